@@ -1,0 +1,39 @@
+# yawbench: every target sets up what it needs.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+SCENARIO ?= scenarios/fnn_sideslip/25mps.yaml
+
+.PHONY: setup fmus demo run test bench lint clean
+
+setup: $(READY)
+
+$(READY): pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet --editable '.[test,lint]'
+	touch $@
+
+fmus: setup
+	$(BIN)/yawbench build
+
+demo: fmus
+	$(BIN)/python -m scenarios.fnn_sideslip.demo
+
+run: fmus
+	$(BIN)/yawbench run $(SCENARIO)
+
+test: fmus
+	$(BIN)/python -m pytest -n auto
+
+bench: fmus
+	$(BIN)/python -m tests.bench
+
+lint: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+clean:
+	rm -rf $(VENV) build results fmus/*.fmu *.egg-info .pytest_cache .ruff_cache .mypy_cache

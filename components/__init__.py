@@ -1,0 +1,1 @@
+"""The units' models: pure physics and control laws behind thin FMI classes."""

@@ -1,0 +1,1 @@
+"""Allocators: from yaw moment to four longitudinal force requests."""

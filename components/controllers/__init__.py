@@ -1,0 +1,1 @@
+"""Controllers: from tracking error to yaw moment."""

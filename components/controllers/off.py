@@ -1,0 +1,15 @@
+"""No control: the yaw moment is always zero, so the car answers as it would by itself."""
+
+from __future__ import annotations
+
+from ..core.component import Component
+
+
+class Off(Component):
+    """No control: zero yaw moment."""
+
+    outputs = ("yaw_moment",)
+    sampled = True
+
+    def output(self, t, u):
+        return (0.0,)

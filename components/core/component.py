@@ -1,0 +1,341 @@
+"""The base class of every FMU.
+
+A component declares parameters, inputs and outputs on its class and overrides up to four methods:
+
+    configure()         values derived from the parameters `self.p`; after every change of them
+    start(t, u)         the state at start time, from the inputs u; may be called repeatedly
+    advance(t, h, u)    the state from t to t + h (t in s, h in s)
+    output(t, u)        all outputs at t in declared order; changes nothing
+
+`u` is the list of all inputs in declared order, `*` expanded to fl, fr, rl, rr. Whatever a
+component stores on `self` in these methods is its state: it is saved and restored with the FMU
+state, bit for bit, without being listed anywhere.
+
+What PythonFMU 0.7.0 makes necessary, and is done here once for all:
+
+* No exception leaves a component. After one, PythonFMU releases the instance twice and the
+  process dies. Every entry point catches everything, logs one sentence (with every `%` doubled:
+  log text is used as a printf format) and the traceback; from then on the instance answers its
+  steps with False.
+* `get_real` and `set_real` look all values up in one list; per-variable getters cost three times
+  as much. All inputs set, or all outputs read, at once is one slice.
+* The resource folder is taken off `sys.path` again, so a process that makes many instances does
+  not search ever more folders.
+"""
+
+from __future__ import annotations
+
+import copy
+import os
+import pickle
+import sys
+import traceback
+from typing import Any, ClassVar
+from xml.etree.ElementTree import Element
+
+from pythonfmu.enums import Fmi2Status
+from pythonfmu.fmi2slave import Fmi2Slave
+
+from . import model_description
+from .roles import ROLES
+from .variables import (
+    NoParameters,
+    Signal,
+    Variable,
+    check_parameter,
+    input_variables,
+    output_variables,
+    parameter_variables,
+)
+
+
+class Component(Fmi2Slave):
+    """A unit of the test bench. The first line of a subclass's docstring describes its FMU."""
+
+    Parameters: ClassVar[type] = NoParameters
+    inputs: ClassVar[tuple[str | Signal, ...]] = ()
+    outputs: ClassVar[tuple[str | Signal, ...]] = ()
+    sampled: ClassVar[bool] = False
+    """True for a unit that samples (controller, allocator): its outputs are discrete."""
+
+    variables: ClassVar[tuple[Variable, ...]] = ()
+    fmu_name: ClassVar[str] = ""
+    """Name of the FMU, `<role>_<file>`."""
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        folder, _, file = cls.__module__.rpartition(".")
+        role = ROLES.get(folder.rpartition(".")[2])
+        cls.fmu_name = f"{role.name}_{file}" if role else file
+        ins = input_variables(cls.inputs)
+        outs = output_variables(cls.outputs, [v.name for v in ins], discrete=cls.sampled)
+        pars = parameter_variables(cls.Parameters)
+        pars.sort(key=lambda v: v.type != "Real")  # stable: all Reals have the lowest references
+        cls.variables = (*ins, *outs, *pars)
+        cls._n_in = len(ins)
+        cls._n_io = len(ins) + len(outs)
+        cls._n_real = sum(v.type == "Real" for v in cls.variables)
+        cls._in_refs = list(range(cls._n_in))
+        cls._out_refs = list(range(cls._n_in, cls._n_io))
+        names = [v.name for v in cls.variables]
+        repeated = {name for name in names if names.count(name) > 1}
+        if repeated:
+            raise TypeError(f"{cls.__name__} declares {', '.join(sorted(repeated))} twice")
+
+    _n_in: ClassVar[int] = 0
+    _n_io: ClassVar[int] = 0
+    _n_real: ClassVar[int] = 0
+    _in_refs: ClassVar[list[int]] = []
+    _out_refs: ClassVar[list[int]] = []
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.modelName = self.fmu_name
+        self.description = (type(self).__doc__ or self.fmu_name).strip().splitlines()[0]
+        resources = self.resources
+        if resources in sys.path:
+            sys.path[:] = [entry for entry in sys.path if entry != resources]
+        self._not_state = frozenset((*self.__dict__, "_not_state"))
+        # Everything below, and whatever the subclass adds, is the FMU state.
+        self._values: list[Any] = [
+            0.0 if v.start is None else float(v.start) for v in self.variables[: self._n_real]
+        ]
+        self._others: list[Any] = [v.start for v in self.variables[self._n_real :]]
+        self._start_time = 0.0
+        self._initializing = True  # until initialization ends, outputs follow inputs at once
+        self._stale = True
+        self._configured = False
+        self._failed = False
+        self.p: Any = None
+
+    # ---- for the subclass -------------------------------------------------------------------
+
+    def configure(self) -> None:
+        """Derive what is needed from the parameters `self.p`."""
+
+    def start(self, t: float, u: list[float]) -> None:
+        """Set the state at start time `t` [s] from the inputs `u`."""
+
+    def advance(self, t: float, h: float, u: list[float]) -> None:
+        """Take the state from `t` to `t + h` [s] with the inputs `u`."""
+
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
+        """Return all outputs at `t` [s], in declared order, without changing anything."""
+        raise NotImplementedError
+
+    def warn(self, message: str) -> None:
+        """Send a warning to the simulation's log."""
+        self.log(message.replace("%", "%%"), Fmi2Status.warning)
+
+    # ---- FMI: life cycle --------------------------------------------------------------------
+
+    def setup_experiment(
+        self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
+    ) -> None:
+        self._start_time = start_time
+        self._stale = True
+
+    def enter_initialization_mode(self) -> None:
+        try:
+            self._refresh()
+        except BaseException:
+            self._fail("initialization failed", self._start_time)
+
+    def exit_initialization_mode(self) -> None:
+        try:
+            if self._stale:
+                self._refresh()
+            self._initializing = False
+        except BaseException:
+            self._fail("initialization failed", self._start_time)
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        if self._failed:
+            return False
+        try:
+            values = self._values
+            n = self._n_in
+            u = values[:n]
+            self.advance(current_time, step_size, u)
+            y = list(map(float, self.output(current_time + step_size, u)))
+            if n + len(y) != self._n_io:
+                raise TypeError(f"output() gave {len(y)} values for {self._n_io - n} outputs")
+            values[n : self._n_io] = y
+            return True
+        except BaseException:
+            self._fail("step failed", current_time)
+            return False
+
+    def _refresh(self) -> None:
+        """Bring parameters, state and outputs up to date with what has been set."""
+        values = self._values
+        n = self._n_in
+        if not self._configured:
+            given = {}
+            for variable, value in zip(
+                self.variables[self._n_io :], values[self._n_io :] + self._others, strict=True
+            ):
+                check_parameter(variable, value)
+                given[variable.name] = value
+            self.p = self.Parameters(**given)
+            self.configure()
+            self._configured = True
+        u = values[:n]
+        self.start(self._start_time, u)
+        y = list(map(float, self.output(self._start_time, u)))
+        if n + len(y) != self._n_io:
+            raise TypeError(f"output() gave {len(y)} values for {self._n_io - n} outputs")
+        values[n : self._n_io] = y
+        self._stale = False
+
+    def _fail(self, what: str, t: float) -> None:
+        """Log the exception being handled, once as a sentence and once in full; stop for good."""
+        self._failed = True
+        try:
+            kind, error, trace = sys.exc_info()
+            home = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+            where = ""
+            for frame in traceback.extract_tb(trace):
+                path = os.path.abspath(frame.filename)
+                if path.startswith(home + os.sep) and frame.name != "_refresh":
+                    relative = path[len(home) + 1 :].replace(os.sep, "/")
+                    where = f" ({relative}:{frame.lineno})"
+            given = ", ".join(
+                f"{v.name} = {x!r}" for v, x in zip(self.variables[: self._n_in], self._values, strict=False)
+            )
+            name = kind.__name__ if kind else "error"
+            text = f"{what} at t = {t:.9g} s: {name}: {error}{where}"
+            if given:
+                text += f"; inputs: {given}"
+            self.log(text.replace("%", "%%"), Fmi2Status.error)
+            full = "".join(traceback.format_exception(kind, error, trace))
+            self.log(full.replace("%", "%%"), Fmi2Status.error, "traceback")
+        except BaseException as e:
+            self.log(f"{what} ({type(e).__name__} while reporting it)", Fmi2Status.error)
+
+    # ---- FMI: values ------------------------------------------------------------------------
+
+    def get_real(self, vrs: list[int]) -> list[float]:
+        try:
+            if self._initializing and self._stale and not self._failed:
+                self._refresh()
+            if vrs == self._out_refs:
+                return self._values[self._n_in : self._n_io]
+            values = self._values
+            return [values[vr] for vr in vrs]
+        except BaseException:
+            self._fail(f"reading Real {vrs} failed", self._start_time)
+            return [float("nan")] * len(vrs)
+
+    def set_real(self, vrs: list[int], values: list[float]) -> None:
+        try:
+            if self._initializing:
+                self._set_before_start(self._values, vrs, values, 0, self._n_real)
+            elif vrs == self._in_refs:
+                self._values[: self._n_in] = values
+            else:
+                stored = self._values
+                for vr, value in zip(vrs, values, strict=True):
+                    if not 0 <= vr < self._n_in:
+                        raise ValueError(f"{self._name_of(vr)} cannot be set after initialization")
+                    stored[vr] = value
+        except BaseException:
+            self._fail(f"setting Real {vrs} failed", self._start_time)
+
+    def _set_before_start(
+        self, store: list[Any], vrs: list[int], values: list[Any], first: int, end: int
+    ) -> None:
+        for vr, value in zip(vrs, values, strict=True):
+            if not first <= vr < end or self._n_in <= vr < self._n_io:
+                raise ValueError(f"{self._name_of(vr)} cannot be set")
+            store[vr - first] = value
+            if vr >= self._n_io:
+                self._configured = False
+        self._stale = True
+
+    def _name_of(self, vr: int) -> str:
+        known = 0 <= vr < len(self.variables)
+        return self.variables[vr].name if known else f"value reference {vr}"
+
+    def _get_other(self, vrs: list[int], kind: str, blank: Any) -> list[Any]:
+        try:
+            for vr in vrs:
+                if not 0 <= vr < len(self.variables) or self.variables[vr].type != kind:
+                    raise TypeError(f"{self._name_of(vr)} is not of type {kind}")
+            return [self._others[vr - self._n_real] for vr in vrs]
+        except BaseException:
+            self._fail(f"reading {kind} {vrs} failed", self._start_time)
+            return [blank] * len(vrs)
+
+    def _set_other(self, vrs: list[int], values: list[Any], kind: str) -> None:
+        try:
+            if not self._initializing:
+                raise ValueError(f"{self._name_of(vrs[0])} cannot be set after initialization")
+            for vr in vrs:
+                if not 0 <= vr < len(self.variables) or self.variables[vr].type != kind:
+                    raise TypeError(f"{self._name_of(vr)} is not of type {kind}")
+            end = len(self.variables)
+            self._set_before_start(self._others, vrs, values, self._n_real, end)
+        except BaseException:
+            self._fail(f"setting {kind} {vrs} failed", self._start_time)
+
+    def get_integer(self, vrs: list[int]) -> list[int]:
+        return self._get_other(vrs, "Integer", 0)
+
+    def get_boolean(self, vrs: list[int]) -> list[bool]:
+        return self._get_other(vrs, "Boolean", False)
+
+    def get_string(self, vrs: list[int]) -> list[str]:
+        return self._get_other(vrs, "String", "")
+
+    def set_integer(self, vrs: list[int], values: list[int]) -> None:
+        self._set_other(vrs, values, "Integer")
+
+    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
+        self._set_other(vrs, [bool(value) for value in values], "Boolean")
+
+    def set_string(self, vrs: list[int], values: list[str]) -> None:
+        self._set_other(vrs, values, "String")
+
+    # ---- FMI: state -------------------------------------------------------------------------
+
+    def _get_fmu_state(self) -> dict[str, Any]:
+        try:
+            kept = {k: v for k, v in self.__dict__.items() if k not in self._not_state}
+            return copy.deepcopy(kept)
+        except BaseException:
+            self._fail("saving the state failed", self._start_time)
+            return {}
+
+    def _set_fmu_state(self, state: dict[str, Any]) -> None:
+        try:
+            if not isinstance(state, dict) or "_values" not in state:
+                raise ValueError("this is no state of this unit")
+            fresh = copy.deepcopy(state)
+            for name in [k for k in self.__dict__ if k not in self._not_state]:
+                del self.__dict__[name]
+            self.__dict__.update(fresh)
+        except BaseException:
+            self._fail("restoring the state failed", self._start_time)
+
+    @staticmethod
+    def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
+        try:
+            return pickle.dumps(state, protocol=4)
+        except BaseException:
+            return b""
+
+    @staticmethod
+    def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
+        try:
+            return pickle.loads(state)
+        except BaseException:
+            return {}
+
+    # ---- FMI: model description -------------------------------------------------------------
+
+    def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
+        """Return the complete model description; `model_options` is not used."""
+        return model_description.to_xml(
+            name=self.fmu_name, description=self.description or "", variables=self.variables
+        )

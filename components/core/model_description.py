@@ -1,0 +1,98 @@
+"""The complete FMI 2.0 model description of a component.
+
+Written here, not by PythonFMU 0.7.0, which leaves out units, limits, dependencies, InitialUnknowns
+and the ability to save the state. The GUID and the date are filled in by the build, which derives
+them from the content.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from xml.etree.ElementTree import Element, SubElement
+
+from .units import UNITS
+from .variables import Variable
+
+LOG_CATEGORIES = {
+    "logStatusWarning": "Messages with the status Warning",
+    "logStatusError": "Messages with the status Error",
+    "traceback": "Full Python traceback of an error",
+    "logAll": "All messages",
+}
+
+
+def to_xml(*, name: str, description: str, variables: Sequence[Variable]) -> Element:
+    """Return the element `fmiModelDescription`; value references are positions in `variables`.
+
+    `InitialUnknowns` carry no list of dependencies, which by FMI 2.0.4, section 2.2.8, means
+    that they depend on all knowns; outputs list exactly the inputs they depend on directly.
+    """
+    root = Element(
+        "fmiModelDescription",
+        fmiVersion="2.0",
+        modelName=name,
+        guid="",
+        description=description,
+        generationTool="yawbench",
+        variableNamingConvention="flat",
+    )
+    used = {v.unit for v in variables if v.unit is not None}
+    if used:
+        definitions = SubElement(root, "UnitDefinitions")
+        for unit in sorted(used):
+            exponents = {base: str(power) for base, power in UNITS[unit].items()}
+            SubElement(SubElement(definitions, "Unit", name=unit), "BaseUnit", exponents)
+    SubElement(
+        root,
+        "CoSimulation",
+        modelIdentifier=name,
+        needsExecutionTool="true",
+        canHandleVariableCommunicationStepSize="true",
+        canInterpolateInputs="false",
+        canBeInstantiatedOnlyOncePerProcess="false",
+        canNotUseMemoryManagementFunctions="true",
+        canGetAndSetFMUstate="true",
+        canSerializeFMUstate="true",
+    )
+    categories = SubElement(root, "LogCategories")
+    for category, text in LOG_CATEGORIES.items():
+        SubElement(categories, "Category", name=category, description=text)
+    SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize="0.001")
+    listed = SubElement(root, "ModelVariables")
+    for reference, variable in enumerate(variables):
+        _scalar_variable(listed, reference, variable)
+    _model_structure(SubElement(root, "ModelStructure"), variables)
+    return root
+
+
+def _scalar_variable(parent: Element, reference: int, v: Variable) -> None:
+    text = v.description
+    if v.choices is not None:
+        text += f" (one of: {', '.join(v.choices)})"
+    attributes = {"name": v.name, "valueReference": str(reference), "description": text}
+    attributes |= {"causality": v.causality, "variability": v.variability}
+    if v.causality != "input":
+        attributes["initial"] = "exact" if v.causality == "parameter" else "calculated"
+    element = SubElement(parent, "ScalarVariable", attributes)
+    typed = SubElement(element, v.type)
+    if v.unit is not None:
+        typed.set("unit", v.unit)
+    for key, limit in (("min", v.minimum), ("max", v.maximum)):
+        if limit is not None:
+            typed.set(key, repr(limit))
+    if v.start is not None:
+        start = str(v.start).lower() if v.type == "Boolean" else str(v.start)
+        typed.set("start", repr(float(v.start)) if v.type == "Real" else start)
+
+
+def _model_structure(parent: Element, variables: Sequence[Variable]) -> None:
+    index = {v.name: i for i, v in enumerate(variables, start=1)}
+    outputs = [v for v in variables if v.causality == "output"]
+    if not outputs:
+        return
+    direct = SubElement(parent, "Outputs")
+    initial = SubElement(parent, "InitialUnknowns")
+    for v in outputs:
+        sources = " ".join(str(index[name]) for name in v.depends_on)
+        SubElement(direct, "Unknown", index=str(index[v.name]), dependencies=sources)
+        SubElement(initial, "Unknown", index=str(index[v.name]))

@@ -1,0 +1,41 @@
+"""The measurement units a variable may carry, with their SI base exponents.
+
+FMI 2.0.4, section 2.2.2: a unit is a product of powers of kg, m, s, A, K, mol, cd and rad.
+The spellings are those of the interface contract; nothing else is accepted, so a typing
+error in a unit is found when the class is read, not when a wire is checked.
+"""
+
+from __future__ import annotations
+
+UNITS: dict[str, dict[str, int]] = {
+    "1": {},
+    "s": {"s": 1},
+    "1/s": {"s": -1},
+    "m": {"m": 1},
+    "1/m": {"m": -1},
+    "m/s": {"m": 1, "s": -1},
+    "m/s2": {"m": 1, "s": -2},
+    "m2": {"m": 2},
+    "m3": {"m": 3},
+    "rad": {"rad": 1},
+    "1/rad": {"rad": -1},
+    "s/rad": {"s": 1, "rad": -1},
+    "rad/s": {"rad": 1, "s": -1},
+    "rad/s2": {"rad": 1, "s": -2},
+    "Hz": {"s": -1},
+    "kg": {"kg": 1},
+    "kg.m2": {"kg": 1, "m": 2},
+    "kg/m3": {"kg": 1, "m": -3},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "N/s": {"kg": 1, "m": 1, "s": -3},
+    "N.m": {"kg": 1, "m": 2, "s": -2},
+    "N.m/s": {"kg": 1, "m": 2, "s": -3},
+    "N/rad": {"kg": 1, "m": 1, "s": -2, "rad": -1},
+    "N/m": {"kg": 1, "s": -2},
+    "N.s/m": {"kg": 1, "s": -1},
+    "N.m/rad": {"kg": 1, "m": 2, "s": -2, "rad": -1},
+    "N.m.s": {"kg": 1, "m": 2, "s": -1},
+    "N.m.s/rad": {"kg": 1, "m": 2, "s": -1, "rad": -1},
+    "Pa": {"kg": 1, "m": -1, "s": -2},
+    "Pa/s": {"kg": 1, "m": -1, "s": -3},
+}

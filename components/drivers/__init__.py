@@ -1,0 +1,1 @@
+"""Drivers: what the person at the wheel does, open or closed loop."""

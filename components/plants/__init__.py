@@ -1,0 +1,1 @@
+"""Plants: the car without its tyres."""

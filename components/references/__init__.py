@@ -1,0 +1,1 @@
+"""References: the motion the driver asks for."""

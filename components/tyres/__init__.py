@@ -1,0 +1,1 @@
+"""Tyres: from slip and load to forces at the contact point."""

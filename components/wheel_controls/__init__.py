@@ -1,0 +1,1 @@
+"""Wheel controls: from force request to torque request."""

@@ -1,0 +1,1 @@
+"""How FMUs are built; the built *.fmu stand beside this file and are not in git."""

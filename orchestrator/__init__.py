@@ -1,0 +1,1 @@
+"""The master and what stands around it; it never imports components."""

@@ -1,0 +1,42 @@
+"""The command `yawbench`: subcommands, exit status, error messages."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+import typer
+
+from .errors import YawbenchError
+
+COMMANDS = ("build", "check", "run", "compare", "plot", "converge")
+"""Each a module of `orchestrator.commands` with a function of the same name."""
+
+
+def _application() -> typer.Typer:
+    app = typer.Typer(
+        name="yawbench",
+        help="A test bench for vehicle yaw-stability control made of FMI units.",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+    )
+    for name in COMMANDS:
+        module = importlib.import_module(f".commands.{name}", __package__)
+        app.command(name)(getattr(module, name))
+    return app
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and exit with 0, 1 (the run failed) or 2 (the input is wrong)."""
+    try:
+        _application()(arguments)
+    except YawbenchError as error:
+        for problem in error.problems:
+            print(problem, file=sys.stderr)
+        sys.exit(error.exit_status)
+
+
+if __name__ == "__main__":
+    main()

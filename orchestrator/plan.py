@@ -1,0 +1,91 @@
+"""The run as plain data: what wiring hands to the master."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Literal
+
+Value = float | int | bool | str
+Algorithm = Literal["jacobi", "gauss_seidel", "extrapolated"]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A scalar variable of an FMU, from its model description."""
+
+    name: str
+    reference: int
+    type: str  # "Real", "Integer", "Boolean", "String" or "Enumeration"
+    causality: str
+    variability: str
+    unit: str | None
+    start: Value | None
+    minimum: float | None
+    maximum: float | None
+    description: str
+    depends_on: tuple[str, ...] | None = None  # of an output: inputs it follows directly
+
+    @property
+    def discrete(self) -> bool:
+        """True for a value that holds between two communication points."""
+        return self.type != "Real" or self.variability != "continuous"
+
+
+@dataclass(frozen=True)
+class Fmu:
+    """An FMU unpacked in the cache."""
+
+    name: str
+    path: Path  # the archive
+    directory: Path  # the unpacked archive
+    sha256: str  # of the archive
+    guid: str
+    model_identifier: str
+    generation_tool: str
+    can_save_state: bool
+    variables: dict[str, Variable]
+
+    def of(self, causality: str) -> list[Variable]:
+        """Return the variables of one causality, in the order of the model description."""
+        return [v for v in self.variables.values() if v.causality == causality]
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One instance of an FMU in a scenario."""
+
+    name: str
+    fmu: Fmu
+    period: int  # in communication steps
+    parameters: dict[str, Value]
+    constants: dict[str, Value]  # inputs that no unit drives
+
+
+@dataclass(frozen=True)
+class Wire:
+    """One scalar connection."""
+
+    source: str  # unit
+    output: str  # variable
+    target: str  # unit
+    input: str  # variable
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Units in evaluation order, wires, and the time grid in integers."""
+
+    units: tuple[Unit, ...]
+    wires: tuple[Wire, ...]
+    record: tuple[tuple[str, str], ...]  # (unit, output) in column order
+    step: Fraction  # communication step size [s]
+    n_steps: int
+    algorithm: Algorithm
+    title: str = ""
+    scenario: dict = field(default_factory=dict)  # as run, for run.json
+
+    def time(self, k: int) -> float:
+        """Return the time [s] of communication point `k`, correctly rounded."""
+        return float(k * self.step)

@@ -1,0 +1,58 @@
+"""A stand that drives one component through its FMI entry points, without an FMU."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from components.core.component import Component
+
+
+class Stand:
+    """One instance of a component class, addressed by variable names.
+
+    >>> stand = Stand(Dugoff, longitudinal_stiffness=4e4)
+    >>> stand.start(slip_angle_fl=0.01)
+    >>> stand.step(0.001, slip_angle_fl=0.02)["tyre_force_y_fl"]
+    """
+
+    def __init__(self, component: type[Component], **parameters: Any) -> None:
+        self.unit = component(instance_name="stand", resources=None)
+        self.reference = {v.name: i for i, v in enumerate(component.variables)}
+        self.type = {v.name: v.type for v in component.variables}
+        self.time = 0.0
+        self.set(**parameters)
+
+    def set(self, **values: Any) -> None:
+        for name, value in values.items():
+            setter = getattr(self.unit, f"set_{self.type[name].lower()}")
+            setter([self.reference[name]], [value])
+        self._check()
+
+    def start(self, **inputs: float) -> dict[str, float]:
+        """Set the inputs, run the initialization and return all outputs."""
+        self.set(**inputs)
+        self.unit.enter_initialization_mode()
+        self.unit.exit_initialization_mode()
+        self._check()
+        return self.outputs()
+
+    def step(self, h: float, **inputs: float) -> dict[str, float]:
+        """Set the inputs, take one step of `h` seconds and return all outputs."""
+        self.set(**inputs)
+        self.unit.do_step(self.time, h)
+        self._check()
+        self.time += h
+        return self.outputs()
+
+    def outputs(self) -> dict[str, float]:
+        names = [v.name for v in self.unit.variables if v.causality == "output"]
+        return dict(zip(names, self.unit.get_real([self.reference[n] for n in names]), strict=True))
+
+    def __getitem__(self, name: str) -> Any:
+        getter = getattr(self.unit, f"get_{self.type[name].lower()}")
+        return getter([self.reference[name]])[0]
+
+    def _check(self) -> None:
+        messages = [m.msg for m in self.unit.log_queue if m.status >= 3]
+        if messages:
+            raise AssertionError("\n".join(messages))
