@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -70,7 +71,7 @@ class Results:
         if not found:
             raise ResultsError(self._unknown(variable, role))
         raise ResultsError(
-            f"{self.folder / RESULTS_FILE}: more than one unit has a variable '{variable}': {', '.join(found)}."
+            f"{self.folder / RESULTS_FILE}: '{variable}' was recorded of more than one unit: {', '.join(found)}."
         )
 
     def units_of_role(self, role: str) -> list[str]:
@@ -99,7 +100,8 @@ def load_results(folder: Path | str) -> Results:
         run = json.loads(run_file.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ResultsError(
-            f"{folder}: no results here ({RUN_FILE} is missing); make them with 'yawbench run SCENARIO --out {folder}'."
+            f"{folder}: no results here, {RUN_FILE} is missing; "
+            f"make them with 'yawbench run SCENARIO --out {folder}'."
         ) from None
     except (OSError, ValueError) as error:
         raise ResultsError(f"{run_file}: cannot be read: {error}") from None
@@ -132,7 +134,7 @@ def _read_columns(path: Path, n: int) -> list[np.ndarray]:
             raise ValueError(f"{table.shape[1]} values in a row for {n} columns")
         return list(np.ascontiguousarray(table.T))
     except ValueError:
-        rows = list(csv.reader(rest.splitlines()))
+        rows = list(csv.reader(io.StringIO(rest, newline="")))
     uneven = [i for i, row in enumerate(rows, start=2) if len(row) != n]
     if uneven:
         raise ValueError(f"line {uneven[0]} has {len(rows[uneven[0] - 2])} values for {n} columns")
