@@ -1,0 +1,291 @@
+"""Mamdani inference: agrees with scikit-fuzzy and with closed forms."""
+
+from __future__ import annotations
+
+import doctest
+import math
+import random
+
+import numpy as np
+import pytest
+from skfuzzy import control, trimf
+
+from components.core import fuzzy
+from components.core.fuzzy import FIVE, SEVEN, Mamdani, Partition, clipped_pair, gaussian_grades
+
+STANDARD_7X7 = """
+    NB NB NB NB NM NS ZO
+    NB NB NB NM NS ZO PS
+    NB NB NM NS ZO PS PM
+    NB NM NS ZO PS PM PB
+    NM NS ZO PS PM PB PB
+    NS ZO PS PM PB PB PB
+    ZO PS PM PB PB PB PB
+"""
+STANDARD_5X5 = """
+    NB NB NB NS Z
+    NB NB NS Z  PS
+    NB NS Z  PS PB
+    NS Z  PS PB PB
+    Z  PS PB PB PB
+"""
+SHARED_5X5 = """
+    SS SS S  S  M
+    S  S  M  M  M
+    S  M  M  B  B
+    S  M  B  B  BB
+    M  M  B  BB BB
+"""  # paper B: one table for two outputs
+THREE_OUTPUTS = """
+    PB/NB/PS  PB/NB/NS  PM/NM/PB  PM/NM/NB  PS/NS/NB  ZO/ZO/NM  ZO/ZO/PS
+    PB/NB/PS  PB/NB/NS  PM/NM/PB  PS/NS/NM  PS/NS/NM  ZO/ZO/NS  NS/ZO/ZO
+    PM/NB/ZO  PM/NM/NS  PM/NS/NM  PS/NS/NM  ZO/ZO/NS  NS/PS/NS  NS/PS/ZO
+    PM/NM/ZO  PM/NM/NS  PS/NS/NS  ZO/ZO/NS  NS/PS/NS  NS/PM/NS  NM/PM/ZO
+    PS/NM/ZO  PS/NS/ZO  ZO/ZO/ZO  NS/PS/ZO  NS/PM/ZO  NM/PM/ZO  NM/PM/ZO
+    PS/ZO/PM  ZO/ZO/PS  NS/PS/PS  NS/PS/PS  NM/PM/PS  NM/PB/PS  NB/PB/PM
+    ZO/ZO/PB  ZO/PS/PM  NM/PS/PM  NM/PM/PS  NM/PM/PS  NB/PB/PS  NB/PB/PB
+"""  # paper C
+
+
+def standard_seven() -> Mamdani:
+    sets = Partition.even(SEVEN)
+    return Mamdani(sets, sets, [sets], STANDARD_7X7)
+
+
+def standard_five() -> Mamdani:
+    sets = Partition.even(FIVE)
+    return Mamdani(sets, sets, [sets], STANDARD_5X5)
+
+
+def paper_b() -> Mamdani:
+    labels = "SS S M B BB"
+    outputs = [Partition.even(labels, 0.0, 3.0), Partition.even(labels, 0.0, 10.0)]
+    return Mamdani(Partition.even(labels, 0.0, 1.0), Partition.even(labels, 0.0, 0.09), outputs, SHARED_5X5)
+
+
+def paper_c() -> Mamdani:
+    sets = Partition.even(SEVEN)
+    return Mamdani(sets, sets, [sets, sets, sets], THREE_OUTPUTS)
+
+
+def uneven() -> Mamdani:
+    output = Partition("low middle high", [0.0, 1.0, 5.0])
+    return Mamdani(
+        Partition("N Z P", [-1.0, 0.2, 1.0]),
+        Partition("N Z P", [-2.0, -1.0, 3.0]),
+        [output],
+        "low low high \n low middle high \n middle high high",
+    )
+
+
+SYSTEMS = [standard_seven, standard_five, paper_b, paper_c, uneven]
+
+
+def scikit_fuzzy_surfaces(system: Mamdani, points: list[tuple[float, float]]) -> np.ndarray:
+    """Evaluate the rules of `system` with scikit-fuzzy: shape (points, outputs)."""
+
+    def variable(kind, name, sets):
+        universe = np.linspace(sets.peaks[0], sets.peaks[-1], 241)
+        made = kind(np.union1d(universe, sets.peaks), name)
+        padded = [sets.peaks[0], *sets.peaks, sets.peaks[-1]]
+        for k, label in enumerate(sets.labels):
+            made[label] = trimf(made.universe, padded[k : k + 3])
+        return made
+
+    x = variable(control.Antecedent, "x", system.rows)
+    y = variable(control.Antecedent, "y", system.columns)
+    outputs = [variable(control.Consequent, f"u{i}", sets) for i, sets in enumerate(system.outputs)]
+    rules = [
+        control.Rule(
+            x[row] & y[column],
+            [u[sets.labels[k]] for u, sets, k in zip(outputs, system.outputs, cell, strict=True)],
+        )
+        for row, line in zip(system.rows.labels, system.rules, strict=True)
+        for column, cell in zip(system.columns.labels, line, strict=True)
+    ]
+    simulation = control.ControlSystemSimulation(control.ControlSystem(rules))
+    surfaces = []
+    for x_value, y_value in points:
+        simulation.input["x"] = min(max(x_value, system.rows.peaks[0]), system.rows.peaks[-1])
+        simulation.input["y"] = min(max(y_value, system.columns.peaks[0]), system.columns.peaks[-1])
+        simulation.compute()
+        surfaces.append([simulation.output[o.label] for o in outputs])
+    return np.array(surfaces)
+
+
+def sample(system: Mamdani, n: int, *, beyond: float = 0.0, seed: int = 1) -> list[tuple[float, float]]:
+    """Random points of the input ranges, widened by the fraction `beyond`."""
+    generator = random.Random(seed)
+
+    def pick(sets):
+        low, high = sets.peaks[0], sets.peaks[-1]
+        margin = beyond * (high - low)
+        return generator.uniform(low - margin, high + margin)
+
+    return [(pick(system.rows), pick(system.columns)) for _ in range(n)]
+
+
+@pytest.mark.filterwarnings("ignore:Passing more than 2 positional:DeprecationWarning")  # in scikit-fuzzy
+@pytest.mark.parametrize("make", SYSTEMS)
+def test_surface_agrees_with_scikit_fuzzy(make):
+    system = make()
+    peaks = [(x, y) for x in system.rows.peaks[::2] for y in system.columns.peaks[::2]]
+    points = sample(system, 40, beyond=0.1) + peaks
+    ours = np.array([system(x, y) for x, y in points])
+    theirs = scikit_fuzzy_surfaces(system, points)
+    ranges = [sets.peaks[-1] - sets.peaks[0] for sets in system.outputs]
+    assert np.max(np.abs(ours - theirs) / ranges) < 1e-3
+
+
+@pytest.mark.parametrize("a", [0.0, 0.2, 0.5, 0.7, 1.0])
+@pytest.mark.parametrize("b", [0.0, 0.1, 0.5, 0.6, 1.0])
+def test_area_and_moment_of_two_clipped_sets_agree_with_quadrature(a, b):
+    t = (np.arange(200_000) + 0.5) / 200_000
+    envelope = np.maximum(np.minimum(a, 1.0 - t), np.minimum(b, t))
+    assert clipped_pair(a, b) == pytest.approx(
+        (
+            envelope.mean(),
+            ((t - 0.5) * envelope).mean(),
+        ),
+        abs=1e-9,
+    )
+
+
+@pytest.mark.parametrize("clip", [0.1, 0.5, 1.0])
+def test_one_clipped_outer_set_has_the_centroid_of_a_right_trapezium(clip):
+    sets = Partition.even(FIVE, 0.0, 4.0)
+    # A half triangle of base 1 cut at the height c: a rectangle 1 - c wide and a triangle.
+    area = clip * (1.0 - clip) + clip**2 / 2.0
+    moment = clip * (1.0 - clip) ** 2 / 2.0 + clip**2 / 2.0 * (1.0 - clip + clip / 3.0)
+    assert sets.centroid([clip, 0, 0, 0, 0]) == pytest.approx(moment / area, abs=1e-14)
+    assert sets.centroid([0, 0, 0, 0, clip]) == pytest.approx(4.0 - moment / area, abs=1e-14)
+
+
+@pytest.mark.parametrize("clip", [0.1, 0.5, 1.0])
+def test_one_clipped_inner_set_has_its_peak_as_centroid(clip):
+    assert Partition.even(FIVE).centroid([0, clip, 0, 0, 0]) == pytest.approx(-0.5, abs=1e-14)
+
+
+def test_outputs_reach_their_range_up_to_a_third_of_the_outermost_spacing():
+    (highest,) = standard_seven()(1.0, 1.0)
+    assert highest == pytest.approx(1.0 - 1.0 / 9.0, abs=1e-14)
+    eps, k_d = paper_b()(1.0, 0.09)
+    assert (eps / 3.0, k_d / 10.0) == pytest.approx((11.0 / 12.0, 11.0 / 12.0), abs=1e-14)
+
+
+def test_outputs_that_share_a_table_are_proportional():
+    system = paper_b()
+    for eps, k_d in (system(x, y) for x, y in sample(system, 50)):
+        assert eps / 3.0 == pytest.approx(k_d / 10.0, abs=1e-14)
+
+
+@pytest.mark.parametrize("make", [standard_seven, standard_five])
+def test_an_antisymmetric_table_gives_an_antisymmetric_surface(make):
+    system = make()
+    for x, y in sample(system, 200, beyond=0.1):
+        assert system(x, y)[0] == pytest.approx(-system(-x, -y)[0], abs=1e-14)
+    assert system(0.0, 0.0) == [0.0]
+
+
+@pytest.mark.parametrize("make", [standard_seven, standard_five])
+def test_a_monotone_table_gives_a_surface_monotone_at_the_peaks(make):
+    system = make()
+    grid = np.array([[system(x, y)[0] for y in system.columns.peaks] for x in system.rows.peaks])
+    assert np.all(np.diff(grid, axis=0) >= -1e-15)
+    assert np.all(np.diff(grid, axis=1) >= -1e-15)
+
+
+@pytest.mark.parametrize("make", [standard_seven, standard_five])
+def test_between_the_peaks_a_monotone_table_dips_by_no_more_than_the_minimum_operator_makes_it(make):
+    # Only along strictly rising rules is min-max-centroid monotone (Van Broekhoven, De Baets,
+    # IEEE Trans. Fuzzy Systems 17(5), 2009); elsewhere clipping moves the outer sets' centroids.
+    system = make()
+    points = np.linspace(-1.0, 1.0, 121)
+    surface = np.array([[system(x, y)[0] for y in points] for x in points])
+    assert np.all(np.diff(surface[60]) > 0.0)
+    dip = np.max(np.maximum.accumulate(surface, axis=1) - surface)
+    assert 0.005 < dip / 2.0 < 0.025
+
+
+@pytest.mark.parametrize("make", SYSTEMS)
+def test_inputs_saturate_at_the_outer_peaks(make):
+    system = make()
+    left, right = system.rows.peaks[0], system.rows.peaks[-1]
+    low, high = system.columns.peaks[0], system.columns.peaks[-1]
+    assert system(left - 3.0, high + 9.0) == system(left, high)
+    assert system(math.inf, -math.inf) == system(right, low)
+
+
+@pytest.mark.parametrize("make", SYSTEMS)
+def test_outputs_stay_inside_their_range_and_are_continuous(make):
+    system = make()
+    for x, y in sample(system, 200, beyond=0.2):
+        here, near = system(x, y), system(x + 1e-9, y - 1e-9)
+        for sets, u, v in zip(system.outputs, here, near, strict=True):
+            assert sets.peaks[0] < u < sets.peaks[-1]
+            assert u == pytest.approx(v, abs=1e-6)
+
+
+@pytest.mark.parametrize("sets", [Partition.even(SEVEN), Partition("a b c", [-3.0, 0.5, 1.0])])
+def test_grades_are_a_partition_of_unity_and_one_at_the_peaks(sets):
+    for x in np.linspace(-4.0, 4.0, 81):
+        grades = sets.grades(float(x))
+        assert sum(grades) == pytest.approx(1.0, abs=1e-15)
+        assert min(grades) >= 0.0
+    for k, peak in enumerate(sets.peaks):
+        assert sets.grades(peak)[k] == 1.0
+
+
+def test_grades_agree_with_scikit_fuzzy():
+    sets = Partition("a b c d", [-2.0, -0.5, 1.0, 3.0])
+    x = np.linspace(-2.0, 3.0, 101)
+    ours = np.array([sets.grades(float(v)) for v in x])
+    padded = [-2.0, *sets.peaks, 3.0]
+    theirs = np.array([trimf(x, padded[k : k + 3]) for k in range(4)]).T
+    assert np.max(np.abs(ours - theirs)) < 1e-14
+
+
+def test_gaussian_grades_are_one_at_the_centre_and_1_over_e_one_width_off():
+    grades = gaussian_grades(0.3, [0.3, 0.1, 0.6], [0.24, 0.2, 0.3])
+    assert grades == pytest.approx([1.0, math.exp(-1.0), math.exp(-1.0)], abs=1e-15)
+
+
+def test_nan_in_gives_nan_out():
+    assert math.isnan(standard_seven()(math.nan, 0.0)[0])
+    assert all(math.isnan(u) for u in paper_c()(0.0, math.nan))
+
+
+def test_the_example_in_the_docstring_is_right():
+    assert doctest.testmod(fuzzy).failed == 0
+
+
+@pytest.mark.parametrize(
+    "table, message",
+    [
+        ("N Z P \n N Z P", "the rule table has 2 rows for 3 sets"),
+        ("N Z P \n N Z \n N Z P", "row Z of the rule table has 2 cells for 3 sets"),
+        (
+            "N Z P \n N Z PB \n N Z P",
+            "row Z, column P of the rule table names the set 'PB'; allowed: N, Z, P",
+        ),
+        ("N Z P \n N Z P \n N/Z Z P", "row P, column N of the rule table has 2 labels for 1 outputs"),
+    ],
+)
+def test_a_wrong_table_is_refused_by_the_name_of_its_cell(table, message):
+    sets = Partition.even("N Z P")
+    with pytest.raises(ValueError, match=message):
+        Mamdani(sets, sets, [sets], table)
+
+
+@pytest.mark.parametrize(
+    "labels, peaks, message",
+    [
+        ("N Z P", [0.0, 1.0], "2 peaks for the 3 sets 'N Z P'"),
+        ("N Z N", [0.0, 1.0, 2.0], "a set is named twice in 'N Z N'"),
+        ("N Z P", [0.0, 1.0, 1.0], "the peaks of 'N Z P' must rise strictly"),
+        ("N P", [0.0, math.nan], "the peaks of 'N P' must rise strictly"),
+    ],
+)
+def test_impossible_sets_are_refused(labels, peaks, message):
+    with pytest.raises(ValueError, match=message):
+        Partition(labels, peaks)
