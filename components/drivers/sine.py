@@ -1,6 +1,6 @@
 """Open-loop sine steering: a number of whole periods, then the wheel is held straight.
 
-    delta(t) = amplitude sin(2 pi frequency (t - start_time)),   start_time <= t <= end
+    delta(t) = amplitude sin(2 pi frequency (t - start_time)),   0 <= frequency (t - start_time) <= periods
 
 Stimuli live in a unit, not in the master, so that they are exact at every instant and not
 quantised to whole communication steps.
@@ -25,6 +25,9 @@ class SineParameters:
     )
     start_time: float = parameter(1.0, "s", "Time of the first zero crossing; chosen: 1 s straight ahead")
     periods: float = parameter(1.0, "1", "Number of periods, then straight ahead; chosen: one", minimum=0.0)
+    constant_drive_force: float = parameter(
+        0.0, "N", "Sum of the longitudinal tyre forces asked for, always; paper A: no driving"
+    )
 
 
 def sine_steer(t: float, p: SineParameters) -> float:
@@ -39,7 +42,8 @@ class Sine(Component):
     """Open-loop sine steering at the road wheels."""
 
     Parameters = SineParameters
-    outputs = ("steer_angle",)
+    outputs = ("steer_angle", "drive_force")
 
     def output(self, t, u):
-        return (sine_steer(t, self.p),)
+        p = self.p
+        return sine_steer(t, p), p.constant_drive_force

@@ -1,0 +1,69 @@
+"""Share the yaw moment among the wheels in fixed parts, by default equally.
+
+    F_i = s_i M_z / arm_i      s_fl = s_l n_l    s_rl = s_l (1 - n_l)       n front shares per side
+                               s_fr = s_r n_r    s_rr = s_r (1 - n_r)       s_l + s_r = 1
+
+so sum(F_i arm_i) = M_z; see `core.moment_sharing` for arms near zero. The driver's force comes on
+top, equal left and right as from one pedal, in fixed parts front and rear.
+
+Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
+FNN, section 3.3: "equal distribution", s_i = 1/4. Ours differs: the shares are parameters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..core.component import Component
+from ..core.moment_sharing import add_drive_force, share_moment
+from ..core.variables import output, parameter
+from ..core.wheel_kinematics import lever_arms
+
+
+@dataclass(frozen=True)
+class FixedShareParameters:
+    """Geometry of the car and the shares."""
+
+    cg_to_front_axle: float = parameter(
+        1.256, "m", "Distance a of the centre of mass from the front axle; paper A, table 1", minimum=0.1
+    )
+    track_width: float = parameter(1.65, "m", "Track width d; paper A, table 1", minimum=0.1)
+    left_share: float = parameter(
+        0.5, "1", "Share s_l of the moment on the left side; paper A: half", minimum=0.0, maximum=1.0
+    )
+    front_share_left: float = parameter(
+        0.5, "1", "Share n_l of the left side's moment in front; paper A: half", minimum=0.0, maximum=1.0
+    )
+    front_share_right: float = parameter(
+        0.5, "1", "Share n_r of the right side's moment in front; paper A: half", minimum=0.0, maximum=1.0
+    )
+    drive_front_share: float = parameter(
+        0.5, "1", "Share of the driver's force in front; chosen: equal motors", minimum=0.0, maximum=1.0
+    )
+
+
+class FixedShare(Component):
+    """Yaw moment shared among the wheels in fixed parts, by default a quarter each."""
+
+    Parameters = FixedShareParameters
+    inputs = ("yaw_moment", "drive_force", "steer_angle")
+    outputs = (output("force_request_*", "yaw_moment", "drive_force", "steer_angle"),)
+    sampled = True
+
+    def configure(self):
+        p = self.p
+        left, right = p.left_share, 1.0 - p.left_share
+        self.shares = (
+            left * p.front_share_left,
+            right * p.front_share_right,
+            left * (1.0 - p.front_share_left),
+            right * (1.0 - p.front_share_right),
+        )
+
+    def output(self, t, u):
+        p = self.p
+        moment, drive, delta = u
+        half_track = 0.5 * p.track_width
+        arms = lever_arms(delta, p.cg_to_front_axle, half_track)
+        forces = share_moment(moment, self.shares, arms, 0.25 * half_track)
+        return forces if drive == 0.0 else add_drive_force(forces, drive, p.drive_front_share)

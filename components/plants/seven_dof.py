@@ -1,0 +1,271 @@
+"""Car with seven degrees of freedom: plane motion of the body, spin of the four wheels.
+
+    m (dv_x/dt - v_y r) = X,    m (dv_y/dt + v_x r) = Y                                     (5), (6)
+    X = (F_xfl + F_xfr) cos(delta) - (F_yfl + F_yfr) sin(delta) + F_xrl + F_xrr
+    Y = (F_xfl + F_xfr) sin(delta) + (F_yfl + F_yfr) cos(delta) + F_yrl + F_yrr
+    I_z dr/dt = a [(F_yfl + F_yfr) cos(delta) + (F_xfl + F_xfr) sin(delta)] - b (F_yrl + F_yrr)
+                + d/2 [(F_yfl - F_yfr) sin(delta) + (F_xfr - F_xfl) cos(delta) + F_xrr - F_xrl]     (7)
+    J dw_i/dt = T_i - F_xi R                                                                (8)
+    F_zf = m g b / 2L - m h a_x / 2L -/+ b m h a_y / (L d)        minus left, plus right   (17)
+    F_zr = m g a / 2L + m h a_x / 2L -/+ a m h a_y / (L d)                                 (18)
+
+with a_x = X / m, a_y = Y / m. A wheel that lifts has no load; the other wheel of its axle then
+carries the axle, so the loads always add up to m g. Roll, pitch and suspension are left out.
+
+Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
+FNN, equations (5)-(8), (13)-(20). Errata: (7) prints the rear-track term with the opposite sign;
+(13)-(16) print sideslip for yaw rate; (17), (18) print b where a is meant.
+
+How it couples. Tyre forces and wheel torques enter the integration only: they are held over the
+step, and a master that knows this hands over their values at its middle. The steer angle feeds
+the slip angles directly, so its value belongs to the end of the step; within the step it goes
+there in a straight line from the last one. The loads follow from the accelerations, these from the
+forces and these from the loads: to leave that loop open, the acceleration of the step, which is
+that of its middle, is carried on to its end along the straight line through the middle of the step
+before (`carry`). All three are exact to second order in the step, which may vary.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import atan2, cos, sin
+
+from ..core.component import Component
+from ..core.integrators import rk4
+from ..core.variables import output, parameter
+from ..core.wheel_kinematics import slip_angle, slip_ratio, wheel_velocities
+
+G = 9.81  # m/s2
+
+Four = tuple[float, float, float, float]
+Motion = tuple[float, ...]  # v_x, v_y [m/s], r [rad/s], x, y [m], psi [rad]
+
+
+@dataclass(frozen=True)
+class SevenDofParameters:
+    """The car of paper A, table 1."""
+
+    mass: float = parameter(1100.0, "kg", "Vehicle mass m; paper A, table 1", minimum=1.0)
+    yaw_inertia: float = parameter(1249.0, "kg.m2", "Yaw inertia I_z; paper A, table 1", minimum=1.0)
+    cg_to_front_axle: float = parameter(
+        1.256, "m", "Distance a of the centre of mass from the front axle; paper A, table 1", minimum=0.1
+    )
+    cg_to_rear_axle: float = parameter(
+        1.368, "m", "Distance b of the centre of mass from the rear axle; paper A, table 1", minimum=0.1
+    )
+    track_width: float = parameter(1.65, "m", "Track width d; paper A, table 1", minimum=0.1)
+    cg_height: float = parameter(
+        0.7, "m", "Height h of the centre of mass; paper A, table 1", minimum=0.0
+    )
+    wheel_radius: float = parameter(0.31, "m", "Wheel radius R; paper A, table 1", minimum=0.05)
+    wheel_inertia: float = parameter(
+        2.1, "kg.m2", "Inertia J of one wheel; chosen: paper B's value, paper A names none", minimum=0.01
+    )
+    initial_speed: float = parameter(25.0, "m/s", "Speed at the start; paper A drives 15, 25, 40 m/s")
+    initial_sideslip: float = parameter(0.0, "rad", "Sideslip angle at the start; chosen: none")
+    initial_yaw_rate: float = parameter(0.0, "rad/s", "Yaw rate at the start; chosen: none")
+    low_speed: float = parameter(
+        0.5,
+        "m/s",
+        "Slips refer to this speed when the wheel is slower; chosen: keeps a parked car quiet at 1 ms",
+        minimum=0.001,
+    )
+
+
+def accelerations(
+    delta: float, forces: Sequence[float], p: SevenDofParameters
+) -> tuple[float, float, float]:
+    """Return (a_x, a_y [m/s2], dr/dt [rad/s2]) of the centre of mass; equations (5)-(7).
+
+    Args:
+        delta: steer angle [rad].
+        forces: F_x of the wheels fl, fr, rl, rr, then F_y, wheel axes [N].
+    """
+    x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr = forces
+    c = cos(delta)
+    s = sin(delta)
+    x = x_fl + x_fr
+    y = y_fl + y_fr
+    front = x * s + y * c
+    rear = y_rl + y_rr
+    turn = (y_fl - y_fr) * s + (x_fr - x_fl) * c + (x_rr - x_rl)
+    moment = p.cg_to_front_axle * front - p.cg_to_rear_axle * rear + 0.5 * p.track_width * turn
+    return (x * c - y * s + (x_rl + x_rr)) / p.mass, (front + rear) / p.mass, moment / p.yaw_inertia
+
+
+def move(
+    motion: Motion,
+    h: float,
+    *,
+    delta: float,
+    delta_end: float,
+    forces: Sequence[float],
+    p: SevenDofParameters,
+) -> Motion:
+    """Return the motion after `h` [s] under forces held in wheel axes [N]; equations (5)-(7).
+
+    The steer angle goes in a straight line from `delta` to `delta_end` [rad].
+    """
+    rate = (delta_end - delta) / h
+
+    def derivatives(t: float, state: Sequence[float]) -> Motion:
+        v_x, v_y, r, _, _, psi = state
+        a_x, a_y, dr = accelerations(delta + rate * t, forces, p)
+        c = cos(psi)
+        s = sin(psi)
+        return a_x + v_y * r, a_y - v_x * r, dr, v_x * c - v_y * s, v_x * s + v_y * c, r
+
+    return rk4(derivatives, 0.0, h, motion)
+
+
+def vertical_loads(a_x: float, a_y: float, p: SevenDofParameters) -> Four:
+    """Return F_z [N] of fl, fr, rl, rr from the accelerations [m/s2]; equations (17), (18)."""
+    a = p.cg_to_front_axle
+    b = p.cg_to_rear_axle
+    weight = p.mass * G
+    lift = p.mass * p.cg_height
+    front = min(max((weight * b - lift * a_x) / (a + b), 0.0), weight)
+    rear = weight - front
+    across = lift * a_y / ((a + b) * p.track_width)
+    front *= 0.5
+    rear *= 0.5
+    front_across = min(max(b * across, -front), front)
+    rear_across = min(max(a * across, -rear), rear)
+    return front - front_across, front + front_across, rear - rear_across, rear + rear_across
+
+
+def carry(middle: float, before: float, ratio: float) -> float:
+    """Return the value at the end of a step from those at its middle and before it.
+
+    `ratio` = h / (h + h_before): the straight line through the middles of two steps, or, with
+    h_before = 0, through the start and the middle of the first step.
+    """
+    return middle + (middle - before) * ratio
+
+
+class SevenDof(Component):
+    """Car with seven degrees of freedom (plane motion, four wheel spins), quasi-static wheel loads."""
+
+    Parameters = SevenDofParameters
+    inputs = ("steer_angle", "tyre_force_x_*", "tyre_force_y_*", "wheel_torque_*")
+    outputs = (
+        "velocity_x",
+        "velocity_y",
+        "yaw_rate",
+        "sideslip",
+        "sideslip_rate",
+        "acceleration_x",
+        "acceleration_y",
+        "position_x",
+        "position_y",
+        "yaw_angle",
+        output("slip_angle_fl", "steer_angle"),
+        output("slip_angle_fr", "steer_angle"),
+        "slip_angle_rl",
+        "slip_angle_rr",
+        output("slip_ratio_fl", "steer_angle"),
+        output("slip_ratio_fr", "steer_angle"),
+        "slip_ratio_rl",
+        "slip_ratio_rr",
+        "vertical_load_*",
+        "wheel_speed_*",
+        output("wheel_velocity_fl", "steer_angle"),
+        output("wheel_velocity_fr", "steer_angle"),
+        "wheel_velocity_rl",
+        "wheel_velocity_rr",
+    )
+
+    def start(self, t, u):
+        p = self.p
+        v_x = p.initial_speed * cos(p.initial_sideslip)
+        v_y = p.initial_speed * sin(p.initial_sideslip)
+        self.motion = (v_x, v_y, p.initial_yaw_rate, 0.0, 0.0, 0.0)
+        self.spin = tuple(v / p.wheel_radius for v in self._wheels(u[0])[:4])  # rolling freely
+        self.steer_angle = u[0]
+        self.middle = self.end = accelerations(u[0], u[1:9], p)[:2]
+        self.last_h = 0.0
+
+    def advance(self, t, h, u):
+        if h <= 0.0:  # nothing moves
+            self.steer_angle = u[0]
+            return
+        p = self.p
+        delta, delta_end = self.steer_angle, u[0]
+        forces = u[1:9]
+        x_fl, x_fr, x_rl, x_rr = u[1:5]
+        t_fl, t_fr, t_rl, t_rr = u[9:13]
+        w_fl, w_fr, w_rl, w_rr = self.spin
+        radius = p.wheel_radius
+        k = h / p.wheel_inertia
+        self.spin = (
+            w_fl + k * (t_fl - radius * x_fl),
+            w_fr + k * (t_fr - radius * x_fr),
+            w_rl + k * (t_rl - radius * x_rl),
+            w_rr + k * (t_rr - radius * x_rr),
+        )
+        self.motion = move(self.motion, h, delta=delta, delta_end=delta_end, forces=forces, p=p)
+        self.steer_angle = delta_end
+        a_x, a_y, _ = accelerations(0.5 * (delta + delta_end), forces, p)
+        before_x, before_y = self.middle
+        ratio = h / (h + self.last_h)
+        self.end = (carry(a_x, before_x, ratio), carry(a_y, before_y, ratio))
+        self.middle = (a_x, a_y)
+        self.last_h = h
+
+    def output(self, t, u):
+        p = self.p
+        low = p.low_speed
+        radius = p.wheel_radius
+        v_x, v_y, r, x, y, psi = self.motion
+        a_x, a_y = self.end
+        w_fl, w_fr, w_rl, w_rr = self.spin
+        v_fl, v_fr, v_rl, v_rr, side_fl, side_fr, side_rl, side_rr = self._wheels(u[0])
+        f_fl, f_fr, f_rl, f_rr = vertical_loads(a_x, a_y, p)
+        turning = (v_x * a_y - v_y * a_x) / max(v_x * v_x + v_y * v_y, low * low)
+        return (
+            v_x,
+            v_y,
+            r,
+            atan2(v_y, v_x),
+            turning - r,
+            a_x,
+            a_y,
+            x,
+            y,
+            psi,
+            slip_angle(v_fl, side_fl, low),
+            slip_angle(v_fr, side_fr, low),
+            slip_angle(v_rl, side_rl, low),
+            slip_angle(v_rr, side_rr, low),
+            slip_ratio(w_fl * radius, v_fl, low),
+            slip_ratio(w_fr * radius, v_fr, low),
+            slip_ratio(w_rl * radius, v_rl, low),
+            slip_ratio(w_rr * radius, v_rr, low),
+            f_fl,
+            f_fr,
+            f_rl,
+            f_rr,
+            w_fl,
+            w_fr,
+            w_rl,
+            w_rr,
+            v_fl,
+            v_fr,
+            v_rl,
+            v_rr,
+        )
+
+    def _wheels(self, delta):
+        """Return the velocities of the wheels [m/s], longitudinal and lateral, at `delta` [rad]."""
+        p = self.p
+        v_x, v_y, r = self.motion[:3]
+        return wheel_velocities(
+            v_x,
+            v_y,
+            r=r,
+            delta=delta,
+            a=p.cg_to_front_axle,
+            b=p.cg_to_rear_axle,
+            half_track=0.5 * p.track_width,
+        )

@@ -1,0 +1,121 @@
+"""Steady state of the linear single-track model: what the driver asks for with the steer angle.
+
+    K        = m / L^2 (b / C_f - a / C_r)                                  stability factor
+    r_ref    = v_x / (L (1 + K v_x^2)) delta,                 |r_ref| <= mu g / |v_x|               (3)
+    beta_1   = (b - m a v_x^2 / (C_r L)) / (L (1 + K v_x^2)) delta                                  (4)
+    beta_ref = beta_1,   |beta_ref| <= min(|mu g (b / v_x^2 - m a / (C_r L))|, beta_max)
+
+with positive axle stiffnesses C_f, C_r. `friction_share` is the share of mu that the limits use.
+The rates are backward differences over the unit's own step, zero at the start.
+
+beta_1 / delta crosses zero at v_x^2 = b C_r L / (m a) (16 m/s for the car of paper A), and so does
+its limit. An oversteering car (K < 0) has no steady state from v_x^2 = -1 / K on: there
+1 + K v_x^2 is held at `SMALLEST` and the limits, if on, take over.
+
+Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
+FNN, equations (1)-(4). Errata: (3), (4) mix both sign conventions of cornering stiffness; (2)
+lacks r in m (dv_y/dt + v_x r). Ours differs: |v_x|, so that a car rolling backwards has its own
+steady state; beta_max, which the paper leaves open.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..core.component import Component
+from ..core.variables import output, parameter, signal
+
+G = 9.81  # m/s2
+SMALLEST = 1e-3
+
+
+@dataclass(frozen=True)
+class SteadyStateParameters:
+    """Of the single-track model and of its limits."""
+
+    mass: float = parameter(1100.0, "kg", "Vehicle mass m; paper A, table 1", minimum=1.0)
+    cg_to_front_axle: float = parameter(
+        1.256, "m", "Distance a of the centre of mass from the front axle; paper A, table 1", minimum=0.1
+    )
+    cg_to_rear_axle: float = parameter(
+        1.368, "m", "Distance b of the centre of mass from the rear axle; paper A, table 1", minimum=0.1
+    )
+    cornering_stiffness_front: float = parameter(
+        100000.0, "N/rad", "Cornering stiffness C_f of the front axle; paper A, table 1, two tyres", minimum=1.0
+    )
+    cornering_stiffness_rear: float = parameter(
+        100000.0, "N/rad", "Cornering stiffness C_r of the rear axle; paper A, table 1, two tyres", minimum=1.0
+    )
+    limited: bool = parameter(True, None, "Limit the references to what the road's friction allows; paper A")
+    friction_share: float = parameter(
+        1.0, "1", "Share of the friction that the limits use; paper A: all of it", minimum=0.0
+    )
+    sideslip_limit: float = parameter(
+        0.1, "rad", "Largest reference sideslip beta_max; chosen: 6 degrees, the paper names none", minimum=0.0
+    )
+
+
+def stability_factor(p: SteadyStateParameters) -> float:
+    """Return K [s2/m2], positive for an understeering car."""
+    a = p.cg_to_front_axle
+    b = p.cg_to_rear_axle
+    wheelbase = a + b
+    return p.mass / wheelbase**2 * (b / p.cornering_stiffness_front - a / p.cornering_stiffness_rear)
+
+
+def steady_state(
+    delta: float, v_x: float, *, mu: float, k: float, p: SteadyStateParameters
+) -> tuple[float, float]:
+    """Return (r_ref [rad/s], beta_ref [rad]); equations (3), (4), limited if `p.limited`.
+
+    Args:
+        delta: steer angle [rad].
+        v_x: longitudinal velocity [m/s]; at zero there is no yaw rate.
+        mu: friction coefficient [1].
+        k: stability factor [s2/m2].
+    """
+    a = p.cg_to_front_axle
+    b = p.cg_to_rear_axle
+    wheelbase = a + b
+    square = v_x * v_x
+    per_rad = delta / (wheelbase * max(1.0 + k * square, SMALLEST))
+    slope = p.mass * a / (p.cornering_stiffness_rear * wheelbase)
+    r = v_x * per_rad
+    beta = (b - slope * square) * per_rad
+    if not p.limited:
+        return r, beta
+    grip = max(mu, 0.0) * p.friction_share * G
+    if abs(r * v_x) > grip:
+        r = grip / v_x if r * v_x > 0.0 else -grip / v_x
+    bound = p.sideslip_limit
+    if abs(grip * (b - slope * square)) < bound * square:
+        bound = abs(grip * (b / square - slope))
+    return r, min(max(beta, -bound), bound)
+
+
+class SteadyState(Component):
+    """Reference from the steady state of the linear single-track model, limited by friction."""
+
+    Parameters = SteadyStateParameters
+    inputs = ("steer_angle", "velocity_x", signal("friction", start=1.0))
+    outputs = (
+        output("yaw_rate_ref", "steer_angle", "velocity_x", "friction"),
+        output("sideslip_ref", "steer_angle", "velocity_x", "friction"),
+        output("yaw_acceleration_ref", "steer_angle", "velocity_x", "friction"),
+        output("sideslip_rate_ref", "steer_angle", "velocity_x", "friction"),
+    )
+
+    def configure(self):
+        self.k = stability_factor(self.p)
+
+    def start(self, t, u):
+        self.now = steady_state(u[0], u[1], mu=u[2], k=self.k, p=self.p)
+        self.rates = (0.0, 0.0)
+
+    def advance(self, t, h, u):
+        r_before, beta_before = self.now
+        r, beta = self.now = steady_state(u[0], u[1], mu=u[2], k=self.k, p=self.p)
+        self.rates = ((r - r_before) / h, (beta - beta_before) / h) if h > 0.0 else (0.0, 0.0)
+
+    def output(self, t, u):
+        return self.now + self.rates

@@ -1,0 +1,88 @@
+"""Dugoff's tyre: combined slip with a friction limit, from two stiffnesses.
+
+    F_x = C_x kappa / (1 + kappa) f(s)          F_y = -C_y tan(alpha) / (1 + kappa) f(s)     (9), (10)
+    f(s) = s (2 - s) for s < 1, else 1                                                   (11)
+    s = mu F_z (1 + kappa) / (2 sqrt((C_x kappa)^2 + (C_y tan(alpha))^2))                (12)
+
+Evaluated without the poles at kappa = -1 and |alpha| = 90 degrees: with g = 1 + kappa,
+c = |cos(alpha)|, q_x = C_x kappa c, q_y = -C_y sin(alpha), n = sqrt(q_x^2 + q_y^2),
+
+    s = mu F_z g c / 2n;    s < 1:  F = mu F_z (1 - s/2) q / n;    else:  F = q / (g c)
+
+so a locked or sideways sliding wheel has exactly mu F_z against its sliding, and a wheel that turns
+against its travel (kappa < -1) slides like a locked one. c is positive also for a wheel that rolls
+backwards, |alpha| > 90 degrees.
+
+Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
+FNN, equations (9)-(12); H. Dugoff, P. S. Fancher, L. Segel, SAE 700377, 1970. Erratum: (10)
+prints cos(alpha) for tan(alpha); slip is positive when driving, as (9) needs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, sin, sqrt
+
+from ..core.component import Component
+from ..core.variables import output, parameter
+
+
+@dataclass(frozen=True)
+class DugoffParameters:
+    """Of one tyre; all four are equal."""
+
+    longitudinal_stiffness: float = parameter(
+        40000.0, "N", "Longitudinal stiffness C_x of one tyre per unit slip; paper A, table 1", minimum=1.0
+    )
+    cornering_stiffness: float = parameter(
+        50000.0, "N/rad", "Cornering stiffness C_y of one tyre; paper A, table 1", minimum=1.0
+    )
+
+
+def dugoff(
+    alpha: float, kappa: float, *, f_z: float, mu: float, c_x: float, c_y: float
+) -> tuple[float, float]:
+    """Return (F_x, F_y) [N] in wheel axes; equations (9)-(12), finite for every slip.
+
+    Args:
+        alpha, kappa: slip angle [rad] and longitudinal slip [1].
+        f_z, mu: vertical load [N] and friction coefficient [1]; no force unless both are positive.
+        c_x, c_y: stiffnesses [N], [N/rad], positive.
+    """
+    if f_z <= 0.0 or mu <= 0.0:
+        return 0.0, 0.0
+    grip = mu * f_z
+    c = abs(cos(alpha))
+    q_x = c_x * kappa * c
+    q_y = -c_y * sin(alpha)
+    n = sqrt(q_x * q_x + q_y * q_y)
+    rolling = (1.0 + kappa) * c
+    if rolling <= 0.0:
+        s = 0.0
+    else:
+        s = 0.5 * grip * rolling
+        if not s < n:
+            return q_x / rolling, q_y / rolling
+        s /= n
+    scale = grip * (1.0 - 0.5 * s) / n
+    return scale * q_x, scale * q_y
+
+
+class Dugoff(Component):
+    """Dugoff tyres on four wheels: combined slip, friction per wheel."""
+
+    Parameters = DugoffParameters
+    inputs = ("slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*")
+    outputs = (
+        output("tyre_force_x_*", "slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*"),
+        output("tyre_force_y_*", "slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*"),
+    )
+
+    def output(self, t, u):
+        c_x = self.p.longitudinal_stiffness
+        c_y = self.p.cornering_stiffness
+        x_fl, y_fl = dugoff(u[0], u[4], f_z=u[8], mu=u[12], c_x=c_x, c_y=c_y)
+        x_fr, y_fr = dugoff(u[1], u[5], f_z=u[9], mu=u[13], c_x=c_x, c_y=c_y)
+        x_rl, y_rl = dugoff(u[2], u[6], f_z=u[10], mu=u[14], c_x=c_x, c_y=c_y)
+        x_rr, y_rr = dugoff(u[3], u[7], f_z=u[11], mu=u[15], c_x=c_x, c_y=c_y)
+        return x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr

@@ -1,0 +1,44 @@
+"""The torque that gives the requested force while the wheel's speed does not change.
+
+    T_i = F_i R,    |T_i| <= T_max
+
+Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
+FNN, section 3.3. Ours differs: the motor's limit, which the paper leaves open.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..core.component import Component
+from ..core.variables import output, parameter
+
+
+@dataclass(frozen=True)
+class DirectParameters:
+    """Of the wheel and its motor."""
+
+    wheel_radius: float = parameter(0.31, "m", "Wheel radius R; paper A, table 1", minimum=0.05)
+    torque_limit: float = parameter(
+        400.0, "N.m", "Largest torque T_max of a wheel; chosen: in-wheel motor of this class", minimum=0.0
+    )
+
+
+def limited_torque(force: float, radius: float, limit: float) -> float:
+    """Return the wheel torque [N.m] for a force [N] at the wheel radius [m], within +-limit [N.m]."""
+    torque = force * radius
+    return limit if torque > limit else -limit if torque < -limit else torque
+
+
+class Direct(Component):
+    """Wheel torque from requested force times wheel radius, limited."""
+
+    Parameters = DirectParameters
+    inputs = ("force_request_*",)
+    outputs = (output("torque_request_*", "force_request_*"),)
+    sampled = True
+
+    def output(self, t, u):
+        radius = self.p.wheel_radius
+        limit = self.p.torque_limit
+        return [limited_torque(force, radius, limit) for force in u]
