@@ -25,12 +25,18 @@ class Variable:
     minimum: float | None
     maximum: float | None
     description: str
-    depends_on: tuple[str, ...] | None = None  # of an output: inputs it follows directly
+    depends_on: tuple[str, ...] | None = None  # of an output: inputs it follows directly; None: not said
+    choices: tuple[str, ...] | None = None  # of a String: allowed values, if the description lists them
+    items: dict[str, int] | None = None  # of an Enumeration: name -> value
 
     @property
     def discrete(self) -> bool:
         """True for a value that holds between two communication points."""
         return self.type != "Real" or self.variability != "continuous"
+
+    def follows(self, input_name: str) -> bool:
+        """Return whether this output may follow the input at the same instant."""
+        return self.depends_on is None or input_name in self.depends_on
 
 
 @dataclass(frozen=True)
@@ -46,6 +52,10 @@ class Fmu:
     generation_tool: str
     can_save_state: bool
     variables: dict[str, Variable]
+    description: str = ""
+    once_per_process: bool = False
+    python_modules: dict[str, str] = field(default_factory=dict)
+    """Of a PythonFMU unit: top-level module in resources/ -> hash of its content."""
 
     def of(self, causality: str) -> list[Variable]:
         """Return the variables of one causality, in the order of the model description."""
@@ -85,6 +95,7 @@ class Plan:
     algorithm: Algorithm
     title: str = ""
     scenario: dict = field(default_factory=dict)  # as run, for run.json
+    notes: tuple[str, ...] = ()  # worth telling the user, but no error
 
     def time(self, k: int) -> float:
         """Return the time [s] of communication point `k`, correctly rounded."""
