@@ -14,11 +14,14 @@ state, bit for bit, without being listed anywhere.
 What PythonFMU 0.7.0 makes necessary, and is done here once for all:
 
 * No exception leaves a component. After one, PythonFMU releases the instance twice and the
-  process dies. Every entry point catches everything, logs one sentence (with every `%` doubled:
-  log text is used as a printf format) and the traceback; from then on the instance answers its
-  steps with False.
+  process dies. Every entry point catches everything, logs one sentence and the traceback; from
+  then on the instance answers its steps with False.
+* Log text is used as a printf format and as UTF-8, so `%` is doubled and what cannot be encoded
+  is escaped.
 * `get_real` and `set_real` look all values up in one list; per-variable getters cost three times
   as much. All inputs set, or all outputs read, at once is one slice.
+* Until initialization ends, state and outputs are computed when somebody asks for them, so inputs
+  may be set in any order before that.
 * The resource folder is taken off `sys.path` again, so a process that makes many instances does
   not search ever more folders.
 """
@@ -48,6 +51,14 @@ from .variables import (
     parameter_variables,
 )
 
+_CATEGORY = {
+    Fmi2Status.ok: "logAll",
+    Fmi2Status.warning: "logStatusWarning",
+    Fmi2Status.discard: "logAll",
+    Fmi2Status.error: "logStatusError",
+    Fmi2Status.fatal: "logStatusFatal",
+}
+
 
 class Component(Fmi2Slave):
     """A unit of the test bench. The first line of a subclass's docstring describes its FMU."""
@@ -60,13 +71,14 @@ class Component(Fmi2Slave):
 
     variables: ClassVar[tuple[Variable, ...]] = ()
     fmu_name: ClassVar[str] = ""
-    """Name of the FMU, `<role>_<file>`."""
+    """Name of the FMU: `<role>_<file>`, unless the class itself says otherwise."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         folder, _, file = cls.__module__.rpartition(".")
         role = ROLES.get(folder.rpartition(".")[2])
-        cls.fmu_name = f"{role.name}_{file}" if role else file
+        if "fmu_name" not in cls.__dict__:
+            cls.fmu_name = f"{role.name}_{file}" if role else file
         ins = input_variables(cls.inputs)
         outs = output_variables(cls.outputs, [v.name for v in ins], discrete=cls.sampled)
         pars = parameter_variables(cls.Parameters)
@@ -125,7 +137,18 @@ class Component(Fmi2Slave):
 
     def warn(self, message: str) -> None:
         """Send a warning to the simulation's log."""
-        self.log(message.replace("%", "%%"), Fmi2Status.warning)
+        self.log(message, Fmi2Status.warning)
+
+    def log(
+        self,
+        msg: str,
+        status: Fmi2Status = Fmi2Status.ok,
+        category: str | None = None,
+        debug: object = None,
+    ) -> None:
+        """Send `msg` to the simulation's log, safe for a host that prints it with printf."""
+        text = str(msg).replace("\0", "\\0").encode("utf-8", "backslashreplace").decode()
+        super().log(text.replace("%", "%%"), Fmi2Status(status), category or _CATEGORY[status])
 
     # ---- FMI: life cycle --------------------------------------------------------------------
 
@@ -137,7 +160,7 @@ class Component(Fmi2Slave):
 
     def enter_initialization_mode(self) -> None:
         try:
-            self._refresh()
+            self._configure()
         except BaseException:
             self._fail("initialization failed", self._start_time)
 
@@ -166,20 +189,25 @@ class Component(Fmi2Slave):
             self._fail("step failed", current_time)
             return False
 
+    def _configure(self) -> None:
+        """Bring the parameters up to date with what has been set."""
+        if self._configured:
+            return
+        given = {}
+        for variable, value in zip(
+            self.variables[self._n_io :], self._values[self._n_io :] + self._others, strict=True
+        ):
+            check_parameter(variable, value)
+            given[variable.name] = value
+        self.p = self.Parameters(**given)
+        self.configure()
+        self._configured = True
+
     def _refresh(self) -> None:
         """Bring parameters, state and outputs up to date with what has been set."""
+        self._configure()
         values = self._values
         n = self._n_in
-        if not self._configured:
-            given = {}
-            for variable, value in zip(
-                self.variables[self._n_io :], values[self._n_io :] + self._others, strict=True
-            ):
-                check_parameter(variable, value)
-                given[variable.name] = value
-            self.p = self.Parameters(**given)
-            self.configure()
-            self._configured = True
         u = values[:n]
         self.start(self._start_time, u)
         y = list(map(float, self.output(self._start_time, u)))
@@ -193,11 +221,13 @@ class Component(Fmi2Slave):
         self._failed = True
         try:
             kind, error, trace = sys.exc_info()
-            home = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+            core = os.path.dirname(os.path.abspath(__file__))
+            home = os.path.dirname(core)
+            machinery = [os.path.join(core, name) for name in ("component.py", "variables.py")]
             where = ""
             for frame in traceback.extract_tb(trace):
                 path = os.path.abspath(frame.filename)
-                if path.startswith(home + os.sep) and frame.name != "_refresh":
+                if path.startswith(home + os.sep) and path not in machinery:
                     relative = path[len(home) + 1 :].replace(os.sep, "/")
                     where = f" ({relative}:{frame.lineno})"
             given = ", ".join(
@@ -207,20 +237,26 @@ class Component(Fmi2Slave):
             text = f"{what} at t = {t:.9g} s: {name}: {error}{where}"
             if given:
                 text += f"; inputs: {given}"
-            self.log(text.replace("%", "%%"), Fmi2Status.error)
+            self.log(text, Fmi2Status.error)
             full = "".join(traceback.format_exception(kind, error, trace))
-            self.log(full.replace("%", "%%"), Fmi2Status.error, "traceback")
+            self.log(full, Fmi2Status.error, "traceback")
         except BaseException as e:
             self.log(f"{what} ({type(e).__name__} while reporting it)", Fmi2Status.error)
 
     # ---- FMI: values ------------------------------------------------------------------------
 
     def get_real(self, vrs: list[int]) -> list[float]:
+        if self._stale and self._initializing and not self._failed:
+            try:
+                if any(self._n_in <= vr < self._n_io for vr in vrs):
+                    self._refresh()
+            except BaseException:
+                self._fail("initialization failed", self._start_time)
         try:
-            if self._initializing and self._stale and not self._failed:
-                self._refresh()
             if vrs == self._out_refs:
                 return self._values[self._n_in : self._n_io]
+            if vrs and min(vrs) < 0:
+                raise IndexError("value reference out of range")
             values = self._values
             return [values[vr] for vr in vrs]
         except BaseException:
@@ -295,7 +331,7 @@ class Component(Fmi2Slave):
         self._set_other(vrs, [bool(value) for value in values], "Boolean")
 
     def set_string(self, vrs: list[int], values: list[str]) -> None:
-        self._set_other(vrs, values, "String")
+        self._set_other(vrs, ["" if value is None else value for value in values], "String")
 
     # ---- FMI: state -------------------------------------------------------------------------
 

@@ -16,6 +16,7 @@ from .variables import Variable
 LOG_CATEGORIES = {
     "logStatusWarning": "Messages with the status Warning",
     "logStatusError": "Messages with the status Error",
+    "logStatusFatal": "Messages with the status Fatal",
     "traceback": "Full Python traceback of an error",
     "logAll": "All messages",
 }
