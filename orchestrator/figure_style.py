@@ -1,0 +1,65 @@
+"""The look of all figures: colours that differ for every eye and in grey print, fonts, files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LINES: tuple[dict[str, Any], ...] = (
+    {"color": "#0072B2", "linestyle": "-", "linewidth": 1.6},
+    {"color": "#D55E00", "linestyle": (0, (5, 1.6)), "linewidth": 1.6},
+    {"color": "#111111", "linestyle": (0, (6, 1.5, 1.2, 1.5)), "linewidth": 1.3},
+    {"color": "#009E73", "linestyle": (0, (1.2, 1.2)), "linewidth": 1.9},
+    {"color": "#CC79A7", "linestyle": (0, (9, 2)), "linewidth": 1.6},
+    {"color": "#56B4E9", "linestyle": (0, (3, 1, 1, 1, 1, 1)), "linewidth": 1.6},
+    {"color": "#E69F00", "linestyle": "-", "linewidth": 1.1},
+)
+"""One style per run: Okabe and Ito's colours, and a dash pattern that survives grey print."""
+
+REFERENCE: dict[str, Any] = {"color": "#B8B8B8", "linestyle": "-", "linewidth": 5.0, "solid_capstyle": "butt"}
+"""A wide pale line below the others: a run that follows its reference runs in its middle."""
+
+RC: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "axes.grid": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#666666",
+    "axes.formatter.useoffset": False,
+    "grid.color": "#E3E3E3",
+    "grid.linewidth": 0.7,
+    "xtick.color": "#444444",
+    "ytick.color": "#444444",
+    "legend.frameon": False,
+    "legend.handlelength": 3.2,
+    "lines.dash_capstyle": "butt",
+    "path.simplify_threshold": 0.2,
+    "svg.hashsalt": "yawbench",
+    "svg.fonttype": "path",
+    "savefig.dpi": 150,
+}
+QUIET = "#666666"
+"""The colour of what may be overlooked: provenance, guides."""
+
+
+def line_style(number: int) -> dict[str, Any]:
+    """Return the style of the run of that number, counted from 0; they repeat after the last."""
+    return dict(LINES[number % len(LINES)])
+
+
+def save(figure: Figure, stem: Path) -> list[Path]:
+    """Write `stem.svg` and `stem.png` and return both paths; equal figures give equal files."""
+    stem.parent.mkdir(parents=True, exist_ok=True)
+    paths = [stem.with_name(f"{stem.name}.{kind}") for kind in ("svg", "png")]
+    import matplotlib
+
+    with matplotlib.rc_context(RC):
+        figure.savefig(paths[0], metadata={"Date": None})
+        figure.savefig(paths[1], metadata={"Software": None})
+    return paths

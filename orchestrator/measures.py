@@ -1,0 +1,178 @@
+"""The table of measures: a number for a signal, or for a signal and its reference.
+
+All functions take time `t` [s] and samples of equal shape (n,), n >= 2, in SI units, and give SI
+units. Integrals are taken by the trapezoidal rule, so uneven samples are right too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+SETTLING_BAND = 0.05
+"""Half-width of the band a settled signal stays in, relative to the reference's peak."""
+
+
+def integral(t: np.ndarray, x: np.ndarray) -> float:
+    """Return the integral of x over t."""
+    return float(np.sum(np.diff(t) * (x[1:] + x[:-1])) / 2)
+
+
+def mean_error(t: np.ndarray, x: np.ndarray, x_ref: np.ndarray) -> float:
+    """Return the mean absolute error over time."""
+    return integral(t, np.abs(x - x_ref)) / float(t[-1] - t[0])
+
+
+def rms_error(t: np.ndarray, x: np.ndarray, x_ref: np.ndarray) -> float:
+    """Return the root of the mean squared error over time."""
+    return math.sqrt(integral(t, (x - x_ref) ** 2) / float(t[-1] - t[0]))
+
+
+def peak_error(t: np.ndarray, x: np.ndarray, x_ref: np.ndarray) -> float:
+    """Return the largest absolute error."""
+    return float(np.max(np.abs(x - x_ref)))
+
+
+def _by_reference_peak(value: float, x_ref: np.ndarray) -> float:
+    largest = float(np.max(np.abs(x_ref)))
+    return value / largest if largest > 0 else math.nan
+
+
+def relative_peak_error(t: np.ndarray, x: np.ndarray, x_ref: np.ndarray) -> float:
+    """Return the largest absolute error over the reference's peak; NaN for a reference of zero."""
+    return _by_reference_peak(peak_error(t, x, x_ref), x_ref)
+
+
+def relative_rms_error(t: np.ndarray, x: np.ndarray, x_ref: np.ndarray) -> float:
+    """Return the RMS error over the reference's peak; NaN for a reference of zero."""
+    return _by_reference_peak(rms_error(t, x, x_ref), x_ref)
+
+
+def relative_mean_error(t: np.ndarray, x: np.ndarray, x_ref: np.ndarray) -> float:
+    """Return the mean absolute error over the reference's peak; NaN for a reference of zero."""
+    return _by_reference_peak(mean_error(t, x, x_ref), x_ref)
+
+
+def overshoot(t: np.ndarray, x: np.ndarray, x_ref: np.ndarray) -> float:
+    """Return how far the signal's peak exceeds the reference's, relative to it; 0 if it does not."""
+    return max(0.0, _by_reference_peak(peak(t, x), x_ref) - 1.0) if np.any(x_ref) else math.nan
+
+
+def settling_time(t: np.ndarray, x: np.ndarray, x_ref: np.ndarray) -> float:
+    """Return the time from t[0] after which the error stays in the settling band; inf if it does not."""
+    band = SETTLING_BAND * float(np.max(np.abs(x_ref)))
+    if band == 0:
+        return math.nan
+    outside = np.flatnonzero(np.abs(x - x_ref) > band)
+    if outside.size == 0:
+        return 0.0
+    last = int(outside[-1])
+    return math.inf if last == t.size - 1 else float(t[last + 1] - t[0])
+
+
+def peak(t: np.ndarray, x: np.ndarray) -> float:
+    """Return the largest absolute value."""
+    return float(np.max(np.abs(x)))
+
+
+def displacement(t: np.ndarray, x: np.ndarray) -> float:
+    """Return the largest distance from the first value."""
+    return float(np.max(np.abs(x - x[0])))
+
+
+def final(t: np.ndarray, x: np.ndarray) -> float:
+    """Return the last value."""
+    return float(x[-1])
+
+
+def effort(t: np.ndarray, x: np.ndarray) -> float:
+    """Return the integral of the absolute value."""
+    return integral(t, np.abs(x))
+
+
+def total_variation(t: np.ndarray, x: np.ndarray) -> float:
+    """Return the sum of the absolute changes from sample to sample."""
+    return float(np.sum(np.abs(np.diff(x))))
+
+
+def total_variation_rate(t: np.ndarray, x: np.ndarray) -> float:
+    """Return the total variation per second: the measure of chatter."""
+    return total_variation(t, x) / float(t[-1] - t[0])
+
+
+def slope_variation_rate(t: np.ndarray, x: np.ndarray) -> float:
+    """Return the total variation per second of the difference quotient dx/dt."""
+    return float(np.sum(np.abs(np.diff(np.diff(x) / np.diff(t))))) / float(t[-1] - t[0])
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A row of the table of measures."""
+
+    function: Callable[..., float]
+    formula: str  # x the signal, x_ref its reference, T the duration
+    definition: str
+    unit: str  # "{x}" the signal's, "{x}/s" per second, "%" a ratio shown in per cent, or a unit
+    needs_reference: bool = False
+
+
+MEASURES: dict[str, Measure] = {
+    "mean_error": Measure(mean_error, "1/T ∫|{x} - {x_ref}| dt", "mean absolute tracking error", "{x}", True),
+    "rms_error": Measure(
+        rms_error, "√(1/T ∫({x} - {x_ref})² dt)", "root mean square tracking error", "{x}", True
+    ),
+    "peak_error": Measure(peak_error, "max|{x} - {x_ref}|", "largest tracking error", "{x}", True),
+    "relative_mean_error": Measure(
+        relative_mean_error,
+        "1/T ∫|{x} - {x_ref}| dt / max|{x_ref}|",
+        "mean absolute tracking error over the reference's peak",
+        "%",
+        True,
+    ),
+    "relative_rms_error": Measure(
+        relative_rms_error,
+        "√(1/T ∫({x} - {x_ref})² dt) / max|{x_ref}|",
+        "root mean square tracking error over the reference's peak",
+        "%",
+        True,
+    ),
+    "relative_peak_error": Measure(
+        relative_peak_error,
+        "max|{x} - {x_ref}| / max|{x_ref}|",
+        "largest tracking error over the reference's peak",
+        "%",
+        True,
+    ),
+    "overshoot": Measure(
+        overshoot, "max|{x}| / max|{x_ref}| - 1", "excess of the peak over the reference's peak", "%", True
+    ),
+    "settling_time": Measure(
+        settling_time,
+        "t: |{x} - {x_ref}| ≤ 5 % max|{x_ref}| from then on",
+        "time from the start after which the error stays within 5 % of the reference's peak",
+        "s",
+        True,
+    ),
+    "peak": Measure(peak, "max|{x}|", "largest absolute value", "{x}"),
+    "displacement": Measure(
+        displacement, "max|{x} - {x}(0)|", "largest distance from the first value", "{x}"
+    ),
+    "final": Measure(final, "{x}(T)", "last value", "{x}"),
+    "effort": Measure(effort, "∫|{x}| dt", "control effort: integral of the absolute value", "{x}.s"),
+    "total_variation": Measure(
+        total_variation, "Σ|Δ{x}|", "total variation: sum of the absolute changes", "{x}"
+    ),
+    "total_variation_rate": Measure(
+        total_variation_rate, "Σ|Δ{x}| / T", "chatter: total variation per second", "{x}/s"
+    ),
+    "slope_variation_rate": Measure(
+        slope_variation_rate,
+        "Σ|Δ(d{x}/dt)| / T",
+        "chatter of the rate: total variation per second of dx/dt",
+        "{x}/s2",
+    ),
+}
+"""All measures, the one table that definitions and units are taken from."""

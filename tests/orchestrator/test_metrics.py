@@ -1,0 +1,168 @@
+"""Measures against closed forms; how metrics find their signals."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from orchestrator import measures
+from orchestrator.display import digits_of, shown
+from orchestrator.errors import ScenarioError
+from orchestrator.metrics import STANDARD, evaluate, evaluate_all, metric
+
+from .recorded import UNITS, car, results
+
+T = np.linspace(0.0, 2.0, 20001)
+SINE = np.sin(2 * np.pi * T)
+
+
+def test_errors_of_a_sine_around_zero_are_those_of_the_sine():
+    zero = np.zeros_like(T)
+    assert measures.mean_error(T, SINE, zero) == pytest.approx(2 / math.pi, rel=1e-7)
+    assert measures.rms_error(T, SINE, zero) == pytest.approx(1 / math.sqrt(2), rel=1e-9)
+    assert measures.peak_error(T, SINE, zero) == pytest.approx(1.0, rel=1e-9)
+
+
+def test_relative_errors_are_relative_to_the_peak_of_the_reference():
+    reference = -2 * SINE
+    assert measures.relative_peak_error(T, 1.5 * reference, reference) == pytest.approx(0.5)
+    assert measures.relative_rms_error(T, 1.5 * reference, reference) == pytest.approx(0.5 / math.sqrt(2))
+    assert measures.relative_mean_error(T, 1.5 * reference, reference) == pytest.approx(1 / math.pi, rel=1e-6)
+
+
+def test_effort_is_the_integral_of_the_absolute_value():
+    assert measures.effort(T, 3 * SINE) == pytest.approx(3 * 4 / math.pi, rel=1e-7)
+
+
+def test_integrals_hold_for_uneven_samples():
+    t = np.concatenate([np.linspace(0, 1, 11), np.linspace(1, 3, 5001)[1:]])
+    assert measures.integral(t, 2 * t) == pytest.approx(9.0, rel=1e-12)
+
+
+def test_total_variation_of_a_sine_is_four_amplitudes_per_period():
+    assert measures.total_variation(T, 5 * SINE) == pytest.approx(2 * 4 * 5, rel=1e-6)
+    assert measures.total_variation_rate(T, 5 * SINE) == pytest.approx(4 * 5, rel=1e-6)
+
+
+def test_slope_variation_of_a_sine_is_that_of_its_derivative():
+    assert measures.slope_variation_rate(T, SINE) == pytest.approx(4 * 2 * math.pi, rel=1e-3)
+
+
+def test_settling_time_of_a_first_order_lag_is_three_time_constants():
+    settles = measures.settling_time(T, 1 - np.exp(-T / 0.4), np.ones_like(T))
+    assert settles == pytest.approx(0.4 * math.log(20), abs=2e-4)
+
+
+def test_a_signal_that_ends_outside_the_band_never_settles():
+    assert measures.settling_time(T, 1 - np.exp(-T / 4), np.ones_like(T)) == math.inf
+
+
+def test_a_signal_that_never_leaves_the_band_has_settled_at_once():
+    assert measures.settling_time(T, SINE * 1.04, SINE) == 0.0
+
+
+def test_overshoot_of_a_second_order_system_follows_from_its_damping():
+    zeta = 0.3
+    omega = 10.0
+    damped = omega * math.sqrt(1 - zeta**2)
+    step = 1 - np.exp(-zeta * omega * T) * (
+        np.cos(damped * T) + zeta / math.sqrt(1 - zeta**2) * np.sin(damped * T)
+    )
+    expected = math.exp(-math.pi * zeta / math.sqrt(1 - zeta**2))
+    assert measures.overshoot(T, step, np.ones_like(T)) == pytest.approx(expected, rel=1e-4)
+    assert measures.overshoot(T, 0.7 * SINE, SINE) == 0.0
+
+
+def test_displacement_counts_from_the_first_value_peak_from_zero():
+    assert measures.displacement(T, 10 - T) == pytest.approx(2.0)
+    assert measures.peak(T, 10 - T) == pytest.approx(10.0)
+    assert measures.final(T, 10 - T) == pytest.approx(8.0)
+
+
+def test_every_standard_metric_applies_to_a_complete_car():
+    assert list(evaluate_all(car())) == list(STANDARD)
+
+
+def test_every_measure_can_be_applied_and_says_its_formula_and_unit():
+    for name, measure in measures.MEASURES.items():
+        value = evaluate(car(1.2), metric(f"{name}(sideslip)"))
+        assert value is not None
+        assert value.number >= 0 or name == "final"
+        assert "{" not in metric(f"{name}(sideslip)").formula
+        assert measure.definition
+
+
+def test_units_of_metrics_follow_from_the_signal():
+    units = {name: value.unit for name, value in evaluate_all(car()).items()}
+    assert units["relative_peak_error(sideslip)"] == "%"
+    assert units["rms_error(yaw_rate)"] == "rad/s"
+    assert units["effort(yaw_moment)"] == "N.m.s"
+    assert units["total_variation_rate(yaw_moment)"] == "N.m/s"
+    assert units["settling_time(yaw_rate)"] == "s"
+    assert metric("slope_variation_rate(yaw_rate)").unit("rad/s") == "rad/s3"
+    assert metric("effort(velocity_x)").unit("m/s") == "m"
+
+
+def test_metrics_find_signals_whatever_the_units_are_called():
+    renamed = results({"Fahrzeug.sideslip": 1.1 * SINE, "soll.sideslip_ref": SINE}, T)
+    assert evaluate_all(renamed)["relative_peak_error(sideslip)"].number == pytest.approx(0.1, rel=1e-6)
+
+
+def test_metrics_without_their_signals_are_absent():
+    without_reference = results({"plant.sideslip": SINE}, T)
+    assert set(evaluate_all(without_reference)) == {"peak(sideslip)"}
+
+
+def test_a_relative_error_against_a_reference_of_zero_is_absent():
+    straight = results({"plant.sideslip": SINE, "reference.sideslip_ref": 0 * SINE}, T)
+    assert set(evaluate_all(straight)) == {"rms_error(sideslip)", "peak(sideslip)"}
+
+
+def test_a_window_limits_a_metric_to_its_samples():
+    ramp = results({"plant.sideslip": T}, T)
+    assert evaluate(ramp, metric("peak(sideslip)"), (0.0, 0.5)).number == pytest.approx(0.5)
+    assert evaluate(ramp, metric("displacement(sideslip)"), (0.5, 2.0)).number == pytest.approx(1.5)
+    assert evaluate(ramp, metric("peak(sideslip)"), (5.0, 6.0)) is None
+
+
+def test_the_largest_of_four_wheels_counts():
+    columns = {f"actuator.wheel_torque_{w}": k * T for k, w in enumerate(("fl", "fr", "rl", "rr"))}
+    wheels = results(columns, T, dict.fromkeys(columns, "N.m"))
+    assert evaluate(wheels, metric("peak(wheel_torque_*)")).number == pytest.approx(6.0)
+
+
+def test_torque_requests_stand_in_where_no_actuator_is_between():
+    run = car(chatter=100.0)
+    asked = evaluate(run, metric("total_variation_rate(torque_request_*)"))
+    assert evaluate(run, metric("total_variation_rate(wheel_torque_*)")) == asked
+
+
+def test_of_two_units_with_the_signal_the_plants_counts():
+    both = results({"estimator.sideslip": 0 * T, "plant.sideslip": SINE}, T)
+    assert evaluate(both, metric("peak(sideslip)")).number == pytest.approx(1.0)
+    assert evaluate(both, metric("peak(estimator.sideslip)")).number == 0.0
+
+
+def test_an_unknown_measure_is_an_error_that_names_the_nearest():
+    with pytest.raises(ScenarioError, match="there is no measure 'peek'; did you mean 'peak'"):
+        metric("peek(sideslip)")
+    with pytest.raises(ScenarioError, match=r"is no metric; write measure\(signal\)"):
+        metric("sideslip")
+
+
+def test_numbers_are_shown_in_the_units_people_read():
+    assert shown(0.0349, "rad") == "2.00 °"
+    assert shown(25.0, "m/s") == "90.0 km/h"
+    assert shown(0.0394, "%") == "3.94 %"
+    assert shown(14180.0, "N.m/s") == "14.2 kN·m/s"
+    assert shown(2.513, "%") == "251 %"
+    assert shown(math.inf, "s") == "never"
+    assert digits_of(0.0996) == "0.0996"
+    assert digits_of(0.9996) == "1.00"
+    assert digits_of(12345.0) == "12345"
+
+
+def test_the_usual_columns_of_a_car_carry_their_units():
+    assert set(car().columns) == set(UNITS)

@@ -1,0 +1,194 @@
+"""What figures show: panels, lines, words, units, scales and files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import ResultsError
+from orchestrator.figure_style import LINES, save
+from orchestrator.panels import Run, thinned
+from orchestrator.plots import draw, provenance, title_of
+
+from .recorded import car, results
+
+
+def panel(figure, name):
+    return next(axes for axes in figure.axes if axes.get_label() == name)
+
+
+def names(figure):
+    return [axes.get_label() for axes in figure.axes]
+
+
+def legend(figure):
+    return [text.get_text() for box in figure.legends for text in box.get_texts()]
+
+
+SEVERAL = [Run("no control", car(2.4)), Run("fuzzy", car(1.2)), Run("neural", car(1.02))]
+
+
+def test_the_overview_of_a_car_has_the_papers_panels_in_order():
+    figure = draw([Run("run", car())])
+    assert names(figure) == [
+        "steer_angle", "sideslip", "yaw_rate", "acceleration_y", "yaw_moment", "wheel_torque_*", "path",
+    ]  # fmt: skip
+
+
+def test_a_panel_without_its_signal_is_left_out():
+    t = np.linspace(0, 1, 11)
+    figure = draw([Run("run", results({"plant.yaw_rate": t, "plant.position_x": t}, t))])
+    assert names(figure) == ["yaw_rate"]
+
+
+def test_a_run_with_none_of_the_signals_is_an_error():
+    with pytest.raises(ResultsError, match="nothing to draw, no run recorded any of steer_angle"):
+        draw([Run("run", results({"plant.other": [0.0, 1.0]}))])
+
+
+def test_angles_are_drawn_in_degrees_and_named_so():
+    run = car()
+    axes = panel(draw([Run("run", run)]), "steer_angle")
+    assert axes.get_title(loc="left") == r"Steer angle $δ$ in °"
+    assert np.max(axes.get_lines()[0].get_ydata()) == pytest.approx(np.degrees(0.03), rel=1e-3)
+
+
+def test_speeds_are_drawn_in_kilometres_per_hour():
+    axes = panel(draw([Run("run", car())], ["velocity_x"]), "velocity_x")
+    assert axes.get_title(loc="left").endswith("in km/h")
+    assert axes.get_lines()[0].get_ydata()[0] == pytest.approx(90.0)
+
+
+def test_a_signal_with_a_reference_is_drawn_over_it():
+    lines = panel(draw([Run("run", car(1.5))]), "sideslip").get_lines()
+    assert [line.get_label() == "reference" for line in lines] == [True, False]
+    assert lines[0].get_zorder() <= lines[1].get_zorder()
+    assert lines[0].get_linewidth() > 2 * lines[1].get_linewidth()
+
+
+def test_runs_with_one_reference_share_its_line():
+    figure = draw(SEVERAL)
+    assert len(panel(figure, "sideslip").get_lines()) == 4
+    assert legend(figure) == ["no control", "fuzzy", "neural", "reference"]
+
+
+def test_runs_with_references_of_their_own_show_each_in_the_runs_colour():
+    slow = car(1.0)
+    slow.columns["reference.sideslip_ref"] = 1.5 * slow.columns["reference.sideslip_ref"]
+    figure = draw([SEVERAL[1], Run("slow", slow)])
+    pale = [line for line in panel(figure, "sideslip").get_lines() if line.get_label() == "reference"]
+    assert [line.get_color() for line in pale] == [LINES[0]["color"], LINES[1]["color"]]
+    assert legend(figure)[-1] == "wide and pale: the run's own reference"
+
+
+def test_runs_differ_in_colour_and_in_dash_pattern():
+    assert len({style["color"] for style in LINES}) == len(LINES)
+    dashes = [(style["linestyle"], style["linewidth"]) for style in LINES]
+    assert len({str(d) for d in dashes}) == len(LINES)
+    lines = panel(draw(SEVERAL), "acceleration_y").get_lines()
+    assert [line.get_color() for line in lines] == [style["color"] for style in LINES[:3]]
+
+
+def test_wheels_of_one_run_share_a_panel_with_a_legend():
+    axes = panel(draw([Run("run", car())]), "wheel_torque_*")
+    assert len(axes.get_lines()) == 4
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["fl", "fr", "rl", "rr"]
+
+
+def test_wheels_of_several_runs_have_a_panel_each():
+    figure = draw(SEVERAL, ["wheel_torque_*"])
+    assert names(figure) == [f"wheel_torque_{w}" for w in ("fl", "fr", "rl", "rr")]
+    assert all(len(axes.get_lines()) == 3 for axes in figure.axes)
+    assert panel(figure, "wheel_torque_rr").get_title(loc="left") == "Wheel torque, rear right, in N·m"
+
+
+def test_the_error_panel_is_in_per_cent_of_the_references_peak():
+    axes = panel(draw([Run("run", car(1.5))], ["sideslip_error"]), "sideslip_error")
+    assert np.max(axes.get_lines()[0].get_ydata()) == pytest.approx(50.0, rel=1e-3)
+
+
+def test_a_lost_car_leaves_the_axes_and_the_figure_says_so():
+    figure = draw([Run("lost", car(40.0)), Run("held", car(1.1))], ["sideslip"])
+    axes = panel(figure, "sideslip")
+    assert axes.get_ylim()[1] < 3 * np.degrees(1.1 * 0.6 * 0.03)
+    assert [text.get_text() for text in axes.texts] == ["beyond the axes: lost: up to 41.3 °"]
+
+
+def test_a_lost_car_alone_is_shown_whole():
+    axes = panel(draw([Run("lost", car(40.0))], ["sideslip"]), "sideslip")
+    assert axes.get_ylim()[1] > np.degrees(40 * 0.6 * 0.03)
+    assert not axes.texts
+
+
+def path_of(length, breadth):
+    x = np.linspace(0, length, 101)
+    y = breadth * np.sin(np.linspace(0, np.pi, 101))
+    return draw([Run("run", results({"plant.position_x": x, "plant.position_y": y}))], ["path"])
+
+
+def test_a_broad_path_is_drawn_to_scale():
+    axes = panel(path_of(60.0, 40.0), "path")
+    assert axes.get_aspect() == 1.0
+    assert "both axes to the same scale" in axes.get_title(loc="left")
+
+
+def test_a_narrow_path_is_stretched_and_the_figure_says_how_much():
+    figure = path_of(200.0, 3.0)
+    axes = panel(figure, "path")
+    assert axes.get_aspect() == 5.0
+    assert "lateral scale 5 times the longitudinal" in axes.get_title(loc="left")
+    figure.draw_without_rendering()
+    low, high = axes.get_ylim()
+    assert 3.0 < high - low < 12.0
+
+
+def test_a_standing_car_has_a_path_too():
+    assert panel(path_of(0.0, 0.0), "path") is not None
+
+
+def test_title_and_provenance_come_from_the_runs_records():
+    figure = draw(SEVERAL)
+    texts = [text.get_text() for text in figure.texts]
+    assert texts[0] == title_of(SEVERAL) == "Sine at 25 m/s"
+    assert texts[1] == provenance(SEVERAL) == "yawbench 0.1.0 · paper A · extrapolated · step 1.00 ms"
+
+
+def test_a_run_that_ended_early_is_named():
+    failed = car()
+    failed.run["status"] = "failed"
+    assert provenance([Run("third try", failed)]).endswith("ended early: third try")
+
+
+def test_nothing_of_the_head_covers_a_panel():
+    labels = ["a controller with a rather long name indeed", "another one of about that length", "short"]
+    runs = [Run(label, run.results) for label, run in zip(labels * 2, SEVERAL * 2, strict=True)]
+    figure = draw(runs, title="A title of two lines " * 8)
+    figure.draw_without_rendering()
+    renderer = figure.canvas.get_renderer()
+    head = figure.legends[0].get_window_extent(renderer)
+    title = figure.texts[0].get_window_extent(renderer)
+    assert title.y0 > head.y1
+    assert all(axes.get_tightbbox(renderer).y1 < head.y0 for axes in figure.axes)
+    assert head.x1 < figure.bbox.x1
+
+
+def test_a_thinned_line_keeps_its_peaks_and_its_ends():
+    t = np.linspace(0, 1, 100_001)
+    x = np.sin(9 * t)
+    x[54_321] = 7.0
+    thin_t, thin_x = thinned(t, x)
+    assert thin_x.size <= 3002
+    assert thin_x.max() == 7.0
+    assert (thin_t[0], thin_t[-1]) == (0.0, 1.0)
+    assert np.all(np.diff(thin_t) > 0)
+
+
+def test_files_are_svg_and_png_and_the_same_every_time(tmp_path: Path):
+    first = save(draw(SEVERAL), tmp_path / "a" / "overview.25mps")
+    again = save(draw(SEVERAL), tmp_path / "b" / "overview.25mps")
+    assert [path.name for path in first] == ["overview.25mps.svg", "overview.25mps.png"]
+    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in again]
+    assert first[0].read_text().startswith("<?xml")
+    assert all(5_000 < path.stat().st_size < 1_000_000 for path in first)
