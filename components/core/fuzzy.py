@@ -142,6 +142,9 @@ class Mamdani:
             for upper, lower in zip(self.rules, self.rules[1:], strict=False)
         ]
 
+    def __deepcopy__(self, memo: object) -> Mamdani:
+        return self  # never changes: saving a unit's state need not copy it
+
     def __call__(self, x: float, y: float) -> list[float]:
         """Return the outputs for the inputs `x` (rows) and `y` (columns); NaN for NaN."""
         if x != x or y != y:
