@@ -1,0 +1,29 @@
+"""The sentence that says why a unit has failed, from what it has logged."""
+
+from __future__ import annotations
+
+import re
+
+from .log import PENDING, STATUS, Log
+from .unit import Status
+
+_TELLS_WHEN = re.compile(r"^[^:]* failed at t = [^:]* s: ")
+
+
+def describe(unit: str, what: str, time: float, status: Status, log: Log) -> str:
+    """Return one sentence: unit, what failed, when, and the reason.
+
+    Args:
+        what: "step", "initialization", "setting inputs", ...
+        time: beginning of the step [s].
+    """
+    errors = log.errors(unit)
+    if status == PENDING and not errors:
+        reason = "the FMU wants to compute asynchronously, which is not supported"
+    elif not errors:
+        reason = f"the FMU returned {STATUS[status]} and gave no reason"
+    else:
+        reason = " ".join(errors[0].text.split())
+        if _TELLS_WHEN.match(reason):  # a component of this project: it knows where and when
+            return f"{unit}: {reason.partition('; inputs: ')[0]}"
+    return f"{unit}: {what} failed at t = {time:.9g} s: {reason}"

@@ -1,0 +1,123 @@
+"""What the units say through the FMI logger.
+
+FMI log texts are printf formats with arguments that Python cannot read; fmpy's native proxy
+formats them (at most 2047 bytes). That proxy knows one receiver per process, so there is one
+callback here, and the component environment of an instance says whose message it is.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from fmpy import calloc, free
+from fmpy.fmi2 import (
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+)
+
+OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
+STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
+
+KEPT = 1000
+"""Messages kept per unit; a unit that goes on is only counted."""
+
+
+@dataclass(frozen=True)
+class Message:
+    """One message of a unit; `time` [s] is the communication point before it."""
+
+    unit: str
+    time: float
+    status: int
+    category: str
+    text: str
+
+
+class Log:
+    """All messages of a run with a status worse than OK, in the order in which they came."""
+
+    def __init__(self) -> None:
+        self.messages: list[Message] = []
+        self.dropped = 0
+        self.time = ctypes.c_double(0.0)  # [s], moved on by the master
+
+    def add(self, unit: str, status: int, category: str, text: str) -> None:
+        """Keep a message; those with the status OK are of no interest."""
+        if status == OK:
+            return
+        if sum(m.unit == unit for m in self.messages) >= KEPT:
+            self.dropped += 1
+            return
+        self.messages.append(Message(unit, self.time.value, status, category, text.rstrip()))
+
+    def errors(self, unit: str) -> list[Message]:
+        """Return the unit's messages with a status worse than Warning, without tracebacks."""
+        return [
+            m for m in self.messages if m.unit == unit and m.status > WARNING and m.category != "traceback"
+        ]
+
+    def tracebacks(self, unit: str) -> list[str]:
+        """Return the full Python tracebacks that the unit has logged."""
+        return [m.text for m in self.messages if m.unit == unit and m.category == "traceback"]
+
+    def warnings(self) -> Iterable[Message]:
+        """Return the warnings of all units."""
+        return [m for m in self.messages if m.status == WARNING]
+
+
+_listeners: dict[int, tuple[Log, str]] = {}
+_numbers = itertools.count(1)
+
+
+def _receive(environment, instance, status, category, text):
+    try:
+        log, unit = _listeners[environment]
+        log.add(unit, status, _decoded(category), _decoded(text))
+    except Exception as error:  # must not reach the C code that called
+        print(f"yawbench: a log message was lost: {error}")
+
+
+def _decoded(text: bytes | None) -> str:
+    return (text or b"").decode("utf-8", errors="replace")
+
+
+def _receive_unformatted(environment, instance, status, category, text):
+    _receive(environment, instance, status, category, (text or b"").replace(b"%%", b"%"))
+
+
+try:
+    from fmpy.logging import addLoggerProxy
+
+    _receiver = fmi2CallbackLoggerTYPE(_receive)
+except (ImportError, OSError):  # no native proxy for this platform: arguments stay unformatted
+    addLoggerProxy = None
+    _receiver = fmi2CallbackLoggerTYPE(_receive_unformatted)
+
+_allocate = fmi2CallbackAllocateMemoryTYPE(calloc)
+_free = fmi2CallbackFreeMemoryTYPE(free)
+
+
+def listen(log: Log, unit: str) -> fmi2CallbackFunctions:
+    """Return callback functions for one instance, whose messages go to `log`.
+
+    The structure must live as long as the instance; give it to `unlisten` afterwards.
+    """
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = _receiver
+    callbacks.allocateMemory = _allocate
+    callbacks.freeMemory = _free
+    if addLoggerProxy is not None:
+        addLoggerProxy(ctypes.byref(callbacks))
+    callbacks.componentEnvironment = number = next(_numbers)
+    _listeners[number] = (log, unit)
+    return callbacks
+
+
+def unlisten(callbacks: fmi2CallbackFunctions) -> None:
+    """Forget an instance that has been freed."""
+    _listeners.pop(callbacks.componentEnvironment, None)

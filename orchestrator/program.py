@@ -1,0 +1,176 @@
+"""The calls of one communication step, put together before the run.
+
+A program is a flat list of calls without arguments, each of which returns an FMI status; the
+master walks it and stops at the first that is not OK. Which units take part, and with which
+weights, repeats after the least common multiple of the units' periods: one program per phase.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from .coupling import Weights, weights
+from .memory import Memory, Station
+from .unit import OK, Status
+
+Kind = Literal["gather", "set", "step", "keep", "get"]
+
+
+class Operation(NamedTuple):
+    """One call on behalf of a unit ("" for all units at once)."""
+
+    unit: str
+    kind: Kind
+    call: Callable[[], Status | None]
+
+
+class Programs:
+    """The programs of all phases, made when they are first needed."""
+
+    def __init__(self, memory: Memory) -> None:
+        self._memory = memory
+        self.cycle = math.lcm(*(s.unit.period for s in memory.stations))
+        self._made: dict[int, list[Operation]] = {}
+        self._gathers: dict[tuple, list[Operation]] = {}
+
+    def at(self, k: int) -> list[Operation]:
+        """Return what is to be done from communication point `k` - 1 to `k`."""
+        phase = k % self.cycle
+        if phase not in self._made:
+            jacobi = self._memory.plan.algorithm == "jacobi"
+            self._made[phase] = self._jacobi(phase) if jacobi else self._in_sequence(phase)
+        return self._made[phase]
+
+    def _jacobi(self, k: int) -> list[Operation]:
+        """All inputs are taken before anything moves; a slow unit's at the start of its period."""
+        m = self._memory
+        beginning = [s for s in m.placed if (k - 1) % s.unit.period == 0]
+        ending = [s for s in m.stations if k % s.unit.period == 0]
+        fast = [s for s in beginning if s.unit.period == 1 and s.inputs]
+        operations = []
+        if fast:
+            sources = np.concatenate([s.sources for s in fast])
+            operations.append(Operation("", "gather", _held(m, sources, m.inputs[: len(sources)])))
+        slow = [s for s in beginning if s.unit.period > 1 and s.inputs]
+        operations += [Operation(s.name, "gather", _held(m, s.sources, s.u)) for s in slow]
+        operations += [op for s in beginning for op in _setting(m, s)]
+        for s in ending:
+            operations += [Operation(s.name, "step", s.calls.step), *_getting(m, s)]
+        return operations
+
+    def _in_sequence(self, k: int) -> list[Operation]:
+        """Units one after the other, each with the newest that there is; slow ones at their end."""
+        operations: list[Operation] = []
+        for s in self._memory.stations:
+            if k % s.unit.period == 0:
+                operations += self._gathering(s, k)
+                operations += _setting(self._memory, s)
+                operations.append(Operation(s.name, "step", s.calls.step))
+                if self._memory.plan.algorithm == "extrapolated" and s.outputs:
+                    operations.append(Operation(s.name, "keep", _copy(s.y, s.y_before)))
+                operations += _getting(self._memory, s)
+        return operations
+
+    def _gathering(self, s: Station, k: int) -> list[Operation]:
+        m = self._memory
+        if not any(s.wires):
+            return []
+        per_input = []
+        for variable, wire in zip(s.inputs, s.wires, strict=True):
+            if wire is None:
+                per_input.append(Weights())
+            else:
+                relation = m.relation(s, variable, wire)
+                # one cycle on, so that no sample before the start is looked at
+                per_input.append(weights(m.plan.algorithm, relation, k + 2 * self.cycle))
+        key = (s.name, *per_input)
+        if key not in self._gathers:
+            operations = [Operation(s.name, "gather", _gather(m, s, per_input))]
+            if any(w.kept for w in per_input):
+                operations.append(Operation(s.name, "keep", _held(m, s.sources, s.kept)))
+            self._gathers[key] = operations
+        return self._gathers[key]
+
+
+def _gather(m: Memory, s: Station, per_input: list[Weights]) -> Callable[[], Status]:
+    """Return the call that brings a unit's inputs up to date."""
+    first, second, factors = [], [], []
+    for i, w in enumerate(per_input):
+        now = int(s.sources[i])
+        past = s.kept_at + i if w.kept else now + m.n_outputs
+        if w == Weights(0.0, 1.0):
+            first.append(past)
+            second.append(past)
+            factors.append((1.0, 0.0))
+        else:
+            first.append(now)
+            second.append(past if w.before or w.kept else now)
+            factors.append((w.now, w.before + w.kept))
+    if all(factor == (1.0, 0.0) for factor in factors):
+        return _held(m, np.array(first, np.intp), s.u)
+    return _blended(m, np.array([first, second], np.intp), np.array(factors).T.copy(), s.u)
+
+
+def _held(m: Memory, sources: np.ndarray, target: np.ndarray) -> Callable[[], Status]:
+    take = m.pool.take
+
+    def held() -> Status:
+        take(sources, None, target, "clip")
+        return OK
+
+    return held
+
+
+def _blended(m: Memory, pairs: np.ndarray, factors: np.ndarray, target: np.ndarray) -> Callable[[], Status]:
+    take, multiply, add = m.pool.take, np.multiply, np.add
+    terms = np.empty(pairs.shape)
+    first, second = terms
+
+    def blended() -> Status:
+        take(pairs, None, terms, "clip")
+        multiply(terms, factors, terms)
+        add(first, second, target)
+        return OK
+
+    return blended
+
+
+def _copy(source: np.ndarray, target: np.ndarray) -> Callable[[], None]:
+    return functools.partial(target.data.__setitem__, slice(None), source.data)
+
+
+def _setting(m: Memory, s: Station) -> list[Operation]:
+    operations = []
+    if any(s.wires):
+        operations.append(Operation(s.name, "set", s.calls.set))
+    for kind in {v.type: None for v, source in s.other_inputs if source is not None}:
+        chosen = [(v.reference, src) for v, src in s.other_inputs if v.type == kind and src is not None]
+        references, sources = [r for r, _ in chosen], [src for _, src in chosen]
+
+        def put(kind: str = kind, references: list = references, sources: list = sources) -> Status:
+            return s.slave.put(kind, references, [m.others[source] for source in sources])
+
+        operations.append(Operation(s.name, "set", put))
+    return operations
+
+
+def _getting(m: Memory, s: Station) -> list[Operation]:
+    operations = []
+    if s.outputs:
+        operations.append(Operation(s.name, "get", s.calls.get))
+    for kind in {v.type: None for v in s.other_outputs}:
+        chosen = [v for v in s.other_outputs if v.type == kind]
+        references, keys = [v.reference for v in chosen], [(s.name, v.name) for v in chosen]
+
+        def fetch(kind: str = kind, references: list = references, keys: list = keys) -> Status:
+            status, values = s.slave.fetch(kind, references)
+            m.others.update(zip(keys, values, strict=True))
+            return status
+
+        operations.append(Operation(s.name, "get", fetch))
+    return operations
