@@ -1,0 +1,39 @@
+"""Magic Formula tyre, 2002 form: load dependence, combined slip, aligning moment, friction per wheel.
+
+The formulae, their source and what stands for friction are described in `core/magic_formula.py`,
+the default set, of a 205/60R15, in `core/magic_formula_parameters.py`.
+"""
+
+from __future__ import annotations
+
+from ..core.component import Component
+from ..core.magic_formula import forces_and_moment
+from ..core.magic_formula_parameters import MagicFormulaParameters, coefficients
+from ..core.variables import output
+
+_INPUTS = ("slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*")
+
+
+class MagicFormula(Component):
+    """Magic Formula tyres (2002 form) on four wheels: combined slip, aligning moment, friction per wheel."""
+
+    Parameters = MagicFormulaParameters
+    inputs = _INPUTS
+    outputs = (
+        output("tyre_force_x_*", *_INPUTS),
+        output("tyre_force_y_*", *_INPUTS),
+        output("aligning_moment_*", *_INPUTS),
+    )
+
+    def configure(self):
+        self.front = coefficients(self.p, "front")
+        self.rear = coefficients(self.p, "rear")
+
+    def output(self, t, u):
+        front = self.front
+        rear = self.rear
+        x_fl, y_fl, z_fl = forces_and_moment(u[4], u[0], u[8], u[12], front)
+        x_fr, y_fr, z_fr = forces_and_moment(u[5], u[1], u[9], u[13], front)
+        x_rl, y_rl, z_rl = forces_and_moment(u[6], u[2], u[10], u[14], rear)
+        x_rr, y_rr, z_rr = forces_and_moment(u[7], u[3], u[11], u[15], rear)
+        return x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr, z_fl, z_fr, z_rl, z_rr

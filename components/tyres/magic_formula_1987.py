@@ -1,0 +1,39 @@
+"""Magic Formula tyre, original form of 1987: the set many papers use, combined slip by similarity.
+
+The formulae and their sources are described in `core/magic_formula_1987.py`. There is no aligning
+moment: the set has none.
+"""
+
+from __future__ import annotations
+
+from ..core.component import Component
+from ..core.magic_formula_1987 import (
+    MagicFormula1987Parameters,
+    coefficients_1987,
+    forces_1987,
+    loaded_tyre,
+)
+from ..core.variables import output
+
+_INPUTS = ("slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*")
+
+
+class MagicFormula1987(Component):
+    """Magic Formula tyres (1987 form) on four wheels: combined slip by similarity, friction per wheel."""
+
+    Parameters = MagicFormula1987Parameters
+    inputs = _INPUTS
+    outputs = (output("tyre_force_x_*", *_INPUTS), output("tyre_force_y_*", *_INPUTS))
+
+    def configure(self):
+        self.coefficients = coefficients_1987(self.p)
+
+    def output(self, t, u):
+        longitudinal = []
+        lateral = []
+        for wheel in range(4):
+            tyre = loaded_tyre(u[8 + wheel], u[12 + wheel], self.coefficients)
+            f_x, f_y = (0.0, 0.0) if tyre is None else forces_1987(u[4 + wheel], u[wheel], tyre)
+            longitudinal.append(f_x)
+            lateral.append(f_y)
+        return longitudinal + lateral
