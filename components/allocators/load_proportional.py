@@ -70,6 +70,4 @@ class LoadProportional(Component):
     def output(self, t, u):
         p = self.p
         half_track = 0.5 * p.track_width
-        return share_by_load(
-            u[0], u[1], delta=u[2], loads=u[3:], a=p.cg_to_front_axle, half_track=half_track
-        )
+        return share_by_load(u[0], u[1], delta=u[2], loads=u[3:], a=p.cg_to_front_axle, half_track=half_track)

@@ -13,16 +13,17 @@ with a_x = X / m, a_y = Y / m. A wheel that lifts has no load; the other wheel o
 carries the axle, so the loads always add up to m g. Roll, pitch and suspension are left out.
 
 Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
-FNN, equations (5)-(8), (13)-(20). Errata: (7) prints the rear-track term with the opposite sign;
+FNN, equations (5)-(8), (13)-(20). Ours differs: the lifted wheel; slips at rest, see
+`core.wheel_kinematics`. Errata: (7) prints the rear-track term with the opposite sign;
 (13)-(16) print sideslip for yaw rate; (17), (18) print b where a is meant.
 
 How it couples. Tyre forces and wheel torques enter the integration only: they are held over the
 step, and a master that knows this hands over their values at its middle. The steer angle feeds
 the slip angles directly, so its value belongs to the end of the step; within the step it goes
 there in a straight line from the last one. The loads follow from the accelerations, these from the
-forces and these from the loads: to leave that loop open, the acceleration of the step, which is
-that of its middle, is carried on to its end along the straight line through the middle of the step
-before (`carry`). All three are exact to second order in the step, which may vary.
+forces and these from the loads: to leave that loop open, the accelerations, known at the middle
+of each step, are carried on to its end along the straight line nearest to the last three (`carry`).
+All of this is exact to second order in the step, which may vary.
 """
 
 from __future__ import annotations
@@ -55,9 +56,7 @@ class SevenDofParameters:
         1.368, "m", "Distance b of the centre of mass from the rear axle; paper A, table 1", minimum=0.1
     )
     track_width: float = parameter(1.65, "m", "Track width d; paper A, table 1", minimum=0.1)
-    cg_height: float = parameter(
-        0.7, "m", "Height h of the centre of mass; paper A, table 1", minimum=0.0
-    )
+    cg_height: float = parameter(0.7, "m", "Height h of the centre of mass; paper A, table 1", minimum=0.0)
     wheel_radius: float = parameter(0.31, "m", "Wheel radius R; paper A, table 1", minimum=0.05)
     wheel_inertia: float = parameter(
         2.1, "kg.m2", "Inertia J of one wheel; chosen: paper B's value, paper A names none", minimum=0.01
@@ -73,9 +72,7 @@ class SevenDofParameters:
     )
 
 
-def accelerations(
-    delta: float, forces: Sequence[float], p: SevenDofParameters
-) -> tuple[float, float, float]:
+def accelerations(delta: float, forces: Sequence[float], p: SevenDofParameters) -> tuple[float, float, float]:
     """Return (a_x, a_y [m/s2], dr/dt [rad/s2]) of the centre of mass; equations (5)-(7).
 
     Args:
@@ -135,13 +132,24 @@ def vertical_loads(a_x: float, a_y: float, p: SevenDofParameters) -> Four:
     return front - front_across, front + front_across, rear - rear_across, rear + rear_across
 
 
-def carry(middle: float, before: float, ratio: float) -> float:
-    """Return the value at the end of a step from those at its middle and before it.
+def carry(values: Sequence[float], ages: Sequence[float]) -> float:
+    """Return the value at age zero of the straight line nearest to three values (least squares).
 
-    `ratio` = h / (h + h_before): the straight line through the middles of two steps, or, with
-    h_before = 0, through the start and the middle of the first step.
+    Args:
+        values: newest first.
+        ages: how long ago they were [s], not all the same.
+
+    Two values would do for second order. Three keep the loop of loads and forces calm: it swings
+    up where (change of the sum of forces) / (m times change of acceleration) falls below -0.60,
+    with two values already below -0.25, which a car on dry road reaches with locked rear wheels.
     """
-    return middle + (middle - before) * ratio
+    y_1, y_2, y_3 = values
+    t_1, t_2, t_3 = ages
+    t = (t_1 + t_2 + t_3) / 3.0
+    y = (y_1 + y_2 + y_3) / 3.0
+    d_1, d_2, d_3 = t_1 - t, t_2 - t, t_3 - t
+    slope = (d_1 * (y_1 - y) + d_2 * (y_2 - y) + d_3 * (y_3 - y)) / (d_1 * d_1 + d_2 * d_2 + d_3 * d_3)
+    return y - slope * t
 
 
 class SevenDof(Component):
@@ -180,11 +188,12 @@ class SevenDof(Component):
         p = self.p
         v_x = p.initial_speed * cos(p.initial_sideslip)
         v_y = p.initial_speed * sin(p.initial_sideslip)
-        self.motion = (v_x, v_y, p.initial_yaw_rate, 0.0, 0.0, 0.0)
+        self.motion: Motion = (v_x, v_y, p.initial_yaw_rate, 0.0, 0.0, 0.0)
         self.spin = tuple(v / p.wheel_radius for v in self._wheels(u[0])[:4])  # rolling freely
         self.steer_angle = u[0]
-        self.middle = self.end = accelerations(u[0], u[1:9], p)[:2]
-        self.last_h = 0.0
+        a_x, a_y, _ = accelerations(u[0], u[1:9], p)
+        self.end = (a_x, a_y)
+        self.history = ((0.0, a_x, a_y),) * 2  # age [s] and accelerations at the last two middles
 
     def advance(self, t, h, u):
         if h <= 0.0:  # nothing moves
@@ -207,11 +216,10 @@ class SevenDof(Component):
         self.motion = move(self.motion, h, delta=delta, delta_end=delta_end, forces=forces, p=p)
         self.steer_angle = delta_end
         a_x, a_y, _ = accelerations(0.5 * (delta + delta_end), forces, p)
-        before_x, before_y = self.middle
-        ratio = h / (h + self.last_h)
-        self.end = (carry(a_x, before_x, ratio), carry(a_y, before_y, ratio))
-        self.middle = (a_x, a_y)
-        self.last_h = h
+        (age_1, x_1, y_1), (age_2, x_2, y_2) = self.history
+        ages = 0.5 * h, age_1 + h, age_2 + h
+        self.end = carry((a_x, x_1, x_2), ages), carry((a_y, y_1, y_2), ages)
+        self.history = (0.5 * h, a_x, a_y), (age_1 + h, x_1, y_1)
 
     def output(self, t, u):
         p = self.p

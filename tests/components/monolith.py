@@ -8,6 +8,7 @@ solved at every instant.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from math import cos, pi, sin, sqrt, tan
 
 import numpy as np
@@ -98,7 +99,7 @@ def solve(
     columns = np.empty((10, len(times)))
     edges = [times[0], *sorted(k for k in kinks if times[0] < k < times[-1]), times[-1]]
     scale = np.array([1.0, 0.1, 0.01, 1.0, 1.0, 0.01, 10.0, 10.0, 10.0, 10.0])
-    for begin, end in zip(edges, edges[1:], strict=False):
+    for begin, end in pairwise(edges):
         piece = solve_ivp(
             derivatives,
             (begin, end),
