@@ -104,9 +104,8 @@ class Component(Fmi2Slave):
         super().__init__(**kwargs)
         self.modelName = self.fmu_name
         self.description = (type(self).__doc__ or self.fmu_name).strip().splitlines()[0]
-        resources = self.resources
-        if resources in sys.path:
-            sys.path[:] = [entry for entry in sys.path if entry != resources]
+        if "logger" in kwargs:  # made by PythonFMU's library; its builder tidies up by itself
+            sys.path[:] = [entry for entry in sys.path if entry != self.resources]
         self._not_state = frozenset((*self.__dict__, "_not_state"))
         # Everything below, and whatever the subclass adds, is the FMU state.
         self._values: list[Any] = [
@@ -364,7 +363,8 @@ class Component(Fmi2Slave):
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
         try:
-            return pickle.loads(state)
+            restored = pickle.loads(state)
+            return restored if isinstance(restored, dict) else {}
         except BaseException:
             return {}
 

@@ -37,12 +37,6 @@ def to_xml(*, name: str, description: str, variables: Sequence[Variable]) -> Ele
         generationTool="yawbench",
         variableNamingConvention="flat",
     )
-    used = {v.unit for v in variables if v.unit is not None}
-    if used:
-        definitions = SubElement(root, "UnitDefinitions")
-        for unit in sorted(used):
-            exponents = {base: str(power) for base, power in UNITS[unit].items()}
-            SubElement(SubElement(definitions, "Unit", name=unit), "BaseUnit", exponents)
     SubElement(
         root,
         "CoSimulation",
@@ -55,6 +49,12 @@ def to_xml(*, name: str, description: str, variables: Sequence[Variable]) -> Ele
         canGetAndSetFMUstate="true",
         canSerializeFMUstate="true",
     )
+    used = {v.unit for v in variables if v.unit is not None}
+    if used:
+        definitions = SubElement(root, "UnitDefinitions")
+        for unit in sorted(used):
+            exponents = {base: str(power) for base, power in UNITS[unit].items()}
+            SubElement(SubElement(definitions, "Unit", name=unit), "BaseUnit", exponents)
     categories = SubElement(root, "LogCategories")
     for category, text in LOG_CATEGORIES.items():
         SubElement(categories, "Category", name=category, description=text)

@@ -127,6 +127,12 @@ def parameter(
     return field(default=default, metadata=metadata)
 
 
+def changed(parameters: type, name: str, default: float | int | bool | str) -> Any:
+    """Declare anew, with another default value, a field that a dataclass of parameters has."""
+    (original,) = (f for f in dataclasses.fields(parameters) if f.name == name)
+    return field(default=default, metadata=original.metadata)
+
+
 @dataclass(frozen=True)
 class NoParameters:
     """For a component that has none."""

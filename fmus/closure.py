@@ -1,0 +1,181 @@
+"""Which source files one FMU needs: the transitive closure of its imports, and nothing more.
+
+Only the closure is packed and only the closure is hashed, so touching `core/fuzzy.py` changes the
+FMUs that use it and no other. Imports are read from the syntax tree; nothing is executed. Every
+absolute import must be of the standard library, because the host's Python may have nothing else.
+Two are allowed and made relative: `components.<...>`, as a file outside this project writes it, and
+`pythonfmu.<...>`, of which each FMU carries its own copy, so that another FMU's version of
+PythonFMU in the same process cannot come between.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from orchestrator.errors import BuildError
+
+Parts = tuple[str, ...]
+"""A module's dotted name inside the package, split: ("controllers", "fnn")."""
+
+
+@dataclass(frozen=True)
+class _Module:
+    """One source file: its text, and the modules of the package it imports."""
+
+    text: str
+    imports: tuple[tuple[Parts, str], ...]  # and where: file:line
+
+
+class Sources:
+    """The source files of components, read and parsed once.
+
+    Args:
+        root: folder of the package `components`.
+        elsewhere: folder of the package -> a folder outside of `root` whose files come first.
+        pythonfmu: folder of the installed package `pythonfmu`.
+    """
+
+    def __init__(self, root: Path, *, pythonfmu: Path, elsewhere: Mapping[str, Path] | None = None) -> None:
+        self.root = root
+        self.pythonfmu = pythonfmu
+        self.elsewhere = dict(elsewhere or {})
+        self._modules: dict[Parts, _Module | None] = {}
+
+    def closure(self, module: Parts) -> dict[str, str]:
+        """Return path -> text of every file that importing `module` executes, sorted.
+
+        Raises:
+            BuildError: a file that is missing, cannot be parsed or imports what no FMU may.
+        """
+        files: dict[str, str] = {}
+        waiting = [(module, "")]
+        seen: set[Parts] = set()
+        while waiting:
+            parts, where = waiting.pop()
+            if parts in seen:
+                continue
+            seen.add(parts)
+            found = self._module(parts)
+            if found is None:
+                raise BuildError(f"{where}there is no module {'.'.join(parts)} in {self.root}")
+            waiting += [(parts[:i], where) for i in range(len(parts))]  # the packages above it
+            is_package = self._file(parts).name == "__init__.py"
+            files["/".join((*parts, "__init__") if is_package else parts) + ".py"] = found.text
+            waiting += found.imports
+        return dict(sorted(files.items()))
+
+    def _file(self, parts: Parts) -> Path:
+        """Return the file of a module or package, whether or not it exists."""
+        if parts[:1] == ("pythonfmu",):
+            return _module_file(self.pythonfmu, parts[1:])
+        if len(parts) > 1 and parts[0] in self.elsewhere:
+            file = _module_file(self.elsewhere[parts[0]], parts[1:])
+            if file.exists():
+                return file
+        return _module_file(self.root, parts)
+
+    def _module(self, parts: Parts) -> _Module | None:
+        """Return a module of the package, None if there is none."""
+        if parts not in self._modules:
+            file = self._file(parts)
+            found = None
+            if parts == ("pythonfmu",):
+                found = _Module(_PYTHONFMU, ())
+            elif file.exists():
+                found = self._parse(file, parts)
+            elif self.root.joinpath(*parts).is_dir() or (len(parts) == 1 and parts[0] in self.elsewhere):
+                found = _Module("", ())  # a folder without __init__.py
+            self._modules[parts] = found
+        return self._modules[parts]
+
+    def _parse(self, file: Path, parts: Parts) -> _Module:
+        name = _shown(file)
+        try:
+            text = file.read_text("utf-8").replace("\r\n", "\n")
+            tree = ast.parse(text)
+        except SyntaxError as error:
+            raise BuildError(f"{name}:{error.lineno}: {type(error).__name__}: {error.msg}") from None
+        except (OSError, ValueError) as error:
+            raise BuildError(f"{name}: cannot be read: {error}") from None
+        package = parts if file.name == "__init__.py" else parts[:-1]
+        lines = text.split("\n")
+        imports: list[tuple[Parts, str]] = []
+        for node in _imports(tree):
+            where = f"{name}:{node.lineno}"
+            if isinstance(node, ast.Import):
+                for alias in node.names:
+                    _check_standard(alias.name, where)
+                continue
+            base = self._base(node, package, where)
+            if base is None:
+                continue
+            if node.level == 0:
+                _make_relative(lines, node, levels=len(package) + 1)
+            modules = [base] + [(*base, a.name) for a in node.names if self._file((*base, a.name)).exists()]
+            imports += [(module, f"{where}: ") for module in modules]
+        return _Module("\n".join(lines), tuple(imports))
+
+    def _base(self, node: ast.ImportFrom, package: Parts, where: str) -> Parts | None:
+        """Return the module of the package that a `from` imports from, None for the standard library."""
+        names = tuple(node.module.split(".")) if node.module else ()
+        if node.level == 0:
+            if names[0] == "components":
+                return names[1:]
+            if names[0] == "pythonfmu" and len(names) > 1:
+                return names
+            _check_standard(".".join(names), where)
+            return None
+        if node.level > len(package) + 1:
+            raise BuildError(f"{where}: the relative import goes beyond the package of the components")
+        return package[: len(package) + 1 - node.level] + names
+
+
+_PYTHONFMU = '"""The part of PythonFMU 0.7.0 (MIT licence) that runs inside an FMU."""\n'
+
+
+def _module_file(folder: Path, parts: Parts) -> Path:
+    package = folder.joinpath(*parts, "__init__.py")
+    return package if package.exists() or not parts else folder.joinpath(*parts[:-1], parts[-1] + ".py")
+
+
+def _imports(tree: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
+    """Yield every import that runs, so none below `if TYPE_CHECKING:`."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            yield node
+        elif isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
+            for other in node.orelse:
+                yield from _imports(ast.Module([other], []))
+        else:
+            yield from _imports(node)
+
+
+def _check_standard(name: str, where: str) -> None:
+    top = name.partition(".")[0]
+    if top in ("components", "pythonfmu"):
+        raise BuildError(f"{where}: write 'from {name}{'.<module>' if name == top else ''} import ...'")
+    if top not in sys.stdlib_module_names:
+        raise BuildError(
+            f"{where}: imports {name}, which is outside the standard library; an FMU must run in a Python "
+            "that has nothing else installed"
+        )
+
+
+def _make_relative(lines: list[str], node: ast.ImportFrom, *, levels: int) -> None:
+    """Rewrite `from components.core.x` or `from pythonfmu.x` in place, keeping the line."""
+    line = lines[node.lineno - 1].encode()
+    head, tail = line[: node.col_offset].decode(), line[node.col_offset :].decode()
+    dots = "." * levels
+    tail = re.sub(r"^from\s+components(\.|\b)", f"from {dots}", tail)
+    tail = re.sub(r"^from\s+pythonfmu\.", f"from {dots}pythonfmu.", tail)
+    lines[node.lineno - 1] = head + tail
+
+
+def _shown(file: Path) -> str:
+    """Return a file's name as messages give it: the last folder and the file."""
+    return f"{file.parent.name}/{file.name}"

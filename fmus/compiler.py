@@ -1,0 +1,69 @@
+"""The launcher as a binary: compiled by cc once per source and compiler, then kept in a cache."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import platformdirs
+
+HERE = Path(__file__).resolve().parent
+SOURCES = ("launcher.c", "fmi2.h", "find_python.h", "text.h")
+FLAGS = ("-std=c11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-Wl,--build-id=none", "-s")
+LIBRARIES = ("-ldl", "-pthread")
+
+
+def compile_launcher(cache: Path | None = None) -> tuple[bytes | None, str]:
+    """Return the launcher for this machine, or None with the reason why there is none.
+
+    The same sources and the same compiler give the same bytes; another compiler may give others.
+    `CC` names a compiler other than `cc`. `cache` is a folder; default: the user's cache.
+    """
+    if sys.platform != "linux" or platform.machine() != "x86_64":
+        return None, f"it is for Linux on x86-64, this is {platform.system()} on {platform.machine()}"
+    command = shlex.split(os.environ.get("CC", "")) or ["cc"]
+    compiler = shutil.which(command[0])
+    if compiler is None:
+        return None, f"there is no C compiler ({command[0]})"
+    version = subprocess.run([*command, "--version"], capture_output=True, text=True, check=False).stdout
+    content = hashlib.sha256("\0".join([*command, version, *FLAGS, *LIBRARIES]).encode())
+    for name in SOURCES:
+        content.update((HERE / name).read_bytes())
+    folder = cache or platformdirs.user_cache_path("yawbench") / "launcher"
+    kept = folder / f"{content.hexdigest()[:16]}.so"
+    if kept.exists():
+        return kept.read_bytes(), ""
+    with tempfile.TemporaryDirectory() as temporary:
+        made = Path(temporary) / "launcher.so"
+        # Relative names: what the compiler writes must not depend on where the sources stand.
+        done = subprocess.run(
+            [*command, *FLAGS, "launcher.c", "-o", str(made), *LIBRARIES],
+            cwd=HERE,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if done.returncode != 0:
+            first = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[0]
+            return None, f"the C compiler failed: {first}"
+        binary = made.read_bytes()
+    _keep(kept, binary)
+    return binary, ""
+
+
+def _keep(file: Path, content: bytes) -> None:
+    """Write a file that others may be writing too; without the right to write there, do nothing."""
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=file.parent, delete=False) as draft:
+            draft.write(content)
+        os.replace(draft.name, file)
+    except OSError:
+        pass

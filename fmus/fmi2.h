@@ -1,0 +1,82 @@
+/* The types and functions of FMI 2.0 for co-simulation, as the standard (2.0.4) names them. */
+#ifndef YAWBENCH_FMI2_H
+#define YAWBENCH_FMI2_H
+
+#include <stddef.h>
+
+typedef void *fmi2Component;
+typedef void *fmi2ComponentEnvironment;
+typedef void *fmi2FMUstate;
+typedef unsigned int fmi2ValueReference;
+typedef double fmi2Real;
+typedef int fmi2Integer;
+typedef int fmi2Boolean;
+typedef char fmi2Char;
+typedef const fmi2Char *fmi2String;
+typedef char fmi2Byte;
+
+enum { fmi2False = 0, fmi2True = 1 };
+
+typedef enum { fmi2OK, fmi2Warning, fmi2Discard, fmi2Error, fmi2Fatal, fmi2Pending } fmi2Status;
+typedef enum { fmi2ModelExchange, fmi2CoSimulation } fmi2Type;
+typedef enum { fmi2DoStepStatus, fmi2PendingStatus, fmi2LastSuccessfulTime, fmi2Terminated } fmi2StatusKind;
+
+typedef void fmi2Logger(fmi2ComponentEnvironment, fmi2String instance, fmi2Status, fmi2String category,
+                        fmi2String message, ...);
+
+typedef struct {
+    fmi2Logger *logger;
+    void *(*allocateMemory)(size_t, size_t);
+    void (*freeMemory)(void *);
+    void (*stepFinished)(fmi2ComponentEnvironment, fmi2Status);
+    fmi2ComponentEnvironment componentEnvironment;
+} fmi2CallbackFunctions;
+
+/* Every function that answers with a status: X(name, parameters). */
+#define FMI2_STATUS_FUNCTIONS(X)                                                                            \
+    X(SetDebugLogging, (fmi2Component, fmi2Boolean, size_t, const fmi2String[]))                            \
+    X(SetupExperiment, (fmi2Component, fmi2Boolean, fmi2Real, fmi2Real, fmi2Boolean, fmi2Real))             \
+    X(EnterInitializationMode, (fmi2Component))                                                             \
+    X(ExitInitializationMode, (fmi2Component))                                                              \
+    X(Terminate, (fmi2Component))                                                                           \
+    X(Reset, (fmi2Component))                                                                               \
+    X(GetReal, (fmi2Component, const fmi2ValueReference[], size_t, fmi2Real[]))                             \
+    X(GetInteger, (fmi2Component, const fmi2ValueReference[], size_t, fmi2Integer[]))                       \
+    X(GetBoolean, (fmi2Component, const fmi2ValueReference[], size_t, fmi2Boolean[]))                       \
+    X(GetString, (fmi2Component, const fmi2ValueReference[], size_t, fmi2String[]))                         \
+    X(SetReal, (fmi2Component, const fmi2ValueReference[], size_t, const fmi2Real[]))                       \
+    X(SetInteger, (fmi2Component, const fmi2ValueReference[], size_t, const fmi2Integer[]))                 \
+    X(SetBoolean, (fmi2Component, const fmi2ValueReference[], size_t, const fmi2Boolean[]))                 \
+    X(SetString, (fmi2Component, const fmi2ValueReference[], size_t, const fmi2String[]))                   \
+    X(GetFMUstate, (fmi2Component, fmi2FMUstate *))                                                         \
+    X(SetFMUstate, (fmi2Component, fmi2FMUstate))                                                           \
+    X(FreeFMUstate, (fmi2Component, fmi2FMUstate *))                                                        \
+    X(SerializedFMUstateSize, (fmi2Component, fmi2FMUstate, size_t *))                                      \
+    X(SerializeFMUstate, (fmi2Component, fmi2FMUstate, fmi2Byte[], size_t))                                 \
+    X(DeSerializeFMUstate, (fmi2Component, const fmi2Byte[], size_t, fmi2FMUstate *))                       \
+    X(GetDirectionalDerivative, (fmi2Component, const fmi2ValueReference[], size_t,                         \
+                                 const fmi2ValueReference[], size_t, const fmi2Real[], fmi2Real[]))         \
+    X(SetRealInputDerivatives, (fmi2Component, const fmi2ValueReference[], size_t, const fmi2Integer[],     \
+                                const fmi2Real[]))                                                          \
+    X(GetRealOutputDerivatives, (fmi2Component, const fmi2ValueReference[], size_t, const fmi2Integer[],    \
+                                 fmi2Real[]))                                                               \
+    X(DoStep, (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean))                                             \
+    X(CancelStep, (fmi2Component))                                                                          \
+    X(GetStatus, (fmi2Component, const fmi2StatusKind, fmi2Status *))                                       \
+    X(GetRealStatus, (fmi2Component, const fmi2StatusKind, fmi2Real *))                                     \
+    X(GetIntegerStatus, (fmi2Component, const fmi2StatusKind, fmi2Integer *))                               \
+    X(GetBooleanStatus, (fmi2Component, const fmi2StatusKind, fmi2Boolean *))                               \
+    X(GetStringStatus, (fmi2Component, const fmi2StatusKind, fmi2String *))
+
+/* fmi2<name>Fn is a pointer to the function fmi2<name>. */
+#define FMI2_POINTER_TYPE(name, parameters) typedef fmi2Status(*fmi2##name##Fn) parameters;
+FMI2_STATUS_FUNCTIONS(FMI2_POINTER_TYPE)
+#undef FMI2_POINTER_TYPE
+
+typedef fmi2String (*fmi2GetVersionFn)(void);
+typedef fmi2Component (*fmi2InstantiateFn)(fmi2String name, fmi2Type, fmi2String guid, fmi2String resources,
+                                           const fmi2CallbackFunctions *, fmi2Boolean visible,
+                                           fmi2Boolean logging_on);
+typedef void (*fmi2FreeInstanceFn)(fmi2Component);
+
+#endif

@@ -1,0 +1,611 @@
+/* The FMU's binary on Linux: provides Python, then passes every call on to PythonFMU's library.
+ *
+ * PythonFMU 0.7.0's own library has no link to libpython, so only a host that is itself a Python
+ * could load it. This launcher lies in its place and opens it, from beside itself, at the first
+ * instantiation. On the way it mends what the library gets wrong for every host:
+ *
+ * - the resource location is decoded in full, not only "%20";
+ * - an error that the component logged becomes the status of the call during which it was logged,
+ *   and errors are logged even if debug logging is off, so that no host can miss them;
+ * - after fmi2Fatal the instance has been released already: nothing is called on it any more;
+ * - reset makes a new instance, because the library touches a freed list if that fails;
+ * - arguments that are NULL, empty or no UTF-8 are refused instead of ending the process.
+ */
+#define _GNU_SOURCE
+
+#include <pthread.h>
+#include <stdarg.h>
+#include <stdint.h>
+
+#include "fmi2.h"
+
+#include "find_python.h"
+#include "text.h"
+
+#define EXPORT __attribute__((visibility("default")))
+#define UNLIKELY(x) __builtin_expect(!!(x), 0)
+#define PYTHONFMU "libpythonfmu-export.so"
+
+/* PythonFMU's library: loaded once, by whoever instantiates first. */
+static struct {
+    void *handle;
+    fmi2InstantiateFn Instantiate;
+    fmi2FreeInstanceFn FreeInstance;
+#define MEMBER(name, parameters) fmi2##name##Fn name;
+    FMI2_STATUS_FUNCTIONS(MEMBER)
+#undef MEMBER
+} library;
+static Python python;
+static pthread_mutex_t loading = PTHREAD_MUTEX_INITIALIZER;
+
+typedef struct {
+    fmi2Component stock; /* PythonFMU's instance */
+    fmi2CallbackFunctions host;
+    fmi2CallbackFunctions own;
+    char *name;
+    char *resources;
+    fmi2Boolean visible;
+    bool error_logged; /* during the call in progress */
+    bool failed;       /* an error has been logged since the last reset or restored state */
+    bool dead;         /* PythonFMU's instance has been released by a fatal error */
+    bool log_all;
+    char **categories; /* the host's choice; none means all */
+    size_t n_categories;
+    fmi2FMUstate *states; /* not freed yet */
+    size_t n_states;
+} Instance;
+
+/* ---- log ---- */
+
+/* Send a message of the launcher's own to the host; its text must hold no '%'. */
+static void tell(const fmi2CallbackFunctions *host, const char *name, const char *text)
+{
+    char *safe = double_percent(text);
+    if (host->logger != NULL && safe != NULL) {
+        host->logger(host->componentEnvironment, name, fmi2Error, "logStatusError", safe);
+    }
+    free(safe);
+}
+
+/* Messages of a failure reach every host; the rest only those that asked for debug logging. */
+static bool wanted(const Instance *in, fmi2Status status, const char *category)
+{
+    if (status != fmi2OK && strcmp(category, "traceback") != 0) {
+        return true;
+    }
+    if (!in->log_all || in->n_categories == 0) {
+        return in->log_all;
+    }
+    for (size_t i = 0; i < in->n_categories; i++) {
+        if (strcmp(in->categories[i], category) == 0 || strcmp(in->categories[i], "logAll") == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* The logger that PythonFMU's library sees; the component has doubled its '%' already. */
+static void relay(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category,
+                  fmi2String message, ...)
+{
+    (void)name;
+    Instance *in = environment;
+    if (status == fmi2Error || status == fmi2Fatal) {
+        in->error_logged = true;
+    }
+    char *safe = NULL;
+    if (category == NULL) { /* from the library itself, which doubles nothing */
+        category = status == fmi2Fatal ? "logStatusFatal" : status == fmi2OK ? "logAll" : "logStatusError";
+        message = safe = double_percent(message);
+    }
+    if (in->host.logger != NULL && message != NULL && wanted(in, status, category)) {
+        in->host.logger(in->host.componentEnvironment, in->name, status, category, message);
+    }
+    free(safe);
+}
+
+/* Return the status of a call that PythonFMU's library answered with `status`. */
+static fmi2Status settled(Instance *in, fmi2Status status)
+{
+    in->dead = in->dead || status == fmi2Fatal;
+    in->failed = in->failed || in->error_logged;
+    bool hidden = in->error_logged && status < fmi2Error;
+    in->error_logged = false;
+    return hidden ? fmi2Error : status;
+}
+
+static inline fmi2Status checked(Instance *in, fmi2Status status)
+{
+    return UNLIKELY(in->error_logged || status == fmi2Fatal) ? settled(in, status) : status;
+}
+
+static fmi2Status refused(Instance *in, const char *text)
+{
+    tell(&in->host, in->name, text);
+    return fmi2Error;
+}
+
+/* Leave the calling function unless its instance `c` is there and alive. */
+#define INSTANCE(c)                                                                                                    \
+    Instance *in = (c);                                                                                                \
+    if (UNLIKELY(in == NULL || in->dead)) {                                                                            \
+        return in == NULL ? fmi2Error : fmi2Fatal;                                                                     \
+    }
+
+#define REQUIRE(condition, text)                                                                                       \
+    if (UNLIKELY(!(condition))) {                                                                                      \
+        return refused(in, text);                                                                                      \
+    }
+
+/* ---- loading ---- */
+
+/* Write the folder of this very file to `folder`. */
+static bool own_folder(char folder[PATH_MAX])
+{
+    Dl_info own;
+    return dladdr(&library, &own) != 0 && realpath(own.dli_fname, folder) != NULL && to_parent(folder);
+}
+
+static bool open_library(char *problem, size_t size)
+{
+    char folder[PATH_MAX], file[PATH_MAX + sizeof PYTHONFMU + 1];
+    if (!own_folder(folder)) {
+        snprintf(problem, size, "the folder of the FMU's binary cannot be found");
+        return false;
+    }
+    snprintf(file, sizeof file, "%s/" PYTHONFMU, folder);
+    void *handle = dlopen(file, RTLD_NOW | RTLD_LOCAL);
+    if (handle == NULL) {
+        snprintf(problem, size, "PythonFMU's library cannot be opened: %s", dlerror());
+        return false;
+    }
+    const struct {
+        const char *name;
+        void *slot;
+    } functions[] = {
+        {"fmi2Instantiate", &library.Instantiate},
+        {"fmi2FreeInstance", &library.FreeInstance},
+#define SLOT(name, parameters) {"fmi2" #name, &library.name},
+        FMI2_STATUS_FUNCTIONS(SLOT)
+#undef SLOT
+    };
+    for (size_t i = 0; i < sizeof functions / sizeof *functions; i++) {
+        void *symbol = dlsym(handle, functions[i].name);
+        if (symbol == NULL) {
+            snprintf(problem, size, "%s has no function %s", file, functions[i].name);
+            dlclose(handle);
+            return false;
+        }
+        memcpy(functions[i].slot, &symbol, sizeof symbol);
+    }
+    library.handle = handle;
+    return true;
+}
+
+static bool load(char *problem, size_t size)
+{
+    pthread_mutex_lock(&loading);
+    bool ready = library.handle != NULL || (provide_python(&python, problem, size) && open_library(problem, size));
+    pthread_mutex_unlock(&loading);
+    return ready;
+}
+
+/* The FMU is being unloaded: take PythonFMU's library along. Python itself stays. */
+__attribute__((destructor)) static void unload(void)
+{
+    if (library.handle != NULL) {
+        dlclose(library.handle);
+    }
+}
+
+/* ---- resources ---- */
+
+/* True if `folder` holds what PythonFMU's library is going to read without looking. */
+static bool is_complete(const char *folder)
+{
+    char file[PATH_MAX], module[256] = "";
+    int length = snprintf(file, sizeof file, "%s/slavemodule.txt", folder);
+    FILE *text = length < (int)sizeof file ? fopen(file, "r") : NULL;
+    if (text == NULL) {
+        return false;
+    }
+    bool named = fgets(module, sizeof module, text) != NULL;
+    fclose(text);
+    module[strcspn(module, "\r\n")] = '\0';
+    return named && exists("%s/%s.py", folder, module);
+}
+
+/* Return the resource folder as PythonFMU's library must be told it; NULL with a sentence in `problem`. */
+static char *find_resources(const char *location, char *problem, size_t size)
+{
+    char folder[PATH_MAX], own[PATH_MAX + sizeof "/../../resources"];
+    char *decoded = strdup(location == NULL ? "" : without_scheme(location));
+    char *plain = decoded == NULL ? NULL : strdup(decoded);
+    if (plain == NULL) {
+        free(decoded);
+        snprintf(problem, size, "out of memory");
+        return NULL;
+    }
+    decode_percent(decoded);
+    own[0] = '\0';
+    if (own_folder(folder)) { /* by the standard's layout; for a host that names no location, or a wrong one */
+        snprintf(own, sizeof own, "%s/../../resources", folder);
+    }
+    const char *candidates[] = {decoded, plain, own};
+    char *found = NULL;
+    for (size_t i = 0; found == NULL && i < sizeof candidates / sizeof *candidates; i++) {
+        if (candidates[i][0] != '\0' && realpath(candidates[i], folder) != NULL && is_complete(folder)) {
+            found = spelled_for_pythonfmu(folder);
+            if (found == NULL || !is_utf8(folder)) {
+                snprintf(problem, size, "the FMU lies in a folder that PythonFMU cannot read: %s", folder);
+                free(found);
+                free(decoded);
+                free(plain);
+                return NULL;
+            }
+        }
+    }
+    if (found == NULL) {
+        snprintf(problem, size, "the FMU's resources are incomplete or not at %s", location == NULL ? "(none)" : location);
+    }
+    free(decoded);
+    free(plain);
+    return found;
+}
+
+/* ---- FMI: life cycle ---- */
+
+EXPORT fmi2String fmi2GetTypesPlatform(void)
+{
+    return "default";
+}
+
+EXPORT fmi2String fmi2GetVersion(void)
+{
+    return "2.0";
+}
+
+static void choose_categories(Instance *in, size_t count, const fmi2String categories[])
+{
+    for (size_t i = 0; i < in->n_categories; i++) {
+        free(in->categories[i]);
+    }
+    free(in->categories);
+    in->n_categories = 0;
+    in->categories = count > 0 && categories != NULL ? calloc(count, sizeof *in->categories) : NULL;
+    for (size_t i = 0; in->categories != NULL && i < count; i++) {
+        char *copy = categories[i] == NULL ? NULL : strdup(categories[i]);
+        if (copy != NULL) {
+            in->categories[in->n_categories++] = copy;
+        }
+    }
+}
+
+static void discard(Instance *in)
+{
+    choose_categories(in, 0, NULL);
+    free(in->states);
+    free(in->name);
+    free(in->resources);
+    free(in);
+}
+
+/* PythonFMU's library always logs, so that no error passes unseen; `wanted` decides for the host. */
+static fmi2Component new_stock(Instance *in)
+{
+    return library.Instantiate(in->name, fmi2CoSimulation, "", in->resources, &in->own, in->visible, fmi2True);
+}
+
+EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String location,
+                                     const fmi2CallbackFunctions *functions, fmi2Boolean visible,
+                                     fmi2Boolean logging_on)
+{
+    (void)guid; /* not known here: the same launcher serves every FMU */
+    char problem[2 * PATH_MAX];
+    if (functions == NULL) {
+        return NULL;
+    }
+    if (name == NULL || *name == '\0' || !is_utf8(name)) {
+        tell(functions, "", "fmi2Instantiate needs an instance name in UTF-8");
+        return NULL;
+    }
+    if (type != fmi2CoSimulation) {
+        tell(functions, name, "this FMU is for co-simulation only");
+        return NULL;
+    }
+    if (!load(problem, sizeof problem)) {
+        tell(functions, name, problem);
+        return NULL;
+    }
+    Instance *in = calloc(1, sizeof *in);
+    if (in == NULL) {
+        return NULL;
+    }
+    in->host = *functions;
+    in->own = (fmi2CallbackFunctions){relay, functions->allocateMemory, functions->freeMemory, NULL, in};
+    in->name = strdup(name);
+    in->visible = visible;
+    in->log_all = logging_on != fmi2False;
+    in->resources = find_resources(location, problem, sizeof problem);
+    if (in->resources == NULL) {
+        tell(functions, name, problem);
+    } else if (in->name != NULL) {
+        in->stock = new_stock(in);
+        in->error_logged = false;
+    }
+    if (in->stock == NULL) {
+        discard(in);
+        return NULL;
+    }
+    return in;
+}
+
+EXPORT void fmi2FreeInstance(fmi2Component c)
+{
+    Instance *in = c;
+    if (in == NULL) {
+        return;
+    }
+    for (size_t i = 0; i < in->n_states; i++) {
+        library.FreeFMUstate(in->stock, &in->states[i]);
+    }
+    if (!in->dead) {
+        library.FreeInstance(in->stock);
+    }
+    discard(in);
+}
+
+EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean logging_on, size_t count,
+                                      const fmi2String categories[])
+{
+    INSTANCE(c)
+    REQUIRE(count == 0 || categories != NULL, "fmi2SetDebugLogging: no categories given")
+    in->log_all = logging_on != fmi2False;
+    choose_categories(in, count, categories);
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance,
+                                      fmi2Real start, fmi2Boolean stop_defined, fmi2Real stop)
+{
+    INSTANCE(c)
+    return checked(in, library.SetupExperiment(in->stock, tolerance_defined, tolerance, start, stop_defined, stop));
+}
+
+EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
+{
+    INSTANCE(c)
+    return checked(in, library.EnterInitializationMode(in->stock));
+}
+
+EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
+{
+    INSTANCE(c)
+    return checked(in, library.ExitInitializationMode(in->stock));
+}
+
+EXPORT fmi2Status fmi2Terminate(fmi2Component c)
+{
+    INSTANCE(c)
+    return checked(in, library.Terminate(in->stock));
+}
+
+EXPORT fmi2Status fmi2Reset(fmi2Component c)
+{
+    INSTANCE(c)
+    fmi2Component fresh = new_stock(in);
+    in->error_logged = false;
+    if (fresh == NULL) {
+        return fmi2Error;
+    }
+    library.FreeInstance(in->stock);
+    in->stock = fresh;
+    in->failed = false;
+    return checked(in, fmi2OK);
+}
+
+/* ---- FMI: values ---- */
+
+#define GET(Type)                                                                                                      \
+    EXPORT fmi2Status fmi2Get##Type(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2##Type value[])      \
+    {                                                                                                                  \
+        INSTANCE(c)                                                                                                    \
+        if (UNLIKELY(n == 0)) {                                                                                        \
+            return fmi2OK;                                                                                             \
+        }                                                                                                              \
+        REQUIRE(vr != NULL && value != NULL, "fmi2Get" #Type ": value references or values are missing")              \
+        return checked(in, library.Get##Type(in->stock, vr, n, value));                                                \
+    }
+
+#define SET(Type, check)                                                                                               \
+    EXPORT fmi2Status fmi2Set##Type(fmi2Component c, const fmi2ValueReference vr[], size_t n,                          \
+                                    const fmi2##Type value[])                                                          \
+    {                                                                                                                  \
+        INSTANCE(c)                                                                                                    \
+        if (UNLIKELY(n == 0)) {                                                                                        \
+            return fmi2OK;                                                                                             \
+        }                                                                                                              \
+        REQUIRE(vr != NULL && value != NULL, "fmi2Set" #Type ": value references or values are missing")              \
+        check return checked(in, library.Set##Type(in->stock, vr, n, value));                                          \
+    }
+
+static bool all_utf8(size_t n, const fmi2String value[])
+{
+    for (size_t i = 0; i < n; i++) {
+        if (value[i] == NULL || !is_utf8(value[i])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+GET(Real)
+GET(Integer)
+GET(Boolean)
+GET(String)
+SET(Real, )
+SET(Integer, )
+SET(Boolean, )
+SET(String, REQUIRE(all_utf8(n, value), "fmi2SetString: a string is missing or not UTF-8"))
+
+/* ---- FMI: state ---- */
+
+/* Take note of a new state, so that none outlives its instance. */
+static void keep(Instance *in, fmi2FMUstate state)
+{
+    fmi2FMUstate *states = realloc(in->states, (in->n_states + 1) * sizeof *states);
+    if (states != NULL) {
+        in->states = states;
+        states[in->n_states++] = state;
+    }
+}
+
+static bool forget(Instance *in, fmi2FMUstate state)
+{
+    for (size_t i = 0; i < in->n_states; i++) {
+        if (in->states[i] == state) {
+            in->states[i] = in->states[--in->n_states];
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool is_empty(fmi2FMUstate state)
+{
+    int lock = python.PyGILState_Ensure();
+    bool empty = python.PyDict_Size(state) <= 0;
+    python.PyGILState_Release(lock);
+    return empty;
+}
+
+/* Hand a new state over in place of the one that `*target` may hold; a failed unit gives an empty one. */
+static fmi2Status deliver(Instance *in, fmi2Status status, fmi2FMUstate fresh, fmi2FMUstate *target, const char *failure)
+{
+    if (status == fmi2OK && is_empty(fresh)) {
+        library.FreeFMUstate(in->stock, &fresh);
+        return refused(in, failure);
+    }
+    if (status == fmi2OK) {
+        if (*target != NULL && forget(in, *target)) {
+            library.FreeFMUstate(in->stock, target);
+        }
+        keep(in, fresh);
+        *target = fresh;
+    }
+    return status;
+}
+
+EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
+{
+    INSTANCE(c)
+    REQUIRE(state != NULL, "fmi2GetFMUstate: no place for the state")
+    fmi2FMUstate fresh = NULL;
+    fmi2Status status = checked(in, library.GetFMUstate(in->stock, &fresh));
+    if (status == fmi2Error && fresh != NULL) {
+        library.FreeFMUstate(in->stock, &fresh);
+    }
+    return deliver(in, status, fresh, state, "fmi2GetFMUstate: the state is empty");
+}
+
+EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
+{
+    INSTANCE(c)
+    REQUIRE(state != NULL, "fmi2SetFMUstate: no state given")
+    in->failed = false;
+    return checked(in, library.SetFMUstate(in->stock, state));
+}
+
+EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
+{
+    Instance *in = c;
+    if (in == NULL) {
+        return fmi2Error;
+    }
+    if (state == NULL || *state == NULL) {
+        return fmi2OK;
+    }
+    forget(in, *state);
+    fmi2Status status = library.FreeFMUstate(in->stock, state);
+    *state = NULL;
+    return status;
+}
+
+EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
+{
+    INSTANCE(c)
+    REQUIRE(state != NULL && size != NULL, "fmi2SerializedFMUstateSize: no state, or no place for its size")
+    fmi2Status status = checked(in, library.SerializedFMUstateSize(in->stock, state, size));
+    REQUIRE(status != fmi2OK || *size > 0, "fmi2SerializedFMUstateSize: this state cannot be serialized")
+    return status;
+}
+
+EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+{
+    INSTANCE(c)
+    REQUIRE(bytes != NULL, "fmi2SerializeFMUstate: no place for the bytes")
+    size_t needed = 0; /* the library copies `size` bytes, however many there are */
+    fmi2Status status = fmi2SerializedFMUstateSize(c, state, &needed);
+    REQUIRE(status != fmi2OK || size >= needed, "fmi2SerializeFMUstate: the place for the bytes is too small")
+    return status != fmi2OK ? status : checked(in, library.SerializeFMUstate(in->stock, state, bytes, needed));
+}
+
+EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+{
+    INSTANCE(c)
+    REQUIRE(bytes != NULL && state != NULL, "fmi2DeSerializeFMUstate: no bytes, or no place for the state")
+    fmi2FMUstate fresh = NULL;
+    fmi2Status status = checked(in, library.DeSerializeFMUstate(in->stock, bytes, size, &fresh));
+    return deliver(in, status, fresh, state, "fmi2DeSerializeFMUstate: these bytes are no state of this FMU");
+}
+
+/* ---- FMI: step ---- */
+
+EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_set_state_prior)
+{
+    INSTANCE(c)
+    fmi2Status status = checked(in, library.DoStep(in->stock, t, h, no_set_state_prior));
+    return UNLIKELY(status == fmi2Discard && in->failed) ? fmi2Error : status;
+}
+
+EXPORT fmi2Status fmi2CancelStep(fmi2Component c)
+{
+    INSTANCE(c)
+    return checked(in, library.CancelStep(in->stock));
+}
+
+EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t n_unknown,
+                                               const fmi2ValueReference known[], size_t n_known,
+                                               const fmi2Real d_known[], fmi2Real d_unknown[])
+{
+    INSTANCE(c)
+    return checked(in, library.GetDirectionalDerivative(in->stock, unknown, n_unknown, known, n_known, d_known, d_unknown));
+}
+
+EXPORT fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                                              const fmi2Integer order[], const fmi2Real value[])
+{
+    INSTANCE(c)
+    return checked(in, library.SetRealInputDerivatives(in->stock, vr, n, order, value));
+}
+
+EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                                               const fmi2Integer order[], fmi2Real value[])
+{
+    INSTANCE(c)
+    return checked(in, library.GetRealOutputDerivatives(in->stock, vr, n, order, value));
+}
+
+#define STATUS(Name, Type)                                                                                             \
+    EXPORT fmi2Status fmi2Get##Name(fmi2Component c, const fmi2StatusKind kind, Type *value)                           \
+    {                                                                                                                  \
+        INSTANCE(c)                                                                                                    \
+        REQUIRE(value != NULL, "fmi2Get" #Name ": no place for the value")                                            \
+        return checked(in, library.Get##Name(in->stock, kind, value));                                                 \
+    }
+
+STATUS(Status, fmi2Status)
+STATUS(RealStatus, fmi2Real)
+STATUS(IntegerStatus, fmi2Integer)
+STATUS(BooleanStatus, fmi2Boolean)
+STATUS(StringStatus, fmi2String)

@@ -1,0 +1,212 @@
+"""A component's sources as a package of its own, imported apart from everything else.
+
+Building imports the component, because PythonFMU asks the class for its model description. Its
+modules carry the name `yawbench_<hash>`, are taken out of `sys.modules` again afterwards, and
+modules of the same name that are in use (an FMU that is loaded in this process) are put back.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import sys
+import tempfile
+import traceback
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pythonfmu
+import pythonfmu.fmi2slave
+from pythonfmu import FmuBuilder
+
+from components.core.roles import Role, wheels
+from orchestrator.errors import BuildError
+
+from .closure import Parts
+
+PYTHONFMU = Path(pythonfmu.__file__).resolve().parent
+"""Folder of the installed PythonFMU."""
+
+ENTRY = '''"""Entry module of the FMU {name}."""
+
+from {package}.{module} import {component}
+
+# At every instantiation PythonFMU's library runs these lines once more, with locals of their own,
+# and then gives back a reference to the globals that it never took. Here it gets one.
+if locals() is not globals():
+    try:
+        from ctypes import py_object, pythonapi
+
+        pythonapi.Py_IncRef(py_object(globals()))
+    except Exception:  # a Python without ctypes
+        globals().setdefault("_references", []).append(globals())
+'''
+
+VARIANT = '''"""{module} with a name or default values of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..core.variables import changed
+from .{module} import {component} as Base
+
+
+@dataclass(frozen=True)
+class Parameters(Base.Parameters):
+    """The parameters with other defaults."""
+
+{fields}
+
+
+class {component}(Base):
+    fmu_name = {name!r}
+    Parameters = Parameters
+
+
+{component}.__doc__ = Base.__doc__
+'''
+
+
+@contextmanager
+def apart(*packages: str) -> Iterator[None]:
+    """Import modules of these packages afresh, and leave no trace of them behind."""
+
+    def ours(name: str) -> bool:
+        return name.partition(".")[0] in packages
+
+    path, quiet = list(sys.path), sys.dont_write_bytecode
+    in_use = {name: module for name, module in sys.modules.items() if ours(name)}
+    for name in in_use:
+        del sys.modules[name]
+    sys.dont_write_bytecode = True
+    importlib.invalidate_caches()
+    try:
+        yield
+    finally:
+        sys.path[:], sys.dont_write_bytecode = path, quiet
+        for name in [name for name in sys.modules if ours(name)]:
+            del sys.modules[name]
+        sys.modules.update(in_use)
+
+
+class Stage:
+    """A folder with the package of one component, for as long as the context lasts."""
+
+    def __init__(self, folder: Path, package: str, entry: str) -> None:
+        self.folder = folder
+        self.package = package
+        self.entry = entry
+
+    def component(self, module: Parts) -> type[Any]:
+        """Return the component class that a module of the package defines.
+
+        Raises:
+            BuildError: importing it fails, or it defines none or several.
+        """
+        name = f"{self.package}.{'.'.join(module)}"
+        try:
+            base = importlib.import_module(f"{self.package}.core.component").Component
+            loaded = importlib.import_module(name)
+        except (Exception, SystemExit) as error:
+            raise BuildError(self.explain(error)) from None
+        found = [
+            value
+            for value in vars(loaded).values()
+            if inspect.isclass(value) and issubclass(value, base) and value.__module__ == name
+        ]
+        final = [c for c in found if not any(other is not c and issubclass(other, c) for other in found)]
+        if len(final) != 1:
+            names = ", ".join(c.__name__ for c in final)
+            raise BuildError(f"defines {'components ' + names if names else 'no component'}; one is right")
+        return final[0]
+
+    def build(self, name: str, component: type[Any]) -> Path:
+        """Let PythonFMU's builder write the FMU `name`; return its path."""
+        script = self.folder / f"{self.entry}.py"
+        module = component.__module__.partition(".")[2]
+        script.write_text(
+            ENTRY.format(name=name, package=self.package, module=module, component=component.__name__),
+            "utf-8",
+        )
+        try:
+            return FmuBuilder.build_FMU(
+                script, dest=self.folder / "built", project_files=[self.folder / self.package]
+            )
+        except (Exception, SystemExit) as error:
+            raise BuildError(self.explain(error)) from None
+
+    def explain(self, error: BaseException) -> str:
+        """Return an exception as one sentence with the file and line of the package it came from."""
+        where = ""
+        inside = str(self.folder / self.package)
+        for frame in traceback.extract_tb(error.__traceback__):
+            if frame.filename.startswith(inside):
+                where = f" ({frame.filename[len(inside) + 1 :].replace(chr(92), '/')}:{frame.lineno})"
+        return f"{type(error).__name__}: {error}{where}"
+
+
+@contextmanager
+def staged(files: Mapping[str, str], package: str, entry: str) -> Iterator[Stage]:
+    """Write `files` as the package `package` into a temporary folder that can be imported from.
+
+    The package's own copy of PythonFMU stands in for the installed one here, so that PythonFMU's
+    builder recognises the component.
+    """
+    with tempfile.TemporaryDirectory(prefix="yawbench_") as temporary, apart(package, entry):
+        folder = Path(temporary).resolve()
+        for path, text in files.items():
+            file = folder / package / path
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(text.encode())
+        sys.path.insert(0, str(folder))
+        importlib.invalidate_caches()
+        for name in [name for name in sys.modules if name.partition(".")[0] == "pythonfmu"]:
+            sys.modules[f"{package}.{name}"] = sys.modules[name]
+        yield Stage(folder, package, entry)
+
+
+def variant(component: type[Any], name: str, defaults: Mapping[str, Any]) -> str:
+    """Return the source of a module that gives a component another name and other defaults.
+
+    Raises:
+        BuildError: a default for something that is no parameter, of the wrong type, or not allowed.
+    """
+    parameters = {v.name: v for v in component.variables if v.causality == "parameter"}
+    annotation = {"Real": "float", "Integer": "int", "Boolean": "bool", "String": "str"}
+    package = component.__module__.partition(".")[0]
+    check = importlib.import_module(f"{package}.core.variables").check_parameter
+    fields = []
+    for key, value in defaults.items():
+        if key not in parameters:
+            raise BuildError(f"has no parameter {key!r}; it has: {', '.join(parameters) or 'none'}")
+        kind = annotation[parameters[key].type]
+        if kind == "float" and type(value) is int:
+            value = float(value)
+        if type(value).__name__ != kind:
+            raise BuildError(f"parameter {key} is of type {kind}, not {type(value).__name__}")
+        try:
+            check(parameters[key], value)
+        except ValueError as error:
+            raise BuildError(str(error)) from None
+        fields.append(f"    {key}: {kind} = changed(Base.Parameters, {key!r}, {value!r})")
+    module = component.__module__.rpartition(".")[2]
+    return VARIANT.format(
+        module=module, component=component.__name__, name=name, fields="\n".join(fields)
+    ).replace("\n\n\n\n\n", "\n\n\n")
+
+
+def missing_signals(role: Role, variables: Iterable[Any]) -> list[str]:
+    """Return one sentence per signal that the role demands and the component does not declare."""
+    declared = {(v.causality, v.name) for v in variables}
+    problems = []
+    for causality, patterns in (("input", role.inputs), ("output", role.outputs)):
+        for pattern in patterns:
+            names = wheels(pattern)
+            lacking = [name for name in names if (causality, name) not in declared]
+            if lacking:
+                shown = pattern if len(lacking) == len(names) else ", ".join(lacking)
+                problems.append(f"a {role.name} must declare the {causality} {shown}")
+    return problems
