@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import itertools
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -44,13 +45,15 @@ class Log:
     def __init__(self) -> None:
         self.messages: list[Message] = []
         self.dropped = 0
+        self._counts: Counter[str] = Counter()
         self.time = ctypes.c_double(0.0)  # [s], moved on by the master
 
     def add(self, unit: str, status: int, category: str, text: str) -> None:
         """Keep a message; those with the status OK are of no interest."""
         if status == OK:
             return
-        if sum(m.unit == unit for m in self.messages) >= KEPT:
+        self._counts[unit] += 1
+        if self._counts[unit] > KEPT:
             self.dropped += 1
             return
         self.messages.append(Message(unit, self.time.value, status, category, text.rstrip()))

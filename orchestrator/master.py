@@ -136,7 +136,7 @@ class Master:
         station.slave.note(status)
         if status == WARNING:
             if not any(m.unit == operation.unit for m in self.log.warnings()):
-                self.log.add(operation.unit, WARNING, "", f"fmi2 {operation.kind} returned Warning")
+                self.log.add(operation.unit, WARNING, "", f"the {operation.kind} returned Warning")
             return
         self._check_finite(k)  # a value that went wrong upstream explains this failure
         time = self.plan.time(k - station.unit.period)

@@ -92,7 +92,7 @@ class Recorder:
                 view = view[self._file.write(view) :]
         except OSError as error:
             self._cut_back(data[: len(data) - len(view)])
-            raise ResultsError(f"{self._path}: cannot be written: {_reason(error)}.") from None
+            raise ResultsError(f"{self.folder / RESULTS_FILE}: cannot be written: {_reason(error)}.") from None
         self._size += len(data)
 
     def _cut_back(self, arrived: bytes) -> None:

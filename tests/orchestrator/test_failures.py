@@ -1,0 +1,300 @@
+import json
+import math
+import os
+import signal
+
+import pytest
+
+from orchestrator.errors import SimulationError
+from orchestrator.log import DISCARD, ERROR, FATAL, OK, PENDING, WARNING
+from orchestrator.results import load_results
+from orchestrator.simulate import simulate
+
+from .fakes import Behaviour, Clock, FakeSlave, Function, Stage, make_plan
+
+
+class Passing(Behaviour):
+    """y follows x and the unit does something of the test's choice in every step."""
+
+    inputs = ("x",)
+    outputs = {"y": ("x",)}
+
+    def __init__(self, act=lambda t: None):
+        self.act = act
+
+    def advance(self, t, h, u):
+        self.act(t)
+
+    def output(self, t, u):
+        return {"y": u["x"]}
+
+
+def fail(tmp_path, units, wires, *, opener=None, **options):
+    """Run fake units to the error they make; return its sentence, the results and the slaves."""
+    stage = opener or Stage(units)
+    with pytest.raises(SimulationError) as caught:
+        simulate(make_plan(units, wires, **options), tmp_path, opener=stage)
+    assert caught.value.exit_status == 1
+    return str(caught.value), load_results(tmp_path), stage.slaves
+
+
+def ramp_into(act):
+    return {"source": Clock(x=lambda t: 10.0 * t), "target": Passing(act)}
+
+
+def raise_at(when, error):
+    def act(t):
+        if t >= when:
+            raise error
+
+    return act
+
+
+def test_a_failed_step_is_one_sentence_with_unit_time_and_reason(tmp_path):
+    units = ramp_into(raise_at(0.5, ValueError("velocity_x must exceed 1 m/s (got 0.2)")))
+    sentence, results, _ = fail(tmp_path, units, ["source.x -> target.x"])
+    assert sentence == "target: step failed at t = 0.5 s: ValueError: velocity_x must exceed 1 m/s (got 0.2)"
+    assert results.run["status"] == "failed"
+    assert results.run["error"]["message"] == sentence
+    assert results.run["error"]["unit"] == "target"
+    assert results.run["error"]["time"] == 0.5
+
+
+def test_a_failed_run_keeps_the_rows_before_and_the_inputs_of_the_failed_step(tmp_path):
+    units = ramp_into(raise_at(0.5, ValueError("no")))
+    _, results, _ = fail(tmp_path, units, ["source.x -> target.x"])
+    assert results.time.tolist() == [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]
+    assert results["target.y"].tolist() == results["source.x"].tolist()
+    assert results.run["rows"] == 6
+    assert results.run["error"]["inputs"] == {"x": pytest.approx(6.0)}
+
+
+def test_every_instance_is_freed_exactly_once_after_a_failure(tmp_path):
+    units = ramp_into(raise_at(0.5, ValueError("no")))
+    _, _, slaves = fail(tmp_path, units, ["source.x -> target.x"])
+    assert [slave.freed for slave in slaves.values()] == [1, 1]
+    assert slaves["target"].worst == ERROR
+
+
+class Opener(Stage):
+    """Lets a test put its own slave in the place of one unit's."""
+
+    def __init__(self, units, name, kind):
+        super().__init__(units)
+        self.name, self.kind = name, kind
+
+    def __call__(self, unit, log, corrupted):
+        if unit.name != self.name:
+            return super().__call__(unit, log, corrupted)
+        self.slaves[unit.name] = slave = self.kind(unit, self.units[unit.name], log)
+        return slave
+
+
+def answering(status, *messages, call="step", at=3):
+    """Return a kind of slave that logs and returns a status in its `at`th call of a kind."""
+
+    class Slave(FakeSlave):
+        def connect(self, *args):
+            calls = super().connect(*args)
+            count = iter(range(1, 10**9))
+
+            def answer():
+                inner = getattr(calls, call)()
+                if next(count) != at:
+                    return inner
+                for level, text in messages:
+                    self.log.add(self.name, level, "", text)
+                return status
+
+            return calls._replace(**{call: answer})
+
+    return Slave
+
+
+def answer(tmp_path, kind):
+    units = {"source": Clock(x=lambda t: 10.0 * t), "target": Passing()}
+    return fail(tmp_path, units, ["source.x -> target.x"], opener=Opener(units, "target", kind))
+
+
+@pytest.mark.parametrize(("status", "word"), [(DISCARD, "Discard"), (ERROR, "Error"), (FATAL, "Fatal")])
+def test_a_status_without_a_message_is_named(status, word, tmp_path):
+    sentence, _, slaves = answer(tmp_path, answering(status))
+    assert sentence == f"target: step failed at t = 0.2 s: the FMU returned {word} and gave no reason"
+    assert slaves["target"].worst == status
+
+
+def test_the_first_error_that_was_logged_is_the_reason(tmp_path):
+    kind = answering(ERROR, (WARNING, "getting warm"), (ERROR, "pressure\n  too high"), (ERROR, "giving up"))
+    sentence, _, _ = answer(tmp_path, kind)
+    assert sentence == "target: step failed at t = 0.2 s: pressure too high"
+
+
+def test_a_component_s_own_sentence_is_not_wrapped_in_another(tmp_path):
+    text = (
+        "step failed at t = 0.2 s: ValueError: 100 % too much: no (plants/a.py:7); inputs: x = 1.0, y = 2.0"
+    )
+    sentence, _, _ = answer(tmp_path, answering(DISCARD, (ERROR, text)))
+    assert sentence == "target: step failed at t = 0.2 s: ValueError: 100 % too much: no (plants/a.py:7)"
+
+
+@pytest.mark.parametrize(("call", "words"), [("set", "setting inputs"), ("get", "reading outputs")])
+def test_a_failed_set_or_get_says_so(call, words, tmp_path):
+    sentence, results, _ = answer(tmp_path, answering(ERROR, (ERROR, "no"), call=call, at=6))
+    assert f"target: {words} failed at t = " in sentence
+    assert sentence.endswith(" s: no")
+    assert 1 <= len(results.time) < 11
+
+
+def test_an_asynchronous_unit_is_refused(tmp_path):
+    sentence, _, _ = answer(tmp_path, answering(PENDING))
+    assert sentence.endswith("the FMU wants to compute asynchronously, which is not supported")
+
+
+def test_a_warning_is_reported_and_the_run_goes_on(tmp_path):
+    units = {"source": Clock(x=lambda t: 10.0 * t), "target": Passing()}
+    opener = Opener(units, "target", answering(WARNING, (WARNING, "getting warm")))
+    info = simulate(make_plan(units, ["source.x -> target.x"]), tmp_path, opener=opener)
+    assert [(m.unit, m.time, m.text) for m in info.warnings] == [("target", 0.2, "getting warm")]
+    results = load_results(tmp_path)
+    assert len(results.time) == 11
+    assert results.run["warnings"] == [
+        {"unit": "target", "time": 0.2, "status": "Warning", "text": "getting warm"}
+    ]
+
+
+def test_a_warning_without_a_message_is_reported_too(tmp_path):
+    units = {"source": Clock(x=lambda t: 10.0 * t), "target": Passing()}
+    info = simulate(
+        make_plan(units, ["source.x -> target.x"]), tmp_path,
+        opener=Opener(units, "target", answering(WARNING)),
+    )  # fmt: skip
+    assert [(m.unit, m.text) for m in info.warnings] == [("target", "the step returned Warning")]
+
+
+def test_an_error_logged_during_initialization_ends_the_run_although_the_status_is_ok(tmp_path):
+    class Slave(FakeSlave):
+        def enter(self, stop_time):
+            self.log.add(self.name, ERROR, "", "initialization failed at t = 0 s: ValueError: mass is -1")
+            return OK
+
+    sentence, results, slaves = answer(tmp_path, Slave)
+    assert sentence == "target: initialization failed at t = 0 s: ValueError: mass is -1"
+    assert len(results.time) == 0
+    assert [slave.freed for slave in slaves.values()] == [1, 1]
+
+
+def test_an_instance_that_cannot_be_made_frees_those_made_before(tmp_path):
+    units = {"source": Clock(x=lambda t: t), "target": Passing()}
+    stage = Stage(units)
+
+    def opener(unit, log, corrupted):
+        if unit.name == "target":
+            raise SimulationError("target: cannot be instantiated: no licence", unit="target", time=0.0)
+        return stage(unit, log, corrupted)
+
+    with pytest.raises(SimulationError, match="no licence"):
+        simulate(make_plan(units, ["source.x -> target.x"]), tmp_path, opener=opener)
+    assert stage.slaves["source"].freed == 1
+    assert json.loads((tmp_path / "run.json").read_text())["status"] == "failed"
+
+
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
+@pytest.mark.parametrize(("value", "word"), [(math.nan, "not a number"), (-math.inf, "infinite")])
+def test_a_value_that_is_not_finite_names_its_wire_and_time(value, word, algorithm, tmp_path):
+    units = {
+        "source": Clock(ok=lambda t: t, x=lambda t: value if t > 0.45 else t),
+        "a": Passing(),
+        "b": Passing(),
+    }
+    wires = ["source.ok -> b.x", "source.x -> a.x"]
+    sentence, results, _ = fail(tmp_path, units, wires, algorithm=algorithm)
+    assert sentence == f"source: x is {word} at t = 0.5 s, on the wire source.x -> a.x"
+    assert results.time.tolist() == [0.0, 0.1, 0.2, 0.3, 0.4]
+
+
+def test_a_failure_downstream_of_a_nan_is_blamed_on_its_source(tmp_path):
+    def act(t):
+        if t > 0.35:
+            raise ValueError("cannot convert float NaN to integer")
+
+    units = {"source": Clock(x=lambda t: math.nan if t > 0.45 else t), "target": Passing(act)}
+    sentence, _, _ = fail(tmp_path, units, ["source.x -> target.x"])
+    assert sentence == "source: x is not a number at t = 0.5 s, on the wire source.x -> target.x"
+
+
+def test_a_nan_from_a_unit_that_has_logged_an_error_is_explained_by_it(tmp_path):
+    class Slave(FakeSlave):
+        def connect(self, *args):
+            calls = super().connect(*args)
+            outputs = args[2]
+
+            def get():
+                calls.get()
+                if self.time > 0.45:
+                    self.log.add(self.name, ERROR, "", "reading Real [17] failed at t = 0.5 s: KeyError: 17")
+                    outputs[:] = math.nan
+                return OK
+
+            return calls._replace(get=get)
+
+    units = {"source": Clock(x=lambda t: t), "target": Passing()}
+    sentence, _, _ = fail(tmp_path, units, ["source.x -> target.x"], opener=Opener(units, "source", Slave))
+    assert sentence == "source: reading Real [17] failed at t = 0.5 s: KeyError: 17"
+
+
+def test_a_nan_that_is_only_recorded_does_not_stop_the_run(tmp_path):
+    units = {"source": Clock(x=lambda t: t, spare=lambda t: math.nan), "target": Passing()}
+    simulate(make_plan(units, ["source.x -> target.x"]), tmp_path, opener=Stage(units))
+    results = load_results(tmp_path)
+    assert len(results.time) == 11
+    assert all(math.isnan(value) for value in results["source.spare"])
+
+
+def test_a_nan_at_the_start_that_the_loop_heals_is_no_error(tmp_path):
+    units = {
+        "a": Function(lambda t, u: {"y": 1.0 / u["x"] if u["x"] else math.nan}, ["x"], ["y"]),
+        "b": Clock(x=lambda t: 2.0),
+    }
+    simulate(make_plan(units, ["b.x -> a.x"]), tmp_path, opener=Stage(units))
+    assert load_results(tmp_path)["a.y"].tolist() == [0.5] * 11
+
+
+def test_a_nan_that_stays_after_initialization_names_its_wire(tmp_path):
+    units = {"source": Clock(x=lambda t: math.nan), "target": Passing()}
+    sentence, _, _ = fail(tmp_path, units, ["source.x -> target.x"])
+    assert sentence == "source: x is not a number at t = 0 s, on the wire source.x -> target.x"
+
+
+def interrupt_at(when, number):
+    def act(t):
+        if abs(t - when) < 1e-9:
+            os.kill(os.getpid(), number)
+
+    return act
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_ends_between_two_steps_and_keeps_its_results(number, tmp_path):
+    before = signal.getsignal(number)
+    units = ramp_into(interrupt_at(0.5, number))
+    sentence, results, slaves = fail(tmp_path, units, ["source.x -> target.x"])
+    assert sentence == "the run was interrupted at t = 0.6 s"
+    assert results.run["status"] == "interrupted"
+    assert results.time.tolist()[-1] == 0.6
+    assert [slave.freed for slave in slaves.values()] == [1, 1]
+    assert signal.getsignal(number) is before
+
+
+def test_handlers_are_restored_after_a_run(tmp_path):
+    before = signal.getsignal(signal.SIGINT)
+    units = {"a": Clock(x=math.sin)}
+    simulate(make_plan(units), tmp_path, opener=Stage(units))
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_failed_run_replaces_the_results_of_an_earlier_one_as_a_whole(tmp_path):
+    units = {"a": Clock(x=math.sin)}
+    simulate(make_plan(units), tmp_path, opener=Stage(units))
+    _, results, _ = fail(tmp_path, ramp_into(raise_at(0.5, ValueError("no"))), ["source.x -> target.x"])
+    assert list(results) == ["source.x", "target.y"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["results.csv", "run.json"]

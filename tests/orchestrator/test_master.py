@@ -1,0 +1,311 @@
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import SimulationError
+from orchestrator.results import load_results
+from orchestrator.simulate import simulate
+
+from .fakes import Behaviour, Clock, Function, Integrator, Mass, Stage, make_plan
+
+
+def run(units, wires, out, **options):
+    """Simulate fake units and return their slaves and the results."""
+    stage = Stage(units)
+    simulate(make_plan(units, wires, **options), out, opener=stage)
+    return stage.slaves, load_results(out)
+
+
+def spring():
+    return Function(lambda t, u: {"force": -4.0 * u["x"]}, ["x"], ["force"])
+
+
+def oscillator_error(algorithm, first, periods, n, out):
+    """Return the largest error of cos(2 t) over two seconds in n steps, where all units are up to date."""
+    units = {"mass": Mass(), "spring": spring()} if first == "mass" else {"spring": spring(), "mass": Mass()}
+    _, results = run(
+        units, ["mass.x -> spring.x", "spring.force -> mass.force"], out,
+        step=Fraction(2, n), n_steps=n, algorithm=algorithm, periods=periods,
+    )  # fmt: skip
+    return float(np.abs(results["mass.x"] - np.cos(2.0 * results.time))[::4].max())
+
+
+@pytest.mark.parametrize("first", ["mass", "spring"])
+@pytest.mark.parametrize(
+    "periods",
+    [{}, {"spring": 2}, {"mass": 2}, {"mass": 4, "spring": 2}, {"mass": 2, "spring": 4}],
+    ids=lambda p: " ".join(f"{k}={v}" for k, v in p.items()) or "one rate",
+)
+def test_extrapolated_is_second_order_in_any_order_and_at_any_rate(first, periods, tmp_path):
+    coarse, fine = (oscillator_error("extrapolated", first, periods, n, tmp_path) for n in (400, 800))
+    assert math.log2(coarse / fine) == pytest.approx(2.0, abs=0.05)
+    assert fine < 6e-4
+
+
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel"])
+def test_holding_values_is_first_order(algorithm, tmp_path):
+    coarse, fine = (oscillator_error(algorithm, "mass", {}, n, tmp_path) for n in (400, 800))
+    assert math.log2(coarse / fine) == pytest.approx(1.0, abs=0.05)
+
+
+class Witness(Behaviour):
+    """Writes down its inputs at every step: `middle` is integrated, `end` is passed through."""
+
+    inputs = ("middle", "end")
+    outputs = {"y": ("end",)}
+
+    def __init__(self):
+        self.seen = []
+
+    def advance(self, t, h, u):
+        self.seen.append((t, h, u["middle"], u["end"]))
+
+    def output(self, t, u):
+        return {"y": u["end"]}
+
+
+@pytest.mark.parametrize("source_first", [True, False])
+@pytest.mark.parametrize(("n", "m"), [(1, 1), (2, 1), (5, 1), (1, 2), (1, 5), (2, 4), (4, 2), (2, 3), (3, 2)])
+def test_a_linear_signal_arrives_exactly_at_the_middle_and_the_end_of_the_step(n, m, source_first, tmp_path):
+    source, witness = Clock(x=lambda t: 3.0 + 2.0 * t), Witness()
+    units = {"source": source, "target": witness}
+    if not source_first:
+        units = dict(reversed(units.items()))
+    run(
+        units, ["source.x -> target.middle", "source.x -> target.end"], tmp_path,
+        step="1/8", n_steps=60, periods={"source": n, "target": m},
+    )  # fmt: skip
+    assert len(witness.seen) == 60 // m
+    settled = [seen for seen in witness.seen if seen[0] >= (2 * n + m) / 8]
+    assert settled
+    for t, h, middle, end in settled:
+        assert middle == pytest.approx(3.0 + 2.0 * (t + h / 2), abs=1e-12)
+        assert end == pytest.approx(3.0 + 2.0 * (t + h), abs=1e-12)
+
+
+def test_the_first_step_holds_what_has_no_history(tmp_path):
+    witness = Witness()
+    units = {"target": witness, "source": Clock(x=lambda t: 3.0 + 2.0 * t)}
+    run(units, ["source.x -> target.middle", "source.x -> target.end"], tmp_path, step="1/8", n_steps=2)
+    assert witness.seen[0] == (0.0, 0.125, 3.0, 3.0)
+
+
+class Sampler(Behaviour):
+    """A controller that samples: u = -gain x, held until its next step."""
+
+    inputs = ("x",)
+    outputs = {"u": ("x",)}
+    discrete = True
+
+    def output(self, t, u):
+        return {"u": -3.0 * u["x"]}
+
+
+@pytest.mark.parametrize("first", ["plant", "controller"])
+def test_a_sampled_controller_gives_the_exact_sampled_data_solution(first, tmp_path):
+    units = {"plant": Integrator(), "controller": Sampler()}
+    if first == "controller":
+        units = dict(reversed(units.items()))
+    _, results = run(
+        units, ["plant.x -> controller.x", "controller.u -> plant.rate"], tmp_path,
+        step="1/100", n_steps=200, periods={"controller": 10},
+    )  # fmt: skip
+    exact = (1.0 - 3.0 * 0.1) ** np.arange(21)  # x_k+1 = x_k + T u_k
+    np.testing.assert_allclose(results["plant.x"][::10], exact, atol=1e-13)
+
+
+def test_a_discrete_source_is_taken_as_it_was_in_force(tmp_path):
+    witness = Witness()
+    steps = Clock(x=lambda t: round(8 * t))
+    steps.discrete = True
+    run(
+        {"source": steps, "target": witness}, ["source.x -> target.middle", "source.x -> target.end"],
+        tmp_path, step="1/8", n_steps=4, periods={"source": 2},
+    )  # fmt: skip
+    assert [seen[2:] for seen in witness.seen] == [(0.0, 0.0), (0.0, 2.0), (2.0, 2.0), (2.0, 4.0)]
+
+
+def test_jacobi_takes_all_inputs_before_anything_moves(tmp_path):
+    chain = {
+        "a": Clock(x=lambda t: 8 * t),
+        "b": Function(lambda t, u: {"y": u["x"]}, ["x"], ["y"]),
+        "c": Function(lambda t, u: {"y": u["x"]}, ["x"], ["y"]),
+    }
+    _, results = run(chain, ["a.x -> b.x", "b.y -> c.x"], tmp_path, step="1/8", n_steps=4, algorithm="jacobi")
+    assert results["b.y"].tolist() == [0, 0, 1, 2, 3]
+    assert results["c.y"].tolist() == [0, 0, 0, 1, 2]
+
+
+def test_a_slow_unit_under_jacobi_takes_inputs_at_the_start_and_publishes_at_the_end(tmp_path):
+    witness = Witness()
+    _, results = run(
+        {"source": Clock(x=lambda t: 8 * t), "target": witness},
+        ["source.x -> target.middle", "source.x -> target.end"], tmp_path,
+        step="1/8", n_steps=9, algorithm="jacobi", periods={"target": 3},
+    )  # fmt: skip
+    assert witness.seen == [(0.0, 0.375, 0.0, 0.0), (0.375, 0.375, 3.0, 3.0), (0.75, 0.375, 6.0, 6.0)]
+    assert results["target.y"].tolist() == [0, 0, 0, 0, 0, 0, 3, 3, 3, 6]
+
+
+def test_a_slow_unit_under_gauss_seidel_steps_at_the_end_of_its_period(tmp_path):
+    witness = Witness()
+    _, results = run(
+        {"source": Clock(x=lambda t: 8 * t), "target": witness},
+        ["source.x -> target.middle", "source.x -> target.end"], tmp_path,
+        step="1/8", n_steps=7, algorithm="gauss_seidel", periods={"target": 3},
+    )  # fmt: skip
+    assert witness.seen == [(0.0, 0.375, 3.0, 3.0), (0.375, 0.375, 6.0, 6.0)]
+    assert results["target.y"].tolist() == [0, 0, 0, 3, 3, 3, 6, 6]
+
+
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
+def test_one_set_one_step_one_get_per_unit_and_step(algorithm, tmp_path):
+    units = {"mass": Mass(), "spring": spring()}
+    slaves, _ = run(units, ["mass.x -> spring.x", "spring.force -> mass.force"], tmp_path, n_steps=7,
+                    algorithm=algorithm)  # fmt: skip
+    for slave in slaves.values():
+        after = slave.calls[slave.calls.index(("exit",)) :]
+        assert [call[0] for call in after].count("set") == 7
+        assert [call[0] for call in after].count("step") == 7
+
+
+@pytest.mark.parametrize("step", ["1/10", "1/1000", "1/3", "7/30000"])
+def test_time_is_the_correctly_rounded_multiple_of_the_step(step, tmp_path):
+    slaves, results = run({"a": Clock(x=math.sin)}, [], tmp_path, step=step, n_steps=1000)
+    step = Fraction(step)
+    assert results.time.tolist() == [float(k * step) for k in range(1001)]
+    assert [c for c in slaves["a"].calls if c[0] == "step"] == [
+        ("step", float(k * step), float(step)) for k in range(1000)
+    ]
+
+
+def test_a_slow_unit_is_stepped_by_its_whole_period(tmp_path):
+    slaves, _ = run({"a": Clock(x=math.sin)}, [], tmp_path, step="1/10", n_steps=8, periods={"a": 3})
+    assert [c for c in slaves["a"].calls if c[0] == "step"] == [
+        ("step", 0.0, float(Fraction(3, 10))),
+        ("step", float(Fraction(3, 10)), float(Fraction(3, 10))),
+    ]
+
+
+def test_constants_are_set_once_and_never_again(tmp_path):
+    unit = Function(lambda t, u: {"y": 2 * u["mu"]}, ["mu"], ["y"])
+    slaves, results = run({"a": unit}, [], tmp_path, constants={"a": {"mu": 0.65}})
+    calls = slaves["a"].calls
+    assert ("put", "Real", ("mu",), (0.65,)) in calls[: calls.index(("enter", 1.0))]
+    assert "set" not in [call[0] for call in calls[calls.index(("exit",)) :]]
+    assert results["a.y"].tolist() == [1.3] * 11
+
+
+def test_wired_and_constant_inputs_are_set_together_in_declared_order(tmp_path):
+    unit = Function(lambda t, u: {"y": u["x"] * u["mu"]}, ["mu", "x"], ["y"])
+    slaves, results = run(
+        {"s": Clock(x=lambda t: 1 + t), "a": unit}, ["s.x -> a.x"], tmp_path, constants={"a": {"mu": 2.0}}
+    )
+    assert slaves["a"].calls[-2][:2] == ("set", 2.0)
+    np.testing.assert_allclose(results["a.y"], 2.0 * (1.0 + results.time))
+
+
+def test_what_nobody_needs_is_not_read(tmp_path):
+    read = []
+
+    class Slave(Clock):
+        def output(self, t, u):
+            read.append(t)
+            return super().output(t, u)
+
+    _, results = run({"a": Slave(x=math.sin)}, [], tmp_path, record=[])
+    assert list(results) == []
+    assert len(results.time) == 11
+    assert read == [0.0]  # the fake's own, when it leaves initialization
+
+
+def test_parameters_are_set_before_initialization_mode(tmp_path):
+    class Gain(Behaviour):
+        parameters = {"gain": 1.0}
+        outputs = {"y": ()}
+
+        def output(self, t, u):
+            return {"y": u["gain"]}
+
+    slaves, results = run({"a": Gain()}, [], tmp_path, parameters={"a": {"gain": 5.0}})
+    assert slaves["a"].calls[0] == ("put", "Real", ("gain",), (5.0,))
+    assert results["a.y"].tolist() == [5.0] * 11
+
+
+def test_initialization_goes_round_until_a_loop_agrees_to_the_last_bit(tmp_path):
+    half = lambda t, u: {"y": 0.5 * u["x"] + 1.0}  # noqa: E731
+    slaves, results = run(
+        {"a": Function(half, ["x"], ["y"]), "b": Function(half, ["x"], ["y"])},
+        ["a.y -> b.x", "b.y -> a.x"], tmp_path, n_steps=1,
+    )  # fmt: skip
+    assert results["a.y"][0] == results["b.y"][0] == 2.0
+    assert slaves["a"].values["x"] == 2.0
+
+
+def test_units_enter_initialization_with_the_outputs_of_those_before_them(tmp_path):
+    units = {"a": Clock(x=lambda t: 25.0), "b": Function(lambda t, u: {"y": 1.0 / u["x"]}, ["x"], ["y"])}
+    slaves, _ = run(units, ["a.x -> b.x"], tmp_path)
+    calls = slaves["b"].calls
+    assert calls[: calls.index(("enter", 1.0))] == [("put", "Real", ("x",), (25.0,))]
+
+
+def test_a_loop_that_does_not_settle_is_an_error_that_names_its_wires(tmp_path):
+    units = {
+        "a": Function(lambda t, u: {"y": 2.0 * u["x"] + 1.0}, ["x"], ["y"]),
+        "b": Function(lambda t, u: {"y": u["x"]}, ["x"], ["y"]),
+    }
+    with pytest.raises(SimulationError, match=r"does not settle: after 100 passes .* a\.y -> b\.x"):
+        run(units, ["a.y -> b.x", "b.y -> a.x"], tmp_path)
+
+
+def test_a_loop_that_flickers_in_its_last_digits_is_accepted(tmp_path):
+    flips = iter([1.0, 1.0 + 1e-12] * 1000)
+    units = {
+        "a": Function(lambda t, u: {"y": next(flips) + 0.0 * u["x"]}, ["x"], ["y"]),
+        "b": Function(lambda t, u: {"y": u["x"]}, ["x"], ["y"]),
+    }
+    _, results = run(units, ["a.y -> b.x", "b.y -> a.x"], tmp_path, n_steps=1)
+    assert results["a.y"][0] == pytest.approx(1.0, abs=1e-11)
+
+
+class Mixed(Behaviour):
+    """One output of every type there is beside Real."""
+
+    inputs = ()
+    outputs = {"count": (), "flag": (), "word": (), "mode": (), "x": ()}
+    types = {"count": "Integer", "flag": "Boolean", "word": "String", "mode": "Enumeration"}
+
+    def output(self, t, u):
+        k = round(10 * t)
+        return {"count": k, "flag": k % 2 == 1, "word": f'"{k}", {k}', "mode": k % 3, "x": t}
+
+
+class Echo(Mixed):
+    inputs = tuple(f"{name}_in" for name in Mixed.outputs)
+    outputs = {name: (f"{name}_in",) for name in Mixed.outputs}
+    types = {**Mixed.types, **{f"{name}_in": kind for name, kind in Mixed.types.items()}}
+
+    def output(self, t, u):
+        return {name: u[f"{name}_in"] for name in Mixed.outputs}
+
+
+@pytest.mark.parametrize(("algorithm", "late"), [("jacobi", 1), ("gauss_seidel", 0), ("extrapolated", 0)])
+def test_values_that_are_no_reals_travel_and_are_recorded(algorithm, late, tmp_path):
+    _, results = run(
+        {"a": Mixed(), "b": Echo()}, [f"a.{n} -> b.{n}_in" for n in Mixed.outputs], tmp_path,
+        n_steps=5, algorithm=algorithm, record=["b.word", "b.x", "b.flag", "b.count", "b.mode"],
+    )  # fmt: skip
+    seen = [max(0, k - late) for k in range(6)]
+    assert list(results) == ["b.word", "b.x", "b.flag", "b.count", "b.mode"]
+    assert results["b.word"].tolist() == [f'"{k}", {k}' for k in seen]
+    assert results["b.flag"].tolist() == [k % 2 for k in seen]
+    assert results["b.count"].tolist() == seen
+    assert results["b.mode"].tolist() == [k % 3 for k in seen]
+
+
+def test_constants_of_any_type_reach_their_unit(tmp_path):
+    constants = {"count_in": 3, "flag_in": True, "word_in": "dry", "mode_in": 2, "x_in": 0.5}
+    _, results = run({"b": Echo()}, [], tmp_path, n_steps=1, constants={"b": constants})
+    assert [results[f"b.{n}"][1] for n in Mixed.outputs] == [3, 1, "dry", 2, 0.5]

@@ -1,0 +1,171 @@
+import csv
+import errno
+import json
+import math
+import os
+import sys
+
+import numpy as np
+import pytest
+
+from orchestrator import recorder as module
+from orchestrator.errors import ResultsError, SimulationError
+from orchestrator.recorder import BLOCK, Recorder
+from orchestrator.results import load_results
+from orchestrator.simulate import simulate
+
+from .fakes import Clock, Stage, make_plan
+
+
+def record(folder, table, *, real=None, others=None, run=None):
+    """Write a table (first column time) as a run does."""
+    columns = [f"unit.v{i}" for i in range(1, table.shape[1])]
+    writer = Recorder(folder, columns, real or [True] * len(columns))
+    for begin in range(0, len(table), BLOCK):
+        block = table[begin : begin + BLOCK]
+        for row, values in zip(writer.rows, block, strict=False):
+            row[:] = values
+        writer.others.extend(others[begin : begin + BLOCK] if others else [])
+        writer.write(len(block))
+    writer.finish({"status": "completed", "units": {}, **(run or {})})
+
+
+def table(rows, columns=3):
+    return np.random.default_rng(1).standard_normal((rows, columns)) * 10.0 ** np.arange(
+        -8, 4 * columns - 8, 4
+    )
+
+
+@pytest.mark.parametrize("rows", [1, BLOCK - 1, BLOCK, BLOCK + 1, 3 * BLOCK + 7])
+def test_numbers_are_read_back_to_the_last_bit(rows, tmp_path):
+    values = table(rows)
+    record(tmp_path, values)
+    results = load_results(tmp_path)
+    assert results.time.tolist() == values[:, 0].tolist()
+    assert [column.tolist() for column in results.columns.values()] == values[:, 1:].T.tolist()
+
+
+def test_the_file_is_a_plain_csv_with_a_header(tmp_path):
+    record(tmp_path, np.array([[0.0, 1.5, -2e-9], [0.001, math.inf, math.nan]]))
+    assert (tmp_path / "results.csv").read_bytes() == (
+        b"time,unit.v1,unit.v2\n0.0,1.5,-2e-09\n0.001,inf,nan\n"
+    )
+
+
+def test_names_with_commas_and_quotes_are_quoted(tmp_path):
+    names = ["unit.matrix[1,2]", 'unit."odd"', "unit.Ümläut"]
+    writer = Recorder(tmp_path, names, [True] * 3)
+    writer.rows[0][:] = [0.0, 1.0, 2.0, 3.0]
+    writer.write(1)
+    writer.finish({"units": {}})
+    with (tmp_path / "results.csv").open(encoding="utf-8", newline="") as stream:
+        assert next(csv.reader(stream)) == ["time", *names]
+    assert [float(c[0]) for c in load_results(tmp_path).columns.values()] == [1.0, 2.0, 3.0]
+
+
+def test_columns_keep_their_order_when_some_are_no_reals(tmp_path):
+    writer = Recorder(tmp_path, ["a.n", "a.x", "a.s", "a.y", "a.b"], [False, True, False, True, False])
+    writer.rows[0][:] = [0.0, 1.0, 2.0]
+    writer.others.append([7, 'say "ä",\nthen stop', True])
+    writer.write(1)
+    writer.finish({"units": {}})
+    results = load_results(tmp_path)
+    assert {name: column[0] for name, column in results.columns.items()} == {
+        "a.n": 7, "a.x": 1.0, "a.s": 'say "ä",\nthen stop', "a.y": 2.0, "a.b": 1,
+    }  # fmt: skip
+
+
+def test_the_record_may_hold_numbers_that_json_does_not_know(tmp_path):
+    record(tmp_path, table(2), run={"error": {"inputs": {"x": math.nan, "y": -math.inf, "n": np.float64(2)}}})
+    text = (tmp_path / "run.json").read_text()
+    assert json.loads(text, parse_constant=pytest.fail)["error"]["inputs"] == {
+        "x": "nan",
+        "y": "-inf",
+        "n": 2.0,
+    }
+
+
+def test_earlier_results_stay_until_the_new_ones_are_whole(tmp_path):
+    record(tmp_path, table(3), run={"title": "first"})
+    writer = Recorder(tmp_path, ["a.x"], [True])
+    writer.rows[0][:] = 1.0
+    writer.write(1)
+    assert load_results(tmp_path).run["title"] == "first"
+    assert len(load_results(tmp_path).time) == 3
+    writer.finish({"title": "second", "units": {}})
+    assert load_results(tmp_path).run["title"] == "second"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["results.csv", "run.json"]
+
+
+def test_results_may_go_to_a_path_with_spaces_and_umlauts_that_does_not_exist_yet(tmp_path):
+    folder = tmp_path / "Läufe von heute" / "Nr. 1"
+    record(folder, table(2))
+    assert len(load_results(folder).time) == 2
+
+
+def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ResultsError, match=r"file.out: results cannot be written here: Not a directory\.$"):
+        Recorder(tmp_path / "file" / "out", ["a.x"], [True])
+
+
+def no_space(*args, **kwargs):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs the device that is always full")
+def test_a_disk_that_is_full_from_the_start_is_one_sentence(tmp_path):
+    (tmp_path / "results.csv.part").symlink_to("/dev/full")
+    units = {"a": Clock(x=math.sin)}
+    stage = Stage(units)
+    with pytest.raises(ResultsError, match=r"results\.csv: cannot be written: the disk is full\.$"):
+        simulate(make_plan(units), tmp_path, opener=stage)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on the size of files")
+def test_a_disk_that_fills_up_keeps_whole_rows_and_says_so(tmp_path):
+    import resource
+
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    units = {"a": Clock(x=math.sin, y=math.cos)}
+    stage = Stage(units)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, limits[1]))
+    try:
+        with pytest.raises(SimulationError) as caught:
+            simulate(make_plan(units, step="1/1000", n_steps=3000), tmp_path, opener=stage)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    results = load_results(tmp_path)
+    assert str(caught.value) == (
+        f"{tmp_path}/results.csv: cannot be written: File too large; "
+        f"results up to t = {results.time[-1]:.9g} s are kept."
+    )
+    assert 49_900 < (tmp_path / "results.csv").stat().st_size <= 50_000
+    assert results.run["status"] == "failed"
+    assert results.run["rows"] == len(results.time) > 500
+    np.testing.assert_allclose(results["a.y"], np.cos(results.time), atol=1e-15)
+    assert stage.slaves["a"].freed == 1
+
+
+def test_rows_at_the_end_make_room_for_the_record_on_a_full_disk(tmp_path, monkeypatch):
+    values = table(2 * BLOCK)
+    write_text = module.Path.write_text
+    answers = iter([no_space])
+    monkeypatch.setattr(
+        module.Path, "write_text", lambda *args, **kwargs: next(answers, write_text)(*args, **kwargs)
+    )
+    record(tmp_path, values, run={"title": "x" * 5000})
+    results = load_results(tmp_path)
+    assert 0 < len(results.time) < len(values)
+    assert results.run["rows"] == len(results.time)
+    assert results.time.tolist() == values[: len(results.time), 0].tolist()
+
+
+def test_earlier_results_stay_if_the_record_cannot_be_written_at_all(tmp_path, monkeypatch):
+    record(tmp_path, table(3), run={"title": "first"})
+    monkeypatch.setattr(module.Path, "write_text", no_space)
+    with pytest.raises(ResultsError, match="results cannot be written: the disk is full"):
+        record(tmp_path, table(5), run={"title": "second"})
+    assert load_results(tmp_path).run["title"] == "first"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["results.csv", "run.json"]
