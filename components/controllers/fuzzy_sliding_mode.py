@@ -1,0 +1,99 @@
+"""Fuzzy sliding-mode yaw-moment control: the gains of the reaching law follow steering and friction.
+
+The law stands in `core.sliding_mode`, here always with the saturation of equation (24). A Mamdani
+system with five sets per variable sets eps and k_d from |delta| and mu by one table for both: small
+gains on a slippery road and going straight, where a strong law only shakes the car, large ones in a
+sharp turn on a good road. The centroid spans about 0.08 to 0.92 of each gain's range.
+
+Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, section 2.1,
+table 2. Ranges, sets and boundary layer are not given there: chosen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..core import sliding_mode
+from ..core.component import Component
+from ..core.fuzzy import Mamdani, Partition
+from ..core.variables import output, parameter
+
+LABELS = "SS S M B BB"
+
+TABLE = """
+    SS  SS  S   S   M
+    S   S   M   M   M
+    S   M   M   B   B
+    S   M   B   B   BB
+    M   M   B   BB  BB
+"""
+"""Paper B, table 2: rows friction, columns |steer angle|, both from SS to BB."""
+
+
+@dataclass(frozen=True)
+class FuzzySlidingModeParameters:
+    """Of the law and of the ranges that the paper leaves open."""
+
+    largest_reaching_rate: float = parameter(
+        3.0, "rad/s2", "Range of eps, from 0; chosen: its middle exceeds the constant law's", minimum=1e-6
+    )
+    largest_reaching_gain: float = parameter(
+        10.0, "1/s", "Range of k_d, from 0; chosen: up to that of the constant law", minimum=1e-6
+    )
+    largest_steer_angle: float = parameter(
+        0.09, "rad", "Steer angle from which |delta| is BB; chosen: the amplitude of the runs", minimum=1e-6
+    )
+    largest_friction: float = parameter(
+        1.0, "1", "Friction from which mu is BB; chosen: dry asphalt", minimum=1e-6
+    )
+    boundary_layer: float = parameter(
+        0.1, "rad/s", "Half width Delta of the boundary layer; chosen: about 6 deg/s", minimum=0.0
+    )
+    sideslip_weight: float = parameter(
+        -0.25, "1/s", "Weight w of the sideslip error; negative, see core.sliding_mode; chosen"
+    )
+    yaw_inertia: float = parameter(1343.1, "kg.m2", "Yaw inertia I_z; paper B, table 1", minimum=1.0)
+    moment_limit: float = parameter(
+        10000.0, "N.m", "Largest yaw moment; chosen: m g d / 2, what the road can give at mu 1", minimum=0.0
+    )
+    fade_speed: float = parameter(
+        2.0, "m/s", "Below it the moment fades out; chosen: walking pace", minimum=0.001
+    )
+
+
+def gain_system(p: FuzzySlidingModeParameters) -> Mamdani:
+    """Return the Mamdani system (friction, |steer angle| [rad]) -> (eps [rad/s2], k_d [1/s])."""
+    return Mamdani(
+        Partition.even(LABELS, 0.0, p.largest_friction),
+        Partition.even(LABELS, 0.0, p.largest_steer_angle),
+        [
+            Partition.even(LABELS, 0.0, p.largest_reaching_rate),
+            Partition.even(LABELS, 0.0, p.largest_reaching_gain),
+        ],
+        TABLE,
+    )
+
+
+class FuzzySlidingMode(Component):
+    """Sliding-mode yaw-moment controller whose gains a fuzzy system sets from steering and friction."""
+
+    Parameters = FuzzySlidingModeParameters
+    sampled = True
+    inputs = (*sliding_mode.ERRORS, "velocity_x", "steer_angle", "friction")
+    outputs = (
+        output("yaw_moment", *sliding_mode.ERRORS, "velocity_x", "steer_angle", "friction"),
+        output("sliding_surface", *sliding_mode.ERRORS, unit="rad/s", text="Sliding surface s"),
+        output("reaching_rate", "steer_angle", "friction", unit="rad/s2", text="Gain eps as set on line"),
+        output("reaching_gain", "steer_angle", "friction", unit="1/s", text="Gain k_d as set on line"),
+    )
+
+    def configure(self):
+        self.gains = gain_system(self.p)
+
+    def output(self, t, u):
+        p = self.p
+        s, equivalent = sliding_mode.surface(u[:7], p.sideslip_weight)
+        eps, k_d = self.gains(u[9], abs(u[8]))
+        switched = sliding_mode.saturation(s, p.boundary_layer)
+        moment = sliding_mode.demand(s, equivalent, switched, eps=eps, k_d=k_d, i_z=p.yaw_inertia)
+        return sliding_mode.limit(moment, p.moment_limit, u[7], p.fade_speed), s, eps, k_d

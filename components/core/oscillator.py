@@ -1,0 +1,32 @@
+"""The damped oscillator, solved exactly over a step.
+
+    x'' + 2 s x' + q x = 0        =>        (x, x') after h  =  Phi(h) (x, x')
+
+for every damping, so a stiff oscillator needs no small step. With a held force, x counts from the
+equilibrium that the force has.
+"""
+
+from __future__ import annotations
+
+from math import cos, exp, sin, sinh, sqrt
+
+Four = tuple[float, float, float, float]
+
+
+def transition(s: float, q: float, h: float) -> Four:
+    """Return Phi(h) by rows, from s [1/s], q [1/s2] and the time `h` [s]."""
+    discriminant = s * s - q
+    if discriminant < 0.0:
+        rate = sqrt(-discriminant)
+        decay = exp(-s * h)
+        even = decay * cos(rate * h)
+        odd = decay * sin(rate * h) / rate
+    elif discriminant == 0.0:
+        even = exp(-s * h)
+        odd = h * even
+    else:
+        rate = sqrt(discriminant)
+        slow, fast = exp((rate - s) * h), exp(-(rate + s) * h)
+        even = 0.5 * (slow + fast)
+        odd = 0.5 * (slow - fast) / rate if rate * h > 1.0 else exp(-s * h) * sinh(rate * h) / rate
+    return even + s * odd, odd, -q * odd, even - s * odd

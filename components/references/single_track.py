@@ -1,0 +1,174 @@
+"""Reference from the linear single-track model, dynamic or in its steady state, limited by friction.
+
+    the model of core.single_track,        |delta| <= share mu g / (v r/delta)     `limit_steer_angle`
+    r_ref    = r limited to                +-share mu g / v                        `limit_yaw_rate`, (17)
+    beta_ref = beta limited to             +-atan(c mu), c = 0.02 g                `limit_sideslip`, (18)
+
+The limits keep the sign of the linear value (paper B writes the sign of delta). Limiting the outputs
+alone leaves yaw rate and sideslip of two different turns; limiting the steer angle that feeds the
+model keeps them of one. Paper B limits the outputs, paper D needs the steer angle limited first.
+
+Sliding mode needs the rates of the limited references. One mechanism serves all modes: the slope of
+the limited output over the step, smoothed by a first-order lag,  tau dq/dt = slope - q,  solved
+exactly; with tau = 0 it is the backward difference. So the rates belong to what is shown, corners
+included, and a jump of the reference gives a pulse of the area of the jump.
+
+The model takes the steer angle and the speed in a straight line from the last value to the new one.
+Below `low_speed`, where its time constants vanish, it runs at that speed and the yaw rate is scaled
+down with the true one; a car that stands or rolls backwards is asked for none.
+
+Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, equations
+(16)-(18); Xie, Li, Zheng, Pei, Synthesized feedback control of the ESP system based on fuzzy
+technology, equation (3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan, exp
+
+from ..core.component import Component
+from ..core.integrators import rk4
+from ..core.single_track import SingleTrackCar
+from ..core.variables import output, parameter, signal
+
+G = 9.81  # m/s2
+
+
+@dataclass(frozen=True)
+class SingleTrackParameters:
+    """The car of paper B, table 1, and the limits."""
+
+    mass: float = parameter(1350.0, "kg", "Vehicle mass m; paper B, table 1", minimum=1.0)
+    yaw_inertia: float = parameter(1343.1, "kg.m2", "Yaw inertia I_z; paper B, table 1", minimum=1.0)
+    cg_to_front_axle: float = parameter(
+        1.04, "m", "Distance a of the centre of mass from the front axle; paper B, table 1", minimum=0.1
+    )
+    cg_to_rear_axle: float = parameter(
+        1.56, "m", "Distance b of the centre of mass from the rear axle; paper B, table 1", minimum=0.1
+    )
+    cornering_stiffness_front: float = parameter(
+        91600.0, "N/rad", "Stiffness C_f of the front axle; chosen: that of the tyres of set 1", minimum=1.0
+    )
+    cornering_stiffness_rear: float = parameter(
+        67800.0, "N/rad", "Stiffness C_r of the rear axle; chosen: that of the tyres of set 1", minimum=1.0
+    )
+    mode: str = parameter(
+        "steady_state", None, "Steady state or dynamic model; chosen", choices=("steady_state", "dynamic")
+    )
+    limit_steer_angle: bool = parameter(
+        False, None, "Limit the steer angle that feeds the model to the road's friction; paper B does not"
+    )
+    limit_yaw_rate: bool = parameter(True, None, "Limit the yaw rate; paper B, equation (17)")
+    limit_sideslip: bool = parameter(True, None, "Limit the sideslip; paper B, equation (18)")
+    friction_share: float = parameter(
+        1.0, "1", "Share of mu that steer and yaw-rate limits use; paper B: all of it", minimum=0.0
+    )
+    sideslip_per_friction: float = parameter(
+        0.1962, "1", "c in |beta_ref| <= atan(c mu); paper B, equation (18): 0.02 s2/m times g", minimum=0.0
+    )
+    rate_time_constant: float = parameter(
+        0.005, "s", "Lag tau of the rates; chosen: one sample of the controllers", minimum=0.0
+    )
+    low_speed: float = parameter(2.0, "m/s", "Slowest speed of the model; chosen: walking pace", minimum=0.1)
+
+
+def limited_steer(delta: float, v: float, *, mu: float, car: SingleTrackCar, share: float) -> float:
+    """Return the steer angle [rad] whose steady turn at `v` [m/s] needs at most `share` of `mu`."""
+    gain, _ = car.gains(v)
+    return clamp(delta, share * mu * G / max(v * gain, 1e-9))
+
+
+def clamp(x: float, most: float) -> float:
+    """Return `x` limited to +-`most`, which keeps its sign."""
+    return min(max(x, -most), most)
+
+
+class SingleTrack(Component):
+    """Reference from the linear single-track model, steady state or dynamic, limited by friction."""
+
+    Parameters = SingleTrackParameters
+    inputs = ("steer_angle", "velocity_x", signal("friction", start=1.0))
+    outputs = (
+        output("yaw_rate_ref", "steer_angle", "velocity_x", "friction"),
+        output("sideslip_ref", "steer_angle", "velocity_x", "friction"),
+        output("yaw_acceleration_ref", "steer_angle", "velocity_x", "friction"),
+        output("sideslip_rate_ref", "steer_angle", "velocity_x", "friction"),
+    )
+
+    def configure(self):
+        p = self.p
+        self.car = SingleTrackCar(
+            p.mass,
+            p.yaw_inertia,
+            p.cg_to_front_axle,
+            p.cg_to_rear_axle,
+            p.cornering_stiffness_front,
+            p.cornering_stiffness_rear,
+        )
+
+    def start(self, t, u):
+        self.feed = self._feed(u)
+        self.model = self._steady(*self.feed)  # a dynamic model starts in its steady state
+        self.limited = self._limit(u)
+        self.rates = (0.0, 0.0)
+
+    def advance(self, t, h, u):
+        delta, v = self.feed
+        delta_end, v_end = self.feed = self._feed(u)
+        if self.p.mode == "steady_state":
+            self.model = self._steady(delta_end, v_end)
+        elif h > 0.0:
+            derivatives = self.car.derivatives
+
+            def along(time, state):
+                part = time / h
+                return derivatives(
+                    state[0], state[1], delta=delta + part * (delta_end - delta), v=v + part * (v_end - v)
+                )
+
+            self.model = rk4(along, 0.0, h, self.model)
+        beta, r = self.limited
+        self.limited = beta_end, r_end = self._limit(u)
+        if h > 0.0:
+            tau = self.p.rate_time_constant
+            kept = exp(-h / tau) if tau > 0.0 else 0.0
+            q_beta, q_r = self.rates
+            slope_beta = (beta_end - beta) / h
+            slope_r = (r_end - r) / h
+            self.rates = (
+                slope_beta + (q_beta - slope_beta) * kept,
+                slope_r + (q_r - slope_r) * kept,
+            )
+
+    def output(self, t, u):
+        beta, r = self.limited
+        q_beta, q_r = self.rates
+        return r, beta, q_r, q_beta
+
+    def _feed(self, u):
+        """Return steer angle [rad] and speed [m/s] as the model takes them."""
+        p = self.p
+        v = max(u[1], p.low_speed)
+        if p.limit_steer_angle:
+            return limited_steer(u[0], v, mu=max(u[2], 0.0), car=self.car, share=p.friction_share), v
+        return u[0], v
+
+    def _steady(self, delta, v):
+        """Return (beta [rad], r [rad/s]) of the steady turn."""
+        r_gain, beta_gain = self.car.gains(v)
+        return beta_gain * delta, r_gain * delta
+
+    def _limit(self, u):
+        """Return (beta_ref [rad], r_ref [rad/s]) of the model's state; equations (17), (18)."""
+        p = self.p
+        beta, r = self.model
+        v = max(u[1], 0.0)
+        mu = max(u[2], 0.0)
+        if v < p.low_speed:
+            r *= v / p.low_speed
+        if p.limit_yaw_rate:
+            r = clamp(r, p.friction_share * mu * G / max(v, p.low_speed))
+        if p.limit_sideslip:
+            beta = clamp(beta, atan(p.sideslip_per_friction * mu))
+        return beta, r
