@@ -210,7 +210,7 @@ def test_recall_brings_weights_back_that_no_longer_serve():
 
 
 def test_sets_learn_only_when_asked_and_stay_usable():
-    still, moving = Stand(Fnn), Stand(Fnn, learn_sets=True, error_scale=1e5)
+    still, moving = Stand(Fnn), Stand(Fnn, set_learning_rate=20.0)
     still.start(), moving.start()
     for k in range(2000):
         inputs = see(0.002 * math.sin(0.03 * k), 0.01)
@@ -223,7 +223,7 @@ def test_sets_learn_only_when_asked_and_stay_usable():
 
 
 def test_one_step_of_learning_sets_goes_down_the_gradient():
-    stand = Stand(Fnn, learn_sets=True)
+    stand = Stand(Fnn, set_learning_rate=2.0)
     stand.start()
     e, rate = 0.0012, 0.004
     stand.step(0.001, **see(e, rate))
@@ -235,18 +235,18 @@ def test_one_step_of_learning_sets_goes_down_the_gradient():
 
 
 def test_a_new_start_forgets_what_was_learnt():
-    stand = Stand(Fnn, learn_sets=True)
+    stand = Stand(Fnn, set_learning_rate=2.0)
     first = stand.start(**see(0.001))
     for _ in range(10):
         stand.step(0.001, **see(0.001, 0.01))
-    fresh = Stand(Fnn, learn_sets=True)
+    fresh = Stand(Fnn, set_learning_rate=2.0)
     stand.unit.start(0.0, list(see(0.001).values()))
     assert fresh.start(**see(0.001)) == first
     assert (stand.unit.weights, stand.unit.centres) == (fresh.unit.weights, fresh.unit.centres)
 
 
 def test_a_step_undone_and_repeated_gives_the_same_bits():
-    stand = Stand(Fnn, learn_sets=True, recall=0.1)
+    stand = Stand(Fnn, set_learning_rate=2.0, recall=0.1)
     stand.start()
     for k in range(20):
         stand.step(0.001, **see(0.001 * math.sin(k)))
