@@ -19,21 +19,19 @@ noted, not refused.
 
 from __future__ import annotations
 
-import re
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
 from .plan import Fmu, Wire
+from .wording import star
 
 Node = tuple[str, str]  # unit, variable
 Edge = tuple[str, str]  # source unit, target unit
 
 EXACT_UP_TO = 12
 """Units in one cycle for which the best order is searched; beyond, a good one."""
-
-_ANY_WHEEL = re.compile(r"_(fl|fr|rl|rr)\b")
 
 
 @dataclass(frozen=True)
@@ -93,7 +91,7 @@ def _loops(graph: Mapping[Node, list[Node]]) -> list[str]:
         ways = (_way_back(remaining, node) for node in remaining)
         loop = min((way for way in ways if way), key=len)
         text = " -> ".join(f"{unit}.{name}" for unit, name in loop)
-        texts.setdefault(_ANY_WHEEL.sub("_*", text), text)
+        texts.setdefault(star(text), text)
         remaining = _without_ends({k: v for k, v in remaining.items() if k not in loop})
     return list(texts.values())
 

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Sequence
+from typing import TypeVar
 
 WHEELS = ("fl", "fr", "rl", "rr")
+
+_WHEEL_SUFFIX = re.compile(r"_(fl|fr|rl|rr)\b")
+
+K = TypeVar("K")
 
 
 def listed(items: Iterable[object], *, last: str = "and") -> str:
@@ -41,4 +47,37 @@ def fold(names: Sequence[str]) -> list[str]:
         per_wheel = name[-2:] in WHEELS and stem.endswith("_")
         whole = per_wheel and all(stem + wheel in present for wheel in WHEELS)
         folded[stem + "*" if whole else name] = None
+    return list(folded)
+
+
+def star(text: str) -> str:
+    """Return the text with the wheel at the end of every name replaced by `*`."""
+    return _WHEEL_SUFFIX.sub("_*", text)
+
+
+def fold_sentences(items: Sequence[tuple[K, str]]) -> list[tuple[K, str]]:
+    """Return the sentences, each with its key, those that say the same of all four wheels once."""
+    folded: dict[tuple[K, str], None] = {}
+    alike: dict[tuple[K, str], set[str]] = {}
+    for key, text in items:
+        alike.setdefault((key, star(text)), set()).add(text)
+    for key, text in items:
+        whole = len(alike[key, star(text)]) == len(WHEELS)
+        folded[key, star(text) if whole else text] = None
+    return list(folded)
+
+
+def fold_wires(pairs: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Return (output, input) pairs, those of the four wheels as one with `*`."""
+    alike: dict[tuple[str, str], set[tuple[str, str]]] = {}
+    for pair in pairs:
+        alike.setdefault((star(pair[0]), star(pair[1])), set()).add(pair)
+    folded: dict[tuple[str, str], None] = {}
+    for output, name in pairs:
+        whole = alike[star(output), star(name)]
+        if len(whole) == len(WHEELS):
+            one_source = len({source for source, _ in whole}) == 1
+            folded[output if one_source else star(output), star(name)] = None
+        else:
+            folded[output, name] = None
     return list(folded)

@@ -1,0 +1,138 @@
+"""`yawbench check`: validate a scenario and show how its units are connected and ordered."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from .options import Fmus, ScenarioFile, Set, Swap
+
+if TYPE_CHECKING:
+    from ..plan import Plan, Unit, Value, Wire
+
+
+def check(scenario: ScenarioFile, swap: Swap = None, set_: Set = None, fmus: Fmus = None) -> None:
+    """Validate a scenario; show units in evaluation order, wires and constants."""
+    import sys
+
+    from rich.console import Console
+
+    from ..scenario import load_scenario
+    from ..wiring import make_plan
+
+    plan = make_plan(load_scenario(scenario, swaps=swap or (), settings=set_ or ()), fmus=fmus)
+    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else 140)
+    console.print(f"{scenario}: {plan.title}" if plan.title else f"{scenario}")
+    console.print(
+        f"{_number(plan.n_steps * plan.step)} s in {plan.n_steps} steps of {_number(1000 * plan.step)} ms, "
+        f"{plan.algorithm}; {len(plan.wires)} wires, {len(plan.record)} outputs recorded"
+    )
+    _show(console, "Units in evaluation order", ("unit", "FMU", "step", "parameters"), _unit_rows(plan))
+    _show(console, "Wires", ("from", "to", "variables"), _wire_rows(plan))
+    _show(console, "Constants", ("input", "value"), _constant_rows(plan.units))
+    _show(console, "Why this order", ("unit", "after", "because its outputs follow"), _order_rows(plan))
+    _show(console, "Against the order", ("from", "to", "uses earlier values of"), _backward_rows(plan))
+    console.print("\nNothing is wrong.")
+    for note in plan.notes:
+        print(f"note: {note}", file=sys.stderr)
+
+
+def _show(console, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    from rich.padding import Padding
+    from rich.table import Table
+
+    table = Table(*columns, box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
+    for column in table.columns[:-1]:
+        column.no_wrap = True
+    for row in rows:
+        table.add_row(*row)
+    if table.row_count:
+        console.print(f"\n{title}", style="bold")
+        console.print(Padding(table, (0, 0, 0, 2), expand=False))
+
+
+def _number(value: object) -> str:
+    return f"{float(value):.12g}"  # type: ignore[arg-type]
+
+
+def _unit_rows(plan: Plan) -> Iterable[Sequence[str]]:
+    for unit in plan.units:
+        variables = unit.fmu.variables
+        differing = [
+            _assignment(name, value, variables[name].unit)
+            for name, value in unit.parameters.items()
+            if value != variables[name].start
+        ]
+        step = f"{_number(1000 * unit.period * plan.step)} ms"
+        yield unit.name, unit.fmu.name, step, ", ".join(differing) or "all at their defaults"
+
+
+def _assignment(name: str, value: object, measure: str | None) -> str:
+    shown = f"{value:.6g}" if isinstance(value, float) else f"{value}"
+    return f"{name} = {shown}{f' {measure}' if measure and measure != '1' else ''}"
+
+
+def _wire_rows(plan: Plan) -> Iterable[Sequence[str]]:
+    from ..wording import fold_wires
+
+    units = {unit.name: unit.fmu.variables for unit in plan.units}
+    for (source, target), wires in _grouped(plan.wires).items():
+        shown = []
+        for output, name in fold_wires([(w.output, w.input) for w in wires]):
+            example = next(w for w in wires if _is_of(w.input, name))
+            measure = units[target][example.input].unit
+            ends = output if output == name else f"{output} → {name}"
+            shown.append(f"{ends} [{measure}]" if measure else ends)
+        yield source, target, ", ".join(shown)
+
+
+def _grouped(wires: Iterable[Wire]) -> dict[tuple[str, str], list[Wire]]:
+    groups: dict[tuple[str, str], list[Wire]] = {}
+    for wire in wires:
+        groups.setdefault((wire.source, wire.target), []).append(wire)
+    return groups
+
+
+def _is_of(name: str, pattern: str) -> bool:
+    return name == pattern or (pattern.endswith("*") and name.startswith(pattern[:-1]))
+
+
+def _constant_rows(units: Iterable[Unit]) -> Iterable[Sequence[str]]:
+    from ..wording import fold
+
+    for unit in units:
+        by_value: dict[tuple[str, Value], list[str]] = {}
+        for name, value in unit.constants.items():
+            by_value.setdefault((unit.fmu.variables[name].unit or "1", value), []).append(name)
+        for (measure, value), names in by_value.items():
+            shown = _assignment("", value, measure).removeprefix(" = ")
+            for name in fold(names):
+                yield f"{unit.name}.{name}", shown
+
+
+def _order_rows(plan: Plan) -> Iterable[Sequence[str]]:
+    from ..wording import fold
+
+    position = {unit.name: i for i, unit in enumerate(plan.units)}
+    forward = [w for w in _direct(plan) if position[w.source] < position[w.target]]
+    for unit in plan.units:
+        before = [w for w in forward if w.target == unit.name]
+        sources = list(dict.fromkeys(w.source for w in before))
+        names = fold([w.input for w in before])
+        if before:
+            yield unit.name, ", ".join(sources), ", ".join(names)
+
+
+def _backward_rows(plan: Plan) -> Iterable[Sequence[str]]:
+    from ..wording import fold
+
+    position = {unit.name: i for i, unit in enumerate(plan.units)}
+    backward = [w for w in _direct(plan) if position[w.source] >= position[w.target]]
+    for (source, target), wires in _grouped(backward).items():
+        yield source, target, ", ".join(fold([w.output for w in wires]))
+
+
+def _direct(plan: Plan) -> Sequence[Wire]:
+    from ..order import evaluate
+
+    return evaluate({unit.name: unit.fmu for unit in plan.units}, plan.wires).direct
