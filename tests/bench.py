@@ -1,0 +1,161 @@
+"""What a run costs: `make bench`, or `python -m tests.bench [SCENARIO ...]`.
+
+Prints, and asserts nothing: times depend on the machine and on who else uses it. Every figure is
+the best of several runs, which is the one least disturbed.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from collections import defaultdict
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter, perf_counter_ns
+
+import numpy as np
+
+from orchestrator.interrupts import StopFlag
+from orchestrator.log import Log
+from orchestrator.master import Master
+from orchestrator.plan import Plan
+from orchestrator.program import Operation
+from orchestrator.scenario import load_scenario
+from orchestrator.unit import FmuSlave
+from orchestrator.wiring import make_plan
+
+DEFAULT = Path(__file__).parents[1] / "scenarios" / "fnn_sideslip" / "25mps.yaml"
+REPEATS = 3
+STEPS = 4000
+"""Communication steps measured at most; a scenario's start is representative of its cost."""
+
+
+class Meter:
+    """Adds up the time of calls by unit and kind, less what the clock itself takes."""
+
+    def __init__(self) -> None:
+        self.spent: dict[tuple[str, str], int] = defaultdict(int)
+        self._own = min(self._once(lambda: None) for _ in range(10_000))
+
+    @staticmethod
+    def _once(call: Callable[[], object]) -> int:
+        begin = perf_counter_ns()
+        call()
+        return perf_counter_ns() - begin
+
+    def around(self, operation: Operation) -> list[Operation]:
+        call, spent, own, key = operation.call, self.spent, self._own, (operation.unit, operation.kind)
+
+        def timed():
+            begin = perf_counter_ns()
+            status = call()
+            spent[key] += perf_counter_ns() - begin - own
+            return status
+
+        return [operation._replace(call=timed)]
+
+
+Change = Callable[[Operation], list[Operation]]
+"""What becomes of an operation of the program before it is measured."""
+
+
+def measure(plan: Plan, change: Change = lambda operation: [operation]) -> dict[str, float]:
+    """Run the first steps of a plan; return the seconds of every phase, those of stepping per step."""
+    log, slaves = Log(), {}
+    corrupted: set[Path] = set()
+    begin = perf_counter()
+    try:
+        for unit in plan.units:
+            slaves[unit.name] = FmuSlave(unit, log, corrupted)
+        opened = perf_counter()
+        master = Master(plan, slaves, log, StopFlag())
+        row = np.zeros(1 + len(plan.record))
+        master.initialize(row, [])
+        ready = perf_counter()
+        for k in range(1, master.programs.cycle + 1):
+            program = master.programs.at(k)
+            program[:] = [changed for operation in program for changed in change(operation)]
+        n = min(STEPS, plan.n_steps)
+        started = perf_counter()
+        master.advance(n, [row] * n, [])
+        ended = perf_counter()
+    finally:
+        for slave in slaves.values():
+            slave.free()
+    return {"instantiate": opened - begin, "initialize": ready - opened, "step": (ended - started) / n}
+
+
+def bench(path: Path) -> None:
+    """Print the costs of one scenario."""
+    begin = perf_counter()
+    scenario = load_scenario(path)
+    plan = make_plan(scenario)
+    opening = perf_counter() - begin
+    runs = [measure(plan) for _ in range(REPEATS)]
+    best = {phase: min(run[phase] for run in runs) for phase in runs[0]}
+    meters = [Meter() for _ in range(REPEATS)]
+    metered = [measure(plan, meter.around) for meter in meters]
+    meter = meters[min(range(REPEATS), key=lambda i: metered[i]["step"])]
+    n = min(STEPS, plan.n_steps)
+    unit_steps = sum(n // unit.period for unit in plan.units) / n
+
+    print(f"{path}: {plan.title}")
+    print(f"  {plan.algorithm}, step {float(plan.step):g} s, {n} of {plan.n_steps} steps measured\n")
+    print(f"  {'us per call':24s}{'set':>8s}{'step':>8s}{'get':>8s}{'sum':>8s}   calls per step")
+    for unit in plan.units:
+        times = [1e-3 * meter.spent[unit.name, kind] * unit.period / n for kind in ("set", "step", "get")]
+        cells = "".join(f"{t:8.2f}" for t in (*times, sum(times)))
+        print(f"  {unit.name:24s}{cells}   {'1' if unit.period == 1 else f'1/{unit.period}'}")
+    inside = {kind: 0.0 for kind in ("set", "step", "get", "gather", "keep")}
+    for (_, kind), spent in meter.spent.items():
+        inside[kind] += 1e-3 * spent / n
+    whole = 1e6 * best["step"]
+    loop = 1e6 * min(measure(plan, lambda operation: [])["step"] for _ in range(REPEATS))
+    units_share = inside["set"] + inside["step"] + inside["get"]
+    own = inside["gather"] + inside["keep"] + loop
+    print(f"\n  per communication step   {whole:8.2f} us")
+    print(
+        f"    in the units           {units_share:8.2f} us: set {inside['set']:.2f}, "
+        f"step {inside['step']:.2f}, get {inside['get']:.2f}"
+    )
+    print(
+        f"    master's own           {own:8.2f} us: gather {inside['gather']:.2f}, "
+        f"keep {inside['keep']:.2f}, loop, check and recorded row {loop:.2f}"
+    )
+    print(f"  per step of a unit       {whole / unit_steps:8.2f} us on average, {unit_steps:g} in a step")
+    print(
+        f"\n  start-up: imports {1e3 * imports():.0f} ms, scenario and FMUs {1e3 * opening:.0f} ms, "
+        f"instantiate {1e3 * best['instantiate']:.1f} ms, initialize {1e3 * best['initialize']:.1f} ms"
+    )
+    print(f"  yawbench run, process start to files written: {process(path):.2f} s\n")
+
+
+def imports() -> float:
+    """Return the time [s] to import what a run needs, in a fresh interpreter."""
+    code = (
+        "import time; t = time.perf_counter(); import orchestrator.cli, orchestrator.simulate, "
+        "orchestrator.wiring; print(time.perf_counter() - t)"
+    )
+    command = [sys.executable, "-c", code]
+    return min(float(subprocess.run(command, capture_output=True, check=True).stdout) for _ in range(REPEATS))
+
+
+def process(path: Path) -> float:
+    """Return the time [s] of a whole `yawbench run`."""
+    times = []
+    with tempfile.TemporaryDirectory() as folder:
+        for _ in range(REPEATS):
+            begin = perf_counter()
+            subprocess.run(
+                [sys.executable, "-m", "orchestrator.cli", "run", str(path), "--out", folder],
+                capture_output=True,
+                check=True,
+            )
+            times.append(perf_counter() - begin)
+    return min(times)
+
+
+if __name__ == "__main__":
+    for scenario_file in [Path(argument) for argument in sys.argv[1:]] or [DEFAULT]:
+        bench(scenario_file)
