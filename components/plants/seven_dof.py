@@ -19,11 +19,12 @@ FNN, equations (5)-(8), (13)-(20). Ours differs: the lifted wheel; slips at rest
 
 How it couples. Tyre forces and wheel torques enter the integration only: they are held over the
 step, and a master that knows this hands over their values at its middle. The steer angle feeds
-the slip angles directly, so its value belongs to the end of the step; within the step it goes
-there in a straight line from the last one. The loads follow from the accelerations, these from the
+the slip angles directly, so its value belongs to the end of the step; the forces are turned
+by the mean of it and the last one. The loads follow from the accelerations, these from the
 forces and these from the loads: to leave that loop open, the accelerations, known at the middle
-of each step, are carried on to its end along the straight line nearest to the last three (`carry`).
-All of this is exact to second order in the step, which may vary.
+of each step, are carried on to its end along the straight line nearest to the last three (`core.carry`).
+All of this is exact to second order in the step, which may vary. The body's motion is solved by
+`core.plane_body`, the wheels' by `core.wheel_spin`, which also says what becomes of slow, braked wheels.
 """
 
 from __future__ import annotations
@@ -32,15 +33,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan2, cos, sin
 
+from ..core import carry
 from ..core.component import Component
-from ..core.integrators import rk4
+from ..core.plane_body import Four, move, resultants
 from ..core.variables import output, parameter
 from ..core.wheel_kinematics import slip_angle, slip_ratio, wheel_velocities
+from ..core.wheel_spin import spin
 
 G = 9.81  # m/s2
-
-Four = tuple[float, float, float, float]
-Motion = tuple[float, ...]  # v_x, v_y [m/s], r [rad/s], x, y [m], psi [rad]
 
 
 @dataclass(frozen=True)
@@ -70,6 +70,12 @@ class SevenDofParameters:
         "Slips refer to this speed when the wheel is slower; chosen: keeps a parked car quiet at 1 ms",
         minimum=0.001,
     )
+    slip_stiffness_per_load: float = parameter(
+        15.0,
+        "1",
+        "Slip stiffness over load for slow wheels, see core.wheel_spin; chosen: paper A's tyre at rest",
+        minimum=0.0,
+    )
 
 
 def accelerations(delta: float, forces: Sequence[float], p: SevenDofParameters) -> tuple[float, float, float]:
@@ -79,41 +85,10 @@ def accelerations(delta: float, forces: Sequence[float], p: SevenDofParameters) 
         delta: steer angle [rad].
         forces: F_x of the wheels fl, fr, rl, rr, then F_y, wheel axes [N].
     """
-    x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr = forces
-    c = cos(delta)
-    s = sin(delta)
-    x = x_fl + x_fr
-    y = y_fl + y_fr
-    front = x * s + y * c
-    rear = y_rl + y_rr
-    turn = (y_fl - y_fr) * s + (x_fr - x_fl) * c + (x_rr - x_rl)
-    moment = p.cg_to_front_axle * front - p.cg_to_rear_axle * rear + 0.5 * p.track_width * turn
-    return (x * c - y * s + (x_rl + x_rr)) / p.mass, (front + rear) / p.mass, moment / p.yaw_inertia
-
-
-def move(
-    motion: Motion,
-    h: float,
-    *,
-    delta: float,
-    delta_end: float,
-    forces: Sequence[float],
-    p: SevenDofParameters,
-) -> Motion:
-    """Return the motion after `h` [s] under forces held in wheel axes [N]; equations (5)-(7).
-
-    The steer angle goes in a straight line from `delta` to `delta_end` [rad].
-    """
-    rate = (delta_end - delta) / h
-
-    def derivatives(t: float, state: Sequence[float]) -> Motion:
-        v_x, v_y, r, _, _, psi = state
-        a_x, a_y, dr = accelerations(delta + rate * t, forces, p)
-        c = cos(psi)
-        s = sin(psi)
-        return a_x + v_y * r, a_y - v_x * r, dr, v_x * c - v_y * s, v_x * s + v_y * c, r
-
-    return rk4(derivatives, 0.0, h, motion)
+    x, front, rear, moment = resultants(
+        delta, forces, a=p.cg_to_front_axle, b=p.cg_to_rear_axle, half_track=0.5 * p.track_width
+    )
+    return x / p.mass, (front + rear) / p.mass, moment / p.yaw_inertia
 
 
 def vertical_loads(a_x: float, a_y: float, p: SevenDofParameters) -> Four:
@@ -130,26 +105,6 @@ def vertical_loads(a_x: float, a_y: float, p: SevenDofParameters) -> Four:
     front_across = min(max(b * across, -front), front)
     rear_across = min(max(a * across, -rear), rear)
     return front - front_across, front + front_across, rear - rear_across, rear + rear_across
-
-
-def carry(values: Sequence[float], ages: Sequence[float]) -> float:
-    """Return the value at age zero of the straight line nearest to three values (least squares).
-
-    Args:
-        values: newest first.
-        ages: how long ago they were [s], not all the same.
-
-    Two values would do for second order. Three keep the loop of loads and forces calm: it swings
-    up where (change of the sum of forces) / (m times change of acceleration) falls below -0.60,
-    with two values already below -0.25, which a car on dry road reaches with locked rear wheels.
-    """
-    y_1, y_2, y_3 = values
-    t_1, t_2, t_3 = ages
-    t = (t_1 + t_2 + t_3) / 3.0
-    y = (y_1 + y_2 + y_3) / 3.0
-    d_1, d_2, d_3 = t_1 - t, t_2 - t, t_3 - t
-    slope = (d_1 * (y_1 - y) + d_2 * (y_2 - y) + d_3 * (y_3 - y)) / (d_1 * d_1 + d_2 * d_2 + d_3 * d_3)
-    return y - slope * t
 
 
 class SevenDof(Component):
@@ -188,38 +143,50 @@ class SevenDof(Component):
         p = self.p
         v_x = p.initial_speed * cos(p.initial_sideslip)
         v_y = p.initial_speed * sin(p.initial_sideslip)
-        self.motion: Motion = (v_x, v_y, p.initial_yaw_rate, 0.0, 0.0, 0.0)
-        self.spin = tuple(v / p.wheel_radius for v in self._wheels(u[0])[:4])  # rolling freely
+        self.motion = (v_x, v_y, p.initial_yaw_rate, 0.0, 0.0, 0.0)
         self.steer_angle = u[0]
+        self.wheels = self._wheels(u[0])
+        self.spins = tuple([v / p.wheel_radius for v in self.wheels[:4]])  # rolling freely
         a_x, a_y, _ = accelerations(u[0], u[1:9], p)
         self.end = (a_x, a_y)
         self.history = ((0.0, a_x, a_y),) * 2  # age [s] and accelerations at the last two middles
+        self.loads = vertical_loads(a_x, a_y, p)
 
     def advance(self, t, h, u):
-        if h <= 0.0:  # nothing moves
-            self.steer_angle = u[0]
-            return
         p = self.p
-        delta, delta_end = self.steer_angle, u[0]
-        forces = u[1:9]
-        x_fl, x_fr, x_rl, x_rr = u[1:5]
-        t_fl, t_fr, t_rl, t_rr = u[9:13]
-        w_fl, w_fr, w_rl, w_rr = self.spin
-        radius = p.wheel_radius
-        k = h / p.wheel_inertia
-        self.spin = (
-            w_fl + k * (t_fl - radius * x_fl),
-            w_fr + k * (t_fr - radius * x_fr),
-            w_rl + k * (t_rl - radius * x_rl),
-            w_rr + k * (t_rr - radius * x_rr),
+        delta, self.steer_angle = self.steer_angle, u[0]
+        if h <= 0.0:  # nothing moves
+            self.wheels = self._wheels(u[0])
+            return
+        a_x, a_y, dr = accelerations(0.5 * (delta + u[0]), u[1:9], p)
+        self.motion = move(self.motion, h, a_x=a_x, a_y=a_y, dr=dr)
+        before = self.wheels
+        after = self.wheels = self._wheels(u[0])
+        speeds, loads = self.spins, self.loads
+        radius, inertia, low = p.wheel_radius, p.wheel_inertia, p.low_speed
+        per_load = p.slip_stiffness_per_load
+        self.spins = tuple(
+            [
+                spin(
+                    speeds[i],
+                    h,
+                    torque=u[9 + i],
+                    f_x=u[1 + i],
+                    v=before[i],
+                    v_end=after[i],
+                    radius=radius,
+                    inertia=inertia,
+                    stiffness=per_load * loads[i],
+                    v_low=low,
+                )
+                for i in (0, 1, 2, 3)
+            ]
         )
-        self.motion = move(self.motion, h, delta=delta, delta_end=delta_end, forces=forces, p=p)
-        self.steer_angle = delta_end
-        a_x, a_y, _ = accelerations(0.5 * (delta + delta_end), forces, p)
         (age_1, x_1, y_1), (age_2, x_2, y_2) = self.history
-        ages = 0.5 * h, age_1 + h, age_2 + h
-        self.end = carry((a_x, x_1, x_2), ages), carry((a_y, y_1, y_2), ages)
-        self.history = (0.5 * h, a_x, a_y), (age_1 + h, x_1, y_1)
+        k_0, k_1, k_2 = carry.weights(0.5 * h, age_1 + h, age_2 + h)
+        self.history = ((0.5 * h, a_x, a_y), (age_1 + h, x_1, y_1))
+        self.end = (k_0 * a_x + k_1 * x_1 + k_2 * x_2, k_0 * a_y + k_1 * y_1 + k_2 * y_2)
+        self.loads = vertical_loads(*self.end, p)
 
     def output(self, t, u):
         p = self.p
@@ -227,9 +194,9 @@ class SevenDof(Component):
         radius = p.wheel_radius
         v_x, v_y, r, x, y, psi = self.motion
         a_x, a_y = self.end
-        w_fl, w_fr, w_rl, w_rr = self.spin
-        v_fl, v_fr, v_rl, v_rr, side_fl, side_fr, side_rl, side_rr = self._wheels(u[0])
-        f_fl, f_fr, f_rl, f_rr = vertical_loads(a_x, a_y, p)
+        w_fl, w_fr, w_rl, w_rr = self.spins
+        v_fl, v_fr, v_rl, v_rr, side_fl, side_fr, side_rl, side_rr = self.wheels
+        f_fl, f_fr, f_rl, f_rr = self.loads
         turning = (v_x * a_y - v_y * a_x) / max(v_x * v_x + v_y * v_y, low * low)
         return (
             v_x,
