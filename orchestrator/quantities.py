@@ -94,7 +94,9 @@ _COMMON = (  # noqa: SIM905 - units read better as one line of text
 
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _TOKEN = re.compile(r"(?P<symbol>[A-Za-zµ°%]+|1)(?:\^?(?P<power>-?\d{1,2}))?|(?P<mark>[./()*·])|\s+")
-_NUMBER = re.compile(r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(?P<unit>\S.*?)?\s*")
+_NUMBER = re.compile(
+    r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(?P<unit>[A-Za-zµμ°%1(].*?)?\s*"
+)
 
 
 def parse_unit(text: str) -> Measure:
@@ -192,17 +194,20 @@ def convert(text: str, unit: str | None) -> Fraction | float:
     if given == "g" and target.powers == _GRAVITY.powers:
         source = _GRAVITY
     if source.powers != target.powers:
-        raise ValueError(f"{text!r} is not a value in {unit}: use {listed(_spellings(target), last='or')}")
+        raise ValueError(
+            f"{text!r} is not a value in {unit}: use {listed(_spellings(unit, target), last='or')}"
+        )
     exact = number * source.factor / target.factor
     turns = source.pi - target.pi
     return exact if turns == 0 else float(exact) * math.pi**turns
 
 
-def _spellings(target: Measure) -> list[str]:
-    fitting = [name for name in dict.fromkeys(_COMMON) if parse_unit(name).powers == target.powers]
+def _spellings(unit: str, target: Measure) -> list[str]:
+    """Return units that fit, the one in question first."""
+    fitting = [name for name in _COMMON if parse_unit(name).powers == target.powers]
     if target.powers == _GRAVITY.powers:
         fitting.append("g")
-    return fitting or ["a plain number"]
+    return list(dict.fromkeys((unit, *fitting)))
 
 
 def seconds(value: object) -> Fraction:

@@ -140,11 +140,13 @@ def _check_time_grid(document: Document) -> None:
         if time is None or time % step == 0:
             continue
         below = time // step * step
+        option = document.override(("step_size",))
+        origin = f" ({option})" if option else ""
         nearest = listed([f"{float(t):.12g} s" for t in (below, below + step) if t > 0], last="or")
         document.report(
             key,
             f"{float(time):.12g} s is no integer multiple of the communication step "
-            f"{float(step):.12g} s; nearest allowed: {nearest}",
+            f"{float(step):.12g} s{origin}; nearest allowed: {nearest}",
         )
 
 

@@ -25,7 +25,7 @@ def listed(items: Iterable[object], *, last: str = "and") -> str:
 def closest(name: str, valid: Iterable[str]) -> str | None:
     """Return the valid name most like `name`, or None if none is like it."""
     by_lower = {v.lower(): v for v in valid}
-    found = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.7)
+    found = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.65)
     return by_lower[found[0]] if found else None
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+from .wording import closest, listed
 
 Key = tuple[str | int, ...]
 """Where a value stands: ('connections', 3, 'from')."""
@@ -177,8 +178,8 @@ def _neighbours(path: Path) -> str:
     """Return what the folder of a missing file holds in its place."""
     if not path.parent.is_dir():
         return ""
-    names = sorted(p.name for p in path.parent.iterdir() if p.suffix in (".yaml", ".yml"))
-    close = difflib.get_close_matches(path.name, names, n=1)
-    if close:
-        return f"; did you mean {str(path.parent / close[0])!r}?"
-    return f"; {path.parent} holds {', '.join(names)}" if names else ""
+    names = {p.stem: p.name for p in sorted(path.parent.iterdir()) if p.suffix in (".yaml", ".yml")}
+    close = closest(path.stem, names)
+    if close is not None:
+        return f"; did you mean {str(path.parent / names[close])!r}?"
+    return f"; {path.parent.absolute()} holds {listed(names.values())}" if names else ""

@@ -1,0 +1,124 @@
+"""Quantities with units: exact conversion, and sentences for what is none."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import pytest
+
+from orchestrator import quantities
+from orchestrator.quantities import convert, parse_unit, same_unit, seconds
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("90 km/h", "m/s", Fraction(25)),
+        ("-3.6 km/h", "m/s", Fraction(-1)),
+        ("12 bar", "Pa", Fraction(1_200_000)),
+        ("120 kPa", "Pa", Fraction(120_000)),
+        ("20 MPa/s", "Pa/s", Fraction(20_000_000)),
+        ("3 mm", "m", Fraction(3, 1000)),
+        ("250 g", "kg", Fraction(1, 4)),
+        ("0.5 g", "m/s2", Fraction("4.903325")),
+        ("1.2 t", "kg", Fraction(1200)),
+        ("5 %", "1", Fraction(1, 20)),
+        ("2 min", "s", Fraction(120)),
+        ("1.5 ms", "s", Fraction(3, 2000)),
+        ("34 kN/m", "N/m", Fraction(34_000)),
+        ("1 N/mm", "N/m", Fraction(1000)),
+        ("3 N·m·s/rad", "N.m.s/rad", Fraction(3)),
+        ("1343.1 kg m²", "kg.m2", Fraction("1343.1")),
+        ("9 m/s^2", "m/s2", Fraction(9)),
+        ("1e3Nm", "N.m", Fraction(1000)),
+        ("1.2258 kg/m3", "kg/m3", Fraction("1.2258")),
+        ("2 J/(kg K)", "m2/(s2.K)", Fraction(2)),
+        ("5 widgets", "widgets", Fraction(5)),
+    ],
+)
+def test_quantity_is_converted_exactly(text: str, unit: str, value: Fraction) -> None:
+    assert convert(text, unit) == value
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("180 deg", "rad", math.pi),
+        ("5 deg/s", "rad/s", math.radians(5.0)),
+        ("30 rpm", "rad/s", math.pi),
+        ("2 N.m/deg", "N.m/rad", 2.0 * 180.0 / math.pi),
+    ],
+)
+def test_quantity_with_pi_is_converted_to_rounding(text: str, unit: str, value: float) -> None:
+    assert convert(text, unit) == pytest.approx(value, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "message"),
+    [
+        ("5 kg", "rad", "'5 kg' is not a value in rad: use rad, deg or mrad"),
+        ("5 rad", "kg", "'5 rad' is not a value in kg: use kg, g or t"),
+        ("fast", "m/s", "'fast' is neither a number in m/s nor a number with its unit"),
+        ("0,5 m", "m", "'0,5 m' is neither a number in m nor a number with its unit"),
+        ("5 foo", "m", "'foo' is not a unit"),
+        ("5 m/", "m", "'m/' is not a unit"),
+        ("5 m/s.kg", "m", "'m/s.kg' is ambiguous: put the denominator in parentheses"),
+        ("5 m", "widgets", "'5 m' cannot be converted to widgets: give a number in widgets"),
+        ("5 m", None, "'5 m' names a unit, but the FMU declares none: give a plain number"),
+        ("5 mkg", "kg", "'mkg' is not a unit"),
+    ],
+)
+def test_what_is_no_such_quantity_is_said_in_a_sentence(text: str, unit: str | None, message: str) -> None:
+    with pytest.raises(ValueError) as caught:
+        convert(text, unit)
+    assert str(caught.value) == message
+
+
+def test_every_offered_spelling_is_a_unit() -> None:
+    assert [name for name in quantities._COMMON if parse_unit(name) is None] == []
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "same"),
+    [
+        ("N.m", "N.m", True),
+        ("N.m", "Nm", True),
+        ("m/s2", "m/s^2", True),
+        ("kg.m2", "kg*m2", True),
+        ("widgets", "widgets", True),
+        ("rad", "deg", False),
+        ("rad/s", "1/s", False),
+        ("N", "kN", False),
+        ("widgets", "m", False),
+        ("1", None, False),
+    ],
+)
+def test_units_are_the_same_if_they_mean_the_same(a: str, b: str | None, same: bool) -> None:
+    assert same_unit(a, b) is same
+    assert same_unit(b, a) is same
+
+
+@pytest.mark.parametrize(
+    ("value", "time"),
+    [(0.001, Fraction(1, 1000)), (8, Fraction(8)), ("1 ms", Fraction(1, 1000)), (1e-5, Fraction(1, 100_000))],
+)
+def test_times_are_the_fractions_that_were_written(value: object, time: Fraction) -> None:
+    assert seconds(value) == time
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (0, "must be a time above 0 s (got 0)"),
+        ("-1 ms", "must be a time above 0 s (got '-1 ms')"),
+        (True, "must be a time in s (got True)"),
+        (math.inf, "must be a time in s (got inf)"),
+        ([1], "must be a time in s (got [1])"),
+        ("1 m", "'1 m' is not a value in s: use s, ms, min or h"),
+    ],
+)
+def test_what_is_no_time_is_said_in_a_sentence(value: object, message: str) -> None:
+    with pytest.raises(ValueError) as caught:
+        seconds(value)
+    assert str(caught.value) == message
