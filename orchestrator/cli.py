@@ -9,7 +9,7 @@ import typer
 
 from .errors import YawbenchError
 
-COMMANDS = ("build", "check", "run", "compare", "plot", "converge")
+COMMANDS = ("build", "check", "run", "compare", "plot", "converge", "study")
 """Each a module of `orchestrator.commands` with a function of the same name."""
 
 

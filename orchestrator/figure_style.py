@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+import textwrap
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 LINES: tuple[dict[str, Any], ...] = (
     {"color": "#0072B2", "linestyle": "-", "linewidth": 1.6},
@@ -44,6 +48,8 @@ RC: Any = {
     "svg.fonttype": "path",
     "savefig.dpi": 150,
 }
+WIDTH, ROW = 10.0, 2.25
+"""Width of a figure and height of a row of panels [inches]."""
 QUIET = "#666666"
 """The colour of what may be overlooked: provenance, guides."""
 
@@ -63,3 +69,31 @@ def save(figure: Figure, stem: Path) -> list[Path]:
         figure.savefig(paths[0], metadata={"Date": None})
         figure.savefig(paths[1], metadata={"Software": None})
     return paths
+
+
+def frame(figure: Figure, height: float, handles: Sequence[Line2D], title: str, note: str) -> None:
+    """Set title and legend above the panels and the note below, in room of their own.
+
+    Args:
+        figure: with constrained layout.
+        height: of all its panels [inches].
+        handles: what the legend shows.
+        title, note: broken into lines as needed.
+    """
+    titles, notes = textwrap.wrap(title, 95), textwrap.wrap(note, 165)
+    widths = [len(str(handle.get_label())) + 9 for handle in handles]  # characters
+    columns = len(handles) if sum(widths) <= 135 else max(1, 135 // max(widths))
+    above = 0.12 + 0.22 * len(titles)
+    lines = math.ceil(len(handles) / max(columns, 1))
+    head, foot = above + 0.2 * lines + 0.08, 0.12 + 0.13 * len(notes)  # inches
+    total = height + head + foot
+    figure.set_size_inches(WIDTH, total)
+    figure.get_layout_engine().set(rect=(0, foot / total, 1, height / total), h_pad=0.07)  # type: ignore[union-attr, call-arg]
+    left = 0.1 / WIDTH
+    figure.text(left, 1 - 0.1 / total, "\n".join(titles), va="top", fontsize=12, fontweight="bold")
+    figure.text(left, 0.08 / total, "\n".join(notes), va="bottom", fontsize=7, color=QUIET)
+    if handles:
+        figure.legend(
+            handles=handles, loc="upper left", bbox_to_anchor=(left, 1 - above / total),
+            ncols=columns, borderaxespad=0.0, borderpad=0.0,
+        )  # fmt: skip

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .display import symbol, variable_of
+from .display import symbol, variable_of, words
 from .errors import ResultsError, ScenarioError
 from .measures import MEASURES, Measure
 from .wording import WHEELS, hint
@@ -67,6 +67,11 @@ class Metric:
     def definition(self) -> str:
         of_wheels = ", the largest of the four wheels" if "*" in self.signal else ""
         return f"{self.measure.definition}{of_wheels}"
+
+    @property
+    def title(self) -> str:
+        """The signal and the measure in words."""
+        return f"{words(self.signal)}: {self.measure.definition}"
 
     def unit(self, signal_unit: str) -> str:
         """Return the metric's unit for a signal in `signal_unit`."""

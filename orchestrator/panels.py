@@ -15,14 +15,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .display import digits_of, shown_unit, symbol, variable_of, words
-from .figure_style import QUIET, REFERENCE, line_style
+from .figure_style import QUIET, REFERENCE, ROW, WIDTH, line_style
 from .metrics import columns_of, reference_of
 from .results import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-WIDTH, ROW = 10.0, 2.25  # inches
 WHEEL_NAMES = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 POINTS = 1500
 """Buckets a line is thinned to; each keeps its smallest and its largest value."""
@@ -76,6 +75,11 @@ def panels_of(runs: Sequence[Run], name: str) -> list[Panel]:
     return four
 
 
+def shown_by(runs: Sequence[Run], names: Sequence[str]) -> list[Panel]:
+    """Return all panels that the names stand for, in order."""
+    return [panel for name in names for panel in panels_of(runs, name)]
+
+
 def _one_wheel(runs: Sequence[Run], name: str, k: int, heading: str) -> Callable[[Axes], None]:
     def fill(axes: Axes) -> None:
         unit = ""
@@ -127,7 +131,7 @@ def _limit(axes: Axes, scale: float, lines: list[tuple[str, float]], unit: str) 
         return
     largest = 1.5 * factor * max(scale, *(peak for _, peak in lines if peak <= OFF_SCALE * scale))
     axes.set_ylim(-largest, largest)
-    note = "; ".join(f"{label}: up to {digits_of(peak * factor)} {text}" for label, peak in lost)
+    note = "; ".join(f"{label}, up to {digits_of(peak * factor)} {text}" for label, peak in lost)
     axes.set_title(axes.get_title(loc="left"), pad=16)
     axes.annotate(
         f"beyond the axes: {note}", (0, 1), (0, 4), xycoords="axes fraction",

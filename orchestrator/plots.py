@@ -7,15 +7,13 @@ legend covers no data; the line at the bottom says where the figure comes from.
 
 from __future__ import annotations
 
-import math
-import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from .display import digits_of
 from .errors import ResultsError
-from .figure_style import QUIET, RC, REFERENCE, line_style
-from .panels import ROW, WIDTH, Panel, Run, panels_of
+from .figure_style import RC, REFERENCE, ROW, frame, line_style
+from .panels import Panel, Run, shown_by
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,7 +53,7 @@ def draw(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    found = [panel for name in panels for panel in panels_of(runs, name)]
+    found = shown_by(runs, panels)
     if not found:
         where = ", ".join(str(run.results.folder) for run in runs)
         raise ResultsError(f"{where}: nothing to draw, no run recorded any of {', '.join(panels)}.")
@@ -73,7 +71,7 @@ def draw(
                 if below and below[0].name != "path":
                     axes.set_xlabel("")  # the same time axis stands below
         foot = provenance(runs) if note is None else note
-        _frame(figure, ROW * len(rows), _legend(figure, runs), title or title_of(runs), foot)
+        frame(figure, ROW * len(rows), _legend(figure, runs), title or title_of(runs), foot)
     return figure
 
 
@@ -101,44 +99,26 @@ def _legend(figure: Figure, runs: Sequence[Run]) -> list[Line2D]:
     return handles
 
 
-def _frame(figure: Figure, height: float, handles: list[Line2D], title: str, note: str) -> None:
-    """Set title and legend above the panels and the note below, in room of their own."""
-    titles, notes = textwrap.wrap(title, 95), textwrap.wrap(note, 165)
-    widths = [len(str(handle.get_label())) + 9 for handle in handles]  # characters
-    columns = len(handles) if sum(widths) <= 135 else max(1, 135 // max(widths))
-    above = 0.12 + 0.22 * len(titles)
-    lines = math.ceil(len(handles) / max(columns, 1))
-    head, foot = above + 0.2 * lines + 0.08, 0.12 + 0.13 * len(notes)  # inches
-    total = height + head + foot
-    figure.set_size_inches(WIDTH, total)
-    figure.get_layout_engine().set(rect=(0, foot / total, 1, height / total), h_pad=0.07)  # type: ignore[union-attr, call-arg]
-    left = 0.1 / WIDTH
-    figure.text(left, 1 - 0.1 / total, "\n".join(titles), va="top", fontsize=12, fontweight="bold")
-    figure.text(left, 0.08 / total, "\n".join(notes), va="bottom", fontsize=7, color=QUIET)
-    if handles:
-        figure.legend(
-            handles=handles, loc="upper left", bbox_to_anchor=(left, 1 - above / total),
-            ncols=columns, borderaxespad=0.0, borderpad=0.0,
-        )  # fmt: skip
-
-
 def title_of(runs: Sequence[Run]) -> str:
     """Return the title of the runs' scenario, or a general one where they differ."""
-    titles = {str(run.results.run.get("scenario", {}).get("title") or "") for run in runs}
+    titles = {str(run.results.run.get("title") or "") for run in runs}
     return (titles.pop() if len(titles) == 1 else "") or "Comparison of runs"
 
 
 def provenance(runs: Sequence[Run]) -> str:
-    """Return where the figure comes from: source, folders, algorithm, step, version, as far as recorded."""
-    first = runs[0].results.run
-    scenario = first.get("scenario", {})
-    parts = [str(scenario["source"])] if scenario.get("source") else []
-    for key in ("algorithm", "step_size"):
-        given = {run.results.run.get("scenario", {}).get(key) for run in runs}
-        if len(given) == 1 and None not in given:
-            value = given.pop()
-            parts.append(f"step {digits_of(1000 * value)} ms" if isinstance(value, float) else str(value))
-    unfinished = [run.label for run in runs if run.results.run.get("status") not in (None, "completed", "ok")]
+    """Return where the figure comes from: version, source, algorithm, step, FMUs with their hashes."""
+    records = [run.results.run for run in runs]
+    sources = dict.fromkeys(str(record.get("scenario", {}).get("source") or "") for record in records)
+    parts = [f"yawbench {records[0].get('versions', {}).get('yawbench', '')}".strip(), *filter(None, sources)]
+    algorithms = dict.fromkeys(str(record.get("algorithm")) for record in records if "algorithm" in record)
+    steps = dict.fromkeys(record["step_size"] for record in records if "step_size" in record)
+    parts += [*algorithms, *(f"step {digits_of(1000 * step)} ms" for step in steps)]
+    fmus = dict.fromkeys(
+        f"{fmu.get('name')} {str(fmu.get('sha256', ''))[:8]}"
+        for record in records
+        for fmu in record.get("fmus", {}).values()
+    )
+    parts += [f"FMUs: {', '.join(fmus)}"] if fmus else []
+    unfinished = [run.label for run in runs if run.results.run.get("status") != "completed"]
     parts += [f"ended early: {', '.join(unfinished)}"] if unfinished else []
-    version = first.get("versions", {}).get("yawbench")
-    return " · ".join([f"yawbench {version}" if version else "yawbench", *parts])
+    return " · ".join(parts)

@@ -42,11 +42,11 @@ def results(
 
 def run_record(units: dict[str, str], title: str = "Sine at 25 m/s") -> dict[str, Any]:
     """Return what `run.json` holds of such a run."""
-    scenario = {"title": title, "step_size": 0.001, "algorithm": "extrapolated", "source": "paper A"}
-    fmus = {unit: {"name": f"{unit}_made_up", "sha256": "0" * 64} for unit in ("controller", "plant")}
+    fmus = {unit: {"name": f"{unit}_made_up", "sha256": "0123456789" * 6} for unit in ("controller", "plant")}
     return {
-        "scenario": scenario, "title": title, "units": units, "fmus": fmus, "algorithm": "extrapolated",
-        "step_size": 0.001, "status": "completed", "versions": {"yawbench": "0.1.0"}, "wall_time": 1.5,
+        "status": "completed", "error": None, "title": title, "wall_time": 1.5, "algorithm": "extrapolated",
+        "step_size": 0.001, "units": units, "fmus": fmus, "versions": {"yawbench": "0.1.0"},
+        "scenario": {"title": title, "source": "paper A"},
     }  # fmt: skip
 
 

@@ -1,0 +1,50 @@
+"""What the commands that make several runs share: an option, progress, tables on the terminal."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from ..jobs import Outcome
+    from ..tables import Table
+
+Jobs = Annotated[
+    int | None,
+    typer.Option("--jobs", metavar="N", min=1, help="Runs at a time; default: one per processor core."),
+]
+WIDTH = 140
+"""Of tables that go into a file or a pipe."""
+
+
+def say(text: str) -> None:
+    """Write a message for the user, apart from what the command gives out."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def progress(total: int) -> Callable[[Outcome], None]:
+    """Return what reports each run as it ends."""
+    width, count = len(str(total)), 0
+
+    def done(outcome: Outcome) -> None:
+        nonlocal count
+        count += 1
+        ended = f"{outcome.seconds:.1f} s" if outcome.ok else f"failed: {outcome.reason}"
+        say(f"[{count:{width}}/{total}] {outcome.job.label}: {ended}")
+
+    return done
+
+
+def print_tables(tables: Iterable[Table]) -> None:
+    """Print tables on the standard output, as wide as the terminal."""
+    from rich.console import Console
+
+    from ..tables import for_terminal
+
+    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else WIDTH)
+    for table in tables:
+        console.print()
+        console.print(for_terminal(table))

@@ -1,0 +1,53 @@
+"""`yawbench compare`: one scenario with several FMUs for a unit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .batch import Jobs
+from .options import Fmus, Out, ScenarioFile, Set
+
+Swaps = Annotated[
+    list[str],
+    typer.Option(
+        "--swap",
+        metavar="UNIT=FMU,FMU,...",
+        help="FMUs to compare for a unit; one alone is compared with the scenario's own. Repeatable.",
+    ),
+]
+
+
+def compare(
+    scenario: ScenarioFile,
+    swap: Swaps,
+    set_: Set = None,
+    out: Out = None,
+    fmus: Fmus = None,
+    jobs: Jobs = None,
+) -> None:
+    """Run a scenario once per FMU; overlay the runs in figures and put their metrics side by side.
+
+    Without --out, results go to results/<folder of the scenario>/<its name>-compare. A run that
+    fails is named and takes no other with it.
+    """
+    from ..compare import judge_comparison, metric_table, variants, write_comparison
+    from ..jobs import check, execute
+    from .batch import print_tables, progress, say
+    from .run import default_folder
+
+    default: Path = default_folder(scenario)
+    folder = out or default.with_name(f"{default.name}-compare")
+    work = variants(scenario, swap, set_ or (), folder, fmus)
+    check(work)
+    outcomes = execute(work, workers=jobs, done=progress(len(work)))
+    comparison = judge_comparison(outcomes)
+    title = str(comparison.runs[0].results.run.get("title") or "") if comparison.runs else ""
+    table = metric_table(comparison, title or scenario.stem)
+    files = write_comparison(comparison, table, folder)
+    print_tables([table])
+    say(f"{folder}: {', '.join(files)}")
+    if comparison.failed:
+        raise typer.Exit(max(outcome.exit_status for outcome in outcomes) or 1)

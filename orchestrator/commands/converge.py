@@ -1,0 +1,83 @@
+"""`yawbench converge`: the same scenario at h, h/2, h/4, ..."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from ..plan import Algorithm
+from .options import Fmus, Out, ScenarioFile, Set, Swap
+
+Halvings = Annotated[
+    int, typer.Option("--halvings", metavar="N", min=2, max=10, help="How often the step is halved.")
+]
+Signal = Annotated[str, typer.Option("--signal", metavar="UNIT.VARIABLE", help="What is compared.")]
+Algorithms = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--algorithm",
+        metavar="NAME",
+        help="jacobi, gauss_seidel or extrapolated; repeatable, all are compared with the first. "
+        "Default: the scenario's.",
+    ),
+]
+
+
+def converge(
+    scenario: ScenarioFile,
+    halvings: Halvings = 3,
+    signal: Signal = "plant.yaw_rate",
+    algorithm: Algorithms = None,
+    swap: Swap = None,
+    set_: Set = None,
+    out: Out = None,
+    fmus: Fmus = None,
+) -> None:
+    """Run a scenario at its step size, half of it, and so on: error against the finest, order, cost.
+
+    Units with a step size of their own keep it. Runs follow each other, so that their wall times
+    can be compared. Without --out, results go to results/<folder of the scenario>/<its name>-converge.
+    """
+    from typing import get_args
+
+    from ..converge import convergence_figure, convergence_table, measure, refinements
+    from ..errors import ScenarioError
+    from ..figure_style import save
+    from ..jobs import check, execute
+    from ..tables import for_markdown, write_csv
+    from ..wording import hint
+    from .batch import print_tables, progress, say
+    from .run import default_folder
+
+    for name in algorithm or ():
+        if name not in get_args(Algorithm):
+            guess = hint(name, get_args(Algorithm), lead="there are")
+            raise ScenarioError(f"--algorithm {name}: no such algorithm{guess}")
+    default = default_folder(scenario)
+    folder = out or default.with_name(f"{default.name}-converge")
+    work = refinements(
+        scenario,
+        halvings=halvings,
+        signal=signal,
+        algorithms=algorithm or (),  # type: ignore[arg-type]
+        out=folder,
+        swaps=swap or (),
+        settings=set_ or (),
+        fmus=fmus,
+    )
+    check(work)
+    outcomes = execute(work, workers=1, done=progress(len(work)))
+    rows = measure(outcomes, signal)
+    title = f"Convergence of {signal}, {scenario.stem}"
+    table = convergence_table(rows, title)
+    note = "order observed from successive refinements; units with a step size of their own keep it"
+    save(
+        convergence_figure(rows, signal, title, f"yawbench converge {scenario} · {note}"), folder / "converge"
+    )
+    write_csv(folder / "converge.csv", ["algorithm", "step", "error", "order", "wall_time"], table.rows)
+    (folder / "converge.md").write_text(for_markdown(table), encoding="utf-8")
+    print_tables([table])
+    say(f"{folder}: converge.svg, converge.png, converge.csv, converge.md")
+    if any(row.failed for row in rows):
+        raise typer.Exit(1)

@@ -1,0 +1,70 @@
+"""`yawbench plot`: draw figures of recorded results."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import Out
+
+Folders = Annotated[
+    list[Path],
+    typer.Argument(help="Folders of results; several are laid over each other.", metavar="RESULTS..."),
+]
+Labels = Annotated[
+    list[str] | None,
+    typer.Option("--label", metavar="TEXT", help="Label of a run in the legend, in the order of RESULTS."),
+]
+Panels = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--panel",
+        metavar="NAME",
+        help="A signal (yaw_rate, plant.roll_angle, wheel_torque_*), its error (sideslip_error) or path; "
+        "repeatable. Default: all the papers draw.",
+    ),
+]
+
+
+def plot(folders: Folders, label: Labels = None, panel: Panels = None, out: Out = None) -> None:
+    """Draw the figures of a run, or of several laid over each other, as SVG and PNG.
+
+    Without --out, the figure of one run goes into its folder, that of several into the folder that
+    holds them all.
+    """
+    from ..compare import FIGURES
+    from ..errors import ScenarioError
+    from ..figure_style import save
+    from ..panels import Run, shown_by
+    from ..plots import OVERVIEW, draw
+    from ..results import load_results
+    from .batch import say
+
+    if label and len(label) != len(folders):
+        raise ScenarioError(f"--label: {len(label)} labels for {len(folders)} folders of results")
+    labels = label or distinct(folders)
+    runs = [Run(name, load_results(folder)) for name, folder in zip(labels, folders, strict=True)]
+    figures: dict[str, Sequence[str]] = {"overview": panel or OVERVIEW}
+    target = folders[0]
+    if len(runs) > 1:
+        target = Path(os.path.commonpath([folder.absolute().parent for folder in folders]))
+        if not panel:
+            figures = {name: panels for name, panels in FIGURES.items() if shown_by(runs, panels)}
+    for name, panels in figures.items():
+        paths = save(draw(runs, panels), (out or target) / name)
+        say(f"{paths[0]}, {paths[1].name}")
+
+
+def distinct(folders: Sequence[Path]) -> list[str]:
+    """Return the shortest ends of the paths that tell the folders apart."""
+    parts = [folder.absolute().parts for folder in folders]
+    longest = max(len(p) for p in parts)
+    for n in range(1, longest + 1):
+        names = ["/".join(p[-n:]) for p in parts]
+        if len(set(names)) == len(names):
+            return names
+    return ["/".join(p[-1:]) for p in parts]

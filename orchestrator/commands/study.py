@@ -1,0 +1,47 @@
+"""`yawbench study`: run all that a study file names and judge its claims."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .batch import Jobs
+from .options import Fmus, Out
+
+StudyFile = Annotated[Path, typer.Argument(help="Study file (YAML).", metavar="STUDY")]
+NoRun = Annotated[
+    bool, typer.Option("--no-run", help="Run nothing: judge and draw what stands in the results folder.")
+]
+
+
+def study(
+    file: StudyFile, out: Out = None, fmus: Fmus = None, jobs: Jobs = None, no_run: NoRun = False
+) -> None:
+    """Run a study: its scenarios, a table of metrics, a verdict per claim, figures.
+
+    Without --out, results go to results/<folder of the study>/<its name>. Every run has a process
+    of its own; one that fails is named in the table and takes no other with it.
+    """
+    from ..jobs import Outcome, check, execute
+    from ..study import claim_tables, judge_study, run_tables
+    from ..study_file import load_study
+    from ..study_report import REPORT, write_study
+    from .batch import print_tables, progress, say
+    from .run import default_folder
+
+    loaded = load_study(file)
+    folder = out or default_folder(file)
+    outcomes: list[Outcome] = []
+    if not no_run:
+        work = [run.job(folder, fmus) for run in loaded.runs.values()]
+        check(work)
+        outcomes = execute(work, workers=jobs, done=progress(len(work)))
+    findings = judge_study(loaded, folder, outcomes)
+    for problem in write_study(findings, folder):
+        say(problem)
+    print_tables([*run_tables(findings), *claim_tables(findings)])
+    say(f"Results, figures and tables: {folder} (begin with {folder / REPORT})")
+    if findings.failed:
+        raise typer.Exit(1)
