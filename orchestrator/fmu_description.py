@@ -79,8 +79,6 @@ def _variables(description: Any) -> dict[str, Variable]:
         sources[unknown.variable.name] = names
     variables: dict[str, Variable] = {}
     for v in description.modelVariables:
-        if v.name in variables:
-            raise ValueError(f"it declares the variable {v.name!r} twice")
         declared = v.declaredType
         text = v.description or ""
         listed = _CHOICES.search(text) if v.type == "String" else None

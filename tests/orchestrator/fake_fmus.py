@@ -31,7 +31,7 @@ class Var:
 
 
 def out(name: str, *follows: str, unit: str | None = "1", **rest: object) -> Var:
-    """Return an output and the inputs that it follows at once; `...` as `follows=None`: not said."""
+    """Return an output and the inputs that it follows at once; `follows=None`: it is not said."""
     return Var(name, unit, **{"follows": follows, **rest})  # type: ignore[arg-type]
 
 
@@ -75,6 +75,7 @@ def model_description(
         for item in variables:
             var = Var(item) if isinstance(item, str) else item
             rows += [(causality, one) for one in _wheels(var)]
+    rows = rows or [("output", Var("idle"))]  # FMI wants one variable at least
     index = {var.name: i for i, (_, var) in enumerate(rows, start=1)}
     units = sorted({var.unit for _, var in rows if var.unit and var.type == "Real"})
     types = [var for _, var in rows if var.items]
