@@ -10,11 +10,12 @@ grows without bound as the car slows: at walking pace a tyre force that is held 
 swings up. The slip speed u = w R - v then takes only the part of its change that a force held over
 the step can bear,
 
-    u_end = u + gamma (u_free - u),     gamma = min(1, 0.6 / (lambda h)),
+    u_end = u_same + gamma (u_free - u_same),     gamma = min(1, 0.6 / (lambda h)),
 
-u_free from the equation above. Its equilibrium stays exact (gamma multiplies what vanishes there) and
-the rolling motion is untouched: the wheel follows the car without delay, the slip settles within a few
-steps, later than the true wheel but far faster than the car. Above lambda h = 0.6, on 1 ms steps
+u_free from the equation above, u_same = u v_end / v that of the same slip at the new speed. A steady
+slip stays exact (gamma multiplies what vanishes there) and the rolling motion is untouched: the wheel
+follows the car without delay, the slip settles within a few steps, later than the true wheel but far
+faster than the car. Above lambda h = 0.6, on 1 ms steps
 below some 6 to 10 m/s, this trades the exactness of the slip's own fast motion for stability; at
 higher speed or smaller steps gamma = 1 and nothing is changed. For lambda the tyre's stiffness must be
 known roughly: it is taken as stiffness_per_load F_z / (1 + (kappa / 0.1)^2), so a sliding
@@ -68,6 +69,8 @@ def spin(
     rate = stiffness * radius * radius / (inertia * reference * (1.0 + slip * slip))
     if rate * h > BEARABLE:
         u = rolling - v
+        if abs(v) > v_low:
+            u *= v_end / v
         w_end = (v_end + (u + BEARABLE / (rate * h) * (w_end * radius - v_end - u))) / radius
     if braked and (w * w_end < 0.0 or (w == 0.0 and w_end * moment < 0.0)):
         return 0.0

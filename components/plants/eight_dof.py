@@ -380,7 +380,7 @@ class EightDof(Component):
         a_y = (y + roll.coupling * (dphi_end - dphi) / h) / p.mass  # mean over the step
         a_x = longitudinal(
             x,
-            v_x=v_x + half * (x / p.mass + v_y * r),  # at the middle of the step
+            v_x=v_x + half * (self.end[0] + v_y * r),  # at the middle of the step
             v_y=v_y + half * (a_y - v_x * r),
             r=r + half * dr,
             phi=0.5 * (phi + phi_end),

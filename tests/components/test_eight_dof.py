@@ -1,0 +1,389 @@
+"""The car with eight degrees of freedom: closed forms, limits, conservation, an independent solution."""
+
+from __future__ import annotations
+
+from math import atan, cos, exp, hypot, pi, sin, sqrt, tan
+
+import numpy as np
+import pytest
+
+from components.core.magic_formula import forces_and_moment
+from components.core.magic_formula_parameters import MagicFormulaParameters, coefficients
+from components.core.wheel_spin import spin
+from components.drivers.sine import Sine
+from components.plants.eight_dof import G, EightDof, EightDofParameters
+from components.plants.seven_dof import SevenDof
+from components.tyres.dugoff import Dugoff
+from components.tyres.magic_formula import MagicFormula
+
+from . import monolith, monolith_b
+from .loop import Loop
+from .stand import Stand
+
+WHEELS = ("fl", "fr", "rl", "rr")
+P = EightDofParameters()
+COUPLING = P.sprung_mass * P.roll_arm
+FREE = {"drag_coefficient": 0.0, "rolling_resistance": 0.0}
+
+
+def four(name: str, *values: float) -> dict[str, float]:
+    values = values * 4 if len(values) == 1 else values
+    return {f"{name}_{wheel}": value for wheel, value in zip(WHEELS, values, strict=True)}
+
+
+def lateral(force: float) -> dict[str, float]:
+    """Lateral forces of `force` [N] in all that do not turn the car."""
+    wheelbase = P.cg_to_front_axle + P.cg_to_rear_axle
+    front, rear = 0.5 * force * P.cg_to_rear_axle / wheelbase, 0.5 * force * P.cg_to_front_axle / wheelbase
+    return four("tyre_force_y", front, front, rear, rear)
+
+
+def drive(tyre, *, plant=EightDof, mu=0.8, steer=0.0, until=1.0, h=1e-3, record, torque=(0.0,), **parameters):
+    """Return the recorded signals (rows) of a car driven through one loop of plant and tyre."""
+    loop = Loop(
+        [(Sine, {"amplitude": steer, "frequency": 0.4, "start_time": 0.2}), (plant, parameters), (tyre, {})],
+        algorithm="extrapolated",
+        constants={**four("friction", mu), **four("wheel_torque", *torque)},
+    )
+    return np.array(loop.run(until, round(until / h), lambda each: [each[name] for name in record])).T
+
+
+def roll_energy(y: dict[str, float]) -> float:
+    v_y, phi, dphi = y["velocity_y"], y["roll_angle"], y["roll_rate"]
+    moving = 0.5 * P.mass * v_y**2 - COUPLING * v_y * dphi + 0.5 * P.roll_inertia * dphi**2
+    return moving + 0.5 * P.roll_stiffness * phi**2 + COUPLING * G * (cos(phi) - 1.0)
+
+
+def test_steady_roll_angle_and_load_transfer_match_the_closed_form():
+    force = 6000.0
+    stand = Stand(EightDof, initial_speed=20.0, **FREE)
+    y = stand.start()
+    for _ in range(1000):
+        y = stand.step(0.01, **lateral(force))
+    a_y = force / P.mass
+    phi = COUPLING * a_y / (P.roll_stiffness - COUPLING * G)
+    for _ in range(20):
+        phi = (COUPLING * a_y + COUPLING * G * sin(phi)) / P.roll_stiffness
+    assert y["roll_angle"] == pytest.approx(phi, rel=1e-12)
+    assert y["roll_rate"] == pytest.approx(0.0, abs=1e-12)
+    assert y["acceleration_y"] == pytest.approx(a_y, rel=1e-12)
+    front = (0.55 * P.roll_stiffness * phi + 0.14 * force * 1.56 / 2.6) / 1.48
+    rear = (0.45 * P.roll_stiffness * phi + 0.14 * force * 1.04 / 2.6) / 1.48
+    assert y["vertical_load_fr"] - y["vertical_load_fl"] == pytest.approx(2 * front, rel=1e-12)
+    assert y["vertical_load_rr"] - y["vertical_load_rl"] == pytest.approx(2 * rear, rel=1e-12)
+    # All of it is what the lateral forces and the displaced sprung mass do about the ground.
+    assert (front + rear) * 1.48 == pytest.approx(
+        (COUPLING + 0.14 * P.mass) * a_y + COUPLING * G * sin(phi), rel=1e-12
+    )
+
+
+def test_the_roll_gradient_is_that_of_the_corrected_stiffness():
+    stand = Stand(EightDof, initial_speed=20.0)
+    assert np.degrees(stand.start(**lateral(P.mass * G))["roll_angle"]) == pytest.approx(4.83, abs=0.02)
+
+
+def test_a_start_with_lateral_forces_is_in_roll_equilibrium():
+    stand = Stand(EightDof, initial_speed=20.0, **FREE)
+    before = stand.start(**lateral(4000.0))
+    after = stand.step(0.01)
+    assert before["roll_angle"] > 0.02
+    assert after["roll_angle"] == pytest.approx(before["roll_angle"], rel=1e-12)
+    assert after["roll_rate"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_longitudinal_load_transfer_is_that_of_the_forces_at_the_height_of_the_centre_of_mass():
+    stand = Stand(EightDof)
+    y = stand.start(**four("tyre_force_x", -1000.0, -1000.0, -500.0, -500.0))
+    front = P.mass * G * 1.56 / 2.6 + 0.54 * 3000.0 / 2.6
+    assert y["vertical_load_fl"] == y["vertical_load_fr"] == pytest.approx(front / 2, rel=1e-12)
+    assert sum(y[f"vertical_load_{w}"] for w in WHEELS) == pytest.approx(P.mass * G, rel=1e-12)
+
+
+def test_roll_frequency_and_damping_match_the_closed_form():
+    inertia = P.roll_inertia - COUPLING**2 / P.mass  # the body is free to move sideways
+    natural = sqrt((P.roll_stiffness - COUPLING * G) / inertia)
+    ratio = P.roll_damping / (2 * inertia * natural)
+    assert natural / (2 * pi) == pytest.approx(2.107, abs=1e-3)
+    assert ratio == pytest.approx(0.333, abs=1e-3)
+    stand = Stand(EightDof, initial_speed=20.0, **FREE)
+    start = stand.start(**lateral(500.0))["roll_angle"]
+    rate = natural * sqrt(1 - ratio**2)
+    for _ in range(100):
+        y = stand.step(0.01, **lateral(0.0))
+        t = stand.time
+        phase = cos(rate * t) + ratio / sqrt(1 - ratio**2) * sin(rate * t)
+        assert y["roll_angle"] == pytest.approx(start * exp(-ratio * natural * t) * phase, abs=2e-5 * start)
+
+
+@pytest.mark.parametrize("damping", [0.0, 2600.0])
+def test_rolling_conserves_lateral_momentum_and_loses_energy_only_to_the_dampers(damping):
+    stand = Stand(EightDof, initial_speed=0.0, roll_damping=damping, **FREE)
+    y = stand.start(**lateral(5000.0))
+    first, lost = roll_energy(y), 0.0
+    h = 2.5e-4
+    for _ in range(4000):
+        before = y["roll_rate"]
+        y = stand.step(h, **lateral(0.0))
+        lost += h * damping * ((before + y["roll_rate"]) / 2) ** 2
+        assert P.mass * y["velocity_y"] == pytest.approx(COUPLING * y["roll_rate"], abs=1e-9)
+        assert roll_energy(y) + lost == pytest.approx(first, rel=2e-5)
+    if damping:
+        assert lost == pytest.approx(first, rel=1e-3)
+
+
+def test_a_car_without_forces_keeps_speed_spin_and_course():
+    stand = Stand(
+        EightDof, initial_speed=30.0, initial_yaw_rate=1.5, initial_sideslip=0.2, roll_arm=0.0, **FREE
+    )
+    stand.start()
+    for _ in range(200):
+        y = stand.step(0.01)
+    assert hypot(y["velocity_x"], y["velocity_y"]) == pytest.approx(30.0, rel=1e-12)
+    assert y["yaw_angle"] == pytest.approx(3.0, rel=1e-12)
+    assert y["position_x"] == pytest.approx(60.0 * cos(0.2), rel=1e-8)
+    assert y["position_y"] == pytest.approx(60.0 * sin(0.2), rel=1e-8)
+
+
+def test_coasting_down_matches_the_closed_form_of_drag_and_rolling_resistance():
+    stand = Stand(EightDof, initial_speed=30.0)
+    stand.start()
+    for _ in range(200):
+        y = stand.step(0.05)
+    drag = 0.5 * P.air_density * P.drag_coefficient * P.frontal_area
+    terminal = sqrt(P.rolling_resistance * P.mass * G / drag)
+    rate = sqrt(P.rolling_resistance * P.mass * G * drag) / P.mass
+    assert y["velocity_x"] == pytest.approx(terminal * tan(atan(30.0 / terminal) - rate * 10.0), rel=1e-8)
+
+
+def test_the_excess_of_rotating_mass_slows_longitudinal_motion_alone():
+    stand = Stand(EightDof, initial_speed=10.0, rotating_mass_excess=0.04, **FREE)
+    y = stand.start(**four("tyre_force_x", 300.0))
+    assert y["acceleration_x"] == pytest.approx(1200.0 / (1.04 * P.mass), rel=1e-12)
+
+
+def test_stiff_in_roll_the_car_is_the_one_with_seven_degrees_of_freedom():
+    shared = {"mass": 1350.0, "yaw_inertia": 1343.1, "cg_to_front_axle": 1.04, "cg_to_rear_axle": 1.56}
+    shared |= {"track_width": 1.48, "cg_height": 0.54, "wheel_radius": 0.313, "initial_speed": 25.0}
+    stiff = {"sprung_mass": 1350.0, "roll_arm": 0.54, "front_roll_share": 0.6}
+    stiff |= {"roll_centre_height_front": 0.0, "roll_centre_height_rear": 0.0, "roll_inertia": 450.0}
+    stiff |= {"roll_stiffness": 5e8, "roll_damping": 3e5, **FREE}
+    names = [*four("vertical_load", 0.0), "yaw_rate", "sideslip", "acceleration_y"]
+    record = {"steer": 0.05, "until": 2.0, "h": 2e-4, "record": names, "mu": 0.65}
+    eight = drive(Dugoff, **record, **shared, **stiff)
+    seven = drive(Dugoff, plant=SevenDof, **record, **shared)
+    assert np.abs(seven[4]).max() > 0.2  # the car slides
+    for name, e, s in zip(names, eight, seven, strict=True):
+        assert np.abs(e - s).max() < 5e-4 * np.abs(s - s[0]).max(), name
+
+
+def magic(alpha: float, kappa: float, load: float, mu: float) -> tuple[float, float]:
+    f_x, f_y, _ = forces_and_moment(kappa, alpha, load, mu, MAGIC)
+    return f_x, f_y
+
+
+MAGIC = coefficients(MagicFormulaParameters(), "front")
+RUNS = [
+    pytest.param(Dugoff, monolith.tyre, 25.0, 0.05, 0.65, id="Dugoff, 25 m/s, mu 0.65"),
+    pytest.param(MagicFormula, magic, 100 / 3.6, 0.05, 1.0, id="Magic Formula, 100 km/h, mu 1"),
+    pytest.param(MagicFormula, magic, 50 / 3.6, 0.09, 0.3, id="Magic Formula, 50 km/h, mu 0.3"),
+]
+
+
+@pytest.mark.parametrize("component, tyre, speed, steer, mu", RUNS)
+def test_the_extrapolated_loop_agrees_with_an_independent_solution(component, tyre, speed, steer, mu):
+    names = ["velocity_x", "velocity_y", "yaw_rate", "position_x", "position_y", "yaw_angle"]
+    names += ["roll_angle", "roll_rate", *four("wheel_speed", 0.0)]
+    times = np.linspace(0.0, 3.0, 3001)
+    exact = monolith_b.solve(
+        times,
+        tyre=tyre,
+        steer=monolith.sine(steer, 0.4, 0.2, 1.0),
+        speed=speed,
+        mu=[mu] * 4,
+        kinks=[0.2, 2.7],
+        tolerance=1e-9,
+    )
+    peak = np.abs(exact).max(axis=1)
+    errors = {}
+    for h in (4e-3, 1e-3):
+        run = drive(component, mu=mu, steer=steer, until=3.0, h=h, record=names, initial_speed=speed)
+        errors[h] = np.abs(run - exact[:, :: round(h / 1e-3)]).max(axis=1) / peak
+    assert np.all(errors[1e-3] < 1e-4), dict(zip(names, errors[1e-3], strict=True))
+    assert np.log(errors[4e-3][2] / errors[1e-3][2]) / np.log(4.0) > 1.8
+
+
+def test_braking_agrees_with_an_independent_solution():
+    times = np.linspace(0.0, 2.0, 2001)
+    torque = (-350.0, -350.0, -150.0, -150.0)
+    exact = monolith_b.solve(
+        times,
+        tyre=magic,
+        steer=monolith.sine(0.03, 0.4, 0.2, 1.0),
+        speed=25.0,
+        mu=[0.8] * 4,
+        torque=lambda t: torque,
+        kinks=[0.2],
+        tolerance=1e-9,
+    )
+    run = drive(
+        MagicFormula,
+        mu=0.8,
+        steer=0.03,
+        until=2.0,
+        record=["velocity_x", "yaw_rate", "wheel_speed_fl"],
+        torque=torque,
+        initial_speed=25.0,
+    )
+    error = np.abs(run - exact[[0, 2, 8]]).max(axis=1) / np.abs(exact[[0, 2, 8]]).max(axis=1)
+    assert np.all(error < 3e-4), error  # the torque steps at the start
+
+
+def test_left_and_right_are_mirrored_to_the_last_bit():
+    names = ["velocity_x", "yaw_rate", "roll_angle", "position_y", "vertical_load_fl", "wheel_speed_rl"]
+    mirrored = ["velocity_x", "yaw_rate", "roll_angle", "position_y", "vertical_load_fr", "wheel_speed_rr"]
+    setting = {"mu": 0.9, "until": 3.0, "torque": (-200.0,), "initial_speed": 25.0}
+    left = drive(Dugoff, steer=0.08, record=names, **setting)
+    right = drive(Dugoff, steer=-0.08, record=mirrored, **setting)
+    assert np.array_equal(left, right * np.array([[1.0], [-1.0], [-1.0], [-1.0], [1.0], [1.0]]))
+    assert np.ptp(left[1]) > 0.4
+
+
+def test_a_step_with_held_inputs_may_be_split():
+    held = {"steer_angle": 0.05, **lateral(3000.0), **four("tyre_force_x", 100.0, -300.0, 200.0, -100.0)}
+    torque = four("wheel_torque", -20.0, -60.0, 50.0, -30.0)
+    ends = []
+    for parts in (1, 5):
+        stand = Stand(EightDof, initial_speed=25.0, slip_stiffness_per_load=0.0)
+        stand.start(**held, **torque)
+        for _ in range(100 * parts):
+            y = stand.step(0.005 / parts)
+        ends.append(y)
+    for name, value in ends[0].items():
+        assert value == pytest.approx(ends[1][name], rel=1e-6, abs=1e-6), name
+
+
+def test_lifted_wheels_carry_nothing_and_the_others_carry_the_car():
+    stand = Stand(EightDof, initial_speed=20.0, cg_height=0.9, roll_centre_height_front=0.5)
+    y = stand.start(**lateral(14000.0))
+    assert y["vertical_load_fl"] == 0.0
+    assert y["vertical_load_fr"] == pytest.approx(0.6 * P.mass * G, rel=1e-12)
+    assert sum(y[f"vertical_load_{w}"] for w in WHEELS) == pytest.approx(P.mass * G, rel=1e-12)
+    y = stand.step(1e-3, **lateral(0.0), **four("tyre_force_x", -20000.0))
+    assert y["vertical_load_rl"] == y["vertical_load_rr"] == 0.0
+    assert y["vertical_load_fl"] + y["vertical_load_fr"] == pytest.approx(P.mass * G, rel=1e-12)
+
+
+def test_a_car_on_two_wheels_does_not_blow_up():
+    names = ["yaw_rate", "sideslip", "roll_angle", "velocity_x", *four("vertical_load", 0.0)]
+    run = drive(
+        MagicFormula,
+        mu=1.2,
+        steer=0.2,
+        until=4.0,
+        record=names,
+        initial_speed=25.0,
+        roll_centre_height_front=0.6,
+        roll_centre_height_rear=0.6,
+    )
+    assert run[4:].min() == 0.0
+    assert np.all(np.isfinite(run))
+    assert np.abs(run[2]).max() < 0.3
+    assert np.hypot(run[3], run[3] * np.tan(run[1])).max() < 26.0
+
+
+def test_a_braked_wheel_locks_stays_locked_and_spins_up_again():
+    stand = Stand(EightDof, initial_speed=20.0)
+    y = stand.start()
+    for _ in range(300):
+        y = stand.step(1e-3, **four("wheel_torque", -2000.0), **four("tyre_force_x", -3000.0))
+        assert y["wheel_speed_fl"] >= 0.0
+    assert y["wheel_speed_fl"] == 0.0
+    assert y["slip_ratio_fl"] == -1.0
+    y = stand.step(1e-3, **four("wheel_torque", -900.0))  # less than the tyre's 939 N.m
+    assert y["wheel_speed_fl"] == pytest.approx(1e-3 * 39.0 / 2.1, rel=1e-9)
+    for _ in range(20):
+        y = stand.step(1e-3, **four("wheel_torque", 0.0))
+    assert y["wheel_speed_fl"] > 8.0
+
+
+def test_brakes_stop_the_wheels_of_a_car_that_rolls_backwards_and_do_not_reverse_them():
+    stand = Stand(EightDof, initial_speed=15.0, initial_sideslip=pi)
+    y = stand.start()
+    assert y["wheel_speed_rl"] == pytest.approx(-15.0 / P.wheel_radius)
+    for _ in range(300):
+        y = stand.step(1e-3, **four("wheel_torque", -1500.0), **four("tyre_force_x", 2000.0))
+        assert y["wheel_speed_rl"] <= 0.0
+    assert y["wheel_speed_rl"] == 0.0
+    assert 0.0 > y["velocity_x"] > -15.0
+
+
+def test_driving_torque_turns_a_backward_rolling_wheel_forward():
+    stand = Stand(EightDof, initial_speed=1.0, initial_sideslip=pi)
+    stand.start()
+    for _ in range(100):
+        y = stand.step(1e-3, **four("wheel_torque", 400.0))
+    assert y["wheel_speed_rl"] > 5.0
+
+
+@pytest.mark.parametrize("torque", [0.0, -1000.0])
+def test_a_car_at_rest_stays_at_rest(torque):
+    names = ["velocity_x", "velocity_y", "yaw_rate", "roll_angle", "wheel_speed_fl", "position_x"]
+    run = drive(MagicFormula, until=0.5, record=names, torque=(torque,), initial_speed=0.0)
+    assert not run.any()
+
+
+@pytest.mark.parametrize("tyre", [Dugoff, MagicFormula])
+@pytest.mark.parametrize("front, rear", [(-700.0, -300.0), (-3000.0, -3000.0)], ids=["rolling", "locked"])
+@pytest.mark.parametrize("steer", [0.0, 0.02])
+def test_braking_to_standstill_has_no_limit_cycle(tyre, front, rear, steer):
+    names = ["velocity_x", "velocity_y", "yaw_rate", *four("wheel_speed", 0.0)]
+    run = drive(
+        tyre,
+        mu=0.8,
+        steer=steer,
+        until=6.5,
+        record=names,
+        torque=(front, front, rear, rear),
+        initial_speed=25.0,
+    )
+    speed, spins = run[0], run[3:]
+    assert speed[4500 if front == -700.0 else 2500] > 1.0
+    assert np.abs(run[:, -1]).max() < 1e-4
+    slow = speed < 8.0
+    # Wheels and car only ever slow down: nothing swings.
+    assert np.diff(spins[:, slow]).max() <= 1e-12
+    assert np.diff(speed).max() <= 1e-6
+
+
+def test_a_slow_wheel_settles_at_the_slip_of_the_whole_equation():
+    # Braking at walking pace, where a held force would swing up: C R^2 h / (J v) = 4.
+    stiffness, torque, v, deceleration, h = 80000.0, -600.0, 1.0, 5.0, 1e-3
+    w, f_x, kappa = v / 0.313, 0.0, 0.0
+    before = 0.0
+    for _ in range(60):
+        v_end = v - deceleration * h
+        w = spin(
+            w,
+            h,
+            torque=torque,
+            f_x=1.5 * f_x - 0.5 * before,
+            v=v,
+            v_end=v_end,
+            radius=0.313,
+            inertia=2.1,
+            stiffness=stiffness,
+            v_low=0.5,
+        )
+        v = v_end
+        kappa = (0.313 * w - v) / v
+        before, f_x = f_x, stiffness * kappa
+    # J dw/dt = T - F R with dw/dt = (1 + kappa) dv/dt / R
+    balance = torque + 2.1 * deceleration * (1 + kappa) / 0.313
+    assert f_x * 0.313 == pytest.approx(balance, rel=1e-9)
+
+
+def test_springs_that_cannot_hold_the_body_are_refused():
+    with pytest.raises(AssertionError, match="roll_stiffness must exceed .* 4355.64"):
+        Stand(EightDof, roll_stiffness=4000.0).start()
+    with pytest.raises(AssertionError, match="roll_inertia must exceed"):
+        Stand(EightDof, roll_inertia=100.0).start()
