@@ -173,7 +173,9 @@ def test_stiff_in_roll_the_car_is_the_one_with_seven_degrees_of_freedom():
     seven = drive(Dugoff, plant=SevenDof, **record, **shared)
     assert np.abs(seven[4]).max() > 0.2  # the car slides
     for name, e, s in zip(names, eight, seven, strict=True):
-        assert np.abs(e - s).max() < 5e-4 * np.abs(s - s[0]).max(), name
+        peak = np.abs(s - s[0]).max()
+        assert np.abs(e - s).max() < 1e-3 * peak, name  # at the corner where steering begins
+        assert np.abs(e - s)[-5000:].max() < 5e-5 * peak, name
 
 
 def magic(alpha: float, kappa: float, load: float, mu: float) -> tuple[float, float]:
