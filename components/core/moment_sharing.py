@@ -4,7 +4,8 @@
 
 A wheel whose arm is nearly zero could carry its share only with an enormous force. Below `least_arm`
 its share fades with (arm / least_arm)^2 and the others take over; the force then goes to zero
-with the arm, without a jump, and the sum stays M_z.
+with the arm, without a jump, and the sum stays M_z. Only where the others had no share to begin with,
+so that less than `LEAST_CARRIED` of the shares is left, the sum falls short of M_z.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 Four = tuple[float, float, float, float]
+
+LEAST_CARRIED = 0.05
 
 NO_FORCE: Four = (0.0, 0.0, 0.0, 0.0)
 
@@ -46,10 +49,10 @@ def _share_faded(moment: float, weights: Sequence[float], arms: Sequence[float],
         for w, arm in zip(weights, arms, strict=True)
     ]
     fl, fr, rl, rr = (x * arm for x, arm in zip(per_arm, arms, strict=True))
-    total = (fl + fr) + (rl + rr)
-    if total <= 0.0:
+    whole = (weights[0] + weights[1]) + (weights[2] + weights[3])
+    if whole <= 0.0:
         return NO_FORCE
-    k = moment / total
+    k = moment / max((fl + fr) + (rl + rr), LEAST_CARRIED * whole)
     return k * per_arm[0], k * per_arm[1], k * per_arm[2], k * per_arm[3]
 
 

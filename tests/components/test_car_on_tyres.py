@@ -1,0 +1,318 @@
+"""Driver, 7-DOF car and tyres in a loop: against linear theory, an independent solution, common sense."""
+
+from __future__ import annotations
+
+from cmath import exp as cexp
+from dataclasses import dataclass
+from functools import cache
+from math import isfinite, log2, pi, sin
+
+import numpy as np
+import pytest
+
+from components.core.component import Component
+from components.core.roles import WHEELS
+from components.core.variables import parameter
+from components.drivers.sine import Sine
+from components.plants.seven_dof import SevenDof, SevenDofParameters
+from components.tyres.dugoff import Dugoff
+from components.tyres.linear import LinearTyre
+
+from . import monolith
+from .loop import Loop
+
+P = SevenDofParameters()
+A, B, M, I_Z = P.cg_to_front_axle, P.cg_to_rear_axle, P.mass, P.yaw_inertia
+C_F = C_R = 100000.0
+L = A + B
+SPEED = 25.0
+
+
+@dataclass(frozen=True)
+class HoldParameters:
+    angle: float = parameter(1e-4, "rad", "Steer angle")
+
+
+class Hold(Component):
+    """Steer angle held."""
+
+    Parameters = HoldParameters
+    outputs = ("steer_angle",)
+
+    def output(self, t, u):
+        return (self.p.angle,)
+
+
+@dataclass(frozen=True)
+class SwellingTorqueParameters:
+    front: float = parameter(-200.0, "N.m", "Largest torque of each front wheel")
+    rear: float = parameter(100.0, "N.m", "Largest torque of each rear wheel")
+
+
+def swell(t):
+    return sin(pi * min(t, 2.0) / 2.0) ** 2
+
+
+class SwellingTorque(Component):
+    """Wheel torques that come and go smoothly within 2 s."""
+
+    Parameters = SwellingTorqueParameters
+    outputs = ("wheel_torque_*",)
+
+    def output(self, t, u):
+        f, r = self.p.front * swell(t), self.p.rear * swell(t)
+        return f, 0.5 * f, r, 0.5 * r
+
+
+def friction(value):
+    return {f"friction_{w}": value for w in WHEELS}
+
+
+def drive(units, *, algorithm="extrapolated", mu=0.65, until=6.0, h=0.001, read=("yaw_rate",), **constants):
+    loop = Loop(units, algorithm=algorithm, constants={**friction(mu), **constants})
+    return np.array(loop.run(until, round(until / h), lambda now: [now[name] for name in read]))
+
+
+# ---- linear theory
+
+
+@pytest.mark.parametrize("speed", [10.0, 25.0, 40.0])
+def test_steady_state_yaw_rate_and_sideslip_match_the_understeer_formulas(speed):
+    units = [(Hold, {}), (SevenDof, {"initial_speed": speed}), (LinearTyre, {})]
+    read = ("yaw_rate", "sideslip", "velocity_x")
+    r, beta, v = drive(units, until=5.0, h=0.002, read=read)[-1]
+    k = M / L**2 * (B / C_F - A / C_R)
+    gain = 1e-4 / (L * (1.0 + k * v * v))
+    assert k > 0.0
+    assert r == pytest.approx(v * gain, rel=1e-6)
+    assert beta == pytest.approx((B - M * A * v * v / (C_R * L)) * gain, rel=1e-5)
+
+
+def single_track(frequency, v=SPEED):
+    """Return r / delta and beta / delta of the linear single-track car at `frequency` [Hz].
+
+    Its freely rolling wheels are spun up and down by the yaw motion, left against right: through slip, a
+    first-order lag of rate lambda = C_x R^2 / (J v), they add to the yaw inertia.
+    """
+    s = 2j * pi * frequency
+    rate = monolith.C_X * P.wheel_radius**2 / (P.wheel_inertia * v)
+    wheels = 4.0 * (0.5 * P.track_width) ** 2 * P.wheel_inertia / P.wheel_radius**2 / (1.0 + s / rate)
+    matrix = np.array(
+        [
+            [M * s + (C_F + C_R) / v, M * v + (A * C_F - B * C_R) / v],
+            [(A * C_F - B * C_R) / v, (I_Z + wheels) * s + (A * A * C_F + B * B * C_R) / v],
+        ]
+    )
+    v_y, r = np.linalg.solve(matrix, [C_F, A * C_F])
+    return r, v_y / v
+
+
+@pytest.mark.parametrize("frequency", [0.25, 0.5, 1.0, 2.0, 4.0])
+def test_frequency_response_at_small_angles_is_that_of_the_linear_single_track_model(frequency):
+    amplitude, settle, periods = 1e-4, 3.0, 4
+    settle = round(settle * frequency) / frequency or 1.0 / frequency
+    until = settle + periods / frequency
+    sine = {"amplitude": amplitude, "frequency": frequency, "start_time": 0.0, "periods": 100.0}
+    units = [(Sine, sine), (SevenDof, {"initial_speed": SPEED}), (LinearTyre, {})]
+    found = drive(units, until=until, read=("yaw_rate", "sideslip"))[:-1]
+    time = np.arange(len(found)) * 0.001
+    last = time >= settle - 1e-9
+    turning = np.exp(-2j * pi * frequency * time[last])
+    # delta = amplitude sin(...) = Im(amplitude exp(...)); the mean of y exp(-...) is -i/2 of its phasor
+    for column, expected in enumerate(single_track(frequency)):
+        phasor = 2j * np.mean(found[last, column] * turning) / amplitude
+        assert abs(phasor / expected) == pytest.approx(1.0, abs=3e-4)
+        assert np.angle(phasor / expected) == pytest.approx(0.0, abs=3e-4)
+
+
+def test_the_phasor_evaluation_itself_is_exact():
+    time = np.arange(4000) * 0.001
+    y = 0.3 * np.sin(2 * pi * time + 0.7)
+    assert 2j * np.mean(y * np.exp(-2j * pi * time)) == pytest.approx(0.3 * cexp(0.7j), rel=1e-12)
+
+
+# ---- an independent solution of the same equations
+
+
+@cache
+def exact(start, until=6.0, step=0.004):
+    """The monolithic solution for one period of 0.05 rad at 0.25 Hz from `start` [s], every 4 ms."""
+    times = np.linspace(0.0, until, round(until / step) + 1)
+    steer = monolith.sine(0.05, 0.25, start, 1.0)
+    return monolith.solve(times, steer=steer, speed=SPEED, mu=[0.65] * 4, kinks=[start, start + 4.0])
+
+
+def sine_run(algorithm, h, start=0.5, **options):
+    sine = {"amplitude": 0.05, "frequency": 0.25, "start_time": start}
+    units = [(Sine, sine), (SevenDof, {"initial_speed": SPEED}), (Dugoff, {})]
+    found = drive(units, algorithm=algorithm, h=h, read=("yaw_rate", "sideslip", "velocity_x"), **options)
+    return found[:: round(0.004 / h)]
+
+
+def errors(algorithm, h, start=0.5, **options):
+    """Return the largest errors of yaw rate and sideslip, relative to their peaks."""
+    v_x, v_y, r = exact(start)[:3]
+    found = sine_run(algorithm, h, start, **options)
+    beta = np.arctan2(v_y, v_x)
+    return tuple(np.abs(found[:, i] - y).max() / np.abs(y).max() for i, y in enumerate((r, beta)))
+
+
+@pytest.mark.parametrize("start", [0.0, 0.5])
+def test_extrapolated_is_within_a_ten_thousandth_of_the_exact_solution_at_1_ms(start):
+    yaw_rate, sideslip = errors("extrapolated", 0.001, start)
+    assert yaw_rate < 1e-4
+    assert sideslip < 1e-4
+
+
+@pytest.mark.parametrize("start", [0.0, 0.5])
+def test_extrapolated_is_of_second_order(start):
+    for coarse, fine in zip(
+        errors("extrapolated", 0.004, start), errors("extrapolated", 0.001, start), strict=True
+    ):
+        assert 1.9 < log2(coarse / fine) / 2 < 2.1
+
+
+@pytest.mark.parametrize("algorithm", ["gauss_seidel", "jacobi"])
+def test_held_inputs_are_of_first_order(algorithm):
+    for coarse, fine in zip(errors(algorithm, 0.002), errors(algorithm, 0.001), strict=True):
+        assert 0.9 < log2(coarse / fine) < 1.1
+
+
+def test_extrapolated_beats_gauss_seidel_a_hundredfold_at_1_ms():
+    assert errors("gauss_seidel", 0.001)[0] > 100 * errors("extrapolated", 0.001)[0]
+
+
+def test_wheel_loads_accelerations_and_path_are_of_second_order_too():
+    start = 0.5
+    solution = exact(start)
+    steer = monolith.sine(0.05, 0.25, start, 1.0)
+    times = np.linspace(0.0, 6.0, solution.shape[1])[::25]
+    balances = [
+        monolith.balance(x, steer(t), [0.65] * 4) for x, t in zip(solution.T[::25], times, strict=True)
+    ]
+    expected = np.array([[b[0], b[1], *b[4]] for b in balances])
+    expected = np.column_stack([expected, solution[3:6].T[::25], solution[6:10].T[::25]])
+    names = ["acceleration_x", "acceleration_y", *(f"vertical_load_{w}" for w in WHEELS)]
+    names += ["position_x", "position_y", "yaw_angle", *(f"wheel_speed_{w}" for w in WHEELS)]
+    sine = {"amplitude": 0.05, "frequency": 0.25, "start_time": start}
+    units = [(Sine, sine), (SevenDof, {"initial_speed": SPEED}), (Dugoff, {})]
+    worst = {}
+    for h in (0.004, 0.001):
+        found = drive(units, h=h, read=names)[:: 25 * round(0.004 / h)]
+        worst[h] = np.abs(found - expected).max(axis=0) / np.abs(expected).max(axis=0)
+    for name, coarse, fine in zip(names, worst[0.004], worst[0.001], strict=True):
+        assert fine < 4e-4, name
+        assert log2(coarse / fine) / 2 > 1.8, name
+
+
+def test_smooth_driving_and_braking_in_a_turn_is_of_second_order_with_split_friction():
+    mu = (0.9, 0.5, 0.9, 0.5)
+    steer = monolith.sine(0.03, 0.5, 0.0, 100.0)
+    times = np.linspace(0.0, 2.0, 501)
+
+    def torque(t):
+        return [swell(t) * x for x in (-200.0, -100.0, 100.0, 50.0)]
+
+    exact_r = monolith.solve(times, steer=steer, speed=20.0, mu=mu, torque=torque)[2]
+    sine = {"amplitude": 0.03, "frequency": 0.5, "start_time": 0.0, "periods": 100.0}
+    units = [(Sine, sine), (SwellingTorque, {}), (SevenDof, {"initial_speed": 20.0}), (Dugoff, {})]
+    split = {f"friction_{w}": x for w, x in zip(WHEELS, mu, strict=True)}
+    error = {}
+    for h in (0.004, 0.001):
+        found = drive(units, until=2.0, h=h, **split)[:: round(0.004 / h), 0]
+        error[h] = np.abs(found - exact_r).max() / np.abs(exact_r).max()
+    assert error[0.001] < 1e-4
+    assert log2(error[0.004] / error[0.001]) / 2 > 1.8
+
+
+def test_evaluating_the_tyre_before_the_car_is_of_second_order_as_well():
+    sine = {"amplitude": 0.05, "frequency": 0.25, "start_time": 0.5}
+    units = [(Dugoff, {}), (SevenDof, {"initial_speed": SPEED}), (Sine, sine)]
+    r = exact(0.5)[2]
+    error = {
+        h: np.abs(drive(units, h=h)[:: round(0.004 / h), 0] - r).max() / np.abs(r).max()
+        for h in (0.004, 0.001)
+    }
+    assert log2(error[0.004] / error[0.001]) / 2 > 1.8
+
+
+# ---- common sense
+
+
+def test_the_mirrored_manoeuvre_gives_the_mirrored_motion_to_the_last_bit():
+    def run(sign):
+        sine = {"amplitude": sign * 0.06, "frequency": 0.5, "start_time": 0.1}
+        units = [(Sine, sine), (SevenDof, {"initial_speed": SPEED}), (Dugoff, {})]
+        return drive(units, until=3.0, read=("yaw_rate", "sideslip", "velocity_x", "position_y"))
+
+    left, right = run(1.0), run(-1.0)
+    assert (left == right * [-1.0, -1.0, 1.0, -1.0]).all()
+    assert np.abs(left[:, 0]).max() > 0.3
+
+
+def test_straight_running_on_tyres_changes_nothing():
+    units = [(Hold, {"angle": 0.0}), (SevenDof, {"initial_speed": 33.3}), (Dugoff, {})]
+    read = ("velocity_x", "velocity_y", "yaw_rate", "yaw_angle", "wheel_speed_fl", "vertical_load_rr")
+    found = drive(units, until=2.0, read=read)
+    assert (found[:, 1:4] == 0.0).all()
+    assert found[-1] == pytest.approx(found[0], rel=1e-12)
+
+
+def test_freely_rolling_cornering_only_ever_loses_energy():
+    read = ("velocity_x", "velocity_y", "yaw_rate", *(f"wheel_speed_{w}" for w in WHEELS))
+    sine = {"amplitude": 0.08, "frequency": 0.4, "start_time": 0.1}
+    found = drive([(Sine, sine), (SevenDof, {"initial_speed": SPEED}), (Dugoff, {})], until=3.0, read=read)
+    weights = 0.5 * np.array([M, M, I_Z, *[P.wheel_inertia] * 4])
+    energy = (found**2) @ weights
+    assert np.diff(energy).max() < 1e-7 * energy[0]
+    assert energy[-1] < 0.98 * energy[0]
+
+
+def test_loads_stay_calm_when_locked_rear_wheels_brake_on_dry_road():
+    units = [(Hold, {"angle": 0.0}), (SevenDof, {"initial_speed": SPEED, "cg_height": 0.9}), (Dugoff, {})]
+    torque = {"wheel_torque_rl": -2000.0, "wheel_torque_rr": -2000.0}
+    a_x = drive(units, mu=1.2, until=1.0, read=("acceleration_x",), **torque)[:, 0]
+    assert np.abs(np.diff(a_x[-300:])).max() < 1e-9
+    # (m + 2 J / R^2) a_x = -mu F_zr with F_zr = m g a / L + m h a_x / L; the front wheels roll freely
+    inertia = M + 2 * P.wheel_inertia / P.wheel_radius**2
+    assert a_x[-1] == pytest.approx(-1.2 * M * 9.81 * A / (inertia * L + 1.2 * M * 0.9), rel=3e-4)
+
+
+@pytest.mark.parametrize("algorithm", ["extrapolated", "gauss_seidel", "jacobi"])
+def test_the_car_brakes_to_rest_and_stays_there(algorithm):
+    units = [(Hold, {"angle": 0.0}), (SevenDof, {"initial_speed": SPEED}), (Dugoff, {})]
+    torque = {f"wheel_torque_{w}": x for w, x in zip(WHEELS, (-700.0, -700.0, -400.0, -400.0), strict=True)}
+    read = ("velocity_x", "wheel_speed_fl", "wheel_speed_rl", "acceleration_x")
+    found = drive(units, algorithm=algorithm, mu=0.8, until=6.0, read=read, **torque)
+    assert np.diff(found[:, 1]).max() <= 1e-9  # no limit cycle in the wheels
+    assert np.diff(found[:, 2]).max() <= 1e-9
+    assert found[-500:] == pytest.approx(0.0, abs=1e-6)
+    assert np.isfinite(found).all()
+
+
+def test_a_parked_car_stays_parked_with_the_wheels_turned():
+    units = [(Hold, {"angle": 0.4}), (SevenDof, {"initial_speed": 0.0}), (Dugoff, {})]
+    found = drive(units, until=0.5, read=("velocity_x", "velocity_y", "yaw_rate", "wheel_speed_fl"))
+    assert (found == 0.0).all()
+
+
+def test_driving_off_from_rest_gives_the_acceleration_of_the_torque():
+    units = [(Hold, {"angle": 0.0}), (SevenDof, {"initial_speed": 0.0}), (Dugoff, {})]
+    torque = {f"wheel_torque_{w}": 100.0 for w in WHEELS}
+    v, w = drive(units, mu=0.8, until=4.0, read=("velocity_x", "wheel_speed_fl"), **torque)[-1]
+    inertia = M + 4 * P.wheel_inertia / P.wheel_radius**2
+    assert v == pytest.approx(4.0 * 400.0 / P.wheel_radius / inertia, rel=0.01)
+    assert w * P.wheel_radius == pytest.approx(v, rel=0.02)
+
+
+def test_spinning_the_car_round_gives_no_undefined_value():
+    units = [
+        (Hold, {"angle": 0.1}),
+        (SevenDof, {"initial_speed": 20.0, "initial_yaw_rate": 4.0}),
+        (Dugoff, {}),
+    ]
+    read = [v.name for v in SevenDof.variables if v.causality == "output"]
+    found = drive(units, mu=0.4, until=4.0, read=read)
+    assert all(map(isfinite, found.ravel()))
+    angle = found[-1, read.index("yaw_angle")]
+    assert angle > pi  # it did turn round

@@ -1,0 +1,353 @@
+"""The 7-DOF car alone, under forces given from outside."""
+
+from __future__ import annotations
+
+from math import atan2, cos, isfinite, sin
+
+import numpy as np
+import pytest
+
+from components.core.roles import WHEELS
+from components.plants.seven_dof import SevenDof, SevenDofParameters, vertical_loads
+
+from .stand import Stand
+
+P = SevenDofParameters()
+WEIGHT = P.mass * 9.81
+L = P.cg_to_front_axle + P.cg_to_rear_axle
+
+
+def car(**parameters):
+    return Stand(SevenDof, **parameters)
+
+
+def per_wheel(name, values):
+    return {f"{name}_{w}": float(v) for w, v in zip(WHEELS, values, strict=True)}
+
+
+def wheel_values(outputs, name):
+    return [outputs[f"{name}_{w}"] for w in WHEELS]
+
+
+def pushed(f_x=(0, 0, 0, 0), f_y=(0, 0, 0, 0), torque=(0, 0, 0, 0), delta=0.0):
+    return {
+        "steer_angle": delta,
+        **per_wheel("tyre_force_x", f_x),
+        **per_wheel("tyre_force_y", f_y),
+        **per_wheel("wheel_torque", torque),
+    }
+
+
+HARD = pushed((300, -200, 150, -90), (-2000, -3000, -1500, -2500), (80, -60, 40, -20), 0.04)
+MIRRORED = pushed((-200, 300, -90, 150), (3000, 2000, 2500, 1500), (-60, 80, -20, 40), -0.04)
+
+
+def kinetic_energy(y, p=P):
+    body = (
+        0.5 * p.mass * (y["velocity_x"] ** 2 + y["velocity_y"] ** 2)
+        + 0.5 * p.yaw_inertia * y["yaw_rate"] ** 2
+    )
+    return body + sum(0.5 * p.wheel_inertia * w**2 for w in wheel_values(y, "wheel_speed"))
+
+
+# ---- rest and straight running
+
+
+def test_a_car_at_rest_has_the_loads_of_the_lever_rule():
+    loads = wheel_values(car(initial_speed=0.0).start(), "vertical_load")
+    front, rear = 0.5 * WEIGHT * P.cg_to_rear_axle / L, 0.5 * WEIGHT * P.cg_to_front_axle / L
+    assert loads == pytest.approx([front, front, rear, rear], rel=1e-12)
+
+
+def test_straight_running_without_force_changes_nothing_but_the_position():
+    stand = car(initial_speed=25.0)
+    before = stand.start()
+    for _ in range(100):
+        after = stand.step(0.01)
+    assert after.pop("position_x") == pytest.approx(25.0, rel=1e-13)
+    assert before.pop("position_x") == 0.0
+    assert after == before
+
+
+def test_wheels_roll_freely_at_the_start_also_in_a_turn():
+    y = car(initial_speed=20.0, initial_yaw_rate=0.5, initial_sideslip=-0.1).start(steer_angle=0.1)
+    assert wheel_values(y, "slip_ratio") == pytest.approx([0.0] * 4, abs=1e-15)
+    rolling = [w * P.wheel_radius for w in wheel_values(y, "wheel_speed")]
+    assert rolling == pytest.approx(wheel_values(y, "wheel_velocity"), rel=1e-15)
+    assert y["sideslip"] == pytest.approx(-0.1)
+    assert y["velocity_x"] ** 2 + y["velocity_y"] ** 2 == pytest.approx(400.0)
+
+
+def test_slip_angles_are_those_of_the_velocity_at_the_wheels():
+    y = car(initial_speed=20.0, initial_yaw_rate=0.5, initial_sideslip=-0.1).start(steer_angle=0.1)
+    a, b, half = P.cg_to_front_axle, P.cg_to_rear_axle, 0.5 * P.track_width
+    places = ((a, half, 0.1), (a, -half, 0.1), (-b, half, 0.0), (-b, -half, 0.0))
+    v_x, v_y, r = 20.0 * cos(-0.1), 20.0 * sin(-0.1), 0.5
+    expected = [atan2(v_y + r * x, v_x - r * y) - steer for x, y, steer in places]
+    assert wheel_values(y, "slip_angle") == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_start_may_be_computed_again_and_again_until_forces_and_loads_agree():
+    stand = car(initial_speed=20.0)
+    stand.set(**HARD)
+    stand.unit.enter_initialization_mode()
+    stand.set(**pushed(f_y=(0, 0, 0, -400)))
+    first = stand.outputs()
+    stand.set(**HARD)
+    stand.outputs()
+    stand.set(**pushed(f_y=(0, 0, 0, -400)))
+    assert stand.outputs() == first
+    stand.unit.exit_initialization_mode()
+    assert stand.outputs() == first == car(initial_speed=20.0).start(**pushed(f_y=(0, 0, 0, -400)))
+
+
+# ---- conservation
+
+
+def test_without_forces_momentum_spin_and_turning_are_kept_in_earth_axes():
+    stand = car(initial_speed=22.0, initial_sideslip=-0.3, initial_yaw_rate=0.8)
+    y = stand.start()
+    v = (22.0 * cos(-0.3), 22.0 * sin(-0.3))
+    for _ in range(2000):
+        y = stand.step(0.001)
+    psi = y["yaw_angle"]
+    assert psi == pytest.approx(1.6, rel=1e-12)
+    found = complex(y["velocity_x"], y["velocity_y"]) * complex(cos(psi), sin(psi))
+    assert (found.real, found.imag) == pytest.approx(v, rel=1e-12)
+    assert (y["position_x"], y["position_y"]) == pytest.approx((2 * v[0], 2 * v[1]), rel=1e-12)
+    assert y["yaw_rate"] == 0.8
+    assert y["sideslip_rate"] == pytest.approx(-0.8, rel=1e-12)  # the course stays, the car turns
+
+
+def test_work_of_tyre_forces_and_torques_is_the_change_of_kinetic_energy_with_the_wheels():
+    stand = car(initial_speed=15.0, initial_yaw_rate=0.3)
+    before = stand.start(**HARD)
+    first = kinetic_energy(before)
+    h, steps, work = 1e-4, 5000, 0.0
+
+    def power(y):
+        a, b, half, delta = P.cg_to_front_axle, P.cg_to_rear_axle, 0.5 * P.track_width, 0.04
+        total = 0.0
+        for wheel, x, side, steer in (
+            ("fl", a, half, delta), ("fr", a, -half, delta), ("rl", -b, half, 0.0), ("rr", -b, -half, 0.0)
+        ):  # fmt: skip
+            u, v = y["velocity_x"] - y["yaw_rate"] * side, y["velocity_y"] + y["yaw_rate"] * x
+            f_x, f_y = HARD[f"tyre_force_x_{wheel}"], HARD[f"tyre_force_y_{wheel}"]
+            w = y[f"wheel_speed_{wheel}"]
+            total += f_x * (u * cos(steer) + v * sin(steer) - w * P.wheel_radius)
+            total += f_y * (v * cos(steer) - u * sin(steer)) + HARD[f"wheel_torque_{wheel}"] * w
+        return total
+
+    last = power(before)
+    for _ in range(steps):
+        y = stand.step(h, **HARD)
+        now = power(y)
+        work += 0.5 * h * (last + now)
+        last = now
+    assert abs(kinetic_energy(y) - first) > 1e4
+    assert kinetic_energy(y) - first == pytest.approx(work, rel=1e-7)
+
+
+def test_a_force_through_the_centre_of_mass_gives_newtons_acceleration():
+    stand = car(initial_speed=10.0)
+    stand.start(**pushed(f_x=(0, 0, 550, 550)))
+    y = stand.step(0.5, **pushed(f_x=(0, 0, 550, 550)))
+    assert y["velocity_x"] == pytest.approx(10.5, rel=1e-14)
+    assert y["position_x"] == pytest.approx(5.125, rel=1e-14)
+    assert y["acceleration_x"] == pytest.approx(1.0, rel=1e-14)
+    assert (y["velocity_y"], y["yaw_rate"], y["position_y"]) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("wheel", "f_x", "f_y", "moment"),
+    [
+        ("fl", 100.0, 0.0, -82.5),
+        ("fr", 100.0, 0.0, 82.5),
+        ("rl", 100.0, 0.0, -82.5),
+        ("rr", 100.0, 0.0, 82.5),
+        ("fl", 0.0, 100.0, 125.6),
+        ("fr", 0.0, 100.0, 125.6),
+        ("rl", 0.0, 100.0, -136.8),
+        ("rr", 0.0, 100.0, -136.8),
+    ],
+)
+def test_each_force_turns_the_straight_car_with_its_lever_arm(wheel, f_x, f_y, moment):
+    stand = car()
+    stand.start()
+    y = stand.step(0.01, **{f"tyre_force_x_{wheel}": f_x, f"tyre_force_y_{wheel}": f_y})
+    assert y["yaw_rate"] * P.yaw_inertia / 0.01 == pytest.approx(moment, rel=1e-12)
+
+
+def test_a_driving_torque_spins_the_wheel_up_and_a_tyre_force_slows_it():
+    stand = car(initial_speed=20.0)
+    w_0 = stand.start()["wheel_speed_rl"]
+    y = stand.step(0.001, wheel_torque_rl=300.0, tyre_force_x_rl=100.0)
+    assert y["wheel_speed_rl"] - w_0 == pytest.approx(0.001 * (300.0 - 31.0) / 2.1, rel=1e-9)
+    assert y["wheel_speed_rr"] == w_0
+
+
+# ---- wheel loads
+
+
+def test_the_loads_always_add_up_to_the_weight():
+    for a_x, a_y in np.random.default_rng(2).uniform(-40, 40, (500, 2)):
+        loads = vertical_loads(a_x, a_y, P)
+        assert sum(loads) == pytest.approx(WEIGHT, rel=1e-14)
+        assert min(loads) >= 0.0
+
+
+def test_braking_loads_the_front_axle_by_the_moment_of_inertia_force():
+    level, braking = vertical_loads(0.0, 0.0, P), vertical_loads(-5.0, 0.0, P)
+    shift = P.mass * 5.0 * P.cg_height / (2 * L)
+    changes = [b - a for a, b in zip(level, braking, strict=True)]
+    assert changes == pytest.approx([shift, shift, -shift, -shift], rel=1e-12)
+
+
+def test_a_left_turn_loads_the_right_wheels_by_the_moment_of_inertia_force():
+    level, turning = vertical_loads(0.0, 0.0, P), vertical_loads(0.0, 4.0, P)
+    fl, fr, rl, rr = (b - a for a, b in zip(level, turning, strict=True))
+    assert (fr - fl + rr - rl) * 0.5 * P.track_width == pytest.approx(P.mass * 4.0 * P.cg_height, rel=1e-12)
+    assert (fl, rl) == pytest.approx((-fr, -rr))
+    assert fr / rr == pytest.approx(P.cg_to_rear_axle / P.cg_to_front_axle)
+
+
+def test_a_wheel_lifts_at_the_rollover_limit_and_the_other_then_carries_its_axle():
+    limit = 9.81 * P.track_width / (2 * P.cg_height)
+    assert min(vertical_loads(0.0, 0.999 * limit, P)) > 0.0
+    fl, fr, rl, rr = vertical_loads(0.0, 1.001 * limit, P)
+    assert (fl, rl) == (0.0, 0.0)
+    assert fr == pytest.approx(WEIGHT * P.cg_to_rear_axle / L)
+    assert rr == pytest.approx(WEIGHT * P.cg_to_front_axle / L)
+
+
+def test_an_axle_lifts_under_extreme_braking_and_the_other_carries_the_car():
+    assert vertical_loads(-100.0, 0.0, P) == pytest.approx((WEIGHT / 2, WEIGHT / 2, 0.0, 0.0))
+    assert vertical_loads(100.0, 0.0, P) == pytest.approx((0.0, 0.0, WEIGHT / 2, WEIGHT / 2))
+
+
+def test_loads_of_a_step_follow_from_its_forces():
+    stand = car()
+    forces = pushed(f_y=(1000, 1000, 900, 900))
+    stand.start(**forces)
+    y = stand.step(0.001, **forces)
+    assert y["acceleration_y"] == pytest.approx(3800.0 / P.mass)
+    assert wheel_values(y, "vertical_load") == pytest.approx(vertical_loads(0.0, 3800.0 / P.mass, P))
+
+
+def test_after_initialization_loads_and_accelerations_follow_no_force_at_once():
+    stand = car()
+    before = stand.start()
+    stand.set(**pushed(f_x=(900,) * 4, f_y=(1000,) * 4))
+    assert stand.outputs() == before
+    for v in SevenDof.variables:
+        assert set(v.depends_on) <= {"steer_angle"}
+
+
+def test_what_follows_the_steer_angle_at_once_is_what_the_model_structure_lists():
+    straight, steered = car(), car()
+    straight.start()
+    steered.start()
+    y_0, y_1 = straight.step(1e-9), steered.step(1e-9, steer_angle=0.1)
+    changed = {n for n in y_0 if abs(y_0[n] - y_1[n]) > 1e-12}
+    listed = {v.name for v in SevenDof.variables if v.depends_on}
+    assert changed == listed
+
+
+@pytest.mark.parametrize("steps", [(0.001,) * 6, (0.001, 0.004, 0.002, 0.0005, 0.003), (0.01, 0.0001, 0.02)])
+def test_accelerations_that_grow_linearly_are_carried_to_the_end_of_any_step_exactly(steps):
+    stand = car()
+    t = 0.0
+    stand.start(**pushed(f_y=(100, 100, 100, 100)))
+    for h in steps:
+        force = 100.0 + 5000.0 * (t + 0.5 * h)  # at the middle of the step
+        y = stand.step(h, **pushed(f_y=(force,) * 4))
+        t += h
+        assert y["acceleration_y"] == pytest.approx(4 * (100.0 + 5000.0 * t) / P.mass, rel=1e-12)
+
+
+# ---- symmetry, steps, state
+
+
+def test_the_mirrored_car_does_the_mirrored_to_the_last_bit():
+    left = car(initial_speed=25.0, initial_sideslip=-0.05, initial_yaw_rate=0.3)
+    right = car(initial_speed=25.0, initial_sideslip=0.05, initial_yaw_rate=-0.3)
+    y_l, y_r = left.start(**HARD), right.start(**MIRRORED)
+    odd = {"velocity_y", "yaw_rate", "sideslip", "sideslip_rate", "acceleration_y", "position_y", "yaw_angle"}
+    swap = {"fl": "fr", "fr": "fl", "rl": "rr", "rr": "rl"}
+    for k in range(300):
+        for name, value in y_l.items():
+            stem, _, wheel = name.rpartition("_")
+            other = f"{stem}_{swap[wheel]}" if wheel in swap else name
+            sign = -1.0 if name in odd or stem == "slip_angle" else 1.0
+            assert y_r[other] == sign * value, (k, name)
+        y_l, y_r = left.step(0.002, **HARD), right.step(0.002, **MIRRORED)
+    assert abs(y_l["yaw_rate"]) > 0.3
+
+
+def test_under_held_forces_the_result_does_not_depend_on_how_the_step_is_split():
+    whole, split = car(initial_speed=25.0), car(initial_speed=25.0)
+    whole.start(**HARD)
+    split.start(**HARD)
+    one = whole.step(0.004, **HARD)
+    for h in (0.0005, 0.001, 0.002, 0.0005):
+        many = split.step(h, **HARD)
+    for name, value in one.items():
+        assert many[name] == pytest.approx(value, rel=1e-9, abs=1e-9), name
+
+
+def test_steering_during_the_step_is_right_to_at_least_the_third_power_of_the_step():
+    def error(h):
+        one, many = car(initial_speed=25.0), car(initial_speed=25.0)
+        start = {**HARD, "steer_angle": 0.0}
+        one.start(**start)
+        many.start(**start)
+        whole = one.step(h, **{**HARD, "steer_angle": 4.0 * h})
+        for k in range(1, 101):
+            fine = many.step(h / 100, **{**HARD, "steer_angle": 4.0 * h * k / 100})
+        return abs(whole["velocity_x"] - fine["velocity_x"]), abs(whole["velocity_y"] - fine["velocity_y"])
+
+    for coarse, fine in zip(error(0.01), error(0.005), strict=True):
+        assert fine < 2e-6
+        assert coarse / fine > 7.0
+
+
+def test_a_step_undone_and_repeated_gives_the_same_bits():
+    stand = car(initial_speed=25.0)
+    stand.start()
+    for k in range(5):
+        stand.step(0.001 * (1 + k % 2), **HARD)
+    kept = stand.unit._get_fmu_state()
+    first = [stand.step(0.001, **MIRRORED), stand.step(0.003, **HARD)]
+    stand.step(0.1, **HARD)
+    stand.unit._set_fmu_state(kept)
+    assert [stand.step(0.001, **MIRRORED), stand.step(0.003, **HARD)] == first
+
+
+# ---- walking pace and rest
+
+
+def test_nothing_is_ever_infinite_or_undefined_whatever_the_forces():
+    random = np.random.default_rng(7)
+    for speed in (0.0, 1e-9, 0.1, -3.0, 60.0):
+        stand = car(initial_speed=speed)
+        stand.start()
+        for _ in range(200):
+            f = random.uniform(-1, 1, (3, 4)) * 10.0 ** random.uniform(-6, 4)
+            y = stand.step(0.001, **pushed(*f, delta=random.uniform(-1.5, 1.5)))
+            assert all(map(isfinite, y.values()))
+
+
+def test_a_step_of_no_length_moves_nothing():
+    stand = car()
+    stand.start(**HARD)
+    before = stand.step(0.001, **HARD)
+    assert stand.step(0.0, **HARD) == before
+
+
+def test_a_braked_wheel_stops_and_does_not_reverse():
+    stand = car(initial_speed=5.0)
+    stand.start()
+    for _ in range(100):
+        y = stand.step(0.001, **pushed(torque=(-2000,) * 4))
+    assert wheel_values(y, "wheel_speed") == [0.0] * 4
+    assert wheel_values(y, "slip_ratio") == [-1.0] * 4

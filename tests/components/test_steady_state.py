@@ -1,0 +1,137 @@
+"""The steady-state reference."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+import pytest
+
+from components.references.steady_state import (
+    SteadyState,
+    SteadyStateParameters,
+    stability_factor,
+    steady_state,
+)
+
+from .stand import Stand
+
+P = SteadyStateParameters()
+FREE = SteadyStateParameters(limited=False)
+A, B, M, C = P.cg_to_front_axle, P.cg_to_rear_axle, P.mass, P.cornering_stiffness_rear
+L = A + B
+K = stability_factor(P)
+
+
+def reference(delta, v_x, mu=1.0, p=P):
+    return steady_state(delta, v_x, mu=mu, k=stability_factor(p), p=p)
+
+
+def test_the_stability_factor_of_the_papers_car_is_slightly_understeering():
+    assert pytest.approx(1100.0 / 2.624**2 * (1.368 - 1.256) / 1e5, rel=1e-12) == K
+    assert K > 0.0
+
+
+@pytest.mark.parametrize("v_x", [5.0, 15.0, 25.0, 40.0])
+def test_the_unlimited_reference_is_a_state_of_rest_of_the_single_track_equations(v_x):
+    delta = 0.02
+    r, beta = reference(delta, v_x, p=FREE)
+    front = -C * (beta + A * r / v_x - delta)
+    rear = -C * (beta - B * r / v_x)
+    assert front + rear == pytest.approx(M * v_x * r, rel=1e-12)
+    assert A * front - B * rear == pytest.approx(0.0, abs=1e-9)
+
+
+def test_at_walking_pace_the_car_follows_its_wheels():
+    r, beta = reference(0.1, 0.01, p=FREE)
+    assert r == pytest.approx(0.01 * 0.1 / L, rel=1e-6)
+    assert beta == pytest.approx(B / L * 0.1, rel=1e-6)
+
+
+def test_the_reference_within_the_limits_is_that_without():
+    assert reference(0.01, 15.0) == reference(0.01, 15.0, p=FREE)
+
+
+def test_the_yaw_rate_is_limited_to_what_friction_allows():
+    for delta, sign in ((0.2, 1.0), (-0.2, -1.0)):
+        assert reference(delta, 25.0, 0.65)[0] == pytest.approx(sign * 0.65 * 9.81 / 25.0, rel=1e-14)
+    half = SteadyStateParameters(friction_share=0.5)
+    assert reference(0.2, 25.0, 0.65, half)[0] == pytest.approx(0.5 * 0.65 * 9.81 / 25.0, rel=1e-14)
+
+
+def test_the_sideslip_is_limited_to_that_of_the_limited_yaw_rate():
+    v = 25.0
+    r, beta = reference(0.2, v, 0.65)
+    assert beta == pytest.approx(r * (B / v - M * A * v / (C * L)), rel=1e-12)
+    assert beta < 0.0  # above 16 m/s the tail hangs out of the turn
+
+
+def test_the_sideslip_never_exceeds_its_own_limit():
+    assert reference(0.5, 1.0)[1] == P.sideslip_limit
+    assert reference(-0.5, 1.0)[1] == -P.sideslip_limit
+
+
+def test_the_sideslip_vanishes_where_its_gain_crosses_zero():
+    v = (B * C * L / (M * A)) ** 0.5
+    assert v == pytest.approx(16.1, abs=0.05)
+    assert reference(0.05, v)[1] == pytest.approx(0.0, abs=1e-15)
+
+
+def test_a_standing_car_has_no_yaw_rate():
+    for delta in (-0.3, 0.0, 0.3):
+        r, beta = reference(delta, 0.0, 0.65)
+        assert r == 0.0
+        assert abs(beta) <= P.sideslip_limit
+
+
+def test_mirrored_steering_gives_the_mirrored_reference_to_the_last_bit():
+    for delta in (0.001, 0.03, 0.4):
+        for v in (0.0, 3.0, 16.0, 40.0, -5.0):
+            r, beta = reference(delta, v, 0.65)
+            assert reference(-delta, v, 0.65) == (-r, -beta)
+
+
+def test_a_car_rolling_backwards_turns_the_other_way():
+    forwards, backwards = reference(0.05, 5.0), reference(0.05, -5.0)
+    assert backwards == (-forwards[0], forwards[1])
+    assert reference(0.5, -25.0, 0.65)[0] == pytest.approx(-0.65 * 9.81 / 25.0)
+
+
+def test_the_reference_is_finite_for_any_speed_friction_and_car():
+    oversteering = SteadyStateParameters(cornering_stiffness_rear=40000.0)
+    assert stability_factor(oversteering) < 0.0
+    critical = (-1.0 / stability_factor(oversteering)) ** 0.5
+    for p in (P, oversteering):
+        for v in (0.0, 1e-300, 1e-9, 16.13, critical, 2 * critical, 1e4):
+            for mu in (-0.1, 0.0, 1e-9, 1.2):
+                r, beta = reference(0.3, v, mu, p)
+                assert isfinite(r) and isfinite(beta)
+                assert abs(r * v) <= max(mu, 0.0) * 9.81 * (1 + 1e-12)
+                assert abs(beta) <= p.sideslip_limit
+
+
+def test_rates_are_zero_at_the_start_and_then_differences_over_the_units_own_step():
+    stand = Stand(SteadyState)
+    first = stand.start(steer_angle=0.01, velocity_x=20.0, friction=0.8)
+    assert (first["yaw_acceleration_ref"], first["sideslip_rate_ref"]) == (0.0, 0.0)
+    for h, angle in ((0.002, 0.011), (0.005, 0.008)):
+        y = stand.step(h, steer_angle=angle)
+        assert y["yaw_acceleration_ref"] == (y["yaw_rate_ref"] - first["yaw_rate_ref"]) / h
+        assert y["sideslip_rate_ref"] == (y["sideslip_ref"] - first["sideslip_ref"]) / h
+        first = y
+
+
+def test_friction_is_one_until_somebody_sets_it():
+    stand = Stand(SteadyState)
+    assert stand["friction"] == 1.0
+    assert stand.start(steer_angle=0.5, velocity_x=25.0)["yaw_rate_ref"] == pytest.approx(9.81 / 25.0)
+
+
+def test_a_step_undone_and_repeated_gives_the_same_bits():
+    stand = Stand(SteadyState)
+    stand.start(steer_angle=0.01, velocity_x=20.0)
+    stand.step(0.001, steer_angle=0.02)
+    kept = stand.unit._get_fmu_state()
+    once = stand.step(0.002, steer_angle=0.05)
+    stand.step(0.01, steer_angle=-0.05)
+    stand.unit._set_fmu_state(kept)
+    assert stand.step(0.002, steer_angle=0.05) == once
