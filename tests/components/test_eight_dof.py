@@ -175,7 +175,7 @@ def test_stiff_in_roll_the_car_is_the_one_with_seven_degrees_of_freedom():
     for name, e, s in zip(names, eight, seven, strict=True):
         peak = np.abs(s - s[0]).max()
         assert np.abs(e - s).max() < 1e-3 * peak, name  # at the corner where steering begins
-        assert np.abs(e - s)[-5000:].max() < 5e-5 * peak, name
+        assert np.abs(e - s)[-5000:].max() < 1e-4 * peak, name  # roll follows forces half a step late
 
 
 def magic(alpha: float, kappa: float, load: float, mu: float) -> tuple[float, float]:
