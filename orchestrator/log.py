@@ -73,13 +73,13 @@ class Log:
         return [m for m in self.messages if m.status == WARNING]
 
 
-_listeners: dict[int, tuple[Log, str]] = {}
+_listeners: dict[int, tuple[Log, str, fmi2CallbackFunctions]] = {}
 _numbers = itertools.count(1)
 
 
 def _receive(environment, instance, status, category, text):
     try:
-        log, unit = _listeners[environment]
+        log, unit, _ = _listeners[environment]
         log.add(unit, status, _decoded(category), _decoded(text))
     except Exception as error:  # must not reach the C code that called
         print(f"yawbench: a log message was lost: {error}")
@@ -108,7 +108,7 @@ _free = fmi2CallbackFreeMemoryTYPE(free)
 def listen(log: Log, unit: str) -> fmi2CallbackFunctions:
     """Return callback functions for one instance, whose messages go to `log`.
 
-    The structure must live as long as the instance; give it to `unlisten` afterwards.
+    The structure is kept until it is given to `unlisten`, when the instance is gone.
     """
     callbacks = fmi2CallbackFunctions()
     callbacks.logger = _receiver
@@ -117,7 +117,7 @@ def listen(log: Log, unit: str) -> fmi2CallbackFunctions:
     if addLoggerProxy is not None:
         addLoggerProxy(ctypes.byref(callbacks))
     callbacks.componentEnvironment = number = next(_numbers)
-    _listeners[number] = (log, unit)
+    _listeners[number] = (log, unit, callbacks)
     return callbacks
 
 

@@ -47,8 +47,9 @@ class Recorder:
         self._block = np.zeros((BLOCK, 1 + sum(real)))
         self.rows = list(self._block)
         self.others: list[list[Value]] = []
-        self._path = folder / f"{RESULTS_FILE}.part"
-        self._run_path = folder / f"{RUN_FILE}.part"
+        self._home = folder.absolute()  # an FMU may change the working directory
+        self._path = self._home / f"{RESULTS_FILE}.part"
+        self._run_path = self._home / f"{RUN_FILE}.part"
         header = io.StringIO()
         csv.writer(header, lineterminator="\n").writerow(["time", *columns])
         try:
@@ -92,7 +93,9 @@ class Recorder:
                 view = view[self._file.write(view) :]
         except OSError as error:
             self._cut_back(data[: len(data) - len(view)])
-            raise ResultsError(f"{self.folder / RESULTS_FILE}: cannot be written: {_reason(error)}.") from None
+            raise ResultsError(
+                f"{self.folder / RESULTS_FILE}: cannot be written: {_reason(error)}."
+            ) from None
         self._size += len(data)
 
     def _cut_back(self, arrived: bytes) -> None:
@@ -116,9 +119,9 @@ class Recorder:
                     raise
                 self._write_record(run)
             self._file.close()
-            target = self.folder / RUN_FILE
+            target = self._home / RUN_FILE
             target.unlink(missing_ok=True)  # from here on the earlier results are gone as a whole
-            os.replace(self._path, self.folder / RESULTS_FILE)
+            os.replace(self._path, self._home / RESULTS_FILE)
             os.replace(self._run_path, target)
         except OSError as error:
             self.discard()

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -92,6 +93,7 @@ class FmuSlave:
         self._freed = False
         self._worst = OK
         fmu = unit.fmu
+        here = os.getcwd()
         try:
             self._fmu = FMU2Slave(
                 guid=fmu.guid,
@@ -101,6 +103,8 @@ class FmuSlave:
             )
         except Exception as error:  # fmpy raises plain Exception here
             raise ModelDescriptionError(_cannot_load(unit, error)) from None
+        finally:
+            os.chdir(here)  # fmpy goes to the library's folder and, if loading fails, stays there
         self._library = self._fmu.dll
         self._callbacks = listen(log, unit.name)
         self._component = self._library.fmi2Instantiate(

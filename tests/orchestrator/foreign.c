@@ -1,0 +1,145 @@
+/* A co-simulation FMU without Python: doubles its inputs, answers steps from 0.25 s on as it is told. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "fmi2.h"
+
+#define EXPORT __attribute__((visibility("default")))
+#define INPUT 1000001u      /* value references are large and sparse */
+#define OUTPUT 4000000000u
+#define ANSWER 7u
+
+typedef struct {
+    fmi2CallbackFunctions host;
+    char name[64];
+    double real;
+    int integer, boolean, answer;
+    char given[64], made[80];
+} Instance;
+
+EXPORT int counters[3]; /* instantiated, terminated, freed */
+
+EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
+                                     const fmi2CallbackFunctions *host, fmi2Boolean visible, fmi2Boolean logging)
+{
+    (void)type, (void)visible, (void)logging;
+    if (strcmp(guid, "{refuse}") == 0) {
+        host->logger(host->componentEnvironment, name, fmi2Error, "logStatusError", "no licence in %s", "the shop");
+        return NULL;
+    }
+    if (strncmp(resources, "file:///", 8) != 0) {
+        return NULL;
+    }
+    Instance *in = host->allocateMemory(1, sizeof *in);
+    in->host = *host;
+    snprintf(in->name, sizeof in->name, "%s", name);
+    counters[0]++;
+    return in;
+}
+
+EXPORT void fmi2FreeInstance(fmi2Component c)
+{
+    Instance *in = c;
+    counters[2]++;
+    in->host.freeMemory(in);
+}
+
+EXPORT fmi2Status fmi2Terminate(fmi2Component c)
+{
+    (void)c;
+    counters[1]++;
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean keep)
+{
+    (void)h, (void)keep;
+    Instance *in = c;
+    if (t < 0.249 || t > 0.251 || in->answer == fmi2OK) {
+        return fmi2OK;
+    }
+    in->host.logger(in->host.componentEnvironment, in->name, in->answer, "events",
+                    "valve %d of %s is %.1f%% open, größer als %s", 3, in->name, 99.5, "gedacht");
+    return in->answer;
+}
+
+#define EXCHANGE(Type, set, get)                                                                            \
+    EXPORT fmi2Status fmi2Set##Type(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2##Type v[]) \
+    {                                                                                                       \
+        Instance *in = c;                                                                                   \
+        for (size_t i = 0; i < n; i++) {                                                                    \
+            if (r[i] == INPUT) {                                                                            \
+                set;                                                                                        \
+            } else if (r[i] == ANSWER) {                                                                    \
+                in->answer = (int)(size_t)v[i];                                                             \
+            } else {                                                                                        \
+                return fmi2Error;                                                                           \
+            }                                                                                               \
+        }                                                                                                   \
+        return fmi2OK;                                                                                      \
+    }                                                                                                       \
+    EXPORT fmi2Status fmi2Get##Type(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2##Type v[]) \
+    {                                                                                                       \
+        Instance *in = c;                                                                                   \
+        for (size_t i = 0; i < n; i++) {                                                                    \
+            if (r[i] != OUTPUT) {                                                                           \
+                return fmi2Error;                                                                           \
+            }                                                                                               \
+            get;                                                                                            \
+        }                                                                                                   \
+        return fmi2OK;                                                                                      \
+    }
+
+EXCHANGE(Integer, in->integer = v[i], v[i] = 2 * in->integer)
+EXCHANGE(Boolean, in->boolean = v[i], v[i] = !in->boolean)
+EXCHANGE(String, snprintf(in->given, sizeof in->given, "%s", v[i]),
+         (snprintf(in->made, sizeof in->made, "<%s>", in->given), v[i] = in->made))
+
+EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Real v[])
+{
+    if (n != 1 || r[0] != INPUT) {
+        return fmi2Error;
+    }
+    ((Instance *)c)->real = v[0];
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2Real v[])
+{
+    if (n != 1 || r[0] != OUTPUT) {
+        return fmi2Error;
+    }
+    v[0] = 2 * ((Instance *)c)->real;
+    return fmi2OK;
+}
+
+#define ALWAYS_OK(Name, parameters) \
+    EXPORT fmi2Status fmi2##Name parameters { return fmi2OK; }
+
+ALWAYS_OK(SetDebugLogging, (fmi2Component c, fmi2Boolean on, size_t n, const fmi2String names[]))
+ALWAYS_OK(SetupExperiment, (fmi2Component c, fmi2Boolean a, fmi2Real b, fmi2Real d, fmi2Boolean e, fmi2Real f))
+ALWAYS_OK(EnterInitializationMode, (fmi2Component c))
+ALWAYS_OK(ExitInitializationMode, (fmi2Component c))
+ALWAYS_OK(Reset, (fmi2Component c))
+ALWAYS_OK(GetFMUstate, (fmi2Component c, fmi2FMUstate *s))
+ALWAYS_OK(SetFMUstate, (fmi2Component c, fmi2FMUstate s))
+ALWAYS_OK(FreeFMUstate, (fmi2Component c, fmi2FMUstate *s))
+ALWAYS_OK(SerializedFMUstateSize, (fmi2Component c, fmi2FMUstate s, size_t *n))
+ALWAYS_OK(SerializeFMUstate, (fmi2Component c, fmi2FMUstate s, fmi2Byte b[], size_t n))
+ALWAYS_OK(DeSerializeFMUstate, (fmi2Component c, const fmi2Byte b[], size_t n, fmi2FMUstate *s))
+ALWAYS_OK(GetDirectionalDerivative, (fmi2Component c, const fmi2ValueReference a[], size_t n,
+                                     const fmi2ValueReference b[], size_t m, const fmi2Real d[], fmi2Real e[]))
+ALWAYS_OK(SetRealInputDerivatives, (fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Integer o[],
+                                    const fmi2Real v[]))
+ALWAYS_OK(GetRealOutputDerivatives, (fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Integer o[],
+                                     fmi2Real v[]))
+ALWAYS_OK(CancelStep, (fmi2Component c))
+ALWAYS_OK(GetStatus, (fmi2Component c, fmi2StatusKind k, fmi2Status *s))
+ALWAYS_OK(GetRealStatus, (fmi2Component c, fmi2StatusKind k, fmi2Real *v))
+ALWAYS_OK(GetIntegerStatus, (fmi2Component c, fmi2StatusKind k, fmi2Integer *v))
+ALWAYS_OK(GetBooleanStatus, (fmi2Component c, fmi2StatusKind k, fmi2Boolean *v))
+ALWAYS_OK(GetStringStatus, (fmi2Component c, fmi2StatusKind k, fmi2String *v))
+
+EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
+EXPORT const char *fmi2GetVersion(void) { return "2.0"; }

@@ -1,0 +1,393 @@
+"""`yawbench run` with real FMUs, the project's own and faulty ones made for the test."""
+
+import gc
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fmus.build import build_all, build_component
+from orchestrator import log
+from orchestrator.cli import main
+from orchestrator.results import load_results
+from orchestrator.scenario import load_scenario
+from orchestrator.simulate import simulate
+from orchestrator.unit import FmuSlave
+from orchestrator.wiring import make_plan
+
+UNITS = (
+    "driver_sine", "reference_steady_state", "controller_fnn", "controller_off",
+    "allocator_load_proportional", "wheel_control_direct", "plant_seven_dof", "tyre_dugoff",
+)  # fmt: skip
+
+CAR = """
+title: A car on a slalom
+stop_time: {stop}
+step_size: 0.001
+inputs: {{"friction*": 0.65}}
+units:
+  driver:        {{fmu: driver_sine, parameters: {{amplitude: 0.03, frequency: 2, start_time: 0}}}}
+  reference:     {{fmu: reference_steady_state}}
+  controller:    {{fmu: controller_fnn, step_size: 0.002}}
+  allocator:     {{fmu: allocator_load_proportional, step_size: 0.002}}
+  wheel_control: {{fmu: wheel_control_direct, step_size: 0.002}}
+  plant:         {{fmu: plant_seven_dof, parameters: {{initial_speed: 25.0}}}}
+  tyre:          {{fmu: tyre_dugoff}}
+connections:
+  - {{from: wheel_control.torque_request_*, to: plant.wheel_torque_*}}
+"""
+
+PAIR = """
+stop_time: 0.1
+step_size: 0.01
+units:
+  driver: {{fmu: driver_sine, parameters: {{frequency: 2, start_time: 0}}}}
+  controller: {{fmu: {controller}}}
+"""
+
+FAULTY = '''
+import os
+import signal
+
+from components.core.component import Component
+
+
+class {name}(Component):
+    """A controller that does something it should not."""
+
+    inputs = ("steer_angle",)
+    outputs = ("yaw_moment",)
+    sampled = True
+
+    def advance(self, t, h, u):
+        if t > 0.045:
+            {act}
+
+    def output(self, t, u):
+        return ({value},)
+'''
+
+
+@pytest.fixture(scope="session")
+def fmus(tmp_path_factory):
+    """A folder with the FMUs of a car."""
+    folder = tmp_path_factory.mktemp("fmus")
+    build_all(folder, components=UNITS)
+    return folder
+
+
+@pytest.fixture
+def faulty(tmp_path, fmus):
+    """Make a controller that does `act` from t = 0.05 s on; return a scenario with it."""
+
+    def make(act="pass", value="0.0", name="faulty"):
+        file = tmp_path / f"{name}.py"
+        file.write_text(FAULTY.format(name=name.capitalize(), act=act, value=value), encoding="utf-8")
+        fmu = build_component(file, tmp_path, role="controllers")
+        scenario = tmp_path / "pair.yaml"
+        scenario.write_text(PAIR.format(controller=fmu.name))
+        return scenario
+
+    return make
+
+
+@pytest.fixture
+def yawbench(fmus, capsys):
+    """Run the command line; return its exit status and what it said on stderr."""
+
+    def run(scenario, *arguments, command="run"):
+        with pytest.raises(SystemExit) as exit_:
+            main([command, str(scenario), "--fmus", str(fmus), *map(str, arguments)])
+        captured = capsys.readouterr()
+        assert captured.out == ""
+        return exit_.value.code, captured.err
+
+    return run
+
+
+def car(folder, stop=0.05):
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "car.yaml"
+    path.write_text(CAR.format(stop=stop), encoding="utf-8")
+    return path
+
+
+def test_a_run_writes_results_and_says_where(yawbench, tmp_path):
+    status, said = yawbench(car(tmp_path), "--out", tmp_path / "out")
+    assert status == 0
+    assert said.startswith(f"{tmp_path / 'out'}: 51 rows of ")
+    assert said.count("\n") == 1
+    results = load_results(tmp_path / "out")
+    assert results.time.tolist() == [k / 1000 for k in range(51)]
+    assert results["plant.velocity_x"][0] == 25.0
+    assert abs(results["driver.steer_angle"]).max() > 0.01
+    assert abs(results["plant.yaw_rate"]).max() > 0.01
+    assert results.units["plant.yaw_rate"] == "rad/s"
+
+
+def test_the_record_tells_everything_needed_to_repeat_the_run(yawbench, fmus, tmp_path):
+    yawbench(car(tmp_path), "--out", tmp_path / "out", "--set", "driver.amplitude=0.02")
+    run = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert run["status"] == "completed"
+    assert run["error"] is None
+    assert run["title"] == "A car on a slalom"
+    assert (run["algorithm"], run["step_size"], run["stop_time"], run["rows"]) == (
+        "extrapolated",
+        0.001,
+        0.05,
+        51,
+    )
+    assert sorted(run["evaluation_order"]) == sorted(run["fmus"])
+    assert list(run["units"]) == ["time", *load_results(tmp_path / "out")]
+    for fmu in run["fmus"].values():
+        content = (fmus / fmu["file"]).read_bytes()
+        assert fmu["sha256"] == hashlib.sha256(content).hexdigest()
+        assert fmu["generation_tool"].startswith("yawbench")
+        assert fmu["guid"]
+    assert run["fmus"]["driver"]["parameters"]["amplitude"] == 0.02
+    assert run["fmus"]["controller"]["step_size"] == 0.002
+    assert run["fmus"]["tyre"]["constants"] == {f"friction_{w}": 0.65 for w in ("fl", "fr", "rl", "rr")}
+    assert run["scenario"]["units"]["driver"]["parameters"]["amplitude"] == 0.02
+    assert set(run["versions"]) == {"python", "yawbench", "fmpy", "pythonfmu", "numpy", "platform"}
+    assert run["wall_time"] > 0
+
+
+def test_results_go_to_a_folder_named_after_the_scenario(yawbench, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    scenario = car(tmp_path / "study")
+    status, said = yawbench(scenario)
+    assert status == 0
+    assert said.startswith(f"{Path('results', 'study', 'car')}: ")
+    assert len(load_results(tmp_path / "results" / "study" / "car").time) == 51
+
+
+def test_a_swapped_unit_and_a_set_parameter_reach_the_run(yawbench, tmp_path):
+    scenario = car(tmp_path)
+    yawbench(scenario, "--out", tmp_path / "a")
+    yawbench(scenario, "--out", tmp_path / "b", "--swap", "controller=controller_off")
+    yawbench(scenario, "--out", tmp_path / "c", "--set", "plant.initial_speed=20")
+    assert abs(load_results(tmp_path / "a")["controller.yaw_moment"]).max() > 0
+    assert abs(load_results(tmp_path / "b")["controller.yaw_moment"]).max() == 0
+    assert load_results(tmp_path / "c")["plant.velocity_x"][0] == 20.0
+
+
+def test_the_same_run_gives_the_same_bytes(yawbench, tmp_path):
+    scenario = car(tmp_path)
+    yawbench(scenario, "--out", tmp_path / "a")
+    yawbench(scenario, "--out", tmp_path / "b")
+    first, second = ((tmp_path / name / "results.csv").read_bytes() for name in "ab")
+    assert first == second
+
+
+def test_two_units_of_one_fmu_have_their_own_state(yawbench, tmp_path):
+    scenario = tmp_path / "two.yaml"
+    scenario.write_text(
+        "stop_time: 0.1\nstep_size: 0.01\nunits:\n"
+        "  slow: {fmu: driver_sine, parameters: {frequency: 1, start_time: 0}}\n"
+        "  fast: {fmu: driver_sine, parameters: {frequency: 2, start_time: 0}}\n"
+    )
+    status, _ = yawbench(scenario, "--out", tmp_path / "out")
+    assert status == 0
+    results = load_results(tmp_path / "out")
+    assert results["slow.steer_angle"][10] == pytest.approx(results["fast.steer_angle"][5], rel=1e-12)
+    assert results["slow.steer_angle"][10] != results["fast.steer_angle"][10]
+
+
+def test_paths_with_spaces_and_umlauts_work(fmus, tmp_path, monkeypatch, capsys):
+    folder = tmp_path / "Prüfstand für Autos"
+    scenario = car(folder / "Läufe 1")
+    build_all(folder / "meine FMUs", components=UNITS)
+    monkeypatch.chdir(folder)
+    with pytest.raises(SystemExit) as exit_:
+        main(["run", "Läufe 1/car.yaml", "--fmus", "meine FMUs", "--out", "Ergebnis ä"])
+    assert exit_.value.code == 0
+    assert capsys.readouterr().err.startswith("Ergebnis ä: 51 rows")
+    assert len(load_results(folder / "Ergebnis ä").time) == 51
+    assert scenario.exists()
+
+
+def test_an_exception_in_a_component_is_one_sentence_with_file_and_line(yawbench, faulty, tmp_path):
+    scenario = faulty('raise ValueError("velocity must exceed 1 m/s, 100 % größer {u}".format(u=int(t > 0)))')
+    status, said = yawbench(scenario, "--out", tmp_path / "out")
+    assert status == 1
+    assert said.splitlines() == [
+        "controller: step failed at t = 0.05 s: ValueError: velocity must exceed 1 m/s, 100 % größer 1 "
+        "(controllers/faulty.py:17)",
+        f"What was recorded until then: {tmp_path / 'out'}",
+    ]
+    results = load_results(tmp_path / "out")
+    assert results.time.tolist() == [0.0, 0.01, 0.02, 0.03, 0.04, 0.05]
+    error = results.run["error"]
+    assert results.run["status"] == "failed"
+    assert error["message"] == said.splitlines()[0]
+    assert (error["unit"], error["time"]) == ("controller", 0.05)
+    assert error["inputs"]["steer_angle"] == pytest.approx(results["driver.steer_angle"][5], rel=0.5)
+    assert "in advance\n" in error["traceback"][0]
+    assert error["traceback"][0].rstrip().endswith("100 % größer 1")
+
+
+def test_an_exception_at_the_start_is_one_sentence(yawbench, faulty, tmp_path):
+    status, said = yawbench(faulty(value="1.0 / u[0]"), "--out", tmp_path / "out")
+    assert status == 1
+    assert said.startswith("controller: ")
+    assert "ZeroDivisionError: float division by zero (controllers/faulty.py:20)" in said.splitlines()[0]
+    assert "Traceback" not in said
+    assert len(load_results(tmp_path / "out").time) == 0
+
+
+def test_a_wrong_value_of_a_parameter_names_the_allowed_ones(yawbench, tmp_path):
+    status, said = yawbench(car(tmp_path), "--out", tmp_path / "out", "--set", "plant.mass=-5")
+    assert status in (1, 2)
+    assert "plant" in said
+    assert "mass" in said
+    assert "-5" in said
+    assert "Traceback" not in said
+
+
+@pytest.mark.parametrize(("value", "word"), [("float('nan')", "not a number"), ("1e999", "infinite")])
+def test_a_value_that_is_not_finite_stops_the_run_and_names_its_wire(
+    value, word, yawbench, faulty, fmus, tmp_path
+):
+    faulty(value=f"{value} if t > 0.0145 else 0.0")
+    scenario = car(tmp_path)
+    fmu = tmp_path / "controller_faulty.fmu"
+    status, said = yawbench(scenario, "--out", tmp_path / "out", "--swap", f"controller={fmu}")
+    assert status == 1
+    assert said.splitlines()[0] == (
+        f"controller: yaw_moment is {word} at t = 0.016 s, on the wire controller.yaw_moment -> "
+        "allocator.yaw_moment"
+    )
+    assert load_results(tmp_path / "out").time[-1] == 0.015
+
+
+def test_a_warning_of_a_component_is_shown_and_recorded(yawbench, faulty, tmp_path):
+    status, said = yawbench(faulty('self.warn("tyres are 90 % warm")'), "--out", tmp_path / "out")
+    assert status == 0
+    assert said.splitlines()[0] == "warning: controller at t = 0.05 s: tyres are 90 % warm"
+    run = load_results(tmp_path / "out").run
+    assert [w["text"] for w in run["warnings"]] == ["tyres are 90 % warm"] * 5
+
+
+def test_ctrl_c_inside_a_component_ends_the_run_after_the_step(yawbench, faulty, tmp_path):
+    status, said = yawbench(faulty("os.kill(os.getpid(), signal.SIGINT)"), "--out", tmp_path / "out")
+    assert status == 1
+    assert said.splitlines() == [
+        "the run was interrupted at t = 0.06 s",
+        f"What was recorded until then: {tmp_path / 'out'}",
+    ]
+    results = load_results(tmp_path / "out")
+    assert results.run["status"] == "interrupted"
+    assert results.time[-1] == 0.06
+
+
+def run_process(*arguments):
+    """Run the command line in a process of its own; its stderr is no terminal."""
+    command = [sys.executable, "-m", "orchestrator.cli", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="os.kill ends the process there")
+def test_a_second_ctrl_c_leaves_a_component_that_never_comes_back(faulty, fmus, tmp_path):
+    scenario = faulty("while True: os.kill(os.getpid(), signal.SIGINT)")
+    done = run_process("run", scenario, "--fmus", fmus, "--out", tmp_path / "out")
+    assert done.returncode == 1
+    assert done.stderr == (
+        "yawbench: the run was interrupted inside a unit; "
+        f"results so far: {tmp_path / 'out'}\n"
+    )  # fmt: skip
+    results = load_results(tmp_path / "out")
+    assert results.run["status"] == "interrupted"
+    assert results.time[-1] == 0.05
+
+
+def test_output_to_a_pipe_has_no_progress_bar(fmus, tmp_path):
+    done = run_process("run", car(tmp_path, stop=1), "--fmus", fmus, "--out", tmp_path / "out")
+    assert done.returncode == 0
+    assert done.stdout == ""
+    assert done.stderr.startswith(f"{tmp_path / 'out'}: 1001 rows of ")
+    assert "\x1b" not in done.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
+def test_a_terminal_shows_a_progress_bar_and_keeps_only_the_last_line(fmus, tmp_path):
+    import pty
+
+    leader, follower = pty.openpty()
+    command = [sys.executable, "-m", "orchestrator.cli", "run", car(tmp_path, stop=4), "--fmus", fmus,
+               "--out", tmp_path / "out"]  # fmt: skip
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "200"}
+    process = subprocess.Popen([str(c) for c in command], stderr=follower, env=environment)
+    os.close(follower)
+    seen = b""
+    while True:
+        try:
+            part = os.read(leader, 65536)
+        except OSError:
+            break
+        if not part:
+            break
+        seen += part
+    os.close(leader)
+    assert process.wait() == 0
+    assert b"A car on a slalom" in seen
+    assert b"100%" in seen
+    assert b"4001 rows of " in seen.splitlines()[-1]
+
+
+def calls_of(action):
+    """Return how many Python functions are called in an action: its work, whatever the clock says."""
+    count = 0
+
+    def profile(frame, event, argument):
+        nonlocal count
+        count += event == "call"
+
+    sys.setprofile(profile)
+    try:
+        action()
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def live_components():
+    """Return how many instances of components there are in this process."""
+    gc.collect()
+    return sum(any(c.__name__ == "Component" for c in type(o).__mro__) for o in gc.get_objects())
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+def test_300_runs_in_one_process_neither_leak_units_nor_take_more_work(fmus, tmp_path):
+    plan = make_plan(load_scenario(car(tmp_path, stop=0.004)), fmus=fmus)
+    already, listening = live_components(), len(log._listeners)
+    slave = FmuSlave(plan.units[0], log.Log(), set())
+    assert live_components() == already + 1
+    slave.free()
+
+    def run():
+        simulate(plan, tmp_path / "out")
+
+    def state():
+        mapped = sum(".so" in line for line in Path("/proc/self/maps").read_text().splitlines())
+        open_files = len(os.listdir("/proc/self/fd"))
+        return live_components(), len(log._listeners), len(sys.path), len(sys.modules), open_files, mapped
+
+    for _ in range(10):
+        run()
+    before, work, memory = state(), calls_of(run), resident()
+    for _ in range(290):
+        run()
+    assert state() == before
+    assert before[:2] == (already, listening)
+    assert calls_of(run) <= work
+    assert resident() - memory < 10e6  # PythonFMU's library loses 1.7 kB per instance
+
+
+def resident():
+    """Return the memory this process occupies [bytes]."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")

@@ -1,0 +1,147 @@
+"""An FMU written in C behind the master: what does not come from PythonFMU."""
+
+import ctypes
+import os
+import shlex
+import subprocess
+import sys
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import fmpy
+import pytest
+
+from orchestrator.errors import ModelDescriptionError, SimulationError
+from orchestrator.plan import Fmu, Plan, Unit, Variable, Wire
+from orchestrator.results import load_results
+from orchestrator.simulate import simulate
+
+HERE = Path(__file__).parent
+TYPES = ("Real", "Integer", "Boolean", "String")
+DISCARD, ERROR, FATAL = 2, 3, 4
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux")
+
+
+@pytest.fixture(scope="session")
+def library(tmp_path_factory):
+    """The compiled library."""
+    file = tmp_path_factory.mktemp("foreign") / "foreign.so"
+    compiler = shlex.split(os.environ.get("CC", "cc"))
+    include = HERE.parents[1] / "fmus"
+    source = HERE / "foreign.c"
+    subprocess.run([*compiler, "-shared", "-fPIC", "-w", f"-I{include}", source, "-o", file], check=True)
+    return file
+
+
+@pytest.fixture
+def fmu(library, tmp_path):
+    """The unpacked FMU, with a copy of the library for this test alone."""
+    binaries = tmp_path / "fmu" / "binaries" / fmpy.platform
+    binaries.mkdir(parents=True)
+    (binaries / "foreign.so").write_bytes(library.read_bytes())
+    (tmp_path / "fmu" / "resources").mkdir()
+    variables = [variable("answer", 7, "Integer", "parameter")]
+    for kind in TYPES:
+        variables.append(variable(f"{kind}_in", 1000001, kind, "input"))
+        variables.append(variable(f"{kind}_out", 4000000000, kind, "output", (f"{kind}_in",)))
+    return Fmu(
+        "foreign", tmp_path / "foreign.fmu", tmp_path / "fmu", "", "{good}", "foreign", "hand", False,
+        {v.name: v for v in variables},
+    )  # fmt: skip
+
+
+def variable(name, reference, kind, causality, follows=None):
+    return Variable(name, reference, kind, causality, "continuous" if kind == "Real" else "discrete",
+                    None, None, None, None, "", follows)  # fmt: skip
+
+
+CONSTANTS = {"Real_in": 0.75, "Integer_in": -21, "Boolean_in": True, "String_in": "größer"}
+
+
+def chain(fmu, answer=0, algorithm="extrapolated"):
+    """Two units of one FMU, the second fed by the first."""
+    units = (
+        Unit("a", fmu, 1, {"answer": 0}, dict(CONSTANTS)),
+        Unit("b", fmu, 1, {"answer": answer}, {}),
+    )
+    wires = tuple(Wire("a", f"{kind}_out", "b", f"{kind}_in") for kind in TYPES)
+    record = tuple((unit, f"{kind}_out") for unit in "ab" for kind in TYPES)
+    return Plan(units, wires, record, Fraction(1, 20), 10, algorithm)
+
+
+def counters(fmu):
+    """Return how often the library was asked to instantiate, terminate and free."""
+    library = ctypes.CDLL(str(fmu.directory / "binaries" / fmpy.platform / "foreign.so"))
+    return list((ctypes.c_int * 3).in_dll(library, "counters"))
+
+
+@pytest.fixture
+def held(fmu):
+    """Keeps the library in memory, so that its counters outlive the run."""
+    return ctypes.CDLL(str(fmu.directory / "binaries" / fmpy.platform / "foreign.so"))
+
+
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
+def test_values_of_every_type_pass_through_a_foreign_fmu(fmu, held, algorithm, tmp_path):
+    simulate(chain(fmu, algorithm=algorithm), tmp_path / "out")
+    results = load_results(tmp_path / "out")
+    last = {name: column[-1] for name, column in results.columns.items()}
+    assert last == {
+        "a.Real_out": 1.5, "a.Integer_out": -42, "a.Boolean_out": 0, "a.String_out": "<größer>",
+        "b.Real_out": 3.0, "b.Integer_out": -84, "b.Boolean_out": 1, "b.String_out": "<<größer>>",
+    }  # fmt: skip
+    assert all(len(set(column.tolist())) == 1 for column in results.columns.values())
+    assert counters(fmu) == [2, 2, 2]
+
+
+@pytest.mark.parametrize(("answer", "ended"), [(DISCARD, [2, 2, 2]), (ERROR, [2, 1, 2]), (FATAL, [2, 0, 0])])
+def test_a_failed_instance_is_ended_as_the_standard_allows(fmu, held, answer, ended, tmp_path):
+    with pytest.raises(SimulationError) as caught:
+        simulate(chain(fmu, answer), tmp_path / "out")
+    assert str(caught.value) == (
+        "b: step failed at t = 0.25 s: valve 3 of b is 99.5% open, größer als gedacht"
+    )
+    assert counters(fmu) == ended
+    results = load_results(tmp_path / "out")
+    assert results.time[-1] == 0.25
+    assert results.run["error"]["inputs"] == {
+        "Real_in": 1.5, "Integer_in": -42, "Boolean_in": False, "String_in": "<größer>",
+    }  # fmt: skip
+
+
+def test_a_warning_with_printf_arguments_is_readable(fmu, held, tmp_path):
+    info = simulate(chain(fmu, 1), tmp_path / "out")
+    assert [(m.unit, m.time, m.text) for m in info.warnings] == [
+        ("b", 0.25, "valve 3 of b is 99.5% open, größer als gedacht")
+    ]
+    assert counters(fmu) == [2, 2, 2]
+
+
+def test_an_fmu_that_refuses_to_be_instantiated_says_why(fmu, held, tmp_path):
+    plan = chain(fmu)
+    refusing = replace(plan.units[1], fmu=replace(fmu, guid="{refuse}"))
+    with pytest.raises(
+        SimulationError, match=r"^b: .*foreign\.fmu cannot be instantiated: no licence in the shop$"
+    ):
+        simulate(replace(plan, units=(plan.units[0], refusing)), tmp_path / "out")
+    assert counters(fmu) == [1, 0, 1]
+
+
+def test_an_fmu_for_other_platforms_only_is_refused(fmu, tmp_path):
+    binaries = fmu.directory / "binaries"
+    (binaries / fmpy.platform).rename(binaries / "win16")
+    with pytest.raises(
+        ModelDescriptionError, match=rf"has no binary for {fmpy.platform} \(it has: win16\)\.$"
+    ):
+        simulate(chain(fmu), tmp_path / "out")
+
+
+def test_a_library_that_is_none_is_refused(fmu, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (fmu.directory / "binaries" / fmpy.platform / "foreign.so").write_bytes(b"no library")
+    with pytest.raises(ModelDescriptionError, match=r"^a: .*its library cannot be loaded: "):
+        simulate(chain(fmu), "out")
+    assert Path.cwd() == tmp_path
+    assert load_results("out").run["status"] == "failed"
