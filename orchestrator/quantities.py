@@ -84,6 +84,9 @@ _PREFIXES = {
     "µ": Fraction(1, 10**6),
     "n": Fraction(1, 10**9),
 }
+LONGEST = 1e9
+"""The longest time that is taken for one [s]."""
+
 _GRAVITY = _unit("980665/100000", m=1, s=-2)
 _COMMON = (  # noqa: SIM905 - units read better as one line of text
     "s ms min h m mm cm km m/s km/h m/s2 g m2 m3 rad deg mrad rad/s deg/s rpm rad/s2 deg/s2 Hz "
@@ -224,6 +227,7 @@ def seconds(value: object) -> Fraction:
         time = Fraction(repr(value))
     else:
         raise ValueError(f"must be a time in s (got {value!r})")
-    if time <= 0:
-        raise ValueError(f"must be a time above 0 s (got {value!r})")
+    if not 0 < time <= LONGEST:
+        limit = f" and at most {LONGEST:g} s" if time > 0 else ""
+        raise ValueError(f"must be a time above 0 s{limit} (got {value!r})")
     return Fraction(time)

@@ -1,0 +1,601 @@
+"""From scenario to plan: parameters, wires, constants, records; and each sentence when it cannot be."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from orchestrator.errors import ModelDescriptionError, WiringError, YawbenchError
+from orchestrator.plan import Plan, Unit, Wire
+from orchestrator.scenario import load_scenario
+from orchestrator.wiring import make_plan
+
+from .fake_fmus import WHEELS, Var, make_fmu, out
+
+pytestmark = pytest.mark.usefixtures("cache")
+
+UNITS = """\
+  driver: {fmu: driver_sine}
+  controller: {fmu: controller_fnn, step_size: 2 ms}
+  plant: {fmu: plant_seven_dof}
+  tyre: {fmu: tyre_dugoff}
+"""
+CONSTANTS = 'inputs: {"friction*": 0.65}\n'
+TORQUES = "connections:\n  - {from: controller.torque_request_*, to: plant.wheel_torque_*}\n"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working directory with the FMUs of a small car."""
+    monkeypatch.chdir(tmp_path)
+    fmus = tmp_path / "fmus"
+    make_fmu(
+        fmus / "driver_sine.fmu",
+        outputs=[out("steer_angle", unit="rad")],
+        parameters=[
+            Var("amplitude", "rad", start=0.05),
+            Var("frequency", "Hz", start=0.2, minimum=0.0),
+            Var("periods", type="Integer", start=1, minimum=1),
+            Var("smooth", type="Boolean", start=False),
+            Var("shape", type="String", start="sine", choices=("sine", "square")),
+            Var("road", type="Enumeration", start=1, items=("dry", "wet")),
+        ],
+    )
+    make_fmu(
+        fmus / "controller_fnn.fmu",
+        inputs=[Var("steer_angle", "rad"), Var("yaw_rate", "rad/s"), Var("friction")],
+        outputs=[out("torque_request_*", "yaw_rate", unit="N.m", variability="discrete")],
+        parameters=[Var("gain", start=1.0), Var("wheel_radius", "m", start=0.3), Var("rule_base", start=7.0)],
+    )
+    make_fmu(
+        fmus / "controller_off.fmu",
+        outputs=[out("torque_request_*", unit="N.m", variability="discrete")],
+        parameters=[Var("gain", start=0.0)],
+    )
+    make_fmu(
+        fmus / "plant_seven_dof.fmu",
+        inputs=[
+            Var("steer_angle", "rad"),
+            Var("tyre_force_x_*", "N"),
+            Var("tyre_force_y_*", "N"),
+            Var("wheel_torque_*", "N.m"),
+        ],
+        outputs=[
+            out("yaw_rate", unit="rad/s"),
+            out("acceleration_y", *(f"tyre_force_y_{w}" for w in WHEELS), unit="m/s2"),
+            out("slip_angle_*", "steer_angle", unit="rad"),
+            out("slip_ratio_*"),
+            Var("status", type="String", start="", follows=()),
+        ],
+        parameters=[
+            Var("mass", "kg", start=1500.0, minimum=1.0),
+            Var("wheel_radius", "m", start=0.3, minimum=0.1, maximum=1.0),
+            Var("initial_speed", "m/s", start=20.0),
+        ],
+    )
+    tyre: dict[str, Any] = {
+        "inputs": [Var("slip_angle_*", "rad"), Var("slip_ratio_*"), Var("friction_*")],
+        "outputs": [
+            out("tyre_force_x_*", "slip_ratio_*", "friction_*", unit="N"),
+            out("tyre_force_y_*", "slip_angle_*", "friction_*", unit="N"),
+        ],
+    }
+    make_fmu(fmus / "tyre_dugoff.fmu", **tyre)
+    return fmus
+
+
+def scenario(units: str = UNITS, rest: str = CONSTANTS + TORQUES, *, head: str = "") -> Path:
+    path = Path("a.yaml")
+    path.write_text(f"{head}stop_time: 8\nstep_size: 1 ms\nunits:\n{units}{rest}", encoding="utf-8")
+    return path
+
+
+def plan(path: Path | None = None, *, fmus: Path | None = None, **options: Any) -> Plan:
+    return make_plan(load_scenario(path or scenario(), **options), fmus=fmus)
+
+
+def problems(path: Path, kind: type[YawbenchError] = WiringError, **options: Any) -> list[str]:
+    with pytest.raises(kind) as caught:
+        plan(path, **options)
+    assert caught.value.exit_status == 2
+    return caught.value.problems
+
+
+def unit(made: Plan, name: str) -> Unit:
+    return next(u for u in made.units if u.name == name)
+
+
+def test_the_plan_holds_units_wires_and_the_time_grid() -> None:
+    made = plan()
+    assert [u.name for u in made.units] == ["driver", "plant", "controller", "tyre"]
+    assert [u.period for u in made.units] == [1, 1, 2, 1]
+    assert (made.step, made.n_steps, made.algorithm) == (Fraction(1, 1000), 8000, "extrapolated")
+    assert Wire("driver", "steer_angle", "plant", "steer_angle") in made.wires
+    assert Wire("driver", "steer_angle", "controller", "steer_angle") in made.wires
+    assert Wire("controller", "torque_request_rl", "plant", "wheel_torque_rl") in made.wires
+    assert len(made.wires) == 1 + 8 + 4 + 2 + 8
+    assert unit(made, "tyre").constants == {f"friction_{w}": 0.65 for w in WHEELS}
+    assert unit(made, "controller").constants == {"friction": 0.65}
+    assert made.notes == ()
+
+
+def test_wires_are_in_the_order_of_their_targets() -> None:
+    made = plan()
+    names = [u.name for u in made.units]
+    places = [
+        (names.index(w.target), list(unit(made, w.target).fmu.variables).index(w.input)) for w in made.wires
+    ]
+    assert places == sorted(places)
+
+
+def test_every_input_has_exactly_one_source() -> None:
+    made = plan()
+    sources = [(w.target, w.input) for w in made.wires]
+    sources += [(u.name, name) for u in made.units for name in u.constants]
+    inputs = [(u.name, v.name) for u in made.units for v in u.fmu.of("input")]
+    assert sorted(sources) == sorted(inputs)
+
+
+def test_the_scenario_as_run_can_be_written_as_json() -> None:
+    made = plan(swaps=["controller=controller_off"])
+    assert json.loads(json.dumps(made.scenario))["units"]["controller"]["fmu"] == "controller_off"
+
+
+# Where FMUs are
+
+
+def test_the_nearest_folder_of_fmus_above_the_scenario_is_used(folder: Path, tmp_path: Path) -> None:
+    deep = tmp_path / "Läufe 2" / "x"
+    deep.mkdir(parents=True)
+    (tmp_path / "Läufe 2" / "fmus").mkdir()  # holds none, so it is passed over
+    path = scenario().rename(deep / "a.yaml")
+    assert unit(plan(path), "tyre").fmu.path == folder / "tyre_dugoff.fmu"
+
+
+def test_the_working_directory_has_the_fmus_of_a_scenario_elsewhere(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    path = scenario().rename(tmp_path_factory.mktemp("elsewhere") / "a.yaml")
+    assert unit(plan(path), "tyre").fmu.path == folder / "tyre_dugoff.fmu"
+
+
+def test_no_folder_of_fmus_is_said(folder: Path, tmp_path: Path) -> None:
+    folder.rename(tmp_path / "elsewhere")
+    assert problems(scenario(), ModelDescriptionError) == [
+        f"no folder fmus/ with FMUs in {tmp_path}, in {tmp_path} or above them; "
+        "make them with 'yawbench build' or name their folder with --fmus"
+    ]
+    assert len(plan(fmus=tmp_path / "elsewhere").units) == 4
+    with pytest.raises(ModelDescriptionError, match=r"^--fmus nowhere: no such folder$"):
+        plan(fmus=Path("nowhere"))
+
+
+def test_an_fmu_can_be_a_path_relative_to_the_scenario(folder: Path, tmp_path: Path) -> None:
+    other = tmp_path / "Meine Räder" / "tyre ä.fmu"
+    other.parent.mkdir()
+    (folder / "tyre_dugoff.fmu").rename(other)
+    made = plan(scenario(UNITS.replace("tyre_dugoff", "Meine Räder/tyre ä.fmu")))
+    assert unit(made, "tyre").fmu.path == other
+
+
+def test_every_missing_fmu_is_said_with_those_there_are(folder: Path) -> None:
+    path = scenario(UNITS.replace("controller_fnn", "controller_fn").replace("tyre_dugoff", "x/tyre.fmu"))
+    assert problems(path, ModelDescriptionError) == [
+        f"a.yaml:5: units.controller.fmu: no FMU 'controller_fn' in {folder}; did you mean 'controller_fnn'? "
+        "there are: controller_fnn and controller_off",
+        f"a.yaml:7: units.tyre.fmu: {folder.parent}/x/tyre.fmu: no such FMU",
+    ]
+    assert problems(scenario(), ModelDescriptionError, swaps=["tyre=tyre_x"]) == [
+        f"--swap tyre=tyre_x: no FMU 'tyre_x' in {folder}; there are: tyre_dugoff"
+    ]
+
+
+def test_a_corrupt_fmu_is_said_where_it_is_used(folder: Path) -> None:
+    (folder / "tyre_dugoff.fmu").write_bytes(b"PK nonsense")
+    assert problems(scenario(), ModelDescriptionError) == [
+        f"a.yaml:7: units.tyre.fmu: {folder}/tyre_dugoff.fmu: the archive is damaged or cut off "
+        "(File is not a zip file)"
+    ]
+
+
+def test_an_fmu_for_one_instance_is_not_used_twice(folder: Path) -> None:
+    make_fmu(folder / "lonely.fmu", once=True)
+    path = scenario(UNITS + "  one: {fmu: lonely}\n  two: {fmu: lonely}\n")
+    assert problems(path) == [
+        "a.yaml:9: units.two.fmu: lonely can be instantiated only once per process, and one uses it already"
+    ]
+
+
+def test_units_that_would_run_each_others_code_are_refused(folder: Path) -> None:
+    for name, text in (("one", b"x = 1"), ("two", b"x = 2"), ("three", b"x = 2")):
+        files = {"resources/slavemodule.txt": b"model", "resources/model_of_mine.py": text}
+        make_fmu(folder / f"{name}.fmu", files=files)
+    make_fmu(folder / "four.fmu", files={"resources/slavemodule.txt": b"json", "resources/json.py": b""})
+    assert len(plan(scenario(UNITS + "  a: {fmu: two}\n  b: {fmu: three}\n")).units) == 6
+    path = scenario(UNITS + "  a: {fmu: one}\n  b: {fmu: two}\n  c: {fmu: four}\n")
+    assert problems(path) == [
+        "a.yaml: b (two) would run code of a (one): both FMUs bring a Python module 'model_of_mine', and a "
+        "process has room for one; rebuild one of them with another module name",
+        "a.yaml: c (four) would run other code: its Python module 'json' has the name of one of Python's "
+        "own; rebuild it with another module name",
+    ]
+
+
+def test_a_unit_whose_module_is_loaded_already_is_refused(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = {"resources/slavemodule.txt": b"fakes_xyz", "resources/fakes_xyz.py": b"x = 1"}
+    make_fmu(folder / "one.fmu", files=files)
+    loaded = folder / "fakes_xyz.py"
+    loaded.write_text("x = 1")
+    monkeypatch.syspath_prepend(str(folder))
+    __import__("fakes_xyz")
+    path = scenario(UNITS + "  a: {fmu: one}\n")
+    assert len(plan(path).units) == 5  # the same code: no harm
+    loaded.write_text("x = 2")
+    assert problems(path) == [
+        "a.yaml: a (one) would run other code: another Python module 'fakes_xyz' is loaded in this process "
+        "already; rebuild it with another module name"
+    ]
+
+
+# Parameters
+
+
+def test_parameters_are_converted_to_the_units_of_the_fmu() -> None:
+    units = UNITS.replace("driver_sine", "driver_sine, parameters: {amplitude: 180 deg, frequency: 1}")
+    units = units.replace(
+        "plant_seven_dof", "plant_seven_dof, parameters: {initial_speed: 90 km/h, mass: 1.1 t}"
+    )
+    made = plan(scenario(units))
+    assert unit(made, "driver").parameters == {"amplitude": 3.141592653589793, "frequency": 1.0}
+    assert unit(made, "plant").parameters == {"initial_speed": 25.0, "mass": 1100.0}
+    assert isinstance(unit(made, "driver").parameters["frequency"], float)
+
+
+def test_each_unit_takes_the_vehicle_parameters_it_declares_and_its_own_win() -> None:
+    Path("car.yaml").write_text("parameters: {mass: 1100 kg, wheel_radius: 31 cm}\n")
+    units = UNITS.replace("step_size: 2 ms", "parameters: {wheel_radius: 0.33}")
+    made = plan(scenario(units, head="vehicle: car.yaml\n"))
+    assert unit(made, "plant").parameters == {"mass": 1100.0, "wheel_radius": 0.31}
+    assert unit(made, "controller").parameters == {"wheel_radius": 0.33}
+    assert unit(made, "tyre").parameters == {}
+
+
+def test_every_type_of_parameter_is_taken() -> None:
+    made = plan(settings=["driver.periods=3", "driver.smooth=true", "driver.shape=square", "driver.road=wet"])
+    assert unit(made, "driver").parameters == {"periods": 3, "smooth": True, "shape": "square", "road": 2}
+    assert unit(plan(settings=["driver.road=1"]), "driver").parameters == {"road": 1}
+
+
+@pytest.mark.parametrize(
+    ("setting", "expected"),
+    [
+        (
+            "driver.amplitud=1",
+            "driver (driver_sine) has no parameter 'amplitud'; did you mean 'amplitude'?",
+        ),
+        (
+            "controller.k=1",
+            "controller (controller_fnn) has no parameter 'k'; it has: gain, wheel_radius and rule_base",
+        ),
+        ("tyre.k=1", "tyre (tyre_dugoff) has no parameter 'k'; it has: none"),
+        (
+            "tyre.friction_fl=1",
+            "'friction_fl' is an input of tyre, not a parameter: give constants under 'inputs'",
+        ),
+        ("driver.amplitude=5 kg", "'5 kg' is not a value in rad: use rad, deg or mrad"),
+        ("driver.amplitude=big", "'big' is neither a number in rad nor a number with its unit"),
+        ("driver.amplitude=true", "must be a number in rad (got true)"),
+        ("driver.amplitude=1e999 deg", "must be a finite number in rad (got '1e999 deg')"),
+        ("driver.frequency=-1", "must be at least 0 Hz (got -1)"),
+        ("plant.wheel_radius=110 cm", "must be at most 1 m (got '110 cm')"),
+        ("driver.periods=1.5", "must be a whole number (got 1.5)"),
+        ("driver.periods=0", "must be at least 1 (got 0)"),
+        ("driver.smooth=1", "must be true or false (got 1)"),
+        ("driver.shape=5", "must be text (got 5): put it in quotes"),
+        ("driver.shape=sin", "must be one of sine or square (got 'sin'); did you mean 'sine'?"),
+        ("driver.road=icy", "must be one of dry or wet (got 'icy')"),
+        ("driver.road=3", "must be one of dry or wet (got 3)"),
+        ("vehicle.mas=1", "no unit has a parameter 'mas'; did you mean 'mass'?"),
+        ("vehicle.xyz=1", "no unit has a parameter 'xyz'"),
+        ("vehicle.wheel_radius=5 kg", "'5 kg' is not a value in m: use m, mm, cm or km"),
+        ("inputs.frction*=1", "no input matches; did you mean 'friction_*'?"),
+        ("inputs.friction_fl=5 m", "'5 m' is not a value in 1: use 1 or %, for tyre.friction_fl"),
+        (
+            "inputs.steer_angle=0",
+            "plant.steer_angle is driven by driver.steer_angle: a constant is for inputs that no unit drives",
+        ),
+    ],
+)
+def test_a_wrong_value_is_said_in_one_sentence(setting: str, expected: str) -> None:
+    found = problems(scenario(), settings=[setting])
+    assert f"--set {setting}: {expected}" in found
+
+
+def test_all_wrong_values_are_said_at_once_with_their_lines() -> None:
+    Path("car.yaml").write_text("parameters:\n  wheel_radius: 5 kg\n  mass: 0\n")
+    units = UNITS.replace("driver_sine", "driver_sine, parameters: {amplitude: x, frequency: -1}")
+    assert problems(scenario(units, head="vehicle: car.yaml\n")) == [
+        "a.yaml:5: units.driver.parameters.amplitude: 'x' is neither a number in rad nor a number with "
+        "its unit",
+        "a.yaml:5: units.driver.parameters.frequency: must be at least 0 Hz (got -1)",
+        "car.yaml:2: parameters.wheel_radius: '5 kg' is not a value in m: use m, mm, cm or km",
+        "car.yaml:3: parameters.mass: must be at least 1 kg (got 0)",
+    ]
+
+
+# Swapping
+
+
+def test_what_was_meant_for_the_replaced_fmu_is_left_out_with_a_note() -> None:
+    Path("car.yaml").write_text("parameters: {rule_base: 5}\n")
+    units = UNITS.replace("step_size: 2 ms", "parameters: {gain: 2, wheel_radius: 0.33}")
+    path = scenario(units, head="vehicle: car.yaml\n")
+    made = plan(path, swaps=["controller=controller_off"])
+    assert unit(made, "controller").parameters == {"gain": 2.0}
+    assert unit(made, "tyre").constants == {f"friction_{w}": 0.65 for w in WHEELS}
+    assert made.notes == (
+        "vehicle.rule_base is left out: no unit has such a parameter after the swap",
+        "controller.wheel_radius is left out: controller_off has no such parameter",
+    )
+
+
+def test_a_mistake_stays_a_mistake_after_a_swap() -> None:
+    units = UNITS.replace("step_size: 2 ms", "parameters: {gian: 2}")
+    swap = ["controller=controller_off"]
+    assert problems(scenario(units), swaps=swap) == [
+        "a.yaml:5: units.controller.parameters.gian: "
+        "controller (controller_off) has no parameter 'gian'; did you mean 'gain'?"
+    ]
+    assert problems(scenario(), swaps=swap, settings=["controller.rule_base=2"]) == [
+        "--set controller.rule_base=2: controller (controller_off) has no parameter 'rule_base'; it has: gain"
+    ]
+
+
+def test_a_constant_and_a_connection_of_the_replaced_fmu_are_left_out_with_a_note(folder: Path) -> None:
+    make_fmu(folder / "plant_two_dof.fmu", outputs=[out("yaw_rate", unit="rad/s")])
+    units = "\n".join(line for line in UNITS.splitlines() if "tyre" not in line) + "\n"
+    rest = 'inputs: {friction: 1, "tyre_force*": 0}\n' + TORQUES
+    made = plan(scenario(units, rest), swaps=["plant=plant_two_dof"])
+    assert made.notes == (
+        "connections[0] is left out: plant has no input 'wheel_torque_*' any more",
+        "inputs.tyre_force* is left out: no unit has such an input after the swap",
+    )
+
+
+def test_a_swap_works_though_the_replaced_fmu_is_not_there(folder: Path) -> None:
+    units = UNITS.replace("controller_fnn, step_size: 2 ms", "gone, parameters: {secret: 1}")
+    made = plan(scenario(units), swaps=["controller=controller_off"])
+    assert made.notes == ("controller.secret is left out: controller_off has no such parameter",)
+
+
+# Wires
+
+
+def test_an_input_without_a_source_is_said_with_what_fits() -> None:
+    assert problems(scenario(rest="inputs: {friction: 0.65}\n")) == [
+        "a.yaml:6: units.plant: plant.wheel_torque_* [N.m] has no source: no unit has an output of "
+        "this name; connect controller.torque_request_*, or give a constant under 'inputs'",
+        "a.yaml:7: units.tyre: tyre.friction_* [1] has no source: no unit has an output of this name; "
+        "connect plant.slip_ratio_*, or give a constant under 'inputs'",
+    ]
+
+
+def test_an_input_of_one_wheel_without_a_source_is_said_alone() -> None:
+    rest = "inputs: {friction: 1, friction_fl: 1, friction_rl: 1, friction_rr: 1}\n" + TORQUES
+    assert [text.partition(" [1]")[0] for text in problems(scenario(rest=rest))] == [
+        "a.yaml:7: units.tyre: tyre.friction_fr"
+    ]
+
+
+def test_more_than_one_output_of_a_name_is_said_and_a_connection_settles_it() -> None:
+    units = UNITS + "  second: {fmu: driver_sine}\n"
+    assert problems(scenario(units)) == [
+        "a.yaml:5: units.controller: controller.steer_angle has more than one source: driver.steer_angle and "
+        "second.steer_angle; name one under 'connections'",
+        "a.yaml:6: units.plant: plant.steer_angle has more than one source: driver.steer_angle and "
+        "second.steer_angle; name one under 'connections'",
+    ]
+    more = "  - {from: second.steer_angle, to: plant.steer_angle}\n"
+    more += "  - {from: driver.steer_angle, to: controller.steer_angle}\n"
+    made = plan(scenario(units, CONSTANTS + TORQUES + more))
+    assert Wire("second", "steer_angle", "plant", "steer_angle") in made.wires
+    assert Wire("driver", "steer_angle", "controller", "steer_angle") in made.wires
+
+
+@pytest.mark.parametrize(
+    ("connection", "expected"),
+    [
+        (
+            "{from: controler.torque_request_*, to: plant.x}",
+            None,  # said when the file is read
+        ),
+        (
+            "{from: controller.torque_requst_*, to: plant.wheel_torque_*}",
+            "connections[0].from: controller has no output 'torque_requst_*'; did you mean "
+            "'torque_request_*'?",
+        ),
+        (
+            "{from: controller.torque_request_*, to: plant.torque}",
+            "connections[0].to: plant has no input 'torque'; it has: steer_angle, tyre_force_x_*, "
+            "tyre_force_y_* and wheel_torque_*",
+        ),
+        (
+            "{from: controller.yaw_rate, to: plant.wheel_torque_*}",
+            "connections[0].from: controller.yaw_rate is no output: its causality is input",
+        ),
+        (
+            "{from: controller.torque_request_*, to: plant.wheel_torque_fl}",
+            "connections[0]: a * in 'from' (controller.torque_request_*) needs one in 'to' "
+            "(plant.wheel_torque_fl)",
+        ),
+        (
+            "{from: controller.torque_*, to: plant.wheel_torque_*}",
+            "connections[0]: nothing matches: in 'from' the * can be request_fl, request_fr, request_rl or "
+            "request_rr, in 'to' fl, fr, rl or rr",
+        ),
+        ("{from: plant.yaw_rate, to: plant.steer_angle}", "connections[0]: connects plant to itself"),
+        (
+            "{from: driver.steer_angle, to: plant.wheel_torque_*}",
+            "connections[0]: cannot connect driver.steer_angle [rad] to plant.wheel_torque_* [N.m]: "
+            "the units differ",
+        ),
+        (
+            "{from: plant.status, to: controller.yaw_rate}",
+            "connections[0]: cannot connect plant.status [String] to controller.yaw_rate [Real]: "
+            "the types differ",
+        ),
+    ],
+)
+def test_a_wrong_connection_is_said_in_one_sentence(connection: str, expected: str | None) -> None:
+    path = scenario(rest=f"{CONSTANTS}connections:\n  - {connection}\n")
+    if expected is None:
+        with pytest.raises(YawbenchError):
+            plan(path)
+    else:
+        assert f"a.yaml:10: {expected}" in problems(path)
+
+
+def test_two_connections_to_one_input_are_said() -> None:
+    more = "  - {from: controller.torque_request_rr, to: plant.wheel_torque_fl}\n"
+    assert problems(scenario(rest=CONSTANTS + TORQUES + more)) == [
+        "a.yaml:11: connections[1]: plant.wheel_torque_fl has a source already, controller.torque_request_fl "
+        "by connections[0]"
+    ]
+
+
+def test_one_output_can_feed_four_wheels() -> None:
+    rest = CONSTANTS + "connections:\n  - {from: controller.torque_request_fl, to: plant.wheel_torque_*}\n"
+    made = plan(scenario(rest=rest))
+    fed = {w.input: w.output for w in made.wires if w.input.startswith("wheel_torque")}
+    assert fed == {f"wheel_torque_{w}": "torque_request_fl" for w in WHEELS}
+
+
+def test_units_that_differ_over_equal_names_are_said_with_the_target(folder: Path) -> None:
+    make_fmu(folder / "driver_deg.fmu", outputs=[out("steer_angle", unit="deg")])
+    assert problems(scenario(), swaps=["driver=driver_deg"]) == [
+        "a.yaml:5: units.controller: cannot connect driver.steer_angle [deg] to controller.steer_angle "
+        "[rad]: the units differ",
+        "a.yaml:6: units.plant: cannot connect driver.steer_angle [deg] to plant.steer_angle [rad]: "
+        "the units differ",
+    ]
+
+
+def test_units_that_mean_the_same_fit(folder: Path) -> None:
+    make_fmu(folder / "controller_nm.fmu", outputs=[out("torque_request_*", unit="Nm")])
+    assert plan(swaps=["controller=controller_nm"]).notes == ()
+
+
+def test_an_fmu_without_units_is_connected_with_a_note(folder: Path) -> None:
+    make_fmu(folder / "controller_bare.fmu", outputs=[out("torque_request_*", unit=None)])
+    assert plan(swaps=["controller=controller_bare"]).notes == (
+        "controller (controller_bare) declares no unit for torque_request_*: not checked",
+    )
+
+
+def test_types_that_differ_over_equal_names_are_said(folder: Path) -> None:
+    make_fmu(folder / "driver_int.fmu", outputs=[out("steer_angle", unit=None, type="Integer")])
+    assert problems(scenario(), swaps=["driver=driver_int"])[1] == (
+        "a.yaml:6: units.plant: cannot connect driver.steer_angle [Integer] to plant.steer_angle [Real]: "
+        "the types differ"
+    )
+
+
+def test_a_real_algebraic_loop_is_said_with_its_path(folder: Path) -> None:
+    make_fmu(
+        folder / "plant_loop.fmu",
+        inputs=[Var("steer_angle", "rad"), Var("tyre_force_x_*", "N"), Var("tyre_force_y_*", "N")],
+        outputs=[
+            out("yaw_rate", unit="rad/s"),
+            out("slip_angle_*", "tyre_force_y_*", unit="rad"),
+            "slip_ratio_*",
+        ],
+    )
+    path = scenario(UNITS.replace("plant_seven_dof", "plant_loop"), CONSTANTS)
+    assert problems(path) == [
+        "a.yaml: algebraic loop: tyre.tyre_force_y_fl -> plant.tyre_force_y_fl -> plant.slip_angle_fl -> "
+        "tyre.slip_angle_fl -> tyre.tyre_force_y_fl; these values would define each other at one instant, so "
+        "one of these units has to give an output that does not follow its input directly"
+    ]
+
+
+def test_a_loop_through_an_fmu_that_says_nothing_is_a_note(folder: Path) -> None:
+    make_fmu(
+        folder / "plant_silent.fmu",
+        inputs=[Var("steer_angle", "rad"), Var("tyre_force_x_*", "N"), Var("tyre_force_y_*", "N")],
+        outputs=[
+            out("yaw_rate", unit="rad/s", follows=None),
+            out("slip_angle_*", unit="rad", follows=None),
+            out("slip_ratio_*", follows=None),
+        ],
+    )
+    (note,) = plan(scenario(UNITS.replace("plant_seven_dof", "plant_silent"), CONSTANTS)).notes
+    assert note.startswith("possible algebraic loop: tyre.tyre_force_x_fl -> plant.tyre_force_x_fl -> ")
+    assert note.endswith(
+        "; an FMU here does not say which inputs its outputs follow, so a wire against the evaluation order "
+        "uses earlier values"
+    )
+
+
+# Constants
+
+
+def test_a_constant_by_name_goes_before_one_by_pattern() -> None:
+    rest = (
+        'inputs: {"friction*": 80 %, friction_fl: 0.3, tyre.friction_fr: 0.4, "tyre.friction_r*": 0.5}\n'
+        + TORQUES
+    )
+    made = plan(scenario(rest=rest))
+    values = [unit(made, "tyre").constants[f"friction_{w}"] for w in WHEELS]
+    assert values == [0.3, 0.4, 0.5, 0.5]
+    assert unit(made, "controller").constants == {"friction": 0.8}
+
+
+def test_two_constants_for_one_input_are_said() -> None:
+    rest = 'inputs: {"friction*": 0.8, "friction_*": 0.3}\n' + TORQUES
+    assert problems(scenario(rest=rest)) == [
+        "a.yaml:8: inputs.friction_*: tyre.friction_* has another constant already, by inputs.friction*"
+    ]
+
+
+def test_a_constant_for_driven_inputs_is_said_once_for_four_wheels() -> None:
+    rest = 'inputs: {"friction*": 1, "slip_ratio*": 0}\n' + TORQUES
+    assert problems(scenario(rest=rest)) == [
+        "a.yaml:8: inputs.slip_ratio*: tyre.slip_ratio_* is driven by plant.slip_ratio_*: "
+        "a constant is for inputs that no unit drives"
+    ]
+
+
+# Records
+
+
+def test_all_outputs_but_text_are_recorded_unless_the_scenario_says_otherwise() -> None:
+    made = plan()
+    assert made.record[0] == ("driver", "steer_angle")
+    assert len(made.record) == 1 + 4 + 10 + 8
+    assert ("plant", "status") not in made.record
+
+
+def test_recorded_outputs_are_in_the_order_of_the_list_each_once() -> None:
+    rest = (
+        CONSTANTS
+        + TORQUES
+        + 'record: [tyre.tyre_force_y_*, plant.yaw_rate, "*.yaw_rate", tyre.tyre_force_y_fl]\n'
+    )
+    forces = [("tyre", f"tyre_force_y_{w}") for w in WHEELS]
+    assert plan(scenario(rest=rest)).record == (*forces, ("plant", "yaw_rate"))
+
+
+def test_a_record_of_nothing_is_said() -> None:
+    rest = CONSTANTS + TORQUES + 'record: [plant.yawrate, "*.beta"]\n'
+    assert problems(scenario(rest=rest)) == [
+        "a.yaml:11: record[0]: plant has no output 'yawrate' to record; did you mean 'yaw_rate'?",
+        "a.yaml:11: record[1]: no unit has an output 'beta' to record; there are: steer_angle, "
+        "torque_request_*, yaw_rate, acceleration_y, slip_angle_*, slip_ratio_*, tyre_force_x_* and "
+        "tyre_force_y_*",
+    ]
