@@ -1,0 +1,48 @@
+"""The vehicle file of paper A and the defaults of the units agree."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+from components.allocators.fixed_share import FixedShare
+from components.allocators.load_proportional import LoadProportional
+from components.plants.seven_dof import SevenDof
+from components.references.steady_state import SteadyState
+from components.tyres.dugoff import Dugoff
+from components.tyres.linear import LinearTyre
+from components.wheel_controls.direct import Direct
+
+CAR = Path(__file__).parents[2] / "scenarios" / "vehicles" / "in_wheel_motor_car.yaml"
+UNITS = (SteadyState, LoadProportional, FixedShare, Direct, SevenDof, Dugoff, LinearTyre)
+
+
+@pytest.fixture(scope="module")
+def car():
+    return YAML(typ="safe").load(CAR.read_text(encoding="utf-8"))["parameters"]
+
+
+def defaults():
+    return [
+        (component.fmu_name, v.name, v.start)
+        for component in UNITS
+        for v in component.variables
+        if v.causality == "parameter"
+    ]
+
+
+def test_every_value_belongs_to_a_parameter_of_a_unit(car):
+    assert set(car) <= {name for _, name, _ in defaults()}
+
+
+def test_a_unit_without_a_vehicle_file_is_the_papers_car(car):
+    for unit, name, default in defaults():
+        if name in car:
+            assert float(car[name]) == default, f"{unit}.{name}"
+
+
+def test_the_axle_stiffness_is_that_of_two_tyres(car):
+    assert car["cornering_stiffness_front"] == 2 * car["cornering_stiffness"]
+    assert car["cornering_stiffness_rear"] == 2 * car["cornering_stiffness"]
