@@ -71,7 +71,8 @@ class Results:
         if not found:
             raise ResultsError(self._unknown(variable, role))
         raise ResultsError(
-            f"{self.folder / RESULTS_FILE}: '{variable}' was recorded of more than one unit: {', '.join(found)}."
+            f"{self.folder / RESULTS_FILE}: '{variable}' was recorded of more than one unit: "
+            f"{', '.join(found)}."
         )
 
     def units_of_role(self, role: str) -> list[str]:

@@ -64,11 +64,16 @@ def _fmu(unit: Unit, plan: Plan) -> dict[str, Any]:
 
 def versions() -> dict[str, str]:
     """Return the versions of all that has a say in the numbers."""
-    found = {"python": platform.python_version()}
-    for package in ("yawbench", "fmpy", "pythonfmu", "numpy"):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "unknown"
-    found["platform"] = f"{platform.system()} {platform.release()} {platform.machine()}"
-    return found
+    packages = ("yawbench", "fmpy", "pythonfmu", "numpy")
+    return {
+        "python": platform.python_version(),
+        **{package: _version(package) for package in packages},
+        "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "unknown"
