@@ -6,15 +6,12 @@ import os
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
-from pydantic import BaseModel, ValidationError
-
-from . import overrides, quantities, yaml_lines
+from . import overrides, quantities, strict, yaml_lines
 from .errors import ScenarioError
 from .plan import Algorithm
-from .scenario_schema import Connection, Endpoint, Scenario, UnitSpec, Vehicle, endpoint, short
-from .wording import closest, hint, listed
+from .scenario_schema import Connection, Endpoint, Scenario, UnitSpec, Vehicle, endpoint
+from .wording import hint, listed
 from .yaml_lines import Document, Key
 
 __all__ = ["Connection", "Endpoint", "Scenario", "UnitSpec", "Vehicle", "load_scenario"]
@@ -49,8 +46,8 @@ def load_scenario(
     values = {"stop_time": stop_time, "step_size": step_size, "algorithm": algorithm}
     overrides.apply_values(document, values)
 
-    scenario = _validate(Scenario, document)
-    vehicle = _validate(Vehicle, vehicle_document)
+    scenario = strict.validate(Scenario, document)
+    vehicle = strict.validate(Vehicle, vehicle_document)
     if isinstance(document.data, dict):
         _check_time_grid(document)
         _check_unit_names(document)
@@ -72,56 +69,6 @@ def _read_vehicle(document: Document) -> Document:
         document.report(("vehicle",), missing)
         return Document(vehicle, data={})
     return yaml_lines.read(vehicle, what="vehicle file")
-
-
-def _validate(model: type[Any], document: Document) -> Any:
-    """Return the validated model, or None with the problems noted in the document."""
-    if document.data is None:
-        return None
-    try:
-        return model.model_validate(document.data)
-    except ValidationError as errors:
-        for error in errors.errors(include_url=False):
-            key: Key = tuple(part for part in error["loc"] if part != "[key]")
-            _report(model, document, key, error)
-    return None
-
-
-def _report(model: type[BaseModel], document: Document, key: Key, error: Any) -> None:
-    kind, given = error["type"], error["input"]
-    if kind == "missing":
-        document.report(key[:-1], f"{str(key[-1])!r} is missing")
-    elif kind == "extra_forbidden":
-        allowed = _keys(model, key)
-        likely = closest(str(key[-1]), allowed)
-        guess = f"did you mean {likely!r}? " if likely else ""
-        document.report(key, f"unknown key; {guess}allowed here: {listed(allowed)}")
-    elif kind == "literal_error":
-        document.report(key, f"must be {error['ctx']['expected']} (got {short(given)})")
-    elif kind == "value_error":
-        document.report(key, str(error["ctx"]["error"]))
-    elif kind in _MUST_BE:
-        document.report(key, f"must be {_MUST_BE[kind]} (got {short(given)})")
-    else:
-        document.report(key, f"{error['msg']} (got {short(given)})")
-
-
-_MUST_BE = {
-    "string_type": "text",
-    "string_too_short": "text",
-    "dict_type": "a mapping",
-    "model_type": "a mapping",
-    "list_type": "a list",
-    "too_short": "a mapping of at least one unit",
-}
-
-
-def _keys(model: type[BaseModel], key: Key) -> list[str]:
-    """Return the keys allowed where `key` stands."""
-    inner: type[BaseModel] = model
-    if len(key) > 1:
-        inner = UnitSpec if key[0] == "units" else Connection
-    return [field.alias or name for name, field in inner.model_fields.items()]
 
 
 def _check_time_grid(document: Document) -> None:

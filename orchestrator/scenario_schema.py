@@ -13,25 +13,13 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    PlainValidator,
-    PrivateAttr,
-    WithJsonSchema,
-)
+from pydantic import AfterValidator, Field, PlainValidator, PrivateAttr, WithJsonSchema
 
 from . import overrides, quantities
 from .plan import Algorithm, Value
+from .strict import Strict
+from .wording import short
 from .yaml_lines import Document
-
-
-def short(value: object) -> str:
-    """Return a value as it stands in a message, cut if long."""
-    text = "nothing" if value is None else repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 class Endpoint(NamedTuple):
@@ -80,11 +68,7 @@ Variables = Annotated[Endpoint, PlainValidator(endpoint), WithJsonSchema({"type"
 UnitName = Annotated[str, AfterValidator(_unit_name)]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
-
-
-class UnitSpec(_Strict):
+class UnitSpec(Strict):
     """One unit as the scenario gives it."""
 
     fmu: str = Field(description="Name of an FMU in fmus/, or the path of any .fmu", min_length=1)
@@ -92,14 +76,14 @@ class UnitSpec(_Strict):
     parameters: dict[str, Scalar] = Field({}, description="Values of this unit's parameters")
 
 
-class Connection(_Strict):
+class Connection(Strict):
     """Connections beyond equal names; `*` in both ends connects everything that matches in pairs."""
 
     source: Variables = Field(alias="from", description="unit.output")
     target: Variables = Field(alias="to", description="unit.input")
 
 
-class Vehicle(_Strict):
+class Vehicle(Strict):
     """A vehicle file: parameters that every unit takes if it declares them."""
 
     title: str = ""
@@ -107,7 +91,7 @@ class Vehicle(_Strict):
     parameters: dict[str, Scalar] = Field({}, description="Parameter name -> value")
 
 
-class Scenario(_Strict):
+class Scenario(Strict):
     """A scenario file with all overrides applied."""
 
     title: str = ""

@@ -8,8 +8,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from .scenario_schema import short
-from .wording import closest, listed
+from .wording import closest, listed, short
 from .yaml_lines import Document, Key
 
 Model = TypeVar("Model", bound=BaseModel)

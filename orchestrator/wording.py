@@ -22,6 +22,12 @@ def listed(items: Iterable[object], *, last: str = "and") -> str:
     return f"{', '.join(words[:-1])} {last} {words[-1]}"
 
 
+def short(value: object) -> str:
+    """Return a value as it stands in a message, cut if long."""
+    text = "nothing" if value is None else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
 def closest(name: str, valid: Iterable[str]) -> str | None:
     """Return the valid name most like `name`, or None if none is like it."""
     by_lower = {v.lower(): v for v in valid}
