@@ -51,8 +51,8 @@ def compile_launcher(cache: Path | None = None) -> tuple[bytes | None, str]:
             check=False,
         )
         if done.returncode != 0:
-            first = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[0]
-            return None, f"the C compiler failed: {first}"
+            lines = [line for line in done.stderr.splitlines() if "error" in line]
+            return None, f"the C compiler failed: {(lines or [f'exit status {done.returncode}'])[0]}"
         binary = made.read_bytes()
     _keep(kept, binary)
     return binary, ""

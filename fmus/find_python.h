@@ -160,6 +160,19 @@ static bool open_python(char *problem, size_t size)
     return false;
 }
 
+/* True in the plain C locale, where Python itself would read file names as UTF-8 but an embedded one does not. */
+static bool is_plain_locale(void)
+{
+    const char *names[] = {"LC_ALL", "LC_CTYPE", "LANG"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        const char *locale = getenv(names[i]);
+        if (locale != NULL && *locale != '\0') {
+            return strcmp(locale, "C") == 0 || strcmp(locale, "POSIX") == 0;
+        }
+    }
+    return true;
+}
+
 /* Start Python without signal handlers and let go of its lock.
  *
  * We do it, not a PythonFMU library: the library that starts Python also ends it when it is
@@ -190,6 +203,10 @@ static void start_python(const Python *python, int minor)
             symbol.call(home);
         }
     }
+    int *utf8_mode = dlsym(RTLD_DEFAULT, "Py_UTF8Mode");
+    if (utf8_mode != NULL && is_plain_locale()) {
+        *utf8_mode = 1;
+    }
     python->Py_InitializeEx(0);
     python->PyEval_SaveThread();
 }
@@ -219,7 +236,7 @@ static bool provide_python(Python *python, char *problem, size_t size)
     }
     int major = 0, minor = 0;
     if (sscanf(python->Py_GetVersion(), "%d.%d", &major, &minor) != 2 || major != 3 || minor < OLDEST_PYTHON) {
-        snprintf(problem, size, "Python 3.%d or newer is needed, this process has %.40s", OLDEST_PYTHON, python->Py_GetVersion());
+        snprintf(problem, size, "Python 3.%d or newer is needed, this process has Python %d.%d", OLDEST_PYTHON, major, minor);
         return false;
     }
     /* Two FMUs may be loaded at once by two threads; a lock that all libraries share is stderr's. */

@@ -146,6 +146,25 @@ static bool own_folder(char folder[PATH_MAX])
     return dladdr(&library, &own) != 0 && realpath(own.dli_fname, folder) != NULL && to_parent(folder);
 }
 
+/* The process ends or the FMU is being unloaded; Python itself stays.
+ *
+ * PythonFMU's library gives up its handle on Python twice when a process ends, the second time
+ * through a freed pointer. Asked to do it before, it has none left. It must be asked by a handler
+ * that is younger than its own, so not by a destructor.
+ */
+static void unload(void)
+{
+    union {
+        void *object;
+        void (*call)(void);
+    } symbol = {dlsym(library.handle, "finalizePythonInterpreter")};
+    if (symbol.object != NULL) {
+        symbol.call();
+    }
+    dlclose(library.handle);
+    library.handle = NULL;
+}
+
 static bool open_library(char *problem, size_t size)
 {
     char folder[PATH_MAX], file[PATH_MAX + sizeof PYTHONFMU + 1];
@@ -179,6 +198,7 @@ static bool open_library(char *problem, size_t size)
         memcpy(functions[i].slot, &symbol, sizeof symbol);
     }
     library.handle = handle;
+    atexit(unload);
     return true;
 }
 
@@ -188,14 +208,6 @@ static bool load(char *problem, size_t size)
     bool ready = library.handle != NULL || (provide_python(&python, problem, size) && open_library(problem, size));
     pthread_mutex_unlock(&loading);
     return ready;
-}
-
-/* The FMU is being unloaded: take PythonFMU's library along. Python itself stays. */
-__attribute__((destructor)) static void unload(void)
-{
-    if (library.handle != NULL) {
-        dlclose(library.handle);
-    }
 }
 
 /* ---- resources ---- */

@@ -1,0 +1,294 @@
+"""Whatever a component does wrong ends in a sentence and a status, never in a dead process."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+
+import pytest
+
+from tests.fmus.bare import DISCARD, ERROR, FATAL, OK, Refused, Unit
+
+DITCH = "ValueError: 50 % of the wheels (100%s, %n) are in the Gräben: größer als 1 µm"
+
+
+@pytest.fixture
+def failing(sample):
+    fmu = sample("controllers/failing.py")
+    units = []
+
+    def make(**parameters):
+        unit = Unit(fmu, **parameters)
+        units.append(unit)
+        return unit
+
+    yield make
+    for unit in units:
+        unit.free()
+
+
+def test_an_exception_in_configure_makes_entering_initialization_an_error(failing):
+    unit = failing(where="configure")
+    assert unit.call("fmi2EnterInitializationMode") == ERROR
+    assert unit.messages[0].startswith(f"initialization failed at t = 0 s: {DITCH} (controllers/failing.py:")
+
+
+def test_an_exception_in_start_makes_leaving_initialization_an_error(failing):
+    unit = failing(where="start", yaw_rate=0.25)
+    assert unit.call("fmi2EnterInitializationMode") == OK
+    assert unit.call("fmi2ExitInitializationMode") == ERROR
+    assert unit.messages[0].startswith(f"initialization failed at t = 0 s: {DITCH}")
+    assert unit.messages[0].endswith("; inputs: yaw_rate = 0.25")
+
+
+def test_an_exception_in_start_makes_reading_an_output_during_initialization_an_error(failing):
+    unit = failing(where="start")
+    assert unit.call("fmi2EnterInitializationMode") == OK
+    with pytest.raises(Refused, match="initialization failed"):
+        unit.get("yaw_moment")
+
+
+@pytest.mark.parametrize("where", ["advance", "output"])
+def test_an_exception_in_a_step_names_time_place_and_inputs(failing, where):
+    unit = failing(where=where, when=0.0015)
+    unit.start()
+    unit.set(yaw_rate=0.5)
+    steps = [unit.try_step(k * 0.001) for k in range(4)]
+    first = 2 if where == "advance" else 1
+    assert steps == [OK] * first + [ERROR] * (4 - first)
+    sentence = unit.messages[0]
+    assert sentence.startswith(f"step failed at t = {first * 0.001:g} s: {DITCH} (controllers/failing.py:")
+    assert sentence.endswith("; inputs: yaw_rate = 0.5")
+
+
+def test_the_traceback_is_logged_for_those_who_ask(failing, sample):
+    quiet, curious = failing(where="configure"), failing(where="configure", logging_on=True)
+    for unit in (quiet, curious):
+        assert unit.call("fmi2EnterInitializationMode") == ERROR
+    assert [category for _, category, _ in quiet.log] == ["logStatusError"]
+    assert [category for _, category, _ in curious.log] == ["logStatusError", "traceback"]
+    assert curious.messages[1].startswith("Traceback (most recent call last):")
+    assert "in configure" in curious.messages[1]
+
+
+@pytest.mark.parametrize(
+    ("how", "what"),
+    [
+        ("interrupt", "KeyboardInterrupt"),
+        ("exit", "SystemExit: 3"),
+        ("recursion", "RecursionError"),
+        ("surrogate", r"half a character: \ud800, and a \0 in between"),
+        ("unprintable", "step failed (ValueError while reporting it)"),
+        ("none", "TypeError: 'NoneType' object is not iterable"),
+        ("count", "TypeError: output() gave 2 values for 1 outputs"),
+        ("text", "ValueError: could not convert string to float: 'far'"),
+    ],
+)
+def test_any_other_failure_of_a_step_is_an_error_with_a_sentence(failing, how, what):
+    unit = failing(where="output", how=how)
+    unit.start()
+    assert unit.try_step(0.0) == ERROR
+    assert what in unit.messages[0]
+    assert unit.get("yaw_moment") == [0.0]  # the last good value
+
+
+def test_a_nan_is_handed_to_the_host_as_it_is(failing):
+    unit = failing(where="output", how="nan")
+    unit.start()
+    assert unit.try_step(0.0) == OK
+    assert math.isnan(unit.get("yaw_moment")[0])
+
+
+def test_a_parameter_out_of_range_is_named_with_what_is_allowed(failing):
+    unit = failing(when=-1.0)
+    with pytest.raises(Refused, match=r"ValueError: when must be at least 0 \(got -1.0\); inputs"):
+        unit.start()
+    unit = failing(how="quietly")
+    with pytest.raises(Refused, match=r"how must be one of exception, interrupt, .* \(got 'quietly'\)"):
+        unit.start()
+    unit = failing(when=math.nan)
+    with pytest.raises(Refused, match=r"when must be a finite number \(got nan\)"):
+        unit.start()
+
+
+def test_what_cannot_be_set_is_refused_by_name(failing):
+    unit = failing()
+    with pytest.raises(Refused, match="yaw_moment cannot be set"):
+        unit.set(yaw_moment=1.0)
+    unit = failing()
+    unit.start()
+    with pytest.raises(Refused, match="when cannot be set after initialization"):
+        unit.set(when=1.0)
+    unit = failing()
+    unit.start()
+    with pytest.raises(Refused, match="how cannot be set after initialization"):
+        unit.set(how="exit")
+
+
+@pytest.mark.parametrize("kind", ["Real", "Integer", "Boolean", "String"])
+@pytest.mark.parametrize("access", ["Get", "Set"])
+def test_an_unknown_value_reference_or_one_of_another_type_is_an_error(failing, kind, access):
+    other = failing().fmu.reference["when" if kind == "Boolean" else "unsavable"]
+    if kind == "Real":
+        other = len(failing().fmu.reference)
+    for reference in (other, 99, 0x7FFFFFFF, 0xFFFFFFFF):
+        unit = failing()
+        values = (ctypes.c_char_p * 1)(b"x") if kind == "String" else (ctypes.c_double * 1)(0.0)
+        status = unit.call(f"fmi2{access}{kind}", (ctypes.c_uint * 1)(reference), ctypes.c_size_t(1), values)
+        assert status == ERROR
+        assert "failed at t = 0 s" in unit.messages[0]
+
+
+def test_a_reset_makes_a_failed_unit_work_again(failing):
+    unit = failing(where="advance")
+    unit.start()
+    assert unit.try_step(0.0) == ERROR
+    unit.do("fmi2Reset")
+    unit.start()
+    assert [unit.try_step(k * 0.001) for k in range(3)] == [OK] * 3
+    assert unit.get("yaw_moment") == [3.0]
+
+
+def test_a_state_from_before_the_failure_makes_the_unit_work_again(failing):
+    unit = failing(where="advance", when=0.0005)
+    unit.start()
+    unit.step(0.0)
+    state = unit.save()
+    assert unit.try_step(0.001) == ERROR
+    unit.restore(state)
+    assert unit.try_step(0.0) == OK
+    assert unit.get("yaw_moment") == [2.0]
+
+
+def test_a_state_that_cannot_be_saved_is_an_error(failing):
+    unit = failing(unsavable=True)
+    unit.start()
+    with pytest.raises(Refused, match=r"saving the state failed .* cannot pickle"):
+        unit.save()
+
+
+@pytest.mark.parametrize("content", [b"", b"\0", b"rubbish", b"\x80\x04K\x01.", b"\x80\x04}."])
+def test_bytes_that_are_no_state_are_refused(failing, content):
+    unit = failing()
+    unit.start()
+    with pytest.raises(Refused, match="these bytes are no state of this FMU"):
+        unit.from_bytes(content)
+    unit.step(0.0)
+
+
+def test_a_hundred_failures_leave_the_process_alive(sample):
+    fmu = sample("controllers/failing.py")
+    for i in range(100):
+        unit = Unit(fmu, where=["configure", "start", "advance", "output"][i % 4])
+        with pytest.raises(Refused):
+            unit.start()
+            unit.step(0.001)
+        unit.free()
+    unit = Unit(fmu)
+    unit.start()
+    unit.step(0.0)
+    assert unit.outputs() == [1.0]
+    unit.free()
+
+
+def test_after_a_fatal_error_nothing_is_released_twice(sample):
+    fmu = sample("controllers/hostile.py")
+    for _ in range(30):
+        unit = Unit(fmu)
+        unit.start()
+        state = unit.save()
+        assert unit.try_step(0.0) == FATAL
+        assert unit.log[0][1] == "logStatusFatal"
+        assert "RuntimeError('100 % hostile')" in unit.messages[0]
+        assert unit.try_step(0.0) == FATAL
+        assert unit.call("fmi2Reset") == FATAL
+        unit.forget(state)
+        unit.free()
+    unit = Unit(fmu)
+    unit.start()
+    assert unit.outputs() == [1.0]
+    unit.free()
+
+
+def test_log_text_is_safe_to_print_and_warnings_are_no_errors(sample):
+    unit = Unit(sample("controllers/talking.py"), logging_on=True)
+    unit.start()
+    assert unit.log == [
+        (0, "logAll", "42"),
+        (0, "logAll", "100 %s of nothing"),
+        (0, "logAll", r"a \ud800 and a \0"),
+        (1, "logStatusWarning", "grip is 5 % short"),
+    ]
+    unit.free()
+
+
+def test_without_debug_logging_only_warnings_and_errors_are_sent(sample):
+    unit = Unit(sample("controllers/talking.py"))
+    unit.start()
+    assert unit.messages == ["grip is 5 % short"]
+    unit.free()
+
+
+def test_log_categories_can_be_chosen(sample):
+    unit = Unit(sample("controllers/failing.py"), where="configure")
+    chosen = (ctypes.c_char_p * 1)(b"traceback")
+    unit.do("fmi2SetDebugLogging", 1, ctypes.c_size_t(1), chosen)
+    assert unit.call("fmi2EnterInitializationMode") == ERROR
+    assert [category for _, category, _ in unit.log] == ["logStatusError", "traceback"]
+    unit.free()
+
+
+def test_missing_arguments_are_refused(sample):
+    unit = Unit(sample("controllers/failing.py"))
+    one, value = ctypes.c_size_t(1), (ctypes.c_double * 1)(0.0)
+    reference = (ctypes.c_uint * 1)(0)
+    for kind in ("Real", "Integer", "Boolean", "String"):
+        for access in ("Get", "Set"):
+            assert unit.call(f"fmi2{access}{kind}", None, one, value) == ERROR
+            assert unit.call(f"fmi2{access}{kind}", reference, one, None) == ERROR
+            assert unit.call(f"fmi2{access}{kind}", None, ctypes.c_size_t(0), None) == OK
+    assert unit.call("fmi2SetString", reference, one, (ctypes.c_char_p * 1)(None)) == ERROR
+    assert unit.call("fmi2SetString", reference, one, (ctypes.c_char_p * 1)(b"\xff\xfe")) == ERROR
+    for call in ("fmi2GetFMUstate", "fmi2SetFMUstate"):
+        assert unit.call(call, None) == ERROR
+    assert unit.call("fmi2FreeFMUstate", None) == OK
+    assert unit.call("fmi2SerializedFMUstateSize", None, None) == ERROR
+    assert unit.call("fmi2SerializeFMUstate", None, None, one) == ERROR
+    assert unit.call("fmi2DeSerializeFMUstate", None, one, None) == ERROR
+    assert unit.call("fmi2SetDebugLogging", 1, one, None) == ERROR
+    assert unit.call("fmi2GetRealStatus", 2, None) == ERROR
+    unit.start()
+    unit.step(0.0)
+    assert unit.outputs() == [1.0]
+    unit.free()
+
+
+def test_no_instance_is_refused(sample):
+    library = sample("controllers/failing.py").library
+    for call in ("fmi2EnterInitializationMode", "fmi2Reset", "fmi2Terminate", "fmi2CancelStep"):
+        assert getattr(library, call)(None) == ERROR
+    assert library.fmi2DoStep(None, ctypes.c_double(0.0), ctypes.c_double(0.1), 1) == ERROR
+    assert library.fmi2GetReal(None, None, ctypes.c_size_t(0), None) == ERROR
+    library.fmi2FreeInstance(None)
+
+
+def test_a_state_needs_room_to_be_serialized(sample):
+    unit = Unit(sample("controllers/failing.py"))
+    unit.start()
+    state = unit.save()
+    room = (ctypes.c_char * 4)()
+    assert unit.call("fmi2SerializeFMUstate", state, room, ctypes.c_size_t(4)) == ERROR
+    assert "too small" in unit.messages[0]
+    unit.free()
+
+
+def test_what_pythonfmu_does_not_support_is_an_error_not_a_crash(sample):
+    unit = Unit(sample("controllers/failing.py"))
+    unit.start()
+    value = (ctypes.c_double * 1)(0.0)
+    reference, one = (ctypes.c_uint * 1)(0), ctypes.c_size_t(1)
+    assert unit.call("fmi2GetDirectionalDerivative", reference, one, reference, one, value, value) == ERROR
+    assert unit.call("fmi2CancelStep") == ERROR
+    unit.step(0.0)
+    assert unit.try_step(0.001) not in (DISCARD, FATAL)
+    unit.free()
