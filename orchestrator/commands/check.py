@@ -2,26 +2,46 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .options import Fmus, ScenarioFile, Set, Swap
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from ..plan import Plan, Unit, Value, Wire
+
+PIPE_WIDTH = 140
+"""Columns of what goes into a pipe or a file."""
 
 
 def check(scenario: ScenarioFile, swap: Swap = None, set_: Set = None, fmus: Fmus = None) -> None:
     """Validate a scenario; show units in evaluation order, wires and constants."""
-    import sys
-
-    from rich.console import Console
-
     from ..scenario import load_scenario
     from ..wiring import make_plan
 
     plan = make_plan(load_scenario(scenario, swaps=swap or (), settings=set_ or ()), fmus=fmus)
-    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else 140)
+    show(plan, scenario)
+    for note in plan.notes:
+        print(f"note: {note}", file=sys.stderr)
+
+
+def show(plan: Plan, scenario: Path) -> None:
+    """Print what the plan of a scenario file holds: for a terminal in its width, for a pipe in lines."""
+    from rich.console import Console
+
+    width = None if sys.stdout.isatty() else PIPE_WIDTH
+    console = Console(highlight=False, markup=False, emoji=False, width=width)
+    with console.capture() as capture:
+        _print(plan, scenario, console)
+    for line in capture.get().splitlines():
+        print(line.rstrip())
+
+
+def _print(plan: Plan, scenario: Path, console: Console) -> None:
     console.print(f"{scenario}: {plan.title}" if plan.title else f"{scenario}")
     console.print(
         f"{_number(plan.n_steps * plan.step)} s in {plan.n_steps} steps of {_number(1000 * plan.step)} ms, "
@@ -33,11 +53,9 @@ def check(scenario: ScenarioFile, swap: Swap = None, set_: Set = None, fmus: Fmu
     _show(console, "Why this order", ("unit", "after", "because its outputs follow"), _order_rows(plan))
     _show(console, "Against the order", ("from", "to", "uses earlier values of"), _backward_rows(plan))
     console.print("\nNothing is wrong.")
-    for note in plan.notes:
-        print(f"note: {note}", file=sys.stderr)
 
 
-def _show(console, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+def _show(console: Console, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     from rich.padding import Padding
     from rich.table import Table
 
@@ -64,7 +82,8 @@ def _unit_rows(plan: Plan) -> Iterable[Sequence[str]]:
             if value != variables[name].start
         ]
         step = f"{_number(1000 * unit.period * plan.step)} ms"
-        yield unit.name, unit.fmu.name, step, ", ".join(differing) or "all at their defaults"
+        otherwise = "all at their defaults" if unit.fmu.of("parameter") else "none"
+        yield unit.name, unit.fmu.name, step, ", ".join(differing) or otherwise
 
 
 def _assignment(name: str, value: object, measure: str | None) -> str:

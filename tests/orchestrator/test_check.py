@@ -1,0 +1,154 @@
+"""What `yawbench check` prints, and how it ends."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from orchestrator.cli import main
+
+from .fake_fmus import Var, make_fmu, out
+
+pytestmark = pytest.mark.usefixtures("cache")
+
+SCENARIO = """\
+title: Single sine [mu 0.65]
+stop_time: 2
+step_size: 1 ms
+inputs: {"friction*": 0.65}
+units:
+  tyre: {fmu: tyre}
+  plant: {fmu: plant, parameters: {mass: 1.2 t, note: default}}
+  driver: {fmu: driver, step_size: 5 ms}
+connections:
+  - {from: driver.torque_*, to: plant.wheel_torque_*}
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working directory with a scenario, `Läufe 2/a.yaml`, and its FMUs."""
+    monkeypatch.chdir(tmp_path)
+    make_fmu(
+        tmp_path / "fmus/driver.fmu",
+        inputs=[Var("friction")],
+        outputs=[out("steer_angle", unit="rad"), out("torque_*", unit="N.m")],
+    )
+    make_fmu(
+        tmp_path / "fmus/plant.fmu",
+        inputs=[Var("steer_angle", "rad"), Var("tyre_force_*", "N"), Var("wheel_torque_*", "N.m")],
+        outputs=[out("slip_angle_*", "steer_angle", unit="rad"), out("load_*", "tyre_force_*", unit="N")],
+        parameters=[Var("mass", "kg", start=1500.0), Var("note", type="String", start="default")],
+    )
+    make_fmu(
+        tmp_path / "fmus/tyre.fmu",
+        inputs=[Var("slip_angle_*", "rad"), Var("friction_*")],
+        outputs=[out("tyre_force_*", "slip_angle_*", unit="N")],
+    )
+    path = tmp_path / "Läufe 2" / "a.yaml"
+    path.parent.mkdir()
+    path.write_text(SCENARIO, encoding="utf-8")
+    return path.parent
+
+
+def check(*arguments: str) -> int:
+    """Run the command and return its exit status."""
+    with pytest.raises(SystemExit) as caught:
+        main(["check", *arguments])
+    assert isinstance(caught.value.code, int)
+    return caught.value.code
+
+
+def test_a_scenario_is_shown_with_units_wires_constants_and_the_reasons_of_its_order(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert check("Läufe 2/a.yaml") == 0
+    shown = capsys.readouterr()
+    assert shown.err == ""
+    assert (
+        shown.out
+        == """\
+Läufe 2/a.yaml: Single sine [mu 0.65]
+2 s in 2000 steps of 1 ms, extrapolated; 13 wires, 17 outputs recorded
+
+Units in evaluation order
+  unit    FMU     step  parameters
+  driver  driver  5 ms  none
+  plant   plant   1 ms  mass = 1200 kg
+  tyre    tyre    1 ms  none
+
+Wires
+  from    to     variables
+  driver  plant  steer_angle [rad], torque_* → wheel_torque_* [N.m]
+  tyre    plant  tyre_force_* [N]
+  plant   tyre   slip_angle_* [rad]
+
+Constants
+  input            value
+  driver.friction  0.65
+  tyre.friction_*  0.65
+
+Why this order
+  unit   after   because its outputs follow
+  plant  driver  steer_angle
+  tyre   plant   slip_angle_*
+
+Against the order
+  from  to     uses earlier values of
+  tyre  plant  tyre_force_*
+
+Nothing is wrong.
+"""
+    )
+
+
+def test_options_are_applied_and_notes_go_to_stderr(capsys: pytest.CaptureFixture[str]) -> None:
+    assert check("Läufe 2/a.yaml", "--swap", "plant=plant_other", "--fmus", "fmus") == 2
+    assert capsys.readouterr().err.startswith("--swap plant=plant_other: no FMU 'plant_other' in fmus; ")
+    make_fmu(
+        Path("fmus/plant_other.fmu"),
+        inputs=[Var("steer_angle", "rad")],
+        outputs=[out("slip_angle_*", unit="rad")],
+    )
+    assert check("Läufe 2/a.yaml", "--swap", "plant=plant_other", "--set", "inputs.friction*=30 %") == 0
+    shown = capsys.readouterr()
+    assert "  driver.friction  0.3\n" in shown.out
+    assert shown.err.splitlines() == [
+        "note: plant.mass is left out: plant_other has no such parameter",
+        "note: plant.note is left out: plant_other has no such parameter",
+        "note: connections[0] is left out: plant has no input 'wheel_torque_*' any more",
+    ]
+
+
+def test_every_problem_is_a_line_on_stderr_and_the_status_is_2(
+    capsys: pytest.CaptureFixture[str], folder: Path
+) -> None:
+    path = folder / "a.yaml"
+    path.write_text(
+        SCENARIO.replace("mass: 1.2 t", "mas: 1.2 t").replace("to: plant.wheel", "to: plant.weel")
+    )
+    assert check("Läufe 2/a.yaml") == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.splitlines() == [
+        "Läufe 2/a.yaml:7: units.plant.parameters.mas: plant (plant) has no parameter 'mas'; "
+        "did you mean 'mass'?",
+        "Läufe 2/a.yaml:7: units.plant: plant.wheel_torque_* [N.m] has no source: no unit has an output of "
+        "this name; connect driver.torque_*, or give a constant under 'inputs'",
+        "Läufe 2/a.yaml:10: connections[0].to: plant has no input 'weel_torque_*'; "
+        "did you mean 'wheel_torque_*'?",
+    ]
+
+
+def test_checking_loads_no_simulation_and_no_figures() -> None:
+    code = (
+        "import sys; from orchestrator.scenario import load_scenario; from orchestrator.wiring import make_plan\n"
+        "make_plan(load_scenario('Läufe 2/a.yaml'))\n"
+        "print(sorted({'fmpy', 'numpy', 'lxml', 'matplotlib', 'rich', 'components'} & set(sys.modules)))"
+    )
+    assert check("Läufe 2/a.yaml") == 0  # fills the cache
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
