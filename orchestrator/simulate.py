@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from .errors import ResultsError, SimulationError
+from .errors import ResultsError, SimulationError, YawbenchError
 from .interrupts import StopFlag, interrupts
 from .log import Log, Message
 from .master import Interrupted, Master
@@ -146,9 +146,11 @@ class _Run:
         try:
             self.recorder.write(count)
         except ResultsError as error:
-            kept = self.plan.time(max(0, self.recorder.written - 1))
-            problem = f"{error.problems[0].rstrip('.')}; results up to t = {kept:.9g} s are kept."
-            raise SimulationError(problem, unit=None, time=self.plan.time(self.master.completed)) from None
+            time_reached = self.plan.time(self.master.completed)
+            problem = (
+                f"{error.problems[0].rstrip('.')} (at t = {time_reached:.9g} s); the rows that fit are kept."
+            )
+            raise SimulationError(problem, unit=None, time=time_reached) from None
         finally:
             self._writing = False
 
@@ -156,7 +158,13 @@ class _Run:
         """Write what there is and why there is no more."""
         with contextlib.suppress(SimulationError):  # the disk may be why; what fits has been kept
             self._flush()
-        self.save("interrupted" if isinstance(error, Interrupted) else "failed", error)
+        problems = error.problems if isinstance(error, YawbenchError) else []
+        try:
+            self.save("interrupted" if isinstance(error, Interrupted) else "failed", error)
+        except ResultsError as lost:
+            problems += lost.problems
+        else:
+            problems.append(f"What was recorded until then: {self.recorder.folder}")
 
     def abandon(self) -> None:
         """Leave at once: somebody insists, perhaps because a unit never comes back."""

@@ -22,7 +22,6 @@ def run(
     Without --out, results go to results/<folder of the scenario>/<its name>; those of an earlier run
     there are replaced.
     """
-    from ..errors import SimulationError
     from ..scenario import load_scenario
     from ..simulate import simulate
     from ..wiring import make_plan
@@ -31,13 +30,8 @@ def run(
     for note in plan.notes:
         _say(f"note: {note}")
     folder = out or default_folder(scenario)
-    try:
-        with _bar(plan.title or scenario.stem) as progress:
-            info = simulate(plan, folder, progress=progress)
-    except SimulationError as error:
-        if (folder / "run.json").exists():
-            error.problems.append(f"What was recorded until then: {folder}")
-        raise
+    with _bar(plan.title or scenario.stem) as progress:
+        info = simulate(plan, folder, progress=progress)
     for message in info.warnings[:SHOWN]:
         _say(f"warning: {message.unit} at t = {message.time:.9g} s: {message.text}")
     if len(info.warnings) > SHOWN:

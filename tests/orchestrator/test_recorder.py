@@ -14,7 +14,7 @@ from orchestrator.recorder import BLOCK, Recorder
 from orchestrator.results import load_results
 from orchestrator.simulate import simulate
 
-from .fakes import Clock, Stage, make_plan
+from .fakes import Clock, Function, Stage, make_plan
 
 
 def record(folder, table, *, real=None, others=None, run=None):
@@ -138,8 +138,8 @@ def test_a_disk_that_fills_up_keeps_whole_rows_and_says_so(tmp_path):
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     results = load_results(tmp_path)
     assert str(caught.value) == (
-        f"{tmp_path}/results.csv: cannot be written: File too large; "
-        f"results up to t = {results.time[-1]:.9g} s are kept."
+        f"{tmp_path}/results.csv: cannot be written: File too large (at t = 1.535 s); "
+        "the rows that fit are kept."
     )
     assert 49_900 < (tmp_path / "results.csv").stat().st_size <= 50_000
     assert results.run["status"] == "failed"
@@ -169,3 +169,15 @@ def test_earlier_results_stay_if_the_record_cannot_be_written_at_all(tmp_path, m
         record(tmp_path, table(5), run={"title": "second"})
     assert load_results(tmp_path).run["title"] == "first"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["results.csv", "run.json"]
+
+
+def test_a_failure_that_cannot_be_recorded_says_both(tmp_path, monkeypatch):
+    monkeypatch.setattr(module.Path, "write_text", no_space)
+    units = {"a": Clock(x=lambda t: math.nan), "b": Function(lambda t, u: {"y": u["x"]}, ["x"], ["y"])}
+    with pytest.raises(SimulationError) as caught:
+        simulate(make_plan(units, ["a.x -> b.x"]), tmp_path / "out", opener=Stage(units))
+    assert caught.value.problems == [
+        "a: x is not a number at t = 0 s, on the wire a.x -> b.x",
+        f"{tmp_path / 'out'}: results cannot be written: the disk is full.",
+    ]
+    assert list((tmp_path / "out").iterdir()) == []
