@@ -106,8 +106,7 @@ class Connector:
 
     def _no_such(self, key: Key, unit: str, pattern: str, kind: str) -> None:
         """Report a pattern without a match, or note it if the FMU that was replaced has one."""
-        before = self._replaced(unit) if unit in self._scenario.replaced else None
-        if before is not None and any(match(pattern, v.name) is not None for v in before.of(kind)):
+        if self._had([unit], kind, pattern):
             self._notes.append(f"{dotted(key[:2])} is left out: {unit} has no {kind} {pattern!r} any more")
             return
         variable = self._fmus[unit].variables.get(pattern)
@@ -116,6 +115,11 @@ class Connector:
             return
         names = fold([v.name for v in self._fmus[unit].of(kind)])
         self._report(key, f"{unit} has no {kind} {pattern!r}{hint(pattern, names, lead='it has')}")
+
+    def _had(self, units: Iterable[str], causality: str, pattern: str) -> bool:
+        """Return whether an FMU that an option has replaced in one of the units has such a variable."""
+        replaced = [self._replaced(unit) for unit in units if unit in self._scenario.replaced]
+        return any(match(pattern, v.name) is not None for fmu in replaced if fmu for v in fmu.of(causality))
 
     def _by_names(self, wires: dict[Input, tuple[Wire, Key]]) -> set[Input]:
         """Add the wires of equal names; return the inputs that have more than one candidate."""
@@ -173,10 +177,7 @@ class Connector:
         return values
 
     def _no_such_input(self, key: Key, pattern: str, name_pattern: str, units: Iterable[str]) -> None:
-        before = (self._replaced(unit) for unit in units if unit in self._scenario.replaced)
-        if any(
-            fmu and any(match(name_pattern, v.name) is not None for v in fmu.of("input")) for fmu in before
-        ):
+        if self._had(units, "input", name_pattern):
             self._notes.append(f"inputs.{pattern} is left out: no unit has such an input after the swap")
             return
         names = fold(list(dict.fromkeys(n for unit in units for n in self._inputs[unit])))
@@ -238,6 +239,9 @@ class Connector:
             found = [(u, n) for u in units for n in numbers[u] if match(pattern, n) is not None]
             chosen.update(dict.fromkeys(found))
             if found:
+                continue
+            if self._had(units, "output", pattern):
+                self._notes.append(f"record[{i}] is left out: {unit} has no output {pattern!r} any more")
                 continue
             names = fold(list(dict.fromkeys(n for u in units for n in numbers[u])))
             who = "no unit has an" if unit == "*" else f"{unit} has no"

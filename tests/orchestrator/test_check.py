@@ -136,8 +136,8 @@ def test_every_problem_is_a_line_on_stderr_and_the_status_is_2(
     assert shown.err.splitlines() == [
         "Läufe 2/a.yaml:7: units.plant.parameters.mas: plant (plant) has no parameter 'mas'; "
         "did you mean 'mass'?",
-        "Läufe 2/a.yaml:7: units.plant: plant.wheel_torque_* [N.m] has no source: no unit has an output of "
-        "this name; connect driver.torque_*, or give a constant under 'inputs'",
+        "Läufe 2/a.yaml:7: units.plant: plant.wheel_torque_* [N.m] has no source: no unit has an output "
+        "of this name; connect driver.torque_*, or give a constant under 'inputs'",
         "Läufe 2/a.yaml:10: connections[0].to: plant has no input 'weel_torque_*'; "
         "did you mean 'wheel_torque_*'?",
     ]
@@ -145,7 +145,8 @@ def test_every_problem_is_a_line_on_stderr_and_the_status_is_2(
 
 def test_checking_loads_no_simulation_and_no_figures() -> None:
     code = (
-        "import sys; from orchestrator.scenario import load_scenario; from orchestrator.wiring import make_plan\n"
+        "import sys; from orchestrator.scenario import load_scenario\n"
+        "from orchestrator.wiring import make_plan\n"
         "make_plan(load_scenario('Läufe 2/a.yaml'))\n"
         "print(sorted({'fmpy', 'numpy', 'lxml', 'matplotlib', 'rich', 'components'} & set(sys.modules)))"
     )

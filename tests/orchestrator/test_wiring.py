@@ -360,12 +360,14 @@ def test_a_mistake_stays_a_mistake_after_a_swap() -> None:
 def test_a_constant_and_a_connection_of_the_replaced_fmu_are_left_out_with_a_note(folder: Path) -> None:
     make_fmu(folder / "plant_two_dof.fmu", outputs=[out("yaw_rate", unit="rad/s")])
     units = "\n".join(line for line in UNITS.splitlines() if "tyre" not in line) + "\n"
-    rest = 'inputs: {friction: 1, "tyre_force*": 0}\n' + TORQUES
+    rest = 'inputs: {friction: 1, "tyre_force*": 0}\n' + TORQUES + "record: [plant.acceleration_y]\n"
     made = plan(scenario(units, rest), swaps=["plant=plant_two_dof"])
     assert made.notes == (
         "connections[0] is left out: plant has no input 'wheel_torque_*' any more",
         "inputs.tyre_force* is left out: no unit has such an input after the swap",
+        "record[0] is left out: plant has no output 'acceleration_y' any more",
     )
+    assert made.record == ()
 
 
 def test_a_swap_works_though_the_replaced_fmu_is_not_there(folder: Path) -> None:
