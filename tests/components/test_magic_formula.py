@@ -1,0 +1,395 @@
+"""The Magic Formula tyre against a published table, the book's equations and their properties."""
+
+from __future__ import annotations
+
+import dataclasses
+import random
+from itertools import pairwise
+from math import atan, cos, degrees, exp, hypot, isfinite, pi, radians, sin, sqrt, tan
+
+import pytest
+from scipy.optimize import minimize_scalar
+
+from components.core.magic_formula import (
+    forces_and_moment,
+    lateral_slip,
+    longitudinal_curve,
+    longitudinal_force,
+    practical_slip,
+)
+from components.core.magic_formula_parameters import MagicFormulaParameters, coefficients
+from components.core.slip_curve import slip_stiffness
+from components.tyres.magic_formula import MagicFormula
+
+from .stand import Stand
+
+LOADS = (2000.0, 4000.0, 6000.0)
+SLIPS = (-1.0, -0.4, -0.12, -0.03, 0.0, 0.01, 0.06, 0.3, 0.8, 1.0)
+ANGLES = (0.0, 1e-9, 0.004, 0.03, 0.1, 0.25, 0.6, 1.2, 0.5 * pi)
+
+
+def tyre(kappa, alpha, f_z=4000.0, mu=1.0, *, axle="front", **changed):
+    return forces_and_moment(kappa, alpha, f_z, mu, coefficients(MagicFormulaParameters(**changed), axle))
+
+
+def interface_slip(kappa):
+    """The interface's slip for the book's."""
+    return kappa / (1.0 + kappa) if kappa > 0.0 else kappa
+
+
+def extreme(function, low, high, sign):
+    """The largest (sign 1) or smallest (-1) value in an interval, and where it is."""
+    found = minimize_scalar(
+        lambda x: -sign * function(x), bounds=(low, high), method="bounded", options={"xatol": 1e-9}
+    )
+    return function(found.x), found.x
+
+
+# The table of tyres.md, from a second implementation, offsets included.
+TABLE = {
+    2000.0: (2457.0, 0.1653, 38204.0, 2239.0, -15.09, -2011.0, 14.15, -26609.0),
+    4000.0: (4840.0, 0.1473, 86040.0, 4140.0, -15.00, -3780.0, 14.03, -46009.0),
+    6000.0: (7149.0, 0.1307, 145326.0, 5703.0, -15.85, -5307.0, 14.83, -56303.0),
+}
+
+
+@pytest.mark.parametrize("f_z", LOADS)
+def test_a_second_implementation_with_the_offsets_is_met_to_a_thousandth(f_z):
+    x_max, kappa_max, k_x, y_max, alpha_max, y_min, alpha_min, k_y = TABLE[f_z]
+    c = coefficients(MagicFormulaParameters(asymmetric_terms=True), "front")
+
+    def f_x(kappa):
+        return longitudinal_force(interface_slip(kappa), longitudinal_curve(0.0, True, f_z, 1.0, c))
+
+    def f_y(alpha):
+        return forces_and_moment(0.0, alpha, f_z, 1.0, c)[1]
+
+    assert extreme(f_x, 0.02, 0.4, 1) == pytest.approx((x_max, kappa_max), rel=1e-3)
+    value, alpha = extreme(f_y, -0.5, -0.05, 1)
+    assert (value, degrees(alpha)) == pytest.approx((y_max, alpha_max), rel=1e-3)
+    value, alpha = extreme(f_y, 0.05, 0.5, -1)
+    assert (value, degrees(alpha)) == pytest.approx((y_min, alpha_min), rel=1e-3)
+    df = f_z / 4000.0 - 1.0
+    kappa_0, alpha_0, h = 0.002 - 0.002 * df, -(0.003 - 0.001 * df), 1e-6  # where the shifts are undone
+    assert (f_x(kappa_0 + h) - f_x(kappa_0 - h)) / (2 * h) == pytest.approx(k_x, rel=1e-3)
+    assert (f_y(alpha_0 + h) - f_y(alpha_0 - h)) / (2 * h) == pytest.approx(k_y, rel=1e-3)
+
+
+def test_the_asymmetric_terms_give_the_forces_at_zero_slip_that_they_are_switched_off_for():
+    induced = tyre(-0.1, 0.0, asymmetric_terms=True)[1] - tyre(-0.1, 0.0, asymmetric_terms=True, RVY1=0.0)[1]
+    assert induced == pytest.approx(-210.0, abs=1.0)
+    assert tyre(0.0, 0.0, asymmetric_terms=True)[0] == pytest.approx(-172.0, abs=1.0)
+
+
+def magic(x, b, c, d, e):
+    return d * sin(c * atan(b * x - e * (b * x - atan(b * x))))
+
+
+def book(kappa, alpha, f_z, lam, p, k_y_scale=1.0, k_x_scale=1.0):
+    """Equations 4.E9-4.E78 as printed, zero camber, forward, lambda_mu = lam, slips not scaled.
+
+    Only G >= 0 is added.
+    """
+    df = f_z / p.nominal_load - 1.0
+    sgn = lambda x: (x > 0) - (x < 0)  # noqa: E731
+    f_0, r_0, tan_a = p.nominal_load, p.unloaded_radius, tan(alpha)
+    lam_x, lam_y = lam * p.friction_scale_x, lam * p.friction_scale_y
+    fade = lambda x: 10 * x / (1 + 9 * x)  # noqa: E731
+    k_s = kappa + p.PHX1 + p.PHX2 * df
+    mu_x = (p.PDX1 + p.PDX2 * df) * lam_x
+    e_x = min(1.0, (p.PEX1 + p.PEX2 * df + p.PEX3 * df**2) * (1 - p.PEX4 * sgn(k_s)))
+    k_x = f_z * (p.PKX1 + p.PKX2 * df) * exp(p.PKX3 * df) * k_x_scale
+    f_x0 = magic(k_s, k_x / (p.PCX1 * mu_x * f_z), p.PCX1, mu_x * f_z, e_x)
+    f_x0 += f_z * (p.PVX1 + p.PVX2 * df) * fade(lam_x)
+    b = p.RBX1 * cos(atan(p.RBX2 * kappa))
+    e = p.REX1 + p.REX2 * df
+    weight = lambda x, b, c, e: cos(c * atan(b * x - e * (b * x - atan(b * x))))  # noqa: E731
+    f_x = f_x0 * max(0.0, weight(tan_a + p.RHX1, b, p.RCX1, e) / weight(p.RHX1, b, p.RCX1, e))
+
+    s_hy = p.PHY1 + p.PHY2 * df
+    s_vy = f_z * (p.PVY1 + p.PVY2 * df) * fade(lam_y)
+    a_y = tan_a + s_hy
+    mu_y = (p.PDY1 + p.PDY2 * df) * lam_y
+    e_y = min(1.0, (p.PEY1 + p.PEY2 * df) * (1 - p.PEY3 * sgn(a_y)))
+    k_y = p.PKY1 * f_0 * sin(p.PKY4 * atan(f_z / (p.PKY2 * f_0))) * k_y_scale
+    b_y = k_y / (p.PCY1 * mu_y * f_z)
+    f_y0 = magic(a_y, b_y, p.PCY1, mu_y * f_z, e_y) + s_vy
+    b = p.RBY1 * cos(atan(p.RBY2 * (tan_a - p.RBY3)))
+    e, s = p.REY1 + p.REY2 * df, p.RHY1 + p.RHY2 * df
+    unshifted = f_y0 * max(0.0, weight(kappa + s, b, p.RCY1, e) / weight(s, b, p.RCY1, e))
+    d_v = mu_y * f_z * (p.RVY1 + p.RVY2 * df) * cos(atan(p.RVY4 * tan_a))
+    f_y = unshifted + d_v * sin(p.RVY5 * atan(p.RVY6 * kappa))
+
+    a_t = tan_a + p.QHZ1 + p.QHZ2 * df
+    a_r = tan_a + s_hy + s_vy / k_y
+    b_t = (p.QBZ1 + p.QBZ2 * df + p.QBZ3 * df**2) * k_y_scale / lam_y
+    e_t = p.QEZ1 + p.QEZ2 * df + p.QEZ3 * df**2
+    e_t = min(1.0, e_t * (1 + p.QEZ4 * 2 / pi * atan(b_t * p.QCZ1 * a_t)))
+    d_t = f_z * r_0 / f_0 * (p.QDZ1 + p.QDZ2 * df)
+    b_r = p.QBZ9 * k_y_scale / lam_y + p.QBZ10 * b_y * p.PCY1
+    d_r = f_z * r_0 * (p.QDZ6 + p.QDZ7 * df) * cos(alpha) * lam_y
+    a_t_eq = sqrt(a_t**2 + (k_x / k_y * kappa) ** 2) * sgn(a_t)
+    a_r_eq = sqrt(a_r**2 + (k_x / k_y * kappa) ** 2) * sgn(a_r)
+    x = b_t * a_t_eq
+    trail = d_t * cos(p.QCZ1 * atan(x - e_t * (x - atan(x)))) * cos(alpha)
+    lever = r_0 * (p.SSZ1 + p.SSZ2 * f_y / f_0)
+    return f_x, f_y, -trail * unshifted + d_r * cos(atan(b_r * a_r_eq)) + lever * f_x
+
+
+ODD = [
+    "PHX1", "PHX2", "PVX1", "PVX2", "PHY1", "PHY2", "PVY1", "PVY2", "QHZ1", "QHZ2",
+    "PEY3", "QEZ4", "RHX1", "RBY3", "RVY1", "RVY2", "QDZ6", "QDZ7", "SSZ1",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("asymmetric", [True, False])
+def test_forces_and_moment_are_those_of_the_printed_equations_for_any_complete_set(asymmetric):
+    draw = random.Random(1)
+    plain = MagicFormulaParameters()
+    unlisted = {"PEX4": 0.1, "PVX1": 0.01, "PVX2": -0.02, "REX1": -0.3, "REX2": 0.1, "REY1": 0.2}
+    unlisted |= {"REY2": -0.1, "RHY2": 0.01, "QBZ10": 0.4, "QEZ3": -0.1, "QDZ7": 0.003}
+    for _ in range(400):
+        names = [f.name for f in dataclasses.fields(plain) if f.name.isupper()]
+        given = {name: unlisted.get(name, getattr(plain, name)) * draw.uniform(0.8, 1.2) for name in names}
+        given |= {"friction_scale_x": draw.uniform(0.8, 1.2), "friction_scale_y": draw.uniform(0.8, 1.2)}
+        p = MagicFormulaParameters(asymmetric_terms=asymmetric, reference_friction=0.9, **given)
+        printed = p if asymmetric else dataclasses.replace(p, **dict.fromkeys(ODD, 0.0))
+        kappa, alpha = draw.uniform(-0.9, 0.3), draw.uniform(-0.4, 0.4)
+        f_z, mu = draw.uniform(300.0, 9000.0), draw.uniform(0.5, 1.2)
+        expected = book(kappa, alpha, f_z, mu / 0.9, printed)
+        found = forces_and_moment(interface_slip(kappa), alpha, f_z, mu, coefficients(p, "front"))
+        assert found == pytest.approx(expected, rel=1e-9, abs=1e-7)
+
+
+def test_axle_scalings_scale_the_stiffnesses_of_their_axle_and_the_slope_of_its_trail():
+    p = MagicFormulaParameters(
+        cornering_stiffness_scale_front=0.611,
+        cornering_stiffness_scale_rear=1.169,
+        slip_stiffness_scale_front=0.9,
+        slip_stiffness_scale_rear=1.1,
+    )
+    plain = dataclasses.replace(
+        p, **{n: 1.0 for n in vars(p) if n.endswith(("scale_front", "scale_rear"))}, **dict.fromkeys(ODD, 0.0)
+    )
+    for axle, k_y, k_x in (("front", 0.611, 0.9), ("rear", 1.169, 1.1)):
+        found = forces_and_moment(-0.03, 0.05, 5000.0, 1.0, coefficients(p, axle))
+        assert found == pytest.approx(book(-0.03, 0.05, 5000.0, 1.0, plain, k_y, k_x), rel=1e-12)
+
+
+@pytest.mark.parametrize("mode", ["scale", "similarity"])
+@pytest.mark.parametrize("mu", [0.1, 0.4, 1.0])
+@pytest.mark.parametrize("f_z", LOADS)
+def test_slopes_at_the_origin_are_the_stiffnesses_on_any_friction(f_z, mu, mode):
+    c = coefficients(MagicFormulaParameters(low_friction=mode), "front")
+    df = f_z / 4000.0 - 1.0
+    slopes = slip_stiffness(lambda kappa, alpha: forces_and_moment(kappa, alpha, f_z, mu, c), 0.0, 0.0)
+    k_x = f_z * (21.51 - 0.163 * df) * exp(0.245 * df)
+    k_y = -14.95 * 4000.0 * sin(2.0 * atan(f_z / 8520.0))
+    assert slopes == pytest.approx((k_x, 0.0, 0.0, k_y), rel=1e-4, abs=1e-3)
+
+
+def test_friction_scales_the_peaks_of_pure_slip():
+    for mode in ("scale", "similarity"):
+        for mu in (0.05, 0.3, 0.8, 1.2):
+            x, _ = extreme(lambda k: tyre(k, 0.0, mu=mu, low_friction=mode)[0], -0.5 * mu, 0.0, -1)  # noqa: B023
+            y, _ = extreme(lambda a: tyre(0.0, a, mu=mu, low_friction=mode)[1], 0.0, 0.8 * mu, -1)  # noqa: B023
+            assert (x, y) == pytest.approx((-1.21 * mu * 4000.0, -0.99 * mu * 4000.0), rel=1e-6)
+
+
+def test_reference_friction_is_the_friction_at_which_the_set_holds():
+    assert tyre(-0.05, 0.04, mu=0.8, reference_friction=0.8) == tyre(-0.05, 0.04, mu=1.0)
+
+
+def test_similarity_scales_forces_and_slips_together():
+    for mu in (0.1, 0.3, 1.4):
+        for kappa in (-0.05, -0.01, 0.0):
+            for alpha in (-0.2, 0.002, 0.05):
+                slippery = tyre(kappa, alpha, mu=mu, low_friction="similarity", SSZ2=0.0)
+                angle = atan(tan(alpha) / mu)
+                dry = tyre(kappa / mu, angle, SSZ2=0.0)
+                moment = dry[2] * cos(alpha) / cos(angle)  # the arm turns with the true slip angle
+                assert slippery == pytest.approx((mu * dry[0], mu * dry[1], mu * moment), rel=1e-11, abs=1e-9)
+
+
+def test_scale_keeps_the_weights_of_the_dry_tyre():
+    for mu in (0.1, 0.3, 1.4):
+        for kappa, alpha in ((-0.05, 0.1), (0.2, 0.03)):
+            ratios = [
+                (tyre(kappa, alpha, mu=m)[0] / tyre(kappa, 0.0, mu=m)[0],
+                 tyre(kappa, alpha, mu=m)[1] / tyre(0.0, alpha, mu=m)[1])
+                for m in (mu, 1.0)
+            ]  # fmt: skip
+            assert ratios[0] == pytest.approx(ratios[1], rel=1e-12)
+
+
+def test_similarity_keeps_the_resultant_in_the_bounds_of_the_dry_tyre_and_scale_does_not():
+    def largest(mode, mu):
+        return max(
+            hypot(*tyre(-0.01 * i * mu, 0.02 * j * mu, mu=mu, low_friction=mode)[:2]) / (mu * 4000.0)
+            for i in range(40)
+            for j in range(20)
+        )
+
+    dry = largest("similarity", 1.0)
+    assert largest("similarity", 0.3) <= 1.02 * dry
+    assert largest("scale", 0.3) > 1.15 * dry
+
+
+@pytest.mark.parametrize("mode", ["scale", "similarity"])
+def test_combined_slip_ends_in_pure_slip(mode):
+    for kappa in (-0.3, -0.05, 0.02, 0.4):
+        pure = tyre(kappa, 0.0, low_friction=mode)
+        near = tyre(kappa, 1e-7, low_friction=mode)
+        assert pure[1:] == (0.0, 0.0)
+        assert near[0] == pytest.approx(pure[0], rel=1e-9)
+    for alpha in (-0.3, -0.05, 0.02, 0.4):
+        assert tyre(0.0, alpha, low_friction=mode)[0] == 0.0
+        near = tyre(1e-9, alpha, low_friction=mode)
+        assert near[1] == pytest.approx(tyre(0.0, alpha, low_friction=mode)[1], rel=1e-8)
+
+
+@pytest.mark.parametrize("mode", ["scale", "similarity"])
+@pytest.mark.parametrize("mu", [0.3, 1.0])
+def test_each_force_falls_with_the_slip_in_the_other_direction(mu, mode):
+    for kappa in (-0.6, -0.1, -0.01, 0.02, 0.3):
+        forces = [abs(tyre(kappa, 0.01 * i, mu=mu, low_friction=mode)[0]) for i in range(80)]
+        assert all(later < earlier or earlier == 0.0 for earlier, later in pairwise(forces))
+    for alpha in (0.01, 0.1, 0.3):
+        for sign in (1.0, -1.0):  # from the shift RHY1 of the largest side force, at kappa -0.009, on
+            steps = [-0.009 * (1.0 if mode == "scale" else mu) + sign * 0.01 * i for i in range(40)]
+            forces = [abs(tyre(interface_slip(k), alpha, mu=mu, low_friction=mode)[1]) for k in steps]
+            assert all(later < earlier or earlier == 0.0 for earlier, later in pairwise(forces))
+
+
+@pytest.mark.parametrize("mode", ["scale", "similarity"])
+def test_without_asymmetric_terms_mirrored_slip_gives_mirrored_forces_to_the_bit(mode):
+    c = coefficients(MagicFormulaParameters(low_friction=mode), "rear")
+    for kappa in SLIPS:
+        for alpha in (*ANGLES, 2.0, 3.1):
+            for mu in (0.3, 1.0):
+                x, y, z = forces_and_moment(kappa, alpha, 3700.0, mu, c)
+                assert forces_and_moment(kappa, -alpha, 3700.0, mu, c) == (x, -y, -z)
+
+
+def test_without_asymmetric_terms_zero_slip_gives_no_force():
+    for f_z in LOADS:
+        assert tyre(0.0, 0.0, f_z) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_each_asymmetric_term_alone_breaks_the_symmetry_or_the_zero(name):
+    zero = dict.fromkeys(ODD, 0.0)
+    slips = ((0.0, 0.0), (0.0, 0.04), (-0.06, 0.03))
+
+    def broken(**one):
+        changed = {"asymmetric_terms": True, **zero, **one}
+        return tyre(0.0, 0.0, 5000.0, **changed) != (0.0, 0.0, 0.0) or any(
+            tyre(k, -a, 5000.0, **changed)[i] != s * tyre(k, a, 5000.0, **changed)[i]
+            for k, a in slips
+            for i, s in enumerate((1.0, -1.0, -1.0))
+        )
+
+    assert not broken()
+    assert broken(**{name: 0.01})
+
+
+@pytest.mark.parametrize("asymmetric", [True, False])
+@pytest.mark.parametrize("mode", ["scale", "similarity"])
+def test_forces_stay_finite_and_bounded_at_any_slip_load_and_friction(mode, asymmetric):
+    c = coefficients(MagicFormulaParameters(low_friction=mode, asymmetric_terms=asymmetric), "front")
+    for kappa in (*SLIPS, -2.0, 2.0, 1e9, -1e9):
+        for alpha in (*ANGLES, -0.5 * pi, pi, -3.0, 1e-300):
+            for f_z in (1e-5, 1.0, 4000.0, 1e5, 1e12):
+                for mu in (1e-5, 0.3, 1.0, 5.0):
+                    values = forces_and_moment(kappa, alpha, f_z, mu, c)
+                    assert all(isfinite(value) for value in values)
+                    assert hypot(*values[:2]) < 3.0 * mu * f_z
+
+
+def test_without_load_or_friction_there_is_no_force():
+    for f_z, mu in ((0.0, 1.0), (-50.0, 1.0), (4000.0, 0.0), (4000.0, -1.0), (5e-324, 1.0)):
+        assert tyre(-0.1, 0.1, f_z, mu) == (0.0, 0.0, 0.0)
+
+
+def test_above_maximum_load_everything_is_proportional_to_load():
+    at_limit = tyre(-0.05, 0.06, 12000.0)
+    assert tyre(-0.05, 0.06, 36000.0) == pytest.approx([3.0 * value for value in at_limit], rel=1e-12)
+    assert tyre(-0.05, 0.06, 8000.0, maximum_load=4000.0) == pytest.approx(
+        [2.0 * value for value in tyre(-0.05, 0.06, 4000.0)], rel=1e-12
+    )
+
+
+def test_forces_oppose_the_slip_and_the_moment_aligns():
+    for alpha in (0.02, 0.05):
+        _, y, z = tyre(0.0, alpha)
+        assert y < 0.0 < z
+    assert tyre(0.05, 0.0)[0] > 0.0 > tyre(-0.05, 0.0)[0]
+
+
+def test_a_wheel_that_rolls_backwards_pushes_against_its_sliding_with_the_trail_on_the_other_side():
+    for kappa in (-0.04, 0.04):
+        x, y, _ = tyre(kappa, 0.1, RHY1=0.0)
+        assert tyre(-kappa, pi - 0.1, RHY1=0.0)[:2] == pytest.approx((-x, y), rel=1e-9)
+    assert tyre(0.0, pi - 0.1)[2] == pytest.approx(-tyre(0.0, 0.1)[2], rel=1e-9)
+
+
+def test_driving_slip_of_the_interface_is_turned_into_that_of_the_book():
+    assert practical_slip(0.2, True) == pytest.approx(0.25, rel=1e-15)
+    assert practical_slip(-0.2, True) == -0.2
+    assert practical_slip(-0.2, False) == pytest.approx(-0.25, rel=1e-15)
+    assert practical_slip(0.2, False) == 0.2
+    assert practical_slip(1.0, True) == practical_slip(0.99, True) == pytest.approx(99.0, rel=1e-12)
+
+
+def test_slip_angle_is_folded_for_a_wheel_that_rolls_backwards():
+    assert lateral_slip(0.3) == (tan(0.3), True)
+    assert lateral_slip(pi - 0.3)[0] == pytest.approx(tan(0.3), rel=1e-12)
+    assert lateral_slip(0.3 - pi)[0] == pytest.approx(-tan(0.3), rel=1e-12)
+    assert lateral_slip(pi)[1] is False
+
+
+def test_a_braked_force_is_not_turned_round_by_a_large_slip_angle():
+    angles = [radians(a) for a in range(0, 91, 3)]
+    assert all(tyre(-0.02, a)[0] <= 0.0 for a in angles)
+    assert tyre(-0.02, radians(60.0))[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("changed", "named"),
+    [
+        ({"PDY2": 0.6}, "mu_y (PDY1, PDY2)"),
+        ({"PDX1": 0.0}, "mu_x (PDX1, PDX2)"),
+        ({"PKX2": -11.0}, "K_x (PKX1, PKX2)"),
+        ({"PKY4": 4.0}, "K_y (PKY1, PKY2, PKY4)"),
+        ({"maximum_load": 40000.0}, "mu_y (PDY1, PDY2)"),
+    ],
+)
+def test_a_set_that_changes_sign_below_maximum_load_is_refused_by_name(changed, named):
+    with pytest.raises(ValueError) as error:
+        coefficients(MagicFormulaParameters(**changed), "front")
+    assert named in str(error.value)
+    assert "maximum_load" in str(error.value)
+
+
+def test_the_unit_gives_each_wheel_its_own_slip_load_friction_and_axle():
+    stand = Stand(MagicFormula, cornering_stiffness_scale_rear=1.169)
+    wheels = {
+        "fl": (0.02, -0.03, 4000.0, 1.0),
+        "fr": (-0.05, 0.02, 3000.0, 0.3),
+        "rl": (0.01, 0.0, 3500.0, 0.8),
+        "rr": (0.04, -0.1, 2500.0, 0.5),
+    }
+    names = ("slip_angle", "slip_ratio", "vertical_load", "friction")
+    given = {f"{n}_{w}": x for w, values in wheels.items() for n, x in zip(names, values, strict=True)}
+    for out in (stand.start(**given), stand.step(0.001)):
+        for wheel, (alpha, kappa, f_z, mu) in wheels.items():
+            axle = "front" if wheel[0] == "f" else "rear"
+            expected = tyre(kappa, alpha, f_z, mu, axle=axle, cornering_stiffness_scale_rear=1.169)
+            found = [out[f"{n}_{wheel}"] for n in ("tyre_force_x", "tyre_force_y", "aligning_moment")]
+            assert tuple(found) == expected
+
+
+def test_the_units_defaults_are_symmetric_and_its_set_is_that_of_the_table():
+    stand = Stand(MagicFormula)
+    assert stand["asymmetric_terms"] is False
+    assert (stand["PCX1"], stand["PKY1"], stand["RVY6"], stand["SSZ2"]) == (1.685, -14.95, -10.71, 0.001)

@@ -1,0 +1,201 @@
+"""The Magic Formula tyre of 1987 against its printed formulae and the properties of combined slip."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import atan, atan2, cos, exp, hypot, isfinite, pi, radians, sin, tan
+
+import pytest
+
+from components.core.magic_formula_1987 import (
+    MagicFormula1987Parameters,
+    coefficients_1987,
+    forces_1987,
+    loaded_tyre,
+)
+from components.core.slip_curve import slip_stiffness
+from components.tyres.magic_formula_1987 import MagicFormula1987
+
+from .stand import Stand
+
+
+def tyre(kappa, alpha, f_z=4500.0, mu=1.0, **changed):
+    loaded = loaded_tyre(f_z, mu, coefficients_1987(MagicFormula1987Parameters(**changed)))
+    return (0.0, 0.0) if loaded is None else forces_1987(kappa, alpha, loaded)
+
+
+def magic(x, b, c, d, e):
+    return d * sin(c * atan(b * x - e * (b * x - atan(b * x))))
+
+
+def printed_lateral(degrees, f, d):
+    bcd = 1078.0 * sin(1.82 * atan(0.208 * f))
+    return magic(degrees, bcd / (1.30 * d), 1.30, d, -0.354 * f + 0.707)
+
+
+def printed_longitudinal(percent, f, d):
+    bcd = (49.6 * f * f + 226.0 * f) * exp(-0.069 * f)
+    return magic(percent, bcd / (1.65 * d), 1.65, d, -0.006 * f * f + 0.056 * f + 0.486)
+
+
+@pytest.mark.parametrize("f_z", [500.0, 2000.0, 4500.0, 8000.0])
+@pytest.mark.parametrize("mu", [0.3, 0.5, 1.0])
+def test_pure_slip_gives_the_printed_formulae_with_the_peak_asked_for(mu, f_z):
+    f = 0.001 * f_z
+    peaks = {
+        "road": (mu * f_z, mu * f_z),
+        "measured": (mu * (-21.3 * f * f + 1144.0 * f), mu * (-22.1 * f * f + 1011.0 * f)),
+    }
+    for mode, (d_x, d_y) in peaks.items():
+        for degrees in (0.1, 1.0, 4.0, 12.0, 45.0):
+            f_x, f_y = tyre(0.0, radians(degrees), f_z, mu, peak_friction=mode)
+            assert (f_x, f_y) == pytest.approx((0.0, -printed_lateral(degrees, f, d_y)), rel=1e-12)
+        for percent in (-100.0, -20.0, -3.0, -0.1):
+            f_x, f_y = tyre(0.01 * percent, 0.0, f_z, mu, peak_friction=mode)
+            assert (f_x, f_y) == pytest.approx((printed_longitudinal(percent, f, d_x), 0.0), rel=1e-12)
+
+
+def test_driving_slip_is_turned_into_that_of_the_formula():
+    assert tyre(0.2, 0.0)[0] == pytest.approx(printed_longitudinal(25.0, 4.5, 4500.0), rel=1e-12)
+
+
+def test_the_measured_peak_is_nine_tenths_of_a_load_of_4500_newtons():
+    assert max(-tyre(0.0, 0.001 * i, peak_friction="measured")[1] for i in range(400)) == pytest.approx(
+        0.91 * 4500.0, rel=5e-3
+    )
+
+
+def test_cornering_stiffnesses_of_the_car_of_paper_d_are_those_the_paper_page_states():
+    weight, a, b = 1820.0 * 9.81, 1.463, 1.585
+    c = coefficients_1987(MagicFormula1987Parameters())
+    axles = [2.0 * loaded_tyre(0.5 * weight * arm / (a + b), 0.5, c).k_y for arm in (b, a)]
+    assert axles == pytest.approx([121700.0, 119800.0], rel=1e-3)
+
+
+@pytest.mark.parametrize("mode", ["road", "measured"])
+@pytest.mark.parametrize("mu", [0.1, 0.5, 1.0])
+def test_slopes_at_the_origin_are_the_stiffnesses_of_the_set_on_any_friction(mu, mode):
+    loaded = loaded_tyre(4500.0, mu, coefficients_1987(MagicFormula1987Parameters(peak_friction=mode)))
+    slopes = slip_stiffness(lambda kappa, alpha: forces_1987(kappa, alpha, loaded), 0.0, 0.0)
+    k_x = 100.0 * (49.6 * 4.5**2 + 226.0 * 4.5) * exp(-0.069 * 4.5)
+    k_y = 180.0 / pi * 1078.0 * sin(1.82 * atan(0.208 * 4.5))
+    assert slopes == pytest.approx((k_x, 0.0, 0.0, -k_y), rel=1e-4, abs=1e-3)
+
+
+def test_combined_slip_ends_in_pure_slip_without_a_jump():
+    for kappa in (-0.3, -0.05, 0.02, 0.4):
+        assert tyre(kappa, 1e-7)[0] == pytest.approx(tyre(kappa, 0.0)[0], rel=1e-6)
+    for alpha in (-0.3, -0.05, 0.02, 0.4):
+        assert tyre(1e-9, alpha)[1] == pytest.approx(tyre(0.0, alpha)[1], rel=1e-6)
+
+
+def test_small_combined_slips_give_the_sum_of_both_stiffnesses():
+    f_x, f_y = tyre(-1e-5, 2e-5)
+    assert f_x == pytest.approx(tyre(-1e-5, 0.0)[0], rel=1e-4)
+    assert f_y == pytest.approx(tyre(0.0, 2e-5)[1], rel=1e-4)
+
+
+def test_each_force_falls_with_the_slip_in_the_other_direction():
+    for mu in (0.3, 1.0):
+        for kappa in (-0.2, -0.05, -0.01, 0.02, 0.3):
+            assert all(
+                later < earlier
+                for earlier, later in pairwise(abs(tyre(kappa, 0.01 * i, mu=mu)[0]) for i in range(50))
+            )
+        for alpha in (0.01, 0.05, 0.2):
+            assert all(
+                later < earlier
+                for earlier, later in pairwise(abs(tyre(-0.01 * i, alpha, mu=mu)[1]) for i in range(50))
+            )
+
+
+def test_the_resultant_never_exceeds_mu_times_load():
+    for mu in (0.3, 1.0):
+        for i in range(51):
+            for alpha in (0.0, 0.01, 0.04, 0.1, 0.3, 1.0):
+                assert hypot(*tyre(-0.02 * i * mu, alpha, mu=mu)) <= mu * 4500.0 * (1.0 + 1e-12)
+
+
+def test_a_locked_wheel_slides_against_its_travel_where_both_sliding_frictions_are_equal():
+    equal = {"a0": 1.3, "b0": 1.3, "b6": 0.0, "b7": -0.354, "b8": 0.707}
+    for alpha in (0.02, 0.2, 0.8):
+        f_x, f_y = tyre(-1.0, alpha, mu=0.3, **equal)
+        assert atan2(-f_y, -f_x) == pytest.approx(alpha, abs=0.01)
+
+
+def test_mirrored_slip_gives_mirrored_forces_to_the_bit():
+    for kappa in (-1.0, -0.1, 0.0, 0.02, 0.5, 1.0):
+        for alpha in (0.0, 0.01, 0.3, 0.5 * pi, 2.0, 3.1):
+            x, y = tyre(kappa, alpha, mu=0.7)
+            assert tyre(kappa, -alpha, mu=0.7) == (x, -y)
+
+
+def test_forces_stay_finite_and_within_friction_at_any_slip_load_and_friction():
+    for kappa in (-1e9, -2.0, -1.0, -1e-300, 0.0, 0.5, 1.0, 2.0):
+        for alpha in (0.0, 1e-300, 0.1, 0.5 * pi, -0.5 * pi, 2.0, pi, -3.0):
+            for f_z in (1e-5, 4500.0, 1e5, 1e12):
+                for mu in (1e-5, 0.5, 5.0):
+                    values = tyre(kappa, alpha, f_z, mu)
+                    assert all(isfinite(value) for value in values)
+                    assert hypot(*values) <= mu * f_z * (1.0 + 1e-9)
+
+
+def test_without_slip_load_or_friction_there_is_no_force():
+    assert tyre(0.0, 0.0) == (0.0, 0.0)
+    for f_z, mu in ((0.0, 1.0), (-50.0, 1.0), (4000.0, 0.0), (4000.0, -1.0)):
+        assert tyre(-0.1, 0.1, f_z, mu) == (0.0, 0.0)
+
+
+def test_above_maximum_load_everything_is_proportional_to_load():
+    for mode in ("road", "measured"):
+        at_limit = tyre(-0.05, 0.06, 12000.0, peak_friction=mode)
+        tripled = [3.0 * force for force in at_limit]
+        assert tyre(-0.05, 0.06, 36000.0, peak_friction=mode) == pytest.approx(tripled, rel=1e-12)
+
+
+def test_a_wheel_that_rolls_backwards_pushes_against_its_sliding():
+    x, y = tyre(-0.04, 0.1)
+    assert tyre(0.04, pi - 0.1) == pytest.approx((-x, y), rel=1e-9)
+
+
+def test_half_the_reference_friction_doubles_a_measured_peak():
+    one = tyre(0.0, 0.3, mu=0.4, peak_friction="measured")
+    assert tyre(0.0, 0.3, mu=0.2, peak_friction="measured", reference_friction=0.5) == pytest.approx(one)
+
+
+@pytest.mark.parametrize("changed", [{"a2": 100.0}, {"b2": -1.0}, {"a4": 3.0}, {"b3": -30.0}, {"a0": 0.0}])
+def test_a_set_that_is_not_positive_up_to_maximum_load_is_refused_by_name(changed):
+    (name,) = changed
+    with pytest.raises(ValueError) as error:
+        coefficients_1987(MagicFormula1987Parameters(**changed))
+    assert name in str(error.value)
+    assert "maximum_load = 12000 N" in str(error.value)
+
+
+def test_the_unit_gives_each_wheel_its_own_slip_load_and_friction():
+    stand = Stand(MagicFormula1987)
+    wheels = {
+        "fl": (0.02, -0.03, 4000.0, 1.0),
+        "fr": (-0.05, 0.02, 3000.0, 0.3),
+        "rl": (0.01, 0.0, 3500.0, 0.8),
+        "rr": (0.04, -0.1, 0.0, 0.5),
+    }
+    names = ("slip_angle", "slip_ratio", "vertical_load", "friction")
+    given = {f"{n}_{w}": x for w, values in wheels.items() for n, x in zip(names, values, strict=True)}
+    for out in (stand.start(**given), stand.step(0.001)):
+        for wheel, (alpha, kappa, f_z, mu) in wheels.items():
+            found = (out[f"tyre_force_x_{wheel}"], out[f"tyre_force_y_{wheel}"])
+            assert found == tyre(kappa, alpha, f_z, mu)
+
+
+def test_the_force_direction_at_half_the_way_to_sliding_is_that_of_radt():
+    # k = pi: eta = (1 + eta_0) / 2 exactly
+    f_z, mu, alpha = 4500.0, 0.5, 0.05
+    loaded = loaded_tyre(f_z, mu, coefficients_1987(MagicFormula1987Parameters()))
+    n_x, n_y = loaded.k_x / loaded.d_x, loaded.k_y / loaded.d_y
+    kappa = -((pi**2 - (n_y * alpha) ** 2) ** 0.5) / n_x
+    f_x, f_y = forces_1987(kappa, alpha, loaded)
+    size_x = printed_longitudinal(100.0 * pi / n_x, 4.5, loaded.d_x)
+    size_y = printed_lateral(180.0 / pi * pi / n_y, 4.5, loaded.d_y)
+    angle = atan2(0.5 * (1.0 + n_y / n_x) * tan(alpha), kappa)
+    assert (f_x, f_y) == pytest.approx((size_x * cos(angle), -size_y * sin(angle)), rel=1e-10)
