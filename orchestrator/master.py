@@ -115,9 +115,10 @@ class Master:
         s = self.memory.of[unit]
         values: dict[str, Value] = {v.name: float(u) for v, u in zip(s.inputs, s.u, strict=True)}
         for variable, key in s.other_inputs:
-            values[variable.name] = (
-                s.unit.constants[variable.name] if key is None else self.memory.others[key]
-            )
+            if key is None:
+                values[variable.name] = s.unit.constants[variable.name]
+            elif key in self.memory.others:  # else its source has not been read yet
+                values[variable.name] = self.memory.others[key]
         return values
 
     def _values_of_others(self) -> list[Value]:
@@ -128,6 +129,8 @@ class Master:
         self.memory.of[unit].slave.note(status)
         if status > WARNING or self.log.errors(unit):
             raise SimulationError(describe(unit, what, 0.0, status, self.log), unit=unit, time=0.0)
+        if self.stop.requested:
+            raise Interrupted("the run was interrupted during initialization", unit=None, time=0.0)
 
     def _answer(self, k: int, call: Callable[[], Status | None], status: Status) -> None:
         """Judge a call of the step from `k` - 1 to `k` that did not return OK."""

@@ -230,3 +230,30 @@ class Clock(Behaviour):
 
     def output(self, t: float, u: dict[str, Any]) -> dict[str, Any]:
         return {name: function(t) for name, function in self.functions.items()}
+
+
+class Mixed(Behaviour):
+    """One output of every type there is beside Real."""
+
+    outputs: Mapping[str, Sequence[str] | None] = {"count": (), "flag": (), "word": (), "mode": (), "x": ()}
+    types: Mapping[str, str] = {
+        "count": "Integer",
+        "flag": "Boolean",
+        "word": "String",
+        "mode": "Enumeration",
+    }
+
+    def output(self, t, u):
+        k = round(10 * t)
+        return {"count": k, "flag": k % 2 == 1, "word": f'"{k}", {k}', "mode": k % 3, "x": t}
+
+
+class Echo(Mixed):
+    """Puts out what comes in."""
+
+    inputs = tuple(f"{name}_in" for name in Mixed.outputs)
+    outputs = {name: (f"{name}_in",) for name in Mixed.outputs}
+    types = {**Mixed.types, **{f"{name}_in": kind for name, kind in Mixed.types.items()}}
+
+    def output(self, t, u):
+        return {name: u[f"{name}_in"] for name in Mixed.outputs}

@@ -10,7 +10,7 @@ from orchestrator.log import DISCARD, ERROR, FATAL, OK, PENDING, WARNING
 from orchestrator.results import load_results
 from orchestrator.simulate import simulate
 
-from .fakes import Behaviour, Clock, FakeSlave, Function, Stage, make_plan
+from .fakes import Behaviour, Clock, Echo, FakeSlave, Function, Mixed, Stage, make_plan
 
 
 class Passing(Behaviour):
@@ -283,6 +283,32 @@ def test_an_interrupted_run_ends_between_two_steps_and_keeps_its_results(number,
     assert results.time.tolist()[-1] == 0.6
     assert [slave.freed for slave in slaves.values()] == [1, 1]
     assert signal.getsignal(number) is before
+
+
+def test_a_run_interrupted_during_initialization_has_no_rows(tmp_path):
+    class Slave(FakeSlave):
+        def enter(self, stop_time):
+            os.kill(os.getpid(), signal.SIGINT)
+            return OK
+
+    sentence, results, slaves = answer(tmp_path, Slave)
+    assert sentence == "the run was interrupted during initialization"
+    assert results.run["status"] == "interrupted"
+    assert len(results.time) == 0
+    assert [slave.freed for slave in slaves.values()] == [1, 1]
+
+
+def test_a_failure_before_all_inputs_are_known_records_those_that_are(tmp_path):
+    class Slave(FakeSlave):
+        def enter(self, stop_time):
+            return ERROR
+
+    units = {"b": Echo(), "a": Mixed()}
+    wires = [f"a.{name} -> b.{name}_in" for name in Mixed.outputs if name != "flag"]
+    _, results, _ = fail(
+        tmp_path, units, wires, opener=Opener(units, "b", Slave), constants={"b": {"flag_in": True}}
+    )
+    assert results.run["error"]["inputs"] == {"x_in": "nan", "flag_in": True}
 
 
 def test_handlers_are_restored_after_a_run(tmp_path):

@@ -8,7 +8,7 @@ from orchestrator.errors import SimulationError
 from orchestrator.results import load_results
 from orchestrator.simulate import simulate
 
-from .fakes import Behaviour, Clock, Function, Integrator, Mass, Stage, make_plan
+from .fakes import Behaviour, Clock, Echo, Function, Integrator, Mass, Mixed, Stage, make_plan
 
 
 def run(units, wires, out, **options):
@@ -268,27 +268,6 @@ def test_a_loop_that_flickers_in_its_last_digits_is_accepted(tmp_path):
     }
     _, results = run(units, ["a.y -> b.x", "b.y -> a.x"], tmp_path, n_steps=1)
     assert results["a.y"][0] == pytest.approx(1.0, abs=1e-11)
-
-
-class Mixed(Behaviour):
-    """One output of every type there is beside Real."""
-
-    inputs = ()
-    outputs = {"count": (), "flag": (), "word": (), "mode": (), "x": ()}
-    types = {"count": "Integer", "flag": "Boolean", "word": "String", "mode": "Enumeration"}
-
-    def output(self, t, u):
-        k = round(10 * t)
-        return {"count": k, "flag": k % 2 == 1, "word": f'"{k}", {k}', "mode": k % 3, "x": t}
-
-
-class Echo(Mixed):
-    inputs = tuple(f"{name}_in" for name in Mixed.outputs)
-    outputs = {name: (f"{name}_in",) for name in Mixed.outputs}
-    types = {**Mixed.types, **{f"{name}_in": kind for name, kind in Mixed.types.items()}}
-
-    def output(self, t, u):
-        return {name: u[f"{name}_in"] for name in Mixed.outputs}
 
 
 @pytest.mark.parametrize(("algorithm", "late"), [("jacobi", 1), ("gauss_seidel", 0), ("extrapolated", 0)])
