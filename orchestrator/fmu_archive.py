@@ -122,6 +122,8 @@ def _read(path: Path) -> bytes:
         raise ModelDescriptionError(f"{path}: no such FMU{more}") from None
     except OSError as error:
         raise ModelDescriptionError(f"{path}: cannot read this FMU: {error.strerror}") from None
+    except ValueError as error:  # a null character in the path
+        raise ModelDescriptionError(f"{str(path)!r}: cannot read this FMU: {error}") from None
 
 
 def _load(entry: Path, path: Path) -> Fmu | None:

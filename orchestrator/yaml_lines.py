@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -83,13 +84,17 @@ def read(path: Path, *, what: str) -> Document:
         return fail(0, f"cannot read this {what}: {error.strerror}")
     except UnicodeDecodeError:
         return fail(0, f"this {what} is not UTF-8 text")
+    except ValueError as error:
+        return fail(0, f"cannot read this {what}: {error}")
 
     from ruamel.yaml import YAML
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
     yaml = YAML(typ="safe", pure=True)
     try:
-        node = yaml.compose(text)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # an anchor that is given again is no mistake
+            node = yaml.compose(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         reason = " ".join(f"{error.context or ''} {error.problem or ''}".split())

@@ -270,6 +270,12 @@ def test_a_missing_vehicle_file_is_said_where_it_is_named(file: Path) -> None:
     ]
 
 
+def test_a_vehicle_path_that_cannot_be_one_is_said(file: Path) -> None:
+    (said,) = problems(edited(("title:", 'vehicle: "a\\0"\ntitle:')))
+    assert said.startswith("a.yaml:1: vehicle: ")
+    assert "cannot read this vehicle file: embedded null byte" in said
+
+
 def test_swap_replaces_the_fmu_and_remembers_the_old_one(file: Path) -> None:
     scenario = load_scenario(file, swaps=["controller=controller_fnn"])
     assert scenario.units["controller"].fmu == "controller_fnn"
