@@ -19,7 +19,7 @@ fmus: setup
 	$(BIN)/yawbench build
 
 demo: fmus
-	$(BIN)/python -m scenarios.fnn_sideslip.demo
+	$(BIN)/yawbench study scenarios/fnn_sideslip/study.yaml
 
 run: fmus
 	$(BIN)/yawbench run $(SCENARIO)

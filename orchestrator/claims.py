@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 
 from .display import shown
 from .errors import ScenarioError
@@ -30,40 +31,52 @@ class Judgement:
 
     claim: Claim
     holds: bool | None
-    measured: str
+    measured: tuple[str, ...]
 
 
-def judge(claim: Claim, values: Values) -> Judgement:
+def judge(claim: Claim, values: Values, runs: Sequence[str]) -> Judgement:
     """Judge a claim by the values of metrics.
+
+    Args:
+        claim: its conditions must all be true, of every run that they name.
+        values: what the runs came to.
+        runs: names of all runs, those without values too.
 
     Raises:
         ScenarioError: a bound is given in a unit that its metric does not have.
     """
-    found = [_compare(condition, values) for condition in claim.holds_if]
+    found = [_compare(condition, values, runs) for condition in claim.holds_if]
     verdicts = [holds for holds, _ in found]
     holds = None if None in verdicts else all(verdicts)
-    return Judgement(claim, holds, "; ".join(dict.fromkeys(text for _, text in found)))
+    return Judgement(claim, holds, tuple(dict.fromkeys(text for _, text in found)))
 
 
-def _compare(condition: Condition, values: Values) -> tuple[bool | None, str]:
-    measured = values.get((condition.run, condition.metric))
+def _compare(condition: Condition, values: Values, runs: Sequence[str]) -> tuple[bool | None, str]:
+    """Return whether a condition is true of all runs it names, and their values as text."""
+    named = [run for run in runs if fnmatchcase(run, condition.run)]
+    measured = [values.get((run, condition.metric)) for run in named]
+    known = sorted((value for value in measured if value is not None), key=lambda value: value.number)
+    missing = len(known) < len(named)
+    text = _range(known, missing)
     bound = condition.bound
+    limit: float | None
     if isinstance(bound, Reference):
         other = values.get((bound.run, bound.metric))
-        if measured is None or other is None:
-            return None, f"{_text(measured)} against {_text(other)}"
-        limit = bound.times * other.number
-        text = f"{_text(measured)} against {_text(other)}"
+        limit = None if other is None else bound.times * other.number
+        text = f"{text} against {_range([other] if other else [], other is None)}"
     else:
-        if measured is None:
-            return None, _text(measured)
-        limit = _number(bound, measured.unit)
-        text = _text(measured)
-    return _COMPARE[condition.operator](measured.number, limit), text
+        limit = _number(bound, known[0].unit) if known else None
+    if missing or limit is None:
+        return None, text
+    compare = _COMPARE[condition.operator]
+    return all(compare(value.number, limit) for value in known), text
 
 
-def _text(value: Value | None) -> str:
-    return "no result" if value is None else shown(value.number, value.unit)
+def _range(known: Sequence[Value], missing: bool) -> str:
+    """Return the value, or the smallest and the largest."""
+    ends = [known[0], known[-1]] if len(known) > 1 else known
+    text = " to ".join(shown(value.number, value.unit) for value in ends)
+    return " and ".join(filter(None, [text, "no result" if missing else ""]))
 
 
 def _number(bound: float | str, unit: str) -> float:

@@ -106,7 +106,7 @@ def judge_comparison(outcomes: Sequence[Outcome]) -> Comparison:
 def metric_table(comparison: Comparison, title: str) -> Table:
     """Return a table with one row per metric and one column per run."""
     labels = [*comparison.values, *comparison.failed]
-    table = Table(title, ["metric", "", *labels], names=2)
+    table = Table(title, ["metric", "", *labels])
     for name in STANDARD:
         cells: list[Cell] = [values.get(name) for values in comparison.values.values()]
         if any(cell is not None for cell in cells):
@@ -116,9 +116,9 @@ def metric_table(comparison: Comparison, title: str) -> Table:
 
 
 def write_comparison(comparison: Comparison, table: Table, out: Path) -> list[str]:
-    """Write figures and tables into `out`; return the names of the files."""
+    """Write figures and tables into `out`, under the table's title; return the names of the files."""
     drawable = [name for name, panels in FIGURES.items() if shown_by(comparison.runs, panels)]
-    figures = {name: draw(comparison.runs, FIGURES[name]) for name in drawable}
+    figures = {name: draw(comparison.runs, FIGURES[name], title=table.title) for name in drawable}
     written = [path.name for name, figure in figures.items() for path in save(figure, out / name)]
     names = [name for name in STANDARD if any(name in v for v in comparison.values.values())]
     units = {name: value.unit for values in comparison.values.values() for name, value in values.items()}

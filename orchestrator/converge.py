@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .display import digits_of, words
+from .display import words
 from .errors import ResultsError, ScenarioError
 from .figure_style import QUIET, RC, frame, line_style
 from .jobs import Job, Outcome, read_back
@@ -133,7 +133,7 @@ def _distance(a: np.ndarray | None, b: np.ndarray | None) -> float | None:
 
 def convergence_table(rows: Sequence[Row], title: str) -> Table:
     """Return the table of all runs."""
-    table = Table(title, ["algorithm", "step", "error", "observed order", "wall time"], names=2)
+    table = Table(title, ["algorithm", "step", "error", "observed order", "wall time"])
     for row in rows:
         error: Cell = Value(row.error, "1") if row.error is not None else "the finest"
         if row.failed:
@@ -154,6 +154,7 @@ def convergence_figure(rows: Sequence[Row], signal: str, title: str, note: str) 
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
+    from matplotlib.ticker import LogLocator
 
     drawn = [row for row in rows if row.error and row.wall_time]
     if not drawn:
@@ -178,24 +179,25 @@ def convergence_figure(rows: Sequence[Row], signal: str, title: str, note: str) 
         ):
             axes.set(xscale="log", yscale="log", xlabel=below)
             axes.set_title(heading)
-        for axis in (by_step.xaxis, by_cost.xaxis):
-            axis.set_major_formatter(lambda value, _: digits_of(value, 2))
-            axis.set_minor_formatter("")
         steps = sorted({1000 * row.step for row in drawn})
         by_step.set_xticks(steps, [f"{step:g}" for step in steps])
+        by_step.minorticks_off()
+        by_cost.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        by_cost.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        by_cost.xaxis.set_minor_formatter("")
         handles = [Line2D([], [], label=name, **styles[name]) for name in names]
         frame(figure, 3.6, handles, title, note)
     return figure
 
 
 def _slopes(axes: Axes, rows: Sequence[Row]) -> None:
-    """Draw lines of order 1 and 2 through the largest error of the coarsest step."""
-    top = max(rows, key=lambda row: (row.step, row.error or 0.0))
-    low = min(row.step for row in rows)
+    """Draw lines of order 1 and 2 above the data, from the coarsest step down."""
+    steps = [1000 * row.step for row in rows]
+    coarse, fine = max(steps), min(steps)
+    top = 3 * max(row.error or 0.0 for row in rows)
     for order in (1, 2):
-        errors = [top.error or 0.0, (top.error or 0.0) * (low / top.step) ** order]
-        axes.plot([1000 * top.step, 1000 * low], errors, color=QUIET, linewidth=0.8, linestyle=":")
+        end = top * (fine / coarse) ** order
+        axes.plot([coarse, fine], [top, end], color=QUIET, linewidth=0.8, linestyle=":")
         axes.annotate(
-            f"order {order}", (1000 * low, errors[1]), (3, 3), textcoords="offset points",
-            fontsize=7.5, color=QUIET,
-        )  # fmt: skip
+            f"order {order}", (fine, end), (4, 4), textcoords="offset points", fontsize=7.5, color=QUIET
+        )

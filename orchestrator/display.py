@@ -42,6 +42,8 @@ WORDS: dict[str, str] = {
     "velocity_x": "Longitudinal velocity",
     "acceleration_x": "Longitudinal acceleration",
     "acceleration_y": "Lateral acceleration",
+    "position_x": "Longitudinal position",
+    "position_y": "Lateral position",
     "yaw_moment": "Yaw moment",
     "wheel_torque_*": "Wheel torque",
     "torque_request_*": "Wheel torque asked for",

@@ -66,6 +66,9 @@ def save(figure: Figure, stem: Path) -> list[Path]:
     import matplotlib
 
     with matplotlib.rc_context(RC):
+        if (layout := figure.get_layout_engine()) is not None:
+            layout.execute(figure)  # once, not once per file
+            figure.set_layout_engine("none")
         figure.savefig(paths[0], metadata={"Date": None})
         figure.savefig(paths[1], metadata={"Software": None})
     return paths

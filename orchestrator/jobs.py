@@ -8,6 +8,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -56,8 +57,8 @@ class Outcome:
         return self.problems[0] if self.problems else ""
 
 
-NEEDED = ("scenario", "wiring", "simulate")
-"""Modules of the package that every run needs."""
+NEEDED = ("orchestrator.wiring", "orchestrator.simulate", "matplotlib.backends.backend_agg")
+"""Modules that take long to import."""
 
 
 def plan_of(job: Job) -> Plan:
@@ -141,10 +142,7 @@ def execute(
         done: called with every outcome as it comes.
         run: what a process does with its job; importable by name.
     """
-    methods = multiprocessing.get_all_start_methods()
-    context: Any = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
-    if "forkserver" in methods:  # imports once for all runs what each needs
-        context.set_forkserver_preload(["__main__", *(f"orchestrator.{name}" for name in NEEDED)])
+    context = _context()
     limit = max(1, workers or default_workers())
     outcomes: dict[int, Outcome] = {}
     waiting: Iterator[tuple[int, Job]] = iter(enumerate(jobs))
@@ -168,6 +166,20 @@ def execute(
         for one in running:
             one.process.terminate()
             one.process.join()
+
+
+def pool(workers: int | None = None) -> ProcessPoolExecutor:
+    """Return an executor for work that cannot fail as FMUs can: reading results, drawing figures."""
+    return ProcessPoolExecutor(max(1, workers or default_workers()), mp_context=_context())
+
+
+def _context() -> Any:
+    """Return how processes start: from a server that has imported once what each needs, or afresh."""
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["__main__", *NEEDED])
+    return context
 
 
 @dataclass

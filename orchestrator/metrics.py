@@ -70,8 +70,8 @@ class Metric:
 
     @property
     def title(self) -> str:
-        """The signal and the measure in words."""
-        return f"{words(self.signal)}: {self.measure.definition}"
+        """The signal and the measure in few words."""
+        return f"{words(self.signal)}: {self.name.partition('(')[0].replace('_', ' ')}"
 
     def unit(self, signal_unit: str) -> str:
         """Return the metric's unit for a signal in `signal_unit`."""

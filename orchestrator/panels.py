@@ -44,11 +44,15 @@ class Run:
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes: its name, whether it takes a whole row, and how it is filled."""
+    """One pair of axes: its name, whether it takes a whole row, and how it is filled.
+
+    Panels of one `scale` get the same limits.
+    """
 
     name: str
     wide: bool
     draw: Callable[[Axes], None]
+    scale: str = ""
 
 
 def panels_of(runs: Sequence[Run], name: str) -> list[Panel]:
@@ -71,7 +75,7 @@ def panels_of(runs: Sequence[Run], name: str) -> list[Panel]:
     four = []
     for k, wheel in enumerate(WHEEL_NAMES):
         heading = f"{words(name)}, {WHEEL_NAMES[wheel]},"
-        four.append(Panel(name.replace("*", wheel), False, _one_wheel(runs, name, k, heading)))
+        four.append(Panel(name.replace("*", wheel), False, _one_wheel(runs, name, k, heading), name))
     return four
 
 
@@ -224,6 +228,7 @@ def _finish(axes: Axes, heading: str, unit: str) -> None:
     text = shown_unit(unit)[0]
     axes.set_title(f"{heading} in {text}" if text else heading)
     axes.set_xlabel("$t$ in s")
+    axes.locator_params(axis="x", nbins=9, steps=[1, 2, 5, 10])
     axes.margins(x=0.01)
     low, high = axes.get_ylim()
     if all(np.ptp(line.get_ydata()) == 0 for line in axes.get_lines()):
@@ -247,9 +252,9 @@ def _span(arrays: list[np.ndarray]) -> float:
 
 
 def _nearly_equal(references: list[np.ndarray]) -> bool:
-    """Return whether one line can stand for all references: within 2 % of their peak."""
+    """Return whether one wide line can stand for all references: they lie within its width."""
     if not references:
         return False
     first = references[0]
-    allowed = 0.02 * max(_peak(r) for r in references)
+    allowed = 0.05 * max(_peak(r) for r in references)
     return all(r.shape == first.shape and _peak(r - first) <= allowed for r in references[1:])

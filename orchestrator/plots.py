@@ -16,6 +16,7 @@ from .figure_style import RC, REFERENCE, ROW, frame, line_style
 from .panels import Panel, Run, shown_by
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
@@ -62,10 +63,15 @@ def draw(
         figure = Figure(layout="constrained")
         FigureCanvasAgg(figure)
         grid = figure.add_gridspec(len(rows), 2)
+        first: dict[str, Axes] = {}
         for i, row in enumerate(rows):
             for k, panel in enumerate(row):
                 axes = figure.add_subplot(grid[i, :] if len(row) == 1 else grid[i, k])
                 axes.set_label(panel.name)
+                if panel.scale in first:
+                    axes.sharey(first[panel.scale])
+                elif panel.scale:
+                    first[panel.scale] = axes
                 panel.draw(axes)
                 below = rows[i + 1] if i + 1 < len(rows) else []
                 if below and below[0].name != "path":

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from .claims import Judgement, judge
 from .jobs import Outcome, read_back
 from .metrics import Metric, Value, evaluate, metric
 from .results import Results
 from .study_file import Study, StudyRun
-from .study_schema import Claim, MetricSpec, TableSpec
+from .study_schema import MetricSpec, Reference, TableSpec
 from .tables import Cell, Table
 
 HOLDS, NOT_JUDGED = "holds", "not judged"
@@ -30,13 +31,18 @@ class Findings:
     checks: list[Judgement]
 
 
-def judge_study(study: Study, out: Path, outcomes: Iterable[Outcome] = ()) -> Findings:
+Each = Callable[..., Iterable[Any]]
+"""`map`, or the `map` of an executor."""
+
+
+def judge_study(study: Study, out: Path, outcomes: Iterable[Outcome] = (), *, each: Each = map) -> Findings:
     """Read the results of all runs below `out` and judge the study by them.
 
     Args:
         study: the study.
         out: its folder of results.
         outcomes: of the runs if they have just been made; they know best why one has no results.
+        each: how to read the results of all runs.
 
     Raises:
         ScenarioError: a claim's bound is in a unit that its metric does not have.
@@ -44,8 +50,9 @@ def judge_study(study: Study, out: Path, outcomes: Iterable[Outcome] = ()) -> Fi
     reasons = {outcome.job.label: outcome.reason for outcome in outcomes if not outcome.ok}
     results: dict[str, Results] = {}
     failed: dict[str, str] = {}
-    for name in study.runs:
-        found = reasons.get(name) or read_back(out / name)
+    recorded = each(read_back, [out / name for name in study.runs])
+    for name, read in zip(study.runs, recorded, strict=True):
+        found = reasons.get(name) or read
         if isinstance(found, str):
             failed[name] = found
         else:
@@ -53,12 +60,13 @@ def judge_study(study: Study, out: Path, outcomes: Iterable[Outcome] = ()) -> Fi
     values: dict[tuple[str, str], Value] = {}
     for key, spec in study.spec.metrics.items():
         chosen, window = metric(spec.metric), _window(spec)
-        for name, recorded in results.items():
-            value = evaluate(recorded, chosen, window)
+        for name, run in results.items():
+            value = evaluate(run, chosen, window)
             if value is not None:
                 values[name, key] = value
-    claims = [judge(claim, values) for claim in study.spec.claims]
-    checks = [judge(claim, values) for claim in study.spec.checks]
+    runs = list(study.runs)
+    claims = [judge(claim, values, runs) for claim in study.spec.claims]
+    checks = [judge(claim, values, runs) for claim in study.spec.checks]
     return Findings(study, results, failed, values, claims, checks)
 
 
@@ -94,51 +102,64 @@ def _run_table(findings: Findings, spec: TableSpec) -> Table:
     study = findings.study
     runs = study.matching(spec.runs)
     said = {run.name: _said_of(findings, run, spec) for run in runs}
+    columns = [study.spec.metrics[key] for key in spec.metrics]
+    table = Table(spec.title, ["run", *map(heading, columns)])
+    formulas: dict[str, list[str]] = {}
+    for column in columns:
+        if column.heading:
+            formulas.setdefault(_metric(column).formula, []).append(column.heading)
+    table.notes = [f"{', '.join(named)}: {formula}" for formula, named in formulas.items()]
     some = any(said.values())
-    headings = ["run", *(heading(study.spec.metrics[key]) for key in spec.metrics)]
     if some:  # beside the first metric, which the claims are about
-        headings[2:2] = ["the paper says", "verdict"]
-    table = Table(spec.title, headings)
+        table.headings[2:2] = ["the paper says", "verdict"]
     for run in runs:
         if run.name in findings.failed:
-            cells: list[Cell] = [f"failed: {findings.failed[run.name]}", *[None] * (len(headings) - 2)]
+            cells: list[Cell] = ["failed", *[None] * (len(table.headings) - 2)]
+            table.notes.append(f"{run.row}: {findings.failed[run.name]}")
         else:
             cells = [findings.values.get((run.name, key)) for key in spec.metrics]
             if some:
                 judged = said[run.name]
-                words = "; ".join(j.claim.short or j.claim.says for j in judged)
+                words = "; ".join(f"{j.claim.short} ({j.claim.source})" for j in judged)
                 cells[1:1] = [words or None, "; ".join(verdict(j, "claims") for j in judged) or None]
-        table.rows.append([run.label, *cells])
+                table.notes += [f"{run.row}: {j.claim.note}" for j in judged if j.claim.note]
+        table.rows.append([run.row, *cells])
     return table
 
 
 def _said_of(findings: Findings, run: StudyRun, table: TableSpec) -> list[Judgement]:
-    """Return the claims that speak of the table's first metric of this run alone."""
-
-    def alone(claim: Claim) -> bool:
-        return all(
-            condition.run == run.name
-            and condition.metric == table.metrics[0]
-            and isinstance(condition.bound, (int, float, str))
-            for condition in claim.holds_if
+    """Return the claims with a short form that speak of the table's first metric of this run alone."""
+    return [
+        judgement
+        for judgement in findings.claims
+        if judgement.claim.short
+        and all(
+            (condition.run, condition.metric) == (run.name, table.metrics[0])
+            and not isinstance(condition.bound, Reference)
+            for condition in judgement.claim.holds_if
         )
-
-    return [judgement for judgement in findings.claims if alone(judgement.claim)]
+    ]
 
 
 def claim_tables(findings: Findings) -> list[Table]:
-    """Return one table of the paper's claims and one of the project's own checks."""
+    """Return the paper's claims that stand beside no run, and the project's own checks."""
+    shown = {
+        id(judgement)
+        for table in findings.study.spec.tables
+        for run in findings.study.matching(table.runs)
+        for judgement in _said_of(findings, run, table)
+    }
     tables = []
     for title, group, judged in (
-        ("What the paper says", "claims", findings.claims),
+        ("What the paper says beyond single runs", "claims", findings.claims),
         ("What this project asks of it", "checks", findings.checks),
     ):
-        table = Table(title, ["claim", "where", "measured", "verdict"])
+        rows: list[list[Cell]] = []
         for one in judged:
-            note = f" ({one.claim.note})" if one.claim.note else ""
-            table.rows.append(
-                [one.claim.says, one.claim.source, one.measured, f"{verdict(one, group)}{note}"]
-            )
-        if judged:
-            tables.append(table)
+            if id(one) not in shown:
+                says = f"{one.claim.says} ({one.claim.source})" if one.claim.source else one.claim.says
+                note = f"\n{one.claim.note}" if one.claim.note else ""
+                rows.append([f"{says}{note}", "\n".join(one.measured), verdict(one, group)])
+        if rows:
+            tables.append(Table(title, ["claim", "measured", "verdict"], [*rows]))
     return tables

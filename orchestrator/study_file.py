@@ -29,6 +29,7 @@ class StudyRun:
 
     name: str
     label: str
+    row: str
     scenario: Path
     swaps: tuple[str, ...]
     settings: tuple[str, ...]
@@ -107,11 +108,12 @@ def _expanded(document: Document, key: Key, entry: RunSpec) -> Iterator[StudyRun
             swaps.append(f"{unit}={folder / filled if overrides.is_path(filled) else filled}")
         settings = [f"{k}={fill(text_of(v), 'set', k)}" for k, v in entry.set.items()]
         label = fill(entry.label, "label", use=wording) or name
+        row = fill(entry.row, "row", use=wording) or label
         scenario = folder / fill(entry.scenario, "scenario")
         if len(document.problems) > known:
             return
         yield StudyRun(
-            name, label, scenario, tuple(swaps), tuple(settings),
+            name, label, row, scenario, tuple(swaps), tuple(settings),
             entry.stop_time, entry.step_size, entry.algorithm,
         )  # fmt: skip
 
@@ -153,12 +155,12 @@ def _check_conditions(study: Study, document: Document, key: Key, claim: Claim) 
         if len(given) != 1:
             document.report((*key, i), f"needs exactly one of {listed(OPERATORS, last='or')}")
             continue
-        places: list[tuple[Key, str, str]] = [((*key, i), condition.run, condition.metric)]
+        places = [((*key, i), condition.run, condition.metric, bool(study.matching([condition.run])))]
         if isinstance(condition.bound, Reference):
             bound = condition.bound
-            places.append(((*key, i, given[0]), bound.run, bound.metric))
-        for place, run, name in places:
-            if study.runs and run not in study.runs:
+            places.append(((*key, i, given[0]), bound.run, bound.metric, bound.run in study.runs))
+        for place, run, name, exists in places:
+            if study.runs and not exists:
                 sentence = f"there is no run {run!r}" + hint(run, study.runs, lead="runs")
                 document.report((*place, "run"), sentence)
             _check_metric(study.spec, document, (*place, "metric"), name)

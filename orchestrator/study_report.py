@@ -14,16 +14,17 @@ from .metrics import Value, metric
 from .panels import Run
 from .plots import draw
 from .results import Results
-from .study import Findings, claim_tables, heading, run_tables, verdict
+from .study import Each, Findings, claim_tables, heading, run_tables, verdict
 from .study_file import FIGURES
 from .tables import for_markdown, si, write_csv
 
 REPORT, METRICS, RECORD = "study.md", "metrics.csv", "study.json"
 
 
-def write_study(findings: Findings, out: Path) -> list[str]:
+def write_study(findings: Findings, out: Path, *, each: Each = map) -> list[str]:
     """Write everything that a study leaves on disk into `out`; return what could not be drawn."""
-    drawn, problems = draw_figures(findings, out)
+    out.mkdir(parents=True, exist_ok=True)
+    drawn, problems = draw_figures(findings, out, each)
     write_metrics(findings, out / METRICS)
     (out / REPORT).write_text(_markdown(findings, drawn), encoding="utf-8")
     record = json.dumps(_record(findings, drawn), indent=1, ensure_ascii=False, allow_nan=False)
@@ -31,26 +32,30 @@ def write_study(findings: Findings, out: Path) -> list[str]:
     return problems
 
 
-def draw_figures(findings: Findings, out: Path) -> tuple[dict[str, Path], list[str]]:
+def draw_figures(findings: Findings, out: Path, each: Each = map) -> tuple[dict[str, Path], list[str]]:
     """Draw the study's figures; return each one's PNG by its title, and problems as sentences."""
-    drawn: dict[str, Path] = {}
-    problems: list[str] = []
-    for spec in findings.study.spec.figures:
+    study = findings.study
+    wanted = []
+    for spec in study.spec.figures:
         runs = [
             Run(run.label, findings.results[run.name])
-            for run in findings.study.matching(spec.runs)
+            for run in study.matching(spec.runs)
             if run.name in findings.results
         ]
-        title = spec.title or f"{findings.study.spec.title}: {spec.name}"
-        problem = _draw(runs, spec.panels, title, out / FIGURES / spec.name)
+        title = spec.title or f"{study.spec.title}: {spec.name}"
+        wanted.append((runs, spec.panels, title, out / FIGURES / spec.name))
+    drawn: dict[str, Path] = {}
+    problems: list[str] = []
+    for (_, _, title, stem), problem in zip(wanted, each(_draw, wanted), strict=True):
         if problem:
-            problems.append(f"figure {spec.name}: {problem}")
+            problems.append(f"figure {stem.name}: {problem}")
         else:
-            drawn[title] = out / FIGURES / f"{spec.name}.png"
+            drawn[title] = stem.with_name(f"{stem.name}.png")
     return drawn, problems
 
 
-def _draw(runs: list[Run], panels: list[str], title: str, stem: Path) -> str | None:
+def _draw(wanted: tuple[list[Run], list[str], str, Path]) -> str | None:
+    runs, panels, title, stem = wanted
     if not runs:
         return "none of its runs has results"
     try:
@@ -149,7 +154,7 @@ def _judgement(one: Judgement, group: str) -> dict[str, Any]:
         "says": one.claim.says,
         "source": one.claim.source,
         "holds_if": [condition_text(condition) for condition in one.claim.holds_if],
-        "measured": one.measured,
+        "measured": list(one.measured),
         "holds": one.holds,
         "verdict": verdict(one, group),
         "note": one.claim.note,

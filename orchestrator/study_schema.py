@@ -5,7 +5,8 @@ A run entry with `for` stands for one run per combination; `{name}` in its texts
     runs:
       - for: {speed: [15, 25], controller: {off: no control, fnn: neural network}}
         name: "{speed}mps/{controller}"
-        label: "{controller}"              # in labels the words: "no control"
+        label: "{controller}"              # in legends and tables the words: "no control"
+        row: "{speed} m/s, {controller}"
         scenario: "{speed}mps.yaml"        # relative to the study file
         swap: {controller: "controller_{controller}"}
     metrics:
@@ -67,7 +68,8 @@ class RunSpec(Strict):
     name: str = Field(description="Name of the run and of its folder, e.g. 25mps/fnn", min_length=1)
     scenario: str = Field(description="Scenario file, relative to the study file", min_length=1)
     for_each: dict[str, Alternatives] = Field({}, alias="for", description="Key -> values")
-    label: str = Field("", description="What legends and tables call it; default: the name")
+    label: str = Field("", description="What legends call it; default: the name")
+    row: str = Field("", description="What tables call it; default: the label")
     swap: dict[str, str] = Field({}, description="Unit -> FMU, a name or a path")
     set: dict[str, Scalar] = Field({}, description="unit.parameter -> value")
     stop_time: Time | None = Field(None, description="In place of the scenario's")
@@ -112,7 +114,7 @@ Bound = Annotated[
 class Condition(Strict):
     """A comparison of a metric of a run with exactly one bound."""
 
-    run: str
+    run: str = Field(description="Name of a run; with `*` every run that fits")
     metric: str
     above: Bound | None = None
     at_least: Bound | None = None

@@ -21,12 +21,12 @@ Cell = str | Value | None
 
 @dataclass
 class Table:
-    """Headings and rows of cells; the first `names` columns name the row."""
+    """Headings, rows of cells, and what has to be said below them."""
 
     title: str
-    headings: Sequence[str]
+    headings: list[str]
     rows: list[Sequence[Cell]] = field(default_factory=list)
-    names: int = 1
+    notes: list[str] = field(default_factory=list)
 
     def text(self) -> list[list[str]]:
         """Return the cells of all rows as people read them."""
@@ -49,9 +49,14 @@ def for_terminal(table: Table) -> rich.table.Table:
     from rich import box
     from rich.text import Text
 
-    shape = rich.table.Table(title=table.title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    caption = Text("\n".join(table.notes)) if table.notes else None
+    shape = rich.table.Table(
+        title=Text(table.title), title_justify="left", title_style="bold", caption=caption,
+        caption_justify="left", caption_style="", box=box.SIMPLE_HEAD, pad_edge=False,
+    )  # fmt: skip
     for i, heading in enumerate(table.headings):
-        shape.add_column(Text(heading), justify="right" if table.is_number(i) else "left", overflow="fold")
+        number = table.is_number(i)
+        shape.add_column(Text(heading), justify="right" if number else "left", no_wrap=number)
     for row in table.text():
         shape.add_row(*(Text(cell) for cell in row))
     return shape
@@ -61,11 +66,12 @@ def for_markdown(table: Table) -> str:
     """Return the table as GitHub Markdown, with its title in bold."""
 
     def line(cells: Sequence[str]) -> str:
-        return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"
+        return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", "; ") for cell in cells) + " |"
 
     rule = ["---:" if table.is_number(i) else "---" for i in range(len(table.headings))]
     head = [f"**{table.title}**", ""] if table.title else []
-    return "\n".join([*head, line(table.headings), line(rule), *map(line, table.text())]) + "\n"
+    notes = ["", *(f"{note}  " for note in table.notes)] if table.notes else []
+    return "\n".join([*head, line(table.headings), line(rule), *map(line, table.text()), *notes]) + "\n"
 
 
 def write_csv(path: Path, headings: Sequence[str], rows: Sequence[Sequence[Cell]]) -> None:

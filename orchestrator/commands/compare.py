@@ -45,7 +45,8 @@ def compare(
     outcomes = execute(work, workers=jobs, done=progress(len(work)))
     comparison = judge_comparison(outcomes)
     title = str(comparison.runs[0].results.run.get("title") or "") if comparison.runs else ""
-    table = metric_table(comparison, title or scenario.stem)
+    exchanged = " and ".join(dict.fromkeys(text.partition("=")[0].strip() for text in swap))
+    table = metric_table(comparison, f"{title or scenario.stem} ({exchanged} exchanged)")
     files = write_comparison(comparison, table, folder)
     print_tables([table])
     say(f"{folder}: {', '.join(files)}")

@@ -24,7 +24,7 @@ def study(
     Without --out, results go to results/<folder of the study>/<its name>. Every run has a process
     of its own; one that fails is named in the table and takes no other with it.
     """
-    from ..jobs import Outcome, check, execute
+    from ..jobs import Outcome, check, execute, pool
     from ..study import claim_tables, judge_study, run_tables
     from ..study_file import load_study
     from ..study_report import REPORT, write_study
@@ -38,8 +38,10 @@ def study(
         work = [run.job(folder, fmus) for run in loaded.runs.values()]
         check(work)
         outcomes = execute(work, workers=jobs, done=progress(len(work)))
-    findings = judge_study(loaded, folder, outcomes)
-    for problem in write_study(findings, folder):
+    with pool(jobs) as workers:
+        findings = judge_study(loaded, folder, outcomes, each=workers.map)
+        problems = write_study(findings, folder, each=workers.map)
+    for problem in problems:
         say(problem)
     print_tables([*run_tables(findings), *claim_tables(findings)])
     say(f"Results, figures and tables: {folder} (begin with {folder / REPORT})")
