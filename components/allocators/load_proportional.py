@@ -7,6 +7,10 @@ so sum(F_i arm_i) = M_z; see `core.moment_sharing` for arms near zero. The drive
 top, equal left and right as from one pedal, shared between the axles like their loads. A car
 without any load on its wheels asks for no force.
 
+`side_forces` offers paper B's two other ways to the same moment: one force per side of the car, split
+between its front and rear wheel in proportion to their loads (`core.side_forces`; paper B, equation
+(29) without the factor 1/2 that contradicts (25), (26)).
+
 Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
 FNN, equations (36)-(39). Errata: the front-left arm is printed with the wrong sign of a sin(delta);
 (38), (39) give both rear wheels the same sign; "2d" is 2/d.
@@ -20,6 +24,7 @@ from dataclasses import dataclass
 from ..core.component import Component
 from ..core.moment_sharing import NO_FORCE, Four, add_drive_force, share_moment
 from ..core.roles import wheels
+from ..core.side_forces import SIDE_FORCES, load_share, share_sides
 from ..core.variables import output, parameter
 from ..core.wheel_kinematics import lever_arms
 
@@ -32,10 +37,23 @@ class LoadProportionalParameters:
         1.256, "m", "Distance a of the centre of mass from the front axle; paper A, table 1", minimum=0.1
     )
     track_width: float = parameter(1.65, "m", "Track width d; paper A, table 1", minimum=0.1)
+    side_forces: str = parameter(
+        "all_wheels",
+        None,
+        "All four wheels share the moment, as in paper A, or each side has one force, as in paper B",
+        choices=("all_wheels", *SIDE_FORCES),
+    )
 
 
 def share_by_load(
-    moment: float, drive: float, *, delta: float, loads: Sequence[float], a: float, half_track: float
+    moment: float,
+    drive: float,
+    *,
+    delta: float,
+    loads: Sequence[float],
+    a: float,
+    half_track: float,
+    side_forces: str = "all_wheels",
 ) -> Four:
     """Return the longitudinal forces [N] of fl, fr, rl, rr; equations (36)-(39).
 
@@ -44,6 +62,7 @@ def share_by_load(
         delta: steer angle [rad].
         loads: vertical loads of fl, fr, rl, rr [N]; a negative one counts as none.
         a, half_track: distances of front axle and wheels from the centre of mass [m].
+        side_forces: "all_wheels", or one of `side_forces.SIDE_FORCES`.
     """
     f_fl, f_fr, f_rl, f_rr = loads
     if min(f_fl, f_fr, f_rl, f_rr) < 0.0:
@@ -53,7 +72,18 @@ def share_by_load(
     if total <= 0.0:
         return NO_FORCE
     arms = lever_arms(delta, a, half_track)
-    forces = share_moment(moment, (f_fl, f_fr, f_rl, f_rr), arms, 0.25 * half_track)
+    least_arm = 0.25 * half_track
+    if side_forces == "all_wheels":
+        forces = share_moment(moment, (f_fl, f_fr, f_rl, f_rr), arms, least_arm)
+    else:
+        forces = share_sides(
+            moment,
+            side_forces,
+            front_left=load_share(f_fl, f_rl),
+            front_right=load_share(f_fr, f_rr),
+            arms=arms,
+            least_arm=least_arm,
+        )
     return forces if drive == 0.0 else add_drive_force(forces, drive, front / total)
 
 
@@ -69,5 +99,12 @@ class LoadProportional(Component):
 
     def output(self, t, u):
         p = self.p
-        half_track = 0.5 * p.track_width
-        return share_by_load(u[0], u[1], delta=u[2], loads=u[3:], a=p.cg_to_front_axle, half_track=half_track)
+        return share_by_load(
+            u[0],
+            u[1],
+            delta=u[2],
+            loads=u[3:],
+            a=p.cg_to_front_axle,
+            half_track=0.5 * p.track_width,
+            side_forces=p.side_forces,
+        )

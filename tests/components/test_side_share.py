@@ -1,0 +1,121 @@
+"""Side forces: their moment is the one asked for, in both readings, with fixed shares and by load."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from components.allocators.load_proportional import LoadProportional
+from components.allocators.side_share import SideShare
+from components.core.side_forces import SIDE_FORCES
+from components.core.wheel_kinematics import lever_arms
+
+from .stand import Stand
+
+WHEELS = ("fl", "fr", "rl", "rr")
+D = 1.48
+GEOMETRY = {"cg_to_front_axle": 1.04, "track_width": D}
+
+
+def forces(stand: Stand, **inputs: float) -> list[float]:
+    y = stand.step(0.005, **inputs)
+    return [y[f"force_request_{wheel}"] for wheel in WHEELS]
+
+
+def moment_of(f: list[float], delta: float) -> float:
+    return sum(x * arm for x, arm in zip(f, lever_arms(delta, 1.04, 0.5 * D), strict=True))
+
+
+def loads(*values: float) -> dict[str, float]:
+    return {f"vertical_load_{wheel}": value for wheel, value in zip(WHEELS, values, strict=True)}
+
+
+@pytest.mark.parametrize("reading", SIDE_FORCES)
+def test_the_forces_give_the_moment_asked_for_at_every_steer_angle(reading):
+    rng = random.Random(3)
+    for _ in range(200):
+        stand = Stand(
+            SideShare,
+            front_share_left=rng.choice((0.0, 0.25, 0.5, rng.random(), 1.0)),
+            front_share_right=rng.choice((0.0, 0.25, 0.5, rng.random(), 1.0)),
+            side_forces=reading,
+        )
+        moment, delta = rng.uniform(-1e4, 1e4), rng.uniform(-0.3, 0.3)
+        stand.start()
+        f = forces(stand, yaw_moment=moment, steer_angle=delta)
+        assert moment_of(f, delta) == pytest.approx(moment, rel=1e-12)
+
+
+@pytest.mark.parametrize("reading", SIDE_FORCES)
+def test_sharing_by_load_gives_the_moment_asked_for_at_every_steer_angle(reading):
+    rng = random.Random(4)
+    stand = Stand(LoadProportional, side_forces=reading, **GEOMETRY)
+    stand.start()
+    for _ in range(200):
+        moment, delta = rng.uniform(-1e4, 1e4), rng.uniform(-0.3, 0.3)
+        carried = loads(*(rng.uniform(0.0, 6000.0) for _ in WHEELS))
+        f = forces(stand, yaw_moment=moment, steer_angle=delta, **carried)
+        assert moment_of(f, delta) == pytest.approx(moment, rel=1e-12)
+        for side in ("l", "r"):
+            front, rear = WHEELS.index("f" + side), WHEELS.index("r" + side)
+            ratio = carried[f"vertical_load_r{side}"] / carried[f"vertical_load_f{side}"]
+            assert f[rear] == pytest.approx(f[front] * ratio, rel=1e-9, abs=1e-9)
+
+
+def test_opposite_halves_straight_ahead_are_the_moment_over_the_track():
+    stand = Stand(SideShare, side_forces="opposite_halves", front_share_left=0.25, front_share_right=0.75)
+    stand.start()
+    side = 2000.0 / D
+    assert forces(stand, yaw_moment=2000.0) == pytest.approx(
+        [-0.25 * side, 0.75 * side, -0.75 * side, 0.25 * side], rel=1e-12
+    )
+
+
+@pytest.mark.parametrize("moment, braked", [(2000.0, "l"), (-2000.0, "r")])
+def test_one_side_is_braked_with_twice_the_moment_over_the_track(moment, braked):
+    stand = Stand(SideShare, front_share_left=0.25, front_share_right=0.25)
+    stand.start()
+    f = dict(zip(WHEELS, forces(stand, yaw_moment=moment), strict=True))
+    assert f["f" + braked] == pytest.approx(-0.25 * 4000.0 / D, rel=1e-12)
+    assert f["r" + braked] == pytest.approx(-0.75 * 4000.0 / D, rel=1e-12)
+    other = "r" if braked == "l" else "l"
+    assert f["f" + other] == f["r" + other] == 0.0
+
+
+def test_opposite_halves_of_a_steered_car_neither_drive_nor_brake():
+    stand = Stand(SideShare, side_forces="opposite_halves", front_share_left=0.3, front_share_right=0.8)
+    stand.start()
+    assert sum(forces(stand, yaw_moment=3000.0, steer_angle=0.2)) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("reading", SIDE_FORCES)
+def test_left_and_right_are_mirrored_to_the_last_bit(reading):
+    left = Stand(SideShare, side_forces=reading, front_share_left=0.3, front_share_right=0.7)
+    right = Stand(SideShare, side_forces=reading, front_share_left=0.7, front_share_right=0.3)
+    left.start()
+    right.start()
+    fl, fr, rl, rr = forces(left, yaw_moment=1234.5, steer_angle=0.07, drive_force=321.0)
+    assert [fr, fl, rr, rl] == forces(right, yaw_moment=-1234.5, steer_angle=-0.07, drive_force=321.0)
+
+
+def test_the_drivers_force_comes_on_top_equal_left_and_right():
+    stand = Stand(SideShare, drive_front_share=0.25)
+    stand.start()
+    bare = forces(stand, yaw_moment=1500.0, steer_angle=0.05)
+    driven = forces(stand, yaw_moment=1500.0, steer_angle=0.05, drive_force=-800.0)
+    added = [d - b for d, b in zip(driven, bare, strict=True)]
+    assert added == pytest.approx([-100.0, -100.0, -300.0, -300.0], rel=1e-12)
+
+
+def test_no_moment_asks_for_no_force():
+    stand = Stand(SideShare)
+    stand.start()
+    assert forces(stand, yaw_moment=0.0, steer_angle=0.05) == [0.0] * 4
+
+
+def test_a_side_in_the_air_is_split_in_halves():
+    stand = Stand(LoadProportional, side_forces="one_side_braked", **GEOMETRY)
+    stand.start()
+    f = forces(stand, yaw_moment=1000.0, **loads(0.0, 5000.0, 0.0, 4000.0))
+    assert f == pytest.approx([-1000.0 / D, 0.0, -1000.0 / D, 0.0], rel=1e-12)
