@@ -1,0 +1,153 @@
+"""Motor and friction brake: closed-form step responses, exact delays, blending, limits."""
+
+from __future__ import annotations
+
+from math import exp
+
+import pytest
+
+from components.actuators.lag import Lag, blend, relax
+
+from .stand import Stand
+
+WHEELS = ("fl", "fr", "rl", "rr")
+
+
+def request(value: float) -> dict[str, float]:
+    return {f"torque_request_{wheel}": value for wheel in WHEELS}
+
+
+def response(value: float, *, h: float, until: float, **parameters: float) -> list[tuple[float, dict]]:
+    """Return (time, outputs) after each step of a request held from the start."""
+    stand = Stand(Lag, **parameters)
+    stand.start()
+    results = []
+    for k in range(round(until / h)):
+        y = stand.step(h, **request(value))
+        results.append(((k + 1) * h, y))
+    return results
+
+
+@pytest.mark.parametrize("h", [1e-3, 0.7e-3, 5e-3])
+def test_the_motors_step_response_is_a_delayed_exponential(h):
+    for t, y in response(500.0, h=h, until=0.07, motor_delay=0.0033):
+        late = max(t - 0.0033, 0.0)
+        assert y["motor_torque_fl"] == pytest.approx(500.0 * (1 - exp(-late / 0.015)), abs=1e-9)
+        assert y["wheel_torque_rr"] == y["motor_torque_fl"]
+        assert y["brake_torque_fl"] == 0.0
+
+
+@pytest.mark.parametrize("h", [1e-3, 4e-3])
+def test_the_brakes_step_response_is_a_delayed_exponential(h):
+    for t, y in response(-1800.0, h=h, until=0.4):
+        late = max(t - 0.015, 0.0)
+        assert y["brake_torque_rl"] == pytest.approx(-1000.0 * (1 - exp(-late / 0.08)), abs=1e-9)
+
+
+def test_a_delay_that_is_no_multiple_of_the_step_is_kept_to_the_last_digit():
+    for t, y in response(100.0, h=1e-3, until=0.02, motor_delay=0.01037, motor_time_constant=0.0):
+        assert y["motor_torque_fl"] == (100.0 if t > 0.01037 else 0.0)
+
+
+def test_a_ramp_in_steps_comes_out_delayed_and_lagging_as_in_the_closed_form():
+    # Held steps of a ramp: the ramp itself, half a step late.
+    h, slope, tau, delay = 1e-3, 4000.0, 0.015, 0.0045
+    stand = Stand(Lag, motor_delay=delay)
+    stand.start()
+    for k in range(150):
+        y = stand.step(h, **request(slope * (k + 0.5) * h))
+        t = (k + 1) * h
+    late = t - delay
+    assert y["motor_torque_fl"] == pytest.approx(slope * (late - tau * (1 - exp(-late / tau))), rel=1e-3)
+
+
+def test_a_held_request_may_be_split_into_any_steps():
+    requests = [300.0, -1500.0, -2500.0, 700.0, 0.0, -900.0]
+    parameters = {"brake_rate_limit": 20000.0, "motor_rate_limit": 30000.0, "motor_delay": 0.0071}
+    ends = []
+    for parts in (1, 3, 10):
+        stand = Stand(Lag, **parameters)
+        stand.start()
+        for value in requests:
+            for _ in range(parts):
+                y = stand.step(0.01 / parts, **request(value))
+        ends.append(y)
+    for other in ends[1:]:
+        for name, value in ends[0].items():
+            assert other[name] == pytest.approx(value, abs=1e-9), name
+    assert ends[0]["brake_torque_fl"] < -100.0
+
+
+@pytest.mark.parametrize(
+    "asked, motor, brake",
+    [
+        (300.0, 300.0, 0.0),
+        (2000.0, 800.0, 0.0),
+        (-300.0, -300.0, 0.0),
+        (-1000.0, -800.0, -200.0),
+        (-9000.0, -800.0, -2500.0),
+        (0.0, 0.0, 0.0),
+    ],
+)
+def test_the_motor_takes_what_it_can_and_friction_the_rest(asked, motor, brake):
+    assert blend(asked, 800.0, 2500.0) == (motor, brake)
+    _, y = response(asked, h=0.01, until=3.0)[-1]
+    assert y["motor_torque_fr"] == pytest.approx(motor, abs=1e-9)
+    assert y["brake_torque_fr"] == pytest.approx(brake, abs=1e-9)
+    assert y["wheel_torque_fr"] == pytest.approx(motor + brake, abs=1e-9)
+
+
+def test_a_rate_limit_is_a_straight_line_until_the_lag_is_slower():
+    tau, rate, target = 0.08, 5000.0, -1000.0
+    line = (1000.0 - rate * tau) / rate
+    assert relax(0.0, target, line / 2, tau=tau, rate=rate) == pytest.approx(-rate * line / 2)
+    for h in (line, 0.2, 0.5):
+        expected = target + rate * tau * exp(-(h - line) / tau)
+        assert relax(0.0, target, h, tau=tau, rate=rate) == pytest.approx(expected, rel=1e-12)
+    assert relax(0.0, target, 1.0, tau=0.0, rate=rate) == target
+
+
+def test_the_torque_never_changes_faster_than_its_limit():
+    last = 0.0
+    for _, y in response(-5000.0, h=1e-3, until=0.3, brake_rate_limit=10000.0):
+        assert abs(y["brake_torque_fl"] - last) <= 10.0 + 1e-9
+        last = y["brake_torque_fl"]
+    assert last < -2000.0
+
+
+def test_wheels_are_independent_and_alike():
+    stand = Stand(Lag)
+    stand.start()
+    for k in range(40):
+        y = stand.step(
+            1e-3, torque_request_fl=100.0 * k, torque_request_rr=100.0 * k, torque_request_fr=-50.0
+        )
+    assert y["wheel_torque_fl"] == y["wheel_torque_rr"] > 0.0
+    assert y["wheel_torque_fr"] < 0.0
+    assert y["wheel_torque_rl"] == 0.0
+
+
+def test_actuators_start_without_torque():
+    y = Stand(Lag).start(**request(-500.0))
+    assert set(y.values()) == {0.0}
+
+
+def test_a_step_undone_and_repeated_gives_the_same_bits():
+    stand = Stand(Lag)
+    stand.start()
+    for k in range(20):
+        stand.step(1e-3, **request(-100.0 * k))
+    state, time = stand.unit._get_fmu_state(), stand.time
+    first = [stand.step(1e-3, **request(-50.0 * k)) for k in range(10)]
+    stand.unit._set_fmu_state(state)
+    stand.time = time
+    assert [stand.step(1e-3, **request(-50.0 * k)) for k in range(10)] == first
+
+
+def test_old_requests_are_forgotten():
+    stand = Stand(Lag)
+    stand.start()
+    for k in range(2000):
+        stand.step(1e-3, **request(float(k % 7)))
+    assert len(stand.unit.brakes[0].history) <= 20
+    assert len(stand.unit.motors[0].history) <= 6
