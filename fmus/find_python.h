@@ -99,7 +99,8 @@ static bool find_home(const char *file, int minor, char home[PATH_MAX])
         return false;
     }
     while (to_parent(home)) {
-        if (exists("%s/lib/python3.%d/os.py", home, minor) || exists("%s/lib64/python3.%d/os.py", home, minor)) {
+        if (exists("%s/lib/python3.%d/os.py", home, minor) ||
+            exists("%s/lib64/python3.%d/os.py", home, minor)) {
             return true;
         }
     }
@@ -121,7 +122,8 @@ static void *open_version(int minor)
     while (library == NULL && path != NULL && *path != '\0') {
         int length = (int)strcspn(path, ":");
         int needed = snprintf(binary, sizeof binary, "%.*s/python3.%d", length, path, minor);
-        if (length > 0 && needed < (int)sizeof binary && realpath(binary, home) != NULL && to_parent(home) && to_parent(home)) {
+        if (length > 0 && needed < (int)sizeof binary && realpath(binary, home) != NULL && to_parent(home) &&
+            to_parent(home)) {
             needed = snprintf(file, sizeof file, "%s/lib/libpython3.%d.so.1.0", home, minor);
             if (needed < (int)sizeof file && exists("%s", file)) {
                 library = open_globally(file);
@@ -160,7 +162,8 @@ static bool open_python(char *problem, size_t size)
     return false;
 }
 
-/* True in the plain C locale, where Python itself would read file names as UTF-8 but an embedded one does not. */
+/* True in the plain C locale, where Python itself would read file names as UTF-8 but an embedded one does
+ * not. */
 static bool is_plain_locale(void)
 {
     const char *names[] = {"LC_ALL", "LC_CTYPE", "LANG"};
@@ -214,29 +217,36 @@ static void start_python(const Python *python, int minor)
 /* Find or start Python; false with a sentence in `problem` if there is none to be had. */
 static bool provide_python(Python *python, char *problem, size_t size)
 {
-    if (dlsym(RTLD_DEFAULT, "Py_IsInitialized") == NULL && !promote_loaded_python() && !open_python(problem, size)) {
+    if (dlsym(RTLD_DEFAULT, "Py_IsInitialized") == NULL && !promote_loaded_python() &&
+        !open_python(problem, size)) {
         return false;
     }
     const struct {
         const char *name;
         void *slot;
     } functions[] = {
-        {"Py_IsInitialized", &python->Py_IsInitialized},   {"Py_InitializeEx", &python->Py_InitializeEx},
-        {"Py_GetVersion", &python->Py_GetVersion},         {"PyEval_SaveThread", &python->PyEval_SaveThread},
-        {"PyGILState_Ensure", &python->PyGILState_Ensure}, {"PyGILState_Release", &python->PyGILState_Release},
+        {"Py_IsInitialized", &python->Py_IsInitialized},
+        {"Py_InitializeEx", &python->Py_InitializeEx},
+        {"Py_GetVersion", &python->Py_GetVersion},
+        {"PyEval_SaveThread", &python->PyEval_SaveThread},
+        {"PyGILState_Ensure", &python->PyGILState_Ensure},
+        {"PyGILState_Release", &python->PyGILState_Release},
         {"PyDict_Size", &python->PyDict_Size},
     };
     for (size_t i = 0; i < sizeof functions / sizeof *functions; i++) {
         void *symbol = dlsym(RTLD_DEFAULT, functions[i].name);
         if (symbol == NULL) {
-            snprintf(problem, size, "the Python in this process is not usable: %s is missing", functions[i].name);
+            snprintf(problem, size, "the Python in this process is not usable: %s is missing",
+                     functions[i].name);
             return false;
         }
         memcpy(functions[i].slot, &symbol, sizeof symbol);
     }
     int major = 0, minor = 0;
-    if (sscanf(python->Py_GetVersion(), "%d.%d", &major, &minor) != 2 || major != 3 || minor < OLDEST_PYTHON) {
-        snprintf(problem, size, "Python 3.%d or newer is needed, this process has Python %d.%d", OLDEST_PYTHON, major, minor);
+    if (sscanf(python->Py_GetVersion(), "%d.%d", &major, &minor) != 2 || major != 3 ||
+        minor < OLDEST_PYTHON) {
+        snprintf(problem, size, "Python 3.%d or newer is needed, this process has Python %d.%d",
+                 OLDEST_PYTHON, major, minor);
         return false;
     }
     /* Two FMUs may be loaded at once by two threads; a lock that all libraries share is stderr's. */

@@ -85,8 +85,8 @@ static bool wanted(const Instance *in, fmi2Status status, const char *category)
 }
 
 /* The logger that PythonFMU's library sees; the component has doubled its '%' already. */
-static void relay(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category,
-                  fmi2String message, ...)
+static void relay(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
+                  fmi2String category, fmi2String message, ...)
 {
     (void)name;
     Instance *in = environment;
@@ -126,15 +126,15 @@ static fmi2Status refused(Instance *in, const char *text)
 }
 
 /* Leave the calling function unless its instance `c` is there and alive. */
-#define INSTANCE(c)                                                                                                    \
-    Instance *in = (c);                                                                                                \
-    if (UNLIKELY(in == NULL || in->dead)) {                                                                            \
-        return in == NULL ? fmi2Error : fmi2Fatal;                                                                     \
+#define INSTANCE(c)                                                                                          \
+    Instance *in = (c);                                                                                      \
+    if (UNLIKELY(in == NULL || in->dead)) {                                                                  \
+        return in == NULL ? fmi2Error : fmi2Fatal;                                                           \
     }
 
-#define REQUIRE(condition, text)                                                                                       \
-    if (UNLIKELY(!(condition))) {                                                                                      \
-        return refused(in, text);                                                                                      \
+#define REQUIRE(condition, text)                                                                             \
+    if (UNLIKELY(!(condition))) {                                                                            \
+        return refused(in, text);                                                                            \
     }
 
 /* ---- loading ---- */
@@ -181,11 +181,10 @@ static bool open_library(char *problem, size_t size)
     const struct {
         const char *name;
         void *slot;
-    } functions[] = {
-        {"fmi2Instantiate", &library.Instantiate},
-        {"fmi2FreeInstance", &library.FreeInstance},
+    } functions[] = {{"fmi2Instantiate", &library.Instantiate},
+                     {"fmi2FreeInstance", &library.FreeInstance},
 #define SLOT(name, parameters) {"fmi2" #name, &library.name},
-        FMI2_STATUS_FUNCTIONS(SLOT)
+                     FMI2_STATUS_FUNCTIONS(SLOT)
 #undef SLOT
     };
     for (size_t i = 0; i < sizeof functions / sizeof *functions; i++) {
@@ -205,7 +204,8 @@ static bool open_library(char *problem, size_t size)
 static bool load(char *problem, size_t size)
 {
     pthread_mutex_lock(&loading);
-    bool ready = library.handle != NULL || (provide_python(&python, problem, size) && open_library(problem, size));
+    bool ready =
+        library.handle != NULL || (provide_python(&python, problem, size) && open_library(problem, size));
     pthread_mutex_unlock(&loading);
     return ready;
 }
@@ -240,7 +240,8 @@ static char *find_resources(const char *location, char *problem, size_t size)
     }
     decode_percent(decoded);
     own[0] = '\0';
-    if (own_folder(folder)) { /* by the standard's layout; for a host that names no location, or a wrong one */
+    if (own_folder(
+            folder)) { /* by the standard's layout; for a host that names no location, or a wrong one */
         snprintf(own, sizeof own, "%s/../../resources", folder);
     }
     const char *candidates[] = {decoded, plain, own};
@@ -258,7 +259,8 @@ static char *find_resources(const char *location, char *problem, size_t size)
         }
     }
     if (found == NULL) {
-        snprintf(problem, size, "the FMU's resources are incomplete or not at %s", location == NULL ? "(none)" : location);
+        snprintf(problem, size, "the FMU's resources are incomplete or not at %s",
+                 location == NULL ? "(none)" : location);
     }
     free(decoded);
     free(plain);
@@ -305,7 +307,8 @@ static void discard(Instance *in)
 /* PythonFMU's library always logs, so that no error passes unseen; `wanted` decides for the host. */
 static fmi2Component new_stock(Instance *in)
 {
-    return library.Instantiate(in->name, fmi2CoSimulation, "", in->resources, &in->own, in->visible, fmi2True);
+    return library.Instantiate(in->name, fmi2CoSimulation, "", in->resources, &in->own, in->visible,
+                               fmi2True);
 }
 
 EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String location,
@@ -381,7 +384,8 @@ EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_def
                                       fmi2Real start, fmi2Boolean stop_defined, fmi2Real stop)
 {
     INSTANCE(c)
-    return checked(in, library.SetupExperiment(in->stock, tolerance_defined, tolerance, start, stop_defined, stop));
+    return checked(
+        in, library.SetupExperiment(in->stock, tolerance_defined, tolerance, start, stop_defined, stop));
 }
 
 EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
@@ -418,27 +422,28 @@ EXPORT fmi2Status fmi2Reset(fmi2Component c)
 
 /* ---- FMI: values ---- */
 
-#define GET(Type)                                                                                                      \
-    EXPORT fmi2Status fmi2Get##Type(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2##Type value[])      \
-    {                                                                                                                  \
-        INSTANCE(c)                                                                                                    \
-        if (UNLIKELY(n == 0)) {                                                                                        \
-            return fmi2OK;                                                                                             \
-        }                                                                                                              \
-        REQUIRE(vr != NULL && value != NULL, "fmi2Get" #Type ": value references or values are missing")              \
-        return checked(in, library.Get##Type(in->stock, vr, n, value));                                                \
+#define GET(Type)                                                                                            \
+    EXPORT fmi2Status fmi2Get##Type(fmi2Component c, const fmi2ValueReference vr[], size_t n,                \
+                                    fmi2##Type value[])                                                      \
+    {                                                                                                        \
+        INSTANCE(c)                                                                                          \
+        if (UNLIKELY(n == 0)) {                                                                              \
+            return fmi2OK;                                                                                   \
+        }                                                                                                    \
+        REQUIRE(vr != NULL && value != NULL, "fmi2Get" #Type ": value references or values are missing")     \
+        return checked(in, library.Get##Type(in->stock, vr, n, value));                                      \
     }
 
-#define SET(Type, check)                                                                                               \
-    EXPORT fmi2Status fmi2Set##Type(fmi2Component c, const fmi2ValueReference vr[], size_t n,                          \
-                                    const fmi2##Type value[])                                                          \
-    {                                                                                                                  \
-        INSTANCE(c)                                                                                                    \
-        if (UNLIKELY(n == 0)) {                                                                                        \
-            return fmi2OK;                                                                                             \
-        }                                                                                                              \
-        REQUIRE(vr != NULL && value != NULL, "fmi2Set" #Type ": value references or values are missing")              \
-        check return checked(in, library.Set##Type(in->stock, vr, n, value));                                          \
+#define SET(Type, check)                                                                                     \
+    EXPORT fmi2Status fmi2Set##Type(fmi2Component c, const fmi2ValueReference vr[], size_t n,                \
+                                    const fmi2##Type value[])                                                \
+    {                                                                                                        \
+        INSTANCE(c)                                                                                          \
+        if (UNLIKELY(n == 0)) {                                                                              \
+            return fmi2OK;                                                                                   \
+        }                                                                                                    \
+        REQUIRE(vr != NULL && value != NULL, "fmi2Set" #Type ": value references or values are missing")     \
+        check return checked(in, library.Set##Type(in->stock, vr, n, value));                                \
     }
 
 static bool all_utf8(size_t n, const fmi2String value[])
@@ -492,7 +497,8 @@ static bool is_empty(fmi2FMUstate state)
 }
 
 /* Hand a new state over in place of the one that `*target` may hold; a failed unit gives an empty one. */
-static fmi2Status deliver(Instance *in, fmi2Status status, fmi2FMUstate fresh, fmi2FMUstate *target, const char *failure)
+static fmi2Status deliver(Instance *in, fmi2Status status, fmi2FMUstate fresh, fmi2FMUstate *target,
+                          const char *failure)
 {
     if (status == fmi2OK && is_empty(fresh)) {
         library.FreeFMUstate(in->stock, &fresh);
@@ -559,10 +565,12 @@ EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi
     size_t needed = 0; /* the library copies `size` bytes, however many there are */
     fmi2Status status = fmi2SerializedFMUstateSize(c, state, &needed);
     REQUIRE(status != fmi2OK || size >= needed, "fmi2SerializeFMUstate: the place for the bytes is too small")
-    return status != fmi2OK ? status : checked(in, library.SerializeFMUstate(in->stock, state, bytes, needed));
+    return status != fmi2OK ? status
+                            : checked(in, library.SerializeFMUstate(in->stock, state, bytes, needed));
 }
 
-EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
+                                          fmi2FMUstate *state)
 {
     INSTANCE(c)
     REQUIRE(bytes != NULL && state != NULL, "fmi2DeSerializeFMUstate: no bytes, or no place for the state")
@@ -586,12 +594,13 @@ EXPORT fmi2Status fmi2CancelStep(fmi2Component c)
     return checked(in, library.CancelStep(in->stock));
 }
 
-EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t n_unknown,
-                                               const fmi2ValueReference known[], size_t n_known,
-                                               const fmi2Real d_known[], fmi2Real d_unknown[])
+EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[],
+                                               size_t n_unknown, const fmi2ValueReference known[],
+                                               size_t n_known, const fmi2Real d_known[], fmi2Real d_unknown[])
 {
     INSTANCE(c)
-    return checked(in, library.GetDirectionalDerivative(in->stock, unknown, n_unknown, known, n_known, d_known, d_unknown));
+    return checked(in, library.GetDirectionalDerivative(in->stock, unknown, n_unknown, known, n_known,
+                                                        d_known, d_unknown));
 }
 
 EXPORT fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
@@ -608,12 +617,12 @@ EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueR
     return checked(in, library.GetRealOutputDerivatives(in->stock, vr, n, order, value));
 }
 
-#define STATUS(Name, Type)                                                                                             \
-    EXPORT fmi2Status fmi2Get##Name(fmi2Component c, const fmi2StatusKind kind, Type *value)                           \
-    {                                                                                                                  \
-        INSTANCE(c)                                                                                                    \
-        REQUIRE(value != NULL, "fmi2Get" #Name ": no place for the value")                                            \
-        return checked(in, library.Get##Name(in->stock, kind, value));                                                 \
+#define STATUS(Name, Type)                                                                                   \
+    EXPORT fmi2Status fmi2Get##Name(fmi2Component c, const fmi2StatusKind kind, Type *value)                 \
+    {                                                                                                        \
+        INSTANCE(c)                                                                                          \
+        REQUIRE(value != NULL, "fmi2Get" #Name ": no place for the value")                                   \
+        return checked(in, library.Get##Name(in->stock, kind, value));                                       \
     }
 
 STATUS(Status, fmi2Status)

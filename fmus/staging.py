@@ -37,9 +37,9 @@ from {package}.{module} import {component}
 # and then gives back a reference to the globals that it never took. Here it gets one.
 if locals() is not globals():
     try:
-        from ctypes import py_object, pythonapi
+        import ctypes
 
-        pythonapi.Py_IncRef(py_object(globals()))
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))
     except Exception:  # a Python without ctypes
         globals().setdefault("_references", []).append(globals())
 '''
@@ -141,11 +141,17 @@ class Stage:
     def explain(self, error: BaseException) -> str:
         """Return an exception as one sentence with the file and line of the package it came from."""
         where = ""
-        inside = str(self.folder / self.package)
         for frame in traceback.extract_tb(error.__traceback__):
-            if frame.filename.startswith(inside):
-                where = f" ({frame.filename[len(inside) + 1 :].replace(chr(92), '/')}:{frame.lineno})"
+            file = Path(frame.filename)
+            if file.is_relative_to(self.folder / self.package):
+                shown = file.relative_to(self.folder / self.package).as_posix()
+                if shown not in _MACHINERY:
+                    where = f" ({shown}:{frame.lineno})"
         return f"{type(error).__name__}: {error}{where}"
+
+
+_MACHINERY = ("core/component.py", "core/variables.py")
+"""What finds a wrong declaration, but is not where it stands."""
 
 
 @contextmanager
@@ -208,5 +214,6 @@ def missing_signals(role: Role, variables: Iterable[Any]) -> list[str]:
             lacking = [name for name in names if (causality, name) not in declared]
             if lacking:
                 shown = pattern if len(lacking) == len(names) else ", ".join(lacking)
-                problems.append(f"a {role.name} must declare the {causality} {shown}")
+                article = "an" if role.name[0] in "aeiou" else "a"
+                problems.append(f"{article} {role.name} must declare the {causality} {shown}")
     return problems

@@ -75,9 +75,12 @@ def signal(
             there means the same wheel if the output's own name has one, else all four.
 
     Raises:
-        DeclarationError: unknown name without unit and text, unknown unit, or a unit that
-            contradicts the dictionary.
+        DeclarationError: unknown name without unit and text, a name that is no lower-case
+            identifier, unknown unit, or a unit that contradicts the dictionary.
     """
+    plain = name.replace("*", "x")
+    if not (plain.isidentifier() and plain.isascii() and plain == plain.lower()):
+        raise DeclarationError(f"signal {name!r}: a name is made of lower-case letters, digits and _")
     known = SIGNALS.get(name)
     if known is None:
         for wheel in WHEELS:  # a single wheel of a four-wheel signal

@@ -51,12 +51,12 @@ static void check(int right, const char *what)
     }
 }
 
-#define CALL(name, ...)                                                                                     \
-    do {                                                                                                    \
-        fmi2##name##Fn call;                                                                                \
-        void *symbol = function("fmi2" #name);                                                              \
-        memcpy(&call, &symbol, sizeof symbol);                                                              \
-        check(call(__VA_ARGS__) == fmi2OK, "fmi2" #name);                                                   \
+#define CALL(name, ...)                                                                                      \
+    do {                                                                                                     \
+        fmi2##name##Fn call;                                                                                 \
+        void *symbol = function("fmi2" #name);                                                               \
+        memcpy(&call, &symbol, sizeof symbol);                                                               \
+        check(call(__VA_ARGS__) == fmi2OK, "fmi2" #name);                                                    \
     } while (0)
 
 static void step(fmi2Component unit, int k)
@@ -76,7 +76,8 @@ static void read_all(fmi2Component unit, size_t n, double values[])
 static fmi2Component prepare(fmi2InstantiateFn instantiate, char *argv[], int argc, const char *name,
                              const fmi2CallbackFunctions *callbacks)
 {
-    fmi2Component unit = instantiate(name, fmi2CoSimulation, argv[3], argv[2], callbacks, fmi2False, fmi2False);
+    fmi2Component unit =
+        instantiate(name, fmi2CoSimulation, argv[3], argv[2], callbacks, fmi2False, fmi2False);
     if (unit == NULL) {
         exit(3);
     }

@@ -1,0 +1,220 @@
+"""What the build writes: valid, minimal, the same bytes everywhere, and only what has changed."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import zipfile
+from xml.etree import ElementTree
+
+import pytest
+from fmpy.validation import validate_fmu
+
+from components.core.roles import ROLES
+from fmus.build import COMPONENTS, build_all, build_component, find_components
+from fmus.compiler import compile_launcher
+from orchestrator.errors import BuildError
+
+NAMES = list(find_components())
+SOME = ["controller_off", "driver_sine", "tyre_linear"]
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """A copy of three components and of what they need, in a folder of another name."""
+    root = tmp_path / "another checkout" / "components"
+    shutil.copytree(COMPONENTS / "core", root / "core", ignore=shutil.ignore_patterns("__pycache__"))
+    (root / "__init__.py").write_bytes((COMPONENTS / "__init__.py").read_bytes())
+    for path in ("controllers/off.py", "drivers/sine.py", "tyres/linear.py"):
+        target = root / path
+        target.parent.mkdir()
+        for source in (COMPONENTS / path, (COMPONENTS / path).parent / "__init__.py"):
+            (target.parent / source.name).write_bytes(source.read_bytes())
+    return root
+
+
+def touch(root, path, text="\n# touched\n"):
+    file = root / path
+    file.write_text(file.read_text("utf-8") + text, "utf-8")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_fmpy_finds_nothing_wrong(archive, name):
+    assert validate_fmu(str(archive(name))) == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_variable_carries_unit_description_and_dependencies(archive, name):
+    with zipfile.ZipFile(archive(name)) as fmu:
+        root = ElementTree.fromstring(fmu.read("modelDescription.xml"))
+    units = {unit.get("name") for unit in root.iter("Unit")}
+    variables = list(root.iter("ScalarVariable"))
+    for variable in variables:
+        assert (variable.get("description") or "").strip(), variable.get("name")
+        if variable[0].tag == "Real":
+            assert variable[0].get("unit") in units, variable.get("name")
+    outputs = {str(i) for i, v in enumerate(variables, 1) if v.get("causality") == "output"}
+    listed = list(root.iterfind("ModelStructure/Outputs/Unknown"))
+    assert {unknown.get("index") for unknown in listed} == outputs
+    assert all(unknown.get("dependencies") is not None for unknown in listed)
+    assert {u.get("index") for u in root.iterfind("ModelStructure/InitialUnknowns/Unknown")} == outputs
+    capabilities = root.find("CoSimulation").attrib
+    assert capabilities["canGetAndSetFMUstate"] == capabilities["canSerializeFMUstate"] == "true"
+
+
+def test_an_archive_holds_what_the_fmu_needs_and_nothing_else(archive):
+    with zipfile.ZipFile(archive("controller_off")) as fmu:
+        names = fmu.namelist()
+        module = fmu.read("resources/slavemodule.txt").decode()
+    package = module.replace("controller_off_", "yawbench_")
+    assert names == sorted(names)
+    assert [name for name in names if not name.startswith(f"resources/{package}/")] == [
+        "binaries/linux64/controller_off.so",
+        "binaries/linux64/libpythonfmu-export.so",
+        "binaries/win64/controller_off.dll",
+        "modelDescription.xml",
+        f"resources/{module}.py",
+        "resources/slavemodule.txt",
+    ]
+    inside = {name.removeprefix(f"resources/{package}/") for name in names if f"/{package}/" in name}
+    assert {"controllers/off.py", "core/component.py", "pythonfmu/fmi2slave.py"} <= inside
+    assert not {"core/fuzzy.py", "pythonfmu/builder.py", "pythonfmu/deploy.py"} & inside
+
+
+def test_the_same_sources_give_the_same_bytes_from_another_folder(checkout, tmp_path):
+    build_all(tmp_path / "here", components=SOME)
+    build_all(tmp_path / "there", root=checkout)
+    for name in SOME:
+        assert (tmp_path / "here" / f"{name}.fmu").read_bytes() == (
+            tmp_path / "there" / f"{name}.fmu"
+        ).read_bytes()
+
+
+def test_the_same_sources_give_the_same_bytes_in_another_process(tmp_path):
+    """With other hash seeds, so no order of a set or dictionary leaks into the archive."""
+    for seed in ("1", "2"):
+        script = f"from fmus.build import *; build_all(Path({str(tmp_path / seed)!r}), components={SOME})"
+        subprocess.run(
+            [sys.executable, "-c", script], env={"PYTHONHASHSEED": seed}, cwd=COMPONENTS.parent, check=True
+        )
+    for name in SOME:
+        assert (tmp_path / "1" / f"{name}.fmu").read_bytes() == (tmp_path / "2" / f"{name}.fmu").read_bytes()
+
+
+def test_the_launcher_compiles_to_the_same_bytes_again(tmp_path):
+    first, second = compile_launcher(tmp_path / "a")[0], compile_launcher(tmp_path / "b")[0]
+    assert first is not None
+    assert first == second
+    assert len(list(tmp_path.glob("a/*.so"))) == 1
+
+
+def test_windows_line_ends_make_no_difference(checkout, tmp_path):
+    build_all(tmp_path / "unix", root=checkout)
+    for file in checkout.rglob("*.py"):
+        file.write_bytes(file.read_bytes().replace(b"\n", b"\r\n"))
+    assert build_all(tmp_path / "unix", root=checkout).built == []
+
+
+def test_only_what_has_changed_is_built(checkout, tmp_path):
+    out = tmp_path / "out"
+    assert build_all(out, root=checkout).built == SOME
+    assert build_all(out, root=checkout).current == SOME
+    touch(checkout, "drivers/sine.py")
+    assert build_all(out, root=checkout).built == ["driver_sine"]
+    touch(checkout, "core/fuzzy.py")  # nobody of these uses it
+    assert build_all(out, root=checkout).built == []
+    touch(checkout, "core/component.py")
+    assert build_all(out, root=checkout).built == SOME
+    assert build_all(out, root=checkout, components=["tyre_linear"], force=True).built == ["tyre_linear"]
+
+
+def test_a_module_that_is_imported_anew_counts_from_then_on(checkout, tmp_path):
+    out = tmp_path / "out"
+    build_all(out, root=checkout)
+    touch(checkout, "drivers/sine.py", "\n\ndef late():\n    from ..core import fuzzy\n\n    return fuzzy\n")
+    build_all(out, root=checkout)
+    touch(checkout, "core/fuzzy.py")
+    assert build_all(out, root=checkout).built == ["driver_sine"]
+
+
+def test_the_guid_follows_the_content(checkout, tmp_path):
+    def guid():
+        build_all(tmp_path / "out", root=checkout)
+        with zipfile.ZipFile(tmp_path / "out" / "driver_sine.fmu") as fmu:
+            return ElementTree.fromstring(fmu.read("modelDescription.xml")).get("guid")
+
+    first = guid()
+    touch(checkout, "drivers/sine.py")
+    assert guid() != first
+
+
+def test_fmus_of_components_that_are_gone_are_removed_and_no_others(checkout, tmp_path):
+    out = tmp_path / "out"
+    build_all(out, root=checkout)
+    own = build_component(checkout / "drivers" / "sine.py", out, name="driver_own")
+    foreign = out / "foreign.fmu"
+    with zipfile.ZipFile(foreign, "w") as fmu:
+        fmu.writestr("modelDescription.xml", "<foreign/>")
+    (out / "broken.fmu").write_bytes(b"no archive")
+    (checkout / "drivers" / "sine.py").unlink()
+    assert build_all(out, root=checkout, components=["tyre_linear"]).removed == []
+    assert build_all(out, root=checkout).removed == ["driver_sine"]
+    assert {file.name for file in out.iterdir()} == {
+        "broken.fmu", "controller_off.fmu", own.name, foreign.name, "tyre_linear.fmu"
+    }  # fmt: skip
+
+
+def test_a_component_that_no_longer_builds_loses_its_fmu_and_the_others_are_built(checkout, tmp_path):
+    out = tmp_path / "out"
+    build_all(out, root=checkout)
+    touch(checkout, "drivers/sine.py", "\n1 +\n")
+    touch(checkout, "tyres/linear.py")
+    seen = []
+    with pytest.raises(BuildError) as caught:
+        build_all(out, root=checkout, progress=lambda name, what: seen.append((name, what)))
+    lines = len((checkout / "drivers" / "sine.py").read_text("utf-8").splitlines())
+    assert caught.value.problems == [f"driver_sine: drivers/sine.py:{lines}: SyntaxError: invalid syntax"]
+    assert seen == [("controller_off", "current"), ("driver_sine", "failed"), ("tyre_linear", "built")]
+    assert not (out / "driver_sine.fmu").exists()
+
+
+def test_an_unknown_component_is_an_error_that_lists_the_known_ones(checkout, tmp_path):
+    with pytest.raises(BuildError, match="there is no component 'driver_sin'; there are: controller_off, "):
+        build_all(tmp_path, components=["driver_sin"], root=checkout)
+
+
+def test_a_folder_that_cannot_be_written_is_an_error(checkout, tmp_path):
+    (tmp_path / "out").write_text("a file in the way")
+    with pytest.raises(BuildError, match="controller_off: cannot be written"):
+        build_all(tmp_path / "out", root=checkout)
+
+
+def test_building_leaves_no_module_and_no_path_behind(checkout, tmp_path):
+    modules, path = set(sys.modules), list(sys.path)
+    build_all(tmp_path / "out", root=checkout)
+    ours = {name for name in set(sys.modules) - modules if name.startswith(("yawbench_", "driver_sine"))}
+    assert ours == set()
+    assert sys.path == path
+
+
+def test_without_a_compiler_the_stock_library_is_used_and_the_reason_given(checkout, tmp_path, monkeypatch):
+    monkeypatch.setenv("CC", "no-such-compiler")
+    report = build_all(tmp_path / "out", root=checkout, components=["controller_off"])
+    assert report.warning == "there is no C compiler (no-such-compiler)"
+    with zipfile.ZipFile(tmp_path / "out" / "controller_off.fmu") as fmu:
+        assert "binaries/linux64/libpythonfmu-export.so" not in fmu.namelist()
+        assert b"fmi2Instantiate" in fmu.read("binaries/linux64/controller_off.so")
+    monkeypatch.setenv("CC", "false")
+    assert compile_launcher(tmp_path)[1] == "the C compiler failed: exit status 1"
+
+
+def test_every_file_in_a_role_folder_becomes_an_fmu():
+    files = [
+        f"{ROLES[folder.name].name}_{file.stem}"
+        for folder in COMPONENTS.iterdir()
+        if folder.name in ROLES
+        for file in folder.glob("*.py")
+        if file.stem != "__init__"
+    ]
+    assert sorted(files) == NAMES

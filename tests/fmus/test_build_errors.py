@@ -1,0 +1,239 @@
+"""What cannot become an FMU is named with its file, its line and what would be right."""
+
+from __future__ import annotations
+
+import pytest
+
+from fmus.build import COMPONENTS, build_component
+from orchestrator.errors import BuildError
+from tests.fmus.bare import Fmu, Unit
+
+GOOD = '''"""A controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from components.core.component import Component
+from components.core.variables import parameter
+
+
+@dataclass(frozen=True)
+class Parameters:
+    gain: float = parameter(100.0, "N.m.s/rad", "Gain; chosen: for the test", minimum=0.0)
+    steps: int = parameter(2, None, "A number")
+    fast: bool = parameter(False, None, "A switch")
+    mode: str = parameter("a", None, "A choice", choices=("a", "b"))
+
+
+class Idea(Component):
+    """Somebody's own idea."""
+
+    Parameters = Parameters
+    inputs = ("yaw_rate",)
+    outputs = ("yaw_moment",)
+    sampled = True
+
+    def output(self, t, u):
+        return (-self.p.gain * u[0],)
+'''
+
+
+@pytest.fixture
+def attempt(tmp_path):
+    """Write a controller with some text replaced, try to build it and return the problems."""
+
+    def do(*replacements, **options):
+        text = GOOD
+        for old, new in replacements:
+            assert old in text
+            text = text.replace(old, new)
+        file = tmp_path / "own work" / "controllers" / "idea.py"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text, "utf-8")
+        with pytest.raises(BuildError) as caught:
+            build_component(file, tmp_path / "out", **options)
+        assert list(tmp_path.glob("out/*")) == []
+        return caught.value.problems
+
+    return do
+
+
+def test_a_syntax_error_names_file_and_line(attempt):
+    (problem,) = attempt(("return (-self.p.gain * u[0],)", "return (-self.p.gain * u[0],"))
+    assert problem.startswith("controller_idea: controllers/idea.py:28: SyntaxError: ")
+
+
+def test_an_unknown_unit_lists_the_known_ones(attempt):
+    (problem,) = attempt(('"N.m.s/rad"', '"Nms"'))
+    assert problem.startswith(
+        "controller_idea: DeclarationError: Parameters.gain: unknown unit 'Nms'; known: 1, s,"
+    )
+    assert problem.endswith("(controllers/idea.py:19)")
+
+
+def test_an_unknown_signal_is_named(attempt):
+    (problem,) = attempt(('inputs = ("yaw_rate",)', 'inputs = ("yawrate",)'))
+    assert "signal 'yawrate' is not in the signal dictionary: give its unit and description" in problem
+
+
+def test_a_signal_that_the_role_demands_is_named(attempt):
+    problems = attempt(('"yaw_moment"', '"drive_force"'))
+    assert problems == ["controller_idea: a controller must declare the output yaw_moment"]
+
+
+def test_every_missing_signal_of_the_role_is_named(attempt):
+    problems = attempt(('"yaw_moment"', '"wheel_torque_fl", "wheel_torque_fr"'), role="actuators")
+    assert problems == [
+        "actuator_idea: an actuator must declare the input torque_request_*",
+        "actuator_idea: an actuator must declare the output wheel_torque_rl, wheel_torque_rr",
+    ]
+
+
+def test_an_import_from_outside_the_standard_library_is_refused(attempt):
+    (problem,) = attempt(("from dataclasses import", "import numpy\nfrom dataclasses import"))
+    assert problem == (
+        "controller_idea: controllers/idea.py:5: imports numpy, which is outside the standard library; "
+        "an FMU must run in a Python that has nothing else installed"
+    )
+
+
+def test_an_import_that_only_type_checkers_see_is_allowed(tmp_path):
+    text = GOOD.replace(
+        "from dataclasses import",
+        "from typing import TYPE_CHECKING\n\nif TYPE_CHECKING:\n    import numpy\nfrom dataclasses import",
+    )
+    file = tmp_path / "controllers" / "idea.py"
+    file.parent.mkdir()
+    file.write_text(text)
+    assert build_component(file, tmp_path / "out").exists()
+
+
+def test_an_import_of_the_whole_package_says_how_to_write_it(attempt):
+    (problem,) = attempt(
+        ("from components.core.component import Component", "import components.core.component")
+    )
+    assert problem.endswith("idea.py:7: write 'from components.core.component import ...'")
+
+
+def test_a_module_that_does_not_exist_is_named_with_the_line(attempt):
+    (problem,) = attempt(("components.core.variables", "components.core.variable"))
+    assert problem.startswith("controller_idea: controllers/idea.py:8: there is no module core.variable in ")
+
+
+def test_an_import_beyond_the_package_is_refused(attempt):
+    (problem,) = attempt(("from components.core.component", "from ....core.component"))
+    assert problem.endswith("idea.py:7: the relative import goes beyond the package of the components")
+
+
+def test_a_file_without_a_component_is_refused(attempt):
+    (problem,) = attempt(("class Idea(Component)", "class Idea"))
+    assert problem == "controller_idea: defines no component; one is right"
+
+
+def test_a_file_with_two_components_is_refused(attempt):
+    (problem,) = attempt(("class Idea(", "class First(Component):\n    pass\n\n\nclass Idea("))
+    assert problem == "controller_idea: defines components First, Idea; one is right"
+
+
+def test_a_component_may_build_on_another_in_the_same_file(tmp_path):
+    file = tmp_path / "controllers" / "idea.py"
+    file.parent.mkdir()
+    file.write_text(
+        GOOD.replace("class Idea(Component)", "class Base(Component):\n    pass\n\n\nclass Idea(Base)")
+    )
+    assert build_component(file, tmp_path).exists()
+
+
+def test_an_exception_while_importing_names_file_and_line(attempt):
+    (problem,) = attempt(("class Idea", "LIMIT = 1 / 0\n\n\nclass Idea"))
+    assert problem == "controller_idea: ZeroDivisionError: division by zero (controllers/idea.py:19)"
+
+
+def test_leaving_the_interpreter_while_importing_is_an_error(attempt):
+    (problem,) = attempt(("class Idea", "raise SystemExit(0)\n\n\nclass Idea"))
+    assert problem == "controller_idea: SystemExit: 0 (controllers/idea.py:19)"
+
+
+def test_a_unit_that_cannot_be_instantiated_is_an_error(attempt):
+    (problem,) = attempt(
+        (
+            "    def output",
+            "    def __init__(self, **kwargs):\n        super().__init__(**kwargs)\n"
+            '        if "logger" in kwargs:\n            raise OSError("100 % stillborn")\n\n    def output',
+        )
+    )
+    assert problem.startswith("controller_idea: does not load: Fatal py exception encountered")
+    assert "OSError('100 % stillborn')" in problem
+
+
+def test_a_name_that_is_no_identifier_is_an_error(attempt):
+    (problem,) = attempt(
+        ('"yaw_moment",', '"yaw_moment", signal("Gier winkel", "rad", "text"),'),
+        ("import parameter", "import parameter, signal"),
+    )
+    assert "signal 'Gier winkel': a name is made of lower-case letters, digits and _ (contr" in problem
+
+
+def test_what_fmpy_finds_in_the_model_description_is_an_error(attempt):
+    spoilt = """    def to_xml(self, model_options=None):
+        root = super().to_xml(model_options)
+        structure = root.find("ModelStructure")
+        structure.remove(structure.find("InitialUnknowns"))
+        return root
+
+    def output"""
+    (problem,) = attempt(("    def output", spoilt))
+    assert problem.startswith("controller_idea: model description: ")
+    assert "InitialUnknowns" in problem
+
+
+@pytest.mark.parametrize(
+    ("defaults", "message"),
+    [
+        ({"gian": 1.0}, "has no parameter 'gian'; it has: gain, steps, fast, mode"),
+        ({"gain": "much"}, "parameter gain is of type float, not str"),
+        ({"steps": 1.5}, "parameter steps is of type int, not float"),
+        ({"fast": 1}, "parameter fast is of type bool, not int"),
+        ({"gain": -1.0}, "gain must be at least 0 (got -1.0)"),
+        ({"mode": "c"}, "mode must be one of a, b (got 'c')"),
+    ],
+)
+def test_other_defaults_must_fit_the_parameters(attempt, defaults, message):
+    assert attempt(defaults=defaults) == [f"controller_idea: {message}"]
+
+
+def test_a_file_without_a_role_or_that_does_not_exist_is_an_error(tmp_path):
+    with pytest.raises(BuildError, match="there is no such file"):
+        build_component(tmp_path / "controllers" / "none.py", tmp_path)
+    (tmp_path / "idea.py").write_text(GOOD)
+    with pytest.raises(
+        BuildError, match=r"which role\? Put it into a folder called one of: drivers, references"
+    ):
+        build_component(tmp_path / "idea.py", tmp_path)
+    (tmp_path / "own-idea.py").write_text(GOOD)
+    with pytest.raises(BuildError, match="the name of an FMU is made of letters, digits and _"):
+        build_component(tmp_path / "own-idea.py", tmp_path, role="controllers")
+
+
+@pytest.mark.parametrize("place", ["controllers/idea.py", "controller_idea.py"])
+def test_a_file_from_anywhere_becomes_an_fmu_with_its_neighbours(tmp_path, unpack, place):
+    file = tmp_path / "my own work" / place
+    file.parent.mkdir(parents=True)
+    text = GOOD.replace("from components.core.c", "from .gains import FACTOR\nfrom components.core.c")
+    file.write_text(text.replace("-self.p.gain", "-FACTOR * self.p.gain"))
+    (file.parent / "gains.py").write_text(
+        "from components.core.roles import WHEELS\n\nFACTOR = len(WHEELS)\n"
+    )
+    fmu = build_component(file, tmp_path / "out", defaults={"gain": 10, "mode": "b", "fast": True})
+    assert fmu == tmp_path / "out" / "controller_idea.fmu"
+    unit = Unit(Fmu(unpack(fmu)), yaw_rate=0.5)
+    assert (unit.get("gain"), unit.get("mode"), unit.get("fast")) == ([10.0], [b"b"], [1])
+    unit.start()
+    assert unit.outputs() == [-20.0]
+    unit.free()
+
+
+def test_a_component_of_the_project_can_be_built_by_its_file(tmp_path):
+    fmu = build_component(COMPONENTS / "tyres" / "linear.py", tmp_path)
+    assert fmu.name == "tyre_linear.fmu"

@@ -1,0 +1,252 @@
+"""Many instances, and several builds of one component, live side by side in one process."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fmus.build import COMPONENTS, build_component
+from tests.fmus.bare import Fmu, Unit
+
+TESTS = Path(__file__).resolve().parent
+
+
+def run_apart(script: str, *arguments: str) -> dict:
+    """Run a script in a Python of its own with the tests on its path; return what it prints as JSON."""
+    command = [sys.executable, "-c", script, *arguments]
+    done = subprocess.run(command, cwd=TESTS.parent.parent, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_two_builds_of_a_component_with_other_defaults_keep_their_own_results(tmp_path, unpack):
+    source = COMPONENTS / "drivers" / "sine.py"
+    small = build_component(source, tmp_path, name="driver_small", defaults={"amplitude": 0.01})
+    large = build_component(source, tmp_path, name="driver_large", defaults={"amplitude": 0.04, "periods": 2})
+    angles = {}
+    for fmu in (Fmu(unpack(small)), Fmu(unpack(large))):
+        unit = Unit(fmu)
+        unit.start(2.2)
+        angles[fmu.name] = unit.get("steer_angle")[0]
+    assert angles["driver_small"] == pytest.approx(0.00998027, rel=1e-5)
+    assert angles["driver_large"] == pytest.approx(4 * angles["driver_small"], rel=1e-12)
+
+
+def test_two_builds_of_the_fnn_with_other_weights_differ_in_one_process(tmp_path, unpack):
+    source = COMPONENTS / "controllers" / "fnn.py"
+    results = []
+    for folder, gain in (("first", 5000.0), ("second", 1000.0)):
+        fmu = Fmu(unpack(build_component(source, tmp_path / folder, defaults={"moment_gain": gain})))
+        unit = Unit(fmu, sideslip_ref=0.004)
+        unit.start()
+        unit.step(0.0)
+        results.append(unit.get("yaw_moment")[0])
+    assert results[0] != 0.0
+    assert results[1] == pytest.approx(results[0] / 5.0, rel=1e-3)
+    assert results[1] != results[0]
+
+
+def test_the_defaults_of_a_variant_stand_in_its_model_description(tmp_path, unpack):
+    source = COMPONENTS / "drivers" / "sine.py"
+    fmu = Fmu(unpack(build_component(source, tmp_path, name="driver_other", defaults={"amplitude": 0.02})))
+    natural = Fmu(unpack(build_component(source, tmp_path)))
+    assert (fmu.start["amplitude"], natural.start["amplitude"]) == ("0.02", "0.05")
+    assert list(fmu.reference) == list(natural.reference)
+    assert fmu.guid != natural.guid
+
+
+MANY = """
+import gc, json, sys
+from tests.fmus.bare import Fmu, Unit
+
+def resident():
+    return int(open("/proc/self/statm").read().split()[1])
+
+fmu = Fmu(sys.argv[1])
+module = open(fmu.folder / "resources" / "slavemodule.txt").read().strip()
+without_ctypes = len(sys.argv) > 2
+
+def live(n):
+    units = []
+    for i in range(n):
+        unit = Unit(fmu, f"unit {i}")
+        unit.start()
+        unit.step(0.0)
+        if i % 2:
+            unit.do("fmi2Reset")
+        units.append(unit)
+    for unit in units:
+        unit.free()
+
+if without_ctypes:
+    sys.modules["ctypes"] = None
+path = list(sys.path)
+live(40)
+gc.collect()
+entry = vars(sys.modules[module])
+references, pages, objects = sys.getrefcount(entry), resident(), len(gc.get_objects())
+for _ in range(10):
+    live(40)
+gc.collect()
+print(json.dumps({
+    "path": sys.path == path,
+    "references": sys.getrefcount(entry) - references,
+    "pages": resident() - pages,
+    "objects": len(gc.get_objects()) - objects,
+}))
+"""
+
+
+def test_four_hundred_instances_leave_nothing_behind(load):
+    found = run_apart(MANY, str(load("driver_sine").folder))
+    assert found["path"]
+    assert found["references"] == 0
+    # PythonFMU's library itself forgets a short list and some strings, 1.2 KiB, per instantiation.
+    assert found["objects"] < 600 + 40
+    assert found["pages"] < 400  # of 4 KiB, for 600 instantiations
+
+
+def test_instances_survive_in_a_python_without_ctypes(load):
+    found = run_apart(MANY, str(load("driver_sine").folder), "without ctypes")
+    assert found["path"]
+    assert found["references"] == 0
+
+
+def test_fmus_bring_their_own_copy_of_pythonfmu(load):
+    script = """
+import json, sys, types
+sys.modules["pythonfmu"] = types.ModuleType("pythonfmu")  # another FMU's, of another version
+sys.modules["pythonfmu.fmi2slave"] = types.ModuleType("pythonfmu.fmi2slave")
+from tests.fmus.bare import Fmu, Unit
+unit = Unit(Fmu(sys.argv[1]), amplitude=0.5)
+unit.start(2.25)
+print(json.dumps(unit.outputs()))
+"""
+    assert run_apart(script, str(load("driver_sine").folder))[0] == pytest.approx(0.5)
+
+
+def test_different_fmus_share_one_interpreter_that_no_unloading_ends(load, unpack, host, tmp_path):
+    """In a C host: the FMU that has started Python is unloaded while the other goes on."""
+    first, second = load("driver_sine"), load("controller_off")
+    source = tmp_path / "two.c"
+    source.write_text(
+        r"""
+#include <dlfcn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "fmi2.h"
+static void logger(fmi2ComponentEnvironment e, fmi2String i, fmi2Status s, fmi2String c, fmi2String m, ...)
+{ (void)e; (void)i; (void)s; (void)c; fprintf(stderr, "%s\n", m); }
+static fmi2CallbackFunctions callbacks = {logger, calloc, free, NULL, NULL};
+static void *get(void *library, const char *name) { return dlsym(library, name); }
+typedef struct { void *library; fmi2Component unit; } Loaded;
+static Loaded load(const char *binary, const char *resources)
+{
+    Loaded l = {dlopen(binary, RTLD_NOW | RTLD_LOCAL), NULL};
+    fmi2InstantiateFn make; void *symbol = get(l.library, "fmi2Instantiate");
+    memcpy(&make, &symbol, sizeof symbol);
+    l.unit = make("unit", fmi2CoSimulation, "", resources, &callbacks, fmi2False, fmi2False);
+    return l;
+}
+static int call(Loaded l, const char *name)
+{
+    fmi2EnterInitializationModeFn f; void *symbol = get(l.library, name);
+    memcpy(&f, &symbol, sizeof symbol);
+    return f(l.unit);
+}
+static int step(Loaded l)
+{
+    fmi2DoStepFn f; void *symbol = get(l.library, "fmi2DoStep");
+    memcpy(&f, &symbol, sizeof symbol);
+    return f(l.unit, 0.0, 0.001, fmi2True);
+}
+static void unload(Loaded l)
+{
+    fmi2FreeInstanceFn f; void *symbol = get(l.library, "fmi2FreeInstance");
+    memcpy(&f, &symbol, sizeof symbol);
+    f(l.unit);
+    dlclose(l.library);
+}
+int main(int argc, char *argv[])
+{
+    (void)argc;
+    Loaded first = load(argv[1], argv[2]), second = load(argv[3], argv[4]);
+    int status = call(first, "fmi2EnterInitializationMode") + call(first, "fmi2ExitInitializationMode");
+    unload(first);
+    status += call(second, "fmi2EnterInitializationMode") + call(second, "fmi2ExitInitializationMode");
+    status += step(second);
+    first = load(argv[1], argv[2]);
+    status += call(first, "fmi2EnterInitializationMode") + call(first, "fmi2ExitInitializationMode");
+    unload(second);
+    status += step(first);
+    unload(first);
+    return status;
+}
+"""
+    )
+    program = tmp_path / "two"
+    include = f"-I{COMPONENTS.parent / 'fmus'}"
+    subprocess.run(["cc", "-std=c11", "-Werror", include, source, "-o", program, "-ldl"], check=True)
+    arguments = []
+    for fmu in (first, second):
+        arguments += [str(fmu.binary), (fmu.folder / "resources").as_uri()]
+    environment = {"PATH": os.environ["PATH"]}
+    done = subprocess.run([program, *arguments], env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_python_loaded_with_local_symbols_is_found_and_used(load, tmp_path, host):
+    """As in a program that embeds Python in a plug-in."""
+    from tests.fmus.test_hosts import python_libraries
+
+    libraries = list(python_libraries().values())
+    if not libraries:
+        pytest.skip("no libpython found")
+    fmu = load("driver_sine")
+    source = tmp_path / "local.c"
+    source.write_text(
+        r"""
+#include <dlfcn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "fmi2.h"
+static void logger(fmi2ComponentEnvironment e, fmi2String i, fmi2Status s, fmi2String c, fmi2String m, ...)
+{ (void)e; (void)i; (void)s; (void)c; fprintf(stderr, "%s\n", m); }
+static fmi2CallbackFunctions callbacks = {logger, calloc, free, NULL, NULL};
+int main(int argc, char *argv[])
+{
+    (void)argc;
+    void *python = dlopen(argv[1], RTLD_NOW | RTLD_LOCAL), *symbol = dlsym(python, "Py_InitializeEx");
+    void (*start)(int); void *(*let_go)(void);
+    memcpy(&start, &symbol, sizeof symbol);
+    start(0);
+    symbol = dlsym(python, "PyEval_SaveThread");
+    memcpy(&let_go, &symbol, sizeof symbol);
+    let_go();
+    if (dlsym(RTLD_DEFAULT, "Py_IsInitialized") != NULL) return 4;
+    void *library = dlopen(argv[2], RTLD_NOW | RTLD_LOCAL);
+    fmi2InstantiateFn make;
+    symbol = dlsym(library, "fmi2Instantiate");
+    memcpy(&make, &symbol, sizeof symbol);
+    return make("unit", fmi2CoSimulation, "", argv[3], &callbacks, fmi2False, fmi2False) == NULL;
+}
+"""
+    )
+    program = tmp_path / "local"
+    include = f"-I{COMPONENTS.parent / 'fmus'}"
+    subprocess.run(["cc", "-std=c11", "-Werror", include, source, "-o", program, "-ldl"], check=True)
+    for library in libraries:
+        command = [program, library, str(fmu.binary), (fmu.folder / "resources").as_uri()]
+        # No other Python may be opened: this variable would lead to an error.
+        environment = {"PATH": "/nowhere", "YAWBENCH_LIBPYTHON": "/nowhere"}
+        if "/usr/lib" not in library:
+            environment["PYTHONHOME"] = str(Path(library).parent.parent)
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (0, ""), library
