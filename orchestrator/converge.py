@@ -25,7 +25,7 @@ from .jobs import Job, Outcome, read_back
 from .metrics import Value
 from .plan import Algorithm
 from .scenario import load_scenario
-from .tables import Cell, Table
+from .tables import Cell, Table, write_csv
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -144,6 +144,20 @@ def convergence_table(rows: Sequence[Row], title: str) -> Table:
     return table
 
 
+def write_rows(rows: Sequence[Row], path: Path) -> None:
+    """Write all runs as CSV, in SI."""
+    headings = ["algorithm", "step_size [s]", "error [1]", "order [1]", "wall_time [s]", "failed"]
+    cells: list[list[Cell]] = [
+        [
+            row.algorithm,
+            *(None if x is None else Value(x, "") for x in (row.step, row.error, row.order, row.wall_time)),
+            row.failed,
+        ]
+        for row in rows
+    ]
+    write_csv(path, headings, cells)
+
+
 def convergence_figure(rows: Sequence[Row], signal: str, title: str, note: str) -> Figure:
     """Return error over step and error over cost, both axes logarithmic, with slopes 1 and 2 to compare.
 
@@ -182,7 +196,7 @@ def convergence_figure(rows: Sequence[Row], signal: str, title: str, note: str) 
         steps = sorted({1000 * row.step for row in drawn})
         by_step.set_xticks(steps, [f"{step:g}" for step in steps])
         by_step.minorticks_off()
-        by_cost.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        by_cost.xaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5, 7)))
         by_cost.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
         by_cost.xaxis.set_minor_formatter("")
         handles = [Line2D([], [], label=name, **styles[name]) for name in names]
@@ -196,8 +210,9 @@ def _slopes(axes: Axes, rows: Sequence[Row]) -> None:
     coarse, fine = max(steps), min(steps)
     top = 3 * max(row.error or 0.0 for row in rows)
     for order in (1, 2):
-        end = top * (fine / coarse) ** order
+        end, middle = (top * (step / coarse) ** order for step in (fine, math.sqrt(coarse * fine)))
         axes.plot([coarse, fine], [top, end], color=QUIET, linewidth=0.8, linestyle=":")
         axes.annotate(
-            f"order {order}", (fine, end), (4, 4), textcoords="offset points", fontsize=7.5, color=QUIET
-        )
+            f"order {order}", (math.sqrt(coarse * fine), middle), (-4, 3), ha="right",
+            textcoords="offset points", fontsize=7.5, color=QUIET,
+        )  # fmt: skip

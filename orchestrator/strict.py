@@ -39,7 +39,7 @@ def _place(data: Any, location: Key) -> Key:
         in_list = isinstance(data, list) and isinstance(part, int)
         if in_list or (isinstance(data, dict) and part in data):
             data = data[part]
-        elif i < len(location) - 1 or part == "[key]":
+        elif i < len(location) - 1 or part == "[key]" or not isinstance(data, dict):
             continue
         key = (*key, part)
     return key

@@ -59,7 +59,7 @@ def judge_study(study: Study, out: Path, outcomes: Iterable[Outcome] = (), *, ea
             results[name] = found
     values: dict[tuple[str, str], Value] = {}
     for key, spec in study.spec.metrics.items():
-        chosen, window = metric(spec.metric), _window(spec)
+        chosen, window = metric(spec.metric), spec.window
         for name, run in results.items():
             value = evaluate(run, chosen, window)
             if value is not None:
@@ -68,10 +68,6 @@ def judge_study(study: Study, out: Path, outcomes: Iterable[Outcome] = (), *, ea
     claims = [judge(claim, values, runs) for claim in study.spec.claims]
     checks = [judge(claim, values, runs) for claim in study.spec.checks]
     return Findings(study, results, failed, values, claims, checks)
-
-
-def _window(spec: MetricSpec) -> tuple[float, float] | None:
-    return (spec.window[0], spec.window[1]) if spec.window else None
 
 
 def heading(spec: MetricSpec) -> str:

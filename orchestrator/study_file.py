@@ -76,7 +76,8 @@ def load_study(path: Path | str) -> Study:
                 document.report(("runs", i, "name"), f"there is already a run {run.name!r}")
             runs[run.name] = run
     study = Study(Path(path), spec, runs)
-    _check_names(study, document)
+    if not document.problems:
+        _check_names(study, document)
     if document.problems:
         raise ScenarioError(document.sentences())
     return study
@@ -125,15 +126,12 @@ def _check_names(study: Study, document: Document) -> None:
     for group, lists in patterns.items():
         for i, several in enumerate(lists):
             for k, pattern in enumerate(several):
-                if study.runs and not study.matching([pattern]):
+                if not study.matching([pattern]):
                     sentence = f"no run is named {pattern!r}" + hint(pattern, study.runs, lead="runs")
                     document.report((group, i, "runs", k), sentence)
     for i, table in enumerate(spec.tables):
         for k, name in enumerate(table.metrics):
             _check_metric(spec, document, ("tables", i, "metrics", k), name)
-    for name, item in spec.metrics.items():
-        if item.window and item.window[0] >= item.window[1]:
-            document.report(("metrics", name, "window"), "must be [from, to] with from before to")
     figures = [figure.name for figure in spec.figures]
     for i, name in enumerate(figures):
         if name in figures[:i]:
@@ -160,7 +158,7 @@ def _check_conditions(study: Study, document: Document, key: Key, claim: Claim) 
             bound = condition.bound
             places.append(((*key, i, given[0]), bound.run, bound.metric, bound.run in study.runs))
         for place, run, name, exists in places:
-            if study.runs and not exists:
+            if not exists:
                 sentence = f"there is no run {run!r}" + hint(run, study.runs, lead="runs")
                 document.report((*place, "run"), sentence)
             _check_metric(study.spec, document, (*place, "metric"), name)

@@ -21,6 +21,8 @@ A run entry with `for` stands for one run per combination; `{name}` in its texts
 
 from __future__ import annotations
 
+import math
+import re
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag
@@ -31,6 +33,7 @@ from .plan import Algorithm
 from .plots import OVERVIEW
 from .scenario_schema import Scalar, Time
 from .strict import Strict
+from .wording import short
 
 OPERATORS = ("above", "at_least", "below", "at_most")
 
@@ -49,6 +52,13 @@ def text_of(value: object) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
+def _window(value: object) -> tuple[float, float]:
+    numbers = isinstance(value, list) and len(value) == 2 and all(isinstance(v, (int, float)) for v in value)
+    if not numbers or not value[0] < value[1]:  # type: ignore[index]
+        raise ValueError(f"must be [from, to] in s, from before to (got {short(value)})")
+    return float(value[0]), float(value[1])  # type: ignore[index]
+
+
 def _metric_name(name: str) -> str:
     try:
         return metric(name).name
@@ -57,6 +67,7 @@ def _metric_name(name: str) -> str:
 
 
 Alternatives = Annotated[dict[str, str], PlainValidator(_alternatives)]
+Window = Annotated[tuple[float, float], PlainValidator(_window)]
 MetricName = Annotated[str, AfterValidator(_metric_name)]
 Patterns = Annotated[list[str], Field(min_length=1)]
 """Names of runs, with `*` and `?` for many."""
@@ -81,9 +92,7 @@ class MetricSpec(Strict):
     """A number per run."""
 
     metric: MetricName = Field(description="measure(signal)")
-    window: list[float] | None = Field(
-        None, description="[from, to] in s; left out: the whole run", min_length=2, max_length=2
-    )
+    window: Window | None = Field(None, description="[from, to] in s; left out: the whole run")
     heading: str = Field("", description="Heading of its column; default: the formula")
 
 
@@ -103,9 +112,16 @@ class Reference(Strict):
     times: float = 1.0
 
 
-Number = float | int | str
+def _number(value: object) -> float | str:
+    """Return a number in SI, or text that begins with one."""
+    plain = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    if not plain and not (isinstance(value, str) and re.match(r"\s*[+-]?\.?\d", value)):
+        raise ValueError("must be a number, a number with its unit ('5 %'), or {run: ..., metric: ...}")
+    return value  # type: ignore[return-value]
+
+
 Bound = Annotated[
-    Annotated[Number, Tag("number")] | Annotated[Reference, Tag("reference")],
+    Annotated[float | str, PlainValidator(_number), Tag("number")] | Annotated[Reference, Tag("reference")],
     Discriminator(lambda value: "reference" if isinstance(value, (dict, Reference)) else "number"),
 ]
 """A number in SI, a number with its unit ('5 %'), or another run's metric."""

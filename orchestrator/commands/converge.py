@@ -41,11 +41,11 @@ def converge(
     """
     from typing import get_args
 
-    from ..converge import convergence_figure, convergence_table, measure, refinements
+    from ..converge import convergence_figure, convergence_table, measure, refinements, write_rows
     from ..errors import ScenarioError
     from ..figure_style import save
     from ..jobs import check, execute
-    from ..tables import for_markdown, write_csv
+    from ..tables import for_markdown
     from ..wording import hint
     from .batch import print_tables, progress, say
     from .run import default_folder
@@ -75,7 +75,7 @@ def converge(
     save(
         convergence_figure(rows, signal, title, f"yawbench converge {scenario} · {note}"), folder / "converge"
     )
-    write_csv(folder / "converge.csv", ["algorithm", "step", "error", "order", "wall_time"], table.rows)
+    write_rows(rows, folder / "converge.csv")
     (folder / "converge.md").write_text(for_markdown(table), encoding="utf-8")
     print_tables([table])
     say(f"{folder}: converge.svg, converge.png, converge.csv, converge.md")

@@ -1,0 +1,204 @@
+"""`yawbench compare`, `converge`, `plot` and `study` with real FMUs, from the command line to the files."""
+
+from __future__ import annotations
+
+import csv
+
+import pytest
+
+from fmus.build import build_all
+from orchestrator.cli import main
+
+UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
+
+SCENARIO = """
+title: Half a car
+stop_time: 0.4
+step_size: 0.01
+inputs: {velocity_x: 20, friction: 0.7, sideslip: 0.001, sideslip_rate: 0}
+units:
+  driver:     {fmu: driver_sine, parameters: {frequency: 2, start_time: 0}}
+  reference:  {fmu: reference_steady_state}
+  controller: {fmu: controller_fuzzy_sideslip}
+"""
+
+STUDY = """
+title: Half a paper
+runs:
+  - for: {controller: ["off", fuzzy_sideslip]}
+    name: "{controller}"
+    scenario: half.yaml
+    swap: {controller: "controller_{controller}"}
+metrics:
+  moment: {metric: peak(yaw_moment)}
+tables:
+  - {title: Moments, runs: ["*"], metrics: [moment]}
+claims:
+  - {says: Without control there is no moment., holds_if: [{run: "off", metric: moment, at_most: 0}]}
+  - {says: Control is gentle., holds_if: [{run: fuzzy_sideslip, metric: moment, at_most: 1 N.m}]}
+figures:
+  - {name: moments, runs: ["*"], panels: [steer_angle, yaw_moment]}
+"""
+
+
+@pytest.fixture(scope="session")
+def fmus(tmp_path_factory):
+    """A folder with the FMUs of a controller in an open loop."""
+    folder = tmp_path_factory.mktemp("fmus")
+    build_all(folder, components=UNITS)
+    return folder
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty working directory with the scenario and the study."""
+    (tmp_path / "half.yaml").write_text(SCENARIO)
+    (tmp_path / "study.yaml").write_text(STUDY)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def yawbench(fmus, folder, capsys):
+    """Run the command line; return its exit status, its output and what it said on stderr."""
+
+    def run(*arguments):
+        given = [str(argument) for argument in arguments]
+        if given[0] != "plot":
+            given += ["--fmus", str(fmus)]
+        with pytest.raises(SystemExit) as exit_:
+            main(given)
+        captured = capsys.readouterr()
+        return exit_.value.code or 0, captured.out, captured.err
+
+    return run
+
+
+def test_compare_puts_the_runs_side_by_side(yawbench, folder):
+    status, out, said = yawbench(
+        "compare", "half.yaml", "--swap", "controller=controller_off,controller_fuzzy_sideslip", "--out", "o"
+    )
+    assert status == 0
+    assert "Half a car (controller exchanged)" in out
+    heading = next(line for line in out.splitlines() if "metric" in line)
+    assert heading.split()[1:] == ["controller_off", "controller_fuzzy_sideslip"]
+    assert said.splitlines()[-1].startswith("o: overview.svg, overview.png, metrics.csv, compare.md")
+    rows = {row["run"]: row for row in csv.DictReader((folder / "o/metrics.csv").open())}
+    assert float(rows["controller_off"]["peak(yaw_moment) [N.m]"]) == 0.0
+    assert float(rows["controller_fuzzy_sideslip"]["peak(yaw_moment) [N.m]"]) > 1.0
+    for run in rows:
+        assert (folder / "o" / run / "results.csv").is_file()
+
+
+def test_compare_finds_a_wrong_name_before_anything_runs(yawbench, folder):
+    status, out, said = yawbench("compare", "half.yaml", "--swap", "controller=controller_of", "--out", "o")
+    assert status == 2
+    assert out == ""
+    assert "did you mean 'controller_off'?" in said
+    assert not (folder / "o").exists()
+
+
+def test_compare_reports_a_failed_run_and_keeps_the_others(yawbench, folder):
+    (folder / "o").mkdir()
+    (folder / "o" / "controller_off").write_text("a file where the folder should be")
+    status, out, said = yawbench(
+        "compare", "half.yaml", "--swap", "controller=controller_off", "--out", "o", "--jobs", "1"
+    )
+    assert status == 2
+    assert "controller_off: failed: o/controller_off: results cannot be written here" in said
+    assert "failed" in out
+    rows = {row["run"]: row for row in csv.DictReader((folder / "o/metrics.csv").open())}
+    assert rows["controller_fuzzy_sideslip"]["status"] == "completed"
+
+
+def test_results_go_beside_those_of_run_if_nothing_is_said(yawbench, folder):
+    yawbench("compare", "half.yaml", "--swap", "controller=controller_off")
+    assert (folder / "results" / folder.name / "half-compare" / "overview.png").is_file()
+
+
+def test_converge_halves_the_step_and_reports_order_and_cost(yawbench, folder):
+    status, out, said = yawbench(
+        "converge", "half.yaml", "--signal", "reference.yaw_rate_ref", "--halvings", "2", "--out", "o",
+        "--algorithm", "jacobi", "--algorithm", "gauss_seidel",
+    )  # fmt: skip
+    assert status == 0
+    assert [line.split()[:2] for line in out.splitlines() if line.startswith((" jacobi", " gauss"))] == [
+        [name, step] for name in ("jacobi", "gauss_seidel") for step in ("10", "5", "2.5")
+    ]
+    assert said.splitlines()[-1] == "o: converge.svg, converge.png, converge.csv, converge.md"
+    rows = list(csv.DictReader((folder / "o/converge.csv").open()))
+    assert float(rows[0]["order [1]"]) == pytest.approx(1.0, abs=0.1)  # jacobi is one step late
+    assert float(rows[0]["wall_time [s]"]) > 0
+
+
+def test_converge_records_only_the_signal(yawbench, folder):
+    yawbench("converge", "half.yaml", "--signal", "reference.yaw_rate_ref", "--halvings", "2", "--out", "o",
+             "--algorithm", "jacobi")  # fmt: skip
+    header = (folder / "o/jacobi/5ms/results.csv").read_text().splitlines()[0]
+    assert header == "time,reference.yaw_rate_ref"
+
+
+def test_converge_names_a_wrong_signal_or_algorithm(yawbench):
+    status, _, said = yawbench("converge", "half.yaml", "--signal", "reference.yaw_rate")
+    assert status == 2
+    assert said == (
+        "half.yaml: 'reference.yaw_rate' is not recorded; did you mean 'reference.yaw_rate_ref'?\n"
+    )
+    status, _, said = yawbench("converge", "half.yaml", "--algorithm", "gauss")
+    assert status == 2
+    assert said.startswith("--algorithm gauss: no such algorithm")
+
+
+def test_study_runs_judges_and_draws(yawbench, folder):
+    status, out, said = yawbench("study", "study.yaml", "--out", "o")
+    assert status == 0
+    assert "Without control there is no moment." in out
+    assert "does not reproduce" in out
+    assert said.splitlines()[-1] == "Results, figures and tables: o (begin with o/study.md)"
+    for name in ("study.md", "study.json", "metrics.csv", "figures/moments.svg", "figures/moments.png"):
+        assert (folder / "o" / name).stat().st_size > 0
+
+
+def test_study_judges_what_is_there_without_running(yawbench, folder):
+    yawbench("study", "study.yaml", "--out", "o")
+    before = (folder / "o/off/run.json").read_bytes()
+    (folder / "o/study.md").unlink()
+    status, out, _ = yawbench("study", "study.yaml", "--out", "o", "--no-run")
+    assert status == 0
+    assert (folder / "o/study.md").is_file()
+    assert (folder / "o/off/run.json").read_bytes() == before
+    (folder / "o/off/run.json").unlink()
+    status, out, _ = yawbench("study", "study.yaml", "--out", "o", "--no-run")
+    assert status == 1
+    assert "not judged" in out
+
+
+def test_study_finds_a_wrong_scenario_before_anything_runs(yawbench, folder):
+    (folder / "half.yaml").write_text(SCENARIO.replace("frequency", "frequenzy"))
+    status, _, said = yawbench("study", "study.yaml", "--out", "o")
+    assert status == 2
+    assert "has no parameter 'frequenzy'; did you mean 'frequency'?" in said
+    assert said.count("\n") == 1  # once, though two runs have it
+    assert not (folder / "o").exists()
+
+
+def test_plot_draws_one_run_into_its_folder_and_several_beside_them(yawbench, folder):
+    yawbench("study", "study.yaml", "--out", "o")
+    status, _, said = yawbench("plot", "o/off")
+    assert (status, said) == (0, "o/off/overview.svg, overview.png\n")
+    status, _, _ = yawbench("plot", "o/off", "o/fuzzy_sideslip")
+    assert status == 0
+    assert (folder / "o/overview.png").is_file()
+    status, _, said = yawbench("plot", "o/off", "--panel", "yaw_rate_ref", "--out", "elsewhere")
+    assert (status, said) == (0, "elsewhere/overview.svg, overview.png\n")
+
+
+def test_plot_says_what_is_wrong(yawbench, folder):
+    status, _, said = yawbench("plot", "nowhere")
+    assert status == 2
+    assert said.startswith("nowhere: no results here")
+    yawbench("study", "study.yaml", "--out", "o")
+    status, _, said = yawbench("plot", "o/off", "--panel", "roll_angle")
+    assert (status, said) == (2, "o/off: nothing to draw, no run recorded any of roll_angle.\n")
+    status, _, said = yawbench("plot", "o/off", "--label", "a", "--label", "b")
+    assert (status, said) == (2, "--label: needs one for each folder of results (2 labels, 1 folder)\n")

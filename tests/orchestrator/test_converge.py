@@ -1,0 +1,154 @@
+"""Errors, orders and figures of convergence studies, from made-up runs of known order."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.converge import (
+    convergence_figure,
+    convergence_table,
+    measure,
+    refinements,
+    write_rows,
+)
+from orchestrator.errors import ResultsError, ScenarioError
+from orchestrator.jobs import Job, Outcome
+
+from .recorded import results, write
+
+H = 0.04
+SIGNAL = "plant.yaw_rate"
+
+
+def outcomes(folder: Path, orders: dict[str, int], halvings: int = 3, scale: float = 0.5) -> list[Outcome]:
+    """Return finished runs of sin(t) whose error is scale * sin(2 t) h^order."""
+    made = []
+    for name, order in orders.items():
+        for k in range(halvings + 1):
+            step = H / 2**k
+            t = np.linspace(0, 2, round(2 / step) + 1)
+            recorded = results({SIGNAL: np.sin(t) + scale * step**order * np.sin(2 * t)}, t)
+            write(recorded, folder / name / str(k), wall_time=float(2**k))
+            job = Job(f"{name} {k}", Path("x.yaml"), folder / name / str(k), step_size=step, algorithm=name)
+            made.append(Outcome(job))
+    return made
+
+
+def test_observed_orders_are_those_of_the_methods(tmp_path):
+    rows = measure(outcomes(tmp_path, {"extrapolated": 2, "gauss_seidel": 1}), SIGNAL)
+    orders = {(row.algorithm, row.step): row.order for row in rows}
+    assert orders["extrapolated", H] == pytest.approx(2.0, abs=1e-9)
+    assert orders["extrapolated", H / 2] == pytest.approx(2.0, abs=1e-9)
+    assert orders["gauss_seidel", H] == pytest.approx(1.0, abs=1e-9)
+    assert orders["extrapolated", H / 4] is None
+    assert orders["gauss_seidel", H / 8] is None
+
+
+def test_errors_are_relative_to_the_peak_and_against_the_finest_run_of_the_first_algorithm(tmp_path):
+    rows = measure(outcomes(tmp_path, {"extrapolated": 2, "jacobi": 1}), SIGNAL)
+    errors = {(row.algorithm, row.step): row.error for row in rows}
+    finest = 0.5 * (H / 8) ** 2
+    largest = np.max(np.abs(np.sin(2 * np.linspace(0, 2, 51))))
+    peak = np.max(np.abs(np.sin(t := np.linspace(0, 2, 401)) + finest * np.sin(2 * t)))
+    assert errors["extrapolated", H] == pytest.approx((0.5 * H**2 - finest) * largest / peak, rel=1e-9)
+    assert errors["jacobi", H / 8] == pytest.approx((0.5 * H / 8 - finest) * largest / peak, rel=1e-9)
+    assert errors["extrapolated", H / 8] is None
+
+
+def test_a_failed_run_leaves_the_others_their_errors(tmp_path):
+    made = outcomes(tmp_path, {"extrapolated": 2, "jacobi": 1})
+    made[4] = Outcome(made[4].job, ("plant: not finite",), 1)
+    rows = measure(made, SIGNAL)
+    failed = rows[4]
+    assert (failed.error, failed.order, failed.wall_time) == (None, None, None)
+    assert failed.failed == "plant: not finite"
+    assert rows[5].order == pytest.approx(1.0, abs=1e-9)
+    text = convergence_table(rows, "title").text()
+    assert text[4][2] == "failed: plant: not finite"
+
+
+def test_without_the_finest_run_there_is_nothing_to_compare_with(tmp_path):
+    made = outcomes(tmp_path, {"extrapolated": 2})
+    made[-1] = Outcome(made[-1].job, ("the process of this run died",), 1)
+    with pytest.raises(ResultsError, match="extrapolated 3: nothing to compare with: the process"):
+        measure(made, SIGNAL)
+
+
+def test_a_signal_that_is_zero_throughout_is_an_error(tmp_path):
+    made = outcomes(tmp_path, {"extrapolated": 2})
+    for k in range(4):
+        write(results({SIGNAL: np.zeros(3)}), tmp_path / "extrapolated" / str(k))
+    with pytest.raises(ResultsError, match=r"plant\.yaw_rate is zero throughout: choose another --signal"):
+        measure(made, SIGNAL)
+
+
+def test_the_table_says_step_error_order_and_cost(tmp_path):
+    table = convergence_table(measure(outcomes(tmp_path, {"extrapolated": 2}), SIGNAL), "title")
+    assert [row[:2] for row in table.text()] == [
+        ["extrapolated", step] for step in ("40 ms", "20 ms", "10 ms", "5 ms")
+    ]
+    assert [row[3] for row in table.text()] == ["2.00", "2.00", "-", "-"]
+    assert [row[4] for row in table.text()] == ["1.00 s", "2.00 s", "4.00 s", "8.00 s"]
+    assert table.text()[-1][2] == "the finest"
+
+
+def test_the_csv_has_plain_numbers_in_si(tmp_path):
+    write_rows(measure(outcomes(tmp_path, {"extrapolated": 2}), SIGNAL), tmp_path / "rows.csv")
+    rows = list(csv.DictReader((tmp_path / "rows.csv").open()))
+    assert [float(row["step_size [s]"]) for row in rows] == [H, H / 2, H / 4, H / 8]
+    assert rows[-1]["error [1]"] == ""
+    assert float(rows[0]["order [1]"]) == pytest.approx(2.0)
+
+
+def test_the_figure_shows_error_over_step_and_over_cost(tmp_path):
+    rows = measure(outcomes(tmp_path, {"extrapolated": 2, "jacobi": 1}), SIGNAL)
+    figure = convergence_figure(rows, SIGNAL, "title", "note")
+    by_step, by_cost = figure.axes
+    assert [axes.get_xscale() + axes.get_yscale() for axes in figure.axes] == ["loglog", "loglog"]
+    assert by_step.get_lines()[0].get_xdata() == pytest.approx([40, 20, 10])
+    assert by_cost.get_lines()[1].get_xdata() == pytest.approx([1, 2, 4, 8])
+    assert [text.get_text() for text in by_step.texts] == ["order 1", "order 2"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["extrapolated", "jacobi"]
+
+
+def test_runs_that_do_not_differ_cannot_be_drawn(tmp_path):
+    rows = measure(outcomes(tmp_path, {"extrapolated": 2}, scale=0.0), SIGNAL)
+    with pytest.raises(ResultsError, match="no two runs differ"):
+        convergence_figure(rows, SIGNAL, "title", "note")
+
+
+SCENARIO = """
+stop_time: 1
+step_size: 0.004
+algorithm: jacobi
+units:
+  plant: {fmu: plant_some}
+  controller: {fmu: controller_some, step_size: 0.008}
+"""
+
+
+def test_steps_are_halved_exactly_and_units_keep_their_own(tmp_path):
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    jobs = refinements(
+        tmp_path / "s.yaml", halvings=3, signal=SIGNAL, algorithms=["extrapolated", "jacobi"], out=tmp_path
+    )
+    assert [float(job.step_size) for job in jobs] == [0.004, 0.002, 0.001, 0.0005] * 2
+    assert [job.algorithm for job in jobs] == ["extrapolated"] * 4 + ["jacobi"] * 4
+    assert len({job.out for job in jobs}) == 8
+    assert all(job.record == (SIGNAL,) for job in jobs)
+
+
+def test_the_scenarios_own_algorithm_is_the_default(tmp_path):
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    jobs = refinements(tmp_path / "s.yaml", halvings=2, signal=SIGNAL, algorithms=[], out=tmp_path)
+    assert [job.algorithm for job in jobs] == ["jacobi"] * 3
+
+
+def test_a_signal_without_its_unit_is_an_error(tmp_path):
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    with pytest.raises(ScenarioError, match=r"--signal yaw_rate: write UNIT\.VARIABLE"):
+        refinements(tmp_path / "s.yaml", halvings=2, signal="yaw_rate", algorithms=[], out=tmp_path)

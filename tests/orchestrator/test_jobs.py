@@ -1,0 +1,121 @@
+"""Runs in processes of their own, with made-up runs in place of scenarios."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from orchestrator.errors import ScenarioError, SimulationError
+from orchestrator.jobs import Job, check, execute, pool, read_back
+from orchestrator.results import load_results
+
+from .recorded import car, write
+
+
+def record(job):
+    """Write results, and which process did."""
+    write(car(n=5), job.out)
+    (job.out / "pid").write_text(str(os.getpid()))
+
+
+def obey(job):
+    """Do what the label says."""
+    if job.label == "fails":
+        raise SimulationError("plant: step failed at t = 1 s", unit="plant", time=1.0)
+    if job.label == "wrong":
+        raise ScenarioError(["first problem", "second problem"])
+    if job.label == "dies":
+        os.kill(os.getpid(), signal.SIGKILL)
+    if job.label == "leaves":
+        os._exit(3)
+    if job.label == "breaks":
+        raise ZeroDivisionError("by zero")
+    if job.label == "hangs":
+        job.out.mkdir(parents=True)
+        os.mkfifo(job.out / "never")
+        (job.out / "never").read_text()
+    record(job)
+
+
+def jobs(folder: Path, *labels: str) -> list[Job]:
+    return [Job(label, Path("made_up.yaml"), folder / label) for label in labels]
+
+
+def test_every_run_has_a_process_of_its_own_and_outcomes_keep_their_order(tmp_path):
+    outcomes = execute(jobs(tmp_path, "a", "b", "c", "d"), workers=2, run=record)
+    assert [outcome.job.label for outcome in outcomes] == ["a", "b", "c", "d"]
+    assert all(outcome.ok for outcome in outcomes)
+    pids = {(tmp_path / label / "pid").read_text() for label in "abcd"}
+    assert len(pids) == 4
+    assert str(os.getpid()) not in pids
+
+
+def test_a_run_that_fails_or_dies_takes_no_other_with_it(tmp_path):
+    labels = ["fails", "good", "dies", "wrong", "leaves", "fine"]
+    outcomes = {one.job.label: one for one in execute(jobs(tmp_path, *labels), workers=2, run=obey)}
+    assert outcomes["good"].ok
+    assert outcomes["fine"].ok
+    assert outcomes["fails"].reason == "plant: step failed at t = 1 s"
+    assert outcomes["fails"].exit_status == 1
+    assert outcomes["wrong"].problems == ("first problem", "second problem")
+    assert outcomes["wrong"].exit_status == 2
+    assert outcomes["dies"].reason == "the process of this run died of signal SIGKILL"
+    assert outcomes["leaves"].reason == "the process of this run ended without a word, exit status 3"
+
+
+def test_an_error_of_the_program_itself_is_reported_too(tmp_path):
+    (outcome,) = execute(jobs(tmp_path, "breaks"), run=obey)
+    assert outcome.problems == ("ZeroDivisionError: by zero",)
+    assert outcome.exit_status == 1
+
+
+def test_each_outcome_is_told_as_it_comes(tmp_path):
+    told = []
+    outcomes = execute(jobs(tmp_path, "a", "fails", "b"), workers=1, run=obey, done=told.append)
+    assert told == outcomes
+
+
+def test_results_of_an_earlier_run_cannot_pass_for_new(tmp_path):
+    write(car(n=5), tmp_path / "fails")
+    execute(jobs(tmp_path, "fails"), run=obey)
+    assert isinstance(read_back(tmp_path / "fails"), str)
+
+
+def test_when_the_caller_stops_all_runs_end(tmp_path):
+    class Stop(Exception):
+        pass
+
+    def stop(outcome):
+        raise Stop
+
+    with pytest.raises(Stop):
+        execute(jobs(tmp_path, "hangs", "good"), workers=2, run=obey, done=stop)
+    never = os.open(tmp_path / "hangs" / "never", os.O_RDONLY | os.O_NONBLOCK)
+    os.close(never)
+    with pytest.raises(OSError, match="No such device"):  # nobody reads any more
+        os.open(tmp_path / "hangs" / "never", os.O_WRONLY | os.O_NONBLOCK)
+
+
+def test_only_a_run_that_reached_its_end_is_read_back(tmp_path):
+    write(car(n=5), tmp_path / "whole")
+    write(car(n=5), tmp_path / "part", status="failed", error={"message": "plant: step failed"})
+    assert read_back(tmp_path / "whole").folder == load_results(tmp_path / "whole").folder
+    assert read_back(tmp_path / "part") == f"{tmp_path / 'part'}: this run ended early: plant: step failed"
+    assert "no results here" in read_back(tmp_path / "none")
+
+
+def test_all_problems_of_all_jobs_are_found_before_any_runs(tmp_path):
+    first, second = tmp_path / "first.yaml", tmp_path / "second.yaml"
+    twice = [Job("a", first, tmp_path), Job("b", second, tmp_path), Job("c", first, tmp_path)]
+    with pytest.raises(ScenarioError) as error:
+        check(twice)
+    assert error.value.problems == [f"{path}: no such scenario file" for path in (first, second)]
+
+
+def test_results_can_be_read_by_several_processes(tmp_path):
+    folders = [write(car(n=5), tmp_path / name) for name in "ab"]
+    with pool(2) as workers:
+        assert [results.folder for results in workers.map(read_back, folders)] == folders

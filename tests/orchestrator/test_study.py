@@ -1,0 +1,308 @@
+"""Study files, their verdicts and what they leave on disk, judged on made-up results."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from orchestrator.claims import condition_text, judge
+from orchestrator.errors import ScenarioError
+from orchestrator.jobs import Job, Outcome
+from orchestrator.metrics import Value
+from orchestrator.study import claim_tables, judge_study, run_tables
+from orchestrator.study_file import load_study
+from orchestrator.study_report import write_study
+from orchestrator.study_schema import Claim
+
+from .recorded import car, write
+
+STUDY = """
+title: A made-up paper
+source: Nobody, Nowhere
+runs:
+  - for: {speed: [15, 25], controller: {"off": no control, fnn: neural network}}
+    name: "{speed}mps/{controller}"
+    label: "{controller}"
+    row: "{speed} m/s, {controller}"
+    scenario: "{speed}mps.yaml"
+    swap: {controller: "controller_{controller}"}
+    set: {driver.amplitude: 0.03, controller.learning: true}
+  - {name: slow, scenario: slow.yaml, stop_time: 2 s, algorithm: jacobi}
+metrics:
+  error: {metric: relative_peak_error(sideslip), heading: largest error}
+  late: {metric: peak(sideslip), window: [6.5, 8]}
+  moment: {metric: peak(yaw_moment)}
+tables:
+  - {title: Table, runs: ["*mps/*", slow], metrics: [error, moment]}
+claims:
+  - says: Without control the error exceeds 100 %.
+    short: "> 100 %"
+    source: section 3
+    holds_if: [{run: 15mps/off, metric: error, above: 100 %}]
+  - says: With the network it is within 1 %.
+    short: "≤ 1 %"
+    source: section 3
+    holds_if: [{run: 15mps/fnn, metric: error, at_most: 1 %}]
+    note: the paper names no gains
+  - says: The network is better.
+    source: section 4
+    holds_if:
+      - {run: 15mps/fnn, metric: error, below: {run: 15mps/off, metric: error, times: 0.5}}
+      - {run: 25mps/fnn, metric: error, below: {run: 25mps/off, metric: error}}
+checks:
+  - says: The car is at rest in the end.
+    holds_if: [{run: "*", metric: late, at_most: 0.1 deg}]
+  - says: Moments are small.
+    holds_if: [{run: "*mps/fnn", metric: moment, below: 1 kN.m}]
+figures:
+  - {name: both, title: Both at 15 m/s, runs: ["15mps/*"], panels: [sideslip, path]}
+  - {name: roll, runs: [slow], panels: [roll_angle]}
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    """Load the study with texts of it replaced."""
+
+    def load(*changes: tuple[str, str]):
+        text = STUDY
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        path = tmp_path / "study.yaml"
+        path.write_text(text)
+        return load_study(path)
+
+    return load
+
+
+def problems(study, *changes):
+    with pytest.raises(ScenarioError) as error:
+        study(*changes)
+    return [problem.partition(": ")[2] for problem in error.value.problems]
+
+
+GAINS = {"15mps/off": 2.4, "15mps/fnn": 1.02, "25mps/off": 3.0, "25mps/fnn": 1.04, "slow": 1.0}
+
+
+@pytest.fixture
+def out(tmp_path) -> Path:
+    """A folder with results of all runs."""
+    for name, gain in GAINS.items():
+        write(car(gain), tmp_path / "out" / name)
+    return tmp_path / "out"
+
+
+def test_for_stands_for_one_run_per_combination(study, tmp_path):
+    runs = study().runs
+    assert list(runs) == ["15mps/off", "15mps/fnn", "25mps/off", "25mps/fnn", "slow"]
+    run = runs["25mps/fnn"]
+    assert (run.label, run.row) == ("neural network", "25 m/s, neural network")
+    assert run.scenario == tmp_path / "25mps.yaml"
+    assert run.swaps == ("controller=controller_fnn",)
+    assert run.settings == ("driver.amplitude=0.03", "controller.learning=true")
+    assert (runs["slow"].label, runs["slow"].row) == ("slow", "slow")
+
+
+def test_a_run_becomes_a_job_with_a_folder_of_its_own(study, tmp_path):
+    job = study().runs["slow"].job(tmp_path / "out", None)
+    assert job.out == tmp_path / "out" / "slow"
+    assert (float(job.stop_time), job.algorithm) == (2.0, "jacobi")
+
+
+def test_an_fmu_given_by_its_path_is_relative_to_the_study_file(study, tmp_path):
+    run = study(('"controller_{controller}"', '"mine/{controller}.fmu"')).runs["15mps/fnn"]
+    assert run.swaps == (f"controller={tmp_path / 'mine/fnn.fmu'}",)
+
+
+def test_all_problems_of_a_study_are_reported_at_once(study):
+    found = problems(
+        study,
+        ("stop_time: 2 s", "stop_tim: 2 s"),
+        ("relative_peak_error(sideslip), h", "relative_peek_error(sideslip), h"),
+        ("window: [6.5, 8]", "window: [6.5]"),
+        ("title: Both at", "titel: Both at"),
+        ("above: 100 %", "above: [1]"),
+    )
+    assert found == [
+        "runs[1].stop_tim: unknown key; did you mean 'stop_time'? allowed here: name, scenario, for, label, "
+        "row, swap, set, stop_time, step_size and algorithm",
+        "metrics.error.metric: 'relative_peek_error(sideslip)': there is no measure 'relative_peek_error'"
+        "; did you mean 'relative_peak_error'?",
+        "metrics.late.window: must be [from, to] in s, from before to (got [6.5])",
+        "claims[0].holds_if[0].above: must be a number, a number with its unit ('5 %'), "
+        "or {run: ..., metric: ...}",
+        "figures[0].titel: unknown key; did you mean 'title'? allowed here: name, title, runs and panels",
+    ]
+
+
+def test_names_that_do_not_exist_are_reported_with_the_likely_ones(study):
+    found = problems(
+        study,
+        ("metrics: [error, moment]", "metrics: [error, momentum]"),
+        ("{run: 15mps/off, metric: error, above", "{run: 15mps/of, metric: error, above"),
+        ("{run: 25mps/off, metric: error}", "{run: 25mps/off, metric: errors}"),
+        ("runs: [slow], panels", "runs: [slowly], panels"),
+    )
+    assert found == [
+        "tables[0].metrics[1]: there is no metric 'momentum'; did you mean 'moment'?",
+        "claims[0].holds_if[0].run: there is no run '15mps/of'; did you mean '15mps/off'?",
+        "claims[2].holds_if[1].below.metric: there is no metric 'errors'; did you mean 'error'?",
+        "figures[1].runs[0]: no run is named 'slowly'; did you mean 'slow'?",
+    ]
+
+
+def test_no_two_runs_have_one_name(study):
+    assert problems(study, ("name: slow", "name: 15mps/off")) == [
+        "runs[1].name: there is already a run '15mps/off'"
+    ]
+
+
+@pytest.mark.parametrize("name", ["../up", "figures/x", "a//b", "/root", "a b", ".."])
+def test_a_run_is_named_as_a_folder_below_may_be(study, name):
+    assert problems(study, ("name: slow", f'name: "{name}"')) == [
+        f"runs[1].name: {name!r} cannot name a run: use letters, digits, . _ + - and / between folders"
+    ]
+
+
+def test_a_placeholder_without_values_is_an_error(study):
+    assert problems(study, ('"{speed}mps.yaml"', '"{sped}mps.yaml"')) == [
+        "runs[0].scenario: {sped} stands for nothing; did you mean 'speed'?"
+    ]
+
+
+def test_a_condition_has_exactly_one_bound(study):
+    assert problems(study, ("above: 100 %", "above: 100 %, below: 200 %")) == [
+        "claims[0].holds_if[0]: needs exactly one of above, at_least, below or at_most"
+    ]
+
+
+def test_a_missing_study_file_is_one_sentence(tmp_path):
+    with pytest.raises(ScenarioError) as error:
+        load_study(tmp_path / "none.yaml")
+    assert error.value.problems == [f"{tmp_path / 'none.yaml'}: no such study file"]
+
+
+def verdicts(judgements):
+    return [one.holds for one in judgements]
+
+
+def test_claims_are_judged_by_the_results_on_disk(study, out):
+    findings = judge_study(study(), out)
+    assert verdicts(findings.claims) == [True, False, True]
+    assert verdicts(findings.checks) == [True, False]
+    assert findings.claims[0].measured == ("140 %",)
+    assert findings.claims[2].measured == ("2.00 % against 140 %", "4.00 % against 200 %")
+    assert findings.checks[1].measured == ("2000 N·m to 2000 N·m",)
+    write(car(1.001), out / "15mps/fnn")
+    assert verdicts(judge_study(study(), out).claims) == [True, True, True]
+
+
+def test_a_claim_about_a_run_without_results_is_not_judged(study, out):
+    lost = Outcome(Job("15mps/off", Path("x"), out / "15mps/off"), ("plant: lost",), 1)
+    findings = judge_study(study(), out, [lost])
+    assert findings.failed == {"15mps/off": "plant: lost"}
+    assert verdicts(findings.claims) == [None, False, None]
+    assert findings.claims[2].measured == ("2.00 % against no result", "4.00 % against 200 %")
+    assert verdicts(findings.checks) == [None, False]
+
+
+def test_a_run_that_ended_early_counts_as_failed(study, out):
+    write(car(1.0), out / "slow", status="interrupted", error={"message": "the run was interrupted"})
+    findings = judge_study(study(), out)
+    assert findings.failed == {"slow": f"{out / 'slow'}: this run ended early: the run was interrupted"}
+
+
+def test_operators_and_factors_compare_as_they_say():
+    values = {("a", "m"): Value(1.0, "N.m"), ("b", "m"): Value(2.0, "N.m")}
+
+    def holds(**condition):
+        claim = Claim(says="x", holds_if=[{"run": "a", "metric": "m", **condition}])
+        return judge(claim, values, ["a", "b"]).holds
+
+    assert [holds(above=1.0), holds(at_least=1.0), holds(below=1.0), holds(at_most=1.0)] == [
+        False, True, False, True,
+    ]  # fmt: skip
+    assert holds(at_least={"run": "b", "metric": "m", "times": 0.5})
+    assert not holds(at_least={"run": "b", "metric": "m", "times": 0.6})
+    assert holds(below="0.002 kN.m")
+    assert holds(run="*", at_most=2)
+    assert not holds(run="*", at_most=1.5)
+    with pytest.raises(ScenarioError, match=r"bound: '2 deg' is not a value in N\.m"):
+        holds(below="2 deg")
+
+
+def test_conditions_can_be_read():
+    claim = Claim(
+        says="x",
+        holds_if=[
+            {"run": "a", "metric": "m", "at_most": "5 %"},
+            {"run": "a", "metric": "m", "below": {"run": "b", "metric": "n", "times": 0.5}},
+        ],
+    )
+    assert [condition_text(c) for c in claim.holds_if] == ["a: m ≤ 5 %", "a: m < 0.5 × n of b"]
+
+
+def test_what_the_paper_says_of_a_run_stands_beside_it(study, out):
+    (table,) = run_tables(judge_study(study(), out))
+    assert table.headings == ["run", "largest error", "the paper says", "verdict", "max|M_z|"]
+    assert table.text()[:3] == [
+        ["15 m/s, no control", "140 %", "> 100 % (section 3)", "holds", "2000 N·m"],
+        ["15 m/s, neural network", "2.00 %", "≤ 1 % (section 3)", "does not reproduce", "2000 N·m"],
+        ["25 m/s, no control", "200 %", "-", "-", "2000 N·m"],
+    ]
+    assert table.notes == [
+        "largest error: max|β - β_ref| / max|β_ref|",
+        "15 m/s, neural network: the paper names no gains",
+    ]
+
+
+def test_claims_about_several_runs_and_checks_have_tables_of_their_own(study, out):
+    paper, project = claim_tables(judge_study(study(), out))
+    assert paper.text() == [
+        ["The network is better. (section 4)", "2.00 % against 140 %\n4.00 % against 200 %", "holds"]
+    ]
+    assert [row[2] for row in project.text()] == ["holds", "does not hold"]
+
+
+def test_a_failed_run_is_named_in_the_table_with_its_reason(study, out):
+    lost = Outcome(Job("slow", Path("x"), out / "slow"), ("plant: lost",), 1)
+    (table,) = run_tables(judge_study(study(), out, [lost]))
+    assert table.text()[-1] == ["slow", "failed", "-", "-", "-"]
+    assert table.notes[-1] == "slow: plant: lost"
+
+
+def test_a_study_leaves_figures_tables_and_a_record(study, out):
+    findings = judge_study(study(), out)
+    said = write_study(findings, out)
+    assert len(said) == 1
+    assert said[0].startswith("figure roll: ")
+    assert "no run recorded any of roll_angle" in said[0]
+    assert sorted(path.name for path in (out / "figures").iterdir()) == ["both.png", "both.svg"]
+    report = (out / "study.md").read_text()
+    assert "| 15 m/s, no control | 140 % | > 100 % (section 3) | holds | 2000 N·m |" in report
+    assert "![Both at 15 m/s](figures/both.png)" in report
+    assert "- late: largest absolute value, from 6.5 to 8 s: `max|β|`" in report
+    rows = {row["run"]: row for row in csv.DictReader((out / "metrics.csv").open())}
+    assert float(rows["15mps/fnn"]["error [1]"]) == pytest.approx(0.02, rel=1e-9)
+    record = json.loads((out / "study.json").read_text())
+    assert record["claims"][1]["verdict"] == "does not reproduce"
+    assert record["claims"][1]["holds_if"] == ["15mps/fnn: error ≤ 1 %"]
+    assert record["runs"]["25mps/off"]["metrics"]["error"] == {"value": pytest.approx(2.0), "unit": "1"}
+    assert set(record["runs"]["slow"]["fmus"]) == {"controller_made_up", "plant_made_up"}
+
+
+def test_a_study_without_any_result_still_says_so(study, tmp_path):
+    findings = judge_study(study(), tmp_path / "empty")
+    said = write_study(findings, tmp_path / "empty")
+    assert said == [f"figure {name}: none of its runs has results" for name in ("both", "roll")]
+    assert "no results here" in (tmp_path / "empty" / "study.md").read_text()
+
+
+def test_the_study_of_paper_a_is_right_in_itself():
+    study = load_study(Path(__file__).parents[2] / "scenarios" / "fnn_sideslip" / "study.yaml")
+    assert {f"{v}mps/{c}" for v in (15, 25, 40) for c in ("off", "fuzzy_sideslip", "fnn")} <= set(study.runs)
+    assert all(run.scenario.is_file() for run in study.runs.values())
