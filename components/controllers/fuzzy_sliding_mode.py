@@ -82,7 +82,7 @@ class FuzzySlidingMode(Component):
     inputs = (*sliding_mode.ERRORS, "velocity_x", "steer_angle", "friction")
     outputs = (
         output("yaw_moment", *sliding_mode.ERRORS, "velocity_x", "steer_angle", "friction"),
-        output("sliding_surface", *sliding_mode.ERRORS, unit="rad/s", text="Sliding surface s"),
+        output("sliding_surface", *sliding_mode.SURFACE, unit="rad/s", text="Sliding surface s"),
         output("reaching_rate", "steer_angle", "friction", unit="rad/s2", text="Gain eps as set on line"),
         output("reaching_gain", "steer_angle", "friction", unit="1/s", text="Gain k_d as set on line"),
     )

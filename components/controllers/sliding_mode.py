@@ -52,7 +52,7 @@ class SlidingMode(Component):
     inputs = (*sliding_mode.ERRORS, "velocity_x")
     outputs = (
         output("yaw_moment", *sliding_mode.ERRORS, "velocity_x"),
-        output("sliding_surface", *sliding_mode.ERRORS, unit="rad/s", text="Sliding surface s"),
+        output("sliding_surface", *sliding_mode.SURFACE, unit="rad/s", text="Sliding surface s"),
     )
 
     def output(self, t, u):

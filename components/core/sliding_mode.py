@@ -26,6 +26,9 @@ ERRORS = (
 )
 """The inputs of the law, in the order of `surface` and `demand`."""
 
+SURFACE = ("yaw_rate_ref", "sideslip_ref", "yaw_rate", "sideslip")
+"""Those that the sliding surface itself follows."""
+
 
 def sign(s: float) -> float:
     """Return -1, 0 or 1."""

@@ -43,10 +43,17 @@ _RANGES = {
 }
 
 
-def plausible(names: Iterable[str], source: random.Random) -> dict[str, float]:
-    """Return a value for every name; a signal that is not in the list gets one from -1 to 1."""
+_SPEEDS = {"velocity_x", "wheel_speed_*", "wheel_velocity_*"}
+
+
+def plausible(names: Iterable[str], source: random.Random, *, slow: bool = False) -> dict[str, float]:
+    """Return a value for every name; a signal that is not in the list gets one from -1 to 1.
+
+    With `slow`, the car is nearly standing.
+    """
     values = {}
     for name in names:
         pattern = f"{name[:-2]}*" if name[-2:] in WHEELS and name[-3:-2] == "_" else name
-        values[name] = source.uniform(*_RANGES.get(pattern, (-1.0, 1.0)))
+        crawling = slow and pattern in _SPEEDS
+        values[name] = source.uniform(*((0.0, 1.5) if crawling else _RANGES.get(pattern, (-1.0, 1.0))))
     return values

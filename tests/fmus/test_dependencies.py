@@ -1,0 +1,150 @@
+"""The inputs that every output is declared to follow directly are those that it does follow.
+
+"Directly" means: at the same instant. So one input is changed and a step of no length is taken from
+the same state; what changes then depends on that input, and nothing else does. Initialization is
+the other case: there a plant's accelerations and wheel loads may depend on its forces too, since
+afterwards they are carried on from step to step.
+"""
+
+from __future__ import annotations
+
+import importlib
+import random
+import struct
+
+import pytest
+
+from components.core.component import Component
+from components.core.roles import WHEELS
+from fmus.build import find_components
+from tests.components.stand import Stand
+from tests.fmus.plausible import plausible
+
+COMPONENTS = find_components()
+FORCES = {"steer_angle", "yaw_moment"} | {f"tyre_force_{axis}_{wheel}" for axis in "xy" for wheel in WHEELS}
+
+
+def component_class(name: str) -> type[Component]:
+    module = importlib.import_module("components." + ".".join(COMPONENTS[name]))
+    found = [c for c in vars(module).values() if isinstance(c, type) and issubclass(c, Component)]
+    return max((c for c in found if c.__module__ == module.__name__), key=lambda c: len(c.__mro__))
+
+
+def bits(outputs):
+    return {name: struct.pack("d", value) for name, value in outputs.items()}
+
+
+def varied(component: type[Component], source: random.Random) -> dict:
+    """Return other values for some parameters: choices and switches at random, numbers scaled."""
+    values: dict = {}
+    for v in component.variables:
+        if v.causality != "parameter":
+            continue
+        if v.choices:
+            values[v.name] = source.choice(v.choices)
+        elif v.type == "Boolean":
+            values[v.name] = source.random() < 0.5
+        elif v.type == "Real" and source.random() < 0.3:
+            value = v.start * source.choice((0.2, 0.5, 2.0)) if v.start else source.choice((-0.3, 0.3, 1.0))
+            low = -1e300 if v.minimum is None else v.minimum
+            high = 1e300 if v.maximum is None else v.maximum
+            values[v.name] = min(max(value, low), high)
+    return values
+
+
+class Probe:
+    """A component in some state, asked what follows what."""
+
+    def __init__(self, component: type[Component], source: random.Random, *, vary: bool = False) -> None:
+        self.names = [v.name for v in component.variables if v.causality == "input"]
+        self.component = component
+        self.source = source
+        self.parameters = varied(component, source) if vary else {}
+        self.slow = vary and source.random() < 0.2
+
+    def inputs(self) -> dict[str, float]:
+        return plausible(self.names, self.source, slow=self.slow)
+
+    def driven(self) -> Stand:
+        """Return a unit that has been driven a while."""
+        stand = Stand(self.component, **self.parameters)
+        stand.start(**self.inputs())
+        for _ in range(self.source.randint(2, 6)):
+            stand.step(0.002, **self.inputs())
+        return stand
+
+    def changes(self, answer):
+        """Yield (input, output) for every output that changes when `answer` is given another input."""
+        base = self.inputs()
+        before = bits(answer(base))
+        for name in self.names:
+            other = plausible([name], self.source, slow=self.slow)
+            after = bits(answer(base | other))
+            yield from ((name, output) for output in after if after[output] != before[output])
+
+    def at_a_step(self, h: float):
+        """Return the (input, output) that are seen to be connected at a step of `h` [s]."""
+        stand = self.driven()
+        state = stand.unit._get_fmu_state()
+
+        def answer(inputs):
+            stand.unit._set_fmu_state(state)
+            return stand.step(h, **inputs)
+
+        return set(self.changes(answer))
+
+    def at_initialization(self):
+        return set(self.changes(lambda inputs: Stand(self.component, **self.parameters).start(**inputs)))
+
+
+def declared(component):
+    return {(name, v.name) for v in component.variables if v.causality == "output" for name in v.depends_on}
+
+
+@pytest.mark.parametrize("name", list(COMPONENTS))
+def test_declared_dependencies_are_exactly_those_found(name):
+    """A rate over the step, and what is learnt in it, show at a step of some length only.
+
+    For a unit that samples, all that shows there is direct: it knows nothing of what happens in
+    between. In the others the inputs may have been integrated, so there it proves nothing.
+    """
+    component = component_class(name)
+    source = random.Random(name)
+    expected = declared(component)
+    seen = set()
+    for trial in range(400):
+        probe = Probe(component, source, vary=trial % 4 != 0)
+        try:
+            at_once = probe.at_a_step(0.0)
+            later = probe.at_a_step(0.002)
+        except AssertionError:
+            assert trial % 4 != 0  # the component may refuse parameters, but not its own defaults
+            continue
+        direct = at_once | later if component.sampled else at_once
+        assert direct <= expected, f"not declared: {sorted(direct - expected)}"
+        seen |= at_once | later
+        if expected <= seen and trial > 20:
+            break
+    assert expected <= seen, f"declared, but never seen: {sorted(expected - seen)}"
+
+
+@pytest.mark.parametrize("name", list(COMPONENTS))
+def test_initial_values_depend_on_nothing_else(name):
+    """But for a plant's: its accelerations and its wheel loads start from the forces there are."""
+    component = component_class(name)
+    source = random.Random(name)
+    for _ in range(10):
+        extra = Probe(component, source).at_initialization() - declared(component)
+        if name.startswith("plant_"):
+            extra = {(i, o) for i, o in extra if i not in FORCES}
+        assert extra == set()
+
+
+@pytest.mark.parametrize("name", list(COMPONENTS))
+def test_reading_outputs_again_changes_nothing(name):
+    stand = Probe(component_class(name), random.Random(name)).driven()
+    before = stand.unit._fmu_state_to_bytes(stand.unit._get_fmu_state())
+    inputs = stand.unit._values[: stand.unit._n_in]
+    first = tuple(stand.unit.output(stand.time, inputs))
+    assert tuple(stand.unit.output(stand.time, inputs)) == first
+    assert stand.unit._fmu_state_to_bytes(stand.unit._get_fmu_state()) == before
