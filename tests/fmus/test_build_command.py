@@ -1,0 +1,88 @@
+"""`yawbench build`: what it builds, what it prints, how it ends."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from fmus.build import find_components
+from orchestrator.commands.build import build
+from orchestrator.errors import BuildError
+
+APP = typer.Typer()
+APP.command()(build)
+
+
+def run(*arguments):
+    return CliRunner().invoke(APP, [str(argument) for argument in arguments])
+
+
+def test_it_builds_what_is_named_and_says_so_on_stderr(tmp_path):
+    done = run("controller_off", "driver_sine", "--out", tmp_path)
+    assert (done.exit_code, done.stdout) == (0, "")
+    assert done.stderr == "controller_off: built\ndriver_sine: built\n"
+    assert {file.name for file in tmp_path.iterdir()} == {"controller_off.fmu", "driver_sine.fmu"}
+
+
+def test_it_builds_nothing_twice_unless_forced(tmp_path):
+    run("controller_off", "driver_sine", "--out", tmp_path)
+    assert run("controller_off", "driver_sine", "--out", tmp_path).stderr == "2 of 2 FMUs up to date\n"
+    assert run("driver_sine", "--out", tmp_path, "--force").stderr == "driver_sine: built\n"
+
+
+def test_it_builds_everything_by_default(tmp_path):
+    done = run("--out", tmp_path)
+    assert done.exit_code == 0
+    assert {file.stem for file in tmp_path.iterdir()} == set(find_components())
+
+
+def test_a_name_that_is_no_component_is_wrong_input(tmp_path):
+    done = run("driver_sin", "--out", tmp_path)
+    assert done.exit_code == 2
+    assert "there is no component 'driver_sin'" in " ".join(done.stderr.replace("│", " ").split())
+
+
+def test_a_python_file_from_anywhere_can_be_named(tmp_path):
+    file = tmp_path / "controller_zero.py"
+    file.write_text(
+        "from components.core.component import Component\n\n\n"
+        'class Zero(Component):\n    """Nothing."""\n\n    outputs = ("yaw_moment",)\n\n'
+        "    def output(self, t, u):\n        return (0.0,)\n"
+    )
+    done = run(file, "--out", tmp_path / "out")
+    assert done.exit_code == 0
+    assert done.stderr == f"controller_zero: built from {file}\n"
+    assert (tmp_path / "out" / "controller_zero.fmu").exists()
+
+
+def test_a_component_that_cannot_be_built_ends_with_status_1_and_one_sentence(tmp_path):
+    file = tmp_path / "controller_bad.py"
+    file.write_text("import numpy\n")
+    error = run(file, "--out", tmp_path / "out").exception
+    assert isinstance(error, BuildError)
+    assert error.exit_status == 1
+    assert str(error).startswith("controller_bad: ")
+    command = [sys.executable, "-m", "orchestrator.cli", "build", str(file), "--out", str(tmp_path / "out")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.endswith("an FMU must run in a Python that has nothing else installed\n")
+    assert "Traceback" not in done.stderr
+
+
+def test_without_a_compiler_it_warns(tmp_path, monkeypatch):
+    monkeypatch.setenv("CC", "no-such-compiler")
+    done = run("controller_off", "--out", tmp_path)
+    assert done.exit_code == 0
+    assert "warning: " in done.stderr
+    assert "there is no C compiler (no-such-compiler)" in done.stderr
+
+
+@pytest.mark.parametrize("what", ["orchestrator.commands.build", "orchestrator.cli"])
+def test_the_builder_is_loaded_only_when_it_is_needed(what):
+    script = f"import sys, {what}; print('fmus.build' in sys.modules or 'pythonfmu' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
