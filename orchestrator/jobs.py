@@ -21,6 +21,9 @@ from .plan import Algorithm, Plan
 from .results import RESULTS_FILE, RUN_FILE, Results, load_results
 from .wording import hint
 
+GRACE = 5.0
+"""Time that interrupted runs have to write what they have recorded [s]."""
+
 
 @dataclass(frozen=True)
 class Job:
@@ -160,11 +163,13 @@ def execute(
                 done(outcomes[one.number])
     except KeyboardInterrupt:  # Ctrl-C reaches the runs too: they write what they have
         for one in running:
-            one.process.join(timeout=5)
+            one.process.join(timeout=GRACE)
         raise
     finally:
         for one in running:
             one.process.terminate()
+            one.process.join(timeout=GRACE)
+            one.process.kill()  # one whose unit never comes back
             one.process.join()
 
 

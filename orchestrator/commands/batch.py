@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
-    from ..jobs import Outcome
+    from ..jobs import Job, Outcome
     from ..tables import Table
 
 Jobs = Annotated[
@@ -25,8 +26,23 @@ def say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def progress(total: int) -> Callable[[Outcome], None]:
-    """Return what reports each run as it ends."""
+def run_all(jobs: Sequence[Job], folder: Path, *, workers: int | None) -> list[Outcome]:
+    """Run all jobs, after making sure that every one can start, and report each as it ends.
+
+    Raises:
+        ScenarioError: a job cannot start; none has been.
+    """
+    from ..jobs import check, execute
+
+    check(jobs)
+    try:
+        return execute(jobs, workers=workers, done=_progress(len(jobs)))
+    except KeyboardInterrupt:
+        say(f"Interrupted; what was recorded until then: {folder}")
+        raise typer.Exit(1) from None
+
+
+def _progress(total: int) -> Callable[[Outcome], None]:
     width, count = len(str(total)), 0
 
     def done(outcome: Outcome) -> None:

@@ -34,15 +34,13 @@ def compare(
     fails is named and takes no other with it.
     """
     from ..compare import judge_comparison, metric_table, variants, write_comparison
-    from ..jobs import check, execute
-    from .batch import print_tables, progress, say
+    from .batch import print_tables, run_all, say
     from .run import default_folder
 
     default: Path = default_folder(scenario)
     folder = out or default.with_name(f"{default.name}-compare")
     work = variants(scenario, swap, set_ or (), folder, fmus)
-    check(work)
-    outcomes = execute(work, workers=jobs, done=progress(len(work)))
+    outcomes = run_all(work, folder, workers=jobs)
     comparison = judge_comparison(outcomes)
     title = str(comparison.runs[0].results.run.get("title") or "") if comparison.runs else ""
     exchanged = " and ".join(dict.fromkeys(text.partition("=")[0].strip() for text in swap))

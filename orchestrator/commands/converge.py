@@ -44,10 +44,9 @@ def converge(
     from ..converge import convergence_figure, convergence_table, measure, refinements, write_rows
     from ..errors import ScenarioError
     from ..figure_style import save
-    from ..jobs import check, execute
     from ..tables import for_markdown
     from ..wording import hint
-    from .batch import print_tables, progress, say
+    from .batch import print_tables, run_all, say
     from .run import default_folder
 
     for name in algorithm or ():
@@ -66,8 +65,7 @@ def converge(
         settings=set_ or (),
         fmus=fmus,
     )
-    check(work)
-    outcomes = execute(work, workers=1, done=progress(len(work)))
+    outcomes = run_all(work, folder, workers=1)
     rows = measure(outcomes, signal)
     title = f"Convergence of {signal}, {scenario.stem}"
     table = convergence_table(rows, title)

@@ -45,7 +45,9 @@ def plot(folders: Folders, label: Labels = None, panel: Panels = None, out: Out 
     from .batch import say
 
     if label and len(label) != len(folders):
-        given = f"{len(label)} label{'s' * (len(label) != 1)}, {len(folders)} folder{'s' * (len(folders) != 1)}"
+        given = (
+            f"{len(label)} label{'s' * (len(label) != 1)}, {len(folders)} folder{'s' * (len(folders) != 1)}"
+        )
         raise ScenarioError(f"--label: needs one for each folder of results ({given})")
     labels = label or distinct(folders)
     runs = [Run(name, load_results(folder)) for name, folder in zip(labels, folders, strict=True)]

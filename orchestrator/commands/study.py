@@ -24,11 +24,11 @@ def study(
     Without --out, results go to results/<folder of the study>/<its name>. Every run has a process
     of its own; one that fails is named in the table and takes no other with it.
     """
-    from ..jobs import Outcome, check, execute, pool
+    from ..jobs import Outcome, pool
     from ..study import claim_tables, judge_study, run_tables
     from ..study_file import load_study
     from ..study_report import REPORT, write_study
-    from .batch import print_tables, progress, say
+    from .batch import print_tables, run_all, say
     from .run import default_folder
 
     loaded = load_study(file)
@@ -36,8 +36,7 @@ def study(
     outcomes: list[Outcome] = []
     if not no_run:
         work = [run.job(folder, fmus) for run in loaded.runs.values()]
-        check(work)
-        outcomes = execute(work, workers=jobs, done=progress(len(work)))
+        outcomes = run_all(work, folder, workers=jobs)
     with pool(jobs) as workers:
         findings = judge_study(loaded, folder, outcomes, each=workers.map)
         problems = write_study(findings, folder, each=workers.map)

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import csv
+import json
+import os
+import signal
+import subprocess
+import sys
 
 import pytest
 
@@ -180,6 +185,28 @@ def test_study_finds_a_wrong_scenario_before_anything_runs(yawbench, folder):
     assert "has no parameter 'frequenzy'; did you mean 'frequency'?" in said
     assert said.count("\n") == 1  # once, though two runs have it
     assert not (folder / "o").exists()
+
+
+LONG = """
+  - {name: long, scenario: half.yaml, stop_time: 100000}
+metrics:"""
+
+
+def test_ctrl_c_ends_a_study_and_keeps_finished_runs(fmus, folder):
+    (folder / "study.yaml").write_text(STUDY.replace("\nmetrics:", LONG))
+    command = [sys.executable, "-m", "orchestrator.cli", "study", "study.yaml", "--out", "o", "--jobs", "1"]
+    process = subprocess.Popen(
+        [*command, "--fmus", str(fmus)], stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    assert process.stderr is not None
+    for line in process.stderr:
+        if "fuzzy_sideslip" in line:
+            break
+    os.killpg(process.pid, signal.SIGINT)
+    said = process.stderr.read()
+    assert process.wait() == 1
+    assert said.splitlines()[-1] == "Interrupted; what was recorded until then: o"
+    assert json.loads((folder / "o/fuzzy_sideslip/run.json").read_text())["status"] == "completed"
 
 
 def test_plot_draws_one_run_into_its_folder_and_several_beside_them(yawbench, folder):

@@ -84,14 +84,13 @@ def test_results_of_an_earlier_run_cannot_pass_for_new(tmp_path):
     assert isinstance(read_back(tmp_path / "fails"), str)
 
 
-def test_when_the_caller_stops_all_runs_end(tmp_path):
-    class Stop(Exception):
-        pass
-
+@pytest.mark.parametrize("why", [KeyboardInterrupt, ValueError])
+def test_when_the_caller_stops_all_runs_end(tmp_path, monkeypatch, why):
     def stop(outcome):
-        raise Stop
+        raise why
 
-    with pytest.raises(Stop):
+    monkeypatch.setattr("orchestrator.jobs.GRACE", 0.0)
+    with pytest.raises(why):
         execute(jobs(tmp_path, "hangs", "good"), workers=2, run=obey, done=stop)
     never = os.open(tmp_path / "hangs" / "never", os.O_RDONLY | os.O_NONBLOCK)
     os.close(never)
