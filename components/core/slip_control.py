@@ -17,7 +17,8 @@ What the paper leaves open, and what is done. The target's own rate is left out:
 jump of the request to the torque. Below `slip_control_force` the wheel gets R F, so without a request
 it rolls free; below `slip_control_speed`, where slip loses its meaning, R F with F the force at the
 slip target; both fade in linearly. While braking, the torque is never more than stops the wheel
-within one sample. In reverse only positive torque is used: negative torque is friction to every plant.
+within one sample. In reverse only positive torque is used, and only
+to brake: negative torque is friction to every plant.
 
 Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, equations (30)-(38).
 Ours differs: the cap (with combined slip the optimum grows with slip angle, at mu 0.3 from 0.05 at 0 to
@@ -137,5 +138,5 @@ def wheel_torque(
     if v >= 0.0:
         torque = max(torque, min(radius * f_x - stop * max(w, 0.0), 0.0), -p.brake_torque_limit)
     else:
-        torque = max(min(torque, radius * f_x - stop * min(w, 0.0)), 0.0)
+        torque = max(min(torque, radius * f_x - stop * min(w, 0.0)), 0.0) if request > 0.0 else 0.0
     return min(torque, p.drive_torque_limit), target

@@ -16,7 +16,8 @@ from collections.abc import Callable
 from math import sqrt
 
 GROWTH = 1.6
-"""Factor from one slip to the next on the way to the optimum; an optimum narrower than that is missed."""
+"""Factor from one slip to the next on the way to the optimum. Some tyres' curves (large slip angle on
+low friction) have two optima with a shallow dip between; one narrower than this factor is passed over."""
 FORCE_TOLERANCE = 1e-5
 """Relative error of the force at the slip found."""
 SMALLEST_FORCE = 1e-6

@@ -1,0 +1,440 @@
+"""Slip control: the inverse tyre curve over its whole range, the law, wheels that neither lock nor spin."""
+
+from __future__ import annotations
+
+from itertools import pairwise, product
+from math import isfinite, pi, sin
+
+import pytest
+from scipy.optimize import brentq
+
+from components.core.component import Component
+from components.core.slip_control import SlipControlParameters, slip_torque, wheel_torque
+from components.core.slip_curve import slip_for_force, slip_stiffness
+from components.core.variables import output
+from components.plants.eight_dof import EightDof
+from components.tyres.dugoff import Dugoff
+from components.tyres.linear import LinearTyre
+from components.tyres.magic_formula import MagicFormula
+from components.tyres.magic_formula_1987 import MagicFormula1987
+from components.wheel_controls.direct import Direct
+from components.wheel_controls.slip import CURVES, Slip, SlipParameters, tyre_sets
+
+from .loop import Loop
+from .stand import Stand
+
+WHEELS = ("fl", "fr", "rl", "rr")
+CAP, SHARE = 0.15, 0.95
+SHALLOW = 0.01  # a dip that the search may pass over
+LOADS = (300.0, 2000.0, 4000.0, 8000.0, 15000.0)
+ANGLES = (0.0, 0.03, -0.05, 0.1, 0.25, 0.6, 1.3, 2.8)
+FRICTIONS = (0.1, 0.3, 0.6, 1.0, 1.2)
+TYRES = {
+    "magic formula": {"tyre": "magic_formula"},
+    "magic formula, similarity": {"tyre": "magic_formula", "low_friction": "similarity"},
+    "magic formula, asymmetric": {"tyre": "magic_formula", "asymmetric_terms": True},
+    "magic formula, similarity, asymmetric": {
+        "tyre": "magic_formula",
+        "low_friction": "similarity",
+        "asymmetric_terms": True,
+    },
+    "magic formula 1987": {"tyre": "magic_formula_1987"},
+    "magic formula 1987, measured": {"tyre": "magic_formula_1987", "peak_friction": "measured"},
+    "dugoff": {"tyre": "dugoff"},
+    "linear": {"tyre": "linear"},
+    "linear, limited": {"tyre": "linear", "limited": True},
+}
+
+
+def tyre_curve(alpha, f_z, mu, **given):
+    p = SlipParameters(**given)
+    return CURVES[p.tyre](alpha, f_z, mu, tyre_sets(p)[0])
+
+
+def slip_limits(force, sign):
+    """Return the limits that plain scanning allows, and its grid; see `SHALLOW`.
+
+    `SHARE` times each slip from which the force falls, up to the first from which it falls by more than
+    `SHALLOW`; `CAP` if there is none of those.
+    """
+    n = 4000
+    grid = CAP / SHARE / n
+    forces = [sign * force(sign * i * grid) for i in range(n + 1)]
+    limits = []
+    top, rising = forces[0], True
+    for i, (before, now) in enumerate(pairwise(forces)):
+        falling = now < before - 1e-12 * abs(before)
+        if falling and rising:
+            limits.append(min(CAP, SHARE * i * grid))
+        rising = not falling
+        top = max(top, now)
+        if now < top - SHALLOW * abs(top):
+            return limits, grid
+    return [*limits, CAP], grid
+
+
+@pytest.mark.parametrize("name", TYRES)
+def test_the_inverse_curve_returns_the_force_asked_for_and_clamps_outside(name):
+    for f_z, alpha, mu in product(LOADS, ANGLES, FRICTIONS):
+        force, first = tyre_curve(alpha, f_z, mu, **TYRES[name])
+        for sign in (1.0, -1.0):
+            limits, grid = slip_limits(force, sign)
+            limit = limits[0]
+            at_zero, at_limit = force(0.0), force(sign * limit)
+            for part in (0.001, 0.02, 0.2, 0.5, 0.8, 0.97):
+                wanted = at_zero + part * (at_limit - at_zero)
+                kappa = slip_for_force(wanted, force, first=first, cap=CAP, share=SHARE)
+                assert force(kappa) == pytest.approx(wanted, rel=1e-3, abs=2e-6)
+                assert abs(kappa) <= limit + grid
+            if abs(at_limit - at_zero) > 1e-3:
+                for beyond in (1.1, 5.0):
+                    wanted = at_zero + beyond * (at_limit - at_zero)
+                    kappa = slip_for_force(wanted, force, first=first, cap=CAP, share=SHARE)
+                    at_limit_of_some_optimum = any(
+                        kappa == pytest.approx(sign * x, rel=5e-3, abs=2 * grid) for x in limits
+                    )
+                    beyond_a_dip = len(limits) > 1 and force(kappa) == pytest.approx(wanted, rel=1e-3)
+                    assert at_limit_of_some_optimum or beyond_a_dip
+
+
+def test_the_inverse_curve_is_continuous_in_the_force_up_to_the_clamp():
+    force, first = tyre_curve(0.05, 4000.0, 0.3)
+    slips = [slip_for_force(-2.0 * i, force, first=first, cap=CAP, share=SHARE) for i in range(700)]
+    assert all(later <= earlier for earlier, later in pairwise(slips))
+    slope = (force(slips[-1] + 1e-6) - force(slips[-1] - 1e-6)) / 2e-6  # the curve is flattest at its limit
+    assert max(earlier - later for earlier, later in pairwise(slips)) < 1.1 * 2.0 / slope
+
+
+def test_the_limit_is_the_share_of_the_dry_optimum_and_the_cap_where_the_optimum_lies_beyond():
+    force, first = tyre_curve(0.0, 4000.0, 0.3)
+    optimum = brentq(lambda k: force(k + 1e-6) - force(k - 1e-6), -0.08, -0.02)
+    assert slip_for_force(-9e9, force, first=first, cap=0.5, share=0.9) == pytest.approx(
+        0.9 * optimum, rel=2e-3
+    )
+    force, first = tyre_curve(0.26, 4000.0, 0.3)  # 15 degrees: the optimum is near kappa -0.9
+    assert slip_for_force(-9e9, force, first=first, cap=0.15, share=0.95) == -0.15
+    assert slip_for_force(-9e9, force, first=first, cap=0.9, share=0.95) < -0.5
+
+
+def test_a_curve_without_any_force_gives_the_cap_and_no_request_gives_no_slip():
+    for name, f_z, mu in product(TYRES, (0.0, 4000.0), (0.0, 1.0)):
+        force, first = tyre_curve(0.02, f_z, mu, **TYRES[name])
+        kappa = slip_for_force(-500.0, force, first=first, cap=CAP, share=SHARE)
+        if force(-CAP) == 0.0:
+            assert kappa == -CAP
+        if "asymmetric" not in name:
+            assert slip_for_force(0.0, force, first=first, cap=CAP, share=SHARE) == 0.0
+
+
+def test_zero_force_of_a_tyre_with_offsets_needs_a_slip():
+    force, first = tyre_curve(0.0, 4000.0, 1.0, asymmetric_terms=True)
+    kappa = slip_for_force(0.0, force, first=first, cap=CAP, share=SHARE)
+    assert force(0.0) < -100.0
+    assert kappa == pytest.approx(0.002, rel=0.05)
+    assert force(kappa) == pytest.approx(0.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("name", TYRES)
+def test_the_curve_that_is_inverted_is_that_of_the_tyre_unit(name):
+    units = {
+        "magic_formula": MagicFormula,
+        "magic_formula_1987": MagicFormula1987,
+        "dugoff": Dugoff,
+        "linear": LinearTyre,
+    }
+    given = dict(TYRES[name])
+    stand = Stand(units[given.pop("tyre")], **given)
+    stand.start()
+    for alpha, kappa, f_z, mu in (
+        (0.03, -0.02, 4000.0, 0.5),
+        (-0.2, 0.1, 2500.0, 1.0),
+        (0.0, -0.6, 800.0, 0.3),
+    ):
+        slips = {"slip_angle_rl": alpha, "slip_ratio_rl": kappa, "vertical_load_rl": f_z, "friction_rl": mu}
+        force, _ = tyre_curve(alpha, f_z, mu, **TYRES[name])
+        assert force(kappa) == pytest.approx(stand.step(0.001, **slips)["tyre_force_x_rl"], rel=1e-14)
+
+
+def test_each_axle_has_its_own_stiffness():
+    p = SlipParameters(slip_stiffness_scale_front=0.8, slip_stiffness_scale_rear=1.2)
+    front, rear = [CURVES[p.tyre](0.0, 4000.0, 1.0, c)[0](1e-6) for c in tyre_sets(p)]
+    assert front / rear == pytest.approx(0.8 / 1.2, rel=1e-4)
+
+
+def test_slip_stiffness_of_a_known_function_is_its_gradient():
+    slopes = slip_stiffness(lambda k, a: (k * k + 3.0 * a, sin(k) * a, 7.0), 0.2, 0.3)
+    assert slopes == pytest.approx((0.4, 3.0, 0.3 * 0.98006658, 0.19866933), rel=1e-7)
+
+
+def test_the_torque_gives_the_slip_rate_asked_for_in_both_branches():
+    # Against the derivative of the slip's own definition along the motion it causes.
+    p = SlipControlParameters()
+    radius, inertia, v, dv, f_x = p.wheel_radius, p.wheel_inertia, 15.0, -2.5, -900.0
+    for direction in (1.0, -1.0):
+        for kappa, target in ((-0.08, -0.05), (-0.02, -0.1), (0.06, 0.03), (0.3, 0.1)):
+            ground, rate_of_ground = direction * v, direction * dv
+            signed, wanted = direction * kappa, direction * target
+            rolling = ground * (1.0 + kappa) if kappa < 0.0 else ground / (1.0 - kappa)
+            torque = slip_torque(signed, wanted, f_x, v=ground, dv=rate_of_ground, p=p)
+            dw = (torque - radius * f_x) / inertia
+            h = 1e-6
+
+            def slip(t, rolling=rolling, ground=ground, dw=dw, dv=rate_of_ground):
+                w_r, v_t = rolling + radius * dw * t, ground + dv * t
+                return (w_r - v_t) / max(abs(w_r), abs(v_t))
+
+            s = wanted - signed
+            asked = max(-1.0, min(1.0, s / 0.02)) + 30.0 * s
+            assert slip(0.0) == pytest.approx(signed, rel=1e-12)
+            assert (slip(h) - slip(-h)) / (2 * h) == pytest.approx(asked, rel=1e-6)
+
+
+def torque_of(request, kappa=0.0, *, w, v, dv=0.0, f_z=4000.0, mu=0.8, h=0.001, **given):
+    p = SlipParameters(**given)
+    curve = CURVES[p.tyre](0.0, f_z, mu, tyre_sets(p)[0])
+    return wheel_torque(request, kappa, curve, w=w, v=v, dv=dv, sample_time=h, p=p)[0]
+
+
+def test_without_a_request_the_wheel_rolls_free():
+    for kappa, v in ((0.0, 20.0), (-0.01, 20.0), (0.02, 20.0), (0.0, 0.0)):
+        assert torque_of(0.0, kappa, w=v / 0.313, v=v, dv=-3.0) == 0.0
+
+
+def test_a_small_request_and_a_slow_wheel_get_force_times_radius():
+    assert torque_of(-50.0, -0.03, w=60.0, v=20.0) == pytest.approx(-50.0 * 0.313, rel=1e-4)
+    assert torque_of(-900.0, -0.03, w=2.0, v=1.0) == pytest.approx(-900.0 * 0.313, rel=1e-4)
+    assert torque_of(900.0, 0.0, w=0.0, v=0.0) == pytest.approx(900.0 * 0.313, rel=1e-4)
+
+
+def test_the_fades_leave_no_jump():
+    for low, high in (((-50.0, 20.0), (-50.1, 20.0)), ((-100.0, 20.0), (-100.1, 20.0))):
+        a, b = [torque_of(request, -0.03, w=60.0, v=v, brake_torque_limit=1e6) for request, v in (low, high)]
+        assert a == pytest.approx(b, abs=1.0)
+    for v in (1.0, 3.0):
+        a, b = [torque_of(-900.0, -0.03, w=3.0, v=v + dv) for dv in (-1e-4, 1e-4)]
+        assert a == pytest.approx(b, abs=0.1)
+
+
+def test_a_braked_wheel_gets_no_torque_that_would_reverse_it():
+    for kappa, w, v in product((-1.0, -0.8, -0.2), (0.0, 0.01, 0.5), (0.0, 0.05, 1.5, 10.0)):
+        torque = torque_of(-4000.0, kappa, w=w, v=v, h=0.002)
+        if torque < 0.0:
+            force, _ = tyre_curve(0.0, 4000.0, 0.8)
+            assert w + 0.002 * (torque - 0.313 * force(kappa)) / 2.1 >= -1e-12
+
+
+def test_a_car_at_rest_that_is_asked_to_brake_gets_no_torque():
+    assert torque_of(-2000.0, 0.0, w=0.0, v=0.0) == 0.0
+
+
+def test_nothing_drives_the_car_backwards():
+    for kappa, v in ((0.0, -5.0), (-0.2, -5.0), (0.3, -5.0), (0.0, -0.5)):
+        assert torque_of(-2000.0, kappa, w=v / 0.313, v=v) == 0.0
+
+
+def test_a_car_that_rolls_backwards_is_held_by_a_forward_request():
+    assert torque_of(2000.0, 0.0, w=-5.0 / 0.313, v=-5.0) > 0.0
+
+
+def test_torques_keep_their_limits_and_stay_finite_whatever_comes_in():
+    for request, kappa, v, w in product(
+        (-1e6, -900.0, 0.0, 3e3, 1e9), (-2.0, -1.0, 0.0, 0.9, 1.0), (0.0, 40.0), (-9.0, 300.0)
+    ):
+        for f_z, mu in ((0.0, 1.0), (1e5, 1.0), (4000.0, 0.0)):
+            torque = torque_of(request, kappa, w=w, v=v, f_z=f_z, mu=mu, dv=-50.0)
+            assert isfinite(torque)
+            assert -3300.0 <= torque <= 800.0
+
+
+def test_a_wheel_in_the_air_is_kept_at_the_cap():
+    assert torque_of(-1000.0, -0.15, w=0.85 * 20.0 / 0.313, v=20.0, f_z=0.0) == pytest.approx(0.0, abs=1e-9)
+    assert torque_of(-1000.0, -0.30, w=0.70 * 20.0 / 0.313, v=20.0, f_z=0.0) > 0.0
+
+
+class QuarterCar:
+    """A quarter of paper B's car on one wheel, integrated in steps of 0.1 ms between samples."""
+
+    def __init__(self, v, *, mu, ts, locked=False):
+        self.v, self.mu, self.ts = v, mu, ts
+        self.w = 0.0 if locked else v / 0.313
+        self.load = 1350.0 * 9.81 / 4
+        self.force, _ = tyre_curve(0.0, self.load, mu)
+
+    @property
+    def kappa(self):
+        rolling = self.w * 0.313
+        return (rolling - self.v) / max(abs(rolling), abs(self.v), 0.5)
+
+    def inputs(self, request):
+        values = {
+            "force_request": request,
+            "slip_ratio": self.kappa,
+            "vertical_load": self.load,
+            "wheel_speed": self.w,
+            "wheel_velocity": self.v,
+            "friction": self.mu,
+        }
+        return {f"{name}_{wheel}": value for name, value in values.items() for wheel in WHEELS}
+
+    def hold(self, torque):
+        steps = round(self.ts / 1e-4)
+        for _ in range(steps):
+            f_x = self.force(self.kappa)
+            w = self.w + 1e-4 * (torque - 0.313 * f_x) / 2.1
+            self.w = max(w, 0.0) if torque < 0.0 else w
+            self.v = max(self.v + 1e-4 * f_x / (1350.0 / 4), 0.0)
+
+    def run(self, request, until, *, controlled=True):
+        """Return (kappa, torque, speed) at every sample; request [N] is a function of time [s]."""
+        stand = Stand(Slip)
+        stand.start(**self.inputs(request(0.0)))
+        rows = []
+        for i in range(round(until / self.ts)):
+            wanted = request(i * self.ts)
+            torque = stand.step(self.ts, **self.inputs(wanted))["torque_request_fl"]
+            if not controlled:
+                torque = 0.313 * wanted
+            self.hold(torque)
+            rows.append((self.kappa, torque, self.v))
+        return rows
+
+
+@pytest.mark.parametrize("ts", [0.001, 0.002, 0.005])
+def test_braking_beyond_the_grip_settles_at_the_limit_without_a_limit_cycle(ts):
+    rows = QuarterCar(80.0 / 3.6, mu=0.3, ts=ts).run(lambda t: -1500.0, 1.5)
+    (limit,), grid = slip_limits(tyre_curve(0.0, 1350.0 * 9.81 / 4, 0.3)[0], -1.0)
+    assert max(abs(kappa) for kappa, _, _ in rows) < 0.05
+    late = rows[len(rows) // 3 :]
+    assert all(kappa == pytest.approx(-limit, abs=grid) for kappa, _, _ in late)
+    assert sum(abs(b[1] - a[1]) for a, b in pairwise(late)) < 1.0
+    assert rows[-1][2] < 17.0
+
+
+def test_direct_torque_locks_the_same_wheel_which_then_brakes_worse():
+    rows = QuarterCar(80.0 / 3.6, mu=0.3, ts=0.001).run(lambda t: -1500.0, 1.5, controlled=False)
+    assert rows[-1][0] == -1.0
+    assert rows[-1][2] > 18.5
+
+
+def test_a_locked_wheel_is_brought_back():
+    rows = QuarterCar(80.0 / 3.6, mu=0.3, ts=0.001, locked=True).run(lambda t: -1500.0, 0.6)
+    assert rows[-1][0] == pytest.approx(-0.043, abs=0.001)
+
+
+def test_driving_beyond_the_grip_does_not_spin_the_wheel():
+    rows = QuarterCar(5.0, mu=0.3, ts=0.001).run(lambda t: 1500.0, 1.5)
+    assert max(abs(kappa) for kappa, _, _ in rows) < 0.05
+    assert rows[-1][2] > 9.8
+    spun = QuarterCar(5.0, mu=0.3, ts=0.001).run(lambda t: 1500.0, 1.5, controlled=False)
+    assert spun[-1][0] > 0.5
+
+
+def test_a_force_within_the_grip_is_delivered():
+    car = QuarterCar(80.0 / 3.6, mu=0.3, ts=0.002)
+    car.run(lambda t: -700.0, 0.5)
+    assert car.force(car.kappa) == pytest.approx(-700.0, rel=1e-3)
+
+
+def test_a_changing_force_is_followed():
+    car = QuarterCar(80.0 / 3.6, mu=1.0, ts=0.001)
+    rows = car.run(lambda t: -1500.0 * sin(2.0 * pi * t), 1.0)
+    errors = [
+        car.force(kappa) + 1500.0 * sin(2.0 * pi * 0.001 * (i + 1)) for i, (kappa, _, _) in enumerate(rows)
+    ]
+    assert max(map(abs, errors)) < 0.12 * 1500.0
+
+
+def test_braking_ends_at_rest_and_stays_there():
+    rows = QuarterCar(6.0, mu=0.8, ts=0.001).run(lambda t: -2000.0, 2.0)
+    assert max(abs(kappa) for kappa, _, _ in rows) < 0.1
+    assert all(v < 1e-9 and abs(torque) < 1e-6 for _, torque, v in rows[-300:])
+
+
+class Straight(Component):
+    """Torque requests become wheel torques."""
+
+    inputs = ("torque_request_*",)
+    outputs = (output("wheel_torque_*", "torque_request_*"),)
+    sampled = True
+
+    def output(self, t, u):
+        return u
+
+
+def drive(control, *, total, steer, speed, low_friction="scale", until=1.5):
+    """Return (largest |kappa|, largest |beta|, final yaw rate, final speed) of paper B's car on mu 0.3."""
+    given = {"torque_limit": 3300.0, "wheel_radius": 0.313}
+    if control is Slip:
+        given = {"low_friction": low_friction}
+    constants = {f"force_request_{w}": 0.25 * total for w in WHEELS}
+    constants |= {f"friction_{w}": 0.3 for w in WHEELS} | {"steer_angle": steer}
+    units = [
+        (EightDof, {"initial_speed": speed}),
+        (MagicFormula, {"low_friction": low_friction}),
+        (control, given),
+        (Straight, {}),
+    ]
+    names = [f"slip_ratio_{w}" for w in WHEELS]
+    loop = Loop(units, algorithm="extrapolated", constants=constants)
+    rows = loop.run(
+        until, round(until / 0.001), lambda now: (max(abs(now[n]) for n in names), abs(now["sideslip"]))
+    )
+    return max(k for k, _ in rows), max(b for _, b in rows), loop["yaw_rate"], loop["velocity_x"]
+
+
+@pytest.mark.parametrize("low_friction", ["scale", "similarity"])
+@pytest.mark.parametrize("steer", [0.0, 0.03])
+@pytest.mark.parametrize(("total", "speed"), [(-6000.0, 80.0 / 3.6), (6000.0, 10.0)])
+def test_a_car_asked_for_more_than_its_grip_keeps_its_wheels_turning_and_its_course(
+    total, speed, steer, low_friction
+):
+    kappa, beta, yaw_rate, v_x = drive(Slip, total=total, speed=speed, steer=steer, low_friction=low_friction)
+    assert kappa < 0.15
+    assert beta < 0.06
+    assert (yaw_rate > 0.05) if steer else (yaw_rate == 0.0)
+    assert abs(v_x - speed) > 4.0
+
+
+def test_direct_torque_locks_or_spins_the_wheels_of_that_car_and_loses_it_in_a_turn():
+    assert drive(Direct, total=-6000.0, speed=80.0 / 3.6, steer=0.0)[0] == pytest.approx(1.0, abs=1e-6)
+    assert drive(Direct, total=6000.0, speed=10.0, steer=0.0)[0] > 0.7
+    assert drive(Direct, total=-6000.0, speed=80.0 / 3.6, steer=0.03)[1] > 0.6
+
+
+def test_the_unit_gives_each_wheel_its_own_torque_and_shows_its_slip_target():
+    stand = Stand(Slip, slip_stiffness_scale_rear=1.2)
+    common = {"slip_ratio": 0.0, "slip_angle": 0.0, "vertical_load": 4000.0, "wheel_speed": 60.0}
+    common |= {"wheel_velocity": 60.0 * 0.313, "friction": 1.0}
+    requests = dict(zip(WHEELS, (-1000.0, 500.0, -1000.0, 0.0), strict=True))
+    given = {f"{n}_{w}": x for n, x in common.items() for w in WHEELS}
+    given |= {f"force_request_{w}": x for w, x in requests.items()}
+    out = stand.start(**given)
+    targets = [out[f"slip_ratio_target_{w}"] for w in WHEELS]
+    assert targets[0] == pytest.approx(-1000.0 / 86040.0, rel=0.05)
+    assert targets[2] == pytest.approx(targets[0] / 1.2, rel=0.02)
+    assert targets[1] > 0.0 == targets[3]
+    torques = [out[f"torque_request_{w}"] for w in WHEELS]
+    assert torques[0] < torques[2] < 0.0 == torques[3] < torques[1]
+
+
+def test_the_wheels_acceleration_is_its_filtered_difference():
+    stand = Stand(Slip, acceleration_filter=0.0, switching_gain=0.0, slip_gain=0.0)
+    given = {"slip_ratio_fl": -0.01, "vertical_load_fl": 4000.0, "friction_fl": 1.0, "wheel_speed_fl": 60.0}
+    stand.start(force_request_fl=-1000.0, wheel_velocity_fl=20.0, **given)
+    steady = stand.step(0.001)["torque_request_fl"]
+    slowing = stand.step(0.001, wheel_velocity_fl=19.995)["torque_request_fl"]
+    assert slowing - steady == pytest.approx(2.1 / 0.313 * 0.99 * -5.0, rel=1e-6)
+
+
+def test_the_law_has_no_memory_but_the_acceleration():
+    stand = Stand(Slip)
+    given = {f"{n}_fl": x for n, x in (("slip_ratio", -0.02), ("vertical_load", 3e3), ("friction", 0.4))}
+    given |= {"wheel_speed_fl": 60.0, "wheel_velocity_fl": 19.0, "slip_angle_fl": 0.03}
+    first = stand.start(force_request_fl=-800.0, **given)
+    stand.step(0.001, force_request_fl=3000.0)
+    assert stand.step(0.001, force_request_fl=-800.0) == first
+
+
+def test_an_unknown_tyre_is_refused_with_the_known_ones():
+    with pytest.raises(AssertionError, match="magic_formula, magic_formula_1987, dugoff, linear"):
+        Stand(Slip, tyre="brush").start()
