@@ -7,10 +7,7 @@
 
 so braking is regenerative up to the motor's limit, and friction does the rest.
 
-A request is held over the step for which it is given. Between two changes of the delayed request the
-lag has a closed form, also while its rate is limited (a straight line until the exponential is
-slower), so nothing is integrated numerically: the delay may be any time, no multiple of the step,
-and a request held over two half steps gives what it gives over one.
+How delay and lag are solved exactly, whatever the step: `core.lag`.
 
 Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, equations
 (14), (15). Erratum: printed with exp(+k s), which would be an advance. The paper names no values.
@@ -18,16 +15,11 @@ Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw mom
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from math import exp, inf
 
 from ..core.component import Component
+from ..core.lag import Stage
 from ..core.variables import output, parameter
-
-History = list[tuple[float, float]]
-"""Requests as (time from which it holds [s], value [N.m]), oldest first."""
 
 
 @dataclass(frozen=True)
@@ -58,65 +50,6 @@ def blend(request: float, motor_limit: float, brake_limit: float) -> tuple[float
     return motor, max(min(request - motor, 0.0), -brake_limit)
 
 
-def relax(torque: float, target: float, h: float, *, tau: float, rate: float) -> float:
-    """Return the torque [N.m] after `h` [s] with a held target: lag `tau` [s], `rate` limit [N.m/s]."""
-    gap = target - torque
-    excess = abs(gap) - rate * tau  # what is left for the straight line
-    if excess > 0.0:
-        line = excess / rate
-        if h <= line:
-            return torque + (rate * h if gap > 0.0 else -rate * h)
-        h -= line
-        gap = rate * tau if gap > 0.0 else -rate * tau
-    if tau <= 0.0:
-        return target
-    return target - gap * exp(-h / tau)
-
-
-class Stage:
-    """One delay and lag: its torque and the requests that still count.
-
-    Args:
-        tau, delay: time constant and pure delay [s].
-        rate: rate limit [N.m/s].
-    """
-
-    def __init__(self, *, tau: float, delay: float, rate: float) -> None:
-        self.tau, self.delay, self.rate = tau, delay, rate
-        self.torque = 0.0
-        self.history: History = [(-inf, 0.0)]
-
-    def advance(self, t: float, h: float, request: float) -> None:
-        """Take the torque from `t` to `t + h` [s], the request [N.m] holding over that step."""
-        history = self.history
-        if history[-1][1] != request:
-            history.append((t, request))
-        begin, end = t - self.delay, t + h - self.delay
-        torque = self.torque
-        if len(history) > 1:
-            while len(history) > 1 and history[1][0] <= begin:
-                del history[0]
-            for (_, value), (change, _) in pairwise(history):
-                if change >= end:
-                    break
-                torque = relax(torque, value, change - begin, tau=self.tau, rate=self.rate)
-                begin = change
-        value = current(history, begin)
-        if torque != value and end > begin:
-            torque = relax(torque, value, end - begin, tau=self.tau, rate=self.rate)
-        self.torque = torque
-
-
-def current(history: Sequence[tuple[float, float]], t: float) -> float:
-    """Return the request [N.m] that holds from `t` [s] on."""
-    value = history[0][1]
-    for time, later in history:
-        if time > t:
-            break
-        value = later
-    return value
-
-
 class Lag(Component):
     """Motor and friction brake at each wheel: delay, first-order lag, limits, blending."""
 
@@ -145,6 +78,6 @@ class Lag(Component):
             brake.advance(t, h, asked_brake)
 
     def output(self, t, u):
-        motors = [stage.torque for stage in self.motors]
-        brakes = [stage.torque for stage in self.brakes]
+        motors = [stage.value for stage in self.motors]
+        brakes = [stage.value for stage in self.brakes]
         return [m + b for m, b in zip(motors, brakes, strict=True)] + motors + brakes

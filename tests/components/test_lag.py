@@ -6,7 +6,8 @@ from math import exp
 
 import pytest
 
-from components.actuators.lag import Lag, blend, relax
+from components.actuators.lag import Lag, blend
+from components.core.lag import relax
 
 from .stand import Stand
 
