@@ -34,9 +34,10 @@ def obey(job):
     if job.label == "breaks":
         raise ZeroDivisionError("by zero")
     if job.label == "hangs":
-        job.out.mkdir(parents=True)
-        os.mkfifo(job.out / "never")
-        (job.out / "never").read_text()
+        while True:
+            (job.out.parent / "fifo").read_text()  # waits for somebody to write
+    if job.label == "waits":
+        (job.out.parent / "fifo").write_text("it has begun")  # waits for somebody to read
     record(job)
 
 
@@ -90,12 +91,11 @@ def test_when_the_caller_stops_all_runs_end(tmp_path, monkeypatch, why):
         raise why
 
     monkeypatch.setattr("orchestrator.jobs.GRACE", 0.0)
+    os.mkfifo(tmp_path / "fifo")
     with pytest.raises(why):
-        execute(jobs(tmp_path, "hangs", "good"), workers=2, run=obey, done=stop)
-    never = os.open(tmp_path / "hangs" / "never", os.O_RDONLY | os.O_NONBLOCK)
-    os.close(never)
+        execute(jobs(tmp_path, "hangs", "waits"), workers=2, run=obey, done=stop)
     with pytest.raises(OSError, match="No such device"):  # nobody reads any more
-        os.open(tmp_path / "hangs" / "never", os.O_WRONLY | os.O_NONBLOCK)
+        os.open(tmp_path / "fifo", os.O_WRONLY | os.O_NONBLOCK)
 
 
 def test_only_a_run_that_reached_its_end_is_read_back(tmp_path):
