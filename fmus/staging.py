@@ -8,7 +8,6 @@ modules of the same name that are in use (an FMU that is loaded in this process)
 from __future__ import annotations
 
 import importlib
-import inspect
 import sys
 import tempfile
 import traceback
@@ -115,7 +114,7 @@ class Stage:
         found = [
             value
             for value in vars(loaded).values()
-            if inspect.isclass(value) and issubclass(value, base) and value.__module__ == name
+            if issubclass(type(value), type) and issubclass(value, base) and value.__module__ == name
         ]
         final = [c for c in found if not any(other is not c and issubclass(other, c) for other in found)]
         if len(final) != 1:

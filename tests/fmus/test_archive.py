@@ -13,6 +13,7 @@ from fmpy.validation import validate_fmu
 
 from components.core.roles import ROLES
 from fmus.build import COMPONENTS, build_all, build_component, find_components
+from fmus.build import HERE as FMUS
 from fmus.compiler import compile_launcher
 from orchestrator.errors import BuildError
 
@@ -107,6 +108,12 @@ def test_the_launcher_compiles_to_the_same_bytes_again(tmp_path):
     assert first is not None
     assert first == second
     assert len(list(tmp_path.glob("a/*.so"))) == 1
+
+
+def test_the_launcher_compiles_without_a_warning():
+    flags = ["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror", "-fsyntax-only"]
+    done = subprocess.run(["cc", *flags, "launcher.c"], cwd=FMUS, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_windows_line_ends_make_no_difference(checkout, tmp_path):
