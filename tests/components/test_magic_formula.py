@@ -319,6 +319,15 @@ def test_above_maximum_load_everything_is_proportional_to_load():
     )
 
 
+@pytest.mark.parametrize("asymmetric", [True, False])
+def test_curvatures_above_one_count_as_one(asymmetric):
+    flat = {"PEX2": 0.0, "PEX3": 0.0, "PEY2": 0.0, "PEY3": 0.0, "QEZ2": 0.0, "QEZ4": 0.0}
+    ones, threes = ({"PEX1": e, "PEY1": e, "QEZ1": e, "PEX4": 0.0} for e in (1.0, 3.0))
+    for kappa, alpha in ((-0.05, 0.06), (0.1, -0.02)):
+        expected = tyre(kappa, alpha, asymmetric_terms=asymmetric, **flat, **ones)
+        assert tyre(kappa, alpha, asymmetric_terms=asymmetric, **flat, **threes) == expected
+
+
 def test_forces_oppose_the_slip_and_the_moment_aligns():
     for alpha in (0.02, 0.05):
         _, y, z = tyre(0.0, alpha)

@@ -158,6 +158,11 @@ def test_a_wheel_that_rolls_backwards_pushes_against_its_sliding():
     assert tyre(0.04, pi - 0.1) == pytest.approx((-x, y), rel=1e-9)
 
 
+def test_curvatures_above_one_count_as_one():
+    ones, threes = ({"a7": 0.0, "a8": e, "b6": 0.0, "b7": 0.0, "b8": e} for e in (1.0, 3.0))
+    assert tyre(-0.05, 0.06, **threes) == tyre(-0.05, 0.06, **ones)
+
+
 def test_half_the_reference_friction_doubles_a_measured_peak():
     one = tyre(0.0, 0.3, mu=0.4, peak_friction="measured")
     assert tyre(0.0, 0.3, mu=0.2, peak_friction="measured", reference_friction=0.5) == pytest.approx(one)

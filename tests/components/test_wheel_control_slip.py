@@ -97,6 +97,27 @@ def test_the_inverse_curve_returns_the_force_asked_for_and_clamps_outside(name):
                     assert at_limit_of_some_optimum or beyond_a_dip
 
 
+def test_the_inverse_curve_does_not_depend_on_where_the_search_begins():
+    force, first = tyre_curve(0.02, 4000.0, 0.3)
+    end = slip_for_force(-9e9, force, first=first, cap=CAP, share=SHARE)
+    for part in (0.3, 0.9, 0.99, 0.999):
+        wanted = part * force(end)
+        for i in range(40):
+            begin = first * 0.1 * 1.06**i
+            kappa = slip_for_force(wanted, force, first=begin, cap=CAP, share=SHARE)
+            assert force(kappa) == pytest.approx(wanted, rel=1e-4)
+            assert end <= kappa < 0.0
+
+
+def test_a_force_between_the_share_and_the_optimum_gets_the_share():
+    force, first = tyre_curve(0.0, 4000.0, 0.3)
+    limit = slip_for_force(-9e9, force, first=first, cap=0.5, share=0.8)
+    for share_of_optimum in (0.85, 0.95, 0.99):
+        wanted = force(limit * share_of_optimum / 0.8)
+        kappa = slip_for_force(wanted, force, first=first, cap=0.5, share=0.8)
+        assert kappa == pytest.approx(limit, rel=3e-3)
+
+
 def test_the_inverse_curve_is_continuous_in_the_force_up_to_the_clamp():
     force, first = tyre_curve(0.05, 4000.0, 0.3)
     slips = [slip_for_force(-2.0 * i, force, first=first, cap=CAP, share=SHARE) for i in range(700)]
