@@ -20,8 +20,8 @@ slip target; both fade in linearly. While braking, the torque is never more than
 within one sample. In reverse only positive torque is used, and only
 to brake: negative torque is friction to every plant.
 
-Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, equations (30)-(38).
-Ours differs: the cap (with combined slip the optimum grows with slip angle, at mu 0.3 from 0.05 at 0 to
+Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, equations (31)-(38).
+Ours differs: sat for the sign of (36), which would chatter at every sample; the cap (with combined slip the optimum grows with slip angle, at mu 0.3 from 0.05 at 0 to
 0.9 at 15 degrees, and then protects nothing), and the fades.
 """
 
@@ -84,7 +84,7 @@ class SlipControlParameters:
 def slip_torque(
     kappa: float, target: float, f_x: float, *, v: float, dv: float, p: SlipControlParameters
 ) -> float:
-    """Return the torque [N.m] that moves the slip towards its target; equations (33)-(38).
+    """Return the torque [N.m] that moves the slip towards its target; equation (37).
 
     Args:
         kappa, target: slip and slip target [1].
