@@ -17,12 +17,13 @@ What the paper leaves open, and what is done. The target's own rate is left out:
 jump of the request to the torque. Below `slip_control_force` the wheel gets R F, so without a request
 it rolls free; below `slip_control_speed`, where slip loses its meaning, R F with F the force at the
 slip target; both fade in linearly. While braking, the torque is never more than stops the wheel
-within one sample. In reverse only positive torque is used, and only
-to brake: negative torque is friction to every plant.
+within one sample. In reverse only positive torque is used, only to brake: negative torque is
+friction to every plant.
 
 Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, equations (31)-(38).
-Ours differs: sat for the sign of (36), which would chatter at every sample; the cap (with combined slip the optimum grows with slip angle, at mu 0.3 from 0.05 at 0 to
-0.9 at 15 degrees, and then protects nothing), and the fades.
+Ours differs: sat for the sign in (36), which would chatter at every sample; the cap (with combined slip
+the optimum grows with slip angle, at mu 0.3 from 0.05 at 0 to 0.9 at 15 degrees, and then protects
+nothing); the fades.
 """
 
 from __future__ import annotations
