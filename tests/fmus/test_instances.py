@@ -12,6 +12,7 @@ import pytest
 
 from fmus.build import COMPONENTS, build_component
 from tests.fmus.bare import Fmu, Unit
+from tests.fmus.programs import python_libraries
 
 TESTS = Path(__file__).resolve().parent
 
@@ -130,69 +131,17 @@ print(json.dumps(unit.outputs()))
     assert run_apart(script, str(load("driver_sine").folder))[0] == pytest.approx(0.5)
 
 
+def compiled(source, folder):
+    program = folder / "host"
+    flags = ["-std=c11", "-Wall", "-Wextra", "-Werror", f"-I{COMPONENTS.parent / 'fmus'}"]
+    subprocess.run(["cc", *flags, TESTS / source, "-o", program, "-ldl"], check=True)
+    return program
+
+
 def test_different_fmus_share_one_interpreter_that_no_unloading_ends(load, unpack, host, tmp_path):
     """In a C host: the FMU that has started Python is unloaded while the other goes on."""
     first, second = load("driver_sine"), load("controller_off")
-    source = tmp_path / "two.c"
-    source.write_text(
-        r"""
-#include <dlfcn.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include "fmi2.h"
-static void logger(fmi2ComponentEnvironment e, fmi2String i, fmi2Status s, fmi2String c, fmi2String m, ...)
-{ (void)e; (void)i; (void)s; (void)c; fprintf(stderr, "%s\n", m); }
-static fmi2CallbackFunctions callbacks = {logger, calloc, free, NULL, NULL};
-static void *get(void *library, const char *name) { return dlsym(library, name); }
-typedef struct { void *library; fmi2Component unit; } Loaded;
-static Loaded load(const char *binary, const char *resources)
-{
-    Loaded l = {dlopen(binary, RTLD_NOW | RTLD_LOCAL), NULL};
-    fmi2InstantiateFn make; void *symbol = get(l.library, "fmi2Instantiate");
-    memcpy(&make, &symbol, sizeof symbol);
-    l.unit = make("unit", fmi2CoSimulation, "", resources, &callbacks, fmi2False, fmi2False);
-    return l;
-}
-static int call(Loaded l, const char *name)
-{
-    fmi2EnterInitializationModeFn f; void *symbol = get(l.library, name);
-    memcpy(&f, &symbol, sizeof symbol);
-    return f(l.unit);
-}
-static int step(Loaded l)
-{
-    fmi2DoStepFn f; void *symbol = get(l.library, "fmi2DoStep");
-    memcpy(&f, &symbol, sizeof symbol);
-    return f(l.unit, 0.0, 0.001, fmi2True);
-}
-static void unload(Loaded l)
-{
-    fmi2FreeInstanceFn f; void *symbol = get(l.library, "fmi2FreeInstance");
-    memcpy(&f, &symbol, sizeof symbol);
-    f(l.unit);
-    dlclose(l.library);
-}
-int main(int argc, char *argv[])
-{
-    (void)argc;
-    Loaded first = load(argv[1], argv[2]), second = load(argv[3], argv[4]);
-    int status = call(first, "fmi2EnterInitializationMode") + call(first, "fmi2ExitInitializationMode");
-    unload(first);
-    status += call(second, "fmi2EnterInitializationMode") + call(second, "fmi2ExitInitializationMode");
-    status += step(second);
-    first = load(argv[1], argv[2]);
-    status += call(first, "fmi2EnterInitializationMode") + call(first, "fmi2ExitInitializationMode");
-    unload(second);
-    status += step(first);
-    unload(first);
-    return status;
-}
-"""
-    )
-    program = tmp_path / "two"
-    include = f"-I{COMPONENTS.parent / 'fmus'}"
-    subprocess.run(["cc", "-std=c11", "-Werror", include, source, "-o", program, "-ldl"], check=True)
+    program = compiled("host_two_fmus.c", tmp_path)
     arguments = []
     for fmu in (first, second):
         arguments += [str(fmu.binary), (fmu.folder / "resources").as_uri()]
@@ -203,45 +152,11 @@ int main(int argc, char *argv[])
 
 def test_python_loaded_with_local_symbols_is_found_and_used(load, tmp_path, host):
     """As in a program that embeds Python in a plug-in."""
-    from tests.fmus.test_hosts import python_libraries
-
     libraries = list(python_libraries().values())
     if not libraries:
         pytest.skip("no libpython found")
     fmu = load("driver_sine")
-    source = tmp_path / "local.c"
-    source.write_text(
-        r"""
-#include <dlfcn.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include "fmi2.h"
-static void logger(fmi2ComponentEnvironment e, fmi2String i, fmi2Status s, fmi2String c, fmi2String m, ...)
-{ (void)e; (void)i; (void)s; (void)c; fprintf(stderr, "%s\n", m); }
-static fmi2CallbackFunctions callbacks = {logger, calloc, free, NULL, NULL};
-int main(int argc, char *argv[])
-{
-    (void)argc;
-    void *python = dlopen(argv[1], RTLD_NOW | RTLD_LOCAL), *symbol = dlsym(python, "Py_InitializeEx");
-    void (*start)(int); void *(*let_go)(void);
-    memcpy(&start, &symbol, sizeof symbol);
-    start(0);
-    symbol = dlsym(python, "PyEval_SaveThread");
-    memcpy(&let_go, &symbol, sizeof symbol);
-    let_go();
-    if (dlsym(RTLD_DEFAULT, "Py_IsInitialized") != NULL) return 4;
-    void *library = dlopen(argv[2], RTLD_NOW | RTLD_LOCAL);
-    fmi2InstantiateFn make;
-    symbol = dlsym(library, "fmi2Instantiate");
-    memcpy(&make, &symbol, sizeof symbol);
-    return make("unit", fmi2CoSimulation, "", argv[3], &callbacks, fmi2False, fmi2False) == NULL;
-}
-"""
-    )
-    program = tmp_path / "local"
-    include = f"-I{COMPONENTS.parent / 'fmus'}"
-    subprocess.run(["cc", "-std=c11", "-Werror", include, source, "-o", program, "-ldl"], check=True)
+    program = compiled("host_local_python.c", tmp_path)
     for library in libraries:
         command = [program, library, str(fmu.binary), (fmu.folder / "resources").as_uri()]
         # No other Python may be opened: this variable would lead to an error.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import random
 import struct
 
@@ -71,8 +72,6 @@ def test_a_reset_unit_is_as_new(load, name):
 
 
 def test_saving_into_the_same_place_again_frees_what_was_there(load):
-    import ctypes
-
     unit = Unit(load("driver_sine"))
     unit.start()
     state = unit.save()
