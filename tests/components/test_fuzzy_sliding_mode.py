@@ -1,0 +1,77 @@
+"""Fuzzy sliding mode: the gains of the printed table, and the law with the saturation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from components.controllers.fuzzy_sliding_mode import FuzzySlidingMode
+from components.controllers.sliding_mode import SlidingMode
+from components.core.sliding_mode import ERRORS
+
+from .stand import Stand
+
+TABLE = [
+    ["SS", "SS", "S", "S", "M"],
+    ["S", "S", "M", "M", "M"],
+    ["S", "M", "M", "B", "B"],
+    ["S", "M", "B", "B", "BB"],
+    ["M", "M", "B", "BB", "BB"],
+]
+# Centroids of the sets over a range of one: half triangles at the ends.
+CENTROID = {"SS": 1 / 12, "S": 0.25, "M": 0.5, "B": 0.75, "BB": 11 / 12}
+
+
+@pytest.fixture
+def stand():
+    stand = Stand(FuzzySlidingMode)
+    stand.start(velocity_x=20.0)
+    return stand
+
+
+def gains(stand: Stand, mu: float, delta: float) -> tuple[float, float]:
+    y = stand.step(0.005, friction=mu, steer_angle=delta)
+    return y["reaching_rate"], y["reaching_gain"]
+
+
+def test_at_the_peaks_of_the_sets_the_gains_are_those_of_the_table(stand):
+    for row, cells in enumerate(TABLE):
+        for column, cell in enumerate(cells):
+            eps, k_d = gains(stand, 0.25 * row, 0.0225 * column)
+            assert eps == pytest.approx(3.0 * CENTROID[cell], rel=1e-9)
+            assert k_d == pytest.approx(10.0 * CENTROID[cell], rel=1e-9)
+
+
+def test_gains_rise_with_steering_and_friction_and_hold_beyond_the_ranges(stand):
+    # Between the peaks the centroid of clipped sets may dip a little: Mamdani, not interpolation.
+    grid = [[gains(stand, mu, delta)[0] for delta in np.linspace(0, 0.09, 5)] for mu in np.linspace(0, 1, 5)]
+    assert np.diff(grid, axis=0).min() >= -1e-12
+    assert np.diff(grid, axis=1).min() >= -1e-12
+    assert gains(stand, 1.4, 0.3) == gains(stand, 1.0, 0.09)
+    assert gains(stand, -0.1, 0.0) == gains(stand, 0.0, 0.0)
+
+
+def test_the_side_of_the_turn_does_not_matter(stand):
+    for delta in (0.01, 0.04, 0.09):
+        assert gains(stand, 0.4, delta) == gains(stand, 0.4, -delta)
+
+
+def test_with_its_gains_as_constants_the_plain_law_gives_the_same_moment(stand):
+    errors = dict(zip(ERRORS, (0.3, -0.02, 0.4, 0.05, 0.28, -0.05, 0.02), strict=True)) | {"velocity_x": 20.0}
+    y = stand.step(0.005, steer_angle=0.05, friction=0.6, **errors)
+    plain = Stand(
+        SlidingMode,
+        switching="saturation",
+        reaching_rate=y["reaching_rate"],
+        reaching_gain=y["reaching_gain"],
+    )
+    plain.start()
+    other = plain.step(0.005, **errors)
+    assert y["yaw_moment"] == pytest.approx(other["yaw_moment"], rel=1e-12)
+    assert y["sliding_surface"] == other["sliding_surface"]
+    assert abs(y["yaw_moment"]) > 100.0
+
+
+def test_the_moment_keeps_to_its_limit(stand):
+    errors = dict(zip(ERRORS, (1.0, 0.0, 20.0, 0.0, -1.0, 0.0, 0.0), strict=True))
+    assert stand.step(0.005, **errors, velocity_x=20.0)["yaw_moment"] == 10000.0

@@ -1,0 +1,101 @@
+"""The sliding-mode law: the printed equations, its switching functions, its sign, its limits."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from components.controllers.sliding_mode import SlidingMode
+from components.core.sliding_mode import ERRORS, saturation, sign
+
+from .stand import Stand
+
+I_Z = 1343.1
+
+
+def signals(*values: float, speed: float = 20.0) -> dict[str, float]:
+    return dict(zip(ERRORS, values, strict=True)) | {"velocity_x": speed}
+
+
+def outputs(stand: Stand, *values: float, speed: float = 20.0) -> tuple[float, float]:
+    y = stand.step(0.005, **signals(*values, speed=speed))
+    return y["yaw_moment"], y["sliding_surface"]
+
+
+@pytest.mark.parametrize("switching", ["sign", "saturation"])
+def test_the_moment_is_that_of_the_printed_law(switching):
+    rng = random.Random(1)
+    stand = Stand(SlidingMode, switching=switching, moment_limit=1e6)
+    stand.start()
+    for _ in range(200):
+        r_ref, beta_ref, dr_ref, dbeta_ref, r, beta, dbeta = (rng.uniform(-0.3, 0.3) for _ in ERRORS)
+        s = (r_ref - r) - 0.25 * (beta_ref - beta)
+        switched = (s > 0) - (s < 0) if switching == "sign" else min(max(s / 0.1, -1.0), 1.0)
+        expected = I_Z * (dr_ref + 1.0 * switched + 10.0 * s - 0.25 * (dbeta_ref - dbeta))
+        moment, surface = outputs(stand, r_ref, beta_ref, dr_ref, dbeta_ref, r, beta, dbeta)
+        assert surface == pytest.approx(s, rel=1e-12)
+        assert moment == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+def test_the_switching_functions_differ_only_inside_the_boundary_layer():
+    assert [sign(x) for x in (-2.0, -1e-9, 0.0, 1e-9, 2.0)] == [-1.0, -1.0, 0.0, 1.0, 1.0]
+    assert [saturation(x, 0.1) for x in (-2.0, -0.1, -0.05, 0.0, 0.05, 0.1, 2.0)] == [
+        -1.0,
+        -1.0,
+        -0.5,
+        0.0,
+        0.5,
+        1.0,
+        1.0,
+    ]
+    assert saturation(1e-9, 0.0) == 1.0
+    assert saturation(0.0, 0.0) == 0.0
+
+
+def test_a_yaw_rate_too_low_asks_for_a_turn_to_the_left():
+    stand = Stand(SlidingMode)
+    stand.start()
+    moment, _ = outputs(stand, 0.3, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0)
+    assert moment == pytest.approx(I_Z * (1.0 + 10.0 * 0.2))
+
+
+def test_a_tail_that_slides_out_is_turned_back_by_the_default_weight():
+    # Left turn, beta far below its reference: a moment to the right lets the sideslip come back.
+    stand = Stand(SlidingMode)
+    stand.start()
+    moment, _ = outputs(stand, 0.2, 0.0, 0.0, 0.0, 0.2, -0.3, 0.0)
+    assert moment < 0.0
+    other = Stand(SlidingMode, sideslip_weight=0.25)
+    other.start()
+    assert outputs(other, 0.2, 0.0, 0.0, 0.0, 0.2, -0.3, 0.0)[0] > 0.0
+
+
+def test_without_error_there_is_no_moment():
+    stand = Stand(SlidingMode)
+    stand.start()
+    assert outputs(stand, 0.2, -0.03, 0.0, 0.1, 0.2, -0.03, 0.1) == (0.0, 0.0)
+
+
+def test_the_moment_keeps_to_its_limit_and_fades_out_at_walking_pace():
+    stand = Stand(SlidingMode, moment_limit=3000.0)
+    stand.start()
+    errors = (0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    assert outputs(stand, *errors)[0] == 3000.0
+    assert outputs(stand, *(-e for e in errors))[0] == -3000.0
+    small = (0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    whole = outputs(stand, *small)[0]
+    assert outputs(stand, *small, speed=0.5)[0] == pytest.approx(0.25 * whole)
+    assert outputs(stand, *small, speed=0.0)[0] == 0.0
+    assert outputs(stand, *small, speed=-5.0)[0] == 0.0
+
+
+def test_left_and_right_are_mirrored_to_the_last_bit():
+    rng = random.Random(2)
+    for switching in ("sign", "saturation"):
+        stand = Stand(SlidingMode, switching=switching)
+        stand.start()
+        for _ in range(50):
+            errors = [rng.uniform(-0.2, 0.2) for _ in ERRORS]
+            moment, surface = outputs(stand, *errors)
+            assert outputs(stand, *(-e for e in errors)) == (-moment, -surface)
