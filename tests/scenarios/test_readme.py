@@ -1,0 +1,49 @@
+"""The README's own controller, built and run as the README says."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+
+import pytest
+
+from fmus.build import build_all, build_component
+from orchestrator.cli import COMMANDS, main
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+UNITS = (
+    "driver_sine", "reference_steady_state", "controller_off", "allocator_load_proportional",
+    "wheel_control_direct", "plant_seven_dof", "tyre_dugoff",
+)  # fmt: skip
+
+
+def test_the_controller_of_the_readme_runs_and_follows_the_yaw_rate(tmp_path, capsys):
+    (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    file = tmp_path / "yaw_rate.py"
+    file.write_text(code.replace("from ..core", "from components.core"), encoding="utf-8")
+    build_all(tmp_path, components=UNITS)
+    build_component(file, tmp_path, role="controllers")
+    with pytest.raises(SystemExit) as exit_:
+        main([
+            "compare", str(ROOT / "scenarios/fnn_sideslip/25mps.yaml"),
+            "--swap", "controller=controller_off,controller_yaw_rate",
+            "--fmus", str(tmp_path), "--out", str(tmp_path / "out"),
+        ])  # fmt: skip
+    assert not exit_.value.code
+    runs = {row["run"]: row for row in csv.DictReader((tmp_path / "out" / "metrics.csv").open())}
+    errors = [float(runs[f"controller_{n}"]["rms_error(yaw_rate) [rad/s]"]) for n in ("yaw_rate", "off")]
+    assert errors[0] < 0.5 * errors[1]
+
+
+def test_the_readme_names_every_command():
+    table = re.findall(r"^\| `(\w+)` \|", README, re.MULTILINE)
+    assert set(table) == set(COMMANDS)
+
+
+def test_every_file_that_the_readme_names_exists():
+    named = set(re.findall(r"\b(?:scenarios|components|docs)/[\w/]+\.\w+", README))
+    assert len(named) > 4
+    missing = {name for name in named if not (ROOT / name).is_file()}
+    assert missing == {"components/controllers/yaw_rate.py"}  # the one that the reader writes
