@@ -1,0 +1,107 @@
+"""Contact points of wheels on a sprung body: the forces that act there, and how fast they slide.
+
+Contact points follow the body's roll and pitch and, along the sloping path of the wheel, its travel:
+
+    X_i = x_i - h theta          Y_i = y_i + h phi + p_i c_i          from the centre of mass
+    v_xi = v_x - r Y_i - h dtheta          v_yi = v_y + r X_i + h dphi + p_i dc_i
+
+Symbols are those of `core.ride`. The same X_i, Y_i and p_i are the arms of the forces there, so the
+power of the forces at the contact points is the power that body and wheels receive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import cos, sin
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from .ride import Ride
+
+Eight = tuple[float, float, float, float, float, float, float, float]
+
+
+class Contact(NamedTuple):
+    """Horizontal forces [N] of the tyres in vehicle axes, f_x then f_y, with their plain resultants."""
+
+    x_fl: float
+    x_fr: float
+    x_rl: float
+    x_rr: float
+    y_fl: float
+    y_fr: float
+    y_rl: float
+    y_rr: float
+    x: float  # sum of f_x
+    y: float
+    moment: float  # about the vertical axis at rest [N.m]
+
+
+def contact(delta: float, forces: Sequence[float], *, a: float, b: float, half_track: float) -> Contact:
+    """Return the tyre forces in vehicle axes.
+
+    Args:
+        delta: steer angle of both front wheels [rad].
+        forces: F_x of fl, fr, rl, rr, then F_y, wheel axes [N].
+        a, b, half_track: distances of axles and wheels from the car's centre of mass [m].
+    """
+    f_fl, f_fr, x_rl, x_rr, g_fl, g_fr, y_rl, y_rr = forces
+    c = cos(delta)
+    s = sin(delta)
+    x_fl = f_fl * c - g_fl * s
+    x_fr = f_fr * c - g_fr * s
+    y_fl = f_fl * s + g_fl * c
+    y_fr = f_fr * s + g_fr * c
+    front = y_fl + y_fr
+    rear = y_rl + y_rr
+    moment = a * front - b * rear + half_track * ((x_fr - x_fl) + (x_rr - x_rl))
+    x = (x_fl + x_fr) + (x_rl + x_rr)
+    return Contact(x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr, x, front + rear, moment)
+
+
+def contact_velocities(
+    v_x: float, v_y: float, r: float, y: Sequence[float], *, delta: float, ride: Ride, a: float, b: float
+) -> Eight:
+    """Return the velocities [m/s] of the contact points in wheel axes: four longitudinal, four lateral ones.
+
+    Args:
+        v_x, v_y, r: of the centre of mass, vehicle axes [m/s], [rad/s].
+        y: coordinates and their rates.
+        delta: steer angle of both front wheels [rad].
+        a, b: distances of the axles from the car's centre of mass [m].
+    """
+    z, phi, theta, u_fl, u_fr, u_rl, u_rr, dz, dphi, dtheta, du_fl, du_fr, du_rl, du_rr = y
+    t, h, p_f, p_r = ride.half_track, ride.h, ride.p_f, ride.p_r
+    a_s, b_s = ride.a, ride.b
+    side = t * phi
+    front = z - a_s * theta
+    rear = z + b_s * theta
+    y_fl = p_f * (u_fl - front - side) + t
+    y_fr = p_f * (u_fr - front + side) + t  # to the right
+    y_rl = p_r * (u_rl - rear - side) + t
+    y_rr = p_r * (u_rr - rear + side) + t
+    side = t * dphi
+    front = dz - a_s * dtheta
+    rear = dz + b_s * dtheta
+    shift = h * phi
+    pitched = h * theta
+    ahead = v_x - h * dtheta
+    sway = v_y + h * dphi
+    x_fl = ahead - r * (y_fl + shift)
+    x_fr = ahead + r * (y_fr - shift)
+    along = sway + r * (a - pitched)
+    w_fl = along + p_f * (du_fl - front - side)
+    w_fr = along - p_f * (du_fr - front + side)
+    along = sway - r * (b + pitched)
+    c = cos(delta)
+    s = sin(delta)
+    return (
+        x_fl * c + w_fl * s,
+        x_fr * c + w_fr * s,
+        ahead - r * (y_rl + shift),
+        ahead + r * (y_rr - shift),
+        w_fl * c - x_fl * s,
+        w_fr * c - x_fr * s,
+        along + p_r * (du_rl - rear - side),
+        along - p_r * (du_rr - rear + side),
+    )

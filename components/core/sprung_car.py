@@ -1,0 +1,194 @@
+"""The parameters of a car with a sprung body, and what `core.ride` needs of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .ride import Ride
+from .variables import parameter
+
+G = 9.81  # m/s2
+
+
+@dataclass(frozen=True)
+class FourteenDofParameters:
+    """A large saloon: paper C, table 1, where it says anything."""
+
+    mass: float = parameter(
+        1830.0, "kg", "Vehicle mass m; paper C, table 1: 1650 kg sprung; chosen: 45 kg per wheel", minimum=1.0
+    )
+    sprung_mass: float = parameter(1650.0, "kg", "Sprung mass m_s; paper C, table 1", minimum=1.0)
+    front_unsprung_share: float = parameter(
+        0.5, "1", "Front part of the unsprung mass; chosen: equal wheels", minimum=0.01, maximum=0.99
+    )
+    yaw_inertia: float = parameter(3234.0, "kg.m2", "Yaw inertia I_z; paper C, table 1", minimum=1.0)
+    sprung_roll_inertia: float = parameter(
+        928.0,
+        "kg.m2",
+        "Roll inertia of the sprung mass about its own centre; chosen: a large saloon",
+        minimum=1.0,
+    )
+    sprung_pitch_inertia: float = parameter(
+        2790.0,
+        "kg.m2",
+        "Pitch inertia of the sprung mass about its own centre; chosen: a large saloon",
+        minimum=1.0,
+    )
+    sprung_roll_yaw_product: float = parameter(
+        0.0,
+        "kg.m2",
+        "Product of inertia I_xz of the sprung mass about its own centre, positive where its front is heavy "
+        "on top; chosen: principal axes along the car",
+    )
+    cg_to_front_axle: float = parameter(
+        1.4, "m", "Distance a of the centre of mass from the front axle; paper C, table 1", minimum=0.1
+    )
+    cg_to_rear_axle: float = parameter(
+        1.65, "m", "Distance b of the centre of mass from the rear axle; paper C, table 1", minimum=0.1
+    )
+    track_width: float = parameter(
+        1.6,
+        "m",
+        "Track width d; chosen: paper C prints 1.36, implausible with this wheelbase; peaks change by 1-2 %",
+        minimum=0.1,
+    )
+    cg_height: float = parameter(
+        0.5093, "m", "Height h of the centre of mass; chosen: that of the sprung mass 0.53", minimum=0.0
+    )
+    unsprung_height: float = parameter(
+        0.32, "m", "Height of the wheels' centres; chosen: tyre of 0.34, loaded", minimum=0.0
+    )
+    spring_stiffness_front: float = parameter(
+        34000.0, "N/m", "Front spring, at the wheel; chosen: body modes at 1.4 to 1.8 Hz", minimum=0.0
+    )
+    spring_stiffness_rear: float = parameter(
+        32000.0, "N/m", "Rear spring, at the wheel; chosen: body modes at 1.4 to 1.8 Hz", minimum=0.0
+    )
+    damping_front: float = parameter(
+        3000.0, "N.s/m", "Front damper, at the wheel; chosen: about 0.4 of critical", minimum=0.0
+    )
+    damping_rear: float = parameter(
+        2800.0, "N.s/m", "Rear damper, at the wheel; chosen: about 0.4 of critical", minimum=0.0
+    )
+    anti_roll_stiffness_front: float = parameter(
+        14000.0,
+        "N/m",
+        "Front anti-roll bar, force at each wheel per difference of travel, negative for a bar that stiffens "
+        "heave; chosen: 4.5 deg/g",
+    )
+    anti_roll_stiffness_rear: float = parameter(
+        6000.0,
+        "N/m",
+        "Rear anti-roll bar, force at each wheel per difference of travel, negative for a bar that stiffens "
+        "heave; chosen: 4.5 deg/g",
+    )
+    roll_centre_height_front: float = parameter(0.06, "m", "Front roll centre; chosen: a strut axle")
+    roll_centre_height_rear: float = parameter(0.11, "m", "Rear roll centre; chosen: a multi-link axle")
+    tyre_vertical_stiffness: float = parameter(
+        230000.0, "N/m", "Tyre spring k_t; chosen: a passenger car's, wheel hop at 12 Hz", minimum=1.0
+    )
+    wheel_radius: float = parameter(
+        0.33, "m", "Rolling radius R; chosen: tyre of 0.34 unloaded", minimum=0.05
+    )
+    wheel_inertia: float = parameter(
+        1.5, "kg.m2", "Inertia J of one wheel; chosen: a passenger car's", minimum=0.01
+    )
+    drag_coefficient: float = parameter(0.3, "1", "Drag coefficient C_D; chosen: a saloon's", minimum=0.0)
+    frontal_area: float = parameter(2.2, "m2", "Frontal area A; chosen: a saloon's", minimum=0.0)
+    air_density: float = parameter(1.2258, "kg/m3", "Air density rho; chosen: that of paper B", minimum=0.0)
+    rolling_resistance: float = parameter(
+        0.012, "1", "Rolling resistance f; chosen: a passenger car tyre's", minimum=0.0
+    )
+    rolling_fade_speed: float = parameter(
+        0.1, "m/s", "Rolling resistance fades below this speed; chosen: hardly moving", minimum=0.001
+    )
+    initial_speed: float = parameter(25.0, "m/s", "Speed at the start; paper C: 90 km/h")
+    initial_sideslip: float = parameter(0.0, "rad", "Sideslip angle at the start; chosen: none")
+    initial_yaw_rate: float = parameter(0.0, "rad/s", "Yaw rate at the start; chosen: none")
+    initial_heave: float = parameter(
+        0.0, "m", "Height of body and wheels above rest at the start; chosen: on the road"
+    )
+    low_speed: float = parameter(
+        0.5,
+        "m/s",
+        "Slips refer to this speed when the wheel is slower; chosen: keeps a parked car quiet at 1 ms",
+        minimum=0.001,
+    )
+    slip_stiffness_per_load: float = parameter(
+        22.0,
+        "1",
+        "Slip stiffness over load for slow wheels, see core.wheel_spin; chosen: tyre set 1",
+        minimum=0.0,
+    )
+
+
+def ride_of(p: FourteenDofParameters) -> Ride:
+    """Return the constants of body, suspension and tyre springs.
+
+    Raises:
+        ValueError: masses, inertias or springs with which a car cannot stand.
+    """
+    m_s = p.sprung_mass
+    unsprung = p.mass - m_s
+    if unsprung <= 0.0:
+        raise ValueError(f"sprung_mass must be less than mass = {p.mass:g} kg (got {m_s:g})")
+    m_f = 0.5 * p.front_unsprung_share * unsprung
+    m_r = 0.5 * unsprung - m_f
+    h, h_u, t = p.cg_height, p.unsprung_height, 0.5 * p.track_width
+    h_s = (p.mass * h - unsprung * h_u) / m_s
+    offset = 2.0 * (m_r * p.cg_to_rear_axle - m_f * p.cg_to_front_axle) / m_s  # of the sprung mass, forward
+    a, b = p.cg_to_front_axle - offset, p.cg_to_rear_axle + offset
+    if min(a, b) <= 0.0:
+        raise ValueError("the sprung mass must stand between the axles: correct front_unsprung_share or mass")
+    centre = (b * p.roll_centre_height_front + a * p.roll_centre_height_rear) / (a + b)
+    arms = m_s * (h_s - h) ** 2 + unsprung * (h - h_u) ** 2
+    wheels = (
+        2.0 * m_f * (p.cg_to_front_axle**2 + t * t)
+        + 2.0 * m_r * (p.cg_to_rear_axle**2 + t * t)
+        + m_s * offset * offset
+    )
+    if p.yaw_inertia <= wheels:
+        raise ValueError(
+            f"yaw_inertia is that of the whole car with its wheels: it must exceed {wheels:g} kg.m2 "
+            f"(got {p.yaw_inertia:g})"
+        )
+    share = m_s * G / (2.0 * (a + b))
+    gravity_roll, gravity_pitch = m_s * G * (h_s - centre), m_s * G * h_s
+    k_f, k_r = p.spring_stiffness_front, p.spring_stiffness_rear
+    s_f, s_r = p.anti_roll_stiffness_front, p.anti_roll_stiffness_rear
+    against_roll = 2.0 * t * t * (k_f + k_r + 2.0 * (s_f + s_r))
+    against_pitch = 2.0 * (k_f * a * a + k_r * b * b)
+    if against_roll <= gravity_roll or against_pitch <= gravity_pitch or k_f + k_r <= 0.0:
+        raise ValueError(
+            f"springs and anti-roll bars must give more than {gravity_roll:g} N.m/rad in roll and "
+            f"{gravity_pitch:g} in pitch, or the body falls over (got {against_roll:g} and {against_pitch:g})"
+        )
+    roll = p.sprung_roll_inertia + arms
+    product = p.sprung_roll_yaw_product + m_s * offset * (h_s - h_u)
+    return Ride(
+        m_s=m_s,
+        m_f=m_f,
+        m_r=m_r,
+        a=a,
+        b=b,
+        half_track=t,
+        h=h,
+        k_f=k_f,
+        k_r=k_r,
+        d_f=p.damping_front,
+        d_r=p.damping_rear,
+        s_f=s_f,
+        s_r=s_r,
+        p_f=p.roll_centre_height_front / t,
+        p_r=p.roll_centre_height_rear / t,
+        k_t=p.tyre_vertical_stiffness,
+        load_f=share * b + m_f * G,
+        load_r=share * a + m_r * G,
+        gravity_roll=gravity_roll,
+        gravity_pitch=gravity_pitch,
+        roll=roll,
+        pitch=p.sprung_pitch_inertia + arms,
+        yaw_sprung=p.yaw_inertia - wheels,
+        yaw=p.yaw_inertia - product * product / roll,
+        tilt=product / roll,
+    )
