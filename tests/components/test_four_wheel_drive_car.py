@@ -1,0 +1,46 @@
+"""The vehicle file of paper B and the defaults of its units agree, and its stiffnesses with the tyres."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+from components.actuators.lag import Lag
+from components.allocators.side_share import SideShare
+from components.controllers.fuzzy_sliding_mode import FuzzySlidingMode
+from components.controllers.sliding_mode import SlidingMode
+from components.core.magic_formula import forces_and_moment
+from components.core.magic_formula_parameters import MagicFormulaParameters, coefficients
+from components.plants.eight_dof import EightDof
+from components.references.single_track import SingleTrack
+
+CAR = Path(__file__).parents[2] / "scenarios" / "vehicles" / "four_wheel_drive_car.yaml"
+UNITS = (SingleTrack, SlidingMode, FuzzySlidingMode, SideShare, Lag, EightDof)
+
+
+@pytest.fixture(scope="module")
+def car():
+    return YAML(typ="safe").load(CAR.read_text(encoding="utf-8"))["parameters"]
+
+
+def test_every_value_belongs_to_a_parameter_of_plant_or_reference(car):
+    # These two stand in every scenario of the car, whatever else is exchanged.
+    declared = {v.name for unit in (EightDof, SingleTrack) for v in unit.variables}
+    assert set(car) <= declared
+
+
+def test_a_unit_without_a_vehicle_file_is_the_papers_car(car):
+    for unit in UNITS:
+        for variable in unit.variables:
+            if variable.causality == "parameter" and variable.name in car:
+                assert variable.start == float(car[variable.name]), f"{unit.fmu_name}.{variable.name}"
+
+
+@pytest.mark.parametrize("axle, arm", [("front", "cg_to_rear_axle"), ("rear", "cg_to_front_axle")])
+def test_the_axle_stiffnesses_are_those_of_the_tyres_at_their_static_loads(car, axle, arm):
+    wheelbase = car["cg_to_front_axle"] + car["cg_to_rear_axle"]
+    load = 0.5 * car["mass"] * 9.81 * car[arm] / wheelbase
+    _, f_y, _ = forces_and_moment(0.0, 1e-5, load, 1.0, coefficients(MagicFormulaParameters(), axle))
+    assert -2.0 * f_y / 1e-5 == pytest.approx(car[f"cornering_stiffness_{axle}"], rel=2e-3)
