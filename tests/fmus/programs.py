@@ -84,16 +84,16 @@ def python_libraries() -> dict[str, str]:
 
 
 def interpreters() -> list[str]:
-    """Return every different Python of 3.10 to 3.13 on PATH or in /usr/bin, besides this one."""
+    """Return every different Python of 3.10 to 3.13 on PATH, in /usr/bin or in the folders of pyenv."""
     found = {}
+    pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv"))
     for minor in MINORS:
-        for path in (None, "/usr/bin"):
-            interpreter = shutil.which(f"python3.{minor}", path=path)
-            if interpreter:
-                asked = "import sys; print(sys.executable)"
-                answer = subprocess.run(
-                    [interpreter, "-c", asked], capture_output=True, text=True, check=False
-                )
-                if answer.returncode == 0:
-                    found[os.path.realpath(answer.stdout.strip())] = None
+        name = f"python3.{minor}"
+        candidates = [shutil.which(name), shutil.which(name, path="/usr/bin")]
+        candidates += map(str, sorted(pyenv.glob(f"versions/3.{minor}.*/bin/{name}")))
+        for interpreter in filter(None, candidates):
+            asked = [interpreter, "-c", "import sys; print(sys.executable)"]
+            answer = subprocess.run(asked, capture_output=True, text=True, check=False)
+            if answer.returncode == 0:
+                found[os.path.realpath(answer.stdout.strip())] = None
     return list(found)
