@@ -9,9 +9,10 @@ import pytest
 
 from components.core.magic_formula import forces_and_moment
 from components.core.magic_formula_parameters import MagicFormulaParameters, coefficients
+from components.core.rolling_body import G, RollingCarParameters
 from components.core.wheel_spin import spin
 from components.drivers.sine import Sine
-from components.plants.eight_dof import EightDof, EightDofParameters, G
+from components.plants.eight_dof import EightDof
 from components.plants.seven_dof import SevenDof
 from components.tyres.dugoff import Dugoff
 from components.tyres.magic_formula import MagicFormula
@@ -21,7 +22,7 @@ from .loop import Loop
 from .stand import Stand
 
 WHEELS = ("fl", "fr", "rl", "rr")
-P = EightDofParameters()
+P = RollingCarParameters()
 COUPLING = P.sprung_mass * P.roll_arm
 FREE = {"drag_coefficient": 0.0, "rolling_resistance": 0.0}
 
