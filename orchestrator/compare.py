@@ -49,12 +49,11 @@ def variants(
     """
     choices = _choices(swaps)
     if all(len(names) == 1 for names in choices.values()):
-        units = load_scenario(scenario, settings=settings).units
+        swapped = [f"{unit}={names[0]}" for unit, names in choices.items()]
+        own = load_scenario(scenario, swaps=swapped, settings=settings).replaced
         for unit, names in choices.items():
-            own = units[unit].fmu if unit in units else names[0]
-            names[:0] = [own] if own not in names else []
-            if is_path(own):
-                names[0] = str(scenario.absolute().parent / own)
+            fmu = str(scenario.absolute().parent / own[unit]) if is_path(own[unit]) else own[unit]
+            names[:0] = [fmu] if fmu not in names else []
     named = [unit for unit, names in choices.items() if len(names) > 1]
     if not named:
         raise ScenarioError("nothing to compare: name several FMUs, for example --swap controller=a,b")
@@ -64,13 +63,13 @@ def variants(
         label = " + ".join(_stem(chosen[unit]) for unit in named)
         repeated = sum(job.label.partition(" (")[0] == label for job in jobs)
         label += f" ({repeated + 1})" if repeated else ""
-        swapped = tuple(f"{unit}={fmu}" for unit, fmu in chosen.items())
-        jobs.append(Job(label, scenario, out / label.replace(" ", ""), swapped, tuple(settings), fmus=fmus))
+        options = tuple(f"{unit}={fmu}" for unit, fmu in chosen.items())
+        jobs.append(Job(label, scenario, out / label.replace(" ", ""), options, tuple(settings), fmus=fmus))
     return jobs
 
 
 def _choices(swaps: Sequence[str]) -> dict[str, list[str]]:
-    """Return unit -> FMUs; an option without `=` stays whole, for the scenario's own message."""
+    """Return unit -> FMUs, each once, in the order of the options."""
     choices: dict[str, list[str]] = {}
     for text in swaps:
         unit, equals, fmus = text.partition("=")

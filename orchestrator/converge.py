@@ -32,6 +32,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+ROUNDING = 1e-13
+"""Relative difference that a different order of additions can make."""
+
+
 @dataclass(frozen=True)
 class Row:
     """One run: its algorithm and step [s], and what it came to; None where it cannot be known."""
@@ -42,6 +46,7 @@ class Row:
     order: float | None
     wall_time: float | None  # [s]
     failed: str = ""
+    finest: bool = False  # the run that all others are compared with
 
 
 def refinements(
@@ -86,7 +91,7 @@ def measure(outcomes: Sequence[Outcome], signal: str) -> list[Row]:
     """Return a row for every run, computed from the results on disk.
 
     Raises:
-        ResultsError: the finest run of the first algorithm has no results to compare with.
+        ResultsError: the signal is zero throughout.
     """
     by_algorithm: dict[str, list[Outcome]] = {}
     for outcome in outcomes:
@@ -94,9 +99,7 @@ def measure(outcomes: Sequence[Outcome], signal: str) -> list[Row]:
     finest = next(iter(by_algorithm.values()))[-1]
     samples = {id(outcome): _samples(outcome, signal) for outcome in outcomes}
     reference = samples[id(finest)][0]
-    if reference is None:
-        raise ResultsError(f"{finest.job.label}: nothing to compare with: {samples[id(finest)][2]}")
-    peak = float(np.max(np.abs(reference)))
+    peak = math.nan if reference is None else float(np.max(np.abs(reference)))
     if peak == 0:
         raise ResultsError(f"{signal} is zero throughout: choose another --signal.")
     rows = []
@@ -110,7 +113,8 @@ def measure(outcomes: Sequence[Outcome], signal: str) -> list[Row]:
             distance = None if run is finest else _distance(coarse[k], target)
             _, wall_time, failed = samples[id(run)]
             error = None if distance is None else distance / peak
-            rows.append(Row(algorithm, float(run.job.step_size or 0), error, order, wall_time, failed))
+            step = float(run.job.step_size or 0)
+            rows.append(Row(algorithm, step, error, order, wall_time, failed, run is finest))
     return rows
 
 
@@ -119,6 +123,8 @@ def _samples(outcome: Outcome, signal: str) -> tuple[np.ndarray | None, float | 
     found = outcome.reason or read_back(outcome.job.out)
     if isinstance(found, str):
         return None, None, found
+    if not np.issubdtype(found[signal].dtype, np.number):
+        return None, None, f"{signal} is no number"
     return found[signal], float(found.run["wall_time"]), ""
 
 
@@ -128,16 +134,20 @@ def _common(x: np.ndarray | None, k: int) -> np.ndarray | None:
 
 
 def _distance(a: np.ndarray | None, b: np.ndarray | None) -> float | None:
-    return None if a is None or b is None else float(np.max(np.abs(a - b)))
+    """Return the largest difference; 0 if it is no more than rounding."""
+    if a is None or b is None:
+        return None
+    distance = float(np.max(np.abs(a - b)))
+    return distance if distance > ROUNDING * float(np.max(np.abs(b))) else 0.0
 
 
 def convergence_table(rows: Sequence[Row], title: str) -> Table:
     """Return the table of all runs."""
     table = Table(title, ["algorithm", "step", "error", "observed order", "wall time"])
     for row in rows:
-        error: Cell = Value(row.error, "1") if row.error is not None else "the finest"
-        if row.failed:
-            error = f"failed: {row.failed}"
+        error: Cell = None if row.error is None else Value(row.error, "1")
+        if row.failed or row.finest:
+            error = f"failed: {row.failed}" if row.failed else "the finest"
         order = Value(row.order, "1") if row.order is not None else None
         cost = Value(row.wall_time, "s") if row.wall_time is not None else None
         table.rows.append([row.algorithm, _milliseconds(row.step), error, order, cost])

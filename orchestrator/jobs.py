@@ -57,7 +57,7 @@ class Outcome:
     @property
     def reason(self) -> str:
         """Why it failed, in one sentence."""
-        return self.problems[0] if self.problems else ""
+        return "; ".join(self.problems)
 
 
 NEEDED = ("orchestrator.wiring", "orchestrator.simulate", "matplotlib.backends.backend_agg")
@@ -156,8 +156,8 @@ def execute(
                 running.append(_Running.start(*following, context, run))
             if not running:
                 return [outcomes[i] for i in range(len(jobs))]
-            wait([one.process.sentinel for one in running])
-            for one in [one for one in running if not one.process.is_alive()]:
+            reported = wait([one.pipe for one in running])
+            for one in [one for one in running if one.pipe in reported]:
                 running.remove(one)
                 outcomes[one.number] = one.outcome()
                 done(outcomes[one.number])
@@ -168,14 +168,17 @@ def execute(
     finally:
         for one in running:
             one.process.terminate()
-            one.process.join(timeout=GRACE)
-            one.process.kill()  # one whose unit never comes back
-            one.process.join()
+            one.end()
 
 
 def pool(workers: int | None = None) -> ProcessPoolExecutor:
     """Return an executor for work that cannot fail as FMUs can: reading results, drawing figures."""
-    return ProcessPoolExecutor(max(1, workers or default_workers()), mp_context=_context())
+    return ProcessPoolExecutor(
+        max(1, workers or default_workers()),
+        mp_context=_context(),
+        initializer=signal.signal,
+        initargs=(signal.SIGINT, signal.SIG_IGN),  # the caller ends them
+    )
 
 
 def _context() -> Any:
@@ -209,14 +212,21 @@ class _Running:
         return cls(number, job, process, ours)
 
     def outcome(self) -> Outcome:
-        seconds = time.monotonic() - self.began
-        self.process.join()
+        """Return what the process reported, or how it died if it did not."""
         try:
             status, problems = self.pipe.recv()
+            self.end()
         except EOFError:
+            self.end()
             status, problems = 1, (_death(self.process.exitcode),)
         self.pipe.close()
-        return Outcome(self.job, tuple(problems), status, seconds)
+        return Outcome(self.job, tuple(problems), status, time.monotonic() - self.began)
+
+    def end(self) -> None:
+        """Wait for the process to end; kill one that does not, because a unit never comes back."""
+        self.process.join(timeout=GRACE)
+        self.process.kill()
+        self.process.join()
 
 
 def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:

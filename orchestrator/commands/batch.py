@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -35,8 +36,15 @@ def run_all(jobs: Sequence[Job], folder: Path, *, workers: int | None) -> list[O
     from ..jobs import check, execute
 
     check(jobs)
-    try:
+    with stoppable(folder):
         return execute(jobs, workers=workers, done=_progress(len(jobs)))
+
+
+@contextlib.contextmanager
+def stoppable(folder: Path) -> Iterator[None]:
+    """Let Ctrl-C end the command with a word on what has been recorded."""
+    try:
+        yield
     except KeyboardInterrupt:
         say(f"Interrupted; what was recorded until then: {folder}")
         raise typer.Exit(1) from None

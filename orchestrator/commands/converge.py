@@ -69,13 +69,14 @@ def converge(
     rows = measure(outcomes, signal)
     title = f"Convergence of {signal}, {scenario.stem}"
     table = convergence_table(rows, title)
-    note = "order observed from successive refinements; units with a step size of their own keep it"
-    save(
-        convergence_figure(rows, signal, title, f"yawbench converge {scenario} · {note}"), folder / "converge"
-    )
     write_rows(rows, folder / "converge.csv")
     (folder / "converge.md").write_text(for_markdown(table), encoding="utf-8")
     print_tables([table])
-    say(f"{folder}: converge.svg, converge.png, converge.csv, converge.md")
+    files = ["converge.csv", "converge.md"]
+    if any(row.error for row in rows):
+        note = f"yawbench converge {scenario} · units with a step size of their own keep it"
+        figure = convergence_figure(rows, signal, title, note)
+        files += [path.name for path in save(figure, folder / "converge")]
+    say(f"{folder}: {', '.join(files)}")
     if any(row.failed for row in rows):
         raise typer.Exit(1)

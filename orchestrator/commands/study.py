@@ -28,7 +28,7 @@ def study(
     from ..study import claim_tables, judge_study, run_tables
     from ..study_file import load_study
     from ..study_report import REPORT, write_study
-    from .batch import print_tables, run_all, say
+    from .batch import print_tables, run_all, say, stoppable
     from .run import default_folder
 
     loaded = load_study(file)
@@ -37,7 +37,7 @@ def study(
     if not no_run:
         work = [run.job(folder, fmus) for run in loaded.runs.values()]
         outcomes = run_all(work, folder, workers=jobs)
-    with pool(jobs) as workers:
+    with stoppable(folder), pool(jobs) as workers:
         findings = judge_study(loaded, folder, outcomes, each=workers.map)
         problems = write_study(findings, folder, each=workers.map)
     for problem in problems:

@@ -130,7 +130,7 @@ def test_converge_halves_the_step_and_reports_order_and_cost(yawbench, folder):
     assert [line.split()[:2] for line in out.splitlines() if line.startswith((" jacobi", " gauss"))] == [
         [name, step] for name in ("jacobi", "gauss_seidel") for step in ("10", "5", "2.5")
     ]
-    assert said.splitlines()[-1] == "o: converge.svg, converge.png, converge.csv, converge.md"
+    assert said.splitlines()[-1] == "o: converge.csv, converge.md, converge.svg, converge.png"
     rows = list(csv.DictReader((folder / "o/converge.csv").open()))
     assert float(rows[0]["order [1]"]) == pytest.approx(1.0, abs=0.1)  # jacobi is one step late
     assert float(rows[0]["wall_time [s]"]) > 0
@@ -152,6 +152,14 @@ def test_converge_names_a_wrong_signal_or_algorithm(yawbench):
     status, _, said = yawbench("converge", "half.yaml", "--algorithm", "gauss")
     assert status == 2
     assert said.startswith("--algorithm gauss: no such algorithm")
+
+
+def test_converge_of_what_does_not_depend_on_the_step_has_no_figure(yawbench, folder):
+    status, out, said = yawbench("converge", "half.yaml", "--signal", "driver.steer_angle", "--halvings", "2",
+                                 "--out", "o")  # fmt: skip
+    assert status == 0
+    assert "the finest" in out
+    assert said.splitlines()[-1] == "o: converge.csv, converge.md"
 
 
 def test_study_runs_judges_and_draws(yawbench, folder):

@@ -75,6 +75,13 @@ def test_a_comparison_with_itself_is_an_error(scenario):
         labels(scenario, "controller=controller_fnn")
 
 
+def test_a_unit_that_does_not_exist_is_named_with_the_likely_one(scenario):
+    with pytest.raises(
+        ScenarioError, match="the scenario has no unit 'controler'; did you mean 'controller'"
+    ):
+        labels(scenario, "controler=controller_off")
+
+
 def test_an_option_without_an_fmu_is_an_error(scenario):
     with pytest.raises(ScenarioError, match=r"--swap controller: write --swap UNIT=FMU"):
         labels(scenario, "controller")

@@ -71,11 +71,15 @@ def test_a_failed_run_leaves_the_others_their_errors(tmp_path):
     assert text[4][2] == "failed: plant: not finite"
 
 
-def test_without_the_finest_run_there_is_nothing_to_compare_with(tmp_path):
+def test_without_the_finest_run_orders_are_left(tmp_path):
     made = outcomes(tmp_path, {"extrapolated": 2})
     made[-1] = Outcome(made[-1].job, ("the process of this run died",), 1)
-    with pytest.raises(ResultsError, match="extrapolated 3: nothing to compare with: the process"):
-        measure(made, SIGNAL)
+    rows = measure(made, SIGNAL)
+    assert [row.error for row in rows] == [None] * 4
+    assert rows[0].order == pytest.approx(2.0)
+    assert [row[2] for row in convergence_table(rows, "title").text()] == [
+        "-", "-", "-", "failed: the process of this run died",
+    ]  # fmt: skip
 
 
 def test_a_signal_that_is_zero_throughout_is_an_error(tmp_path):
