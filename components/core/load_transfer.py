@@ -1,0 +1,34 @@
+"""Quasi-static wheel loads of a rigid car from the accelerations of its centre of mass.
+
+    F_zf = m g b / 2L - m h a_x / 2L -/+ b m h a_y / (L d)        minus left, plus right
+    F_zr = m g a / 2L + m h a_x / 2L -/+ a m h a_y / (L d)
+
+A wheel that lifts has no load; the other wheel of its axle then carries the axle, so the loads always
+add up to m g.
+"""
+
+from __future__ import annotations
+
+G = 9.81  # m/s2
+
+
+def quasi_static_loads(
+    a_x: float, a_y: float, *, mass: float, a: float, b: float, track_width: float, height: float
+) -> tuple[float, float, float, float]:
+    """Return F_z [N] of fl, fr, rl, rr from the accelerations [m/s2].
+
+    Args:
+        mass: m [kg].
+        a, b: distances of front and rear axle from the centre of mass [m].
+        track_width, height: d, h [m].
+    """
+    weight = mass * G
+    lift = mass * height
+    front = min(max((weight * b - lift * a_x) / (a + b), 0.0), weight)
+    rear = weight - front
+    across = lift * a_y / ((a + b) * track_width)
+    front *= 0.5
+    rear *= 0.5
+    front_across = min(max(b * across, -front), front)
+    rear_across = min(max(a * across, -rear), rear)
+    return front - front_across, front + front_across, rear - rear_across, rear + rear_across

@@ -1,0 +1,343 @@
+"""The car with two degrees of freedom: linear theory, closed forms, symmetry, an independent solution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from math import atan2, cos, isfinite, log2, pi, sin
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from components.core.component import Component
+from components.core.load_transfer import quasi_static_loads
+from components.core.magic_formula_1987 import (
+    MagicFormula1987Parameters,
+    coefficients_1987,
+    forces_1987,
+    loaded_tyre,
+)
+from components.core.roles import ROLES, WHEELS, wheels
+from components.core.variables import parameter
+from components.drivers.sine import Sine
+from components.plants.two_dof import TwoDof, TwoDofParameters
+from components.tyres.linear import LinearTyre
+from components.tyres.magic_formula_1987 import MagicFormula1987
+
+from .loop import Loop
+from .stand import Stand
+
+P = TwoDofParameters()
+M, I_Z, A, B, D, H = P.mass, P.yaw_inertia, P.cg_to_front_axle, P.cg_to_rear_axle, P.track_width, P.cg_height
+L = A + B
+SPEED, G = 25.0, 9.81
+
+
+def four(name, *values):
+    values = values * 4 if len(values) == 1 else values
+    return {f"{name}_{wheel}": value for wheel, value in zip(WHEELS, values, strict=True)}
+
+
+@dataclass(frozen=True)
+class HoldParameters:
+    angle: float = parameter(1e-4, "rad", "Steer angle")
+
+
+class Hold(Component):
+    """Steer angle held."""
+
+    Parameters = HoldParameters
+    outputs = ("steer_angle",)
+
+    def output(self, t, u):
+        return (self.p.angle,)
+
+
+def drive(
+    tyre=MagicFormula1987,
+    *,
+    driver=None,
+    mu=0.5,
+    until=3.0,
+    h=1e-3,
+    record,
+    tyre_parameters=None,
+    **constants,
+):
+    """Return the recorded signals (rows) of driver, car and tyre in a loop."""
+    driver = driver or (Sine, {"amplitude": 0.05, "frequency": 0.5, "start_time": 0.5})
+    car = {k: constants.pop(k) for k in list(constants) if k.startswith("initial")}
+    loop = Loop(
+        [driver, (TwoDof, car), (tyre, tyre_parameters or {})],
+        algorithm="extrapolated",
+        constants={**four("friction", mu), **constants},
+    )
+    return np.array(loop.run(until, round(until / h), lambda now: [now[name] for name in record])).T
+
+
+# ---- linear theory
+
+
+def test_steady_state_yaw_rate_matches_the_understeer_formula():
+    c = 40000.0  # per tyre
+    record = ["yaw_rate", "sideslip"]
+    r, beta = drive(
+        LinearTyre,
+        driver=(Hold, {"angle": 1e-4}),
+        until=8.0,
+        h=4e-3,
+        record=record,
+        tyre_parameters={"cornering_stiffness": c},
+    )[:, -1]
+    k = M / L**2 * (B - A) / (2 * c)
+    gain = 1e-4 / (L * (1 + k * SPEED**2))
+    assert r == pytest.approx(SPEED * gain, rel=1e-6)
+    assert beta == pytest.approx((B - M * A * SPEED**2 / (2 * c * L)) * gain, rel=1e-6)
+
+
+@pytest.mark.parametrize("frequency", [0.5, 2.0])
+def test_the_response_to_a_yaw_moment_is_that_of_the_linear_single_track_model(frequency):
+    c = 2 * 50000.0
+    s = 2j * pi * frequency
+    matrix = np.array(
+        [
+            [M * s + 2 * c / SPEED, M * SPEED + (A - B) * c / SPEED],
+            [(A - B) * c / SPEED, I_Z * s + (A * A + B * B) * c / SPEED],
+        ]
+    )
+    expected = np.linalg.solve(matrix, [0.0, 1.0])[1]
+    car, tyre = Stand(TwoDof), Stand(LinearTyre)
+    y = car.start()
+    names = [v.name for v in LinearTyre.variables if v.causality == "input" and "friction" not in v.name]
+    forces = tyre.start(**{n: y[n] for n in names})
+    before = forces
+    h, found = 1e-3, []
+    for k in range(4000):
+        middle = {n: 1.5 * forces[n] - 0.5 * before[n] for n in forces if "y" in n}
+        y = car.step(h, yaw_moment=100.0 * sin(2 * pi * frequency * (k + 0.5) * h), **middle)
+        before, forces = forces, tyre.step(h, **{n: y[n] for n in names})
+        found.append(y["yaw_rate"])
+    t = h * np.arange(1, 4001)
+    last = t > 2.0 + 0.5 * h
+    phasor = 2j * np.mean(np.array(found)[last] * np.exp(-2j * pi * frequency * t[last])) / 100.0
+    assert phasor / expected == pytest.approx(1.0, abs=3e-4)
+
+
+# ---- closed forms
+
+
+def test_under_a_yaw_moment_alone_the_car_turns_with_the_moment_over_its_inertia():
+    stand = Stand(TwoDof)
+    stand.start()
+    for _ in range(100):
+        y = stand.step(0.01, yaw_moment=1000.0)
+    assert y["yaw_rate"] == pytest.approx(1000.0 / I_Z, rel=1e-12)
+    assert y["yaw_angle"] == pytest.approx(500.0 / I_Z, rel=1e-12)
+    # No force: dv_y/dt = -v_x r.
+    assert y["velocity_y"] == pytest.approx(-SPEED * 500.0 / I_Z, rel=1e-12)
+    assert y["velocity_x"] == SPEED
+
+
+@pytest.mark.parametrize(("wheel", "arm"), [("fl", A), ("fr", A), ("rl", -B), ("rr", -B)])
+def test_each_lateral_force_turns_the_straight_car_with_its_lever_arm(wheel, arm):
+    stand = Stand(TwoDof)
+    stand.start()
+    y = stand.step(0.01, **{f"tyre_force_y_{wheel}": 500.0})
+    assert y["yaw_rate"] == pytest.approx(0.01 * 500.0 * arm / I_Z, rel=1e-12)
+    assert y["velocity_y"] == pytest.approx(0.01 * (500.0 / M - SPEED * 0.5 * y["yaw_rate"]), rel=1e-12)
+
+
+def test_a_steered_front_force_has_a_part_along_the_track():
+    stand = Stand(TwoDof)
+    stand.start(steer_angle=0.3)
+    y = stand.step(0.01, tyre_force_y_fl=500.0)
+    moment = 500.0 * (A * cos(0.3) + 0.5 * D * sin(0.3))
+    assert y["yaw_rate"] == pytest.approx(0.01 * moment / I_Z, rel=1e-12)
+
+
+def test_longitudinal_tyre_forces_do_nothing():
+    one, other = Stand(TwoDof), Stand(TwoDof)
+    one.start(steer_angle=0.1)
+    other.start(steer_angle=0.1)
+    assert one.step(0.01, **four("tyre_force_x", -900.0)) == other.step(0.01)
+
+
+def test_a_circle_is_driven_as_a_circle():
+    r = 0.5
+    stand = Stand(TwoDof, initial_yaw_rate=r)
+    centripetal = four("tyre_force_y", *[0.5 * M * SPEED * r * x / L for x in (B, B, A, A)])
+    stand.start(**centripetal)
+    for _ in range(400):
+        y = stand.step(0.01)
+    assert y["velocity_y"] == pytest.approx(0.0, abs=1e-9)
+    radius = SPEED / r
+    assert y["position_x"] == pytest.approx(radius * sin(2.0), rel=1e-8)
+    assert y["position_y"] == pytest.approx(radius * (1 - cos(2.0)), rel=1e-8)
+    assert y["acceleration_y"] == pytest.approx(SPEED * r)
+    assert y["sideslip_rate"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_wheel_loads_carry_the_moment_of_the_lateral_acceleration_and_no_more():
+    stand = Stand(TwoDof)
+    y = stand.start(**four("tyre_force_y", 1000.0, 1200.0, 900.0, 1100.0))
+    fl, fr, rl, rr = (y[f"vertical_load_{w}"] for w in WHEELS)
+    assert fl + fr == pytest.approx(M * G * B / L, rel=1e-14)
+    assert rl + rr == pytest.approx(M * G * A / L, rel=1e-14)
+    assert 0.5 * D * (fr - fl + rr - rl) == pytest.approx(4200.0 * H, rel=1e-12)
+    assert (fl, fr, rl, rr) == pytest.approx(
+        quasi_static_loads(0.0, 4200.0 / M, mass=M, a=A, b=B, track_width=D, height=H)
+    )
+
+
+def test_a_wheel_that_lifts_leaves_its_load_to_the_other():
+    y = Stand(TwoDof, cg_height=1.2).start(**four("tyre_force_y", 4500.0))
+    assert (y["vertical_load_fl"], y["vertical_load_rl"]) == (0.0, 0.0)
+    assert y["vertical_load_fr"] == pytest.approx(M * G * B / L)
+
+
+def test_slips_are_those_of_freely_rolling_wheels():
+    y = Stand(TwoDof, initial_yaw_rate=0.4, initial_sideslip=-0.1).start(steer_angle=0.1)
+    v_x, v_y = SPEED * cos(-0.1), SPEED * sin(-0.1)
+    places = ((A, D / 2, 0.1), (A, -D / 2, 0.1), (-B, D / 2, 0.0), (-B, -D / 2, 0.0))
+    for wheel, (x, side, angle) in zip(WHEELS, places, strict=True):
+        assert y[f"slip_ratio_{wheel}"] == 0.0
+        expected = atan2(v_y + 0.4 * x, v_x - 0.4 * side) - angle
+        assert y[f"slip_angle_{wheel}"] == pytest.approx(expected, rel=1e-12)
+
+
+def test_it_shows_what_a_plant_must_show():
+    shown = {v.name for v in TwoDof.variables}
+    role = ROLES["plants"]
+    for pattern in (*role.inputs, *role.outputs):
+        assert set(wheels(pattern)) <= shown
+    assert TwoDof.fmu_name == "plant_two_dof"
+
+
+# ---- an independent solution
+
+
+@cache
+def exact(mu, until=3.0):
+    """v_y, r, x, y, psi (rows) every 4 ms: equations (1), (2) with the load loop solved, by scipy."""
+    c = coefficients_1987(MagicFormula1987Parameters())
+    places = ((A, D / 2), (A, -D / 2), (-B, D / 2), (-B, -D / 2))
+
+    def derivatives(t, state):
+        v_y, r, _, _, psi = state
+        delta = 0.05 * sin(pi * (t - 0.5)) if 0.5 < t < 2.5 else 0.0
+        angles = (delta, delta, 0.0, 0.0)
+        a_y = 0.0
+        for _ in range(200):
+            y = moment = 0.0
+            shift = M * H * a_y / (L * D)
+            loads = [M * G * B / (2 * L) - B * shift, M * G * B / (2 * L) + B * shift]
+            loads += [M * G * A / (2 * L) - A * shift, M * G * A / (2 * L) + A * shift]
+            for (x, side), angle, load in zip(places, angles, loads, strict=True):
+                alpha = atan2(v_y + r * x, SPEED - r * side) - angle
+                f_y = forces_1987(0.0, alpha, loaded_tyre(load, mu, c))[1]
+                y += f_y * cos(angle)
+                moment += x * f_y * cos(angle) + side * f_y * sin(angle)
+            if abs(y / M - a_y) < 1e-13:
+                break
+            a_y = y / M
+        return [
+            a_y - SPEED * r,
+            moment / I_Z,
+            SPEED * cos(psi) - v_y * sin(psi),
+            SPEED * sin(psi) + v_y * cos(psi),
+            r,
+        ]
+
+    times = np.linspace(0.0, until, round(until / 4e-3) + 1)
+    columns, state = np.empty((5, len(times))), np.zeros(5)
+    for begin, end in ((0.0, 0.5), (0.5, 2.5), (2.5, until)):
+        piece = solve_ivp(
+            derivatives, (begin, end), state, method="DOP853", rtol=1e-10, atol=1e-11, dense_output=True
+        )
+        inside = (times >= begin) & (times <= end)
+        columns[:, inside] = piece.sol(times[inside])
+        state = piece.y[:, -1]
+    return columns
+
+
+def errors(h, mu=0.5):
+    record = ["velocity_y", "yaw_rate", "position_x", "position_y", "yaw_angle"]
+    found = drive(record=record, mu=mu, h=h)[:, :: round(4e-3 / h)]
+    return np.abs(found - exact(mu)).max(axis=1) / np.abs(exact(mu)).max(axis=1)
+
+
+def test_the_coupled_car_agrees_with_an_independent_solution_to_second_order():
+    coarse, fine = errors(4e-3), errors(1e-3)
+    assert np.abs(exact(0.5)[1]).max() * SPEED > 4.0  # near the limit of 4.9 m/s2
+    assert np.all(fine < 1e-4), fine
+    assert log2(coarse[1] / fine[1]) / 2 > 1.8
+
+
+# ---- symmetry, steps, state
+
+
+def test_the_mirrored_manoeuvre_gives_the_mirrored_motion_to_the_last_bit():
+    record = ["yaw_rate", "sideslip", "position_y", "vertical_load_fl", "slip_angle_rl"]
+    mirrored = [*record[:3], "vertical_load_fr", "slip_angle_rr"]
+    left = drive(record=record, driver=(Sine, {"amplitude": 0.1, "frequency": 0.5}))
+    right = drive(record=mirrored, driver=(Sine, {"amplitude": -0.1, "frequency": 0.5}))
+    assert np.array_equal(left, right * np.array([[-1.0], [-1.0], [-1.0], [1.0], [-1.0]]))
+    assert np.abs(left[0]).max() > 0.2
+
+
+def test_under_held_forces_the_result_does_not_depend_on_how_the_step_is_split():
+    held = {"steer_angle": 0.05, "yaw_moment": 700.0, **four("tyre_force_y", 800.0, 900.0, 500.0, 600.0)}
+    whole, split = Stand(TwoDof), Stand(TwoDof)
+    whole.start(**held)
+    split.start(**held)
+    one = whole.step(0.008)
+    for h in (0.001, 0.002, 0.004, 0.001):
+        many = split.step(h)
+    for name, value in one.items():
+        assert many[name] == pytest.approx(value, rel=1e-9, abs=1e-10), name
+
+
+def test_what_follows_an_input_at_once_is_what_the_model_structure_lists():
+    straight, steered = Stand(TwoDof), Stand(TwoDof)
+    straight.start()
+    steered.start()
+    y_0 = straight.step(1e-9)
+    y_1 = steered.step(1e-9, steer_angle=0.1, yaw_moment=1.0)
+    changed = {n for n in y_0 if abs(y_0[n] - y_1[n]) > 1e-9}
+    assert changed == {v.name for v in TwoDof.variables if v.depends_on}
+
+
+def test_a_step_undone_and_repeated_gives_the_same_bits():
+    stand = Stand(TwoDof, initial_yaw_rate=0.2)
+    stand.start()
+    for k in range(4):
+        stand.step(0.001 * (1 + k % 2), **four("tyre_force_y", 300.0 * k))
+    kept = stand.unit._get_fmu_state()
+    first = [stand.step(0.001, yaw_moment=500.0), stand.step(0.0), stand.step(0.003)]
+    stand.step(0.1)
+    stand.unit._set_fmu_state(kept)
+    assert [stand.step(0.001, yaw_moment=500.0), stand.step(0.0), stand.step(0.003)] == first
+
+
+def test_a_step_of_no_length_moves_nothing():
+    stand = Stand(TwoDof, initial_yaw_rate=0.2)
+    stand.start(**four("tyre_force_y", 900.0))
+    before = stand.step(0.001)
+    assert stand.step(0.0) == before
+
+
+def test_a_spinning_car_gives_no_undefined_value():
+    record = [v.name for v in TwoDof.variables if v.causality == "output"]
+    found = drive(
+        record=record, driver=(Sine, {"amplitude": 0.3, "frequency": 0.5}), until=6.0, initial_yaw_rate=3.0
+    )
+    assert all(map(isfinite, found.ravel()))
+    assert np.abs(found[record.index("sideslip")]).max() > 1.0
+
+
+def test_without_control_the_papers_manoeuvre_loses_the_car():
+    sine = {"amplitude": 0.14, "frequency": 0.5, "start_time": 0.5}
+    beta, v_x = drive(record=["sideslip", "velocity_x"], driver=(Sine, sine), until=3.5)
+    assert np.degrees(np.abs(beta).max()) > 20.0
+    assert np.all(v_x == SPEED)
