@@ -16,14 +16,14 @@ from time import perf_counter, perf_counter_ns
 
 import numpy as np
 
-from orchestrator.interrupts import StopFlag
-from orchestrator.log import Log
-from orchestrator.master import Master
+from orchestrator.master.interrupts import StopFlag
+from orchestrator.master.log import Log
+from orchestrator.master.master import Master
+from orchestrator.master.program import Operation
+from orchestrator.master.unit import FmuSlave
 from orchestrator.plan import Plan
-from orchestrator.program import Operation
-from orchestrator.scenario import load_scenario
-from orchestrator.unit import FmuSlave
-from orchestrator.wiring import make_plan
+from orchestrator.scenario.load import load_scenario
+from orchestrator.wiring.make_plan import make_plan
 
 DEFAULT = Path(__file__).parents[1] / "scenarios" / "fnn_sideslip" / "25mps.yaml"
 REPEATS = 3
@@ -134,8 +134,8 @@ def bench(path: Path) -> None:
 def imports() -> float:
     """Return the time [s] to import what a run needs, in a fresh interpreter."""
     code = (
-        "import time; t = time.perf_counter(); import orchestrator.cli, orchestrator.simulate, "
-        "orchestrator.wiring; print(time.perf_counter() - t)"
+        "import time; t = time.perf_counter(); import orchestrator.cli, orchestrator.master.simulate, "
+        "orchestrator.wiring.make_plan; print(time.perf_counter() - t)"
     )
     command = [sys.executable, "-c", code]
     return min(float(subprocess.run(command, capture_output=True, check=True).stdout) for _ in range(REPEATS))

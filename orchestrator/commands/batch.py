@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from ..jobs import Job, Outcome
-    from ..tables import Table
+    from ..studies.jobs import Job, Outcome
+    from ..studies.tables import Table
 
 Jobs = Annotated[
     int | None,
@@ -33,7 +33,7 @@ def run_all(jobs: Sequence[Job], folder: Path, *, workers: int | None) -> list[O
     Raises:
         ScenarioError: a job cannot start; none has been.
     """
-    from ..jobs import check, execute
+    from ..studies.jobs import check, execute
 
     check(jobs)
     with stoppable(folder):
@@ -66,7 +66,7 @@ def print_tables(tables: Iterable[Table]) -> None:
     """Print tables on the standard output, as wide as the terminal."""
     from rich.console import Console
 
-    from ..tables import for_terminal
+    from ..studies.tables import for_terminal
 
     console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else WIDTH)
     for table in tables:

@@ -20,8 +20,8 @@ PIPE_WIDTH = 140
 
 def check(scenario: ScenarioFile, swap: Swap = None, set_: Set = None, fmus: Fmus = None) -> None:
     """Validate a scenario; show units in evaluation order, wires and constants."""
-    from ..scenario import load_scenario
-    from ..wiring import make_plan
+    from ..scenario.load import load_scenario
+    from ..wiring.make_plan import make_plan
 
     plan = make_plan(load_scenario(scenario, swaps=swap or (), settings=set_ or ()), fmus=fmus)
     show(plan, scenario)
@@ -152,6 +152,6 @@ def _backward_rows(plan: Plan) -> Iterable[Sequence[str]]:
 
 
 def _direct(plan: Plan) -> Sequence[Wire]:
-    from ..order import evaluate
+    from ..wiring.order import evaluate
 
     return evaluate({unit.name: unit.fmu for unit in plan.units}, plan.wires).direct

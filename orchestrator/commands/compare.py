@@ -33,7 +33,7 @@ def compare(
     Without --out, results go to results/<folder of the scenario>/<its name>-compare. A run that
     fails is named and takes no other with it.
     """
-    from ..compare import judge_comparison, metric_table, variants, write_comparison
+    from ..studies.compare import judge_comparison, metric_table, variants, write_comparison
     from .batch import print_tables, run_all, say
     from .run import default_folder
 

@@ -41,10 +41,10 @@ def converge(
     """
     from typing import get_args
 
-    from ..converge import convergence_figure, convergence_table, measure, refinements, write_rows
     from ..errors import ScenarioError
-    from ..figure_style import save
-    from ..tables import for_markdown
+    from ..figures.style import save
+    from ..studies.converge import convergence_figure, convergence_table, measure, refinements, write_rows
+    from ..studies.tables import for_markdown
     from ..wording import hint
     from .batch import print_tables, run_all, say
     from .run import default_folder

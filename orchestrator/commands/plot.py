@@ -36,12 +36,12 @@ def plot(folders: Folders, label: Labels = None, panel: Panels = None, out: Out 
     Without --out, the figure of one run goes into its folder, that of several into the folder that
     holds them all.
     """
-    from ..compare import FIGURES
     from ..errors import ScenarioError
-    from ..figure_style import save
-    from ..panels import Run, shown_by
-    from ..plots import OVERVIEW, draw
-    from ..results import load_results
+    from ..figures.panels import Run, shown_by
+    from ..figures.plots import OVERVIEW, draw
+    from ..figures.style import save
+    from ..results.read import load_results
+    from ..studies.compare import FIGURES
     from .batch import say
 
     if label and len(label) != len(folders):

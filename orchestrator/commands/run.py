@@ -22,9 +22,9 @@ def run(
     Without --out, results go to results/<folder of the scenario>/<its name>; those of an earlier run
     there are replaced.
     """
-    from ..scenario import load_scenario
-    from ..simulate import simulate
-    from ..wiring import make_plan
+    from ..master.simulate import simulate
+    from ..scenario.load import load_scenario
+    from ..wiring.make_plan import make_plan
 
     plan = make_plan(load_scenario(scenario, swaps=swap or (), settings=set_ or ()), fmus=fmus)
     for note in plan.notes:

@@ -24,10 +24,10 @@ def study(
     Without --out, results go to results/<folder of the study>/<its name>. Every run has a process
     of its own; one that fails is named in the table and takes no other with it.
     """
-    from ..jobs import Outcome, pool
-    from ..study import claim_tables, judge_study, run_tables
-    from ..study_file import load_study
-    from ..study_report import REPORT, write_study
+    from ..studies.jobs import Outcome, pool
+    from ..studies.study import claim_tables, judge_study, run_tables
+    from ..studies.study_file import load_study
+    from ..studies.study_report import REPORT, write_study
     from .batch import print_tables, run_all, say, stoppable
     from .run import default_folder
 

@@ -7,9 +7,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from orchestrator.log import ERROR, OK, Log
+from orchestrator.master.log import ERROR, OK, Log
+from orchestrator.master.unit import Calls, Slave
 from orchestrator.plan import Algorithm, Fmu, Plan, Unit, Variable, Wire
-from orchestrator.unit import Calls, Slave
 
 
 class Behaviour:

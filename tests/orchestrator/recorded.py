@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.results import Results
+from orchestrator.results.read import Results
 
 UNITS = {
     "driver.steer_angle": "rad",

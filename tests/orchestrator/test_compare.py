@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from orchestrator.commands.plot import distinct
-from orchestrator.compare import judge_comparison, metric_table, variants, write_comparison
 from orchestrator.errors import ScenarioError
-from orchestrator.jobs import Job, Outcome
+from orchestrator.studies.compare import judge_comparison, metric_table, variants, write_comparison
+from orchestrator.studies.jobs import Job, Outcome
 
 from .recorded import car, write
 

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.converge import (
+from orchestrator.errors import ResultsError, ScenarioError
+from orchestrator.studies.converge import (
     convergence_figure,
     convergence_table,
     measure,
     refinements,
     write_rows,
 )
-from orchestrator.errors import ResultsError, ScenarioError
-from orchestrator.jobs import Job, Outcome
+from orchestrator.studies.jobs import Job, Outcome
 
 from .recorded import results, write
 

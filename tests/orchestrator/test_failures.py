@@ -6,9 +6,9 @@ import signal
 import pytest
 
 from orchestrator.errors import SimulationError
-from orchestrator.log import DISCARD, ERROR, FATAL, OK, PENDING, WARNING
-from orchestrator.results import load_results
-from orchestrator.simulate import simulate
+from orchestrator.master.log import DISCARD, ERROR, FATAL, OK, PENDING, WARNING
+from orchestrator.master.simulate import simulate
+from orchestrator.results.read import load_results
 
 from .fakes import Behaviour, Clock, Echo, FakeSlave, Function, Mixed, Stage, make_plan
 

@@ -14,9 +14,9 @@ from typing import Any
 
 import pytest
 
-from orchestrator import fmu_archive
 from orchestrator.errors import ModelDescriptionError
-from orchestrator.fmu_archive import cache_folder, open_fmu, platform
+from orchestrator.fmu import archive as fmu_archive
+from orchestrator.fmu.archive import cache_folder, open_fmu, platform
 
 from .fake_fmus import Var, make_fmu, model_description, out
 
@@ -116,7 +116,7 @@ def test_a_damaged_cache_entry_is_put_right(fmu: Path, harm: str) -> None:
 
 
 def test_processes_that_unpack_at_the_same_time_do_not_collide(fmu: Path, cache: Path) -> None:
-    code = "import sys; from orchestrator.fmu_archive import open_fmu; print(open_fmu(sys.argv[1]).directory)"
+    code = "import sys; from orchestrator.fmu.archive import open_fmu; print(open_fmu(sys.argv[1]).directory)"
     command = [sys.executable, "-c", code, str(fmu)]
     started = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(4)]
     said = {process.communicate()[0].strip() for process in started}

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from orchestrator.errors import ScenarioError, SimulationError
-from orchestrator.jobs import Job, check, execute, pool, read_back
-from orchestrator.results import load_results
+from orchestrator.results.read import load_results
+from orchestrator.studies.jobs import Job, check, execute, pool, read_back
 
 from .recorded import car, write
 
@@ -90,7 +90,7 @@ def test_when_the_caller_stops_all_runs_end(tmp_path, monkeypatch, why):
     def stop(outcome):
         raise why
 
-    monkeypatch.setattr("orchestrator.jobs.GRACE", 0.0)
+    monkeypatch.setattr("orchestrator.studies.jobs.GRACE", 0.0)
     os.mkfifo(tmp_path / "fifo")
     with pytest.raises(why):
         execute(jobs(tmp_path, "hangs", "waits"), workers=2, run=obey, done=stop)

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import SimulationError
-from orchestrator.results import load_results
-from orchestrator.simulate import simulate
+from orchestrator.master.simulate import simulate
+from orchestrator.results.read import load_results
 
 from .fakes import Behaviour, Clock, Echo, Function, Integrator, Mass, Mixed, Stage, make_plan
 

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from orchestrator import measures
-from orchestrator.display import digits_of, shown
 from orchestrator.errors import ScenarioError
-from orchestrator.metrics import STANDARD, evaluate, evaluate_all, metric
+from orchestrator.figures.display import digits_of, shown
+from orchestrator.metrics import measures
+from orchestrator.metrics.run_metrics import STANDARD, evaluate, evaluate_all, metric
 
 from .recorded import UNITS, car, results
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.order import Evaluation, evaluate
 from orchestrator.plan import Fmu, Variable, Wire
+from orchestrator.wiring.order import Evaluation, evaluate
 
 
 def fmu(inputs: str = "", **outputs: str | None) -> Fmu:

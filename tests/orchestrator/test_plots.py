@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import ResultsError
-from orchestrator.figure_style import LINES, save
-from orchestrator.panels import Run, thinned
-from orchestrator.plots import draw, provenance, title_of
+from orchestrator.figures.panels import Run, thinned
+from orchestrator.figures.plots import draw, provenance, title_of
+from orchestrator.figures.style import LINES, save
 
 from .recorded import car, results
 

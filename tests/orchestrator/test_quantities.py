@@ -7,8 +7,8 @@ from fractions import Fraction
 
 import pytest
 
-from orchestrator import quantities
-from orchestrator.quantities import convert, parse_unit, same_unit, seconds
+from orchestrator.scenario import quantities
+from orchestrator.scenario.quantities import convert, parse_unit, same_unit, seconds
 
 
 @pytest.mark.parametrize(

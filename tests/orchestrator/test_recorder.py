@@ -8,11 +8,11 @@ import sys
 import numpy as np
 import pytest
 
-from orchestrator import recorder as module
 from orchestrator.errors import ResultsError, SimulationError
-from orchestrator.recorder import BLOCK, Recorder
-from orchestrator.results import load_results
-from orchestrator.simulate import simulate
+from orchestrator.master.simulate import simulate
+from orchestrator.results import recorder as module
+from orchestrator.results.read import load_results
+from orchestrator.results.recorder import BLOCK, Recorder
 
 from .fakes import Clock, Function, Stage, make_plan
 

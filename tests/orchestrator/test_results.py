@@ -3,7 +3,7 @@ import json
 import pytest
 
 from orchestrator.errors import ResultsError
-from orchestrator.results import load_results
+from orchestrator.results.read import load_results
 
 RUN = {
     "status": "completed",

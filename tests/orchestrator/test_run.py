@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 
 from fmus.build import build_all, build_component
-from orchestrator import log
 from orchestrator.cli import main
-from orchestrator.results import load_results
-from orchestrator.scenario import load_scenario
-from orchestrator.simulate import simulate
-from orchestrator.unit import FmuSlave
-from orchestrator.wiring import make_plan
+from orchestrator.master import log
+from orchestrator.master.simulate import simulate
+from orchestrator.master.unit import FmuSlave
+from orchestrator.results.read import load_results
+from orchestrator.scenario.load import load_scenario
+from orchestrator.wiring.make_plan import make_plan
 
 UNITS = (
     "driver_sine", "reference_steady_state", "controller_fnn", "controller_off",

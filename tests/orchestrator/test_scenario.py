@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from orchestrator.errors import ScenarioError
-from orchestrator.scenario import Endpoint, Scenario, load_scenario
+from orchestrator.scenario.load import Endpoint, Scenario, load_scenario
 
 GOOD = """\
 title: Single sine

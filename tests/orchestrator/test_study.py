@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.claims import condition_text, judge
 from orchestrator.errors import ScenarioError
-from orchestrator.jobs import Job, Outcome
-from orchestrator.metrics import Value
-from orchestrator.study import claim_tables, judge_study, run_tables
-from orchestrator.study_file import load_study
-from orchestrator.study_report import write_study
-from orchestrator.study_schema import Claim
+from orchestrator.metrics.run_metrics import Value
+from orchestrator.studies.claims import condition_text, judge
+from orchestrator.studies.jobs import Job, Outcome
+from orchestrator.studies.study import claim_tables, judge_study, run_tables
+from orchestrator.studies.study_file import load_study
+from orchestrator.studies.study_report import write_study
+from orchestrator.studies.study_schema import Claim
 
 from .recorded import car, write
 

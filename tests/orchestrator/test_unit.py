@@ -13,9 +13,9 @@ import fmpy
 import pytest
 
 from orchestrator.errors import ModelDescriptionError, SimulationError
+from orchestrator.master.simulate import simulate
 from orchestrator.plan import Fmu, Plan, Unit, Variable, Wire
-from orchestrator.results import load_results
-from orchestrator.simulate import simulate
+from orchestrator.results.read import load_results
 
 HERE = Path(__file__).parent
 TYPES = ("Real", "Integer", "Boolean", "String")

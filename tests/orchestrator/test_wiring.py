@@ -11,8 +11,8 @@ import pytest
 
 from orchestrator.errors import ModelDescriptionError, WiringError, YawbenchError
 from orchestrator.plan import Plan, Unit, Wire
-from orchestrator.scenario import load_scenario
-from orchestrator.wiring import make_plan
+from orchestrator.scenario.load import load_scenario
+from orchestrator.wiring.make_plan import make_plan
 
 from .fake_fmus import WHEELS, Var, make_fmu, out
 

@@ -1,0 +1,260 @@
+"""The panels of figures: what one pair of axes shows, of one run or of several laid over each other.
+
+A panel is named by what it shows: a signal (over its reference, where the run recorded one),
+`<signal>_error`, `path`, or a signal of four wheels (`wheel_torque_*`: one panel with four lines for
+one run, four panels for several). A panel whose signals no run has does not exist.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..metrics.run_metrics import columns_of, reference_of
+from ..results.read import Results
+from .display import digits_of, shown_unit, symbol, variable_of, words
+from .style import QUIET, REFERENCE, ROW, WIDTH, line_style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+WHEEL_NAMES = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
+POINTS = 1500
+"""Buckets a line is thinned to; each keeps its smallest and its largest value."""
+
+OFF_SCALE = 8.0
+"""A line that exceeds what must be seen by this factor may leave the axes if another one stays."""
+
+
+SEEN_ERROR = 0.02
+"""An error, relative to the reference's peak, that need not be magnified further."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run and what the legend calls it."""
+
+    label: str
+    results: Results
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes: its name, whether it takes a whole row, and how it is filled.
+
+    Panels of one `scale` get the same limits.
+    """
+
+    name: str
+    wide: bool
+    draw: Callable[[Axes], None]
+    scale: str = ""
+
+
+def panels_of(runs: Sequence[Run], name: str) -> list[Panel]:
+    """Return the panels that a name stands for: none if no run has the signals, four for wheels."""
+    if name == "path":
+        drawn = [run for run in runs if _path_columns(run)]
+        return [Panel(name, True, lambda axes: _draw_path(axes, runs))] if drawn else []
+    if name.endswith("_error"):
+        signal = name.removesuffix("_error")
+        if all(_error(run, signal) is None for run in runs):
+            return []
+        return [Panel(name, False, lambda axes: _draw_error(axes, runs, signal))]
+    columns = [columns_of(run.results, name) for run in runs]
+    if not any(columns):
+        return []
+    if "*" not in name:
+        return [Panel(name, False, lambda axes: _draw_signal(axes, runs, name))]
+    if len(runs) == 1:
+        return [Panel(name, False, lambda axes: _draw_wheels(axes, runs[0], name))]
+    four = []
+    for k, wheel in enumerate(WHEEL_NAMES):
+        heading = f"{words(name)}, {WHEEL_NAMES[wheel]},"
+        four.append(Panel(name.replace("*", wheel), False, _one_wheel(runs, name, k, heading), name))
+    return four
+
+
+def shown_by(runs: Sequence[Run], names: Sequence[str]) -> list[Panel]:
+    """Return all panels that the names stand for, in order."""
+    return [panel for name in names for panel in panels_of(runs, name)]
+
+
+def _one_wheel(runs: Sequence[Run], name: str, k: int, heading: str) -> Callable[[Axes], None]:
+    def fill(axes: Axes) -> None:
+        unit = ""
+        for number, run in enumerate(runs):
+            columns = columns_of(run.results, name)
+            if columns:
+                unit = run.results.units[columns[k]]
+                _line(axes, run.results.time, run.results[columns[k]], unit, line_style(number))
+        _finish(axes, heading, unit)
+
+    return fill
+
+
+def _draw_signal(axes: Axes, runs: Sequence[Run], name: str) -> None:
+    """Draw a signal of all runs over its reference, and limit the axes to what can be read."""
+    lines = []
+    for number, run in enumerate(runs):
+        columns = columns_of(run.results, name)
+        if columns:
+            reference = reference_of(run.results, columns[0])
+            lines.append((number, run, columns[0], reference))
+    references = [run.results[reference] for _, run, _, reference in lines if reference]
+    shared = _nearly_equal(references)
+    for place, (number, run, _, reference) in enumerate(lines):
+        if reference and (place == 0 or not shared):
+            style = (
+                REFERENCE if shared else {**REFERENCE, "color": line_style(number)["color"], "alpha": 0.28}
+            )
+            unit = run.results.units[reference]
+            _line(axes, run.results.time, run.results[reference], unit, {**style, "label": "reference"})
+    unit = ""
+    for number, run, column, _ in lines:
+        unit = run.results.units[column]
+        _line(axes, run.results.time, run.results[column], unit, line_style(number))
+    _finish(axes, f"{words(name)} {_maths(name)}", unit)
+    if references:
+        peaks = [(run.label, _peak(run.results[column])) for _, run, column, _ in lines]
+        _limit(axes, max(_peak(reference) for reference in references), peaks, unit)
+
+
+def _limit(axes: Axes, scale: float, lines: list[tuple[str, float]], unit: str) -> None:
+    """Keep the axes readable when a lost car would squash all other lines; say who leaves them.
+
+    `scale` is a peak that must be seen, `lines` the label and the peak of every line, in SI.
+    """
+    text, factor = shown_unit(unit)
+    lost = [line for line in lines if line[1] > OFF_SCALE * scale]
+    if not lost or len(lost) == len(lines) or scale == 0:
+        return
+    largest = 1.5 * factor * max(scale, *(peak for _, peak in lines if peak <= OFF_SCALE * scale))
+    axes.set_ylim(-largest, largest)
+    note = "; ".join(f"{label}, up to {digits_of(peak * factor)} {text}" for label, peak in lost)
+    axes.set_title(axes.get_title(loc="left"), pad=16)
+    axes.annotate(
+        f"beyond the axes: {note}", (0, 1), (0, 4), xycoords="axes fraction",
+        textcoords="offset points", fontsize=7.5, color=QUIET,
+    )  # fmt: skip
+
+
+def _draw_error(axes: Axes, runs: Sequence[Run], signal: str) -> None:
+    """Draw the tracking error in per cent of the reference's peak."""
+    peaks = []
+    for number, run in enumerate(runs):
+        error = _error(run, signal)
+        if error is not None:
+            _line(axes, run.results.time, error, "%", line_style(number))
+            peaks.append((run.label, _peak(error)))
+    _finish(axes, f"{words(signal)}, error in % of max|{_maths(signal + '_ref')}|", "")
+    _limit(axes, max(SEEN_ERROR, min(peak for _, peak in peaks)), peaks, "%")
+
+
+def _error(run: Run, signal: str) -> np.ndarray | None:
+    columns = columns_of(run.results, signal)
+    reference = reference_of(run.results, columns[0]) if columns else None
+    if not reference or _peak(run.results[reference]) == 0:
+        return None
+    wanted = run.results[reference]
+    return (run.results[columns[0]] - wanted) / _peak(wanted)
+
+
+def _draw_wheels(axes: Axes, run: Run, name: str) -> None:
+    columns = columns_of(run.results, name)
+    unit = run.results.units[columns[0]]
+    for k, (column, wheel) in enumerate(zip(columns, WHEEL_NAMES, strict=True)):
+        _line(axes, run.results.time, run.results[column], unit, {**line_style(k), "label": wheel})
+    _finish(axes, f"{words(name)} {_maths(name)}", unit)
+    axes.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, handlelength=2.4,
+        columnspacing=1.2, borderpad=0.2,
+    )  # fmt: skip
+
+
+def _path_columns(run: Run) -> tuple[str, str] | None:
+    x, y = columns_of(run.results, "position_x"), columns_of(run.results, "position_y")
+    return (x[0], y[0]) if x and y else None
+
+
+def _draw_path(axes: Axes, runs: Sequence[Run]) -> None:
+    """Draw the paths seen from above; the lateral axis is stretched as far as the shape needs it."""
+    drawn = [(k, run.results, c) for k, run in enumerate(runs) if (c := _path_columns(run))]
+    for number, results, (x, y) in drawn:
+        every = max(1, results.time.size // POINTS)
+        keep = np.append(np.arange(0, results.time.size, every), results.time.size - 1)
+        axes.plot(results[x][keep], results[y][keep], **line_style(number))
+        axes.plot(results[x][-1:], results[y][-1:], "o", ms=3.5, color=line_style(number)["color"])
+    length = _span([results[x] for _, results, (x, _) in drawn])
+    breadth = _span([results[y] for _, results, (_, y) in drawn])
+    stretch = _stretch(length, breadth, room=(ROW - 0.75) / (WIDTH - 1.0))
+    axes.set_aspect(stretch, adjustable="datalim")
+    scale = (
+        "both axes to the same scale" if stretch == 1 else f"lateral scale {stretch} times the longitudinal"
+    )
+    axes.set_title(f"Path seen from above ({scale}; a dot marks its end)")
+    axes.set_xlabel("$x$ in m")
+    axes.set_ylabel("$y$ in m")
+
+
+def _stretch(length: float, breadth: float, *, room: float) -> int:
+    """Return the factor on y with which a path fills most of a panel of height `room` times its width."""
+    wanted = room * max(length, 1.0) / max(1.25 * breadth, 1.0)
+    return max([k for k in (1, 2, 5, 10, 20, 50) if k <= wanted], default=1)
+
+
+def _line(axes: Axes, t: np.ndarray, x: np.ndarray, unit: str, style: dict[str, Any]) -> None:
+    t, x = thinned(t, x * shown_unit(unit)[1])
+    axes.plot(t, x, **style)
+
+
+def thinned(t: np.ndarray, x: np.ndarray, buckets: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
+    """Return the samples that draw the same line: the smallest and the largest of each bucket."""
+    if x.size <= 2 * buckets + 2:
+        return t, x
+    edges = np.linspace(0, x.size, buckets + 1).astype(int)
+    keep = {0, x.size - 1}
+    for first, last in pairwise(edges):
+        keep.update((first + int(np.argmin(x[first:last])), first + int(np.argmax(x[first:last]))))
+    chosen = np.array(sorted(keep))
+    return t[chosen], x[chosen]
+
+
+def _finish(axes: Axes, heading: str, unit: str) -> None:
+    text = shown_unit(unit)[0]
+    axes.set_title(f"{heading} in {text}" if text else heading)
+    axes.set_xlabel("$t$ in s")
+    axes.locator_params(axis="x", nbins=9, steps=[1, 2, 5, 10])
+    axes.margins(x=0.01)
+    low, high = axes.get_ylim()
+    if all(np.ptp(line.get_ydata()) == 0 for line in axes.get_lines()):
+        axes.set_ylim(min(low, -1.0), max(high, 1.0))
+
+
+def _maths(signal: str) -> str:
+    head, _, index = symbol(signal).partition("_")
+    if symbol(signal) == variable_of(signal):
+        return ""
+    return f"${head}_\\mathrm{{{index}}}$" if index else f"${head}$"
+
+
+def _peak(x: np.ndarray) -> float:
+    return float(np.max(np.abs(x))) if x.size else 0.0
+
+
+def _span(arrays: list[np.ndarray]) -> float:
+    joined = np.concatenate(arrays)
+    return float(np.ptp(joined)) if joined.size else 0.0
+
+
+def _nearly_equal(references: list[np.ndarray]) -> bool:
+    """Return whether one wide line can stand for all references: they lie within its width."""
+    if not references:
+        return False
+    first = references[0]
+    allowed = 0.05 * max(_peak(r) for r in references)
+    return all(r.shape == first.shape and _peak(r - first) <= allowed for r in references[1:])

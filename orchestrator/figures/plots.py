@@ -1,0 +1,130 @@
+"""Figures of one run or of several laid over each other, drawn as the papers draw them.
+
+A figure is a list of panels, named by what they show (see `panels`). A panel whose signal no run has
+is left out. Angles are in degrees, speeds in km/h. Title and legend stand above the panels, so the
+legend covers no data; the line at the bottom says where the figure comes from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from ..errors import ResultsError
+from .display import digits_of
+from .panels import Panel, Run, shown_by
+from .style import RC, REFERENCE, ROW, frame, line_style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+OVERVIEW = (
+    "steer_angle",
+    "sideslip",
+    "yaw_rate",
+    "acceleration_y",
+    "yaw_moment",
+    "wheel_torque_*",
+    "path",
+)
+"""The panels of the figures in the papers."""
+
+
+def draw(
+    runs: Sequence[Run],
+    panels: Sequence[str] = OVERVIEW,
+    *,
+    title: str | None = None,
+    note: str | None = None,
+) -> Figure:
+    """Return a figure of the panels with all runs laid over each other.
+
+    Args:
+        runs: the first is drawn first; the legend keeps the order.
+        panels: names of panels, in order; those that no run has the signals for are left out.
+        title: default: the scenario's title.
+        note: the line of provenance at the bottom; default: made from the runs' records.
+
+    Raises:
+        ResultsError: there is nothing to draw.
+    """
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    found = shown_by(runs, panels)
+    if not found:
+        where = ", ".join(str(run.results.folder) for run in runs)
+        raise ResultsError(f"{where}: nothing to draw, no run recorded any of {', '.join(panels)}.")
+    rows = _rows(found)
+    with matplotlib.rc_context(RC):
+        figure = Figure(layout="constrained")
+        FigureCanvasAgg(figure)
+        grid = figure.add_gridspec(len(rows), 2)
+        first: dict[str, Axes] = {}
+        for i, row in enumerate(rows):
+            for k, panel in enumerate(row):
+                axes = figure.add_subplot(grid[i, :] if len(row) == 1 else grid[i, k])
+                axes.set_label(panel.name)
+                if panel.scale in first:
+                    axes.sharey(first[panel.scale])
+                elif panel.scale:
+                    first[panel.scale] = axes
+                panel.draw(axes)
+                below = rows[i + 1] if i + 1 < len(rows) else []
+                if below and below[0].name != "path":
+                    axes.set_xlabel("")  # the same time axis stands below
+        foot = provenance(runs) if note is None else note
+        frame(figure, ROW * len(rows), _legend(figure, runs), title or title_of(runs), foot)
+    return figure
+
+
+def _rows(panels: Sequence[Panel]) -> list[list[Panel]]:
+    rows: list[list[Panel]] = []
+    for panel in panels:
+        if not panel.wide and rows and len(rows[-1]) == 1 and not rows[-1][0].wide:
+            rows[-1].append(panel)
+        else:
+            rows.append([panel])
+    return rows
+
+
+def _legend(figure: Figure, runs: Sequence[Run]) -> list[Line2D]:
+    """Return what the legend shows: the runs if there are several, and what the pale lines are."""
+    from matplotlib.lines import Line2D
+
+    several = len(runs) > 1
+    handles = [Line2D([], [], label=run.label, **line_style(k)) for k, run in enumerate(runs) if several]
+    pale = [line for axes in figure.axes for line in axes.get_lines() if line.get_label() == "reference"]
+    if pale:
+        own = any(line.get_color() != REFERENCE["color"] for line in pale)
+        says = "wide and pale: the run's own reference" if own else "reference"
+        handles.append(Line2D([], [], label=says, **REFERENCE))
+    return handles
+
+
+def title_of(runs: Sequence[Run]) -> str:
+    """Return the title of the runs' scenario, or a general one where they differ."""
+    titles = {str(run.results.run.get("title") or "") for run in runs}
+    return (titles.pop() if len(titles) == 1 else "") or "Comparison of runs"
+
+
+def provenance(runs: Sequence[Run]) -> str:
+    """Return where the figure comes from: version, source, algorithm, step, FMUs with their hashes."""
+    records = [run.results.run for run in runs]
+    sources = dict.fromkeys(str(record.get("scenario", {}).get("source") or "") for record in records)
+    parts = [f"yawbench {records[0].get('versions', {}).get('yawbench', '')}".strip(), *filter(None, sources)]
+    algorithms = dict.fromkeys(str(record.get("algorithm")) for record in records if "algorithm" in record)
+    steps = dict.fromkeys(record["step_size"] for record in records if "step_size" in record)
+    parts += [*algorithms, *(f"step {digits_of(1000 * step)} ms" for step in steps)]
+    fmus = dict.fromkeys(
+        f"{fmu.get('name')} {str(fmu.get('sha256', ''))[:8]}"
+        for record in records
+        for fmu in record.get("fmus", {}).values()
+    )
+    parts += [f"FMUs: {', '.join(fmus)}"] if fmus else []
+    unfinished = [run.label for run in runs if run.results.run.get("status") != "completed"]
+    parts += [f"ended early: {', '.join(unfinished)}"] if unfinished else []
+    return " · ".join(parts)

@@ -1,0 +1,1 @@
+"""FMU archives: found, unpacked once, described, guarded against each other."""

@@ -1,0 +1,58 @@
+"""A guard against units that would silently run each other's code.
+
+All PythonFMU units of a process share one interpreter: of two modules with one name, the second is
+never loaded. Units made by `yawbench build` carry names that no other content has; units from
+elsewhere may not.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+from ..plan import Fmu
+
+
+def shadowed_modules(fmus: Mapping[str, Fmu]) -> list[str]:
+    """Return a sentence for every unit that would run another unit's, or this program's, module."""
+    problems = []
+    seen: dict[str, tuple[str, str]] = {}
+    for unit, fmu in fmus.items():
+        for module, content in fmu.python_modules.items():
+            other, its_content = seen.setdefault(module, (unit, content))
+            if its_content != content:
+                problems.append(
+                    f"{unit} ({fmu.name}) would run code of {other} ({fmus[other].name}): both FMUs bring "
+                    f"a Python module {module!r}, and a process has room for one; rebuild one of them "
+                    "with another module name"
+                )
+            elif module in sys.stdlib_module_names:
+                problems.append(
+                    f"{unit} ({fmu.name}) would run other code: its Python module {module!r} has the name "
+                    "of one of Python's own; rebuild it with another module name"
+                )
+            elif _loaded_from_elsewhere(module, content, fmu.directory):
+                problems.append(
+                    f"{unit} ({fmu.name}) would run other code: another Python module {module!r} is loaded "
+                    "in this process already; rebuild it with another module name"
+                )
+    return problems
+
+
+def _loaded_from_elsewhere(module: str, content: str, directory: Path) -> bool:
+    """Return whether `module` is loaded, from other content than this unit's."""
+    loaded = getattr(sys.modules.get(module), "__file__", None)
+    if loaded is None or Path(loaded).is_relative_to(directory):
+        return False
+    file = Path(loaded)
+    home = file.parent.parent if file.name == "__init__.py" else file.parent
+    files = sorted(file.parent.rglob("*.py")) if file.name == "__init__.py" else [file]
+    digest = hashlib.sha256()
+    try:
+        for path in files:
+            digest.update(path.relative_to(home).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    except OSError:
+        return True
+    return digest.hexdigest() != content

@@ -1,0 +1,1 @@
+"""Stage three: the units of a plan stepped through integer time."""

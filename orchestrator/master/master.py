@@ -1,0 +1,172 @@
+"""The master: initializes the units of a plan and steps them through integer time.
+
+Per communication step it walks a flat program of calls (see `program`), looks once over all outputs
+for values that are not finite, and copies what is recorded into a row: a few microseconds beside
+the units' own work. Time is k p / q with whole numbers, correctly rounded, so it neither drifts nor
+misses the end.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from ..errors import SimulationError
+from ..plan import Plan, Value
+from .failure import describe
+from .initialization import initialize
+from .interrupts import StopFlag
+from .log import OK, WARNING, Log
+from .memory import Memory
+from .program import Programs
+from .unit import Slave, Status
+
+
+class Interrupted(SimulationError):
+    """The run was asked to stop."""
+
+
+class Master:
+    """One run of a plan. `completed` is the last communication point at which all values stand."""
+
+    def __init__(self, plan: Plan, slaves: Mapping[str, Slave], log: Log, stop: StopFlag) -> None:
+        self.plan = plan
+        self.log = log
+        self.stop = stop
+        self.completed = -1
+        self.passes = 0
+        self.memory = memory = Memory(plan, slaves)
+        slow = {s.unit.period for s in memory.stations} - {1}
+        self._clocks = {1: log.time} | {period: ctypes.c_double(0.0) for period in slow}
+        for s in memory.stations:
+            period = s.unit.period
+            s.calls = s.slave.connect(
+                s.u,
+                [v.reference for v in s.inputs],
+                s.y,
+                [v.reference for v in s.outputs],
+                self._clocks[period],
+                ctypes.c_double(float(period * plan.step)),
+            )
+        self.programs = Programs(memory)
+        real = [memory.index[key] for key in plan.record if key in memory.index]
+        self._recorded = np.array([memory.time_at, *real], np.intp)
+        self._recorded_others = [key for key in plan.record if key not in memory.index]
+        self._wires = [w for w in plan.wires if (w.source, w.output) in memory.index]
+        self._ones = np.ones(memory.n_outputs)
+
+    def initialize(self, row: np.ndarray, others: list[list[Value]]) -> None:
+        """Bring all units to the start, and record it like `advance`.
+
+        Raises:
+            SimulationError: a unit fails or logs an error, a wire does not settle or is not finite.
+        """
+        self.passes = initialize(self.memory, self._check_initialization)
+        self._check_finite(0)
+        self.memory.pool.take(self._recorded, None, row, "clip")
+        if self._recorded_others:
+            others.append(self._values_of_others())
+        self.completed = 0
+
+    def advance(self, end: int, rows: Sequence[np.ndarray], others: list[list[Value]]) -> None:
+        """Step to communication point `end`, filling one of `rows` per point.
+
+        What is recorded and no Real is appended to `others`, one list per row.
+
+        Raises:
+            SimulationError: a unit fails or a wire is not finite. `completed` tells how many rows
+                are whole.
+            Interrupted: the stop flag was raised.
+        """
+        p, q = self.plan.step.numerator, self.plan.step.denominator
+        stop = self.stop
+        first, cycle = self.completed + 1, self.programs.cycle
+        calls = {
+            k % cycle: [operation.call for operation in self.programs.at(k)]
+            for k in range(first, min(end, first + cycle - 1) + 1)
+        }
+        clocks = list(self._clocks.items())
+        total, ones, finite = self.memory.now.dot, self._ones, math.isfinite
+        take, recorded, time = self.memory.pool.take, self._recorded, self.memory.time
+        for k, row in zip(range(first, end + 1), rows, strict=False):
+            if stop.requested:
+                now = self.plan.time(k - 1)
+                raise Interrupted(f"the run was interrupted at t = {now:.9g} s", unit=None, time=now)
+            for period, clock in clocks:
+                if k % period == 0:
+                    clock.value = (k - period) * p / q
+            for call in calls[k % cycle]:
+                status = call()
+                if status:
+                    self._answer(k, call, status)
+            if not finite(total(ones)):
+                self._check_finite(k)
+            time.value = k * p / q
+            take(recorded, None, row, "clip")
+            if self._recorded_others:
+                others.append(self._values_of_others())
+            self.completed = k
+
+    def inputs_of(self, unit: str) -> dict[str, Value]:
+        """Return the inputs with which a unit was last stepped."""
+        s = self.memory.of[unit]
+        values: dict[str, Value] = {v.name: float(u) for v, u in zip(s.inputs, s.u, strict=True)}
+        for variable, key in s.other_inputs:
+            if key is None:
+                values[variable.name] = s.unit.constants[variable.name]
+            elif key in self.memory.others:  # else its source has not been read yet
+                values[variable.name] = self.memory.others[key]
+        return values
+
+    def _values_of_others(self) -> list[Value]:
+        return [self.memory.others[key] for key in self._recorded_others]
+
+    def _check_initialization(self, unit: str, what: str, status: Status) -> None:
+        """Judge a call during initialization, where a logged error counts whatever the status is."""
+        self.memory.of[unit].slave.note(status)
+        if status > WARNING or self.log.errors(unit):
+            raise SimulationError(describe(unit, what, 0.0, status, self.log), unit=unit, time=0.0)
+        if self.stop.requested:
+            raise Interrupted("the run was interrupted during initialization", unit=None, time=0.0)
+
+    def _answer(self, k: int, call: Callable[[], Status | None], status: Status) -> None:
+        """Judge a call of the step from `k` - 1 to `k` that did not return OK."""
+        operation = next(op for op in self.programs.at(k) if op.call is call)
+        station = self.memory.of[operation.unit]
+        station.slave.note(status)
+        if status == WARNING:
+            if not any(m.unit == operation.unit for m in self.log.warnings()):
+                self.log.add(operation.unit, WARNING, "", f"the {operation.kind} returned Warning")
+            return
+        self._check_finite(k)  # a value that went wrong upstream explains this failure
+        time = self.plan.time(k - station.unit.period)
+        sentence = describe(operation.unit, _WORDS[operation.kind], time, status, self.log)
+        raise SimulationError(sentence, unit=operation.unit, time=time)
+
+    def _check_finite(self, k: int) -> None:
+        """Raise SimulationError for the first wire, in evaluation order, that is not finite."""
+        memory = self.memory
+        wires = sorted(self._wires, key=lambda w: memory.of[w.source].position)
+        for wire in wires:
+            value = memory.pool[memory.index[wire.source, wire.output]]
+            if math.isfinite(value):
+                continue
+            time = self.plan.time(k)
+            if self.log.errors(wire.source):
+                problem = describe(wire.source, "reading outputs", time, OK, self.log)
+            else:
+                problem = (
+                    f"{wire.source}: {wire.output} is {_spelled(value)} at t = {time:.9g} s, "
+                    f"on the wire {wire.source}.{wire.output} -> {wire.target}.{wire.input}"
+                )
+            raise SimulationError(problem, unit=wire.source, time=time)
+
+
+_WORDS = {"set": "setting inputs", "step": "step", "get": "reading outputs"}
+
+
+def _spelled(value: float) -> str:
+    return "not a number" if math.isnan(value) else "infinite"

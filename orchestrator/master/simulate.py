@@ -1,0 +1,197 @@
+"""One run, from a plan to results on disk."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import ResultsError, SimulationError, YawbenchError
+from ..plan import Plan, Unit
+from ..results.recorder import BLOCK, Recorder
+from ..results.run_record import run_record
+from .interrupts import StopFlag, interrupts
+from .log import Log, Message
+from .master import Interrupted, Master
+from .unit import FmuSlave, Slave
+
+Progress = Callable[[int, int], None]
+"""Called a few times a second with the communication points done and those in all."""
+
+Opener = Callable[[Unit, Log, set[Path]], Slave]
+"""Makes the instance of a unit (see `unit.FmuSlave`)."""
+
+REPORT_EVERY = 0.2
+"""Time between two reports of progress [s], while a single step does not take longer."""
+
+
+@dataclass(frozen=True)
+class RunInfo:
+    """What a completed run has to tell beside its results."""
+
+    folder: Path
+    rows: int
+    columns: int
+    wall_time: float  # of initialization and stepping [s]
+    passes: int  # of initialization
+    warnings: list[Message] = field(default_factory=list)
+
+
+def simulate(
+    plan: Plan, out: Path | str, *, progress: Progress | None = None, opener: Opener = FmuSlave
+) -> RunInfo:
+    """Run a plan and write `results.csv` and `run.json` into the folder `out`.
+
+    A run that fails or is interrupted (Ctrl-C, SIGTERM) writes what it has recorded, and why it
+    ended, before it raises. Results of an earlier run in `out` are replaced as a whole.
+
+    Args:
+        plan: made by `wiring.make_plan`.
+        out: folder of the results; made if it does not exist.
+        progress: told how far the run is.
+        opener: makes the instances; tests put their own in.
+
+    Raises:
+        ModelDescriptionError: an FMU has no library that this computer can load.
+        SimulationError: a unit failed, a wire was not finite, the run was interrupted or the results
+            cannot be written any further.
+        ResultsError: nothing can be written to `out`.
+    """
+    units = {unit.name: unit for unit in plan.units}
+    real = [units[unit].fmu.variables[name].type == "Real" for unit, name in plan.record]
+    recorder = Recorder(Path(out), [f"{unit}.{name}" for unit, name in plan.record], real)
+    run = _Run(plan, recorder, progress)
+    with interrupts(run.stop, run.abandon):
+        try:
+            with np.errstate(all="ignore"):  # what is not finite is found by looking, not by warning
+                run.go(opener)
+        except BaseException as error:
+            run.fail(error)
+            raise
+        run.save("completed")
+    passes = run.master.passes if run.master else 0
+    warnings = list(run.log.warnings())
+    return RunInfo(Path(out), recorder.written, len(real), run.wall_time, passes, warnings)
+
+
+class _Run:
+    """The course of one run: what there is to write when it ends, however it ends."""
+
+    def __init__(self, plan: Plan, recorder: Recorder, progress: Progress | None) -> None:
+        self.plan = plan
+        self.recorder = recorder
+        self.progress = progress
+        self.log = Log()
+        self.stop = StopFlag()
+        self.master: Master | None = None
+        self._started = datetime.now(timezone.utc)
+        self._began = time.perf_counter()
+        self._handed_over = 0  # rows given to the recorder
+        self._writing = False
+
+    @property
+    def wall_time(self) -> float:
+        return time.perf_counter() - self._began
+
+    def go(self, opener: Opener) -> None:
+        """Open, initialize, step, close."""
+        slaves: dict[str, Slave] = {}
+        corrupted: set[Path] = set()
+        try:
+            for unit in self.plan.units:
+                slaves[unit.name] = opener(unit, self.log, corrupted)
+            self.master = Master(self.plan, slaves, self.log, self.stop)
+            self.master.initialize(self.recorder.rows[0], self.recorder.others)
+            self._step(self.master)
+        finally:
+            for slave in reversed(slaves.values()):
+                slave.free()
+
+    def _step(self, master: Master) -> None:
+        """Step to the end, in stretches short enough to report progress between them."""
+        total, stretch, reported = self.plan.n_steps, 1, time.perf_counter()
+        while master.completed < total:
+            filled = master.completed + 1 - self._handed_over
+            if filled == BLOCK:
+                self._flush()
+                filled = 0
+            end = min(total, master.completed + min(stretch, BLOCK - filled))
+            master.advance(end, self.recorder.rows[filled:], self.recorder.others)
+            now = time.perf_counter()
+            if now - reported < REPORT_EVERY:
+                stretch = min(2 * stretch, BLOCK)
+                continue
+            stretch, reported = max(1, stretch // 2), now
+            if self.progress is not None:
+                self.progress(master.completed, total)
+        self._flush()
+        if self.progress is not None:
+            self.progress(total, total)
+
+    def _flush(self) -> None:
+        """Hand all whole rows to the disk."""
+        if self.master is None:
+            return
+        count = self.master.completed + 1 - self._handed_over
+        self._handed_over += count
+        self._writing = True
+        try:
+            self.recorder.write(count)
+        except ResultsError as error:
+            time_reached = self.plan.time(self.master.completed)
+            problem = (
+                f"{error.problems[0].rstrip('.')} (at t = {time_reached:.9g} s); the rows that fit are kept."
+            )
+            raise SimulationError(problem, unit=None, time=time_reached) from None
+        finally:
+            self._writing = False
+
+    def fail(self, error: BaseException) -> None:
+        """Write what there is and why there is no more."""
+        with contextlib.suppress(SimulationError):  # the disk may be why; what fits has been kept
+            self._flush()
+        problems = error.problems if isinstance(error, YawbenchError) else []
+        try:
+            self.save("interrupted" if isinstance(error, Interrupted) else "failed", error)
+        except ResultsError as lost:
+            problems += lost.problems
+        else:
+            problems.append(f"What was recorded until then: {self.recorder.folder}")
+
+    def abandon(self) -> None:
+        """Leave at once: somebody insists, perhaps because a unit never comes back."""
+        if self._writing:
+            return
+        error = Interrupted("the run was interrupted inside a unit", unit=None, time=self.log.time.value)
+        try:
+            self.fail(error)
+        finally:
+            print(f"yawbench: {error}; results so far: {self.recorder.folder}", file=sys.stderr, flush=True)
+            os._exit(error.exit_status)
+
+    def save(self, status: str, error: BaseException | None = None) -> None:
+        """Write the record of the run and put the results in place."""
+        self._writing = True
+        record = run_record(self.plan, self.log, status=status, started=self._started)
+        record |= {"wall_time": self.wall_time, "error": self._explained(error)}
+        self.recorder.finish(record)
+
+    def _explained(self, error: BaseException | None) -> dict[str, Any] | None:
+        if error is None:
+            return None
+        unit = getattr(error, "unit", None)
+        return {
+            "message": str(error) or type(error).__name__,
+            "unit": unit,
+            "time": getattr(error, "time", None),
+            "inputs": self.master.inputs_of(unit) if unit and self.master else {},
+            "traceback": self.log.tracebacks(unit) if unit else [],
+        }

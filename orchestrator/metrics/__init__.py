@@ -1,0 +1,1 @@
+"""Stage five: what a run is judged by."""

@@ -1,0 +1,167 @@
+"""What a run is judged by: measures of signals, each with its definition and unit.
+
+A metric is a measure of a signal, written `measure(signal)`: `relative_peak_error(sideslip)`,
+`total_variation_rate(wheel_torque_*)`. Signals are named as in the signal dictionary, whatever the
+scenario calls its units (`plant.sideslip` where two units have one of that name); the reference of
+a signal `x` is the signal `x_ref`; of four wheels (`*`) the largest value counts. A metric whose
+signals a run does not have is absent, never zero.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import ResultsError, ScenarioError
+from ..figures.display import symbol, variable_of, words
+from ..wording import WHEELS, hint
+from .measures import MEASURES, Measure
+
+if TYPE_CHECKING:
+    from ..results.read import Results
+
+STANDARD = (
+    "relative_peak_error(sideslip)",
+    "rms_error(sideslip)",
+    "peak(sideslip)",
+    "relative_peak_error(yaw_rate)",
+    "rms_error(yaw_rate)",
+    "overshoot(yaw_rate)",
+    "settling_time(yaw_rate)",
+    "peak(acceleration_y)",
+    "displacement(position_y)",
+    "final(velocity_x)",
+    "peak(yaw_moment)",
+    "effort(yaw_moment)",
+    "total_variation_rate(yaw_moment)",
+    "total_variation_rate(wheel_torque_*)",
+)
+"""The metrics shown where nobody has chosen others."""
+
+ALIASES = {"wheel_torque_*": "torque_request_*"}
+"""Signal -> what stands in for it in a scenario whose units do not have it."""
+
+_PER_SECOND = {"1": "1/s", "m": "m/s", "m/s": "m/s2", "rad": "rad/s", "rad/s": "rad/s2", "rad/s2": "rad/s3"}
+_TIMES_SECOND = {"1": "s", "m/s": "m", "m/s2": "m/s", "rad/s": "rad", "rad/s2": "rad/s"}
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A measure of a signal."""
+
+    name: str
+    measure: Measure
+    signal: str
+
+    @property
+    def formula(self) -> str:
+        x = symbol(self.signal)
+        return self.measure.formula.replace("{x_ref}", f"{x}_ref").replace("{x}", x)
+
+    @property
+    def definition(self) -> str:
+        of_wheels = ", the largest of the four wheels" if "*" in self.signal else ""
+        return f"{self.measure.definition}{of_wheels}"
+
+    @property
+    def title(self) -> str:
+        """The signal and the measure in few words."""
+        return f"{words(self.signal)}: {self.name.partition('(')[0].replace('_', ' ')}"
+
+    def unit(self, signal_unit: str) -> str:
+        """Return the metric's unit for a signal in `signal_unit`."""
+        form, x = self.measure.unit, signal_unit or "1"
+        if form == "{x}/s":
+            return _PER_SECOND.get(x, f"{x}/s")
+        if form == "{x}/s2":
+            once = _PER_SECOND.get(x, f"{x}/s")
+            return _PER_SECOND.get(once, f"{x}/s2")
+        if form == "{x}.s":
+            return _TIMES_SECOND.get(x, f"{x}.s")
+        return form.replace("{x}", x)
+
+
+@dataclass(frozen=True)
+class Value:
+    """What a metric comes to in one run: SI; `unit` "%" marks a ratio that is shown in per cent."""
+
+    number: float
+    unit: str
+
+
+def metric(name: str) -> Metric:
+    """Return the metric written as `measure(signal)`.
+
+    Raises:
+        ScenarioError: the name is not of that form, or there is no such measure.
+    """
+    match = re.fullmatch(r"(\w+)\(([\w.*]+)\)", name.replace(" ", ""))
+    if match is None:
+        raise ScenarioError(f"{name!r} is no metric; write measure(signal), for example {STANDARD[0]}.")
+    measure, signal = match.groups()
+    if measure not in MEASURES:
+        raise ScenarioError(
+            f"{name!r}: there is no measure {measure!r}{hint(measure, MEASURES, lead='known')}"
+        )
+    return Metric(f"{measure}({signal})", MEASURES[measure], signal)
+
+
+def columns_of(results: Results, signal: str) -> list[str]:
+    """Return the columns of a signal: one, or four for a `*`; empty if they were not recorded.
+
+    Where units share the name, the plant's is taken.
+    """
+    names = [signal.replace("*", wheel) for wheel in WHEELS] if "*" in signal else [signal]
+    found = [column for name in names if (column := _column(results, name)) is not None]
+    if len(found) == len(names):
+        return found
+    return columns_of(results, ALIASES[signal]) if signal in ALIASES else []
+
+
+def _column(results: Results, name: str) -> str | None:
+    for role in (None, "plant"):
+        try:
+            column = results.column(name, role=role)
+        except ResultsError:
+            continue
+        return column if np.issubdtype(results.columns[column].dtype, np.number) else None
+    return None
+
+
+def evaluate(results: Results, chosen: Metric, window: tuple[float, float] | None = None) -> Value | None:
+    """Return a metric of a run over the whole run or a window [s], or None if the run has no such signal."""
+    first, last = window or (-math.inf, math.inf)
+    inside = (results.time >= first - 1e-9) & (results.time <= last + 1e-9)
+    t = results.time[inside]
+    columns = columns_of(results, chosen.signal)
+    if t.size < 2 or not columns:
+        return None
+    numbers = []
+    for column in columns:
+        samples = [results.columns[column][inside]]
+        if chosen.measure.needs_reference:
+            reference = reference_of(results, column)
+            if reference is None:
+                return None
+            samples.append(results.columns[reference][inside])
+        numbers.append(chosen.measure.function(t, *samples))
+    number = float(np.max(numbers))  # a NaN of one wheel is not lost
+    if math.isnan(number):
+        return None
+    return Value(number, chosen.unit(results.units[columns[0]]))
+
+
+def reference_of(results: Results, column: str) -> str | None:
+    """Return the column of the signal's reference, `x_ref` for `x`, if it was recorded."""
+    return _column(results, f"{variable_of(column)}_ref")
+
+
+def evaluate_all(results: Results, names: Iterable[str] = STANDARD) -> dict[str, Value]:
+    """Return those of the metrics that the run has the signals for."""
+    values = {name: evaluate(results, metric(name)) for name in names}
+    return {name: value for name, value in values.items() if value is not None}

@@ -1,0 +1,1 @@
+"""Stage four: results written while a run goes on, and read back."""

@@ -1,0 +1,149 @@
+"""Reading back what a run has recorded: results.csv and run.json of one folder."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import ResultsError
+
+RESULTS_FILE = "results.csv"
+RUN_FILE = "run.json"
+
+
+@dataclass(frozen=True)
+class Results:
+    """The recorded values of one run.
+
+    `results["plant.yaw_rate"]` is a column by its full name; `results.find("yaw_rate")` is the only
+    recorded variable of that name, whatever its unit is called in the scenario.
+    """
+
+    folder: Path
+    time: np.ndarray  # shape (rows,) [s]
+    columns: dict[str, np.ndarray]  # "<unit>.<variable>" -> shape (rows,)
+    units: dict[str, str]  # "time" and "<unit>.<variable>" -> measurement unit; "" if it has none
+    run: dict[str, Any]  # run.json
+
+    def __getitem__(self, column: str) -> np.ndarray:
+        try:
+            return self.columns[column]
+        except KeyError:
+            raise ResultsError(self._unknown(column)) from None
+
+    def __contains__(self, column: object) -> bool:
+        return column in self.columns
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.columns)
+
+    def find(self, variable: str, *, role: str | None = None) -> np.ndarray:
+        """Return the values of the only recorded variable of that name (see `column`)."""
+        return self.columns[self.column(variable, role=role)]
+
+    def column(self, variable: str, *, role: str | None = None) -> str:
+        """Return the column's full name for a variable, whatever its unit is called.
+
+        Args:
+            variable: name of a variable; a full name `unit.variable` is given back as it is.
+            role: only units of this role ("plant", "controller", ...): units whose FMU's name
+                begins with `<role>_`, else the unit that is called so.
+
+        Raises:
+            ResultsError: no such column, or more than one.
+        """
+        if role is None and variable in self.columns:
+            return variable
+        found = [name for name in self.columns if name.partition(".")[2] == variable]
+        if role is not None:
+            units = self.units_of_role(role)
+            found = [name for name in found if name.partition(".")[0] in units]
+        if len(found) == 1:
+            return found[0]
+        if not found:
+            raise ResultsError(self._unknown(variable, role))
+        raise ResultsError(
+            f"{self.folder / RESULTS_FILE}: '{variable}' was recorded of more than one unit: "
+            f"{', '.join(found)}."
+        )
+
+    def units_of_role(self, role: str) -> list[str]:
+        """Return the names of the scenario's units that have the role, in evaluation order."""
+        fmus: dict[str, dict[str, Any]] = self.run.get("fmus", {})
+        found = [unit for unit, fmu in fmus.items() if str(fmu.get("name", "")).startswith(role + "_")]
+        return found or [unit for unit in fmus if unit == role]
+
+    def _unknown(self, variable: str, role: str | None = None) -> str:
+        of = f" of a {role}" if role else ""
+        short = {name.partition(".")[2]: name for name in self.columns}
+        close = get_close_matches(variable, [*self.columns, *short], n=1)
+        hint = f"; did you mean '{close[0]}'?" if close else f"; recorded: {', '.join(self.columns)}."
+        return f"{self.folder / RESULTS_FILE}: no column '{variable}'{of} was recorded{hint}"
+
+
+def load_results(folder: Path | str) -> Results:
+    """Read the results of one run; those of a failed run too, as far as they go.
+
+    Raises:
+        ResultsError: a file is missing, unreadable or not what `yawbench run` writes.
+    """
+    folder = Path(folder)
+    run_file, csv_file = folder / RUN_FILE, folder / RESULTS_FILE
+    try:
+        run = json.loads(run_file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ResultsError(
+            f"{folder}: no results here, {RUN_FILE} is missing; "
+            f"make them with 'yawbench run SCENARIO --out {folder}'."
+        ) from None
+    except (OSError, ValueError) as error:
+        raise ResultsError(f"{run_file}: cannot be read: {error}") from None
+    if not isinstance(run, dict):
+        raise ResultsError(f"{run_file}: is not the record of a run.")
+    try:
+        with csv_file.open(encoding="utf-8", newline="") as stream:
+            names = next(csv.reader(stream), [])
+        if names[:1] != ["time"]:
+            raise ResultsError(f"{csv_file}: the first column must be 'time'.")
+        values = _read_columns(csv_file, len(names))
+    except FileNotFoundError:
+        raise ResultsError(f"{csv_file}: is missing, though {RUN_FILE} is there.") from None
+    except (OSError, ValueError) as error:
+        raise ResultsError(f"{csv_file}: cannot be read: {error}") from None
+    units = {name: str(run.get("units", {}).get(name) or "") for name in names}
+    return Results(folder, values[0], dict(zip(names[1:], values[1:], strict=True)), units, run)
+
+
+def _read_columns(path: Path, n: int) -> list[np.ndarray]:
+    """Return the columns below the header: float64, or str where a column holds text."""
+    with path.open(encoding="utf-8", newline="") as stream:
+        next(stream)
+        rest = stream.read()
+    if not rest:
+        return [np.empty(0) for _ in range(n)]
+    try:
+        table = np.loadtxt(rest.splitlines(), delimiter=",", ndmin=2)
+        if table.shape[1] != n:
+            raise ValueError(f"{table.shape[1]} values in a row for {n} columns")
+        return list(np.ascontiguousarray(table.T))
+    except ValueError:
+        rows = list(csv.reader(io.StringIO(rest, newline="")))
+    uneven = [i for i, row in enumerate(rows, start=2) if len(row) != n]
+    if uneven:
+        raise ValueError(f"line {uneven[0]} has {len(rows[uneven[0] - 2])} values for {n} columns")
+    return [_column(text) for text in zip(*rows, strict=True)]
+
+
+def _column(text: tuple[str, ...]) -> np.ndarray:
+    try:
+        return np.array([float(item) for item in text])
+    except ValueError:
+        return np.array(text)

@@ -1,0 +1,183 @@
+"""Writing results.csv and run.json.
+
+Both are written under temporary names and take their places together at the end, so a folder holds
+either the earlier results or the new ones. Rows go out in blocks during the run: whatever ends it,
+what has been recorded stays. Numbers are written so that reading them gives the same bits.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import errno
+import io
+import json
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import ResultsError
+from ..plan import Value
+from .read import RESULTS_FILE, RUN_FILE
+
+BLOCK = 512
+"""Rows kept in memory before they are written."""
+
+
+class Recorder:
+    """The results of one run. Fill `rows` (and `others`), then call `write`; at the end `finish`.
+
+    Args:
+        folder: made if it does not exist.
+        columns: names below the header, `<unit>.<variable>`.
+        real: which of them are Real; the others come in `others`, one list per row.
+
+    Raises:
+        ResultsError: the folder or a file in it cannot be written; so do the methods.
+    """
+
+    def __init__(self, folder: Path, columns: Sequence[str], real: Sequence[bool]) -> None:
+        self.folder = folder
+        self.written = 0
+        self._order = [0, *_order(real)]
+        self._block = np.zeros((BLOCK, 1 + sum(real)))
+        self.rows = list(self._block)
+        self.others: list[list[Value]] = []
+        self._home = folder.absolute()  # an FMU may change the working directory
+        self._path = self._home / f"{RESULTS_FILE}.part"
+        self._run_path = self._home / f"{RUN_FILE}.part"
+        header = io.StringIO()
+        csv.writer(header, lineterminator="\n").writerow(["time", *columns])
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._file = self._path.open("wb", buffering=0)
+        except OSError as error:
+            raise ResultsError(f"{folder}: results cannot be written here: {_reason(error)}.") from None
+        self._size = 0
+        try:
+            self._append(header.getvalue().encode())
+        except ResultsError:
+            self.discard()
+            raise
+
+    def write(self, count: int) -> None:
+        """Write the first `count` of `rows`; they are then free again."""
+        if count <= 0:
+            return
+        values = self._block[:count].tolist()
+        if len(self._order) == self._block.shape[1]:
+            # the text of a list of lists is the fastest way to many shortest decimal numbers
+            text = repr(values)[2:-2].replace("], [", "\n").replace(", ", ",") + "\n"
+        else:
+            text = self._mixed(values, count)
+        self.others.clear()
+        self._append(text.encode())
+        self.written += count
+
+    def _mixed(self, values: list[list[float]], count: int) -> str:
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        for row, others in zip(values, self.others[:count], strict=True):
+            cells = [*row, *(int(v) if isinstance(v, bool) else v for v in others)]
+            writer.writerow([cells[i] for i in self._order])
+        return text.getvalue()
+
+    def _append(self, data: bytes) -> None:
+        view = memoryview(data)
+        try:
+            while view:
+                view = view[self._file.write(view) :]
+        except OSError as error:
+            self._cut_back(data[: len(data) - len(view)])
+            raise ResultsError(
+                f"{self.folder / RESULTS_FILE}: cannot be written: {_reason(error)}."
+            ) from None
+        self._size += len(data)
+
+    def _cut_back(self, arrived: bytes) -> None:
+        """Keep the whole rows of a block that did not fit."""
+        whole = arrived.rfind(b"\n") + 1
+        self.written += arrived[:whole].count(b"\n") if self._size else 0
+        self._size += whole
+        with contextlib.suppress(OSError):
+            self._file.truncate(self._size)
+
+    def finish(self, run: dict[str, Any]) -> None:
+        """Write the record of the run and put both files in their places.
+
+        On a full disk the last rows give way to the record, without which the others are no use.
+        """
+        try:
+            try:
+                self._write_record(run)
+            except OSError as error:
+                if error.errno != errno.ENOSPC or not self._make_room(len(json.dumps(_plain(run)))):
+                    raise
+                self._write_record(run)
+            self._file.close()
+            target = self._home / RUN_FILE
+            target.unlink(missing_ok=True)  # from here on the earlier results are gone as a whole
+            os.replace(self._path, self._home / RESULTS_FILE)
+            os.replace(self._run_path, target)
+        except OSError as error:
+            self.discard()
+            raise ResultsError(f"{self.folder}: results cannot be written: {_reason(error)}.") from None
+
+    def _write_record(self, run: dict[str, Any]) -> None:
+        run = {**run, "rows": self.written}
+        text = json.dumps(_plain(run), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        self._run_path.write_text(text, encoding="utf-8")
+
+    def _make_room(self, needed: int) -> bool:
+        """Cut rows off the end of the results; return whether that gave any room."""
+        size = self._size - 2 * needed - 2 * 4096
+        if size <= 0:
+            return False
+        with self._path.open("rb") as stream:
+            stream.seek(size)
+            lost = stream.read(self._size - size)
+        whole = lost.find(b"\n") + 1
+        self.written -= lost[whole:].count(b"\n")
+        self._size = size + whole
+        self._file.truncate(self._size)
+        return True
+
+    def discard(self) -> None:
+        """Remove the temporary files; earlier results stay as they are."""
+        self._file.close()
+        with contextlib.suppress(OSError):
+            self._path.unlink(missing_ok=True)
+            self._run_path.unlink(missing_ok=True)
+
+
+def _order(real: Sequence[bool]) -> list[int]:
+    """Return where each column stands in time, Reals, others."""
+    reals, others = 1, 1 + sum(real)
+    order = []
+    for is_real in real:
+        order.append(reals if is_real else others)
+        reals, others = reals + is_real, others + (not is_real)
+    return order
+
+
+def _reason(error: OSError) -> str:
+    if error.errno == errno.ENOSPC:
+        return "the disk is full"
+    return f"{error.strerror or error}"
+
+
+def _plain(value: Any) -> Any:
+    """Return `value` as JSON can hold it: numbers that are not finite become text."""
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, bool) or value is None or isinstance(value, (int, str)):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else repr(value)
+    return str(value)

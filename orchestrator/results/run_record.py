@@ -1,0 +1,79 @@
+"""What run.json says about a run: everything needed to repeat and to judge it."""
+
+from __future__ import annotations
+
+import platform
+from datetime import datetime
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from ..master.log import STATUS, Log
+from ..plan import Plan, Unit
+
+WARNINGS = 100
+"""Warnings written out; more are only counted."""
+
+
+def run_record(plan: Plan, log: Log, *, status: str, started: datetime) -> dict[str, Any]:
+    """Return the record of a run without its end: wall time, error and rows come later.
+
+    Args:
+        status: "completed", "failed" or "interrupted".
+        started: when the run began, with a time zone.
+    """
+    units = {unit.name: unit for unit in plan.units}
+    columns = {f"{u}.{name}": units[u].fmu.variables[name].unit for u, name in plan.record}
+    warnings = list(log.warnings())
+    return {
+        "status": status,
+        "error": None,
+        "title": plan.title,
+        "started": started.isoformat(timespec="seconds"),
+        "wall_time": 0.0,
+        "rows": 0,
+        "algorithm": plan.algorithm,
+        "step_size": float(plan.step),
+        "stop_time": plan.time(plan.n_steps),
+        "evaluation_order": list(units),
+        "units": {"time": "s", **columns},
+        "fmus": {name: _fmu(unit, plan) for name, unit in units.items()},
+        "connections": [f"{w.source}.{w.output} -> {w.target}.{w.input}" for w in plan.wires],
+        "scenario": plan.scenario,
+        "versions": versions(),
+        "warnings": [
+            {"unit": m.unit, "time": m.time, "status": STATUS[m.status], "text": m.text}
+            for m in warnings[:WARNINGS]
+        ],
+        "more_warnings": max(0, len(warnings) - WARNINGS) + log.dropped,
+    }
+
+
+def _fmu(unit: Unit, plan: Plan) -> dict[str, Any]:
+    fmu = unit.fmu
+    return {
+        "name": fmu.name,
+        "file": fmu.path.name,
+        "sha256": fmu.sha256,
+        "guid": fmu.guid,
+        "generation_tool": fmu.generation_tool,
+        "step_size": float(unit.period * plan.step),
+        "parameters": dict(unit.parameters),
+        "constants": dict(unit.constants),
+    }
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of all that has a say in the numbers."""
+    packages = ("yawbench", "fmpy", "pythonfmu", "numpy")
+    return {
+        "python": platform.python_version(),
+        **{package: _version(package) for package in packages},
+        "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "unknown"

@@ -1,0 +1,1 @@
+"""Stage one: a scenario file read strictly, every problem with its line."""

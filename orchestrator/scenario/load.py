@@ -1,0 +1,125 @@
+"""Reading a scenario file: options applied, validated, every problem reported in one go."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+
+from ..errors import ScenarioError
+from ..plan import Algorithm
+from ..wording import hint, listed
+from . import overrides, quantities, strict, yaml_lines
+from .schema import Connection, Endpoint, Scenario, UnitSpec, Vehicle, endpoint
+from .yaml_lines import Document, Key
+
+__all__ = ["Connection", "Endpoint", "Scenario", "UnitSpec", "Vehicle", "load_scenario"]
+
+
+def load_scenario(
+    path: Path | str,
+    *,
+    swaps: Sequence[str] = (),
+    settings: Sequence[str] = (),
+    stop_time: Fraction | float | str | None = None,
+    step_size: Fraction | float | str | None = None,
+    algorithm: Algorithm | None = None,
+) -> Scenario:
+    """Read a scenario file.
+
+    Args:
+        path: the YAML file.
+        swaps: `unit=fmu`, as given to --swap.
+        settings: `unit.parameter=value`, as given to --set.
+        stop_time, step_size: in place of the file's [s].
+        algorithm: in place of the file's.
+
+    Raises:
+        ScenarioError: with everything that is wrong with the file, its vehicle file, the options.
+    """
+    document = yaml_lines.read(Path(path), what="scenario file")
+    vehicle_document = _read_vehicle(document)
+    replaced = overrides.apply_swaps(document, swaps) if document.data is not None else {}
+    if document.data is not None:
+        overrides.apply_settings(document, vehicle_document, settings)
+    values = {"stop_time": stop_time, "step_size": step_size, "algorithm": algorithm}
+    overrides.apply_values(document, values)
+
+    scenario = strict.validate(Scenario, document)
+    vehicle = strict.validate(Vehicle, vehicle_document)
+    if isinstance(document.data, dict):
+        _check_time_grid(document)
+        _check_unit_names(document)
+    problems = document.sentences() + vehicle_document.sentences()
+    if problems or scenario is None or vehicle is None:
+        raise ScenarioError(problems)
+    scenario._document, scenario._vehicle_document = document, vehicle_document
+    scenario._vehicle, scenario._replaced = vehicle, replaced
+    return scenario
+
+
+def _read_vehicle(document: Document) -> Document:
+    name = document.data.get("vehicle") if isinstance(document.data, dict) else None
+    if not isinstance(name, str):
+        return Document(document.path, data={})
+    vehicle = Path(os.path.normpath(document.path.parent / name))
+    if not vehicle.exists():
+        missing = yaml_lines.read(vehicle, what="vehicle file").problems[0][1]
+        document.report(("vehicle",), missing)
+        return Document(vehicle, data={})
+    return yaml_lines.read(vehicle, what="vehicle file")
+
+
+def _check_time_grid(document: Document) -> None:
+    """Report every time that is no integer multiple of the communication step."""
+    data = document.data
+    step = _seconds(data.get("step_size"))
+    if step is None:
+        return
+    times: list[tuple[Key, object]] = [(("stop_time",), data.get("stop_time"))]
+    units = data.get("units")
+    for name, unit in units.items() if isinstance(units, dict) else ():
+        if isinstance(unit, dict):
+            times.append((("units", name, "step_size"), unit.get("step_size")))
+    for key, value in times:
+        time = _seconds(value)
+        if time is None or time % step == 0:
+            continue
+        below = time // step * step
+        option = document.override(("step_size",))
+        origin = f" ({option})" if option else ""
+        nearest = listed([f"{float(t):.12g} s" for t in (below, below + step) if t > 0], last="or")
+        document.report(
+            key,
+            f"{float(time):.12g} s is no integer multiple of the communication step "
+            f"{float(step):.12g} s{origin}; nearest allowed: {nearest}",
+        )
+
+
+def _seconds(value: object) -> Fraction | None:
+    try:
+        return quantities.seconds(value)
+    except ValueError:
+        return None
+
+
+def _check_unit_names(document: Document) -> None:
+    """Report every unit that is named in a connection or a record but does not exist."""
+    data = document.data
+    units = data.get("units")
+    if not isinstance(units, dict):
+        return
+    named: list[tuple[Key, object]] = []
+    connections, record = data.get("connections"), data.get("record")
+    for i, connection in enumerate(connections if isinstance(connections, list) else ()):
+        if isinstance(connection, dict):
+            named += [(("connections", i, end), connection.get(end)) for end in ("from", "to")]
+    named += [(("record", i), item) for i, item in enumerate(record if isinstance(record, list) else ())]
+    for key, value in named:
+        try:
+            unit = endpoint(value).unit
+        except ValueError:
+            continue
+        if unit not in units and not (unit == "*" and key[0] == "record"):
+            document.report(key, f"there is no unit {unit!r}{hint(unit, units, lead='units')}")

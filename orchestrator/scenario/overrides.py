@@ -1,0 +1,95 @@
+"""What the command line changes in a scenario before it is validated.
+
+`--swap unit=fmu` replaces a unit's FMU; `--set unit.parameter=value` gives a parameter. Two names
+that no unit may have stand for more: `--set vehicle.mass=1200` changes the parameter set that all
+units share, `--set inputs.friction*=0.3` a constant. Whatever is changed this way remembers its
+option, so that later messages name the option in place of a line.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from ..wording import hint
+from . import yaml_lines
+from .yaml_lines import Document
+
+RESERVED = ("vehicle", "inputs")
+"""Words that `--set` understands in place of a unit."""
+
+
+def is_path(fmu: str) -> bool:
+    """Return whether `fmu` is a path of an archive, not a name in the folder of FMUs."""
+    return fmu.lower().endswith(".fmu") or "/" in fmu or "\\" in fmu
+
+
+def apply_swaps(document: Document, swaps: Iterable[str]) -> dict[str, str]:
+    """Replace FMUs; return the replaced one of each unit. Paths are relative to the working directory."""
+    replaced: dict[str, str] = {}
+    units = _mapping(document.data, "units")
+    for text in swaps:
+        option = f"--swap {text}"
+        unit, equals, fmu = (part.strip() for part in text.partition("="))
+        if not (unit and equals and fmu):
+            document.problems.append((0, f"{option}: write --swap UNIT=FMU"))
+            continue
+        spec = units.get(unit)
+        if not isinstance(spec, dict):
+            sentence = f"{option}: the scenario has no unit {unit!r}"
+            document.problems.append((0, sentence + hint(unit, units, lead="it has")))
+            continue
+        if isinstance(spec.get("fmu"), str):
+            replaced.setdefault(unit, spec["fmu"])
+        spec["fmu"] = os.path.abspath(fmu) if is_path(fmu) else fmu
+        document.overrides[("units", unit, "fmu")] = option
+    return replaced
+
+
+def apply_settings(document: Document, vehicle: Document, settings: Iterable[str]) -> None:
+    """Set parameters of units, of the vehicle, and constants of inputs."""
+    units = _mapping(document.data, "units")
+    for text in settings:
+        option = f"--set {text}"
+        target, equals, raw = (part.strip() for part in text.partition("="))
+        unit, dot, name = target.partition(".")
+        if not (unit and dot and name and equals):
+            document.problems.append((0, f"{option}: write --set UNIT.PARAMETER=VALUE"))
+            continue
+        value = yaml_lines.scalar(raw)
+        if unit == "vehicle":
+            _put(vehicle, (), "parameters", name, value, option)
+        elif unit == "inputs":
+            _put(document, (), "inputs", name, value, option)
+        elif isinstance(units.get(unit), dict):
+            _put(document, ("units", unit), "parameters", name, value, option)
+        else:
+            sentence = f"{option}: the scenario has no unit {unit!r}"
+            document.problems.append((0, sentence + hint(unit, (*units, *RESERVED), lead="it has")))
+
+
+def apply_values(document: Document, values: Mapping[str, Any]) -> None:
+    """Set top-level keys, such as step_size, where the value is not None."""
+    for name, value in values.items():
+        if value is not None and isinstance(document.data, dict):
+            document.data[name] = value
+            document.overrides[(name,)] = f"{name} = {value}"
+
+
+def _put(document: Document, above: tuple[str, ...], group: str, name: str, value: Any, option: str) -> None:
+    holder = document.data
+    for part in above:
+        holder = _mapping(holder, part)
+    if isinstance(holder, dict) and holder.get(group) is None:
+        holder[group] = {}
+    members = _mapping(holder, group)
+    members[name] = value
+    key = (*above, group, name)
+    document.overrides[key] = option
+
+
+def _mapping(data: Any, name: str) -> dict[str, Any]:
+    """Return data[name] if both are mappings, else an empty one: the schema will say what is wrong."""
+    inner = data.get(name) if isinstance(data, dict) else None
+    return inner if isinstance(inner, dict) else {}

@@ -1,0 +1,142 @@
+"""The schema of scenario files and vehicle files: every key, strictly.
+
+Paths (`vehicle`, an `fmu` that is a path) are relative to the scenario file. Values may name their
+unit ('90 km/h'); which unit a parameter wants is known only when its FMU is, so they are converted
+in wiring.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from fractions import Fraction
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import AfterValidator, Field, PlainValidator, PrivateAttr, WithJsonSchema
+
+from ..plan import Algorithm, Value
+from ..wording import short
+from . import overrides, quantities
+from .strict import Strict
+from .yaml_lines import Document
+
+
+class Endpoint(NamedTuple):
+    """A variable of a unit, or with a `*` several of them."""
+
+    unit: str
+    variable: str
+
+    def __str__(self) -> str:
+        return f"{self.unit}.{self.variable}"
+
+
+def endpoint(value: object) -> Endpoint:
+    """Split 'unit.variable'.
+
+    Raises:
+        ValueError: not of that form.
+    """
+    unit, dot, variable = str(value).partition(".")
+    if not isinstance(value, str) or not (unit and dot and variable) or variable.count("*") > 1:
+        raise ValueError(f"must be unit.variable, with at most one * in variable (got {value!r})")
+    return Endpoint(unit, variable)
+
+
+def _unit_name(name: str) -> str:
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
+        raise ValueError(f"{name!r} cannot name a unit: use letters, digits and _")
+    if name in overrides.RESERVED:
+        raise ValueError(f"a unit cannot be named {name!r}: --set {name}.NAME means something else")
+    return name
+
+
+def _plain(value: object) -> Value:
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"must be a finite number (got {value!r})")
+    if isinstance(value, (bool, int, float, str)):
+        return value
+    raise ValueError("has no value" if value is None else f"must be one value (got {short(value)})")
+
+
+_SCALAR_SCHEMA = {"type": ["number", "boolean", "string"]}
+_TIME_SCHEMA = {"type": ["number", "string"]}
+Scalar = Annotated[Value, PlainValidator(_plain), WithJsonSchema(_SCALAR_SCHEMA)]
+Time = Annotated[Fraction, PlainValidator(quantities.seconds), WithJsonSchema(_TIME_SCHEMA)]
+Variables = Annotated[Endpoint, PlainValidator(endpoint), WithJsonSchema({"type": "string"})]
+UnitName = Annotated[str, AfterValidator(_unit_name)]
+
+
+class UnitSpec(Strict):
+    """One unit as the scenario gives it."""
+
+    fmu: str = Field(description="Name of an FMU in fmus/, or the path of any .fmu", min_length=1)
+    step_size: Time | None = Field(None, description="s, an integer multiple of the communication step")
+    parameters: dict[str, Scalar] = Field({}, description="Values of this unit's parameters")
+
+
+class Connection(Strict):
+    """Connections beyond equal names; `*` in both ends connects everything that matches in pairs."""
+
+    source: Variables = Field(alias="from", description="unit.output")
+    target: Variables = Field(alias="to", description="unit.input")
+
+
+class Vehicle(Strict):
+    """A vehicle file: parameters that every unit takes if it declares them."""
+
+    title: str = ""
+    source: str = ""
+    parameters: dict[str, Scalar] = Field({}, description="Parameter name -> value")
+
+
+class Scenario(Strict):
+    """A scenario file with all overrides applied."""
+
+    title: str = ""
+    source: str = Field("", description="Where the scenario comes from: paper, section, figure")
+    vehicle: str | None = Field(None, description="Path of a vehicle file")
+    stop_time: Time = Field(description="s, an integer multiple of the communication step")
+    step_size: Time = Field(description="s, communication step")
+    algorithm: Algorithm = Field("extrapolated", description="How units are coupled")
+    inputs: dict[str, Scalar] = Field({}, description="[unit.]pattern -> constant of undriven inputs")
+    units: dict[UnitName, UnitSpec] = Field(description="Name -> unit", min_length=1)
+    connections: list[Connection] = Field([], description="Connections beyond equal names")
+    record: list[Variables] | None = Field(None, description="unit.pattern; left out: all outputs")
+
+    _document: Document = PrivateAttr()
+    _vehicle_document: Document = PrivateAttr()
+    _vehicle: Vehicle = PrivateAttr()
+    _replaced: dict[str, str] = PrivateAttr()
+
+    @property
+    def path(self) -> Path:
+        """The scenario file."""
+        return self._document.path
+
+    @property
+    def document(self) -> Document:
+        """Where every value stands, for messages."""
+        return self._document
+
+    @property
+    def vehicle_document(self) -> Document:
+        """Where every value of the vehicle file stands, for messages."""
+        return self._vehicle_document
+
+    @property
+    def vehicle_parameters(self) -> dict[str, Value]:
+        """Parameters of the vehicle file; every unit takes those it declares."""
+        return self._vehicle.parameters
+
+    @property
+    def replaced(self) -> dict[str, str]:
+        """Unit -> the FMU that the file names, for units swapped by an option."""
+        return self._replaced
+
+    def as_run(self) -> dict[str, Any]:
+        """Return everything that the file, the vehicle file and the options say, as JSON-ready data."""
+        data = dict(self._document.data)
+        times = {"stop_time": float(self.stop_time), "step_size": float(self.step_size)}
+        return {"file": str(self.path), **data, **times, "vehicle_parameters": self.vehicle_parameters}

@@ -1,0 +1,1 @@
+"""Several runs at once: comparisons, convergence, the study of a paper."""

@@ -1,0 +1,133 @@
+"""One scenario with several FMUs for a unit: what runs, and what the runs come to side by side."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import ScenarioError
+from ..figures.panels import Run, shown_by
+from ..figures.plots import draw
+from ..figures.style import save
+from ..metrics.run_metrics import STANDARD, Value, evaluate_all, metric
+from ..scenario.load import load_scenario
+from ..scenario.overrides import is_path
+from .jobs import Job, Outcome, read_back
+from .tables import Cell, Table, for_markdown, si, write_csv
+
+PANELS = (
+    "steer_angle",
+    "sideslip",
+    "sideslip_error",
+    "yaw_rate",
+    "acceleration_y",
+    "yaw_moment",
+    "path",
+)
+FIGURES = {"overview": PANELS, "wheel_torques": ("wheel_torque_*",)}
+"""Name of the file -> panels."""
+METRICS, REPORT = "metrics.csv", "compare.md"
+
+
+def variants(
+    scenario: Path, swaps: Sequence[str], settings: Sequence[str], out: Path, fmus: Path | None
+) -> list[Job]:
+    """Return one job for every combination of the FMUs that `swaps` names.
+
+    Args:
+        scenario: the scenario file.
+        swaps: `unit=fmu,fmu,...`; a unit may be named more than once. If only one FMU is named in
+            all, the scenario as it stands is the other variant.
+        settings: `unit.parameter=value`, for all.
+        out: folder of all results; each variant has a folder below, named like it.
+        fmus: folder of FMUs given by name.
+
+    Raises:
+        ScenarioError: the scenario or an option is wrong, or there is nothing to compare.
+    """
+    choices = _choices(swaps)
+    if all(len(names) == 1 for names in choices.values()):
+        swapped = [f"{unit}={names[0]}" for unit, names in choices.items()]
+        own = load_scenario(scenario, swaps=swapped, settings=settings).replaced
+        for unit, names in choices.items():
+            fmu = str(scenario.absolute().parent / own[unit]) if is_path(own[unit]) else own[unit]
+            names[:0] = [fmu] if fmu not in names else []
+    named = [unit for unit, names in choices.items() if len(names) > 1]
+    if not named:
+        raise ScenarioError("nothing to compare: name several FMUs, for example --swap controller=a,b")
+    jobs: list[Job] = []
+    for combination in itertools.product(*choices.values()):
+        chosen = dict(zip(choices, combination, strict=True))
+        label = " + ".join(_stem(chosen[unit]) for unit in named)
+        repeated = sum(job.label.partition(" (")[0] == label for job in jobs)
+        label += f" ({repeated + 1})" if repeated else ""
+        options = tuple(f"{unit}={fmu}" for unit, fmu in chosen.items())
+        jobs.append(Job(label, scenario, out / label.replace(" ", ""), options, tuple(settings), fmus=fmus))
+    return jobs
+
+
+def _choices(swaps: Sequence[str]) -> dict[str, list[str]]:
+    """Return unit -> FMUs, each once, in the order of the options."""
+    choices: dict[str, list[str]] = {}
+    for text in swaps:
+        unit, equals, fmus = text.partition("=")
+        names = [fmus] if Path(fmus).is_file() else [name.strip() for name in fmus.split(",")]
+        if not (unit.strip() and equals and all(names)):
+            raise ScenarioError(f"--swap {text}: write --swap UNIT=FMU or --swap UNIT=FMU,FMU,...")
+        known = choices.setdefault(unit.strip(), [])
+        known += [name for name in names if name not in known]
+    return choices
+
+
+def _stem(fmu: str) -> str:
+    return Path(fmu).stem if is_path(fmu) else fmu
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The runs that reached their end, why the others did not, and the metrics of each."""
+
+    runs: list[Run]
+    failed: dict[str, str]
+    values: dict[str, dict[str, Value]]  # label -> metric -> value
+
+
+def judge_comparison(outcomes: Sequence[Outcome]) -> Comparison:
+    """Read the results back from disk and compute the standard metrics."""
+    found = [(outcome.job.label, outcome.reason or read_back(outcome.job.out)) for outcome in outcomes]
+    runs = [Run(label, results) for label, results in found if not isinstance(results, str)]
+    failed = {label: reason for label, reason in found if isinstance(reason, str)}
+    return Comparison(runs, failed, {run.label: evaluate_all(run.results) for run in runs})
+
+
+def metric_table(comparison: Comparison, title: str) -> Table:
+    """Return a table with one row per metric and one column per run."""
+    labels = [*comparison.values, *comparison.failed]
+    table = Table(title, ["metric", "", *labels])
+    for name in STANDARD:
+        cells: list[Cell] = [values.get(name) for values in comparison.values.values()]
+        if any(cell is not None for cell in cells):
+            chosen = metric(name)
+            table.rows.append([chosen.title, chosen.formula, *cells, *("failed" for _ in comparison.failed)])
+    return table
+
+
+def write_comparison(comparison: Comparison, table: Table, out: Path) -> list[str]:
+    """Write figures and tables into `out`, under the table's title; return the names of the files."""
+    drawable = [name for name, panels in FIGURES.items() if shown_by(comparison.runs, panels)]
+    figures = {name: draw(comparison.runs, FIGURES[name], title=table.title) for name in drawable}
+    written = [path.name for name, figure in figures.items() for path in save(figure, out / name)]
+    names = [name for name in STANDARD if any(name in v for v in comparison.values.values())]
+    units = {name: value.unit for values in comparison.values.values() for name, value in values.items()}
+    rows: list[list[Cell]] = [
+        [label, "completed", *(values.get(name) for name in names)]
+        for label, values in comparison.values.items()
+    ]
+    rows += [[label, f"failed: {why}", *(None for _ in names)] for label, why in comparison.failed.items()]
+    write_csv(out / METRICS, ["run", "status", *(f"{name} [{si(units[name])}]" for name in names)], rows)
+    failed = "".join(f"\n{label} failed: {why}\n" for label, why in comparison.failed.items())
+    pictures = "".join(f"\n![{name}]({name})\n" for name in written if name.endswith(".png"))
+    (out / REPORT).write_text(f"{for_markdown(table)}{failed}{pictures}", encoding="utf-8")
+    return [*written, METRICS, REPORT]

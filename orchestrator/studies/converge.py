@@ -1,0 +1,228 @@
+"""How the result of a scenario depends on the communication step: error, observed order, cost.
+
+Each algorithm runs at h, h/2, h/4, ...; units with a step size of their own keep it. The error of
+a run is the largest difference from the finest run of the first algorithm, over the communication
+points of the coarsest run, relative to the signal's peak. The observed order at h is
+log2(|x_h - x_h/2| / |x_h/2 - x_h/4|) with the same norm: it needs no exact solution, and compares
+an algorithm only with itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import ResultsError, ScenarioError
+from ..figures.display import words
+from ..figures.style import QUIET, RC, frame, line_style
+from ..metrics.run_metrics import Value
+from ..plan import Algorithm
+from ..scenario.load import load_scenario
+from .jobs import Job, Outcome, read_back
+from .tables import Cell, Table, write_csv
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+ROUNDING = 1e-13
+"""Relative difference that a different order of additions can make."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One run: its algorithm and step [s], and what it came to; None where it cannot be known."""
+
+    algorithm: str
+    step: float
+    error: float | None  # relative to the signal's peak
+    order: float | None
+    wall_time: float | None  # [s]
+    failed: str = ""
+    finest: bool = False  # the run that all others are compared with
+
+
+def refinements(
+    scenario: Path,
+    *,
+    halvings: int,
+    signal: str,
+    algorithms: Sequence[Algorithm],
+    out: Path,
+    swaps: Sequence[str] = (),
+    settings: Sequence[str] = (),
+    fmus: Path | None = None,
+) -> list[Job]:
+    """Return the runs of a convergence study: all steps of the first algorithm, then the next.
+
+    Raises:
+        ScenarioError: the scenario or an option is wrong.
+    """
+    loaded = load_scenario(scenario, swaps=swaps, settings=settings)
+    if signal.count(".") != 1:
+        raise ScenarioError(f"--signal {signal}: write UNIT.VARIABLE, for example plant.yaw_rate")
+    jobs = []
+    for algorithm in algorithms or [loaded.algorithm]:
+        for k in range(halvings + 1):
+            step: Fraction = loaded.step_size / 2**k
+            label = f"{algorithm}, {_milliseconds(float(step))}"
+            folder = out / algorithm / _milliseconds(float(step)).replace(" ", "")
+            jobs.append(
+                Job(
+                    label, scenario, folder, tuple(swaps), tuple(settings), step_size=step,
+                    algorithm=algorithm, fmus=fmus, record=(signal,),
+                )
+            )  # fmt: skip
+    return jobs
+
+
+def _milliseconds(step: float) -> str:
+    return f"{1000 * step:.10g} ms"
+
+
+def measure(outcomes: Sequence[Outcome], signal: str) -> list[Row]:
+    """Return a row for every run, computed from the results on disk.
+
+    Raises:
+        ResultsError: the signal is zero throughout.
+    """
+    by_algorithm: dict[str, list[Outcome]] = {}
+    for outcome in outcomes:
+        by_algorithm.setdefault(str(outcome.job.algorithm), []).append(outcome)
+    finest = next(iter(by_algorithm.values()))[-1]
+    samples = {id(outcome): _samples(outcome, signal) for outcome in outcomes}
+    reference = samples[id(finest)][0]
+    peak = math.nan if reference is None else float(np.max(np.abs(reference)))
+    if peak == 0:
+        raise ResultsError(f"{signal} is zero throughout: choose another --signal.")
+    rows = []
+    for algorithm, runs in by_algorithm.items():
+        coarse = [_common(samples[id(run)][0], k) for k, run in enumerate(runs)]
+        target = _common(reference, len(runs) - 1)
+        steps = [_distance(a, b) for a, b in zip(coarse, [*coarse[1:], None], strict=True)]
+        for k, run in enumerate(runs):
+            after = steps[k + 1] if k + 1 < len(steps) else None
+            order = math.log2(first / after) if (first := steps[k]) and after else None
+            distance = None if run is finest else _distance(coarse[k], target)
+            _, wall_time, failed = samples[id(run)]
+            error = None if distance is None else distance / peak
+            step = float(run.job.step_size or 0)
+            rows.append(Row(algorithm, step, error, order, wall_time, failed, run is finest))
+    return rows
+
+
+def _samples(outcome: Outcome, signal: str) -> tuple[np.ndarray | None, float | None, str]:
+    """Return the signal, the wall time [s] and why there is neither."""
+    found = outcome.reason or read_back(outcome.job.out)
+    if isinstance(found, str):
+        return None, None, found
+    if not np.issubdtype(found[signal].dtype, np.number):
+        return None, None, f"{signal} is no number"
+    return found[signal], float(found.run["wall_time"]), ""
+
+
+def _common(x: np.ndarray | None, k: int) -> np.ndarray | None:
+    """Return the samples of a run with step h / 2^k at the communication points of that with h."""
+    return None if x is None else x[:: 2**k]
+
+
+def _distance(a: np.ndarray | None, b: np.ndarray | None) -> float | None:
+    """Return the largest difference; 0 if it is no more than rounding."""
+    if a is None or b is None:
+        return None
+    distance = float(np.max(np.abs(a - b)))
+    return distance if distance > ROUNDING * float(np.max(np.abs(b))) else 0.0
+
+
+def convergence_table(rows: Sequence[Row], title: str) -> Table:
+    """Return the table of all runs."""
+    table = Table(title, ["algorithm", "step", "error", "observed order", "wall time"])
+    for row in rows:
+        error: Cell = None if row.error is None else Value(row.error, "1")
+        if row.failed or row.finest:
+            error = f"failed: {row.failed}" if row.failed else "the finest"
+        order = Value(row.order, "1") if row.order is not None else None
+        cost = Value(row.wall_time, "s") if row.wall_time is not None else None
+        table.rows.append([row.algorithm, _milliseconds(row.step), error, order, cost])
+    return table
+
+
+def write_rows(rows: Sequence[Row], path: Path) -> None:
+    """Write all runs as CSV, in SI."""
+    headings = ["algorithm", "step_size [s]", "error [1]", "order [1]", "wall_time [s]", "failed"]
+    cells: list[list[Cell]] = [
+        [
+            row.algorithm,
+            *(None if x is None else Value(x, "") for x in (row.step, row.error, row.order, row.wall_time)),
+            row.failed,
+        ]
+        for row in rows
+    ]
+    write_csv(path, headings, cells)
+
+
+def convergence_figure(rows: Sequence[Row], signal: str, title: str, note: str) -> Figure:
+    """Return error over step and error over cost, both axes logarithmic, with slopes 1 and 2 to compare.
+
+    Raises:
+        ResultsError: no run has an error above zero.
+    """
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import LogLocator
+
+    drawn = [row for row in rows if row.error and row.wall_time]
+    if not drawn:
+        raise ResultsError("nothing to draw: no two runs differ.")
+    names = list(dict.fromkeys(row.algorithm for row in drawn))
+    styles = {
+        name: {**line_style(k), "marker": "os^"[k % 3], "markersize": 5} for k, name in enumerate(names)
+    }
+    with matplotlib.rc_context(RC):
+        figure = Figure(layout="constrained")
+        FigureCanvasAgg(figure)
+        by_step, by_cost = figure.subplots(1, 2, sharey=True)
+        for name in names:
+            mine = [row for row in drawn if row.algorithm == name]
+            errors = [row.error for row in mine]
+            by_step.plot([1000 * row.step for row in mine], errors, **styles[name])
+            by_cost.plot([row.wall_time for row in mine], errors, **styles[name])
+        _slopes(by_step, drawn)
+        for axes, heading, below in (
+            (by_step, f"{words(signal)}: largest error, relative to its peak", "communication step in ms"),
+            (by_cost, "the same over the wall time of the run", "wall time in s"),
+        ):
+            axes.set(xscale="log", yscale="log", xlabel=below)
+            axes.set_title(heading)
+        steps = sorted({1000 * row.step for row in drawn})
+        by_step.set_xticks(steps, [f"{step:g}" for step in steps])
+        by_step.minorticks_off()
+        by_cost.xaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5, 7)))
+        by_cost.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        by_cost.xaxis.set_minor_formatter("")
+        handles = [Line2D([], [], label=name, **styles[name]) for name in names]
+        frame(figure, 3.6, handles, title, note)
+    return figure
+
+
+def _slopes(axes: Axes, rows: Sequence[Row]) -> None:
+    """Draw lines of order 1 and 2 above the data, from the coarsest step down."""
+    steps = [1000 * row.step for row in rows]
+    coarse, fine = max(steps), min(steps)
+    top = 3 * max(row.error or 0.0 for row in rows)
+    for order in (1, 2):
+        end, middle = (top * (step / coarse) ** order for step in (fine, math.sqrt(coarse * fine)))
+        axes.plot([coarse, fine], [top, end], color=QUIET, linewidth=0.8, linestyle=":")
+        axes.annotate(
+            f"order {order}", (math.sqrt(coarse * fine), middle), (-4, 3), ha="right",
+            textcoords="offset points", fontsize=7.5, color=QUIET,
+        )  # fmt: skip

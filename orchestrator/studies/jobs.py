@@ -1,0 +1,273 @@
+"""Runs of scenarios in processes of their own, so that one that crashes takes no other with it."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+from typing import Any
+
+from ..errors import ResultsError, ScenarioError, YawbenchError
+from ..master.interrupts import StopFlag, interrupts
+from ..plan import Algorithm, Plan
+from ..results.read import RESULTS_FILE, RUN_FILE, Results, load_results
+from ..wording import hint
+
+GRACE = 5.0
+"""Time that interrupted runs have to write what they have recorded [s]."""
+LOOK_EVERY = 0.2
+"""Time between two looks whether to stop [s]."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run to be made: a scenario, what is changed in it, and the folder its results go to."""
+
+    label: str
+    scenario: Path
+    out: Path
+    swaps: tuple[str, ...] = ()  # unit=fmu
+    settings: tuple[str, ...] = ()  # unit.parameter=value
+    stop_time: Fraction | float | str | None = None  # in place of the scenario's [s]
+    step_size: Fraction | float | str | None = None
+    algorithm: Algorithm | None = None
+    fmus: Path | None = None
+    record: tuple[str, ...] = ()  # unit.variable; default: what the scenario records
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a job: `problems` is empty if it ran to the end."""
+
+    job: Job
+    problems: tuple[str, ...] = ()
+    exit_status: int = 0
+    seconds: float = 0.0  # of the process, start to end
+
+    @property
+    def ok(self) -> bool:
+        return not self.problems
+
+    @property
+    def reason(self) -> str:
+        """Why it failed, in one sentence."""
+        return "; ".join(self.problems)
+
+
+NEEDED = ("orchestrator.wiring.make_plan", "orchestrator.master.simulate", "matplotlib.backends.backend_agg")
+"""Modules that take long to import."""
+
+
+def plan_of(job: Job) -> Plan:
+    """Return the plan of a job's run.
+
+    Raises:
+        YawbenchError: the scenario, an option or an FMU is wrong.
+    """
+    from ..scenario.load import load_scenario
+    from ..wiring.make_plan import make_plan
+
+    scenario = load_scenario(
+        job.scenario,
+        swaps=job.swaps,
+        settings=job.settings,
+        stop_time=job.stop_time,
+        step_size=job.step_size,
+        algorithm=job.algorithm,
+    )
+    plan = make_plan(scenario, fmus=job.fmus)
+    if not job.record:
+        return plan
+    recorded = {f"{unit}.{variable}": (unit, variable) for unit, variable in plan.record}
+    unknown = [name for name in job.record if name not in recorded]
+    if unknown:
+        guess = hint(unknown[0], recorded, lead="recorded are")
+        raise ScenarioError(f"{job.scenario}: {unknown[0]!r} is not recorded{guess}")
+    return replace(plan, record=tuple(recorded[name] for name in job.record))
+
+
+def check(jobs: Sequence[Job]) -> None:
+    """Make sure that every job can start.
+
+    Raises:
+        ScenarioError: with everything that is wrong with any of them, each problem once.
+    """
+    problems = dict.fromkeys(problem for job in jobs for problem in _problems(job))
+    if problems:
+        raise ScenarioError(problems)
+
+
+def _problems(job: Job) -> list[str]:
+    try:
+        plan_of(job)
+    except YawbenchError as error:
+        return error.problems
+    return []
+
+
+def run_job(job: Job) -> None:
+    """Make one run in this process.
+
+    Raises:
+        YawbenchError: the scenario is wrong or the run failed.
+    """
+    from ..master.simulate import simulate
+
+    simulate(plan_of(job), job.out)
+
+
+def default_workers() -> int:
+    """Return the number of processor cores this process may use."""
+    affinity = getattr(os, "sched_getaffinity", None)
+    return len(affinity(0)) if affinity else os.cpu_count() or 1
+
+
+def execute(
+    jobs: Sequence[Job],
+    *,
+    workers: int | None = None,
+    done: Callable[[Outcome], None] = lambda outcome: None,
+    run: Callable[[Job], Any] = run_job,
+) -> list[Outcome]:
+    """Run all jobs, so many at a time, each in a fresh process; return their outcomes in order.
+
+    Results of an earlier run in a job's folder are deleted first, so that none can pass for new.
+    Ctrl-C is looked at between two runs' ends, never while a process is being started, which would
+    leave one that nobody knows.
+
+    Args:
+        jobs: what to run.
+        workers: processes at a time; default: one per core.
+        done: called with every outcome as it comes.
+        run: what a process does with its job; importable by name.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C or SIGTERM, when all runs have ended.
+    """
+    context = _context()
+    limit = max(1, workers or default_workers())
+    outcomes: dict[int, Outcome] = {}
+    waiting: Iterator[tuple[int, Job]] = iter(enumerate(jobs))
+    running: list[_Running] = []
+    stop = StopFlag()
+    with interrupts(stop, lambda: None):
+        try:
+            while not stop.requested:
+                while len(running) < limit and (following := next(waiting, None)) is not None:
+                    running.append(_Running.start(*following, context, run))
+                if not running:
+                    return [outcomes[i] for i in range(len(jobs))]
+                reported = wait([one.pipe for one in running], timeout=LOOK_EVERY)
+                for one in [one for one in running if one.pipe in reported]:
+                    running.remove(one)
+                    outcomes[one.number] = one.outcome()
+                    done(outcomes[one.number])
+            for one in running:  # Ctrl-C reaches the runs too: they write what they have
+                one.process.join(timeout=GRACE)
+            raise KeyboardInterrupt
+        finally:
+            for one in running:
+                one.process.terminate()
+                one.end()
+
+
+def pool(workers: int | None = None) -> ProcessPoolExecutor:
+    """Return an executor for work that cannot fail as FMUs can: reading results, drawing figures."""
+    return ProcessPoolExecutor(
+        max(1, workers or default_workers()),
+        mp_context=_context(),
+        initializer=signal.signal,
+        initargs=(signal.SIGINT, signal.SIG_IGN),  # the caller ends them
+    )
+
+
+def _context() -> Any:
+    """Return how processes start: from a server that has imported once what each needs, or afresh."""
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["__main__", *NEEDED])
+    return context
+
+
+@dataclass
+class _Running:
+    """A job's process, the pipe it reports through, and when it began."""
+
+    number: int
+    job: Job
+    process: Any
+    pipe: Connection
+    began: float = field(default_factory=time.monotonic)
+
+    @classmethod
+    def start(cls, number: int, job: Job, context: Any, run: Callable[[Job], Any]) -> _Running:
+        for name in (RESULTS_FILE, RUN_FILE):
+            with suppress(OSError):
+                (job.out / name).unlink()
+        ours, theirs = context.Pipe(duplex=False)
+        process = context.Process(target=_work, args=(job, run, theirs), daemon=True)
+        process.start()
+        theirs.close()
+        return cls(number, job, process, ours)
+
+    def outcome(self) -> Outcome:
+        """Return what the process reported, or how it died if it did not."""
+        try:
+            status, problems = self.pipe.recv()
+            self.end()
+        except EOFError:
+            self.end()
+            status, problems = 1, (_death(self.process.exitcode),)
+        self.pipe.close()
+        return Outcome(self.job, tuple(problems), status, time.monotonic() - self.began)
+
+    def end(self) -> None:
+        """Wait for the process to end; kill one that does not, because a unit never comes back."""
+        self.process.join(timeout=GRACE)
+        self.process.kill()
+        self.process.join()
+
+
+def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:
+    """Do one job in a process of its own and report how it ended."""
+    try:
+        run(job)
+        report: tuple[int, list[str]] = (0, [])
+    except YawbenchError as error:
+        report = (error.exit_status, error.problems or [type(error).__name__])
+    except KeyboardInterrupt:
+        report = (1, ["interrupted"])
+    except BaseException as error:
+        sys.excepthook(type(error), error, error.__traceback__)
+        report = (1, [f"{type(error).__name__}: {error}"])
+    pipe.send(report)
+    pipe.close()
+
+
+def _death(code: int | None) -> str:
+    if code is not None and code < 0:
+        with suppress(ValueError):
+            return f"the process of this run died of signal {signal.Signals(-code).name}"
+    return f"the process of this run ended without a word, exit status {code}"
+
+
+def read_back(folder: Path) -> Results | str:
+    """Return the results of a run that reached its end, or a sentence that says why there are none."""
+    try:
+        results = load_results(folder)
+    except ResultsError as error:
+        return str(error)
+    if results.run.get("status") == "completed":
+        return results
+    message = (results.run.get("error") or {}).get("message", "no reason recorded")
+    return f"{folder}: this run ended early: {message}"

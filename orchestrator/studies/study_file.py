@@ -1,0 +1,164 @@
+"""Reading a study file: `for` expanded, every name resolved, every problem reported in one go."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from fractions import Fraction
+from pathlib import Path
+
+from ..errors import ScenarioError
+from ..plan import Algorithm
+from ..scenario import overrides, yaml_lines
+from ..scenario.strict import validate
+from ..scenario.yaml_lines import Document, Key
+from ..wording import hint, listed
+from .jobs import Job
+from .study_schema import OPERATORS, Claim, Reference, RunSpec, StudySpec, text_of
+
+FIGURES = "figures"
+"""Folder of the figures, beside those of the runs."""
+
+
+@dataclass(frozen=True)
+class StudyRun:
+    """One run of a study."""
+
+    name: str
+    label: str
+    row: str
+    scenario: Path
+    swaps: tuple[str, ...]
+    settings: tuple[str, ...]
+    stop_time: Fraction | None
+    step_size: Fraction | None
+    algorithm: Algorithm | None
+
+    def job(self, out: Path, fmus: Path | None) -> Job:
+        """Return the job that makes this run with its results below `out`."""
+        return Job(
+            self.name, self.scenario, out / self.name, self.swaps, self.settings,
+            self.stop_time, self.step_size, self.algorithm, fmus,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study file that is right in itself."""
+
+    path: Path
+    spec: StudySpec
+    runs: dict[str, StudyRun]
+
+    def matching(self, patterns: Sequence[str]) -> list[StudyRun]:
+        """Return the runs that any of the patterns names, in the order of the patterns."""
+        names = [name for pattern in patterns for name in self.runs if fnmatchcase(name, pattern)]
+        return [self.runs[name] for name in dict.fromkeys(names)]
+
+
+def load_study(path: Path | str) -> Study:
+    """Read a study file.
+
+    Raises:
+        ScenarioError: with everything that is wrong with it.
+    """
+    document = yaml_lines.read(Path(path), what="study file")
+    spec = validate(StudySpec, document)
+    if spec is None or document.problems:
+        raise ScenarioError(document.sentences())
+    runs: dict[str, StudyRun] = {}
+    for i, entry in enumerate(spec.runs):
+        for run in _expanded(document, ("runs", i), entry):
+            if run.name in runs:
+                document.report(("runs", i, "name"), f"there is already a run {run.name!r}")
+            runs[run.name] = run
+    study = Study(Path(path), spec, runs)
+    if not document.problems:
+        _check_names(study, document)
+    if document.problems:
+        raise ScenarioError(document.sentences())
+    return study
+
+
+def _expanded(document: Document, key: Key, entry: RunSpec) -> Iterator[StudyRun]:
+    """Return the runs that an entry stands for, none if it is wrong."""
+    known = len(document.problems)
+    for combination in itertools.product(*(choices.items() for choices in entry.for_each.values())):
+        values = dict(zip(entry.for_each, (value for value, _ in combination), strict=True))
+        wording = dict(zip(entry.for_each, (said for _, said in combination), strict=True))
+
+        def fill(text: str, *where: str, use: dict[str, str] = values) -> str:
+            for word in re.findall(r"\{(.*?)\}", text):
+                if word not in use:
+                    sentence = f"{{{word}}} stands for nothing" + hint(word, use, lead="'for' has")
+                    document.report((*key, *where), sentence)
+            return re.sub(r"\{(\w+)\}", lambda match: use.get(match[1], match[0]), text)
+
+        name = fill(entry.name, "name")
+        parts = name.split("/")
+        if not all(re.fullmatch(r"[\w.+-]*[\w+-][\w.+-]*", part) for part in parts) or parts[0] == FIGURES:
+            sentence = f"{name!r} cannot name a run: use letters, digits, . _ + - and / between folders"
+            document.report((*key, "name"), sentence)
+        folder = document.path.parent
+        swaps = []
+        for unit, fmu in entry.swap.items():
+            filled = fill(fmu, "swap", unit)
+            swaps.append(f"{unit}={folder / filled if overrides.is_path(filled) else filled}")
+        settings = [f"{k}={fill(text_of(v), 'set', k)}" for k, v in entry.set.items()]
+        label = fill(entry.label, "label", use=wording) or name
+        row = fill(entry.row, "row", use=wording) or label
+        scenario = folder / fill(entry.scenario, "scenario")
+        if len(document.problems) > known:
+            return
+        yield StudyRun(
+            name, label, row, scenario, tuple(swaps), tuple(settings),
+            entry.stop_time, entry.step_size, entry.algorithm,
+        )  # fmt: skip
+
+
+def _check_names(study: Study, document: Document) -> None:
+    """Report every name of a run or metric that does not exist, and every ambiguous condition."""
+    spec = study.spec
+    patterns = {"tables": [t.runs for t in spec.tables], "figures": [f.runs for f in spec.figures]}
+    for group, lists in patterns.items():
+        for i, several in enumerate(lists):
+            for k, pattern in enumerate(several):
+                if not study.matching([pattern]):
+                    sentence = f"no run is named {pattern!r}" + hint(pattern, study.runs, lead="runs")
+                    document.report((group, i, "runs", k), sentence)
+    for i, table in enumerate(spec.tables):
+        for k, name in enumerate(table.metrics):
+            _check_metric(spec, document, ("tables", i, "metrics", k), name)
+    figures = [figure.name for figure in spec.figures]
+    for i, name in enumerate(figures):
+        if name in figures[:i]:
+            document.report(("figures", i, "name"), f"there is already a figure {name!r}")
+    for group, claims in (("claims", spec.claims), ("checks", spec.checks)):
+        for i, claim in enumerate(claims):
+            _check_conditions(study, document, (group, i, "holds_if"), claim)
+
+
+def _check_metric(spec: StudySpec, document: Document, key: Key, name: str) -> None:
+    if name not in spec.metrics:
+        sentence = f"there is no metric {name!r}" + hint(name, spec.metrics, lead="metrics")
+        document.report(key, sentence)
+
+
+def _check_conditions(study: Study, document: Document, key: Key, claim: Claim) -> None:
+    for i, condition in enumerate(claim.holds_if):
+        given = [name for name in OPERATORS if getattr(condition, name) is not None]
+        if len(given) != 1:
+            document.report((*key, i), f"needs exactly one of {listed(OPERATORS, last='or')}")
+            continue
+        places = [((*key, i), condition.run, condition.metric, bool(study.matching([condition.run])))]
+        if isinstance(condition.bound, Reference):
+            bound = condition.bound
+            places.append(((*key, i, given[0]), bound.run, bound.metric, bound.run in study.runs))
+        for place, run, name, exists in places:
+            if not exists:
+                sentence = f"there is no run {run!r}" + hint(run, study.runs, lead="runs")
+                document.report((*place, "run"), sentence)
+            _check_metric(study.spec, document, (*place, "metric"), name)

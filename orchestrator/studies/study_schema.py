@@ -1,0 +1,180 @@
+"""The schema of study files: runs, metrics, tables, claims of a paper, figures; every key, strictly.
+
+A run entry with `for` stands for one run per combination; `{name}` in its texts is then the value.
+
+    runs:
+      - for: {speed: [15, 25], controller: {off: no control, fnn: neural network}}
+        name: "{speed}mps/{controller}"
+        label: "{controller}"              # in legends and tables the words: "no control"
+        row: "{speed} m/s, {controller}"
+        scenario: "{speed}mps.yaml"        # relative to the study file
+        swap: {controller: "controller_{controller}"}
+    metrics:
+      error: {metric: relative_peak_error(sideslip), window: [1, 6]}
+    claims:
+      - says: Without control the error exceeds 100 %.
+        source: section 3.1
+        holds_if:
+          - {run: 15mps/off, metric: error, above: 100 %}
+          - {run: 15mps/fnn, metric: error, below: {run: 15mps/off, metric: error, times: 0.5}}
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag
+
+from ..errors import ScenarioError
+from ..figures.plots import OVERVIEW
+from ..metrics.run_metrics import metric
+from ..plan import Algorithm
+from ..scenario.schema import Scalar, Time
+from ..scenario.strict import Strict
+from ..wording import short
+
+OPERATORS = ("above", "at_least", "below", "at_most")
+
+
+def _alternatives(value: object) -> dict[str, str]:
+    """Return the values of one `for` key with their words."""
+    if isinstance(value, list) and value and all(isinstance(v, (str, int, float)) for v in value):
+        return {text_of(v): text_of(v) for v in value}
+    if isinstance(value, dict) and value and all(isinstance(v, str) for v in value.values()):
+        return {str(k): v for k, v in value.items()}
+    raise ValueError("must be a list of values, or a mapping of values to words")
+
+
+def text_of(value: object) -> str:
+    """Return a plain value as a YAML file would have it."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _window(value: object) -> tuple[float, float]:
+    numbers = isinstance(value, list) and len(value) == 2 and all(isinstance(v, (int, float)) for v in value)
+    if not numbers or not value[0] < value[1]:  # type: ignore[index]
+        raise ValueError(f"must be [from, to] in s, from before to (got {short(value)})")
+    return float(value[0]), float(value[1])  # type: ignore[index]
+
+
+def _metric_name(name: str) -> str:
+    try:
+        return metric(name).name
+    except ScenarioError as error:
+        raise ValueError(str(error)) from None
+
+
+Alternatives = Annotated[dict[str, str], PlainValidator(_alternatives)]
+Window = Annotated[tuple[float, float], PlainValidator(_window)]
+MetricName = Annotated[str, AfterValidator(_metric_name)]
+Patterns = Annotated[list[str], Field(min_length=1)]
+"""Names of runs, with `*` and `?` for many."""
+
+
+class RunSpec(Strict):
+    """One run, or with `for` one per combination."""
+
+    name: str = Field(description="Name of the run and of its folder, e.g. 25mps/fnn", min_length=1)
+    scenario: str = Field(description="Scenario file, relative to the study file", min_length=1)
+    for_each: dict[str, Alternatives] = Field({}, alias="for", description="Key -> values")
+    label: str = Field("", description="What legends call it; default: the name")
+    row: str = Field("", description="What tables call it; default: the label")
+    swap: dict[str, str] = Field({}, description="Unit -> FMU, a name or a path")
+    set: dict[str, Scalar] = Field({}, description="unit.parameter -> value")
+    stop_time: Time | None = Field(None, description="In place of the scenario's")
+    step_size: Time | None = Field(None, description="In place of the scenario's")
+    algorithm: Algorithm | None = Field(None, description="In place of the scenario's")
+
+
+class MetricSpec(Strict):
+    """A number per run."""
+
+    metric: MetricName = Field(description="measure(signal)")
+    window: Window | None = Field(None, description="[from, to] in s; left out: the whole run")
+    heading: str = Field("", description="Heading of its column; default: the formula")
+
+
+class TableSpec(Strict):
+    """A table of metrics, one row per run."""
+
+    title: str = ""
+    runs: Patterns
+    metrics: list[str] = Field(description="Keys of `metrics`, one column each", min_length=1)
+
+
+class Reference(Strict):
+    """A metric of another run as a bound."""
+
+    run: str
+    metric: str
+    times: float = 1.0
+
+
+def _number(value: object) -> float | str:
+    """Return a number in SI, or text that begins with one."""
+    plain = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    if not plain and not (isinstance(value, str) and re.match(r"\s*[+-]?\.?\d", value)):
+        raise ValueError("must be a number, a number with its unit ('5 %'), or {run: ..., metric: ...}")
+    return value  # type: ignore[return-value]
+
+
+Bound = Annotated[
+    Annotated[float | str, PlainValidator(_number), Tag("number")] | Annotated[Reference, Tag("reference")],
+    Discriminator(lambda value: "reference" if isinstance(value, (dict, Reference)) else "number"),
+]
+"""A number in SI, a number with its unit ('5 %'), or another run's metric."""
+
+
+class Condition(Strict):
+    """A comparison of a metric of a run with exactly one bound."""
+
+    run: str = Field(description="Name of a run; with `*` every run that fits")
+    metric: str
+    above: Bound | None = None
+    at_least: Bound | None = None
+    below: Bound | None = None
+    at_most: Bound | None = None
+
+    @property
+    def operator(self) -> str:
+        """The one operator that is given."""
+        return next(name for name in OPERATORS if getattr(self, name) is not None)
+
+    @property
+    def bound(self) -> Any:
+        """What the metric is compared with."""
+        return getattr(self, self.operator)
+
+
+class Claim(Strict):
+    """What somebody says, and the comparisons that decide whether it holds."""
+
+    says: str = Field(description="The claim in words", min_length=1)
+    short: str = Field("", description="The same for the table of runs, e.g. '> 100 %'")
+    source: str = Field("", description="Where it is said: section, figure, table")
+    holds_if: list[Condition] = Field(description="All must be true", min_length=1)
+    note: str = Field("", description="What a reader should know about the verdict")
+
+
+class FigureSpec(Strict):
+    """A figure of several runs laid over each other."""
+
+    name: str = Field(description="Name of its files", pattern=r"^[\w.+-]+$")
+    title: str = ""
+    runs: Patterns
+    panels: list[str] = Field(list(OVERVIEW), description="Signals and other panels, in order", min_length=1)
+
+
+class StudySpec(Strict):
+    """A study file."""
+
+    title: str = Field(min_length=1)
+    source: str = Field("", description="The paper, with all that is needed to find it")
+    runs: list[RunSpec] = Field(min_length=1)
+    metrics: dict[str, MetricSpec] = Field(min_length=1)
+    tables: list[TableSpec] = []
+    claims: list[Claim] = Field([], description="What the paper says")
+    checks: list[Claim] = Field([], description="What this project asks of its own results")
+    figures: list[FigureSpec] = []

@@ -1,0 +1,94 @@
+"""Tables for people (terminal, Markdown) and for programs (CSV), from one description."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..figures.display import shown
+from ..metrics.run_metrics import Value
+
+if TYPE_CHECKING:
+    import rich.table
+
+Cell = str | Value | None
+"""Words, a number with its unit, or nothing."""
+
+
+@dataclass
+class Table:
+    """Headings, rows of cells, and what has to be said below them."""
+
+    title: str
+    headings: list[str]
+    rows: list[Sequence[Cell]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def text(self) -> list[list[str]]:
+        """Return the cells of all rows as people read them."""
+        return [[_shown(cell) for cell in row] for row in self.rows]
+
+    def is_number(self, column: int) -> bool:
+        """Return whether a column holds numbers, and so is set flush right."""
+        return any(isinstance(row[column], Value) for row in self.rows)
+
+
+def _shown(cell: Cell) -> str:
+    if cell is None:
+        return "-"
+    return shown(cell.number, cell.unit) if isinstance(cell, Value) else cell
+
+
+def for_terminal(table: Table) -> rich.table.Table:
+    """Return the table for a rich console."""
+    import rich.table
+    from rich import box
+    from rich.text import Text
+
+    caption = Text("\n".join(table.notes)) if table.notes else None
+    shape = rich.table.Table(
+        title=Text(table.title), title_justify="left", title_style="bold", caption=caption,
+        caption_justify="left", caption_style="", box=box.SIMPLE_HEAD, pad_edge=False,
+    )  # fmt: skip
+    for i, heading in enumerate(table.headings):
+        number = table.is_number(i)
+        shape.add_column(Text(heading), justify="right" if number else "left", no_wrap=number)
+    for row in table.text():
+        shape.add_row(*(Text(cell) for cell in row))
+    return shape
+
+
+def for_markdown(table: Table) -> str:
+    """Return the table as GitHub Markdown, with its title in bold."""
+
+    def line(cells: Sequence[str]) -> str:
+        return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", "; ") for cell in cells) + " |"
+
+    rule = ["---:" if table.is_number(i) else "---" for i in range(len(table.headings))]
+    head = [f"**{table.title}**", ""] if table.title else []
+    notes = ["", *(f"{note}  " for note in table.notes)] if table.notes else []
+    return "\n".join([*head, line(table.headings), line(rule), *map(line, table.text()), *notes]) + "\n"
+
+
+def write_csv(path: Path, headings: Sequence[str], rows: Sequence[Sequence[Cell]]) -> None:
+    """Write rows for programs: numbers in SI with all their digits, ratios as such, nothing for nothing."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(headings)
+        writer.writerows([_plain(cell) for cell in row] for row in rows)
+
+
+def _plain(cell: Cell) -> str:
+    if isinstance(cell, Value):
+        return "inf" if math.isinf(cell.number) else repr(cell.number)
+    return cell or ""
+
+
+def si(unit: str) -> str:
+    """Return a metric's unit as it stands in a CSV file: ratios are not in per cent there."""
+    return "1" if unit == "%" else unit

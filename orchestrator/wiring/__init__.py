@@ -1,0 +1,1 @@
+"""Stage two: from a scenario to a plan in which every input has its one source."""

@@ -1,0 +1,138 @@
+"""From a scenario to a plan: FMUs opened, parameters distributed, every input given its one source.
+
+An output feeds every input of the same name in other units. A connection of the scenario goes
+before equal names; a constant is for an input that neither feeds, and a constant given by name goes
+before one given by a pattern. Whatever then has no source, or more than one, is an error: the start
+value that an FMU carries for an input is never used in silence.
+
+Two units of measurement fit if they mean the same (N.m and Nm, m/s2 and m/s^2); where an FMU
+declares none, nothing can be checked and a note says so. Types must be equal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+
+from ..errors import ModelDescriptionError, WiringError
+from ..fmu.archive import open_fmu
+from ..fmu.search import find_fmu, find_folder
+from ..fmu.shadowing import shadowed_modules
+from ..plan import Fmu, Plan, Unit, Wire
+from ..scenario.load import Scenario
+from ..scenario.overrides import is_path
+from .connections import Connector
+from .order import evaluate
+from .parameters import Parameters
+
+
+def make_plan(scenario: Scenario, *, fmus: Path | None = None) -> Plan:
+    """Open the scenario's FMUs and connect them.
+
+    Args:
+        scenario: as loaded.
+        fmus: the folder that holds FMUs given by name; None: the nearest `fmus/` that holds any.
+
+    Raises:
+        ModelDescriptionError: FMUs that are missing, damaged or not supported.
+        WiringError: everything that is wrong with parameters and connections.
+    """
+    opened, replaced = _open_all(scenario, fmus)
+    notes: list[str] = []
+    parameters = Parameters(scenario, opened, replaced, notes).of_units()
+    connector = Connector(scenario, opened, replaced, notes)
+    wires, constants = connector.connect()
+    record = connector.recorded()
+    _check_instances(scenario, opened)
+    evaluation = evaluate(opened, wires)
+    problems = scenario.document.sentences()
+    if scenario.vehicle_document is not scenario.document:
+        problems += scenario.vehicle_document.sentences()
+    problems += [f"{scenario.path}: {text}" for text in shadowed_modules(opened)]
+    problems += [
+        f"{scenario.path}: algebraic loop: {loop}; these values would define each other at one instant, so "
+        "one of these units has to give an output that does not follow its input directly"
+        for loop in evaluation.loops
+    ]
+    if problems:
+        raise WiringError(problems)
+    notes += [
+        f"possible algebraic loop: {loop}; an FMU here does not say which inputs its outputs follow, "
+        "so a wire against the evaluation order uses earlier values"
+        for loop in evaluation.possible_loops[:1]
+    ]
+    units = {
+        name: Unit(name, fmu, _period(scenario, name), parameters[name], constants[name])
+        for name, fmu in opened.items()
+    }
+    return Plan(
+        units=tuple(units[name] for name in evaluation.order),
+        wires=_sorted(wires, evaluation.order, opened),
+        record=record,
+        step=scenario.step_size,
+        n_steps=int(scenario.stop_time / scenario.step_size),
+        algorithm=scenario.algorithm,
+        title=scenario.title,
+        scenario=scenario.as_run(),
+        notes=tuple(notes),
+    )
+
+
+def _open_all(scenario: Scenario, fmus: Path | None) -> tuple[dict[str, Fmu], Callable[[str], Fmu | None]]:
+    """Return the FMU of each unit, and a function that gives the one a swap has replaced, if it is there."""
+    document = scenario.document
+    problems: dict[str, None] = {}
+    folder = fmus
+    if fmus is not None and not fmus.is_dir():
+        raise ModelDescriptionError(f"--fmus {fmus}: no such folder")
+    if fmus is None and not all(is_path(spec.fmu) for spec in scenario.units.values()):
+        folder = find_folder(scenario.path)
+
+    @cache
+    def opened(fmu: str) -> Fmu:
+        return open_fmu(find_fmu(fmu, scenario=scenario.path, fmus=folder))
+
+    def replaced(unit: str) -> Fmu | None:
+        try:
+            return opened(scenario.replaced[unit])
+        except ModelDescriptionError:
+            return None
+
+    found: dict[str, Fmu] = {}
+    for name, spec in scenario.units.items():
+        try:
+            found[name] = opened(spec.fmu)
+        except ModelDescriptionError as error:  # noqa: PERF203 - all problems are collected
+            place = document.place(("units", name, "fmu"))
+            problems.update({f"{place}: {problem}": None for problem in error.problems})
+    if problems:
+        raise ModelDescriptionError(problems)
+    return found, replaced
+
+
+def _check_instances(scenario: Scenario, fmus: Mapping[str, Fmu]) -> None:
+    """Report an FMU used by two units though it allows one instance per process."""
+    first: dict[str, str] = {}
+    for name, fmu in fmus.items():
+        other = first.setdefault(fmu.sha256, name)
+        if fmu.once_per_process and other != name:
+            scenario.document.report(
+                ("units", name, "fmu"),
+                f"{fmu.name} can be instantiated only once per process, and {other} uses it already",
+            )
+
+
+def _period(scenario: Scenario, name: str) -> int:
+    """Return a unit's step in communication steps."""
+    step = scenario.units[name].step_size or scenario.step_size
+    return int(Fraction(step) / scenario.step_size)
+
+
+def _sorted(wires: Sequence[Wire], order: Sequence[str], fmus: Mapping[str, Fmu]) -> tuple[Wire, ...]:
+    """Return the wires by target in evaluation order, then by input as the FMU lists them."""
+    place = {
+        (unit, name): (i, j) for i, unit in enumerate(order) for j, name in enumerate(fmus[unit].variables)
+    }
+    return tuple(sorted(wires, key=lambda wire: place[(wire.target, wire.input)]))

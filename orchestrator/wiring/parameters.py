@@ -1,0 +1,148 @@
+"""Values for parameters and constants: type, unit, limits and choices checked against the FMU."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+from ..plan import Fmu, Value, Variable
+from ..scenario import quantities
+from ..scenario.load import Scenario
+from ..scenario.yaml_lines import Document, Key
+from ..wording import closest, fold, hint, listed
+
+
+def value_for(variable: Variable, given: Value) -> Value:
+    """Return what the scenario gives for a variable, in the variable's type and unit.
+
+    Raises:
+        ValueError: a sentence that says what is allowed.
+    """
+    convert = {"Real": _real, "Integer": _integer, "Enumeration": _enumeration}.get(variable.type, _other)
+    value = convert(variable, given)
+    unit = f" {variable.unit}" if variable.unit and variable.unit != "1" else ""
+    if variable.choices is not None and value not in variable.choices:
+        likely = closest(str(value), variable.choices)
+        guess = f"; did you mean {likely!r}?" if likely else ""
+        raise ValueError(f"must be one of {listed(variable.choices, last='or')} (got {given!r}){guess}")
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        if variable.minimum is not None and value < variable.minimum:
+            raise ValueError(f"must be at least {variable.minimum:g}{unit} (got {given!r})")
+        if variable.maximum is not None and value > variable.maximum:
+            raise ValueError(f"must be at most {variable.maximum:g}{unit} (got {given!r})")
+    return value
+
+
+def _real(variable: Variable, given: Value) -> float:
+    in_unit = f" in {variable.unit}" if variable.unit and variable.unit != "1" else ""
+    if isinstance(given, bool):
+        raise ValueError(f"must be a number{in_unit} (got {str(given).lower()})")
+    try:
+        value = float(quantities.convert(given, variable.unit) if isinstance(given, str) else given)
+    except OverflowError:
+        value = math.inf
+    if not math.isfinite(value):
+        raise ValueError(f"must be a finite number{in_unit} (got {given!r})")
+    return value
+
+
+def _integer(variable: Variable, given: Value) -> int:
+    if isinstance(given, bool) or not isinstance(given, int) or not -(2**31) <= given < 2**31:
+        raise ValueError(f"must be a whole number (got {given!r})")
+    return given
+
+
+def _enumeration(variable: Variable, given: Value) -> int:
+    items = variable.items or {}
+    if isinstance(given, str) and given in items:
+        return items[given]
+    if given in items.values() and not isinstance(given, (bool, float)):
+        return int(given)
+    raise ValueError(f"must be one of {listed(items, last='or')} (got {given!r})")
+
+
+def _other(variable: Variable, given: Value) -> Value:
+    if variable.type == "Boolean" and not isinstance(given, bool):
+        raise ValueError(f"must be true or false (got {given!r})")
+    if variable.type == "String" and not isinstance(given, str):
+        raise ValueError(f"must be text (got {given!r}): put it in quotes")
+    return given
+
+
+class Parameters:
+    """The parameters of all units: their own, then the vehicle's for those that declare them.
+
+    Problems go to the documents of the scenario, what was left out after a swap to `notes`: a
+    value meant for the FMU that an option has replaced is no mistake if that FMU declares it.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        fmus: Mapping[str, Fmu],
+        replaced: Callable[[str], Fmu | None],
+        notes: list[str],
+    ) -> None:
+        self._scenario = scenario
+        self._fmus = fmus
+        self._replaced = replaced
+        self._notes = notes
+
+    def of_units(self) -> dict[str, dict[str, Value]]:
+        """Return each unit's values."""
+        given: dict[str, dict[str, Value]] = {unit: {} for unit in self._fmus}
+        self._from_vehicle(given)
+        for unit, fmu in self._fmus.items():
+            for name, raw in self._scenario.units[unit].parameters.items():
+                key = ("units", unit, "parameters", name)
+                if _is_parameter(fmu, name):
+                    self._put(given[unit], fmu.variables[name], raw, self._scenario.document, key)
+                elif self._left_out(unit, name, key):
+                    self._notes.append(f"{unit}.{name} is left out: {fmu.name} has no such parameter")
+                else:
+                    sentence = _unknown(unit, fmu, name)
+                    self._scenario.document.report(key, sentence)
+        return given
+
+    def _from_vehicle(self, given: dict[str, dict[str, Value]]) -> None:
+        document = self._scenario.vehicle_document
+        for name, raw in self._scenario.vehicle_parameters.items():
+            key = ("parameters", name)
+            takers = [unit for unit, fmu in self._fmus.items() if _is_parameter(fmu, name)]
+            for unit in takers:
+                self._put(given[unit], self._fmus[unit].variables[name], raw, document, key)
+            if takers:
+                continue
+            before = (self._replaced(unit) for unit in self._scenario.replaced)
+            if any(fmu is not None and _is_parameter(fmu, name) for fmu in before):
+                self._notes.append(f"vehicle.{name} is left out: no unit has such a parameter after the swap")
+                continue
+            known = {v.name for fmu in self._fmus.values() for v in fmu.of("parameter")}
+            likely = closest(name, sorted(known))
+            guess = f"; did you mean {likely!r}?" if likely else ""
+            document.report(key, f"no unit has a parameter {name!r}{guess}")
+
+    def _left_out(self, unit: str, name: str, key: Key) -> bool:
+        """Return whether a value was meant for the FMU that an option has replaced."""
+        if unit not in self._scenario.replaced or self._scenario.document.override(key):
+            return False
+        before = self._replaced(unit)
+        return before is None or _is_parameter(before, name)
+
+    @staticmethod
+    def _put(values: dict[str, Value], variable: Variable, raw: Value, document: Document, key: Key) -> None:
+        try:
+            values[variable.name] = value_for(variable, raw)
+        except ValueError as error:
+            document.report(key, str(error))
+
+
+def _is_parameter(fmu: Fmu, name: str) -> bool:
+    return name in fmu.variables and fmu.variables[name].causality == "parameter"
+
+
+def _unknown(unit: str, fmu: Fmu, name: str) -> str:
+    if name in fmu.variables and fmu.variables[name].causality == "input":
+        return f"{name!r} is an input of {unit}, not a parameter: give constants under 'inputs'"
+    names = fold([v.name for v in fmu.of("parameter")])
+    return f"{unit} ({fmu.name}) has no parameter {name!r}" + hint(name, names, lead="it has")
