@@ -23,7 +23,7 @@ from ..results.read import RESULTS_FILE, RUN_FILE, Results, load_results
 from ..wording import hint
 
 GRACE = 5.0
-"""Time that interrupted runs have to write what they have recorded [s]."""
+"""Time that a process has to end, and a run to write what it has recorded [s]."""
 LOOK_EVERY = 0.2
 """Time between two looks whether to stop [s]."""
 
@@ -171,12 +171,11 @@ def execute(
                     running.remove(one)
                     outcomes[one.number] = one.outcome()
                     done(outcomes[one.number])
-            for one in running:  # Ctrl-C reaches the runs too: they write what they have
-                one.process.join(timeout=GRACE)
             raise KeyboardInterrupt
         finally:
             for one in running:
-                one.process.terminate()
+                one.process.terminate()  # a run writes what it has recorded
+            for one in running:
                 one.end()
 
 
@@ -240,13 +239,13 @@ class _Running:
 
 def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:
     """Do one job in a process of its own and report how it ended."""
+    if hasattr(os, "setpgrp"):
+        os.setpgrp()  # Ctrl-C on the terminal is for the caller, who ends this process
     try:
         run(job)
         report: tuple[int, list[str]] = (0, [])
     except YawbenchError as error:
         report = (error.exit_status, error.problems or [type(error).__name__])
-    except KeyboardInterrupt:
-        report = (1, ["interrupted"])
     except BaseException as error:
         sys.excepthook(type(error), error, error.__traceback__)
         report = (1, [f"{type(error).__name__}: {error}"])
