@@ -85,11 +85,16 @@ def rows(text):
     return [row for row in cells if row[0].endswith(("control", "fuzzy", "network"))]
 
 
-def test_the_readme_shows_what_the_study_found(study):
+def test_the_readme_tells_what_the_study_found_to_one_per_cent(study):
     found = rows((study["folder"] / "study.md").read_text(encoding="utf-8"))
     told = rows((STUDY.parents[2] / "README.md").read_text(encoding="utf-8"))
-    assert told == [[row[0], row[1], row[2].partition(" (")[0], row[3], row[-1]] for row in found]
     assert len(told) == 9
+    for (name, error, says, verdict, chatter), row in zip(told, found, strict=True):
+        assert [name, says, verdict] == [row[0], row[2].partition(" (")[0], row[3]]
+        for shown, measured in ((error, row[1]), (chatter, row[-1])):
+            number, unit = shown.split()
+            assert float(number) == pytest.approx(float(measured.split()[0]), rel=0.01)
+            assert unit == measured.split()[1]
 
 
 def test_all_figures_are_drawn(study):
