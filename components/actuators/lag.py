@@ -1,7 +1,7 @@
 """Motor and friction brake of each wheel: pure delay, first-order lag, limits; the motor comes first.
 
     motor asked for   T_m* = T* limited to +-motor_torque_limit
-    brake asked for   T_f* = T* - T_m* limited to -brake_torque_limit .. 0
+    brake asked for   T_f* = T* - T_m* limited to -friction_brake_torque_limit .. 0
     either one        tau dT/dt = T*(t - delay) - T,    |dT/dt| <= rate limit              (14), (15)
     wheel torque      T_m + T_f
 
@@ -36,7 +36,7 @@ class LagParameters:
     )
     brake_time_constant: float = parameter(0.08, "s", "Lag of the friction brake; chosen", minimum=0.0)
     brake_delay: float = parameter(0.015, "s", "Pure delay of the friction brake; chosen", minimum=0.0)
-    brake_torque_limit: float = parameter(
+    friction_brake_torque_limit: float = parameter(
         2500.0, "N.m", "Largest friction brake torque at the wheel; chosen", minimum=0.0
     )
     brake_rate_limit: float = parameter(
@@ -73,7 +73,7 @@ class Lag(Component):
     def advance(self, t, h, u):
         p = self.p
         for request, motor, brake in zip(u, self.motors, self.brakes, strict=True):
-            asked_motor, asked_brake = blend(request, p.motor_torque_limit, p.brake_torque_limit)
+            asked_motor, asked_brake = blend(request, p.motor_torque_limit, p.friction_brake_torque_limit)
             motor.advance(t, h, asked_motor)
             brake.advance(t, h, asked_brake)
 

@@ -48,7 +48,12 @@ class SlipControlParameters:
         0.95, "1", "Largest slip over the optimum; paper B", minimum=0.1, maximum=0.99
     )
     slip_cap: float = parameter(
-        0.15, "1", "Largest slip; chosen: near the dry optimum of set 1", minimum=0.001, maximum=0.99
+        0.25,
+        "1",
+        "Largest slip; chosen: at 0.15, tried first, paper B's sliding car is not caught again; slip stays "
+        "below 0.15 all the same in straight and steered braking and driving",
+        minimum=0.001,
+        maximum=0.99,
     )
     boundary_layer: float = parameter(
         0.02, "1", "Boundary layer Delta of the slip error; chosen: calm at 1 to 5 ms", minimum=1e-4
@@ -57,7 +62,10 @@ class SlipControlParameters:
         1.0, "1/s", "Gain eps of the saturated slip error; chosen: calm at 1 to 5 ms", minimum=0.0
     )
     slip_gain: float = parameter(
-        30.0, "1/s", "Gain k_d of the slip error; chosen: calm at 1 to 5 ms", minimum=0.0
+        60.0,
+        "1/s",
+        "Gain k_d of the slip error; chosen: 30, tried first, lets the slip lag behind the yaw-moment control",
+        minimum=0.0,
     )
     acceleration_filter: float = parameter(
         0.02, "s", "Time constant of the wheel's acceleration dv; chosen: an ABS sensor's", minimum=0.0
@@ -78,7 +86,10 @@ class SlipControlParameters:
         800.0, "N.m", "Largest driving torque; chosen: the motor tried for paper B", minimum=0.0
     )
     brake_torque_limit: float = parameter(
-        3300.0, "N.m", "Largest braking torque; chosen: motor and brake tried for paper B", minimum=0.0
+        3300.0,
+        "N.m",
+        "Largest braking torque, motor and friction brake together; chosen: those tried for paper B",
+        minimum=0.0,
     )
 
 

@@ -34,7 +34,7 @@ CONTROLLERS = {
     "fuzzy": (FuzzySlidingMode, {}),
 }
 RUNS = {"high": (100 / 3.6, 1.0), "low": (50 / 3.6, 0.3), "beyond": (80 / 3.6, 0.3)}  # m/s, mu
-SLIP = (Slip, {"slip_cap": 0.25, "slip_gain": 60.0})
+SLIP: tuple = (Slip, {})
 DIRECT = (Direct, {"wheel_radius": 0.313, "torque_limit": 3300.0})
 BY_LOAD = (LoadProportional, {"cg_to_front_axle": 1.04, "track_width": 1.48})
 RECORD = ("yaw_rate", "yaw_rate_ref", "sideslip", "velocity_x", *(f"wheel_torque_{w}" for w in WHEELS))
