@@ -64,7 +64,7 @@ class SlipControlParameters:
     slip_gain: float = parameter(
         60.0,
         "1/s",
-        "Gain k_d of the slip error; chosen: 30, tried first, lets the slip lag behind the yaw-moment control",
+        "Gain k_d of the slip error; chosen: 30, tried first, lets slip lag behind the yaw-moment control",
         minimum=0.0,
     )
     acceleration_filter: float = parameter(
