@@ -25,7 +25,7 @@ def study(
     of its own; one that fails is named in the table and takes no other with it.
     """
     from ..studies.jobs import Outcome, pool
-    from ..studies.study import claim_tables, judge_study, run_tables
+    from ..studies.study import all_tables, judge_study
     from ..studies.study_file import load_study
     from ..studies.study_report import REPORT, write_study
     from .batch import print_tables, run_all, say, stoppable
@@ -42,7 +42,7 @@ def study(
         problems = write_study(findings, folder, each=workers.map)
     for problem in problems:
         say(problem)
-    print_tables([*run_tables(findings), *claim_tables(findings)])
+    print_tables(all_tables(findings))
     say(f"Results, figures and tables: {folder} (begin with {folder / REPORT})")
     if findings.failed:
         raise typer.Exit(1)

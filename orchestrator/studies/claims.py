@@ -34,29 +34,37 @@ class Judgement:
     measured: tuple[str, ...]
 
 
-def judge(claim: Claim, values: Values, runs: Sequence[str]) -> Judgement:
+def judge(
+    claim: Claim, values: Values, runs: Sequence[str], derived: Mapping[str, Value] | None = None
+) -> Judgement:
     """Judge a claim by the values of metrics.
 
     Args:
         claim: its conditions must all be true, of every run that they name.
         values: what the runs came to.
         runs: names of all runs, those without values too.
+        derived: key -> number derived from several runs, of those that exist.
 
     Raises:
         ScenarioError: a bound is given in a unit that its metric does not have.
     """
-    found = [_compare(condition, values, runs) for condition in claim.holds_if]
+    found = [_compare(condition, values, runs, derived or {}) for condition in claim.holds_if]
     verdicts = [holds for holds, _ in found]
     holds = None if None in verdicts else all(verdicts)
     return Judgement(claim, holds, tuple(dict.fromkeys(text for _, text in found)))
 
 
-def _compare(condition: Condition, values: Values, runs: Sequence[str]) -> tuple[bool | None, str]:
+def _compare(
+    condition: Condition, values: Values, runs: Sequence[str], derived: Mapping[str, Value]
+) -> tuple[bool | None, str]:
     """Return whether a condition is true of all runs it names, and their values as text."""
-    named = [run for run in runs if fnmatchcase(run, condition.run)]
-    measured = [values.get((run, condition.metric)) for run in named]
+    if condition.derived:
+        measured = [derived.get(condition.derived)]
+    else:
+        named = [run for run in runs if fnmatchcase(run, condition.run)]
+        measured = [values.get((run, condition.metric)) for run in named]
     known = sorted((value for value in measured if value is not None), key=lambda value: value.number)
-    missing = len(known) < len(named)
+    missing = len(known) < len(measured)
     text = _range(known, missing)
     bound = condition.bound
     limit: float | None
@@ -93,8 +101,9 @@ def condition_text(condition: Condition) -> str:
     bound = condition.bound
     if isinstance(bound, Reference):
         factor = "" if bound.times == 1 else f"{bound.times:g} × "
-        other = f"{bound.metric} of {bound.run}" if bound.metric != condition.metric else bound.run
+        other = bound.run if bound.metric == condition.metric else f"{bound.metric} of {bound.run}"
         limit = f"{factor}{other}"
     else:
         limit = str(bound)
-    return f"{condition.run}: {condition.metric} {_SIGNS[condition.operator]} {limit}"
+    of = condition.derived or f"{condition.run}: {condition.metric}"
+    return f"{of} {_SIGNS[condition.operator]} {limit}"

@@ -9,10 +9,12 @@ from typing import Any
 
 from ..metrics.run_metrics import Metric, Value, evaluate, metric
 from ..results.read import Results
-from .claims import Judgement, judge
+from .claims import Judgement, Values, judge
+from .derived import calculate
+from .grids import correlation, grid_table
 from .jobs import Outcome, read_back
 from .study_file import Study, StudyRun
-from .study_schema import MetricSpec, Reference, TableSpec
+from .study_schema import MetricSpec, Reference, StudySpec, TableSpec
 from .tables import Cell, Table
 
 HOLDS, NOT_JUDGED = "holds", "not judged"
@@ -27,6 +29,7 @@ class Findings:
     results: dict[str, Results]  # of the runs that reached their end
     failed: dict[str, str]  # run -> why it did not
     values: dict[tuple[str, str], Value]  # (run, metric) -> value
+    derived: dict[str, Value]  # of those that exist
     claims: list[Judgement]
     checks: list[Judgement]
 
@@ -64,10 +67,36 @@ def judge_study(study: Study, out: Path, outcomes: Iterable[Outcome] = (), *, ea
             value = evaluate(run, chosen, window)
             if value is not None:
                 values[name, key] = value
-    runs = list(study.runs)
-    claims = [judge(claim, values, runs) for claim in study.spec.claims]
-    checks = [judge(claim, values, runs) for claim in study.spec.checks]
-    return Findings(study, results, failed, values, claims, checks)
+    runs, derived = list(study.runs), derive(study.spec, values)
+    claims = [judge(claim, values, runs, derived) for claim in study.spec.claims]
+    checks = [judge(claim, values, runs, derived) for claim in study.spec.checks]
+    return Findings(study, results, failed, values, derived, claims, checks)
+
+
+def derive(spec: StudySpec, values: Values) -> dict[str, Value]:
+    """Return the numbers derived from several runs, without those that lack one."""
+    found: dict[str, Value] = {}
+    for key, one in spec.derived.items():
+        number = None
+        if one.rank_correlation is not None:
+            number = correlation(spec.grids[one.rank_correlation], values)
+        elif one.expression is not None:
+            known = {word: values.get((source.run, source.metric)) for word, source in one.of.items()}
+            numbers = {word: value.number for word, value in known.items() if value is not None}
+            number = calculate(one.expression, numbers) if len(numbers) == len(known) else None
+        if number is not None:
+            found[key] = Value(number, one.unit)
+    return found
+
+
+def derived_tables(findings: Findings) -> list[Table]:
+    """Return the grids, and a table of the derived numbers if there are any."""
+    spec = findings.study.spec
+    tables = [grid_table(grid, findings.values) for grid in spec.grids.values()]
+    if spec.derived:
+        rows: list[list[Cell]] = [[one.says, findings.derived.get(key)] for key, one in spec.derived.items()]
+        tables.append(Table("Computed from several runs", ["what", "value"], [*rows]))
+    return tables
 
 
 def heading(spec: MetricSpec) -> str:
@@ -121,6 +150,11 @@ def _run_table(findings: Findings, spec: TableSpec) -> Table:
                 table.notes += [f"{run.row}: {j.claim.note}" for j in judged if j.claim.note]
         table.rows.append([run.row, *cells])
     return table
+
+
+def all_tables(findings: Findings) -> list[Table]:
+    """Return all tables of a study, in the order in which they are read."""
+    return [*run_tables(findings), *derived_tables(findings), *claim_tables(findings)]
 
 
 def _said_of(findings: Findings, run: StudyRun, table: TableSpec) -> list[Judgement]:

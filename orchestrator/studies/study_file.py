@@ -16,6 +16,7 @@ from ..scenario import overrides, yaml_lines
 from ..scenario.strict import validate
 from ..scenario.yaml_lines import Document, Key
 from ..wording import hint, listed
+from .grids import cells
 from .jobs import Job
 from .study_schema import OPERATORS, Claim, Reference, RunSpec, StudySpec, text_of
 
@@ -132,6 +133,12 @@ def _check_names(study: Study, document: Document) -> None:
     for i, table in enumerate(spec.tables):
         for k, name in enumerate(table.metrics):
             _check_metric(spec, document, ("tables", i, "metrics", k), name)
+    for name, grid in spec.grids.items():
+        _check_metric(spec, document, ("grids", name, "metric"), grid.metric)
+        for run in dict.fromkeys(cell.run for cell in cells(grid) if cell.run not in study.runs):
+            sentence = f"there is no run {run!r}" + hint(run, study.runs, lead="runs")
+            document.report(("grids", name), sentence)
+    _check_derived(study, document)
     figures = [figure.name for figure in spec.figures]
     for i, name in enumerate(figures):
         if name in figures[:i]:
@@ -139,6 +146,24 @@ def _check_names(study: Study, document: Document) -> None:
     for group, claims in (("claims", spec.claims), ("checks", spec.checks)):
         for i, claim in enumerate(claims):
             _check_conditions(study, document, (group, i, "holds_if"), claim)
+
+
+def _check_derived(study: Study, document: Document) -> None:
+    spec = study.spec
+    for name, number in spec.derived.items():
+        for word, source in number.of.items():
+            place: Key = ("derived", name, "of", word)
+            if source.run not in study.runs:
+                sentence = f"there is no run {source.run!r}" + hint(source.run, study.runs, lead="runs")
+                document.report((*place, "run"), sentence)
+            _check_metric(spec, document, (*place, "metric"), source.metric)
+        grid = number.rank_correlation
+        if grid is not None and grid not in spec.grids:
+            sentence = f"there is no grid {grid!r}" + hint(grid, spec.grids, lead="grids")
+            document.report(("derived", name, "rank_correlation"), sentence)
+        elif grid is not None and all(cell.published is None for cell in cells(spec.grids[grid])):
+            sentence = f"grid {grid!r} has no published numbers to compare with"
+            document.report(("derived", name, "rank_correlation"), sentence)
 
 
 def _check_metric(spec: StudySpec, document: Document, key: Key, name: str) -> None:
@@ -153,7 +178,17 @@ def _check_conditions(study: Study, document: Document, key: Key, claim: Claim) 
         if len(given) != 1:
             document.report((*key, i), f"needs exactly one of {listed(OPERATORS, last='or')}")
             continue
-        places = [((*key, i), condition.run, condition.metric, bool(study.matching([condition.run])))]
+        places = []
+        if bool(condition.derived) == bool(condition.run or condition.metric):
+            document.report((*key, i), "needs run and metric, or derived in place of both")
+            continue
+        if condition.derived and condition.derived not in study.spec.derived:
+            sentence = f"there is no derived number {condition.derived!r}"
+            guess = hint(condition.derived, study.spec.derived, lead="there are")
+            document.report((*key, i, "derived"), sentence + guess)
+        if not condition.derived:
+            exists = bool(study.matching([condition.run]))
+            places.append(((*key, i), condition.run, condition.metric, exists))
         if isinstance(condition.bound, Reference):
             bound = condition.bound
             places.append(((*key, i, given[0]), bound.run, bound.metric, bound.run in study.runs))

@@ -14,7 +14,7 @@ from ..figures.style import save
 from ..metrics.run_metrics import Value, metric
 from ..results.read import Results
 from .claims import Judgement, condition_text
-from .study import Each, Findings, claim_tables, heading, run_tables, verdict
+from .study import Each, Findings, all_tables, heading, verdict
 from .study_file import FIGURES
 from .tables import for_markdown, si, write_csv
 
@@ -82,7 +82,7 @@ def _markdown(findings: Findings, drawn: dict[str, Path]) -> str:
     spec = findings.study.spec
     parts = [f"# {spec.title}\n", f"{spec.source}\n" if spec.source else ""]
     parts += ["All numbers are computed from the recorded results in this folder.\n"]
-    parts += [for_markdown(table) for table in (*run_tables(findings), *claim_tables(findings))]
+    parts += [for_markdown(table) for table in all_tables(findings)]
     if findings.failed:
         failed = [f"- {name}: {reason}" for name, reason in findings.failed.items()]
         parts.append("\n".join(["Runs that did not reach their end:\n", *failed]) + "\n")
@@ -132,6 +132,16 @@ def _record(findings: Findings, drawn: dict[str, Path]) -> dict[str, Any]:
                 "window": item.window,
             }
             for key, item in spec.metrics.items()
+        },
+        "derived": {
+            key: {
+                "says": one.says,
+                "expression": one.expression,
+                "of": {word: [source.run, source.metric] for word, source in one.of.items()},
+                "rank_correlation": one.rank_correlation,
+                **(_value(findings.derived[key]) if key in findings.derived else {"value": None}),
+            }
+            for key, one in spec.derived.items()
         },
         "claims": [_judgement(one, "claims") for one in findings.claims],
         "checks": [_judgement(one, "checks") for one in findings.checks],

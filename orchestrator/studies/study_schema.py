@@ -17,6 +17,25 @@ A run entry with `for` stands for one run per combination; `{name}` in its texts
         holds_if:
           - {run: 15mps/off, metric: error, above: 100 %}
           - {run: 15mps/fnn, metric: error, below: {run: 15mps/off, metric: error, times: 0.5}}
+
+Grids put one metric of many runs into rows and columns, beside what the paper prints; `derived` are
+numbers computed from several runs, which claims may speak of (`{derived: gain, at_least: 50 %}`).
+
+    grids:
+      shares:
+        title: Mean error, rows front share left, columns front share right
+        metric: error
+        run: "shares/{left}_{right}"
+        rows: {left: [0, 0.5]}
+        columns: {right: [0, 0.5]}
+        published: [[0.3966, 0.1576], [0.1312, 0.0069]]
+    derived:
+      order: {says: Rank correlation with table 3, rank_correlation: shares}
+      gain:
+        says: Share of the error that learning removes
+        expression: (frozen - learning) / frozen
+        of: {frozen: {run: frozen, metric: error}, learning: {run: learning, metric: error}}
+        unit: "%"
 """
 
 from __future__ import annotations
@@ -25,7 +44,7 @@ import math
 import re
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag
+from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, model_validator
 
 from ..errors import ScenarioError
 from ..figures.plots import OVERVIEW
@@ -33,7 +52,8 @@ from ..metrics.run_metrics import metric
 from ..plan import Algorithm
 from ..scenario.schema import Scalar, Time
 from ..scenario.strict import Strict
-from ..wording import short
+from ..wording import listed, short
+from . import derived
 
 OPERATORS = ("above", "at_least", "below", "at_most")
 
@@ -104,6 +124,80 @@ class TableSpec(Strict):
     metrics: list[str] = Field(description="Keys of `metrics`, one column each", min_length=1)
 
 
+def _single(value: dict[str, dict[str, str]]) -> dict[str, dict[str, str]]:
+    if len(value) != 1:
+        raise ValueError(f"needs exactly one name with its values (got {len(value)})")
+    return value
+
+
+Axis = Annotated[dict[str, Alternatives], AfterValidator(_single)]
+"""The name that stands for a row's or a column's value, and its values."""
+
+
+class BesideSpec(Strict):
+    """A run that stands outside a grid."""
+
+    run: str = Field(min_length=1)
+    says: str = Field(description="What the run is", min_length=1)
+    published: float | None = Field(None, description="In SI")
+
+
+class GridSpec(Strict):
+    """A metric of many runs in rows and columns, beside what a paper prints."""
+
+    title: str = Field(min_length=1)
+    metric: str
+    run: str = Field(description="Names of the runs, with {name} for row and column", min_length=1)
+    rows: Axis
+    columns: Axis
+    corner: str = Field("", description="Heading of the column of rows")
+    published: list[list[float]] | None = Field(None, description="In SI, row by row")
+    beside: list[BesideSpec] = Field([], description="Runs outside the grid")
+
+    @model_validator(mode="after")
+    def _shape(self) -> GridSpec:
+        ((row, rows),), ((column, columns),) = self.rows.items(), self.columns.items()
+        for name in (row, column):
+            if f"{{{name}}}" not in self.run:
+                raise ValueError(f"run: {self.run!r} does not depend on {{{name}}}")
+        if row == column:
+            raise ValueError(f"rows and columns are both called {row!r}")
+        if self.published and [len(line) for line in self.published] != [len(columns)] * len(rows):
+            raise ValueError(f"published: must have {len(rows)} rows of {len(columns)} numbers")
+        return self
+
+
+class Source(Strict):
+    """A metric of a run."""
+
+    run: str
+    metric: str
+
+
+def _expression(text: str) -> str:
+    derived.parse(text)
+    return text
+
+
+class DerivedSpec(Strict):
+    """A number derived from several runs: an expression of metrics, or a grid's rank correlation."""
+
+    says: str = Field(description="What the number is", min_length=1)
+    expression: Annotated[str, AfterValidator(_expression)] | None = None
+    of: dict[str, Source] = Field({}, description="Name in the expression -> metric of a run")
+    rank_correlation: str | None = Field(None, description="Grid whose order is compared with the paper's")
+    unit: str = Field("1", description="Of the expression's value; '%' shows a ratio in per cent")
+
+    @model_validator(mode="after")
+    def _complete(self) -> DerivedSpec:
+        if (self.expression is None) == (self.rank_correlation is None):
+            raise ValueError("needs exactly one of expression and rank_correlation")
+        for name in derived.names_in(self.expression) if self.expression else ():
+            if name not in self.of:
+                raise ValueError(f"expression: {name} stands for nothing; 'of' has {listed(self.of)}")
+        return self
+
+
 class Reference(Strict):
     """A metric of another run as a bound."""
 
@@ -128,10 +222,11 @@ Bound = Annotated[
 
 
 class Condition(Strict):
-    """A comparison of a metric of a run with exactly one bound."""
+    """A comparison of a metric of a run, or of a derived number, with exactly one bound."""
 
-    run: str = Field(description="Name of a run; with `*` every run that fits")
-    metric: str
+    run: str = Field("", description="Name of a run; with `*` every run that fits")
+    metric: str = ""
+    derived: str = Field("", description="Key of `derived`, in place of run and metric")
     above: Bound | None = None
     at_least: Bound | None = None
     below: Bound | None = None
@@ -175,6 +270,8 @@ class StudySpec(Strict):
     runs: list[RunSpec] = Field(min_length=1)
     metrics: dict[str, MetricSpec] = Field(min_length=1)
     tables: list[TableSpec] = []
+    grids: dict[str, GridSpec] = {}
+    derived: dict[str, DerivedSpec] = {}
     claims: list[Claim] = Field([], description="What the paper says")
     checks: list[Claim] = Field([], description="What this project asks of its own results")
     figures: list[FigureSpec] = []

@@ -27,6 +27,7 @@ class Table:
     headings: list[str]
     rows: list[Sequence[Cell]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    numbers: set[int] = field(default_factory=set)  # columns of numbers that stand as text
 
     def text(self) -> list[list[str]]:
         """Return the cells of all rows as people read them."""
@@ -34,7 +35,7 @@ class Table:
 
     def is_number(self, column: int) -> bool:
         """Return whether a column holds numbers, and so is set flush right."""
-        return any(isinstance(row[column], Value) for row in self.rows)
+        return column in self.numbers or any(isinstance(row[column], Value) for row in self.rows)
 
 
 def _shown(cell: Cell) -> str:

@@ -1,0 +1,91 @@
+"""A metric of many runs in rows and columns, beside what a paper prints for the same cells."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..figures.display import digits_of
+from .claims import Values
+from .derived import rank_correlation
+from .study_schema import GridSpec
+from .tables import Cell, Table
+
+
+@dataclass(frozen=True)
+class GridCell:
+    """A run of a grid, where it stands, and what the paper prints for it (None: nothing)."""
+
+    run: str
+    row: str
+    column: str
+    published: float | None
+
+
+def cells(spec: GridSpec) -> list[GridCell]:
+    """Return the cells row by row, then the runs that stand outside the grid, with an empty column."""
+    ((row_key, rows),) = spec.rows.items()
+    ((column_key, columns),) = spec.columns.items()
+    found = []
+    for (i, row), (k, column) in itertools.product(enumerate(rows), enumerate(columns)):
+        name = spec.run.replace(f"{{{row_key}}}", row).replace(f"{{{column_key}}}", column)
+        published = spec.published[i][k] if spec.published else None
+        found.append(GridCell(name, rows[row], columns[column], published))
+    return found + [GridCell(one.run, one.says, "", one.published) for one in spec.beside]
+
+
+def correlation(spec: GridSpec, values: Values) -> float | None:
+    """Return Spearman's rank correlation with the published values; None if a run is missing."""
+    pairs = [
+        (value.number, cell.published)
+        for cell in cells(spec)
+        if cell.published is not None and (value := values.get((cell.run, spec.metric))) is not None
+    ]
+    wanted = sum(cell.published is not None for cell in cells(spec))
+    if len(pairs) < max(wanted, 2):
+        return None
+    measured, published = zip(*pairs, strict=True)
+    return rank_correlation(measured, published)
+
+
+def grid_table(spec: GridSpec, values: Values) -> Table:
+    """Return the table: measured on the left, published on the right, all in SI and three digits."""
+    ((_, rows),) = spec.rows.items()
+    ((_, columns),) = spec.columns.items()
+    units = {value.unit for (_, key), value in values.items() if key == spec.metric}
+    unit = "" if units <= {"1", "%"} else f" [{units.pop()}]"
+    width, every = len(columns), cells(spec)
+    inside, beside = every[: len(rows) * width], every[len(rows) * width :]
+    table = Table(f"{spec.title}{unit}", [spec.corner, *columns.values()])
+    if spec.published:
+        table.headings += ["the paper:", *columns.values()]
+    for i, row in enumerate(rows.values()):
+        line = inside[i * width : (i + 1) * width]
+        measured = [_digits(_measured(cell, spec, values)) for cell in line]
+        printed = [_digits(cell.published) for cell in line]
+        table.rows.append([row, *measured, *([row, *printed] if spec.published else [])])
+    table.numbers = set(range(1, len(table.headings))) - {width + 1}
+    for cell in beside:
+        said = f", the paper: {_digits(cell.published)}" if cell.published is not None else ""
+        table.notes.append(f"{cell.row}: {_digits(_measured(cell, spec, values))}{said}")
+    if spec.published:
+        found = correlation(spec, values)
+        table.notes.append(
+            f"rank correlation (Spearman) with the paper over {_count(every)} runs: "
+            f"{'not all runs have results' if found is None else f'{found:.2f}'}"
+        )
+    return table
+
+
+def _measured(cell: GridCell, spec: GridSpec, values: Values) -> float | None:
+    value = values.get((cell.run, spec.metric))
+    return None if value is None else value.number
+
+
+def _digits(number: float | None) -> Cell:
+    return None if number is None else digits_of(number)
+
+
+def _count(every: Sequence[GridCell]) -> int:
+    return sum(cell.published is not None for cell in every)
