@@ -36,6 +36,8 @@ SMALLEST_LOAD = 1e-6
 """Vertical load [N] at and below which a tyre gives nothing."""
 SMALLEST_FRICTION = 1e-6
 """lambda = mu / reference_friction [1] at and below which a tyre gives nothing."""
+SLIP_STEP = 1e-6
+"""Difference of kappa for dF_x/dkappa: truncation and rounding both below 1e-4 of the slip stiffness."""
 
 
 class LongitudinalCurve(NamedTuple):
@@ -168,11 +170,23 @@ def forces_and_moment(
         f_z, mu: vertical load [N] and friction coefficient [1].
         c: the axle's set.
     """
+    return forces_moment_stiffness(kappa, alpha, f_z, mu, c)[:3]
+
+
+def forces_moment_stiffness(
+    kappa: float, alpha: float, f_z: float, mu: float, c: Coefficients
+) -> tuple[float, float, float, float]:
+    """Return what `forces_and_moment` does, then dF_x/dkappa [N] at constant slip angle.
+
+    The slope is a difference over `SLIP_STEP` away from |kappa| = 1, beyond which slip has no meaning.
+    """
     tan_alpha, forward = lateral_slip(alpha)
     curve = longitudinal_curve(tan_alpha, forward, f_z, mu, c)
     if curve is None:
-        return 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0
     f_x = longitudinal_force(kappa, curve)
+    step = SLIP_STEP if kappa < 0.0 else -SLIP_STEP
+    stiffness = (longitudinal_force(kappa + step, curve) - f_x) / step
     kappa = practical_slip(kappa, forward)
 
     per_reference, similar = c[0]
@@ -243,4 +257,4 @@ def forces_and_moment(
         e = 1.0
     x = b_t * sqrt(x * x + slip_x * slip_x)
     trail = load * (d1 + d2 * df) * cos(c_t * atan(x - e * (x - atan(x)))) * cos_alpha
-    return f_x, f_y + induced, residual + lever * f_x - trail * f_y
+    return f_x, f_y + induced, residual + lever * f_x - trail * f_y, stiffness

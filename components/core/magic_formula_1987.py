@@ -32,6 +32,9 @@ from typing import Any, NamedTuple
 from .magic_formula import SMALLEST_FRICTION, SMALLEST_LOAD, lateral_slip, practical_slip
 from .variables import parameter
 
+SMALLEST_SLIP = 1e-150
+"""Slip below which there is no force: its square would vanish."""
+
 
 def _c(default: float, description: str) -> Any:
     return parameter(default, "1", f"{description} (F_z in kN, F in N, degrees, percent); SAE 870421")
@@ -152,9 +155,18 @@ def loaded_tyre(f_z: float, mu: float, c: Coefficients1987) -> LoadedTyre | None
 
 def forces_1987(kappa: float, alpha: float, tyre: LoadedTyre) -> tuple[float, float]:
     """Return (F_x, F_y) [N] at the interface's longitudinal slip `kappa` [1] and slip angle `alpha` [rad]."""
+    return forces_stiffness_1987(kappa, alpha, tyre)[:2]
+
+
+def forces_stiffness_1987(kappa: float, alpha: float, tyre: LoadedTyre) -> tuple[float, float, float]:
+    """Return what `forces_1987` does, then dF_x/dkappa [N] at constant slip angle.
+
+    With F_x = D_x f_x(k) kappa / n, n^2 = kappa^2 + T^2, T = eta(k) tan(alpha), times the derivative of the
+    practical slip.
+    """
     c_x, d_x, k_x, e_x, c_y, d_y, k_y, e_y = tyre
     tan_alpha, forward = lateral_slip(alpha)
-    kappa = practical_slip(kappa, forward)
+    given, kappa = kappa, practical_slip(kappa, forward)
     if not forward:
         alpha = copysign(pi, alpha) - alpha
     n_x = k_x / d_x
@@ -162,14 +174,24 @@ def forces_1987(kappa: float, alpha: float, tyre: LoadedTyre) -> tuple[float, fl
     p_x = n_x * kappa
     p_y = n_y * alpha
     k = sqrt(p_x * p_x + p_y * p_y)
-    if k == 0.0:
-        return 0.0, 0.0
+    turned = 0.0
     if k < 2.0 * pi:
         eta_0 = n_y / n_x
+        turned = tan_alpha * 0.25 * (1.0 - eta_0) * sin(0.5 * k)
         tan_alpha *= 0.5 * (1.0 + eta_0 - (1.0 - eta_0) * cos(0.5 * k))
-    size = sqrt(kappa * kappa + tan_alpha * tan_alpha)
+    square = kappa * kappa + tan_alpha * tan_alpha
+    size = sqrt(square)
+    if k < SMALLEST_SLIP or size < SMALLEST_SLIP:
+        return 0.0, 0.0, k_x
     x = k / c_x
     y = k / c_y
-    f_x = d_x * sin(c_x * atan(x - e_x * (x - atan(x))))
+    b = x - e_x * (x - atan(x))
+    angle = c_x * atan(b)
+    f_x = d_x * sin(angle)
     f_y = d_y * sin(c_y * atan(y - e_y * (y - atan(y))))
-    return f_x * kappa / size, -f_y * tan_alpha / size
+    by_k = n_x * p_x / k  # dk/dkappa
+    slope = d_x * cos(angle) / (1.0 + b * b) * (1.0 - e_x + e_x / (1.0 + x * x))
+    stiffness = (slope * by_k * kappa + f_x * tan_alpha * (tan_alpha - kappa * turned * by_k) / square) / size
+    if kappa != given:  # driving: kappa / (1 - kappa), or held at 99
+        stiffness *= (kappa / given) ** 2 if abs(given) < 0.99 else 0.0
+    return f_x * kappa / size, -f_y * tan_alpha / size, stiffness

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from math import sin
 
 from .plane_body import Four
+from .resistance import resistance
 from .variables import parameter
 
 G = 9.81  # m/s2
@@ -158,13 +159,13 @@ def longitudinal(
     roll: RollModel,
 ) -> float:
     """Return a_x [m/s2], equation (2), from the resultant `x` [N] and the motion."""
-    rolling = min(max(v_x / p.rolling_fade_speed, -1.0), 1.0)
-    force = (
-        x
-        - 0.5 * p.air_density * p.drag_coefficient * p.frontal_area * v_x * abs(v_x)
-        - p.rolling_resistance * p.mass * G * rolling
-        - roll.coupling * (2.0 * r * dphi + phi * dr)
+    resisting = resistance(
+        v_x,
+        drag=0.5 * p.air_density * p.drag_coefficient * p.frontal_area,
+        rolling=p.rolling_resistance * p.mass * G,
+        fade=p.rolling_fade_speed,
     )
+    force = x - resisting - roll.coupling * (2.0 * r * dphi + phi * dr)
     xi = p.rotating_mass_excess
     return (force / p.mass - xi * v_y * r) / (1.0 + xi)
 

@@ -36,6 +36,8 @@ SIGNALS: dict[str, tuple[str, str]] = {
     "tyre_force_x_*": ("N", "Longitudinal tyre force, wheel axes, at the contact point"),
     "tyre_force_y_*": ("N", "Lateral tyre force, wheel axes, at the contact point"),
     "aligning_moment_*": ("N.m", "Self-aligning moment of the tyre about its vertical axis"),
+    "slip_stiffness_*": ("N", "Slope dF_x/dkappa of the tyre's force at tyre_slip_ratio; 0: not told"),
+    "tyre_slip_ratio_*": ("1", "Longitudinal slip that the tyre's force and slip_stiffness belong to"),
     "slip_angle_*": ("rad", "Slip angle alpha = atan2(v_y, v_x) in wheel axes"),
     "slip_ratio_*": ("1", "Longitudinal slip kappa = (w R - v) / max(|w R|, |v|)"),
     "vertical_load_*": ("N", "Vertical load F_z on the tyre, positive upwards"),

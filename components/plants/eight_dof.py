@@ -40,14 +40,21 @@ from ..core.plane_body import move, resultants
 from ..core.rolling_body import RollingCarParameters, RollModel, accelerations, longitudinal, vertical_loads
 from ..core.variables import output
 from ..core.wheel_kinematics import slip_angle, slip_ratio, wheel_velocities
-from ..core.wheel_spin import spin
+from ..core.wheel_spin import spin_wheels
 
 
 class EightDof(Component):
     """Car with eight degrees of freedom (plane motion, roll, four wheel spins), loads through roll."""
 
     Parameters = RollingCarParameters
-    inputs = ("steer_angle", "tyre_force_x_*", "tyre_force_y_*", "wheel_torque_*")
+    inputs = (
+        "steer_angle",
+        "tyre_force_x_*",
+        "tyre_force_y_*",
+        "wheel_torque_*",
+        "slip_stiffness_*",
+        "tyre_slip_ratio_*",
+    )
     outputs = (
         "velocity_x",
         "velocity_y",
@@ -111,25 +118,21 @@ class EightDof(Component):
         self._move(h, x, y_f + y_r, moment)
         self.steer_angle = delta_end
         before = self.wheels
-        after = self.wheels = self._wheels()
-        radius, inertia, low = p.wheel_radius, p.wheel_inertia, p.low_speed
-        per_load = p.slip_stiffness_per_load
-        self.spins = tuple(
-            [
-                spin(
-                    self.spins[i],
-                    h,
-                    torque=u[9 + i],
-                    f_x=u[1 + i],
-                    v=before[i],
-                    v_end=after[i],
-                    radius=radius,
-                    inertia=inertia,
-                    stiffness=per_load * self.loads[i],
-                    v_low=low,
-                )
-                for i in (0, 1, 2, 3)
-            ]
+        self.wheels = self._wheels()
+        self.spins = spin_wheels(
+            self.spins,
+            h,
+            torque=u[9:13],
+            f_x=u[1:5],
+            slip_stiffness=u[13:17],
+            tyre_slip=u[17:21],
+            load=self.loads,
+            v=before,
+            v_end=self.wheels,
+            radius=p.wheel_radius,
+            inertia=p.wheel_inertia,
+            stiffness_per_load=p.slip_stiffness_per_load,
+            v_low=p.low_speed,
         )
         (age_1, forces_1), (age_2, forces_2) = self.history
         ages = (0.5 * h, age_1 + h, age_2 + h)

@@ -38,14 +38,21 @@ from ..core.ride import AT_REST, RESOLVED, loads, move_ride
 from ..core.sprung_car import FourteenDofParameters, G, ride_of
 from ..core.variables import output
 from ..core.wheel_kinematics import slip_angle, slip_ratio
-from ..core.wheel_spin import spin
+from ..core.wheel_spin import spin_wheels
 
 
 class FourteenDof(Component):
     """Car with fourteen degrees of freedom (body in space, wheel travel, wheel spins) on tyre springs."""
 
     Parameters = FourteenDofParameters
-    inputs = ("steer_angle", "tyre_force_x_*", "tyre_force_y_*", "wheel_torque_*")
+    inputs = (
+        "steer_angle",
+        "tyre_force_x_*",
+        "tyre_force_y_*",
+        "wheel_torque_*",
+        "slip_stiffness_*",
+        "tyre_slip_ratio_*",
+    )
     outputs = (
         "velocity_x",
         "velocity_y",
@@ -117,25 +124,21 @@ class FourteenDof(Component):
         self.body = tuple(body)
         self.steer_angle = delta_end
         before = self.wheels
-        after = self.wheels = self._wheels()
-        radius, inertia, low = p.wheel_radius, p.wheel_inertia, p.low_speed
-        per_load = p.slip_stiffness_per_load
-        self.spins = tuple(
-            [
-                spin(
-                    self.spins[i],
-                    h,
-                    torque=u[9 + i],
-                    f_x=u[1 + i],
-                    v=before[i],
-                    v_end=after[i],
-                    radius=radius,
-                    inertia=inertia,
-                    stiffness=per_load * self.loads[i],
-                    v_low=low,
-                )
-                for i in (0, 1, 2, 3)
-            ]
+        self.wheels = self._wheels()
+        self.spins = spin_wheels(
+            self.spins,
+            h,
+            torque=u[9:13],
+            f_x=u[1:5],
+            slip_stiffness=u[13:17],
+            tyre_slip=u[17:21],
+            load=self.loads,
+            v=before,
+            v_end=self.wheels,
+            radius=p.wheel_radius,
+            inertia=p.wheel_inertia,
+            stiffness_per_load=p.slip_stiffness_per_load,
+            v_low=p.low_speed,
         )
         self.loads = loads(self.body, self.ride)
         (age_1, x_1, y_1), (age_2, x_2, y_2) = self.history

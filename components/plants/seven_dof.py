@@ -35,12 +35,11 @@ from math import atan2, cos, sin
 
 from ..core import carry
 from ..core.component import Component
+from ..core.load_transfer import quasi_static_loads
 from ..core.plane_body import Four, move, resultants
 from ..core.variables import output, parameter
 from ..core.wheel_kinematics import slip_angle, slip_ratio, wheel_velocities
-from ..core.wheel_spin import spin
-
-G = 9.81  # m/s2
+from ..core.wheel_spin import spin_wheels
 
 
 @dataclass(frozen=True)
@@ -93,25 +92,29 @@ def accelerations(delta: float, forces: Sequence[float], p: SevenDofParameters) 
 
 def vertical_loads(a_x: float, a_y: float, p: SevenDofParameters) -> Four:
     """Return F_z [N] of fl, fr, rl, rr from the accelerations [m/s2]; equations (17), (18)."""
-    a = p.cg_to_front_axle
-    b = p.cg_to_rear_axle
-    weight = p.mass * G
-    lift = p.mass * p.cg_height
-    front = min(max((weight * b - lift * a_x) / (a + b), 0.0), weight)
-    rear = weight - front
-    across = lift * a_y / ((a + b) * p.track_width)
-    front *= 0.5
-    rear *= 0.5
-    front_across = min(max(b * across, -front), front)
-    rear_across = min(max(a * across, -rear), rear)
-    return front - front_across, front + front_across, rear - rear_across, rear + rear_across
+    return quasi_static_loads(
+        a_x,
+        a_y,
+        mass=p.mass,
+        a=p.cg_to_front_axle,
+        b=p.cg_to_rear_axle,
+        track_width=p.track_width,
+        height=p.cg_height,
+    )
 
 
 class SevenDof(Component):
     """Car with seven degrees of freedom (plane motion, four wheel spins), quasi-static wheel loads."""
 
     Parameters = SevenDofParameters
-    inputs = ("steer_angle", "tyre_force_x_*", "tyre_force_y_*", "wheel_torque_*")
+    inputs = (
+        "steer_angle",
+        "tyre_force_x_*",
+        "tyre_force_y_*",
+        "wheel_torque_*",
+        "slip_stiffness_*",
+        "tyre_slip_ratio_*",
+    )
     outputs = (
         "velocity_x",
         "velocity_y",
@@ -161,26 +164,21 @@ class SevenDof(Component):
         a_x, a_y, dr = accelerations(0.5 * (delta + u[0]), u[1:9], p)
         self.motion = move(self.motion, h, a_x=a_x, a_y=a_y, dr=dr)
         before = self.wheels
-        after = self.wheels = self._wheels(u[0])
-        speeds, loads = self.spins, self.loads
-        radius, inertia, low = p.wheel_radius, p.wheel_inertia, p.low_speed
-        per_load = p.slip_stiffness_per_load
-        self.spins = tuple(
-            [
-                spin(
-                    speeds[i],
-                    h,
-                    torque=u[9 + i],
-                    f_x=u[1 + i],
-                    v=before[i],
-                    v_end=after[i],
-                    radius=radius,
-                    inertia=inertia,
-                    stiffness=per_load * loads[i],
-                    v_low=low,
-                )
-                for i in (0, 1, 2, 3)
-            ]
+        self.wheels = self._wheels(u[0])
+        self.spins = spin_wheels(
+            self.spins,
+            h,
+            torque=u[9:13],
+            f_x=u[1:5],
+            slip_stiffness=u[13:17],
+            tyre_slip=u[17:21],
+            load=self.loads,
+            v=before,
+            v_end=self.wheels,
+            radius=p.wheel_radius,
+            inertia=p.wheel_inertia,
+            stiffness_per_load=p.slip_stiffness_per_load,
+            v_low=p.low_speed,
         )
         (age_1, x_1, y_1), (age_2, x_2, y_2) = self.history
         k_0, k_1, k_2 = carry.weights(0.5 * h, age_1 + h, age_2 + h)

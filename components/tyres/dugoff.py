@@ -68,6 +68,34 @@ def dugoff(
     return scale * q_x, scale * q_y
 
 
+def dugoff_slip_stiffness(
+    alpha: float, kappa: float, *, f_z: float, mu: float, c_x: float, c_y: float
+) -> float:
+    """Return dF_x/dkappa [N] at constant slip angle; arguments as of `dugoff`.
+
+    F_x = C_x / (1 + kappa)^2 where the tyre grips; where it slides, with q_x' = C_x c and s' = ds/dkappa,
+    mu F_z ((1 - s/2) q_x' q_y^2 / n^3 - s' q_x / 2n).
+    """
+    if f_z <= 0.0 or mu <= 0.0:
+        return 0.0
+    grip = mu * f_z
+    c = abs(cos(alpha))
+    slope = c_x * c
+    q_x = slope * kappa
+    q_y = -c_y * sin(alpha)
+    n_2 = q_x * q_x + q_y * q_y
+    rolling = (1.0 + kappa) * c
+    s = turn = 0.0
+    if rolling > 0.0:
+        s = 0.5 * grip * rolling
+        if s * s >= n_2:
+            return slope * c / (rolling * rolling)
+        s /= sqrt(n_2)
+        turn = s * c / rolling - s * slope * q_x / n_2
+    n = sqrt(n_2)
+    return grip / n * ((1.0 - 0.5 * s) * slope * q_y * q_y / n_2 - 0.5 * turn * q_x)
+
+
 class Dugoff(Component):
     """Dugoff tyres on four wheels: combined slip, friction per wheel."""
 
@@ -76,6 +104,8 @@ class Dugoff(Component):
     outputs = (
         output("tyre_force_x_*", "slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*"),
         output("tyre_force_y_*", "slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*"),
+        output("slip_stiffness_*", "slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*"),
+        output("tyre_slip_ratio_*", "slip_ratio_*"),
     )
 
     def output(self, t, u):
@@ -85,4 +115,8 @@ class Dugoff(Component):
         x_fr, y_fr = dugoff(u[1], u[5], f_z=u[9], mu=u[13], c_x=c_x, c_y=c_y)
         x_rl, y_rl = dugoff(u[2], u[6], f_z=u[10], mu=u[14], c_x=c_x, c_y=c_y)
         x_rr, y_rr = dugoff(u[3], u[7], f_z=u[11], mu=u[15], c_x=c_x, c_y=c_y)
-        return x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr
+        k_fl = dugoff_slip_stiffness(u[0], u[4], f_z=u[8], mu=u[12], c_x=c_x, c_y=c_y)
+        k_fr = dugoff_slip_stiffness(u[1], u[5], f_z=u[9], mu=u[13], c_x=c_x, c_y=c_y)
+        k_rl = dugoff_slip_stiffness(u[2], u[6], f_z=u[10], mu=u[14], c_x=c_x, c_y=c_y)
+        k_rr = dugoff_slip_stiffness(u[3], u[7], f_z=u[11], mu=u[15], c_x=c_x, c_y=c_y)
+        return x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr, k_fl, k_fr, k_rl, k_rr, *u[4:8]

@@ -54,6 +54,14 @@ def limit_to_friction(f_x: float, f_y: float, grip: float) -> tuple[float, float
     return scale * f_x, scale * f_y
 
 
+def limited_slip_stiffness(f_x: float, f_y: float, grip: float, c_x: float) -> float:
+    """Return dF_x/dkappa [N] of the limited force, from the unlimited force [N] and C_x [N]."""
+    square = f_x * f_x + f_y * f_y
+    if square <= grip * grip:
+        return c_x
+    return max(grip, 0.0) * c_x * f_y * f_y / (square * sqrt(square))
+
+
 class LinearTyre(Component):
     """Linear tyres on four wheels, without or with a friction limit."""
 
@@ -62,6 +70,8 @@ class LinearTyre(Component):
     outputs = (
         output("tyre_force_x_*", "slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*"),
         output("tyre_force_y_*", "slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*"),
+        output("slip_stiffness_*", "slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*"),
+        output("tyre_slip_ratio_*", "slip_ratio_*"),
     )
 
     def output(self, t, u):
@@ -69,7 +79,12 @@ class LinearTyre(Component):
         c_x = p.longitudinal_stiffness
         c_y = p.cornering_stiffness
         forces = [linear_tyre(u[i], u[4 + i], f_z=u[8 + i], c_x=c_x, c_y=c_y) for i in range(4)]
+        stiffness = [c_x if u[8 + i] > 0.0 else 0.0 for i in range(4)]
         if p.limited:
+            stiffness = [
+                limited_slip_stiffness(x, y, u[12 + i] * u[8 + i], stiffness[i])
+                for i, (x, y) in enumerate(forces)
+            ]
             forces = [limit_to_friction(x, y, u[12 + i] * u[8 + i]) for i, (x, y) in enumerate(forces)]
         (x_fl, y_fl), (x_fr, y_fr), (x_rl, y_rl), (x_rr, y_rr) = forces
-        return x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr
+        return x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr, *stiffness, *u[4:8]

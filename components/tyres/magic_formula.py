@@ -7,7 +7,7 @@ the default set, of a 205/60R15, in `core/magic_formula_parameters.py`.
 from __future__ import annotations
 
 from ..core.component import Component
-from ..core.magic_formula import forces_and_moment
+from ..core.magic_formula import forces_moment_stiffness
 from ..core.magic_formula_parameters import MagicFormulaParameters, coefficients
 from ..core.variables import output
 
@@ -23,6 +23,8 @@ class MagicFormula(Component):
         output("tyre_force_x_*", *_INPUTS),
         output("tyre_force_y_*", *_INPUTS),
         output("aligning_moment_*", *_INPUTS),
+        output("slip_stiffness_*", *_INPUTS),
+        output("tyre_slip_ratio_*", "slip_ratio_*"),
     )
 
     def configure(self):
@@ -32,8 +34,9 @@ class MagicFormula(Component):
     def output(self, t, u):
         front = self.front
         rear = self.rear
-        x_fl, y_fl, z_fl = forces_and_moment(u[4], u[0], u[8], u[12], front)
-        x_fr, y_fr, z_fr = forces_and_moment(u[5], u[1], u[9], u[13], front)
-        x_rl, y_rl, z_rl = forces_and_moment(u[6], u[2], u[10], u[14], rear)
-        x_rr, y_rr, z_rr = forces_and_moment(u[7], u[3], u[11], u[15], rear)
-        return x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr, z_fl, z_fr, z_rl, z_rr
+        x_fl, y_fl, z_fl, k_fl = forces_moment_stiffness(u[4], u[0], u[8], u[12], front)
+        x_fr, y_fr, z_fr, k_fr = forces_moment_stiffness(u[5], u[1], u[9], u[13], front)
+        x_rl, y_rl, z_rl, k_rl = forces_moment_stiffness(u[6], u[2], u[10], u[14], rear)
+        x_rr, y_rr, z_rr, k_rr = forces_moment_stiffness(u[7], u[3], u[11], u[15], rear)
+        forces = x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr, z_fl, z_fr, z_rl, z_rr
+        return *forces, k_fl, k_fr, k_rl, k_rr, *u[4:8]

@@ -10,7 +10,7 @@ from ..core.component import Component
 from ..core.magic_formula_1987 import (
     MagicFormula1987Parameters,
     coefficients_1987,
-    forces_1987,
+    forces_stiffness_1987,
     loaded_tyre,
 )
 from ..core.variables import output
@@ -23,7 +23,12 @@ class MagicFormula1987(Component):
 
     Parameters = MagicFormula1987Parameters
     inputs = _INPUTS
-    outputs = (output("tyre_force_x_*", *_INPUTS), output("tyre_force_y_*", *_INPUTS))
+    outputs = (
+        output("tyre_force_x_*", *_INPUTS),
+        output("tyre_force_y_*", *_INPUTS),
+        output("slip_stiffness_*", *_INPUTS),
+        output("tyre_slip_ratio_*", "slip_ratio_*"),
+    )
 
     def configure(self):
         self.coefficients = coefficients_1987(self.p)
@@ -31,9 +36,13 @@ class MagicFormula1987(Component):
     def output(self, t, u):
         longitudinal = []
         lateral = []
+        stiffness = []
         for wheel in range(4):
             tyre = loaded_tyre(u[8 + wheel], u[12 + wheel], self.coefficients)
-            f_x, f_y = (0.0, 0.0) if tyre is None else forces_1987(u[4 + wheel], u[wheel], tyre)
+            f_x, f_y, slope = (
+                (0.0, 0.0, 0.0) if tyre is None else forces_stiffness_1987(u[4 + wheel], u[wheel], tyre)
+            )
             longitudinal.append(f_x)
             lateral.append(f_y)
-        return longitudinal + lateral
+            stiffness.append(slope)
+        return *longitudinal, *lateral, *stiffness, *u[4:8]

@@ -16,7 +16,7 @@ def wheel(alpha, kappa, load, mu, **parameters):
         slip_angle_rl=alpha, slip_ratio_rl=kappa, vertical_load_rl=load, friction_rl=mu
     )
     others = [v for name, v in found.items() if not name.endswith("_rl")]
-    assert others == [0.0] * 6
+    assert others == [0.0] * 12
     return found["tyre_force_x_rl"], found["tyre_force_y_rl"]
 
 

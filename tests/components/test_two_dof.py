@@ -114,7 +114,7 @@ def test_the_response_to_a_yaw_moment_is_that_of_the_linear_single_track_model(f
     before = forces
     h, found = 1e-3, []
     for k in range(4000):
-        middle = {n: 1.5 * forces[n] - 0.5 * before[n] for n in forces if "y" in n}
+        middle = {n: 1.5 * forces[n] - 0.5 * before[n] for n in forces if "force_y" in n}
         y = car.step(h, yaw_moment=100.0 * sin(2 * pi * frequency * (k + 0.5) * h), **middle)
         before, forces = forces, tyre.step(h, **{n: y[n] for n in names})
         found.append(y["yaw_rate"])

@@ -1,0 +1,177 @@
+"""Cars that brake to a standstill at 1 ms, on tyres that tell their slip stiffness and tyres that do not."""
+
+from __future__ import annotations
+
+from math import log2
+
+import numpy as np
+import pytest
+
+from components.core.magic_formula import forces_and_moment
+from components.core.magic_formula_parameters import MagicFormulaParameters, coefficients
+from components.core.roles import WHEELS
+from components.drivers.sine import Sine
+from components.plants.eight_dof import EightDof
+from components.plants.fourteen_dof import FourteenDof
+from components.plants.seven_dof import SevenDof
+from components.tyres.dugoff import Dugoff
+from components.tyres.linear import LinearTyre
+from components.tyres.magic_formula import MagicFormula
+from components.tyres.magic_formula_1987 import MagicFormula1987
+
+from . import monolith, monolith_b
+from .loop import Loop
+
+
+def four(name, *values):
+    values = values * 4 if len(values) == 1 else values
+    return {f"{name}_{wheel}": value for wheel, value in zip(WHEELS, values, strict=True)}
+
+
+class SilentDugoff(Dugoff):
+    """Dugoff tyres that say nothing but their forces."""
+
+    outputs = Dugoff.outputs[:2]
+
+    def output(self, t, u):
+        return super().output(t, u)[:8]
+
+
+class SilentMagicFormula(MagicFormula):
+    """Magic Formula tyres that say nothing but their forces."""
+
+    outputs = MagicFormula.outputs[:2]
+
+    def output(self, t, u):
+        return super().output(t, u)[:8]
+
+
+def drive(
+    plant, tyre, *, torque, until, record, h=1e-3, algorithm="extrapolated", speed=25.0, steer=0.0, mu=0.8
+):
+    """Return the recorded signals (rows); tyres find their wires by name, as in a scenario."""
+    sine = {"amplitude": steer, "frequency": 0.4, "start_time": 0.2}
+    limited = {"limited": True} if tyre is LinearTyre else {}
+    loop = Loop(
+        [(Sine, sine), (plant, {"initial_speed": speed}), (tyre, limited)],
+        algorithm=algorithm,
+        constants={**four("friction", mu), **four("wheel_torque", *torque)},
+    )
+    return np.array(loop.run(until, round(until / h), lambda now: [now[name] for name in record])).T
+
+
+PLANTS = [SevenDof, EightDof, FourteenDof]
+SOFT = {SevenDof: (-700.0, -700.0, -300.0, -300.0), EightDof: (-900.0, -900.0, -400.0, -400.0)}
+SOFT[FourteenDof] = (-1300.0, -1300.0, -600.0, -600.0)
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize(
+    "tyre", [Dugoff, SilentDugoff, MagicFormula, SilentMagicFormula, MagicFormula1987, LinearTyre]
+)
+@pytest.mark.parametrize("hard", [False, True], ids=["rolling", "locking"])
+def test_braking_from_25_m_per_s_to_standstill_shows_no_limit_cycle_in_wheel_speed(plant, tyre, hard):
+    torque = (-4000.0,) * 4 if hard else SOFT[plant]
+    until = 7.5 if plant is FourteenDof else 6.5
+    run = drive(
+        plant, tyre, torque=torque, until=until, record=["velocity_x", "yaw_rate", *four("wheel_speed", 0.0)]
+    )
+    speed, spins = run[0], run[2:]
+    stopped = int(np.argmax(speed < 0.02))
+    assert 2500 < stopped < 5500
+    # Wheels only ever slow down: from 8 m/s on nothing swings. Then they stand.
+    braking = (speed < 8.0) & (np.arange(len(speed)) < stopped)
+    assert np.diff(spins[:, braking]).max() <= 1e-12
+    assert np.diff(speed[:stopped]).max() <= 1e-6
+    assert not spins[:, stopped + 100 :].any()
+    # The body of the fourteen-DOF car swings to rest on its springs, with its contact points.
+    assert np.abs(speed[-500:]).max() < (2e-4 if plant is FourteenDof else 1e-9)
+    assert not run[1].any()
+
+
+@pytest.mark.parametrize("algorithm", ["gauss_seidel", "jacobi"])
+@pytest.mark.parametrize("plant", PLANTS)
+def test_the_other_algorithms_brake_to_standstill_as_calmly(plant, algorithm):
+    run = drive(
+        plant,
+        MagicFormula,
+        torque=SOFT[plant],
+        until=6.0,
+        algorithm=algorithm,
+        record=["velocity_x", "wheel_speed_fl", "wheel_speed_rl"],
+    )
+    stopped = int(np.argmax(run[0] < 0.02))
+    assert np.diff(run[1:, :stopped]).max() <= 1e-12
+    assert not run[1:, stopped + 100 :].any()
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("tyre", [Dugoff, MagicFormula, SilentMagicFormula, MagicFormula1987])
+@pytest.mark.parametrize("torque", [0.0, -1000.0])
+def test_a_car_at_rest_stays_at_rest_with_the_wheels_turned(plant, tyre, torque):
+    record = ["velocity_x", "velocity_y", "yaw_rate", "position_x", "wheel_speed_fl", "wheel_speed_rr"]
+    run = drive(plant, tyre, torque=(torque,), until=0.3, speed=0.0, steer=0.3, record=record)
+    assert not run.any()
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_driving_off_from_rest_is_calm(plant):
+    run = drive(
+        plant,
+        MagicFormula,
+        torque=(150.0,),
+        until=2.0,
+        speed=0.0,
+        record=["velocity_x", *four("wheel_speed", 0.0)],
+    )
+    assert np.diff(run[:, 100:]).min() > 0.0  # they only ever gain speed
+    assert run[0, -1] > 1.0
+
+
+MAGIC = coefficients(MagicFormulaParameters(), "front")
+SLOW = 7.0
+BRAKES = (-350.0, -350.0, -150.0, -150.0)
+
+
+@pytest.fixture(scope="module")
+def slow_braking():
+    """v_x, r and the wheel speeds of paper B's car braking in a turn from 7 to 3.5 m/s, every 4 ms."""
+
+    def tyre(alpha, kappa, load, mu):
+        return forces_and_moment(kappa, alpha, load, mu, MAGIC)[:2]
+
+    times = np.linspace(0.0, 1.5, 376)
+    exact = monolith_b.solve(
+        times,
+        tyre=tyre,
+        steer=monolith.sine(0.05, 0.4, 0.2, 1.0),
+        speed=SLOW,
+        mu=[0.8] * 4,
+        torque=lambda t: BRAKES,
+        kinks=[0.2],
+        tolerance=1e-9,
+    )
+    return exact[[0, 2, 8, 9, 10, 11]]
+
+
+def slow_errors(exact, tyre, h):
+    record = ["velocity_x", "yaw_rate", *four("wheel_speed", 0.0)]
+    run = drive(EightDof, tyre, torque=BRAKES, until=1.5, speed=SLOW, steer=0.05, record=record, h=h)
+    error = np.abs(run[:, :: round(4e-3 / h)] - exact)
+    return error.max(axis=1) / np.abs(exact).max(axis=1)
+
+
+def test_where_slip_is_faster_than_the_step_a_tyre_that_tells_its_stiffness_is_nearer_to_the_truth(
+    slow_braking,
+):
+    # The slip decays with 440 to 900 1/s.
+    told, silent = (slow_errors(slow_braking, tyre, 2e-3) for tyre in (MagicFormula, SilentMagicFormula))
+    assert np.all(told < 7e-4), told
+    assert np.all(told < 0.5 * silent)
+
+
+def test_there_too_the_order_is_two(slow_braking):
+    coarse, fine = (slow_errors(slow_braking, MagicFormula, h) for h in (2e-3, 5e-4))
+    assert np.all(fine < 7e-5)
+    assert log2(coarse[0] / fine[0]) / 2 > 1.8  # speed
+    assert log2(coarse[1] / fine[1]) / 2 > 1.8  # yaw rate
