@@ -59,16 +59,16 @@ class FourteenDofParameters:
         0.32, "m", "Height of the wheels' centres; chosen: tyre of 0.34, loaded", minimum=0.0
     )
     spring_stiffness_front: float = parameter(
-        34000.0, "N/m", "Front spring, at the wheel; chosen: body modes at 1.4 to 1.8 Hz", minimum=0.0
+        34000.0, "N/m", "Front spring, at the wheel; chosen: body modes at 1.3 to 1.7 Hz", minimum=0.0
     )
     spring_stiffness_rear: float = parameter(
-        32000.0, "N/m", "Rear spring, at the wheel; chosen: body modes at 1.4 to 1.8 Hz", minimum=0.0
+        32000.0, "N/m", "Rear spring, at the wheel; chosen: body modes at 1.3 to 1.7 Hz", minimum=0.0
     )
     damping_front: float = parameter(
-        3000.0, "N.s/m", "Front damper, at the wheel; chosen: about 0.4 of critical", minimum=0.0
+        3000.0, "N.s/m", "Front damper, at the wheel; chosen: 0.3 to 0.4 of critical", minimum=0.0
     )
     damping_rear: float = parameter(
-        2800.0, "N.s/m", "Rear damper, at the wheel; chosen: about 0.4 of critical", minimum=0.0
+        2800.0, "N.s/m", "Rear damper, at the wheel; chosen: 0.3 to 0.4 of critical", minimum=0.0
     )
     anti_roll_stiffness_front: float = parameter(
         14000.0,
