@@ -7,6 +7,7 @@ one run, four panels for several). A panel whose signals no run has does not exi
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 WHEEL_NAMES = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 POINTS = 1500
 """Buckets a line is thinned to; each keeps its smallest and its largest value."""
+
+NOTE_WIDTH = 72
+"""Characters of a note above a panel of half the figure's width."""
 
 OFF_SCALE = 8.0
 """A line that exceeds what must be seen by this factor may leave the axes if another one stays."""
@@ -105,15 +109,15 @@ def _draw_signal(axes: Axes, runs: Sequence[Run], name: str) -> None:
         if columns:
             reference = reference_of(run.results, columns[0])
             lines.append((number, run, columns[0], reference))
-    references = [run.results[reference] for _, run, _, reference in lines if reference]
-    shared = _nearly_equal(references)
-    for place, (number, run, _, reference) in enumerate(lines):
-        if reference and (place == 0 or not shared):
-            style = (
-                REFERENCE if shared else {**REFERENCE, "color": line_style(number)["color"], "alpha": 0.28}
-            )
-            unit = run.results.units[reference]
-            _line(axes, run.results.time, run.results[reference], unit, {**style, "label": "reference"})
+    followed = [(number, run, reference) for number, run, _, reference in lines if reference]
+    references = [run.results[reference] for _, run, reference in followed]
+    for group in _alike(references):
+        number, run, reference = followed[group[0]]
+        own = (
+            {} if len(group) > 1 or len(lines) == 1 else {"color": line_style(number)["color"], "alpha": 0.28}
+        )
+        style = {**REFERENCE, **own, "label": "reference"}
+        _line(axes, run.results.time, references[group[0]], run.results.units[reference], style)
     unit = ""
     for number, run, column, _ in lines:
         unit = run.results.units[column]
@@ -136,9 +140,10 @@ def _limit(axes: Axes, scale: float, lines: list[tuple[str, float]], unit: str) 
     largest = 1.5 * factor * max(scale, *(peak for _, peak in lines if peak <= OFF_SCALE * scale))
     axes.set_ylim(-largest, largest)
     note = "; ".join(f"{label}, up to {digits_of(peak * factor)} {text}" for label, peak in lost)
-    axes.set_title(axes.get_title(loc="left"), pad=16)
+    rows = textwrap.wrap(f"beyond the axes: {note}", NOTE_WIDTH)
+    axes.set_title(axes.get_title(loc="left"), pad=6 + 10 * len(rows))
     axes.annotate(
-        f"beyond the axes: {note}", (0, 1), (0, 4), xycoords="axes fraction",
+        "\n".join(rows), (0, 1), (0, 4), xycoords="axes fraction",
         textcoords="offset points", fontsize=7.5, color=QUIET,
     )  # fmt: skip
 
@@ -209,6 +214,9 @@ def _stretch(length: float, breadth: float, *, room: float) -> int:
 
 def _line(axes: Axes, t: np.ndarray, x: np.ndarray, unit: str, style: dict[str, Any]) -> None:
     t, x = thinned(t, x * shown_unit(unit)[1])
+    if unit == "rad":  # an angle that passes half a turn comes back from the other side
+        turned = np.flatnonzero(np.abs(np.diff(x)) > 180.0) + 1
+        t, x = np.insert(t, turned, t[turned]), np.insert(x, turned, np.nan)
     axes.plot(t, x, **style)
 
 
@@ -226,7 +234,7 @@ def thinned(t: np.ndarray, x: np.ndarray, buckets: int = POINTS) -> tuple[np.nda
 
 def _finish(axes: Axes, heading: str, unit: str) -> None:
     text = shown_unit(unit)[0]
-    axes.set_title(f"{heading} in {text}" if text else heading)
+    axes.set_title(f"{heading} in {text}" if text else heading.rstrip(","))
     axes.set_xlabel("$t$ in s")
     axes.locator_params(axis="x", nbins=9, steps=[1, 2, 5, 10])
     axes.margins(x=0.01)
@@ -251,10 +259,16 @@ def _span(arrays: list[np.ndarray]) -> float:
     return float(np.ptp(joined)) if joined.size else 0.0
 
 
-def _nearly_equal(references: list[np.ndarray]) -> bool:
-    """Return whether one wide line can stand for all references: they lie within its width."""
-    if not references:
-        return False
-    first = references[0]
-    allowed = 0.05 * max(_peak(r) for r in references)
-    return all(r.shape == first.shape and _peak(r - first) <= allowed for r in references[1:])
+def _alike(references: list[np.ndarray]) -> list[list[int]]:
+    """Return groups of references for which one wide line can stand: they lie within its width."""
+    allowed = 0.05 * max((_peak(r) for r in references), default=0.0)
+    groups: list[list[int]] = []
+    for i, one in enumerate(references):
+        for group in groups:
+            first = references[group[0]]
+            if first.shape == one.shape and _peak(one - first) <= allowed:
+                group.append(i)
+                break
+        else:
+            groups.append([i])
+    return groups

@@ -73,7 +73,7 @@ def grid_table(spec: GridSpec, values: Values) -> Table:
         found = correlation(spec, values)
         table.notes.append(
             f"rank correlation (Spearman) with the paper over {_count(every)} runs: "
-            f"{'not all runs have results' if found is None else f'{found:.2f}'}"
+            f"{'not all runs have results' if found is None else digits_of(found)}"
         )
     return table
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import ResultsError
-from orchestrator.figures.panels import Run, thinned
+from orchestrator.figures.panels import NOTE_WIDTH, Run, thinned
 from orchestrator.figures.plots import draw, provenance, title_of
-from orchestrator.figures.style import LINES, save
+from orchestrator.figures.style import LINES, REFERENCE, save
 
 from .recorded import car, results
 
@@ -81,6 +81,37 @@ def test_runs_with_references_of_their_own_show_each_in_the_runs_colour():
     pale = [line for line in panel(figure, "sideslip").get_lines() if line.get_label() == "reference"]
     assert [line.get_color() for line in pale] == [LINES[0]["color"], LINES[1]["color"]]
     assert legend(figure)[-1] == "wide and pale: the run's own reference"
+
+
+def test_a_reference_that_several_runs_share_is_drawn_once_beside_that_of_another():
+    slow = car(1.0)
+    slow.columns["reference.sideslip_ref"] = 1.5 * slow.columns["reference.sideslip_ref"]
+    figure = draw([SEVERAL[0], Run("slow", slow), SEVERAL[1], SEVERAL[2]])
+    pale = [line for line in panel(figure, "sideslip").get_lines() if line.get_label() == "reference"]
+    assert [line.get_color() for line in pale] == [REFERENCE["color"], LINES[1]["color"]]
+
+
+def test_an_angle_that_passes_half_a_turn_is_not_joined_across_the_panel():
+    t = np.linspace(0.0, 4.0, 401)
+    angle = np.angle(np.exp(1j * np.pi * 0.6 * t))  # beyond half a turn at 1.67 s
+    (line,) = panel(draw([Run("run", results({"plant.sideslip": angle}, t))], ["sideslip"]), "sideslip").lines
+    drawn = line.get_ydata()
+    assert np.isnan(drawn).sum() == 1
+    assert np.nanmax(np.abs(np.diff(drawn))) < 2.0
+
+
+def test_a_panel_without_a_unit_ends_its_title_without_a_comma():
+    slips = {f"plant.slip_ratio_{w}": [0.0, 0.1] for w in ("fl", "fr", "rl", "rr")}
+    figure = draw([Run("a", results(slips)), Run("b", results(slips))], ["slip_ratio_*"])
+    assert panel(figure, "slip_ratio_rl").get_title(loc="left") == "Longitudinal slip, rear left"
+
+
+def test_a_long_note_on_lost_cars_is_broken_into_lines():
+    lost = [Run(f"a car with a rather long name, number {k}", car(40.0 + k)) for k in range(3)]
+    axes = panel(draw([*lost, Run("held", car(1.1))], ["sideslip"]), "sideslip")
+    rows = axes.texts[0].get_text().splitlines()
+    assert len(rows) > 1
+    assert max(map(len, rows)) <= NOTE_WIDTH
 
 
 def test_runs_differ_in_colour_and_in_dash_pattern():

@@ -6,13 +6,15 @@ import csv
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from orchestrator.errors import ScenarioError
 from orchestrator.metrics.run_metrics import Value
 from orchestrator.studies.claims import condition_text, judge
+from orchestrator.studies.derived import calculate, rank_correlation
 from orchestrator.studies.jobs import Job, Outcome
-from orchestrator.studies.study import claim_tables, judge_study, run_tables
+from orchestrator.studies.study import claim_tables, derived_tables, judge_study, run_tables
 from orchestrator.studies.study_file import load_study
 from orchestrator.studies.study_report import write_study
 from orchestrator.studies.study_schema import Claim
@@ -246,6 +248,162 @@ def test_conditions_can_be_read():
     assert [condition_text(c) for c in claim.holds_if] == ["a: m ≤ 5 %", "a: m < 0.5 × n of b"]
 
 
+@pytest.fixture
+def with_grid(study):
+    """The study with a grid of its four runs, derived numbers and claims about them."""
+
+    def load(*changes):
+        return study(
+            ("claims:\n", GRID + "claims:\n"),
+            ("checks:\n", CHECKS),
+            *changes,
+        )
+
+    return load
+
+
+GRID = """\
+grids:
+  errors:
+    title: Error
+    metric: error
+    run: "{speed}mps/{controller}"
+    rows: {speed: [15, 25]}
+    columns: {controller: {"off": no control, fnn: neural network}}
+    corner: speed
+    published: [[3, 0.01], [2, 0.05]]
+    beside: [{run: slow, says: slow run, published: 0.001}]
+derived:
+  order: {says: Rank correlation, rank_correlation: errors}
+  drop:
+    says: Share of the error removed
+    expression: (off - fnn) / off
+    of: {off: {run: 15mps/off, metric: error}, fnn: {run: 15mps/fnn, metric: error}}
+    unit: "%"
+"""
+
+CHECKS = """\
+checks:
+  - says: The order is the paper's.
+    holds_if: [{derived: order, at_least: 0.9}]
+"""
+
+
+def test_a_grid_stands_beside_the_published_numbers_with_its_rank_correlation(with_grid, out):
+    findings = judge_study(with_grid(), out)
+    grid, numbers = derived_tables(findings)
+    assert grid.headings == [
+        "speed", "no control", "neural network", "the paper:", "no control", "neural network",
+    ]  # fmt: skip
+    assert grid.text() == [
+        ["15", "1.40", "0.0200", "15", "3.00", "0.0100"],
+        ["25", "2.00", "0.0400", "25", "2.00", "0.0500"],
+    ]
+    assert [grid.is_number(i) for i in range(6)] == [False, True, True, False, True, True]
+    assert grid.notes[0].startswith("slow run: ")
+    assert grid.notes[0].endswith(", the paper: 0.00100")
+    assert grid.notes[1] == "rank correlation (Spearman) with the paper over 5 runs: 0.900"
+    assert numbers.text() == [["Rank correlation", "0.900"], ["Share of the error removed", "98.6 %"]]
+    assert findings.checks[0].holds
+    assert findings.checks[0].measured == ("0.900",)
+
+
+def test_a_grid_and_its_derived_numbers_are_written_down(with_grid, out):
+    findings = judge_study(with_grid(), out)
+    write_study(findings, out)
+    report = (out / "study.md").read_text()
+    assert "| 15 | 1.40 | 0.0200 | 15 | 3.00 | 0.0100 |" in report
+    record = json.loads((out / "study.json").read_text())
+    assert record["derived"]["drop"]["value"] == pytest.approx(1.38 / 1.4)
+    assert record["derived"]["drop"]["of"]["off"] == ["15mps/off", "error"]
+    assert record["checks"][0]["holds_if"] == ["order ≥ 0.9"]
+
+
+def test_without_a_run_there_is_neither_correlation_nor_verdict(with_grid, out):
+    lost = Outcome(Job("15mps/off", Path("x"), out / "15mps/off"), ("plant: lost",), 1)
+    findings = judge_study(with_grid(), out, [lost])
+    assert findings.derived == {}
+    assert findings.checks[0].holds is None
+    grid, numbers = derived_tables(findings)
+    assert grid.text()[0] == ["15", "-", "0.0200", "15", "3.00", "0.0100"]
+    assert grid.notes[1].endswith("not all runs have results")
+    assert numbers.text() == [["Rank correlation", "-"], ["Share of the error removed", "-"]]
+
+
+def test_a_grid_without_published_numbers_is_a_plain_table(with_grid, out):
+    study = with_grid(
+        ("    published: [[3, 0.01], [2, 0.05]]\n", ""),
+        (", published: 0.001", ""),
+        ("  order: {says: Rank correlation, rank_correlation: errors}\n", ""),
+        ("{derived: order, at_least: 0.9}", "{derived: drop, at_least: 90 %}"),
+    )
+    findings = judge_study(study, out)
+    grid, _ = derived_tables(findings)
+    assert grid.text() == [["15", "1.40", "0.0200"], ["25", "2.00", "0.0400"]]
+    assert len(grid.notes) == 1
+    assert findings.checks[0].holds
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("metric: error\n    run", "metric: eror\n    run", "grids.errors.metric: there is no metric 'eror'"),
+        (
+            "speed: [15, 25]}\n    col",
+            "speed: [15, 26]}\n    col",
+            "grids.errors: there is no run '26mps/off'",
+        ),
+        ("[2, 0.05]]", "[2]]", "grids.errors: published: must have 2 rows of 2 numbers"),
+        (
+            '"{speed}mps/{controller}"\n    rows',
+            '"{speed}mps/off"\n    rows',
+            "does not depend on {controller}",
+        ),
+        (
+            "    rows: {speed: [15, 25]}",
+            "    rows: {a: [1], b: [2]}",
+            "needs exactly one name with its values",
+        ),
+        ("rank_correlation: errors", "rank_correlation: error", "there is no grid 'error'; did you mean"),
+        ("(off - fnn) / off", "(of - fnn) / off", "expression: of stands for nothing; 'of' has off and fnn"),
+        ("(off - fnn) / off", "off ** fnn", "only + - * / are allowed"),
+        ("(off - fnn) / off", "(off - ", "is no expression"),
+        ("(off - fnn) / off", "abs(off)", "only numbers, names, + - * / and parentheses are allowed"),
+        ("    expression: (off - fnn) / off\n", "", "needs exactly one of expression and rank_correlation"),
+        ("of: {off: {run: 15mps/off", "of: {off: {run: 15mps/of", "derived.drop.of.off.run: there is no run"),
+        ("{derived: order, at", "{derived: ordre, at", "there is no derived number 'ordre'; did you mean"),
+        (
+            "{derived: order, at",
+            "{derived: order, run: slow, at",
+            "needs run and metric, or derived in place",
+        ),
+        ("{derived: order, at", "{at", "needs run and metric, or derived in place of both"),
+    ],
+)
+def test_what_is_wrong_with_grids_and_derived_numbers_is_said(with_grid, old, new, said):
+    with pytest.raises(ScenarioError) as error:
+        with_grid((old, new))
+    assert any(said in problem for problem in error.value.problems), error.value.problems
+
+
+def test_expressions_are_arithmetic():
+    values = {"a": 3.0, "b": 2.0}
+    assert calculate("(a - b) / -b * 4 + 1.5", values) == -0.5
+    assert calculate("a / (b - 2)", values) is None
+    assert calculate("1e308 * 10 * a", values) is None
+
+
+def test_rank_correlation_agrees_with_scipy():
+    stats = pytest.importorskip("scipy.stats")
+    rng = np.random.default_rng(3)
+    for n in (3, 5, 26):
+        x = rng.integers(0, 8, n) + 0.0  # with equal values
+        y = x + rng.normal(0, 3, n)
+        assert rank_correlation(x, y) == pytest.approx(stats.spearmanr(x, y).statistic, abs=1e-12)
+    assert rank_correlation([1, 2, 3], [10, 20, 30]) == pytest.approx(1.0)
+    assert rank_correlation([1, 2, 3], [5, 5, 5]) is None
+
+
 def test_what_the_paper_says_of_a_run_stands_beside_it(study, out):
     (table,) = run_tables(judge_study(study(), out))
     assert table.headings == ["run", "largest error", "the paper says", "verdict", "max|M_z|"]
@@ -300,6 +458,14 @@ def test_a_study_without_any_result_still_says_so(study, tmp_path):
     said = write_study(findings, tmp_path / "empty")
     assert said == [f"figure {name}: none of its runs has results" for name in ("both", "roll")]
     assert "no results here" in (tmp_path / "empty" / "study.md").read_text()
+
+
+def test_the_studies_of_paper_b_are_right_in_themselves():
+    folder = Path(__file__).parents[2] / "scenarios" / "fuzzy_sliding_mode"
+    study, distribution = load_study(folder / "study.yaml"), load_study(folder / "distribution.yaml")
+    assert len(distribution.runs) == 3 * 26
+    for run in (*study.runs.values(), *distribution.runs.values()):
+        assert run.scenario.is_file()
 
 
 def test_the_study_of_paper_a_is_right_in_itself():
