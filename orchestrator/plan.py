@@ -28,6 +28,7 @@ class Variable:
     depends_on: tuple[str, ...] | None = None  # of an output: inputs it follows directly; None: not said
     choices: tuple[str, ...] | None = None  # of a String: allowed values, if the description lists them
     items: dict[str, int] | None = None  # of an Enumeration: name -> value
+    optional: bool = False  # of an input: its start value is meant for when nothing drives it
 
     @property
     def discrete(self) -> bool:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 from ..core.component import Component
 from ..core.moment_sharing import add_drive_force, share_moment
-from ..core.variables import output, parameter
+from ..core.variables import output, parameter, signal
 from ..core.wheel_kinematics import lever_arms
 
 
@@ -46,7 +46,7 @@ class FixedShare(Component):
     """Yaw moment shared among the wheels in fixed parts, by default a quarter each."""
 
     Parameters = FixedShareParameters
-    inputs = ("yaw_moment", "drive_force", "steer_angle")
+    inputs = ("yaw_moment", signal("drive_force", optional=True), "steer_angle")
     outputs = (output("force_request_*", "yaw_moment", "drive_force", "steer_angle"),)
     sampled = True
 

@@ -25,7 +25,7 @@ from ..core.component import Component
 from ..core.moment_sharing import NO_FORCE, Four, add_drive_force, share_moment
 from ..core.roles import wheels
 from ..core.side_forces import SIDE_FORCES, load_share, share_sides
-from ..core.variables import output, parameter
+from ..core.variables import output, parameter, signal
 from ..core.wheel_kinematics import lever_arms
 
 
@@ -91,7 +91,7 @@ class LoadProportional(Component):
     """Yaw moment shared among the wheels in proportion to their vertical loads."""
 
     Parameters = LoadProportionalParameters
-    inputs = ("yaw_moment", "drive_force", "steer_angle", "vertical_load_*")
+    inputs = ("yaw_moment", signal("drive_force", optional=True), "steer_angle", "vertical_load_*")
     outputs = (
         output("force_request_*", "yaw_moment", "drive_force", "steer_angle", *wheels("vertical_load_*")),
     )

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from ..core.component import Component
 from ..core.moment_sharing import add_drive_force
 from ..core.side_forces import SIDE_FORCES, share_sides
-from ..core.variables import output, parameter
+from ..core.variables import output, parameter, signal
 from ..core.wheel_kinematics import lever_arms
 
 
@@ -53,7 +53,7 @@ class SideShare(Component):
     """Yaw moment as one longitudinal force per side, split front to rear in fixed parts."""
 
     Parameters = SideShareParameters
-    inputs = ("yaw_moment", "drive_force", "steer_angle")
+    inputs = ("yaw_moment", signal("drive_force", optional=True), "steer_angle")
     outputs = (output("force_request_*", "yaw_moment", "drive_force", "steer_angle"),)
     sampled = True
 

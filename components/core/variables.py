@@ -38,6 +38,7 @@ class Variable:
     maximum: float | None = None
     choices: tuple[str, ...] | None = None
     depends_on: tuple[str, ...] = ()
+    optional: bool = False
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,7 @@ class Signal:
     minimum: float | None = None
     maximum: float | None = None
     depends_on: tuple[str, ...] = ()
+    optional: bool = False
 
 
 def signal(
@@ -62,6 +64,7 @@ def signal(
     minimum: float | None = None,
     maximum: float | None = None,
     depends_on: Iterable[str] = (),
+    optional: bool = False,
 ) -> Signal:
     """Declare an input or output, from the signal dictionary unless unit and text are given.
 
@@ -73,6 +76,7 @@ def signal(
         minimum, maximum: limits written into the model description.
         depends_on: of an output, the inputs it depends on directly at the same instant. A `*`
             there means the same wheel if the output's own name has one, else all four.
+        optional: of an input, that the unit does its work at the start value if nothing drives it.
 
     Raises:
         DeclarationError: unknown name without unit and text, a name that is no lower-case
@@ -96,7 +100,7 @@ def signal(
     if unit not in UNITS:
         raise DeclarationError(f"signal {name!r}: unknown unit {unit!r}; known: {', '.join(UNITS)}")
     text = description or known[1]  # type: ignore[index]
-    return Signal(name, unit, text, start, minimum, maximum, tuple(depends_on))
+    return Signal(name, unit, text, start, minimum, maximum, tuple(depends_on), optional)
 
 
 def output(name: str, *depends_on: str, unit: str | None = None, text: str | None = None) -> Signal:
@@ -193,7 +197,7 @@ def input_variables(declared: Iterable[str | Signal]) -> list[Variable]:
         variables += [
             Variable(
                 name, "input", "Real", s.unit, _on_wheel(s, name), "continuous",
-                float(s.start), s.minimum, s.maximum,
+                float(s.start), s.minimum, s.maximum, optional=s.optional,
             )
             for name in wheels(s.name)
         ]  # fmt: skip

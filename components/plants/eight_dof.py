@@ -38,7 +38,7 @@ from ..core.component import Component
 from ..core.oscillator import transition
 from ..core.plane_body import move, resultants
 from ..core.rolling_body import RollingCarParameters, RollModel, accelerations, longitudinal, vertical_loads
-from ..core.variables import output
+from ..core.variables import output, signal
 from ..core.wheel_kinematics import slip_angle, slip_ratio, wheel_velocities
 from ..core.wheel_spin import spin_wheels
 
@@ -52,8 +52,8 @@ class EightDof(Component):
         "tyre_force_x_*",
         "tyre_force_y_*",
         "wheel_torque_*",
-        "slip_stiffness_*",
-        "tyre_slip_ratio_*",
+        signal("slip_stiffness_*", optional=True),
+        signal("tyre_slip_ratio_*", optional=True),
     )
     outputs = (
         "velocity_x",

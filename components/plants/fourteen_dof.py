@@ -36,7 +36,7 @@ from ..core.plane_body import move
 from ..core.resistance import resistance
 from ..core.ride import AT_REST, RESOLVED, loads, move_ride
 from ..core.sprung_car import FourteenDofParameters, G, ride_of
-from ..core.variables import output
+from ..core.variables import output, signal
 from ..core.wheel_kinematics import slip_angle, slip_ratio
 from ..core.wheel_spin import spin_wheels
 
@@ -50,8 +50,8 @@ class FourteenDof(Component):
         "tyre_force_x_*",
         "tyre_force_y_*",
         "wheel_torque_*",
-        "slip_stiffness_*",
-        "tyre_slip_ratio_*",
+        signal("slip_stiffness_*", optional=True),
+        signal("tyre_slip_ratio_*", optional=True),
     )
     outputs = (
         "velocity_x",

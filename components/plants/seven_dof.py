@@ -37,7 +37,7 @@ from ..core import carry
 from ..core.component import Component
 from ..core.load_transfer import quasi_static_loads
 from ..core.plane_body import Four, move, resultants
-from ..core.variables import output, parameter
+from ..core.variables import output, parameter, signal
 from ..core.wheel_kinematics import slip_angle, slip_ratio, wheel_velocities
 from ..core.wheel_spin import spin_wheels
 
@@ -112,8 +112,8 @@ class SevenDof(Component):
         "tyre_force_x_*",
         "tyre_force_y_*",
         "wheel_torque_*",
-        "slip_stiffness_*",
-        "tyre_slip_ratio_*",
+        signal("slip_stiffness_*", optional=True),
+        signal("tyre_slip_ratio_*", optional=True),
     )
     outputs = (
         "velocity_x",

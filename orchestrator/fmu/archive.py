@@ -35,7 +35,7 @@ from ..plan import Fmu
 from ..wording import closest, listed
 from . import description as fmu_description
 
-FORMAT = 1
+FORMAT = 2
 """Of the cache's entries; part of their names, so versions of this program do not quarrel."""
 
 KEEP_DAYS = 60

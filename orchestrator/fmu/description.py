@@ -6,7 +6,7 @@ import dataclasses
 import hashlib
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 from xml.etree import ElementTree
@@ -26,13 +26,13 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
     """
     if "modelDescription.xml" not in files:
         raise ModelDescriptionError(f"{path}: no FMU: the archive holds no modelDescription.xml")
-    _check_kind(files["modelDescription.xml"], path)
+    root = _parsed(files["modelDescription.xml"], path)
 
     from fmpy.model_description import ValidationError, read_model_description
 
     try:
         description = read_model_description(io.BytesIO(raw))
-        variables = _variables(description)
+        variables = _variables(description, _optional(root))
     except ValidationError as error:
         raise ModelDescriptionError(
             f"{path}: the model description is not valid FMI 2.0: {error.problems[0]}"
@@ -57,7 +57,8 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
     )
 
 
-def _check_kind(xml: bytes, path: Path) -> None:
+def _parsed(xml: bytes, path: Path) -> ElementTree.Element:
+    """Return the root of the model description of an FMU of a kind that is supported."""
     try:
         root = ElementTree.fromstring(xml)
     except ElementTree.ParseError as error:
@@ -69,9 +70,19 @@ def _check_kind(xml: bytes, path: Path) -> None:
         raise ModelDescriptionError(f"{path}: an FMU of FMI {version}; {SUPPORTED}")
     if root.find("CoSimulation") is None:
         raise ModelDescriptionError(f"{path}: an FMU for model exchange only; {SUPPORTED}")
+    return root
 
 
-def _variables(description: Any) -> dict[str, Variable]:
+def _optional(root: ElementTree.Element) -> set[str]:
+    """Return the inputs that need no source: `<Annotations><Tool name="yawbench"><optional/>`."""
+    mark = "Annotations/Tool[@name='yawbench']/optional"
+    variables = root.iterfind("ModelVariables/ScalarVariable")
+    return {
+        v.get("name", "") for v in variables if v.get("causality") == "input" and v.find(mark) is not None
+    }
+
+
+def _variables(description: Any, optional: Container[str]) -> dict[str, Variable]:
     sources: dict[str, tuple[str, ...] | None] = {}
     for unknown in description.outputs:
         known = unknown.dependencies
@@ -99,6 +110,7 @@ def _variables(description: Any) -> dict[str, Variable]:
             depends_on=sources.get(v.name) if v.causality == "output" else None,
             choices=tuple(listed[1].split(", ")) if listed else None,
             items=items,
+            optional=v.name in optional,
         )
     return variables
 

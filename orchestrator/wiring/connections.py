@@ -1,4 +1,8 @@
-"""One source for every input: wires by connections, by equal names, constants for what is left."""
+"""One source for every input: wires by connections, by equal names, constants for what is left.
+
+An input that its unit declares as optional, and that nothing drives, keeps its start value: it counts
+among the constants, so it is shown and recorded like them.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +53,11 @@ class Connector:
         fed = wires.keys() | constants.keys() | ambiguous
         for unit, inputs in self._inputs.items():
             for name, variable in inputs.items():
-                if (unit, name) not in fed:
+                if (unit, name) in fed:
+                    continue
+                if variable.optional and variable.start is not None:
+                    constants[(unit, name)] = variable.start
+                else:
                     self._report(("units", unit), self._undriven(unit, variable))
         for wire, key in wires.values():
             self._check(wire, key)

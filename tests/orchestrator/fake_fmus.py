@@ -28,6 +28,7 @@ class Var:
     follows: tuple[str, ...] | None = ()
     items: tuple[str, ...] = ()
     choices: tuple[str, ...] = field(default=())
+    optional: bool = False
 
 
 def out(name: str, *follows: str, unit: str | None = "1", **rest: object) -> Var:
@@ -136,9 +137,10 @@ def _scalar_variable(causality: str, var: Var, reference: int) -> str:
     if causality != "output":
         attributes["start"] = str(var.start).lower() if var.type == "Boolean" else str(var.start)
     inner = " ".join(f"{k}={quoteattr(v)}" for k, v in attributes.items())
+    mark = '<Annotations><Tool name="yawbench"><optional/></Tool></Annotations>' if var.optional else ""
     return (
         f'<ScalarVariable name={quoteattr(var.name)} valueReference="{reference}" causality="{causality}"'
-        f' variability="{variability}" description={quoteattr(text)}><{var.type} {inner}/></ScalarVariable>'
+        f' variability="{variability}" description={quoteattr(text)}><{var.type} {inner}/>{mark}</ScalarVariable>'
     )
 
 

@@ -388,6 +388,17 @@ def test_an_input_without_a_source_is_said_with_what_fits() -> None:
     ]
 
 
+def test_an_optional_input_keeps_its_start_value_where_nothing_drives_it(folder: Path) -> None:
+    make_fmu(folder / "fmus" / "tyre_dugoff.fmu", inputs=[Var("heat", "1", start=0.5, optional=True)])
+    units = "  tyre: {fmu: tyre_dugoff}\n"
+    assert unit(plan(scenario(units, "")), "tyre").constants == {"heat": 0.5}
+    assert unit(plan(scenario(units, "inputs: {heat: 0.7}\n")), "tyre").constants == {"heat": 0.7}
+    make_fmu(folder / "fmus" / "road.fmu", outputs=[out("heat")])
+    driven = plan(scenario(units + "  road: {fmu: road}\n", ""))
+    assert unit(driven, "tyre").constants == {}
+    assert Wire("road", "heat", "tyre", "heat") in driven.wires
+
+
 def test_an_input_of_one_wheel_without_a_source_is_said_alone() -> None:
     rest = "inputs: {friction: 1, friction_fl: 1, friction_rl: 1, friction_rr: 1}\n" + TORQUES
     assert [text.partition(" [1]")[0] for text in problems(scenario(rest=rest))] == [
