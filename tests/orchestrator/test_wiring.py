@@ -389,11 +389,11 @@ def test_an_input_without_a_source_is_said_with_what_fits() -> None:
 
 
 def test_an_optional_input_keeps_its_start_value_where_nothing_drives_it(folder: Path) -> None:
-    make_fmu(folder / "fmus" / "tyre_dugoff.fmu", inputs=[Var("heat", "1", start=0.5, optional=True)])
+    make_fmu(folder / "tyre_dugoff.fmu", inputs=[Var("heat", "1", start=0.5, optional=True)])
     units = "  tyre: {fmu: tyre_dugoff}\n"
     assert unit(plan(scenario(units, "")), "tyre").constants == {"heat": 0.5}
     assert unit(plan(scenario(units, "inputs: {heat: 0.7}\n")), "tyre").constants == {"heat": 0.7}
-    make_fmu(folder / "fmus" / "road.fmu", outputs=[out("heat")])
+    make_fmu(folder / "road.fmu", outputs=[out("heat")])
     driven = plan(scenario(units + "  road: {fmu: road}\n", ""))
     assert unit(driven, "tyre").constants == {}
     assert Wire("road", "heat", "tyre", "heat") in driven.wires
