@@ -15,7 +15,8 @@ Swaps = Annotated[
     typer.Option(
         "--swap",
         metavar="UNIT=FMU,FMU,...",
-        help="FMUs to compare for a unit; one alone is compared with the scenario's own. Repeatable.",
+        help="FMUs to compare for a unit; one alone is compared with the scenario's own. An FMU may bring "
+        "parameters, FMU:PARAMETER=VALUE. Repeatable.",
     ),
 ]
 

@@ -27,12 +27,15 @@ if TYPE_CHECKING:
 
 STANDARD = (
     "relative_peak_error(sideslip)",
+    "mean_error(sideslip)",
     "rms_error(sideslip)",
     "peak(sideslip)",
     "relative_peak_error(yaw_rate)",
+    "mean_error(yaw_rate)",
     "rms_error(yaw_rate)",
     "overshoot(yaw_rate)",
     "settling_time(yaw_rate)",
+    "slope_variation_rate(yaw_rate)",
     "peak(acceleration_y)",
     "displacement(position_y)",
     "final(velocity_x)",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,8 +39,9 @@ def variants(
 
     Args:
         scenario: the scenario file.
-        swaps: `unit=fmu,fmu,...`; a unit may be named more than once. If only one FMU is named in
-            all, the scenario as it stands is the other variant.
+        swaps: `unit=fmu,fmu,...`; a unit may be named more than once. An FMU may bring parameters,
+            `fmu:parameter=value:parameter=value`, so that one FMU can be compared with itself. If only
+            one FMU is named in all, the scenario as it stands is the other variant.
         settings: `unit.parameter=value`, for all.
         out: folder of all results; each variant has a folder below, named like it.
         fmus: folder of FMUs given by name.
@@ -49,7 +51,7 @@ def variants(
     """
     choices = _choices(swaps)
     if all(len(names) == 1 for names in choices.values()):
-        swapped = [f"{unit}={names[0]}" for unit, names in choices.items()]
+        swapped = [f"{unit}={_parts(names[0])[0]}" for unit, names in choices.items()]
         own = load_scenario(scenario, swaps=swapped, settings=settings).replaced
         for unit, names in choices.items():
             fmu = str(scenario.absolute().parent / own[unit]) if is_path(own[unit]) else own[unit]
@@ -60,11 +62,13 @@ def variants(
     jobs: list[Job] = []
     for combination in itertools.product(*choices.values()):
         chosen = dict(zip(choices, combination, strict=True))
-        label = " + ".join(_stem(chosen[unit]) for unit in named)
+        label = " + ".join(_label(chosen[unit]) for unit in named)
         repeated = sum(job.label.partition(" (")[0] == label for job in jobs)
         label += f" ({repeated + 1})" if repeated else ""
-        options = tuple(f"{unit}={fmu}" for unit, fmu in chosen.items())
-        jobs.append(Job(label, scenario, out / label.replace(" ", ""), options, tuple(settings), fmus=fmus))
+        options = tuple(f"{unit}={_parts(text)[0]}" for unit, text in chosen.items())
+        brought = tuple(f"{unit}.{one}" for unit, text in chosen.items() for one in _parts(text)[1])
+        folder = out / label.replace(" ", "")
+        jobs.append(Job(label, scenario, folder, options, (*settings, *brought), fmus=fmus))
     return jobs
 
 
@@ -81,8 +85,16 @@ def _choices(swaps: Sequence[str]) -> dict[str, list[str]]:
     return choices
 
 
-def _stem(fmu: str) -> str:
-    return Path(fmu).stem if is_path(fmu) else fmu
+def _parts(text: str) -> tuple[str, list[str]]:
+    """Return the FMU and the settings of `fmu:parameter=value:parameter=value`."""
+    match = re.fullmatch(r"(.*?)((?::\w+=[^:]*)*)", text)
+    assert match is not None
+    return match[1], match[2].split(":")[1:]
+
+
+def _label(text: str) -> str:
+    fmu, settings = _parts(text)
+    return " ".join([Path(fmu).stem if is_path(fmu) else fmu, *settings])
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +15,9 @@ from ..metrics.run_metrics import Value
 
 if TYPE_CHECKING:
     import rich.table
+
+MIN_HEADING = 12
+"""Characters of a heading over numbers before it is broken at a space."""
 
 Cell = str | Value | None
 """Words, a number with its unit, or nothing."""
@@ -55,10 +59,14 @@ def for_terminal(table: Table) -> rich.table.Table:
         title=Text(table.title), title_justify="left", title_style="bold", caption=caption,
         caption_justify="left", caption_style="", box=box.SIMPLE_HEAD, pad_edge=False,
     )  # fmt: skip
+    rows = table.text()
     for i, heading in enumerate(table.headings):
         number = table.is_number(i)
+        if number:  # a long heading is no reason for a broad column
+            widest = max(MIN_HEADING, *(len(row[i]) for row in rows))
+            heading = "\n".join(textwrap.wrap(heading, widest, break_long_words=False)) or heading
         shape.add_column(Text(heading), justify="right" if number else "left", no_wrap=number)
-    for row in table.text():
+    for row in rows:
         shape.add_row(*(Text(cell) for cell in row))
     return shape
 

@@ -70,6 +70,20 @@ def test_a_file_whose_name_holds_a_comma_is_one_fmu(scenario, tmp_path):
     assert labels(scenario, f"controller={odd}") == ["controller_fnn", "a,b"]
 
 
+def test_an_fmu_may_bring_parameters_and_so_be_compared_with_itself(scenario):
+    jobs = variants(scenario, ["controller=a,a:law=sign:gain=2,b"], ["plant.mass=2"], Path("out"), None)
+    assert [job.label for job in jobs] == ["a", "a law=sign gain=2", "b"]
+    assert [job.swaps for job in jobs] == [("controller=a",), ("controller=a",), ("controller=b",)]
+    assert jobs[1].settings == ("plant.mass=2", "controller.law=sign", "controller.gain=2")
+    assert jobs[0].settings == jobs[2].settings == ("plant.mass=2",)
+    assert len({job.out for job in jobs}) == 3
+
+
+def test_parameters_alone_set_the_scenarios_own_fmu_against_itself(scenario):
+    jobs = variants(scenario, ["controller=controller_fnn:learning=false"], (), Path("out"), None)
+    assert [job.settings for job in jobs] == [(), ("controller.learning=false",)]
+
+
 def test_a_comparison_with_itself_is_an_error(scenario):
     with pytest.raises(ScenarioError, match="nothing to compare: name several FMUs"):
         labels(scenario, "controller=controller_fnn")

@@ -18,6 +18,7 @@ from orchestrator.studies.study import claim_tables, derived_tables, judge_study
 from orchestrator.studies.study_file import load_study
 from orchestrator.studies.study_report import write_study
 from orchestrator.studies.study_schema import Claim
+from orchestrator.studies.tables import Table, for_terminal
 
 from .recorded import car, write
 
@@ -384,6 +385,11 @@ def test_what_is_wrong_with_grids_and_derived_numbers_is_said(with_grid, old, ne
     with pytest.raises(ScenarioError) as error:
         with_grid((old, new))
     assert any(said in problem for problem in error.value.problems), error.value.problems
+
+
+def test_a_long_heading_over_numbers_is_broken_on_the_terminal():
+    table = Table("", ["run", "controller_sliding_mode switching=saturation"], [["a", Value(1.0, "N.m")]])
+    assert str(for_terminal(table).columns[1].header) == "controller_sliding_mode\nswitching=saturation"
 
 
 def test_expressions_are_arithmetic():

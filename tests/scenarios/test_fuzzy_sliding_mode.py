@@ -1,0 +1,208 @@
+"""Paper B's scenarios and studies on the real master, with FMUs built for the test."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fmus.build import build_all
+from orchestrator.cli import main
+from orchestrator.results.read import load_results
+from orchestrator.studies.jobs import Job, execute
+
+FOLDER = Path(__file__).parents[2] / "scenarios" / "fuzzy_sliding_mode"
+SCENARIOS = ("high_friction", "low_friction", "beyond_paper", "beyond_grip", "side_share")
+STUDIES = ("study", "distribution")
+UNITS = (
+    "driver_sine", "driver_force_pulse", "reference_single_track", "controller_off",
+    "controller_sliding_mode", "controller_fuzzy_sliding_mode", "allocator_load_proportional",
+    "allocator_side_share", "wheel_control_slip", "wheel_control_direct", "actuator_lag", "plant_eight_dof",
+    "tyre_magic_formula",
+)  # fmt: skip
+LAWS = ("sign", "saturation", "fuzzy")
+ROADS = ("high_friction", "low_friction", "beyond_paper")
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("fmus")
+    build_all(folder, components=UNITS)
+    return folder
+
+
+def judged(name, folder, fmus):
+    """Run a study and return what its study.json says, with its folder."""
+    with pytest.raises(SystemExit) as exit_:
+        main(["study", str(FOLDER / f"{name}.yaml"), "--out", str(folder), "--fmus", str(fmus)])
+    assert not exit_.value.code
+    return json.loads((folder / "study.json").read_text()) | {"folder": folder}
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory, fmus):
+    return judged("study", tmp_path_factory.mktemp("study"), fmus)
+
+
+@pytest.fixture(scope="module")
+def distribution(tmp_path_factory, fmus):
+    return judged("distribution", tmp_path_factory.mktemp("distribution"), fmus)
+
+
+@pytest.fixture
+def metric(study):
+    """Return a metric of a run."""
+    return lambda run, name: study["runs"][run]["metrics"][name]["value"]
+
+
+def test_every_file_of_the_folder_is_tested_here():
+    assert {path.stem for path in FOLDER.glob("*.yaml")} == {*SCENARIOS, *STUDIES}
+
+
+@pytest.fixture(scope="module")
+def short_runs(tmp_path_factory, fmus):
+    """Scenario -> results of its first second."""
+    folder = tmp_path_factory.mktemp("short")
+    jobs = [
+        Job(name, FOLDER / f"{name}.yaml", folder / name, stop_time=Fraction(1), fmus=fmus)
+        for name in SCENARIOS
+    ]
+    assert [outcome.problems for outcome in execute(jobs)] == [()] * len(jobs)
+    return {name: load_results(folder / name) for name in SCENARIOS}
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_every_scenario_runs(short_runs, name):
+    run = short_runs[name]
+    assert run.time[-1] == 1.0
+    assert run["plant.velocity_x"][-1] > 5.0
+
+
+GOLDEN = {
+    "plant.yaw_rate": (2e-4, (0.39343, -0.44462, 0.21466, -0.24508, 0.14896, -0.18487)),
+    "plant.sideslip": (2e-4, (-0.06380, 0.00145, -0.01029, 0.00263, -0.02109, 0.00337)),
+    "plant.velocity_x": (2e-3, (27.1704, 25.6048, 13.7349, 13.4815, 21.9526, 21.5496)),
+    "controller.yaw_moment": (5.0, (-949.5, 1926.6, -99.8, 874.6, -167.1, 1190.6)),
+    "actuator.wheel_torque_fl": (2.0, (48.7, 4.6, 12.2, 47.5, 20.0, -193.8)),
+}
+"""Column -> tolerance in SI, values at 1 and 2 s of each road with the fuzzy law."""
+
+
+@pytest.mark.parametrize("column", GOLDEN)
+def test_the_fuzzy_runs_are_what_they_were(study, column):
+    tolerance, values = GOLDEN[column]
+    found = [load_results(study["folder"] / road / "fuzzy")[column][[1000, 2000]] for road in ROADS]
+    assert np.concatenate(found) == pytest.approx(values, abs=tolerance)
+
+
+@pytest.mark.parametrize("road", ROADS)
+def test_without_control_the_car_leaves_its_reference(metric, road):
+    assert metric(f"{road}/off", "relative_peak") > 0.8
+
+
+def test_beyond_the_paper_the_uncontrolled_car_is_lost(metric):
+    assert metric("beyond_paper/off", "sideslip") > 0.6
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("road", ROADS)
+def test_every_law_follows_the_reference(metric, road, law):
+    assert metric(f"{road}/{law}", "mean") <= 0.25 * metric(f"{road}/off", "mean")
+    if road == "beyond_paper":
+        assert metric(f"{road}/{law}", "sideslip") < np.radians(3.0)
+    else:
+        assert metric(f"{road}/{law}", "relative_peak") <= 0.3
+
+
+@pytest.mark.parametrize("road", ROADS)
+def test_fuzzy_halves_the_chatter_of_the_sign_law_at_no_worse_tracking(metric, road):
+    for chatter in ("torque_chatter", "yaw_chatter"):
+        assert metric(f"{road}/fuzzy", chatter) <= 0.5 * metric(f"{road}/sign", chatter)
+    assert metric(f"{road}/fuzzy", "mean") <= 1.1 * metric(f"{road}/sign", "mean")
+
+
+def test_nearly_all_of_that_is_the_boundary_layers(study):
+    shares = [
+        study["derived"][f"{run}_{of}"]["value"]
+        for run in ("high", "low", "beyond")
+        for of in ("torque", "yaw")
+    ]
+    assert min(shares) > 0.9
+
+
+def test_a_sliding_car_recovers_with_the_weight_as_it_is_and_not_with_the_other_sign(metric):
+    for run in ("weight_-0.25", "weight_-1", "fuzzy_slip_control"):
+        assert metric(f"sliding/{run}", "late_sideslip") < np.radians(1.0)
+    assert metric("sliding/weight_1", "sideslip") > np.radians(90.0)
+
+
+@pytest.mark.parametrize("steer", ["0", "0.03"])
+@pytest.mark.parametrize("force", ["-6000", "6000"])
+def test_beyond_the_grip_slip_control_keeps_the_wheels_and_direct_torque_does_not(metric, force, steer):
+    slip, direct = (f"grip/{force}_{steer}/{name}" for name in ("slip", "direct"))
+    assert metric(slip, "slip") < 0.15
+    assert metric(direct, "slip") > 0.6
+    assert metric(slip, "sideslip") < np.radians(5.0)
+    if steer == "0.03":
+        assert metric(direct, "sideslip") > np.radians(10.0)
+
+
+def test_all_claims_and_checks_of_the_study_hold(study):
+    assert [one["says"] for one in (*study["claims"], *study["checks"]) if not one["holds"]] == []
+
+
+@pytest.mark.slow
+def test_the_distribution_table_is_the_papers_in_order_and_best_in_proportion_to_load(distribution):
+    def means(of):
+        runs = distribution["runs"].items()
+        return {
+            name.split("/")[1]: run["metrics"]["mean"]["value"] for name, run in runs if name.startswith(of)
+        }
+
+    mean = means("one_side_braked/")
+    assert len(mean) == 26
+    assert mean["by_load"] <= 1.05 * min(mean.values())
+    assert mean["by_load"] < mean["0.5_0.5"]
+    assert all(value >= 3.0 * mean["by_load"] for name, value in mean.items() if "0" in name.split("_"))
+    assert max(mean, key=mean.get) == "0_0"
+    assert distribution["derived"]["order_one_side"]["value"] > 0.8
+    assert distribution["derived"]["order_opposite"]["value"] < 0.8
+
+
+@pytest.mark.slow
+def test_of_the_papers_claims_on_distribution_only_the_lost_cars_do_not_reproduce(distribution):
+    assert [one["says"] for one in distribution["claims"] if not one["holds"]] == [
+        "Any variant with a front share of 0 loses the car."
+    ]
+    assert all(one["holds"] for one in distribution["checks"])
+
+
+def test_figures_and_tables_are_written(study):
+    assert set(study["figures"]) == {
+        "high_friction", "low_friction", "beyond_paper", "sliding", "braking_in_a_turn", "driving_in_a_turn",
+        "braking_straight",
+    }  # fmt: skip
+    for name in study["figures"]:
+        for kind in ("svg", "png"):
+            assert (study["folder"] / "figures" / f"{name}.{kind}").stat().st_size > 10_000
+
+
+def test_compare_shows_the_four_controllers(fmus, tmp_path):
+    with pytest.raises(SystemExit) as exit_:
+        main([
+            "compare", str(FOLDER / "low_friction.yaml"), "--fmus", str(fmus), "--out", str(tmp_path),
+            "--swap",
+            "controller=controller_off,controller_sliding_mode,controller_sliding_mode:switching=saturation,"
+            "controller_fuzzy_sliding_mode",
+        ])  # fmt: skip
+    assert not exit_.value.code
+    head = next(
+        line for line in (tmp_path / "compare.md").read_text().splitlines() if line.startswith("| metric")
+    )
+    assert [cell.strip() for cell in head.strip("|").split("|")][2:] == [
+        "controller_off", "controller_sliding_mode", "controller_sliding_mode switching=saturation",
+        "controller_fuzzy_sliding_mode",
+    ]  # fmt: skip
