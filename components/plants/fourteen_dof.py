@@ -27,62 +27,26 @@ springs are stiff or the step is long.
 
 from __future__ import annotations
 
-from math import atan2, cos, sin
-
 from ..core import carry
+from ..core.car_signals import INPUTS, MOTION, WHEELS, initial_motion, motion_outputs, wheel_outputs
 from ..core.component import Component
 from ..core.contact_points import contact, contact_velocities
 from ..core.plane_body import move
 from ..core.resistance import resistance
 from ..core.ride import AT_REST, RESOLVED, loads, move_ride
 from ..core.sprung_car import FourteenDofParameters, G, ride_of
-from ..core.variables import output, signal
-from ..core.wheel_kinematics import slip_angle, slip_ratio
+from ..core.variables import output
 from ..core.wheel_spin import spin_wheels
+
+HEAVE = output("heave", unit="m", text="Height of the sprung mass's centre above its place at rest")
 
 
 class FourteenDof(Component):
     """Car with fourteen degrees of freedom (body in space, wheel travel, wheel spins) on tyre springs."""
 
     Parameters = FourteenDofParameters
-    inputs = (
-        "steer_angle",
-        "tyre_force_x_*",
-        "tyre_force_y_*",
-        "wheel_torque_*",
-        signal("slip_stiffness_*", optional=True),
-        signal("tyre_slip_ratio_*", optional=True),
-    )
-    outputs = (
-        "velocity_x",
-        "velocity_y",
-        "yaw_rate",
-        "sideslip",
-        "sideslip_rate",
-        "acceleration_x",
-        "acceleration_y",
-        "roll_angle",
-        "roll_rate",
-        "pitch_angle",
-        output("heave", unit="m", text="Height of the sprung mass's centre above its place at rest"),
-        "position_x",
-        "position_y",
-        "yaw_angle",
-        output("slip_angle_fl", "steer_angle"),
-        output("slip_angle_fr", "steer_angle"),
-        "slip_angle_rl",
-        "slip_angle_rr",
-        output("slip_ratio_fl", "steer_angle"),
-        output("slip_ratio_fr", "steer_angle"),
-        "slip_ratio_rl",
-        "slip_ratio_rr",
-        "vertical_load_*",
-        "wheel_speed_*",
-        output("wheel_velocity_fl", "steer_angle"),
-        output("wheel_velocity_fr", "steer_angle"),
-        "wheel_velocity_rl",
-        "wheel_velocity_rr",
-    )
+    inputs = INPUTS
+    outputs = (*MOTION, "roll_angle", "roll_rate", "pitch_angle", HEAVE, *WHEELS)
 
     def configure(self):
         p = self.p
@@ -93,9 +57,7 @@ class FourteenDof(Component):
 
     def start(self, t, u):
         p = self.p
-        v_x = p.initial_speed * cos(p.initial_sideslip)
-        v_y = p.initial_speed * sin(p.initial_sideslip)
-        self.motion = (v_x, v_y, p.initial_yaw_rate, 0.0, 0.0, 0.0)
+        self.motion = initial_motion(p)
         high = p.initial_heave
         self.body: tuple[float, ...] = (high, 0.0, 0.0, high, high, high, high, *AT_REST[7:])
         self.steer_angle = u[0]
@@ -152,46 +114,15 @@ class FourteenDof(Component):
 
     def output(self, t, u):
         p = self.p
-        low = p.low_speed
-        radius = p.wheel_radius
-        v_x, v_y, r, x, y, psi = self.motion
-        a_x, a_y = self.end
-        body = self.body
-        w_fl, w_fr, w_rl, w_rr = self.spins
-        v_fl, v_fr, v_rl, v_rr, side_fl, side_fr, side_rl, side_rr = self.wheels
-        turning = (v_x * a_y - v_y * a_x) / max(v_x * v_x + v_y * v_y, low * low)
+        heave, roll, pitch = self.body[:3]
+        wheels = wheel_outputs(self.wheels, self.spins, self.loads, radius=p.wheel_radius, v_low=p.low_speed)
         return (
-            v_x,
-            v_y,
-            r,
-            atan2(v_y, v_x),
-            turning - r,
-            a_x,
-            a_y,
+            *motion_outputs(self.motion, *self.end, p.low_speed),
             body[1],
             body[8],
             body[2],
             body[0],
-            x,
-            y,
-            psi,
-            slip_angle(v_fl, side_fl, low),
-            slip_angle(v_fr, side_fr, low),
-            slip_angle(v_rl, side_rl, low),
-            slip_angle(v_rr, side_rr, low),
-            slip_ratio(w_fl * radius, v_fl, low),
-            slip_ratio(w_fr * radius, v_fr, low),
-            slip_ratio(w_rl * radius, v_rl, low),
-            slip_ratio(w_rr * radius, v_rr, low),
-            *self.loads,
-            w_fl,
-            w_fr,
-            w_rl,
-            w_rr,
-            v_fl,
-            v_fr,
-            v_rl,
-            v_rr,
+            *wheels,
         )
 
     def _contact(self, delta, u):

@@ -31,14 +31,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan2, cos, sin
 
 from ..core import carry
+from ..core.car_signals import INPUTS, MOTION, WHEELS, initial_motion, motion_outputs, wheel_outputs
 from ..core.component import Component
 from ..core.load_transfer import quasi_static_loads
 from ..core.plane_body import Four, move, resultants
-from ..core.variables import output, parameter, signal
-from ..core.wheel_kinematics import slip_angle, slip_ratio, wheel_velocities
+from ..core.variables import parameter
+from ..core.wheel_kinematics import wheel_velocities
 from ..core.wheel_spin import spin_wheels
 
 
@@ -107,46 +107,12 @@ class SevenDof(Component):
     """Car with seven degrees of freedom (plane motion, four wheel spins), quasi-static wheel loads."""
 
     Parameters = SevenDofParameters
-    inputs = (
-        "steer_angle",
-        "tyre_force_x_*",
-        "tyre_force_y_*",
-        "wheel_torque_*",
-        signal("slip_stiffness_*", optional=True),
-        signal("tyre_slip_ratio_*", optional=True),
-    )
-    outputs = (
-        "velocity_x",
-        "velocity_y",
-        "yaw_rate",
-        "sideslip",
-        "sideslip_rate",
-        "acceleration_x",
-        "acceleration_y",
-        "position_x",
-        "position_y",
-        "yaw_angle",
-        output("slip_angle_fl", "steer_angle"),
-        output("slip_angle_fr", "steer_angle"),
-        "slip_angle_rl",
-        "slip_angle_rr",
-        output("slip_ratio_fl", "steer_angle"),
-        output("slip_ratio_fr", "steer_angle"),
-        "slip_ratio_rl",
-        "slip_ratio_rr",
-        "vertical_load_*",
-        "wheel_speed_*",
-        output("wheel_velocity_fl", "steer_angle"),
-        output("wheel_velocity_fr", "steer_angle"),
-        "wheel_velocity_rl",
-        "wheel_velocity_rr",
-    )
+    inputs = INPUTS
+    outputs = (*MOTION, *WHEELS)
 
     def start(self, t, u):
         p = self.p
-        v_x = p.initial_speed * cos(p.initial_sideslip)
-        v_y = p.initial_speed * sin(p.initial_sideslip)
-        self.motion = (v_x, v_y, p.initial_yaw_rate, 0.0, 0.0, 0.0)
+        self.motion = initial_motion(p)
         self.steer_angle = u[0]
         self.wheels = self._wheels(u[0])
         self.spins = tuple([v / p.wheel_radius for v in self.wheels[:4]])  # rolling freely
@@ -188,46 +154,8 @@ class SevenDof(Component):
 
     def output(self, t, u):
         p = self.p
-        low = p.low_speed
-        radius = p.wheel_radius
-        v_x, v_y, r, x, y, psi = self.motion
-        a_x, a_y = self.end
-        w_fl, w_fr, w_rl, w_rr = self.spins
-        v_fl, v_fr, v_rl, v_rr, side_fl, side_fr, side_rl, side_rr = self.wheels
-        f_fl, f_fr, f_rl, f_rr = self.loads
-        turning = (v_x * a_y - v_y * a_x) / max(v_x * v_x + v_y * v_y, low * low)
-        return (
-            v_x,
-            v_y,
-            r,
-            atan2(v_y, v_x),
-            turning - r,
-            a_x,
-            a_y,
-            x,
-            y,
-            psi,
-            slip_angle(v_fl, side_fl, low),
-            slip_angle(v_fr, side_fr, low),
-            slip_angle(v_rl, side_rl, low),
-            slip_angle(v_rr, side_rr, low),
-            slip_ratio(w_fl * radius, v_fl, low),
-            slip_ratio(w_fr * radius, v_fr, low),
-            slip_ratio(w_rl * radius, v_rl, low),
-            slip_ratio(w_rr * radius, v_rr, low),
-            f_fl,
-            f_fr,
-            f_rl,
-            f_rr,
-            w_fl,
-            w_fr,
-            w_rl,
-            w_rr,
-            v_fl,
-            v_fr,
-            v_rl,
-            v_rr,
-        )
+        wheels = wheel_outputs(self.wheels, self.spins, self.loads, radius=p.wheel_radius, v_low=p.low_speed)
+        return (*motion_outputs(self.motion, *self.end, p.low_speed), *wheels)
 
     def _wheels(self, delta):
         """Return the velocities of the wheels [m/s], longitudinal and lateral, at `delta` [rad]."""

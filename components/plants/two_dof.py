@@ -22,9 +22,10 @@ Gauss's rule with two points.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, cos, sin
+from math import cos, sin
 
 from ..core import carry
+from ..core.car_signals import MOTION, initial_motion, motion_outputs
 from ..core.component import Component
 from ..core.load_transfer import quasi_static_loads
 from ..core.plane_body import Motion
@@ -94,16 +95,7 @@ class TwoDof(Component):
     Parameters = TwoDofParameters
     inputs = ("steer_angle", "tyre_force_x_*", "tyre_force_y_*", "yaw_moment")
     outputs = (
-        "velocity_x",
-        "velocity_y",
-        "yaw_rate",
-        "sideslip",
-        "sideslip_rate",
-        "acceleration_x",
-        "acceleration_y",
-        "position_x",
-        "position_y",
-        "yaw_angle",
+        *MOTION,
         output("slip_angle_fl", "steer_angle"),
         output("slip_angle_fr", "steer_angle"),
         "slip_angle_rl",
@@ -118,9 +110,7 @@ class TwoDof(Component):
 
     def start(self, t, u):
         p = self.p
-        v_x = p.initial_speed * cos(p.initial_sideslip)
-        v_y = p.initial_speed * sin(p.initial_sideslip)
-        self.motion = (v_x, v_y, p.initial_yaw_rate, 0.0, 0.0, 0.0)
+        self.motion = initial_motion(p)
         self.steer_angle = u[0]
         a_y = self._resultants(u[0], u)[0] / p.mass
         self.history = ((0.0, a_y), (0.0, a_y))  # age [s] and acceleration at the last two middles
@@ -142,20 +132,10 @@ class TwoDof(Component):
 
     def output(self, t, u):
         low = self.p.low_speed
-        v_x, v_y, r, x, y, psi = self.motion
+        _, v_y, r = self.motion[:3]
         v_fl, v_fr, v_rl, v_rr, side_fl, side_fr, side_rl, side_rr = self.wheels
-        speed_squared = max(v_x * v_x + v_y * v_y, low * low)
         return (
-            v_x,
-            v_y,
-            r,
-            atan2(v_y, v_x),
-            v_x * (self.a_y - v_x * r) / speed_squared,
-            -v_y * r,
-            self.a_y,
-            x,
-            y,
-            psi,
+            *motion_outputs(self.motion, -v_y * r, self.a_y, low),
             slip_angle(v_fl, side_fl, low),
             slip_angle(v_fr, side_fr, low),
             slip_angle(v_rl, side_rl, low),
