@@ -118,10 +118,10 @@ class FourteenDof(Component):
         wheels = wheel_outputs(self.wheels, self.spins, self.loads, radius=p.wheel_radius, v_low=p.low_speed)
         return (
             *motion_outputs(self.motion, *self.end, p.low_speed),
-            body[1],
-            body[8],
-            body[2],
-            body[0],
+            roll,
+            self.body[8],
+            pitch,
+            heave,
             *wheels,
         )
 
