@@ -114,16 +114,12 @@ class FourteenDof(Component):
 
     def output(self, t, u):
         p = self.p
+        a_x, a_y = self.end
         heave, roll, pitch = self.body[:3]
+        roll_rate = self.body[8]
+        motion = motion_outputs(self.motion, a_x, a_y, p.low_speed)
         wheels = wheel_outputs(self.wheels, self.spins, self.loads, radius=p.wheel_radius, v_low=p.low_speed)
-        return (
-            *motion_outputs(self.motion, *self.end, p.low_speed),
-            roll,
-            self.body[8],
-            pitch,
-            heave,
-            *wheels,
-        )
+        return (*motion, roll, roll_rate, pitch, heave, *wheels)
 
     def _contact(self, delta, u):
         p = self.p
