@@ -50,8 +50,8 @@ class SlipControlParameters:
     slip_cap: float = parameter(
         0.25,
         "1",
-        "Largest slip; chosen: at 0.15, tried first, paper B's sliding car is not caught again; slip stays "
-        "below 0.15 all the same in straight and steered braking and driving",
+        "Largest slip; chosen: at 0.15, tried first, paper B's sliding car is not caught again; braking and "
+        "driving beyond the grip, straight and steered, stay below 0.16 all the same",
         minimum=0.001,
         maximum=0.99,
     )

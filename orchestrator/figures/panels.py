@@ -125,7 +125,8 @@ def _draw_signal(axes: Axes, runs: Sequence[Run], name: str) -> None:
     _finish(axes, f"{words(name)} {_maths(name)}", unit)
     if references:
         peaks = [(run.label, _peak(run.results[column])) for _, run, column, _ in lines]
-        _limit(axes, max(_peak(reference) for reference in references), peaks, unit)
+        wanted = max(_peak(reference) for reference in references)
+        _limit(axes, max(wanted, min(peak for _, peak in peaks)), peaks, unit)
 
 
 def _limit(axes: Axes, scale: float, lines: list[tuple[str, float]], unit: str) -> None:

@@ -147,6 +147,13 @@ def test_a_lost_car_leaves_the_axes_and_the_figure_says_so():
     assert [text.get_text() for text in axes.texts] == ["beyond the axes: lost, up to 41.3 °"]
 
 
+def test_a_car_beyond_a_tiny_reference_stays_in_the_axes_with_another_that_is():
+    figure = draw([Run("none", car(24.0)), Run("held", car(6.0))], ["sideslip"])
+    axes = panel(figure, "sideslip")
+    assert axes.get_ylim()[1] > np.degrees(24.0 * 0.6 * 0.03)
+    assert not axes.texts
+
+
 def test_a_lost_car_alone_is_shown_whole():
     axes = panel(draw([Run("lost", car(40.0))], ["sideslip"]), "sideslip")
     assert axes.get_ylim()[1] > np.degrees(40 * 0.6 * 0.03)
