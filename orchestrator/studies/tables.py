@@ -75,7 +75,7 @@ def for_markdown(table: Table) -> str:
     """Return the table as GitHub Markdown, with its title in bold."""
 
     def line(cells: Sequence[str]) -> str:
-        return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", "; ") for cell in cells) + " |"
+        return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", "<br>") for cell in cells) + " |"
 
     rule = ["---:" if table.is_number(i) else "---" for i in range(len(table.headings))]
     head = [f"**{table.title}**", ""] if table.title else []
