@@ -25,7 +25,7 @@ run: fmus
 	$(BIN)/yawbench run $(SCENARIO)
 
 test: fmus
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto --dist loadfile  # a study runs once for all tests of its file
 
 bench: fmus
 	$(BIN)/python -m tests.bench
