@@ -20,6 +20,7 @@ UNITS: dict[str, dict[str, int]] = {
     "rad": {"rad": 1},
     "1/rad": {"rad": -1},
     "s/rad": {"s": 1, "rad": -1},
+    "s2/rad": {"s": 2, "rad": -1},
     "rad/s": {"rad": 1, "s": -1},
     "rad/s2": {"rad": 1, "s": -2},
     "Hz": {"s": -1},
@@ -36,6 +37,8 @@ UNITS: dict[str, dict[str, int]] = {
     "N.m/rad": {"kg": 1, "m": 2, "s": -2, "rad": -1},
     "N.m.s": {"kg": 1, "m": 2, "s": -1},
     "N.m.s/rad": {"kg": 1, "m": 2, "s": -1, "rad": -1},
+    "N.m.s2/rad": {"kg": 1, "m": 2, "rad": -1},
+    "N.m/(rad.s)": {"kg": 1, "m": 2, "s": -3, "rad": -1},
     "Pa": {"kg": 1, "m": -1, "s": -2},
     "Pa/s": {"kg": 1, "m": -1, "s": -3},
 }

@@ -1,6 +1,10 @@
 """Open-loop sine steering: a number of whole periods, then the wheel is held straight.
 
-    delta(t) = amplitude sin(2 pi frequency (t - start_time)),   0 <= frequency (t - start_time) <= periods
+    delta_h(t) = amplitude sin(2 pi frequency (t - start_time)),   0 <= frequency (t - start_time) <= periods
+    delta(t) = delta_h(t) / steering_ratio
+
+With the default steering ratio of one the amplitude is that of the road wheels. The speed is held if
+`speed_gain` says so (`core.speed_holding`).
 
 Stimuli live in a unit, not in the master, so that they are exact at every instant and not
 quantised to whole communication steps.
@@ -12,26 +16,30 @@ import math
 from dataclasses import dataclass
 
 from ..core.component import Component
-from ..core.variables import parameter
+from ..core.speed_holding import SpeedHold, SpeedHoldingParameters
+from ..core.variables import parameter, signal
 
 
 @dataclass(frozen=True)
-class SineParameters:
-    """Of the steering input; the papers name a sine but neither amplitude nor period."""
+class SineParameters(SpeedHoldingParameters):
+    """Of the steering input; papers A and B name a sine but neither amplitude nor period."""
 
-    amplitude: float = parameter(0.05, "rad", "Amplitude at the road wheels; chosen: paper A at 15 m/s")
+    amplitude: float = parameter(0.05, "rad", "Amplitude at the hand wheel; chosen: paper A at 15 m/s")
+    steering_ratio: float = parameter(
+        1.0,
+        "1",
+        "Hand-wheel angle over road-wheel angle; chosen: 1, the amplitude is that of the road wheels",
+        minimum=0.1,
+    )
     frequency: float = parameter(
         0.2, "Hz", "Frequency; chosen: one period of 5 s, as in paper A's figure 6", minimum=0.0
     )
     start_time: float = parameter(1.0, "s", "Time of the first zero crossing; chosen: 1 s straight ahead")
     periods: float = parameter(1.0, "1", "Number of periods, then straight ahead; chosen: one", minimum=0.0)
-    constant_drive_force: float = parameter(
-        0.0, "N", "Sum of the longitudinal tyre forces asked for, always; paper A: no driving"
-    )
 
 
 def sine_steer(t: float, p: SineParameters) -> float:
-    """Return the steer angle [rad] at time `t` [s]."""
+    """Return the hand-wheel angle [rad] at time `t` [s]."""
     phase = p.frequency * (t - p.start_time)
     if phase <= 0.0 or phase >= p.periods:
         return 0.0
@@ -39,11 +47,19 @@ def sine_steer(t: float, p: SineParameters) -> float:
 
 
 class Sine(Component):
-    """Open-loop sine steering at the road wheels."""
+    """Open-loop sine steering; the speed may be held."""
 
     Parameters = SineParameters
-    outputs = ("steer_angle", "drive_force")
+    inputs = (signal("velocity_x", optional=True),)
+    outputs = ("steer_angle", "drive_force", "steering_wheel_angle")
+
+    def start(self, t, u):
+        self.speed = SpeedHold(self.p)
+        self.speed.start(u[0])
+
+    def advance(self, t, h, u):
+        self.speed.advance(t, h, u[0])
 
     def output(self, t, u):
-        p = self.p
-        return sine_steer(t, p), p.constant_drive_force
+        hand = sine_steer(t, self.p)
+        return hand / self.p.steering_ratio, self.speed.force, hand

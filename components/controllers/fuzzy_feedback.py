@@ -1,0 +1,112 @@
+"""Fuzzy feedback of yaw rate and sideslip: two Mamdani systems, their moments weighted and added.
+
+    M_1 =  k_u1 f(k_e1 e_r, k_c1 de_r/dt)             e_r = r_ref - r
+    M_2 = -k_u2 f(k_e2 e_beta, k_c2 de_beta/dt)       e_beta = beta_ref - beta
+    M = W_1 M_1 + W_2 M_2                             limited to +-moment_limit                       (1)
+
+f has five triangular sets {NB, NS, Z, PS, PB} on [-1, 1] for every variable, centroid; it reaches
++-5/6. The quantisation factors k_e, k_c scale the inputs, k_u the output. A positive moment lowers
+the sideslip, so the second system enters negated; the paper's errors are actual minus reference.
+
+de_r/dt is the difference of two samples of e_r (smoothed by `rate_filter`): it holds the moment of the
+sample before, divided by I_z. So k_c1 k_u1 / I_z times the slope of f along its second input must stay
+well below one, or the moment chatters from sample to sample; with the defaults it is about 0.1.
+
+Source: Xie, Li, Zheng, Pei, Synthesized feedback control of the ESP system based on fuzzy
+technology, section 3. Its tables 1, 2 and all factors were lost or not given: see
+`core.rule_tables`, and chosen values below.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..core.component import Component
+from ..core.fuzzy import FIVE, Mamdani, Partition
+from ..core.pid import Pid
+from ..core.rule_tables import FIVE_BY_FIVE
+from ..core.sliding_mode import limit
+from ..core.variables import output, parameter
+
+
+@dataclass(frozen=True)
+class FuzzyFeedbackParameters:
+    """Scales, weights and the choice of the table; the paper names none."""
+
+    rule_table: str = parameter(
+        "standard",
+        None,
+        "Rule table of both systems; chosen: the standard one, since the paper's were lost",
+        choices=tuple(FIVE_BY_FIVE),
+    )
+    yaw_rate_error_factor: float = parameter(
+        40.0, "s/rad", "k_e of the yaw-rate system; chosen: saturates at 0.025 rad/s", minimum=0.0
+    )
+    yaw_rate_error_rate_factor: float = parameter(
+        0.02, "s2/rad", "k_c of the yaw-rate system; chosen: saturates at 50 rad/s2", minimum=0.0
+    )
+    yaw_rate_moment: float = parameter(8000.0, "N.m", "k_u of the yaw-rate system; chosen", minimum=0.0)
+    yaw_rate_weight: float = parameter(1.0, "1", "Weight W_1 of the yaw-rate system; chosen", minimum=0.0)
+    sideslip_error_factor: float = parameter(
+        10.0, "1/rad", "k_e of the sideslip system; chosen: saturates at 0.1 rad", minimum=0.0
+    )
+    sideslip_error_rate_factor: float = parameter(
+        0.5, "s/rad", "k_c of the sideslip system; chosen: saturates at 2 rad/s", minimum=0.0
+    )
+    sideslip_moment: float = parameter(4000.0, "N.m", "k_u of the sideslip system; chosen", minimum=0.0)
+    sideslip_weight: float = parameter(1.0, "1", "Weight W_2 of the sideslip system; chosen", minimum=0.0)
+    rate_filter: float = parameter(
+        0.0, "s", "Time constant smoothing the rate of the yaw-rate error; chosen: none", minimum=0.0
+    )
+    moment_limit: float = parameter(
+        6700.0,
+        "N.m",
+        "Largest yaw moment; chosen: mu m g d / 2 at mu 0.5, the most that longitudinal forces could give",
+        minimum=0.0,
+    )
+    fade_speed: float = parameter(
+        2.0, "m/s", "Below it the moment fades out; chosen: walking pace", minimum=0.001
+    )
+
+
+YAW_RATE = ("yaw_rate_ref", "yaw_rate")
+SIDESLIP = ("sideslip_ref", "sideslip", "sideslip_rate_ref", "sideslip_rate")
+
+
+class FuzzyFeedback(Component):
+    """Weighted sum of two fuzzy controllers, of yaw rate and of sideslip."""
+
+    Parameters = FuzzyFeedbackParameters
+    sampled = True
+    inputs = (*YAW_RATE, *SIDESLIP, "velocity_x")
+    outputs = (
+        output("yaw_moment", *YAW_RATE, *SIDESLIP, "velocity_x"),
+        output("yaw_rate_part", *YAW_RATE, unit="N.m", text="Moment W_1 M_1 of the yaw-rate system"),
+        output("sideslip_part", *SIDESLIP, unit="N.m", text="Moment W_2 M_2 of the sideslip system"),
+    )
+
+    def configure(self):
+        p = self.p
+        sets = Partition.even(FIVE)
+        self.surface = Mamdani(sets, sets, [sets], FIVE_BY_FIVE[p.rule_table])
+        self.moments = (p.yaw_rate_weight * p.yaw_rate_moment, -p.sideslip_weight * p.sideslip_moment)
+
+    def start(self, t, u):
+        self.yaw_rate = Pid(self.p.rate_filter)
+        self.yaw_rate.start(u[0] - u[1])
+
+    def advance(self, t, h, u):
+        self.yaw_rate.see(u[0] - u[1], h)
+
+    def output(self, t, u):
+        p = self.p
+        e_r = self.yaw_rate
+        (share_r,) = self.surface(
+            p.yaw_rate_error_factor * e_r.error, p.yaw_rate_error_rate_factor * e_r.slope
+        )
+        (share_beta,) = self.surface(
+            p.sideslip_error_factor * (u[2] - u[3]), p.sideslip_error_rate_factor * (u[4] - u[5])
+        )
+        m_1 = self.moments[0] * share_r
+        m_2 = self.moments[1] * share_beta
+        return limit(m_1 + m_2, p.moment_limit, u[6], p.fade_speed), m_1, m_2

@@ -1,0 +1,167 @@
+"""Fuzzy PID yaw-moment control: PID loops whose gains follow the error and its rate.
+
+    M = PID(r_ref - r) + PID(beta - beta_ref)         K_x = max(K_x0 + range_x f_x(e, de/dt), 0)
+
+for x = p, i, d of each loop, e = r_ref - r and beta_ref - beta with their filtered rates. f is a Mamdani
+system of seven triangular sets per variable (`core.rule_tables.PID_GAINS`), one for both loops; the
+centroid reaches +-8/9 of a range.
+
+The table read. Its dK_p is antisymmetric: as printed, gains rise for e < 0 and fall for e > 0, so left and
+right turns differ. By default it is therefore read at (-|e|, -sign(e) de/dt), the side on which gains
+rise with the error and with its growth; `printed` reads it at (e, de/dt).
+
+Source: Nie, Xiong, Pan, Multi-condition co-simulations of vehicle stability control via fuzzy PID
+algorithm, Journal of Dynamics and Control 19(3), 2021, section 2.2, table 2; ranges are not given.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..core.component import Component
+from ..core.fuzzy import SEVEN, Mamdani, Partition
+from ..core.pid import Gains, Pid, YawLoops
+from ..core.rule_tables import PID_GAINS
+from ..core.sliding_mode import limit
+from ..core.variables import output, parameter
+from .pid import SEEN, PidParameters, base_gains
+
+
+@dataclass(frozen=True)
+class FuzzyPidParameters(PidParameters):
+    """Base gains as in `pid`, and the ranges of what is added to them."""
+
+    table_reading: str = parameter(
+        "mirrored",
+        None,
+        "How the rule table is read: mirrored at (-|e|, -sign(e) de/dt), printed at (e, de/dt); chosen: left "
+        "and right turns alike",
+        choices=("mirrored", "printed"),
+    )
+    yaw_rate_error_range: float = parameter(
+        0.05, "rad/s", "Yaw-rate error beyond which the outer sets saturate; chosen", minimum=1e-6
+    )
+    yaw_rate_error_rate_range: float = parameter(
+        1.0, "rad/s2", "Rate of the yaw-rate error beyond which the outer sets saturate; chosen", minimum=1e-6
+    )
+    sideslip_error_range: float = parameter(
+        0.02, "rad", "Sideslip error beyond which the outer sets saturate; chosen", minimum=1e-6
+    )
+    sideslip_error_rate_range: float = parameter(
+        1.0, "rad/s", "Rate of the sideslip error beyond which the outer sets saturate; chosen", minimum=1e-6
+    )
+    yaw_rate_proportional_range: float = parameter(
+        30000.0, "N.m.s/rad", "Range of dK_p of the yaw rate; chosen", minimum=0.0
+    )
+    yaw_rate_integral_range: float = parameter(
+        0.0, "N.m/rad", "Range of dK_i of the yaw rate; chosen: none", minimum=0.0
+    )
+    yaw_rate_derivative_range: float = parameter(
+        100.0, "N.m.s2/rad", "Range of dK_d of the yaw rate; chosen", minimum=0.0
+    )
+    sideslip_proportional_range: float = parameter(
+        15000.0, "N.m/rad", "Range of dK_p of the sideslip; chosen", minimum=0.0
+    )
+    sideslip_integral_range: float = parameter(
+        0.0, "N.m/(rad.s)", "Range of dK_i of the sideslip; chosen: none", minimum=0.0
+    )
+    sideslip_derivative_range: float = parameter(
+        100.0, "N.m.s/rad", "Range of dK_d of the sideslip; chosen", minimum=0.0
+    )
+
+
+class GainSchedule:
+    """What sets the gains of one loop on line.
+
+    Args:
+        base: K_p0, K_i0, K_d0.
+        ranges: of dK_p, dK_i, dK_d.
+        error, rate: ranges of the loop's error and of its rate.
+        reading: "mirrored" or "printed".
+    """
+
+    def __init__(self, base: Gains, ranges: Gains, *, error: float, rate: float, reading: str) -> None:
+        self.base, self.ranges, self.mirrored = base, ranges, reading == "mirrored"
+        self.system = Mamdani(
+            Partition.even(SEVEN, -error, error),
+            Partition.even(SEVEN, -rate, rate),
+            [Partition.even(SEVEN)] * 3,
+            PID_GAINS,
+        )
+
+    def gains(self, e: float, rate: float) -> Gains:
+        """Return the gains at the error `e`, reference minus actual, and its rate."""
+        if self.mirrored and e > 0.0:
+            e, rate = -e, -rate
+        return Gains(
+            *[
+                max(base + width * share, 0.0)
+                for base, width, share in zip(self.base, self.ranges, self.system(e, rate), strict=True)
+            ]
+        )
+
+
+class FuzzyPid(Component):
+    """Fuzzy PID yaw-moment controller for yaw rate and sideslip."""
+
+    Parameters = FuzzyPidParameters
+    sampled = True
+    inputs = (*SEEN, "velocity_x")
+    outputs = (
+        output("yaw_moment", *SEEN, "velocity_x"),
+        output("integral_term", *SEEN, unit="N.m", text="Integral part of the moment"),
+        output(
+            "yaw_rate_proportional_gain_now",
+            *("yaw_rate_ref", "yaw_rate"),
+            unit="N.m.s/rad",
+            text="K_p of the yaw rate as set on line",
+        ),
+        output(
+            "sideslip_proportional_gain_now",
+            *("sideslip_ref", "sideslip"),
+            unit="N.m/rad",
+            text="K_p of the sideslip as set on line",
+        ),
+    )
+
+    def configure(self):
+        p = self.p
+        yaw_rate, sideslip = base_gains(p)
+        self.yaw_rate = GainSchedule(
+            yaw_rate,
+            Gains(p.yaw_rate_proportional_range, p.yaw_rate_integral_range, p.yaw_rate_derivative_range),
+            error=p.yaw_rate_error_range,
+            rate=p.yaw_rate_error_rate_range,
+            reading=p.table_reading,
+        )
+        self.sideslip = GainSchedule(
+            sideslip,
+            Gains(p.sideslip_proportional_range, p.sideslip_integral_range, p.sideslip_derivative_range),
+            error=p.sideslip_error_range,
+            rate=p.sideslip_error_rate_range,
+            reading=p.table_reading,
+        )
+
+    def start(self, t, u):
+        self.loops = YawLoops(self.p.derivative_filter)
+        self.loops.start(*u[:4])
+        self._decide()
+
+    def advance(self, t, h, u):
+        self.loops.see(*u[:4], h=h)
+        self._decide()
+
+    def output(self, t, u):
+        p = self.p
+        yaw_rate, sideslip = self.gains
+        moment = limit(self.moment, p.moment_limit, u[4], p.fade_speed)
+        return moment, self.loops.integral(), yaw_rate.p, sideslip.p
+
+    def _decide(self):
+        yaw_rate: Pid = self.loops.yaw_rate
+        sideslip: Pid = self.loops.sideslip  # its error is actual minus reference
+        self.gains = (
+            self.yaw_rate.gains(yaw_rate.error, yaw_rate.slope),
+            self.sideslip.gains(-sideslip.error, -sideslip.slope),
+        )
+        self.moment = self.loops.moment(*self.gains, limit=self.p.moment_limit)

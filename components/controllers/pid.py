@@ -1,0 +1,90 @@
+"""PID yaw-moment control of yaw rate and sideslip, the baseline of paper C.
+
+    M = PID(r_ref - r) + PID(beta - beta_ref)
+
+A positive moment raises the yaw rate and lowers the sideslip. How the loops integrate, differentiate
+and share their limit: `core.pid`. The moment fades out below walking pace, where sideslip means nothing.
+
+Source: Nie, Xiong, Pan, Multi-condition co-simulations of vehicle stability control via fuzzy PID
+algorithm, Journal of Dynamics and Control 19(3), 2021, section 2.1, which names no gains.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..core.component import Component
+from ..core.pid import Gains, YawLoops
+from ..core.sliding_mode import limit
+from ..core.variables import output, parameter
+
+
+@dataclass(frozen=True)
+class PidParameters:
+    """Gains of both loops, filter and limit."""
+
+    yaw_rate_proportional_gain: float = parameter(
+        8000.0, "N.m.s/rad", "K_p of the yaw rate; chosen", minimum=0.0
+    )
+    yaw_rate_integral_gain: float = parameter(2000.0, "N.m/rad", "K_i of the yaw rate; chosen", minimum=0.0)
+    yaw_rate_derivative_gain: float = parameter(
+        100.0, "N.m.s2/rad", "K_d of the yaw rate; chosen", minimum=0.0
+    )
+    sideslip_proportional_gain: float = parameter(
+        4000.0, "N.m/rad", "K_p of the sideslip; chosen", minimum=0.0
+    )
+    sideslip_integral_gain: float = parameter(
+        200.0, "N.m/(rad.s)", "K_i of the sideslip; chosen", minimum=0.0
+    )
+    sideslip_derivative_gain: float = parameter(
+        100.0, "N.m.s/rad", "K_d of the sideslip; chosen", minimum=0.0
+    )
+    derivative_filter: float = parameter(
+        0.02, "s", "Time constant of the derivatives' filter; chosen: a tenth of the car's own", minimum=0.0
+    )
+    moment_limit: float = parameter(
+        5000.0, "N.m", "Largest yaw moment; chosen: beyond what one wheel gives at mu 0.4", minimum=0.0
+    )
+    fade_speed: float = parameter(
+        2.0, "m/s", "Below it the moment fades out; chosen: walking pace", minimum=0.001
+    )
+
+
+SEEN = ("yaw_rate_ref", "yaw_rate", "sideslip_ref", "sideslip")
+"""What the loops see, in the order of `YawLoops`."""
+
+
+def base_gains(p: PidParameters) -> tuple[Gains, Gains]:
+    """Return the constant gains of the yaw-rate and of the sideslip loop."""
+    return (
+        Gains(p.yaw_rate_proportional_gain, p.yaw_rate_integral_gain, p.yaw_rate_derivative_gain),
+        Gains(p.sideslip_proportional_gain, p.sideslip_integral_gain, p.sideslip_derivative_gain),
+    )
+
+
+class PidController(Component):
+    """PID yaw-moment controller for yaw rate and sideslip."""
+
+    Parameters = PidParameters
+    sampled = True
+    inputs = (*SEEN, "velocity_x")
+    outputs = (
+        output("yaw_moment", *SEEN, "velocity_x"),
+        output("integral_term", *SEEN, unit="N.m", text="Integral part of the moment"),
+    )
+
+    def configure(self):
+        self.gains = base_gains(self.p)
+
+    def start(self, t, u):
+        self.loops = YawLoops(self.p.derivative_filter)
+        self.loops.start(*u[:4])
+        self.moment = self.loops.moment(*self.gains, limit=self.p.moment_limit)
+
+    def advance(self, t, h, u):
+        self.loops.see(*u[:4], h=h)
+        self.moment = self.loops.moment(*self.gains, limit=self.p.moment_limit)
+
+    def output(self, t, u):
+        p = self.p
+        return limit(self.moment, p.moment_limit, u[4], p.fade_speed), self.loops.integral()

@@ -1,0 +1,132 @@
+"""The track of ISO 3888-1, a double lane change between cones: its lanes, a path through them, overruns.
+
+    section      1      2       3      4       5, 6
+    length      15 m   30 m    25 m   25 m    15 + 15 m
+    lane width  1.1 w + 1/4    1.2 w + 1/4    1.3 w + 1/4      w vehicle width [m]
+
+The lane offset, 3.5 m, is measured between the right borders of lanes 1 and 3; lane 5 begins again at
+the right border of lane 1. y = 0 is the middle of lane 1, x = 0 the start of the car. The path
+runs along the middles of the lanes, with half cosines in the transitions 2 and 4. A negative
+offset mirrors the track.
+
+Source: ISO 3888-1, Passenger cars - Test track for a severe lane-change manoeuvre - Part 1: Double
+lane-change. Paper C names neither path nor lanes. Ours adds: transitions of another length, for speeds
+that a slippery road does not bear on the standard's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import copysign, cos, hypot, pi, sin
+from typing import NamedTuple
+
+from .variables import parameter
+
+LENGTHS = (15.0, 30.0, 25.0, 25.0, 30.0)
+"""Of lane 1, transition 2, lane 3, transition 4 and lanes 5 and 6 together [m]."""
+
+
+class Lane(NamedTuple):
+    """A lane between two rows of cones, from x = start to end, y = right to left [m]."""
+
+    start: float
+    end: float
+    right: float
+    left: float
+
+    @property
+    def middle(self) -> float:
+        """The y of its middle [m]."""
+        return 0.5 * (self.right + self.left)
+
+
+class Outline(NamedTuple):
+    """A car seen from above: front and rear end from the centre of mass, half its width [m]."""
+
+    front: float
+    rear: float
+    half_width: float
+
+
+@dataclass(frozen=True)
+class LaneChangeParameters:
+    """Of the track and of the car that has to fit in."""
+
+    vehicle_width: float = parameter(
+        1.85, "m", "Vehicle width, from which lane widths follow; chosen: large saloon", minimum=0.5
+    )
+    cg_to_front_end: float = parameter(
+        2.25, "m", "Front end from the centre of mass; chosen: large saloon of 4.9 m", minimum=0.1
+    )
+    cg_to_rear_end: float = parameter(
+        2.65, "m", "Rear end from the centre of mass; chosen: large saloon of 4.9 m", minimum=0.1
+    )
+    track_start: float = parameter(
+        25.0, "m", "Position x of the first cones; chosen: 1 s at 90 km/h straight ahead"
+    )
+    lane_offset: float = parameter(
+        3.5,
+        "m",
+        "Offset of lane 3, to the right if negative; ISO 3888-1",
+        minimum=-20.0,
+        maximum=20.0,
+    )
+    transition_scale: float = parameter(
+        1.0, "1", "Length of the transitions over that of ISO 3888-1", minimum=0.1
+    )
+
+
+class Track:
+    """The three lanes between cones and the path through them."""
+
+    def __init__(self, p: LaneChangeParameters) -> None:
+        one, two, three, four, five = LENGTHS
+        two *= p.transition_scale
+        four *= p.transition_scale
+        side = copysign(1.0, p.lane_offset)
+        right = -0.5 * (1.1 * p.vehicle_width + 0.25)
+        lanes = []
+        x = p.track_start
+        for length, gap, factor, offset in (
+            (one, two, 1.1, 0.0),
+            (three, four, 1.2, abs(p.lane_offset)),
+            (five, 0.0, 1.3, 0.0),
+        ):
+            border = right + offset
+            borders = (side * border, side * (border + factor * p.vehicle_width + 0.25))
+            lanes.append(Lane(x, x + length, min(borders), max(borders)))
+            x += length + gap
+        self.lanes = tuple(lanes)
+        self.outline = Outline(p.cg_to_front_end, p.cg_to_rear_end, 0.5 * p.vehicle_width)
+
+    def path(self, x: float) -> float:
+        """Return the y [m] of the path at `x` [m]."""
+        first, second, third = self.lanes
+        return transition(x, first, second) if x <= second.start else transition(x, second, third)
+
+    def overrun(self, x: float, y: float, psi: float) -> float:
+        """Return by how much [m] a car at `x`, `y` [m], `psi` [rad] is beyond the cones; 0 inside."""
+        front, rear, half = self.outline
+        reach = hypot(max(front, rear), half)
+        worst = 0.0
+        for lane in self.lanes:
+            if x + reach < lane.start or x - reach > lane.end:
+                continue
+            c, s = cos(psi), sin(psi)
+            for along, across in ((front, half), (front, -half), (-rear, half), (-rear, -half)):
+                if lane.start <= x + along * c - across * s <= lane.end:
+                    corner = y + along * s + across * c
+                    worst = max(worst, corner - lane.left, lane.right - corner)
+            for end in (lane.start, lane.end):
+                for border, side in ((lane.left, 1.0), (lane.right, -1.0)):
+                    along = (end - x) * c + (border - y) * s
+                    across = side * ((border - y) * c - (end - x) * s)
+                    if -rear <= along <= front and across > -half:
+                        worst = max(worst, half - across)
+        return worst
+
+
+def transition(x: float, one: Lane, other: Lane) -> float:
+    """Return the y [m] of the way from the middle of one lane to that of the next."""
+    part = min(max((x - one.end) / (other.start - one.end), 0.0), 1.0)
+    return one.middle + (other.middle - one.middle) * 0.5 * (1.0 - cos(pi * part))

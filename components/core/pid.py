@@ -1,0 +1,112 @@
+"""PID control in samples: trapezoidal integral, filtered derivative, anti-windup at the output's limit.
+
+    u = K_p e + I + K_d q
+    dI/dt = K_i e                       but I never moves u beyond its limit, only back towards it
+    tau dq/dt = (slope of e) - q        solved exactly over a sample; tau = 0: the backward difference
+
+I is kept in units of the output, so gains may change on line without a jump of the output.
+
+Two loops for yaw stability share one limit:
+
+    M = PID(r_ref - r) + PID(beta - beta_ref)
+
+A positive moment raises the yaw rate and lowers the sideslip, hence the order of the second difference.
+
+Source: Nie, Xiong, Pan, Multi-condition co-simulations of vehicle stability control via fuzzy PID
+algorithm, Journal of Dynamics and Control 19(3), 2021, section 2.1, whose block diagram leaves that sign
+open and names neither filter nor limit.
+"""
+
+from __future__ import annotations
+
+from math import exp, inf
+from typing import NamedTuple
+
+
+class Gains(NamedTuple):
+    """K_p, K_i, K_d: output per error, per error and second, per error rate."""
+
+    p: float
+    i: float
+    d: float
+
+
+class Pid:
+    """One loop: its last error, integral part and filtered derivative.
+
+    Args:
+        tau: time constant of the derivative's filter [s].
+    """
+
+    def __init__(self, tau: float = 0.0) -> None:
+        self.tau = tau
+        self.start(0.0)
+
+    def start(self, e: float) -> None:
+        """Begin with the error `e`: no integral, no derivative."""
+        self.error = e
+        self.slope = 0.0
+        self.area = 0.0  # under the error, over the last sample
+        self.integral = 0.0
+
+    def see(self, e: float, h: float) -> None:
+        """Take in the error `e` at the end of a sample of `h` [s]."""
+        if h > 0.0:
+            kept = exp(-h / self.tau) if self.tau > 0.0 else 0.0
+            slope = (e - self.error) / h
+            self.slope = slope + (self.slope - slope) * kept
+        self.area = 0.5 * h * (self.error + e)
+        self.error = e
+
+    def value(self, gains: Gains) -> float:
+        """Return K_p e + I + K_d q with the integral as it is."""
+        return gains.p * self.error + self.integral + gains.d * self.slope
+
+    def integrate(self, gains: Gains, total: float, low: float, high: float) -> float:
+        """Add the last sample to the integral and return by how much the output rises.
+
+        Args:
+            total: output so far, of which this loop may be a part.
+            low, high: its limits.
+        """
+        step = gains.i * self.area
+        room = high - total if step > 0.0 else low - total
+        if step * room <= 0.0:
+            return 0.0  # beyond the limit already
+        if abs(step) > abs(room):
+            step = room
+        self.integral += step
+        return step
+
+
+class YawLoops:
+    """The loops of yaw rate and sideslip, with one limit for the sum of both.
+
+    Args:
+        tau: time constant of both derivatives' filters [s].
+    """
+
+    def __init__(self, tau: float) -> None:
+        self.yaw_rate = Pid(tau)
+        self.sideslip = Pid(tau)
+
+    def start(self, r_ref: float, r: float, beta_ref: float, beta: float) -> None:
+        """Begin with these yaw rates [rad/s] and sideslip angles [rad]."""
+        self.yaw_rate.start(r_ref - r)
+        self.sideslip.start(beta - beta_ref)
+
+    def see(self, r_ref: float, r: float, beta_ref: float, beta: float, *, h: float) -> None:
+        """Take in yaw rates [rad/s] and sideslip angles [rad] at the end of a sample of `h` [s]."""
+        self.yaw_rate.see(r_ref - r, h)
+        self.sideslip.see(beta - beta_ref, h)
+
+    def moment(self, yaw_rate: Gains, sideslip: Gains, limit: float = inf) -> float:
+        """Return the yaw moment [N.m] within +-`limit`, the last sample integrated."""
+        total = self.yaw_rate.value(yaw_rate) + self.sideslip.value(sideslip)
+        total += self.yaw_rate.integrate(yaw_rate, total, -limit, limit)
+        total += self.sideslip.integrate(sideslip, total, -limit, limit)
+        return min(max(total, -limit), limit)
+
+    def integral(self) -> float:
+        """Return the integral part of the moment [N.m]."""
+        return self.yaw_rate.integral + self.sideslip.integral

@@ -1,0 +1,86 @@
+"""How drivers hold their speed: a PI law for the drive force, through the lag of pedal and engine.
+
+    F* = K e + (K / T_i) integral(e),   e = v_target - v_x,     0 <= F* <= F_max    no windup at the limits
+    tau dF/dt = F* - F                  drive force = constant part + F
+
+The force follows the speed through the lag alone, never at the same instant, so that speed and force
+make no algebraic loop. A driver who holds the speed accelerates or lets go, but does not brake.
+
+Paper C's runs are "at a constant 90 km/h"; the paper does not say how.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .lag import Stage
+from .pid import Gains, Pid
+from .variables import parameter
+
+
+@dataclass(frozen=True)
+class SpeedHoldingParameters:
+    """Of the driver's right foot and the engine. By default the speed is not held."""
+
+    constant_drive_force: float = parameter(
+        0.0, "N", "Sum of the longitudinal tyre forces asked for, always; paper A: no driving"
+    )
+    speed_gain: float = parameter(
+        0.0,
+        "N.s/m",
+        "Gain K of speed holding, 0 for none; chosen: none in papers A, B, D",
+        minimum=0.0,
+    )
+    speed_integral_time: float = parameter(
+        2.0, "s", "Integral time T_i of speed holding; chosen: slower than the car follows", minimum=0.01
+    )
+    target_speed: float = parameter(25.0, "m/s", "Speed held, if it is held; paper C: 90 km/h", minimum=0.0)
+    drive_force_limit: float = parameter(
+        3000.0, "N", "Largest force F_max for holding the speed; chosen: 75 kW at 25 m/s", minimum=0.0
+    )
+    drive_time_constant: float = parameter(
+        0.2, "s", "Lag tau of pedal and engine; chosen: naturally aspirated engine", minimum=0.0
+    )
+
+
+@dataclass(frozen=True)
+class HeldSpeedParameters(SpeedHoldingParameters):
+    """The same for a driver who holds the speed unless told otherwise."""
+
+    speed_gain: float = parameter(
+        4000.0, "N.s/m", "Gain K of speed holding, 0 for none; chosen: 1000 N at 0.25 m/s", minimum=0.0
+    )
+
+
+class SpeedHold:
+    """The drive force of a driver.
+
+    Args:
+        p: of the driver; read again at every step, never changed.
+    """
+
+    def __init__(self, p: SpeedHoldingParameters) -> None:
+        self.p = p
+        self.gains = Gains(p.speed_gain, p.speed_gain / p.speed_integral_time, 0.0)
+        self.foot = Pid()
+        self.engine = Stage(tau=p.drive_time_constant)
+
+    @property
+    def force(self) -> float:
+        """The drive force [N]."""
+        return self.p.constant_drive_force + self.engine.value
+
+    def start(self, v_x: float) -> None:
+        """Begin at the speed `v_x` [m/s] with the constant force."""
+        self.foot.start(self.p.target_speed - v_x)
+        self.engine = Stage(tau=self.p.drive_time_constant)
+
+    def advance(self, t: float, h: float, v_x: float) -> None:
+        """Take the force from `t` to `t + h` [s] at the speed `v_x` [m/s]."""
+        p = self.p
+        if p.speed_gain == 0.0:
+            return
+        self.foot.see(p.target_speed - v_x, h)
+        wanted = self.foot.value(self.gains)
+        wanted += self.foot.integrate(self.gains, wanted, 0.0, p.drive_force_limit)
+        self.engine.advance(t, h, min(max(wanted, 0.0), p.drive_force_limit))

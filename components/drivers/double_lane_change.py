@@ -1,0 +1,137 @@
+"""Closed-loop driver for a double lane change: steers towards the path one preview ahead, holds the speed.
+
+    p        = (x, y) + L (cos psi, sin psi),        L = v T_p                  preview point
+    e        = (path(p_x) - p_y) cos psi             its distance from the path
+    kappa    = 2 e / L^2                             the arc that ends on the path there
+    delta_h* = steering_ratio kappa l (1 + K v^2)    within +-largest hand-wheel angle
+    tau d(delta_h)/dt = delta_h*(t - delay) - delta_h,    |d(delta_h)/dt| <= largest hand-wheel rate
+
+l wheelbase, K stability factor: the driver knows how the car steers while its tyres are linear. With a
+car that followed at once, the path would be approached as by an oscillator of
+sqrt(2) / T_p and damping ratio 0.7. The path and the cones: `core.lane_change`. The speed:
+`core.speed_holding`.
+
+`path_offset` is the car's own distance from the path, `cone_overrun` how far the body is beyond the cones.
+
+Source: the single-point preview of C. C. MacAdam, IEEE Trans. Systems, Man, and Cybernetics 11(6), 1981,
+393-399, with an arc in place of an optimal control. Paper C does not describe CarSim's driver.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, sin
+
+from ..core.component import Component
+from ..core.lag import Stage
+from ..core.lane_change import LaneChangeParameters, Track
+from ..core.single_track import SingleTrackCar
+from ..core.speed_holding import HeldSpeedParameters, SpeedHold
+from ..core.variables import output, parameter
+
+
+@dataclass(frozen=True)
+class DoubleLaneChangeParameters(HeldSpeedParameters, LaneChangeParameters):
+    """Of the driver, of the car as the driver knows it, and of the track."""
+
+    preview_time: float = parameter(0.9, "s", "Preview T_p; chosen", minimum=0.05)
+    least_preview: float = parameter(
+        4.0, "m", "Shortest preview distance L; chosen: just before the bumper", minimum=0.1
+    )
+    reaction_delay: float = parameter(
+        0.0, "s", "Pure delay of the driver; chosen: none, the lag stands for it", minimum=0.0
+    )
+    steering_lag: float = parameter(0.15, "s", "Lag tau of arms and steering; chosen", minimum=0.0)
+    steering_wheel_limit: float = parameter(
+        6.0, "rad", "Largest hand-wheel angle; chosen: nearly one turn", minimum=0.0
+    )
+    steering_wheel_rate_limit: float = parameter(
+        12.0, "rad/s", "Fastest turn of the hand wheel; chosen: a skilled driver", minimum=0.01
+    )
+    steering_ratio: float = parameter(
+        17.0, "1", "Hand-wheel angle over road-wheel angle; chosen: large saloon", minimum=0.1
+    )
+    mass: float = parameter(1830.0, "kg", "Vehicle mass; paper C, table 1, and wheels", minimum=1.0)
+    cg_to_front_axle: float = parameter(
+        1.4, "m", "Distance a of the centre of mass from the front axle; paper C, table 1", minimum=0.1
+    )
+    cg_to_rear_axle: float = parameter(
+        1.65, "m", "Distance b of the centre of mass from the rear axle; paper C, table 1", minimum=0.1
+    )
+    cornering_stiffness_front: float = parameter(
+        62618.0, "N/rad", "Stiffness C_f of the front axle; paper C, table 1", minimum=1.0
+    )
+    cornering_stiffness_rear: float = parameter(
+        110185.0, "N/rad", "Stiffness C_r of the rear axle; paper C, table 1", minimum=1.0
+    )
+
+
+def arc(x: float, y: float, psi: float, *, track: Track, preview: float) -> float:
+    """Return the curvature [1/m] of the arc to the path `preview` [m] ahead of x, y [m], psi [rad]."""
+    c = cos(psi)
+    return 2.0 * c * (track.path(x + preview * c) - (y + preview * sin(psi))) / (preview * preview)
+
+
+class DoubleLaneChange(Component):
+    """Driver who takes a double lane change at a held speed, by preview of one point."""
+
+    Parameters = DoubleLaneChangeParameters
+    inputs = ("velocity_x", "position_x", "position_y", "yaw_angle")
+    outputs = (
+        "steer_angle",
+        "drive_force",
+        "steering_wheel_angle",
+        output(
+            "path_offset", "position_x", "position_y", unit="m", text="Distance from the path, positive left"
+        ),
+        output(
+            "cone_overrun",
+            *("position_x", "position_y", "yaw_angle"),
+            unit="m",
+            text="How far the car's outline is beyond the cones, 0 inside",
+        ),
+    )
+
+    def configure(self):
+        p = self.p
+        self.track = Track(p)
+        self.car = SingleTrackCar(
+            p.mass,
+            1.0,  # yaw inertia: no matter in a steady turn
+            p.cg_to_front_axle,
+            p.cg_to_rear_axle,
+            p.cornering_stiffness_front,
+            p.cornering_stiffness_rear,
+        )
+
+    def start(self, t, u):
+        p = self.p
+        self.speed = SpeedHold(p)
+        self.speed.start(u[0])
+        self.hands = Stage(tau=p.steering_lag, delay=p.reaction_delay, rate=p.steering_wheel_rate_limit)
+        self.wanted = self._wanted(u)
+
+    def advance(self, t, h, u):
+        self.speed.advance(t, h, u[0])
+        before = self.wanted
+        self.wanted = self._wanted(u)  # positions are those of the end of the step
+        self.hands.advance(t, h, 0.5 * (before + self.wanted))
+
+    def output(self, t, u):
+        hand = self.hands.value
+        return (
+            hand / self.p.steering_ratio,
+            self.speed.force,
+            hand,
+            u[2] - self.track.path(u[1]),
+            self.track.overrun(u[1], u[2], u[3]),
+        )
+
+    def _wanted(self, u):
+        """Return the hand-wheel angle [rad] that the driver wants."""
+        p = self.p
+        v, x, y, psi = u
+        preview = max(v * p.preview_time, p.least_preview)
+        yaw_gain, _ = self.car.gains(max(v, 0.1))
+        delta = arc(x, y, psi, track=self.track, preview=preview) * max(v, 0.1) / yaw_gain
+        return min(max(p.steering_ratio * delta, -p.steering_wheel_limit), p.steering_wheel_limit)

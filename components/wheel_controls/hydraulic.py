@@ -1,0 +1,120 @@
+"""Hydraulic brakes: braking force to cylinder pressure to wheel torque; driving force passed on.
+
+    P* = min(F R / C, P_max) g(kappa),   F > 0 the braking part of the request
+    tau dP/dt = P* - P,                  -falling rate <= dP/dt <= rising rate
+    T = R (driving part of the request) - C P
+
+C = A_w u_b R_b is the torque per pressure of a drum brake, A_w area and u_b friction coefficient of the
+shoe, R_b radius of the drum. The slip release g falls from one to nothing between two values of braking
+slip, so a wheel does not lock; it fades out at walking pace, where slip means nothing.
+
+A request holds from the communication point at which it arrives, so pressure never follows it at the
+same instant; the driving part does.
+
+Source: Nie, Xiong, Pan, Multi-condition co-simulations of vehicle stability control via fuzzy PID
+algorithm, Journal of Dynamics and Control 19(3), 2021, equations (10), (11); no value is given there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..core.component import Component
+from ..core.lag import Stage
+from ..core.variables import output, parameter
+
+
+@dataclass(frozen=True)
+class HydraulicParameters:
+    """Of brakes, hydraulics and slip release."""
+
+    wheel_radius: float = parameter(0.33, "m", "Wheel radius R; chosen: large saloon, rolling", minimum=0.05)
+    brake_factor_front: float = parameter(
+        2.2e-4, "m3", "Torque per pressure C of a front brake; chosen: large saloon", minimum=1e-7
+    )
+    brake_factor_rear: float = parameter(
+        1.1e-4, "m3", "Torque per pressure C of a rear brake; chosen: half of the front's", minimum=1e-7
+    )
+    pressure_limit: float = parameter(
+        1e7, "Pa", "Largest cylinder pressure P_max; chosen: 100 bar", minimum=0.0
+    )
+    pressure_rise_limit: float = parameter(
+        2e7, "Pa/s", "Fastest rise of the pressure; chosen: an ESP pump", minimum=1.0
+    )
+    pressure_fall_limit: float = parameter(
+        4e7, "Pa/s", "Fastest fall of the pressure; chosen: open valves", minimum=1.0
+    )
+    pressure_lag: float = parameter(0.08, "s", "Lag tau of the pressure; chosen", minimum=0.0)
+    release_slip: float = parameter(
+        0.05, "1", "Braking slip from which pressure is released; chosen: before the optimum", minimum=0.0
+    )
+    full_release_slip: float = parameter(
+        0.1, "1", "Braking slip from which no pressure is asked for; chosen: about the optimum", minimum=0.001
+    )
+    release_speed: float = parameter(
+        3.0,
+        "m/s",
+        "Wheel velocity above which slip releases fully, below a third of it not; chosen: walking pace",
+        minimum=0.1,
+    )
+    drive_torque_limit: float = parameter(
+        2500.0, "N.m", "Largest driving torque of a wheel; chosen: an engine in a low gear", minimum=0.0
+    )
+
+
+def asked_pressure(force: float, kappa: float, v: float, *, factor: float, p: HydraulicParameters) -> float:
+    """Return the cylinder pressure [Pa] asked for by a force request [N], negative when braking.
+
+    Args:
+        kappa, v: longitudinal slip [1] and velocity [m/s] of the wheel.
+        factor: torque per pressure C of its brake [m3].
+    """
+    if force >= 0.0:
+        return 0.0
+    pressure = min(-force * p.wheel_radius / factor, p.pressure_limit)
+    braking_slip = -kappa if v >= 0.0 else kappa
+    beyond = (braking_slip - p.release_slip) / max(p.full_release_slip - p.release_slip, 1e-6)
+    if beyond <= 0.0:
+        return pressure
+    fade = min(max(1.5 * abs(v) / p.release_speed - 0.5, 0.0), 1.0)
+    return pressure * (1.0 - fade * min(beyond, 1.0))
+
+
+class Hydraulic(Component):
+    """Wheel torques of hydraulic brakes with slip release, and of the drive."""
+
+    Parameters = HydraulicParameters
+    inputs = ("force_request_*", "slip_ratio_*", "wheel_velocity_*")
+    outputs = (
+        output("torque_request_*", "force_request_*"),
+        output("brake_pressure_*", unit="Pa", text="Pressure in the wheel's brake cylinder"),
+    )
+
+    def configure(self):
+        p = self.p
+        front, rear = p.brake_factor_front, p.brake_factor_rear
+        self.factors = (front, front, rear, rear)
+
+    def start(self, t, u):
+        p = self.p
+        self.requests = u[:4]
+        self.cylinders = [
+            Stage(tau=p.pressure_lag, rate=p.pressure_rise_limit, falling_rate=p.pressure_fall_limit)
+            for _ in range(4)
+        ]
+
+    def advance(self, t, h, u):
+        p = self.p
+        for i, cylinder in enumerate(self.cylinders):
+            asked = asked_pressure(self.requests[i], u[4 + i], u[8 + i], factor=self.factors[i], p=p)
+            cylinder.advance(t, h, asked)
+        self.requests = u[:4]
+
+    def output(self, t, u):
+        p = self.p
+        pressures = [cylinder.value for cylinder in self.cylinders]
+        torques = [
+            min(max(force, 0.0) * p.wheel_radius, p.drive_torque_limit) - factor * pressure
+            for force, factor, pressure in zip(u[:4], self.factors, pressures, strict=True)
+        ]
+        return torques + pressures

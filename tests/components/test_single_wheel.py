@@ -1,0 +1,111 @@
+"""Braking one wheel: the four rows of the rule, its guard, its dead band; hydraulic brakes."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from components.allocators.single_wheel import FL, FR, RL, RR, SingleWheel, chosen_wheel
+from components.core.wheel_kinematics import lever_arms
+from components.wheel_controls.hydraulic import Hydraulic, HydraulicParameters, asked_pressure
+
+from .stand import Stand
+
+WHEELS = ("fl", "fr", "rl", "rr")
+
+
+def forces(outputs):
+    return [outputs[f"force_request_{wheel}"] for wheel in WHEELS]
+
+
+def request(*, moment, delta, dr, drive=0.0, **parameters):
+    stand = Stand(SingleWheel, **parameters)
+    return forces(
+        stand.start(yaw_moment=moment, steer_angle=delta, yaw_rate=dr, yaw_rate_ref=0.0, drive_force=drive)
+    )
+
+
+@pytest.mark.parametrize(
+    "delta, dr, wheel", [(0.05, 0.1, FR), (0.05, -0.1, RL), (-0.05, 0.1, RR), (-0.05, -0.1, FL)]
+)
+def test_the_rule_names_the_wheel_of_each_row(delta, dr, wheel):
+    assert chosen_wheel(delta, dr) == wheel
+
+
+@pytest.mark.parametrize(
+    "moment, delta, dr, wheel",
+    [(-900.0, 0.05, 0.1, FR), (900.0, 0.05, -0.1, RL), (-900.0, -0.05, 0.1, RR), (900.0, -0.05, -0.1, FL)],
+)
+def test_the_chosen_wheel_alone_gives_the_moment(moment, delta, dr, wheel):
+    found = request(moment=moment, delta=delta, dr=dr)
+    assert [i for i, f in enumerate(found) if f] == [wheel]
+    assert found[wheel] < 0.0
+    assert found[wheel] * lever_arms(delta, 1.4, 0.8)[wheel] == pytest.approx(moment, rel=1e-12)
+
+
+def test_a_wheel_that_turns_the_car_the_other_way_is_left_alone():
+    case = {"moment": 900.0, "delta": 0.05, "dr": 0.1}
+    assert request(**case) == [0.0] * 4
+    printed = request(**case, wheel_choice="printed")
+    assert printed[FR] < 0.0  # and turns the car against the moment
+    assert request(**case, wheel_choice="moment")[RL] < 0.0
+
+
+def test_braking_has_a_dead_band_with_hysteresis():
+    stand = Stand(SingleWheel)
+    rest = {"steer_angle": 0.05, "yaw_rate": -0.1, "yaw_rate_ref": 0.0}
+    stand.start(yaw_moment=0.0, **rest)
+    steps = [(190.0, 0.0), (210.0, 1.0), (110.0, 1.0), (90.0, 0.0), (190.0, 0.0)]
+    assert [bool(forces(stand.step(0.01, yaw_moment=m, **rest))[RL]) for m, _ in steps] == [
+        bool(on) for _, on in steps
+    ]
+
+
+def test_the_driver_s_force_is_kept_equal_left_and_right():
+    found = request(moment=900.0, delta=0.05, dr=-0.1, drive=600.0)
+    without = request(moment=900.0, delta=0.05, dr=-0.1)
+    assert [a - b for a, b in zip(found, without, strict=True)] == pytest.approx([0.0, 0.0, 300.0, 300.0])
+
+
+def test_a_pressure_step_answers_with_the_lag_below_the_rate_limit():
+    p = HydraulicParameters()
+    force = -5e5 * p.brake_factor_front / p.wheel_radius  # 5 bar: slower than the pump
+    inputs = {"force_request_fl": force, "wheel_velocity_fl": 25.0}
+    stand = Stand(Hydraulic)
+    stand.start(**inputs)
+    for _ in range(40):
+        found = stand.step(0.002, **inputs)
+    expected = 5e5 * (1.0 - math.exp(-0.08 / p.pressure_lag))
+    assert found["brake_pressure_fl"] == pytest.approx(expected, rel=1e-9)
+    assert found["torque_request_fl"] == pytest.approx(-expected * p.brake_factor_front, rel=1e-9)
+    assert found["brake_pressure_fr"] == 0.0
+
+
+def test_pressure_is_limited_in_size_and_rate():
+    stand = Stand(Hydraulic)
+    inputs = {"force_request_rr": -1e6, "wheel_velocity_rr": 25.0}
+    last = stand.start(**inputs)["brake_pressure_rr"]
+    for _ in range(2000):
+        now = stand.step(0.001, **inputs)["brake_pressure_rr"]
+        assert now - last <= 2e7 * 0.001 * (1 + 1e-9)
+        last = now
+    assert last == pytest.approx(1e7, rel=1e-3)
+
+
+def test_a_slipping_wheel_is_released_and_a_creeping_one_held():
+    p = HydraulicParameters()
+    ask = {"factor": p.brake_factor_front, "p": p}
+    full = asked_pressure(-2000.0, 0.0, 25.0, **ask)
+    assert asked_pressure(-2000.0, -0.05, 25.0, **ask) == full > 0.0
+    assert asked_pressure(-2000.0, -0.075, 25.0, **ask) == pytest.approx(0.5 * full)
+    assert asked_pressure(-2000.0, -0.2, 25.0, **ask) == 0.0
+    assert asked_pressure(-2000.0, -1.0, 0.5, **ask) == full  # a parked wheel stays braked
+    assert asked_pressure(2000.0, 0.0, 25.0, **ask) == 0.0
+
+
+def test_the_drive_part_of_a_request_is_kept():
+    stand = Stand(Hydraulic)
+    assert stand.start(force_request_rl=1000.0)["torque_request_rl"] == pytest.approx(
+        1000.0 * HydraulicParameters().wheel_radius
+    )
