@@ -140,7 +140,8 @@ def _scalar_variable(causality: str, var: Var, reference: int) -> str:
     mark = '<Annotations><Tool name="yawbench"><optional/></Tool></Annotations>' if var.optional else ""
     return (
         f'<ScalarVariable name={quoteattr(var.name)} valueReference="{reference}" causality="{causality}"'
-        f' variability="{variability}" description={quoteattr(text)}><{var.type} {inner}/>{mark}</ScalarVariable>'
+        f' variability="{variability}" description={quoteattr(text)}>'
+        f"<{var.type} {inner}/>{mark}</ScalarVariable>"
     )
 
 
