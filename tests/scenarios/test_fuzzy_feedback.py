@@ -1,0 +1,60 @@
+"""The study of paper D on the real master."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from fmus.build import build_all
+from orchestrator.cli import main
+
+STUDY = Path(__file__).parents[2] / "scenarios" / "fuzzy_feedback" / "study.yaml"
+UNITS = (
+    "driver_sine", "reference_single_track", "controller_off", "controller_fuzzy_feedback", "plant_two_dof",
+    "tyre_magic_formula_1987",
+)  # fmt: skip
+DEGREE = 0.017453292519943295
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """What study.json says."""
+    folder = tmp_path_factory.mktemp("paper_d")
+    build_all(folder / "fmus", components=UNITS)
+    with pytest.raises(SystemExit) as exit_:
+        main(["study", str(STUDY), "--out", str(folder / "out"), "--fmus", str(folder / "fmus")])
+    assert not exit_.value.code
+    return json.loads((folder / "out" / "study.json").read_text())
+
+
+@pytest.fixture
+def metric(study):
+    """Return a metric of a run."""
+    return lambda run, name: study["runs"][run]["metrics"][name]["value"]
+
+
+def test_the_controlled_car_follows_the_limited_reference_and_comes_to_rest(metric):
+    assert metric("both", "rms") <= 0.10
+    assert metric("both", "sideslip") <= 3 * DEGREE
+    assert metric("both", "moment") <= 6700.0
+    assert metric("both", "sideslip_at_end") <= 0.1 * DEGREE
+    assert metric("both", "yaw_rate_at_end") <= 0.001
+
+
+def test_the_uncontrolled_car_is_lost(metric):
+    assert metric("off", "sideslip") > 20 * DEGREE
+
+
+@pytest.mark.parametrize("system", ["yaw_rate_alone", "sideslip_alone"])
+def test_each_system_alone_holds_the_car(metric, system):
+    assert metric(system, "sideslip") < 8 * DEGREE
+
+
+def test_the_printed_reference_asks_for_more_sideslip_than_the_road_allows_the_limited_one(metric):
+    assert metric("unlimited/fuzzy_feedback", "sideslip") > 5 * metric("both", "sideslip")
+
+
+def test_every_claim_and_check_holds(study):
+    assert {entry["verdict"] for entry in study["claims"] + study["checks"]} == {"holds"}
