@@ -1,8 +1,9 @@
 """Writing results.csv and run.json.
 
 Both are written under temporary names and take their places together at the end, so a folder holds
-either the earlier results or the new ones. Rows go out in blocks during the run: whatever ends it,
-what has been recorded stays. Numbers are written so that reading them gives the same bits.
+either the earlier results or the new ones; while a run writes there, no other may. Rows go out in
+blocks during the run: whatever ends it, what has been recorded stays. Numbers are written so that
+reading them gives the same bits.
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ class Recorder:
         real: which of them are Real; the others come in `others`, one list per row.
 
     Raises:
-        ResultsError: the folder or a file in it cannot be written; so do the methods.
+        ResultsError: another run is writing into the folder, or it or a file in it cannot be written;
+            so do the methods.
     """
 
     def __init__(self, folder: Path, columns: Sequence[str], real: Sequence[bool]) -> None:
@@ -52,10 +54,15 @@ class Recorder:
         self._run_path = self._home / f"{RUN_FILE}.part"
         header = io.StringIO()
         csv.writer(header, lineterminator="\n").writerow(["time", *columns])
+        self._lock: int | None = None
         try:
             folder.mkdir(parents=True, exist_ok=True)
+            self._lock = _lock(folder)
             self._file = self._path.open("wb", buffering=0)
+        except FileExistsError:
+            raise ResultsError(f"{folder}: results cannot be written here: it is no folder.") from None
         except OSError as error:
+            self._unlock()
             raise ResultsError(f"{folder}: results cannot be written here: {_reason(error)}.") from None
         self._size = 0
         try:
@@ -123,6 +130,7 @@ class Recorder:
             target.unlink(missing_ok=True)  # from here on the earlier results are gone as a whole
             os.replace(self._path, self._home / RESULTS_FILE)
             os.replace(self._run_path, target)
+            self._unlock()
         except OSError as error:
             self.discard()
             raise ResultsError(f"{self.folder}: results cannot be written: {_reason(error)}.") from None
@@ -130,7 +138,8 @@ class Recorder:
     def _write_record(self, run: dict[str, Any]) -> None:
         run = {**run, "rows": self.written}
         text = json.dumps(_plain(run), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-        self._run_path.write_text(text, encoding="utf-8")
+        # a path that is no UTF-8 comes as lone surrogates, which JSON writes as \\udcxx
+        self._run_path.write_text(text, encoding="utf-8", errors="backslashreplace")
 
     def _make_room(self, needed: int) -> bool:
         """Cut rows off the end of the results; return whether that gave any room."""
@@ -152,6 +161,32 @@ class Recorder:
         with contextlib.suppress(OSError):
             self._path.unlink(missing_ok=True)
             self._run_path.unlink(missing_ok=True)
+        self._unlock()
+
+    def _unlock(self) -> None:
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+
+def _lock(folder: Path) -> int | None:
+    """Claim a folder for this run until the descriptor is closed; None where that is not possible.
+
+    Two runs in one folder would write into each other's files.
+    """
+    try:
+        import fcntl
+    except ImportError:  # Windows, where a file that is being written cannot be replaced anyway
+        return None
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        os.close(descriptor)
+        if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
+            raise ResultsError(f"{folder}: another run is writing its results here.") from None
+        return None  # some network drives cannot lock folders
+    return descriptor
 
 
 def _order(real: Sequence[bool]) -> list[int]:

@@ -109,6 +109,30 @@ def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path):
         Recorder(tmp_path / "file" / "out", ["a.x"], [True])
 
 
+def test_a_file_in_place_of_the_folder_is_one_sentence(tmp_path):
+    (tmp_path / "out").write_text("")
+    with pytest.raises(ResultsError, match=r"out: results cannot be written here: it is no folder\.$"):
+        Recorder(tmp_path / "out", ["a.x"], [True])
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="folders cannot be locked")
+def test_a_second_run_into_the_same_folder_is_refused_until_the_first_has_ended(tmp_path):
+    first = Recorder(tmp_path, ["a.x"], [True])
+    with pytest.raises(ResultsError, match=r"another run is writing its results here\.$"):
+        Recorder(tmp_path, ["a.x"], [True])
+    first.rows[0][:] = 0.0, 1.0
+    first.write(1)
+    first.finish({"status": "completed", "units": {}})
+    assert load_results(tmp_path)["a.x"].tolist() == [1.0]
+    for _ in range(2):
+        Recorder(tmp_path, ["a.x"], [True]).discard()
+
+
+def test_a_path_that_is_no_utf_8_does_not_cost_the_results(tmp_path):
+    record(tmp_path, table(3), run={"scenario": {"file": os.fsdecode(b"sin\xe9.yaml")}})
+    assert load_results(tmp_path).run["scenario"]["file"] == "sin\udce9.yaml"
+
+
 def no_space(*args, **kwargs):
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
