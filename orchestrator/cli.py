@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import io
+import os
 import sys
 
 import typer
@@ -30,12 +32,27 @@ def _application() -> typer.Typer:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with 0, 1 (the run failed) or 2 (the input is wrong)."""
+    _make_printable()
     try:
         _application()(arguments)
     except YawbenchError as error:
         for problem in error.problems:
             print(problem, file=sys.stderr)
         sys.exit(error.exit_status)
+    except OSError as error:  # a figure or table that cannot be written, most likely
+        where = f"{error.filename}: " if error.filename else ""
+        print(f"{where}{error.strerror or error}", file=sys.stderr)
+        sys.exit(1)
+
+
+def _make_printable() -> None:
+    """Let messages pass whatever the terminal can show, and be lost where nobody listens."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:  # closed by the caller, as by `>&-`
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 if __name__ == "__main__":

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 import textwrap
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from ..errors import ResultsError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,17 +63,26 @@ def line_style(number: int) -> dict[str, Any]:
 
 
 def save(figure: Figure, stem: Path) -> list[Path]:
-    """Write `stem.svg` and `stem.png` and return both paths; equal figures give equal files."""
-    stem.parent.mkdir(parents=True, exist_ok=True)
+    """Write `stem.svg` and `stem.png` and return both paths; equal figures give equal files.
+
+    Raises:
+        ResultsError: they cannot be written.
+    """
     paths = [stem.with_name(f"{stem.name}.{kind}") for kind in ("svg", "png")]
     import matplotlib
 
-    with matplotlib.rc_context(RC):
+    with matplotlib.rc_context(RC), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")  # shown as a box
         if (layout := figure.get_layout_engine()) is not None:
             layout.execute(figure)  # once, not once per file
             figure.set_layout_engine("none")
-        figure.savefig(paths[0], metadata={"Date": None})
-        figure.savefig(paths[1], metadata={"Software": None})
+        try:
+            stem.parent.mkdir(parents=True, exist_ok=True)
+            figure.savefig(paths[0], metadata={"Date": None})
+            figure.savefig(paths[1], metadata={"Software": None})
+        except OSError as error:
+            reason = error.strerror or error
+            raise ResultsError(f"{stem}: the figure cannot be written: {reason}.") from None
     return paths
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -60,6 +61,21 @@ def check(*arguments: str) -> int:
         main(["check", *arguments])
     assert isinstance(caught.value.code, int)
     return caught.value.code
+
+
+def test_without_standard_output_the_exit_status_still_tells(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdout", None)
+    monkeypatch.setattr(sys, "stderr", None)
+    assert check("Läufe 2/a.yaml") == 0
+    assert check("Läufe 2/b.yaml") == 2
+
+
+def test_what_a_terminal_cannot_show_is_escaped() -> None:
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    command = [sys.executable, "-m", "orchestrator.cli", "check", "Läufe 2/a.yaml"]
+    done = subprocess.run(command, capture_output=True, env=environment, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert done.stdout.startswith(b"L\\xe4ufe 2/a.yaml: Single sine [mu 0.65]")
 
 
 def test_a_scenario_is_shown_with_units_wires_constants_and_the_reasons_of_its_order(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -234,3 +235,16 @@ def test_files_are_svg_and_png_and_the_same_every_time(tmp_path: Path):
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in again]
     assert first[0].read_text().startswith("<?xml")
     assert all(5_000 < path.stat().st_size < 1_000_000 for path in first)
+
+
+def test_a_figure_that_cannot_be_written_is_one_sentence(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ResultsError, match=r"overview: the figure cannot be written: Not a directory\.$"):
+        save(path_of(60.0, 40.0), tmp_path / "file" / "figures" / "overview")
+
+
+def test_a_title_that_the_font_cannot_show_is_no_warning(tmp_path):
+    figure = draw([Run("run", car())], title="日本")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        save(figure, tmp_path / "overview")
