@@ -101,10 +101,13 @@ def read(path: Path, *, what: str) -> Document:
         return fail(mark.line + 1 if mark else 1, f"not valid YAML: {reason}")
     except YAMLError as error:
         return fail(0, f"not valid YAML: {' '.join(str(error).split())}")
-    if node is None:
-        return fail(0, f"this {what} is empty")
+    except RecursionError:
+        return fail(0, f"cannot read this {what}: it is nested too deeply")
     document.lines[()] = 1
-    document.data = _Reader(document, yaml.constructor).value(node, (), ())
+    if node is not None:
+        document.data = _Reader(document, yaml.constructor).value(node, (), ())
+    if document.data is None and not document.problems:
+        return fail(0, f"this {what} is empty")
     return document
 
 
