@@ -10,6 +10,7 @@ be built, or no longer exists, is removed, so that nobody runs yesterday's model
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -102,7 +103,8 @@ def build_all(
         except BuildError as error:
             problems += error.problems
             if (read_mark(out / f"{name}.fmu") or "").startswith("component "):
-                (out / f"{name}.fmu").unlink()
+                with contextlib.suppress(OSError):  # a folder that cannot be written is the problem told
+                    (out / f"{name}.fmu").unlink()
             tell(name, "failed")
         else:
             (report.built if made else report.current).append(name)
