@@ -44,3 +44,6 @@ SIGNALS: dict[str, tuple[str, str]] = {
     "wheel_speed_*": ("rad/s", "Angular velocity w of the wheel"),
     "wheel_velocity_*": ("m/s", "Longitudinal velocity v of the wheel, wheel axes"),
 }
+
+LEAST: dict[str, float] = {"friction": 0.0, "friction_*": 0.0}
+"""Lower limits: a smaller value is a mistake, not a strange road."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .roles import WHEELS, wheels
-from .signals import SIGNALS
+from .signals import LEAST, SIGNALS
 from .units import UNITS
 
 _FMI_TYPES = {"float": "Real", "int": "Integer", "bool": "Boolean", "str": "String"}
@@ -73,7 +73,7 @@ def signal(
         unit: one of `units.UNITS`; must agree with the dictionary for a name that is in it.
         description: one line; the dictionary's text if left out.
         start: value of an input before anybody sets it.
-        minimum, maximum: limits written into the model description.
+        minimum, maximum: limits written into the model description; the dictionary's if left out.
         depends_on: of an output, the inputs it depends on directly at the same instant. A `*`
             there means the same wheel if the output's own name has one, else all four.
         optional: of an input, that the unit does its work at the start value if nothing drives it.
@@ -85,11 +85,12 @@ def signal(
     plain = name.replace("*", "x")
     if not (plain.isidentifier() and plain.isascii() and plain == plain.lower()):
         raise DeclarationError(f"signal {name!r}: a name is made of lower-case letters, digits and _")
-    known = SIGNALS.get(name)
-    if known is None:
+    entry = name
+    if name not in SIGNALS:
         for wheel in WHEELS:  # a single wheel of a four-wheel signal
             if name.endswith("_" + wheel):
-                known = SIGNALS.get(name[: -len(wheel)] + "*")
+                entry = name[: -len(wheel)] + "*"
+    known = SIGNALS.get(entry)
     if known is None and (unit is None or description is None):
         raise DeclarationError(
             f"signal {name!r} is not in the signal dictionary: give its unit and description"
@@ -100,6 +101,8 @@ def signal(
     if unit not in UNITS:
         raise DeclarationError(f"signal {name!r}: unknown unit {unit!r}; known: {', '.join(UNITS)}")
     text = description or known[1]  # type: ignore[index]
+    if minimum is None:
+        minimum = LEAST.get(entry)
     return Signal(name, unit, text, start, minimum, maximum, tuple(depends_on), optional)
 
 

@@ -248,6 +248,12 @@ def test_a_wrong_value_of_a_parameter_names_the_allowed_ones(yawbench, tmp_path)
     assert "Traceback" not in said
 
 
+def test_friction_below_zero_is_a_mistake(yawbench, tmp_path):
+    status, said = yawbench(car(tmp_path), "--out", tmp_path / "out", "--set", "inputs.friction*=-0.65")
+    assert status == 2
+    assert "--set inputs.friction*=-0.65: must be at least 0 (got -0.65), for tyre.friction_*" in said
+
+
 @pytest.mark.parametrize(("value", "word"), [("float('nan')", "not a number"), ("1e999", "infinite")])
 def test_a_value_that_is_not_finite_stops_the_run_and_names_its_wire(
     value, word, yawbench, faulty, fmus, tmp_path
