@@ -12,6 +12,7 @@ its resources: where the user's cache folder is called something else, a tempora
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import hashlib
 import io
@@ -135,7 +136,8 @@ def _load(entry: Path, path: Path) -> Fmu | None:
             if status.st_size != size or int(status.st_mtime) != _FILE_TIME:
                 return None
         fmu = fmu_description.from_record(record["fmu"], path=path, directory=entry / "fmu")
-        os.utime(entry)
+        with contextlib.suppress(OSError):  # a cache that others keep up is none to be tidied from here
+            os.utime(entry)
         return fmu
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None

@@ -324,6 +324,19 @@ def test_a_cache_that_cannot_be_written_is_said(fmu: Path, tmp_path: Path, cache
     )
 
 
+def test_a_full_cache_serves_although_it_cannot_be_written(
+    fmu: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = open_fmu(fmu)
+
+    def refuse(*args: Any, **kwargs: Any) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(os, "utime", refuse)
+    monkeypatch.setattr(fmu_archive.tempfile, "mkdtemp", refuse)
+    assert open_fmu(fmu) == first
+
+
 def test_modules_of_a_pythonfmu_unit_are_listed_with_their_content(tmp_path: Path, cache: Path) -> None:
     files: dict[str, Any] = {
         "resources/slavemodule.txt": b"entry",
