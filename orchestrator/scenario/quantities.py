@@ -86,6 +86,8 @@ _PREFIXES = {
 }
 LONGEST = 1e9
 """The longest time that is taken for one [s]."""
+SHORTEST = Fraction(1, 10**9)
+"""The shortest [s]; below, steps are lost in the rounding of time."""
 
 _GRAVITY = _unit("980665/100000", m=1, s=-2)
 _COMMON = (  # noqa: SIM905 - units read better as one line of text
@@ -230,4 +232,6 @@ def seconds(value: object) -> Fraction:
     if not 0 < time <= LONGEST:
         limit = f" and at most {LONGEST:g} s" if time > 0 else ""
         raise ValueError(f"must be a time above 0 s{limit} (got {value!r})")
+    if time < SHORTEST:
+        raise ValueError(f"must be a time of at least {float(SHORTEST):g} s (got {value!r})")
     return Fraction(time)
