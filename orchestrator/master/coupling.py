@@ -13,8 +13,8 @@ to k sees a source of period N whose last known sample is at k0 and whose one be
 these are (y_n + y_n+1) / 2 if the source has already been stepped, 1.5 y_n - 0.5 y_n-1 if not. An
 input with direct feedthrough, and every input of a unit that samples, is taken at the end of the
 step, tau = k: y_n+1 or 2 y_n - y_n-1. A discrete source holds its value from one sample to the
-next, so the sample in force at tau is taken: a plant integrates with the moment that the
-controller gave at the beginning of the step.
+next, so of its last two samples the one in force at tau is taken: a plant integrates with the
+moment that the controller gave at the beginning of the step.
 
 A slow unit (M > N) integrates over many samples of its source; it takes the straight line through
 the newest and the one that was newest at its own last step, which weighs neither by more than one.
