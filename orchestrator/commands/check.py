@@ -62,6 +62,7 @@ def _show(console: Console, title: str, columns: Sequence[str], rows: Iterable[S
     table = Table(*columns, box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
     for column in table.columns[:-1]:
         column.no_wrap = True
+    table.columns[-1].overflow = "fold"  # names are never cut
     for row in rows:
         table.add_row(*row)
     if table.row_count:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
+import textwrap
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from .options import Fmus, Out, ScenarioFile, Set, Swap
 
 SHOWN = 5
 """Warnings shown; all are in run.json."""
+BESIDE = 36
+"""Columns of a terminal that the title leaves to the bar and its numbers."""
 
 
 def run(
@@ -64,7 +67,8 @@ def _bar(title: str) -> Iterator[Callable[[int, int], None] | None]:
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
     with Progress(*columns, console=console, auto_refresh=False, transient=True) as bar:
-        task = bar.add_task(title.replace("[", r"\["), total=None)
+        shown = textwrap.shorten(title, max(10, console.width - BESIDE), placeholder="…")
+        task = bar.add_task(shown.replace("[", r"\["), total=None)
 
         def report(done: int, total: int) -> None:
             bar.update(task, completed=done, total=total, refresh=True)

@@ -319,13 +319,17 @@ def test_output_to_a_pipe_has_no_progress_bar(fmus, tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
-def test_a_terminal_shows_a_progress_bar_and_keeps_only_the_last_line(fmus, tmp_path):
+@pytest.mark.parametrize(("columns", "shown"), [(200, "of the [second] kind"), (60, "A car on a slalom of…")])
+def test_a_terminal_shows_a_progress_bar_and_keeps_only_the_last_line(columns, shown, fmus, tmp_path):
     import pty
 
     leader, follower = pty.openpty()
-    command = [sys.executable, "-m", "orchestrator.cli", "run", car(tmp_path, stop=4), "--fmus", fmus,
+    scenario = car(tmp_path, stop=4)
+    text = scenario.read_text(encoding="utf-8")
+    scenario.write_text(text.replace("on a slalom", "on a slalom of the [second] kind"), encoding="utf-8")
+    command = [sys.executable, "-m", "orchestrator.cli", "run", scenario, "--fmus", fmus,
                "--out", tmp_path / "out"]  # fmt: skip
-    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "200"}
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": str(columns)}
     process = subprocess.Popen([str(c) for c in command], stderr=follower, env=environment)
     os.close(follower)
     seen = b""
@@ -339,7 +343,8 @@ def test_a_terminal_shows_a_progress_bar_and_keeps_only_the_last_line(fmus, tmp_
         seen += part
     os.close(leader)
     assert process.wait() == 0
-    assert b"A car on a slalom" in seen
+    assert shown.encode() in seen
+    assert "━".encode() in seen
     assert b"100%" in seen
     assert b"4001 rows of " in seen.splitlines()[-1]
 
