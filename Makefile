@@ -36,4 +36,4 @@ lint: setup
 	$(BIN)/mypy
 
 clean:
-	rm -rf $(VENV) build results fmus/*.fmu *.egg-info .pytest_cache .ruff_cache .mypy_cache
+	rm -rf $(VENV) build fmus/*.fmu *.egg-info .pytest_cache .ruff_cache .mypy_cache
