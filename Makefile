@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+READY_TO_TEST := $(VENV)/.ready-to-test
 SCENARIO ?= scenarios/fnn_sideslip/25mps.yaml
 
 .PHONY: setup fmus demo run test bench lint clean
@@ -12,6 +13,10 @@ setup: $(READY)
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet --editable .
+	touch $@
+
+$(READY_TO_TEST): $(READY)
 	$(BIN)/python -m pip install --quiet --editable '.[test,lint]'
 	touch $@
 
@@ -24,13 +29,13 @@ demo: fmus
 run: fmus
 	$(BIN)/yawbench run $(SCENARIO)
 
-test: fmus
+test: $(READY_TO_TEST) fmus
 	$(BIN)/python -m pytest -n auto --dist loadfile  # a study runs once for all tests of its file
 
-bench: fmus
+bench: $(READY_TO_TEST) fmus
 	$(BIN)/python -m tests.bench
 
-lint: setup
+lint: $(READY_TO_TEST)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
