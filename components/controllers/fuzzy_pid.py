@@ -51,7 +51,10 @@ class FuzzyPidParameters(PidParameters):
         1.0, "rad/s", "Rate of the sideslip error beyond which the outer sets saturate; chosen", minimum=1e-6
     )
     yaw_rate_proportional_range: float = parameter(
-        30000.0, "N.m.s/rad", "Range of dK_p of the yaw rate; chosen", minimum=0.0
+        40000.0,
+        "N.m.s/rad",
+        "Range of dK_p of the yaw rate; chosen: with the sideslip's, a quarter off paper C's peaks",
+        minimum=0.0,
     )
     yaw_rate_integral_range: float = parameter(
         0.0, "N.m/rad", "Range of dK_i of the yaw rate; chosen: none", minimum=0.0
@@ -60,7 +63,7 @@ class FuzzyPidParameters(PidParameters):
         100.0, "N.m.s2/rad", "Range of dK_d of the yaw rate; chosen", minimum=0.0
     )
     sideslip_proportional_range: float = parameter(
-        15000.0, "N.m/rad", "Range of dK_p of the sideslip; chosen", minimum=0.0
+        30000.0, "N.m/rad", "Range of dK_p of the sideslip; chosen: see the yaw rate's", minimum=0.0
     )
     sideslip_integral_range: float = parameter(
         0.0, "N.m/(rad.s)", "Range of dK_i of the sideslip; chosen: none", minimum=0.0

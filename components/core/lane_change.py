@@ -6,8 +6,9 @@
 
 The lane offset, 3.5 m, is measured between the right borders of lanes 1 and 3; lane 5 begins again at
 the right border of lane 1. y = 0 is the middle of lane 1, x = 0 the start of the car. The path
-runs along the middles of the lanes, with half cosines in the transitions 2 and 4. A negative
-offset mirrors the track.
+runs along the middles of lanes 1 and 5 and, in lane 3, at the lane offset from lane 1's: right of the
+middle by 5 % of the vehicle width, since cars run wide to the left there. In the transitions 2 and 4 it is
+a half cosine. A negative offset mirrors the track.
 
 Source: ISO 3888-1, Passenger cars - Test track for a severe lane-change manoeuvre - Part 1: Double
 lane-change. Paper C names neither path nor lanes. Ours adds: transitions of another length, for speeds
@@ -97,12 +98,15 @@ class Track:
             lanes.append(Lane(x, x + length, min(borders), max(borders)))
             x += length + gap
         self.lanes = tuple(lanes)
+        self.offset = p.lane_offset
         self.outline = Outline(p.cg_to_front_end, p.cg_to_rear_end, 0.5 * p.vehicle_width)
 
     def path(self, x: float) -> float:
         """Return the y [m] of the path at `x` [m]."""
         first, second, third = self.lanes
-        return transition(x, first, second) if x <= second.start else transition(x, second, third)
+        if x <= second.start:
+            return transition(x, first.end, second.start, first.middle, self.offset)
+        return transition(x, second.end, third.start, self.offset, third.middle)
 
     def overrun(self, x: float, y: float, psi: float) -> float:
         """Return by how much [m] a car at `x`, `y` [m], `psi` [rad] is beyond the cones; 0 inside."""
@@ -126,7 +130,7 @@ class Track:
         return worst
 
 
-def transition(x: float, one: Lane, other: Lane) -> float:
-    """Return the y [m] of the way from the middle of one lane to that of the next."""
-    part = min(max((x - one.end) / (other.start - one.end), 0.0), 1.0)
-    return one.middle + (other.middle - one.middle) * 0.5 * (1.0 - cos(pi * part))
+def transition(x: float, start: float, end: float, y_start: float, y_end: float) -> float:
+    """Return the y [m] at `x` [m] of a half cosine from `start`, `y_start` to `end`, `y_end` [m]."""
+    part = min(max((x - start) / (end - start), 0.0), 1.0)
+    return y_start + (y_end - y_start) * 0.5 * (1.0 - cos(pi * part))

@@ -34,14 +34,18 @@ from ..core.variables import output, parameter
 class DoubleLaneChangeParameters(HeldSpeedParameters, LaneChangeParameters):
     """Of the driver, of the car as the driver knows it, and of the track."""
 
-    preview_time: float = parameter(0.9, "s", "Preview T_p; chosen", minimum=0.05)
+    preview_time: float = parameter(
+        0.78, "s", "Preview T_p; chosen: through the cones at 70 km/h on mu 0.4", minimum=0.05
+    )
     least_preview: float = parameter(
         4.0, "m", "Shortest preview distance L; chosen: just before the bumper", minimum=0.1
     )
     reaction_delay: float = parameter(
         0.0, "s", "Pure delay of the driver; chosen: none, the lag stands for it", minimum=0.0
     )
-    steering_lag: float = parameter(0.15, "s", "Lag tau of arms and steering; chosen", minimum=0.0)
+    steering_lag: float = parameter(
+        0.1, "s", "Lag tau of arms and steering; chosen: a practised driver", minimum=0.0
+    )
     steering_wheel_limit: float = parameter(
         6.0, "rad", "Largest hand-wheel angle; chosen: nearly one turn", minimum=0.0
     )

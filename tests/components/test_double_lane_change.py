@@ -23,15 +23,16 @@ def test_lanes_have_the_lengths_and_widths_of_the_standard():
     assert lanes[2].right == pytest.approx(lanes[0].right)
 
 
-def test_the_path_runs_along_the_middles_and_is_level_where_lanes_end():
-    track = Track(LaneChangeParameters())
-    for lane in track.lanes:
-        assert track.path(lane.start) == pytest.approx(lane.middle, abs=1e-12)
-        assert track.path(lane.end) == pytest.approx(lane.middle, abs=1e-12)
+def test_the_path_runs_along_the_middles_but_in_lane_three_and_is_level_where_lanes_end():
+    track = Track(LaneChangeParameters(vehicle_width=WIDTH))
+    first, second, third = track.lanes
+    for lane, y in ((first, 0.0), (second, 3.5), (third, third.middle)):
+        assert track.path(lane.start) == pytest.approx(y, abs=1e-12)
+        assert track.path(lane.end) == pytest.approx(y, abs=1e-12)
         assert (track.path(lane.end + 1e-4) - track.path(lane.end)) / 1e-4 == pytest.approx(0.0, abs=1e-4)
-    first, second, _ = track.lanes
-    halfway = 0.5 * (first.end + second.start)
-    assert track.path(halfway) == pytest.approx(0.5 * (first.middle + second.middle))
+    assert first.middle == pytest.approx(0.0, abs=1e-12)
+    assert second.middle - 3.5 == pytest.approx(0.05 * WIDTH)
+    assert track.path(0.5 * (first.end + second.start)) == pytest.approx(1.75)
 
 
 def test_a_negative_offset_mirrors_the_track():
