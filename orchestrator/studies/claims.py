@@ -10,8 +10,7 @@ from fnmatch import fnmatchcase
 from ..errors import ScenarioError
 from ..figures.display import shown
 from ..metrics.run_metrics import Value
-from ..scenario.quantities import convert
-from .study_schema import Claim, Condition, Reference
+from .study_schema import Claim, Condition, Reference, si_number
 
 Values = Mapping[tuple[str, str], Value]
 """(run, key of the metric) -> value, of those that exist."""
@@ -88,10 +87,8 @@ def _range(known: Sequence[Value], missing: bool) -> str:
 
 
 def _number(bound: float | str, unit: str) -> float:
-    if not isinstance(bound, str):
-        return float(bound)
     try:
-        return float(convert(bound, "1" if unit == "%" else unit))
+        return si_number(bound, unit)
     except ValueError as error:
         raise ScenarioError(f"a condition's bound: {error}") from None
 

@@ -14,7 +14,7 @@ from .derived import calculate
 from .grids import correlation, grid_table
 from .jobs import Outcome, read_back
 from .study_file import Study, StudyRun
-from .study_schema import MetricSpec, Reference, StudySpec, TableSpec
+from .study_schema import DerivedSpec, MetricSpec, Reference, StudySpec, TableSpec, si_number
 from .tables import Cell, Table
 
 HOLDS, NOT_JUDGED = "holds", "not judged"
@@ -95,8 +95,17 @@ def derived_tables(findings: Findings) -> list[Table]:
     tables = [grid_table(grid, findings.values) for grid in spec.grids.values()]
     if spec.derived:
         rows: list[list[Cell]] = [[one.says, findings.derived.get(key)] for key, one in spec.derived.items()]
-        tables.append(Table("Computed from several runs", ["what", "value"], [*rows]))
+        headings = ["what", "value"]
+        if any(one.published is not None for one in spec.derived.values()):
+            headings.append("the paper says")
+            for row, one in zip(rows, spec.derived.values(), strict=True):
+                row.append(_published(one))
+        tables.append(Table("Computed from several runs", headings, [*rows]))
     return tables
+
+
+def _published(spec: DerivedSpec) -> Value | None:
+    return None if spec.published is None else Value(si_number(spec.published, spec.unit), spec.unit)
 
 
 def heading(spec: MetricSpec) -> str:

@@ -16,6 +16,7 @@ from ..results.read import Results
 from .claims import Judgement, condition_text
 from .study import Each, Findings, all_tables, heading, verdict
 from .study_file import FIGURES
+from .study_schema import si_number
 from .tables import for_markdown, si, write_csv
 
 REPORT, METRICS, RECORD = "study.md", "metrics.csv", "study.json"
@@ -139,6 +140,7 @@ def _record(findings: Findings, drawn: dict[str, Path]) -> dict[str, Any]:
                 "expression": one.expression,
                 "of": {word: [source.run, source.metric] for word, source in one.of.items()},
                 "rank_correlation": one.rank_correlation,
+                "published": None if one.published is None else si_number(one.published, one.unit),
                 **(_value(findings.derived[key]) if key in findings.derived else {"value": None}),
             }
             for key, one in spec.derived.items()

@@ -36,6 +36,7 @@ numbers computed from several runs, which claims may speak of (`{derived: gain, 
         expression: (frozen - learning) / frozen
         of: {frozen: {run: frozen, metric: error}, learning: {run: learning, metric: error}}
         unit: "%"
+        published: 30 %                    # what the paper prints, in SI or with a unit
 """
 
 from __future__ import annotations
@@ -50,6 +51,7 @@ from ..errors import ScenarioError
 from ..figures.plots import OVERVIEW
 from ..metrics.run_metrics import metric
 from ..plan import Algorithm
+from ..scenario.quantities import convert
 from ..scenario.schema import Scalar, Time
 from ..scenario.strict import Strict
 from ..wording import listed, short
@@ -174,6 +176,34 @@ class Source(Strict):
     metric: str
 
 
+def _is_number(value: object) -> bool:
+    if isinstance(value, str):
+        return re.match(r"\s*[+-]?\.?\d", value) is not None
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _number(value: object) -> float | str:
+    """Return a number in SI, or text that begins with one."""
+    if not _is_number(value):
+        raise ValueError("must be a number, a number with its unit ('5 %'), or {run: ..., metric: ...}")
+    return value  # type: ignore[return-value]
+
+
+def _printed(value: object) -> float | str:
+    if not _is_number(value):
+        raise ValueError(f"must be a number, or a number with its unit ('5 %') (got {short(value)})")
+    return value  # type: ignore[return-value]
+
+
+def si_number(bound: float | str, unit: str) -> float:
+    """Return a number in SI, given as such or as text with its unit; `%` stands for a ratio.
+
+    Raises:
+        ValueError: a sentence that says what the text should have been.
+    """
+    return float(convert(bound, "1" if unit == "%" else unit) if isinstance(bound, str) else bound)
+
+
 def _expression(text: str) -> str:
     derived.parse(text)
     return text
@@ -187,6 +217,9 @@ class DerivedSpec(Strict):
     of: dict[str, Source] = Field({}, description="Name in the expression -> metric of a run")
     rank_correlation: str | None = Field(None, description="Grid whose order is compared with the paper's")
     unit: str = Field("1", description="Of the expression's value; '%' shows a ratio in per cent")
+    published: Annotated[float | str, PlainValidator(_printed)] | None = Field(
+        None, description="What the paper prints, in SI or with its unit"
+    )
 
     @model_validator(mode="after")
     def _complete(self) -> DerivedSpec:
@@ -195,6 +228,11 @@ class DerivedSpec(Strict):
         for name in derived.names_in(self.expression) if self.expression else ():
             if name not in self.of:
                 raise ValueError(f"expression: {name} stands for nothing; 'of' has {listed(self.of)}")
+        if self.published is not None:
+            try:
+                si_number(self.published, self.unit)
+            except ValueError as error:
+                raise ValueError(f"published: {error}") from None
         return self
 
 
@@ -204,14 +242,6 @@ class Reference(Strict):
     run: str
     metric: str
     times: float = 1.0
-
-
-def _number(value: object) -> float | str:
-    """Return a number in SI, or text that begins with one."""
-    plain = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-    if not plain and not (isinstance(value, str) and re.match(r"\s*[+-]?\.?\d", value)):
-        raise ValueError("must be a number, a number with its unit ('5 %'), or {run: ..., metric: ...}")
-    return value  # type: ignore[return-value]
 
 
 Bound = Annotated[

@@ -320,6 +320,20 @@ def test_a_grid_and_its_derived_numbers_are_written_down(with_grid, out):
     assert record["checks"][0]["holds_if"] == ["order ≥ 0.9"]
 
 
+def test_a_derived_number_stands_beside_the_published_one(with_grid, out):
+    findings = judge_study(with_grid(('    unit: "%"\n', '    unit: "%"\n    published: 95 %\n')), out)
+    _, numbers = derived_tables(findings)
+    assert numbers.headings == ["what", "value", "the paper says"]
+    assert numbers.text() == [
+        ["Rank correlation", "0.900", "-"],
+        ["Share of the error removed", "98.6 %", "95.0 %"],
+    ]
+    write_study(findings, out)
+    record = json.loads((out / "study.json").read_text())
+    assert record["derived"]["drop"]["published"] == pytest.approx(0.95)
+    assert record["derived"]["order"]["published"] is None
+
+
 def test_without_a_run_there_is_neither_correlation_nor_verdict(with_grid, out):
     lost = Outcome(Job("15mps/off", Path("x"), out / "15mps/off"), ("plant: lost",), 1)
     findings = judge_study(with_grid(), out, [lost])
@@ -372,6 +386,12 @@ def test_a_grid_without_published_numbers_is_a_plain_table(with_grid, out):
         ("(off - fnn) / off", "abs(off)", "only numbers, names, + - * / and parentheses are allowed"),
         ("    expression: (off - fnn) / off\n", "", "needs exactly one of expression and rank_correlation"),
         ("of: {off: {run: 15mps/off", "of: {off: {run: 15mps/of", "derived.drop.of.off.run: there is no run"),
+        ('    unit: "%"', '    unit: "%"\n    published: 95 kg', "published: '95 kg' is not a value in 1"),
+        (
+            '    unit: "%"',
+            '    unit: "%"\n    published: much',
+            "published: must be a number, or a number with",
+        ),
         ("{derived: order, at", "{derived: ordre, at", "there is no derived number 'ordre'; did you mean"),
         (
             "{derived: order, at",
