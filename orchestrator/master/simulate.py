@@ -16,6 +16,9 @@ import numpy as np
 
 from ..errors import ResultsError, SimulationError, YawbenchError
 from ..plan import Plan, Unit
+from ..results.columnar import MemoryRecorder
+from ..results.formats import recorder_of
+from ..results.read import Results
 from ..results.recorder import BLOCK, Recorder
 from ..results.run_record import run_record
 from .interrupts import StopFlag, interrupts
@@ -46,9 +49,14 @@ class RunInfo:
 
 
 def simulate(
-    plan: Plan, out: Path | str, *, progress: Progress | None = None, opener: Opener = FmuSlave
+    plan: Plan,
+    out: Path | str,
+    *,
+    progress: Progress | None = None,
+    opener: Opener = FmuSlave,
+    format: str = "csv",
 ) -> RunInfo:
-    """Run a plan and write `results.csv` and `run.json` into the folder `out`.
+    """Run a plan and write its results (`results.csv`) and `run.json` into the folder `out`.
 
     A run that fails or is interrupted (Ctrl-C, SIGTERM) writes what it has recorded, and why it
     ended, before it raises. Results of an earlier run in `out` are replaced as a whole.
@@ -58,16 +66,44 @@ def simulate(
         out: folder of the results; made if it does not exist.
         progress: told how far the run is.
         opener: makes the instances; tests put their own in.
+        format: of the results, one of `results.formats.FILES`.
 
     Raises:
+        ScenarioError: there is no such format.
         ModelDescriptionError: an FMU has no library that this computer can load.
         SimulationError: a unit failed, a wire was not finite, the run was interrupted or the results
             cannot be written any further.
-        ResultsError: nothing can be written to `out`.
+        ResultsError: nothing can be written to `out`, or the format needs a package that is missing.
     """
+    recorder = recorder_of(format)(Path(out), *_columns(plan))
+    run = _go(plan, recorder, progress, opener)
+    passes = run.master.passes if run.master else 0
+    warnings = list(run.log.warnings())
+    return RunInfo(Path(out), recorder.written, len(plan.record), run.wall_time, passes, warnings)
+
+
+def simulate_in_memory(plan: Plan, *, opener: Opener = FmuSlave) -> Results:
+    """Run a plan and return its results; nothing is written.
+
+    Raises:
+        ModelDescriptionError, SimulationError: as `simulate`.
+    """
+    recorder = MemoryRecorder(*_columns(plan))
+    _go(plan, recorder, None, opener)
+    assert recorder.results is not None
+    return recorder.results
+
+
+def _columns(plan: Plan) -> tuple[list[str], list[bool], dict[str, str | None]]:
+    """Return the names of the recorded columns, which are Real, and their units."""
     units = {unit.name: unit for unit in plan.units}
-    real = [units[unit].fmu.variables[name].type == "Real" for unit, name in plan.record]
-    recorder = Recorder(Path(out), [f"{unit}.{name}" for unit, name in plan.record], real)
+    recorded = {f"{unit}.{name}": units[unit].fmu.variables[name] for unit, name in plan.record}
+    units_of = {"time": "s", **{column: variable.unit for column, variable in recorded.items()}}
+    return list(recorded), [variable.type == "Real" for variable in recorded.values()], units_of
+
+
+def _go(plan: Plan, recorder: Recorder | MemoryRecorder, progress: Progress | None, opener: Opener) -> _Run:
+    """Run a plan into a recorder."""
     run = _Run(plan, recorder, progress)
     with interrupts(run.stop, run.abandon):
         try:
@@ -77,15 +113,13 @@ def simulate(
             run.fail(error)
             raise
         run.save("completed")
-    passes = run.master.passes if run.master else 0
-    warnings = list(run.log.warnings())
-    return RunInfo(Path(out), recorder.written, len(real), run.wall_time, passes, warnings)
+    return run
 
 
 class _Run:
     """The course of one run: what there is to write when it ends, however it ends."""
 
-    def __init__(self, plan: Plan, recorder: Recorder, progress: Progress | None) -> None:
+    def __init__(self, plan: Plan, recorder: Recorder | MemoryRecorder, progress: Progress | None) -> None:
         self.plan = plan
         self.recorder = recorder
         self.progress = progress
@@ -147,9 +181,8 @@ class _Run:
             self.recorder.write(count)
         except ResultsError as error:
             time_reached = self.plan.time(self.master.completed)
-            problem = (
-                f"{error.problems[0].rstrip('.')} (at t = {time_reached:.9g} s); the rows that fit are kept."
-            )
+            kept = "; the rows that fit are kept" if getattr(self.recorder, "rows_stay", False) else ""
+            problem = f"{error.problems[0].rstrip('.')} (at t = {time_reached:.9g} s){kept}."
             raise SimulationError(problem, unit=None, time=time_reached) from None
         finally:
             self._writing = False
@@ -164,7 +197,8 @@ class _Run:
         except ResultsError as lost:
             problems += lost.problems
         else:
-            problems.append(f"What was recorded until then: {self.recorder.folder}")
+            if self.recorder.folder is not None:
+                problems.append(f"What was recorded until then: {self.recorder.folder}")
 
     def abandon(self) -> None:
         """Leave at once: somebody insists, perhaps because a unit never comes back."""
@@ -174,7 +208,8 @@ class _Run:
         try:
             self.fail(error)
         finally:
-            print(f"yawbench: {error}; results so far: {self.recorder.folder}", file=sys.stderr, flush=True)
+            where = "" if self.recorder.folder is None else f"; results so far: {self.recorder.folder}"
+            print(f"yawbench: {error}{where}", file=sys.stderr, flush=True)
             os._exit(error.exit_status)
 
     def save(self, status: str, error: BaseException | None = None) -> None:

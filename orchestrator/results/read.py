@@ -1,4 +1,4 @@
-"""Reading back what a run has recorded: results.csv and run.json of one folder."""
+"""Reading back what a run has recorded: run.json of one folder, and the results beside it."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import ResultsError
+from ..wording import listed
+from .formats import FILES, RESULTS_FILE, RUN_FILE, Table, reader_of
 
-RESULTS_FILE = "results.csv"
-RUN_FILE = "run.json"
+__all__ = ["RESULTS_FILE", "RUN_FILE", "Results", "load_results"]
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,11 @@ class Results:
     columns: dict[str, np.ndarray]  # "<unit>.<variable>" -> shape (rows,)
     units: dict[str, str]  # "time" and "<unit>.<variable>" -> measurement unit; "" if it has none
     run: dict[str, Any]  # run.json
+
+    @property
+    def file(self) -> Path:
+        """The file that the columns come from."""
+        return self.folder / str(self.run.get("results", RESULTS_FILE))
 
     def __getitem__(self, column: str) -> np.ndarray:
         try:
@@ -71,8 +77,7 @@ class Results:
         if not found:
             raise ResultsError(self._unknown(variable, role))
         raise ResultsError(
-            f"{self.folder / RESULTS_FILE}: '{variable}' was recorded of more than one unit: "
-            f"{', '.join(found)}."
+            f"{self.file}: '{variable}' was recorded of more than one unit: {', '.join(found)}."
         )
 
     def units_of_role(self, role: str) -> list[str]:
@@ -86,7 +91,7 @@ class Results:
         short = {name.partition(".")[2]: name for name in self.columns}
         close = get_close_matches(variable, [*self.columns, *short], n=1)
         hint = f"; did you mean '{close[0]}'?" if close else f"; recorded: {', '.join(self.columns)}."
-        return f"{self.folder / RESULTS_FILE}: no column '{variable}'{of} was recorded{hint}"
+        return f"{self.file}: no column '{variable}'{of} was recorded{hint}"
 
 
 def load_results(folder: Path | str) -> Results:
@@ -96,7 +101,7 @@ def load_results(folder: Path | str) -> Results:
         ResultsError: a file is missing, unreadable or not what `yawbench run` writes.
     """
     folder = Path(folder)
-    run_file, csv_file = folder / RUN_FILE, folder / RESULTS_FILE
+    run_file = folder / RUN_FILE
     try:
         run = json.loads(run_file.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -108,18 +113,34 @@ def load_results(folder: Path | str) -> Results:
         raise ResultsError(f"{run_file}: cannot be read: {error}") from None
     if not isinstance(run, dict):
         raise ResultsError(f"{run_file}: is not the record of a run.")
+    file = str(run.get("results", RESULTS_FILE))
+    path, reader = folder / file, reader_of(file)
+    if reader is None:
+        known = listed(FILES.values(), last="or")
+        raise ResultsError(f"{run_file}: names {file!r} as the file of results; it must be {known}.")
     try:
-        with csv_file.open(encoding="utf-8", newline="") as stream:
-            names = next(csv.reader(stream), [])
-        if names[:1] != ["time"]:
-            raise ResultsError(f"{csv_file}: the first column must be 'time'.")
-        values = _read_columns(csv_file, len(names))
+        columns = reader(path)
     except FileNotFoundError:
-        raise ResultsError(f"{csv_file}: is missing, though {RUN_FILE} is there.") from None
+        raise ResultsError(f"{path}: is missing, though {RUN_FILE} is there.") from None
     except (OSError, ValueError) as error:
-        raise ResultsError(f"{csv_file}: cannot be read: {error}") from None
-    units = {name: str(run.get("units", {}).get(name) or "") for name in names}
-    return Results(folder, values[0], dict(zip(names[1:], values[1:], strict=True)), units, run)
+        raise ResultsError(f"{path}: cannot be read: {error}") from None
+    if next(iter(columns), "") != "time":
+        raise ResultsError(f"{path}: the first column must be 'time'.")
+    units = {name: str(run.get("units", {}).get(name) or "") for name in columns}
+    return Results(folder, columns.pop("time"), columns, units, run)
+
+
+def read_csv(path: Path) -> Table:
+    """Return the columns of a CSV file.
+
+    Raises:
+        OSError, ValueError: it cannot be read.
+    """
+    with path.open(encoding="utf-8", newline="") as stream:
+        names = next(csv.reader(stream), [])
+    if names[:1] != ["time"]:
+        return {name: np.empty(0) for name in names}
+    return dict(zip(names, _read_columns(path, len(names)), strict=True))
 
 
 def _read_columns(path: Path, n: int) -> list[np.ndarray]:

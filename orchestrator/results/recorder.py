@@ -1,4 +1,4 @@
-"""Writing results.csv and run.json.
+"""Writing results.csv (the other formats: `columnar`) and run.json.
 
 Both are written under temporary names and take their places together at the end, so a folder holds
 either the earlier results or the new ones; while a run writes there, no other may. Rows go out in
@@ -15,7 +15,7 @@ import io
 import json
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,37 +23,59 @@ import numpy as np
 
 from ..errors import ResultsError
 from ..plan import Value
-from .read import RESULTS_FILE, RUN_FILE
+from .formats import FILES, RESULTS_FILE, RUN_FILE
 
 BLOCK = 512
 """Rows kept in memory before they are written."""
 
 
-class Recorder:
-    """The results of one run. Fill `rows` (and `others`), then call `write`; at the end `finish`.
+class Block:
+    """The rows that a run has made last. Fill `rows` (and `others`), then call `write`.
+
+    Args:
+        columns: names below the header, `<unit>.<variable>`.
+        real: which of them are Real; the others come in `others`, one list per row.
+    """
+
+    def __init__(self, columns: Sequence[str], real: Sequence[bool]) -> None:
+        self.written = 0
+        self.columns = list(columns)
+        self._order = [0, *_order(real)]
+        self._block = np.zeros((BLOCK, 1 + sum(real)))
+        self.rows = list(self._block)
+        self.others: list[list[Value]] = []
+
+
+class Recorder(Block):
+    """The results of one run on disk. Call `write` for every block; at the end `finish`.
 
     Args:
         folder: made if it does not exist.
-        columns: names below the header, `<unit>.<variable>`.
-        real: which of them are Real; the others come in `others`, one list per row.
+        columns, real: see `Block`.
+        units: column -> measurement unit, for formats that carry it.
 
     Raises:
         ResultsError: another run is writing into the folder, or it or a file in it cannot be written;
             so do the methods.
     """
 
-    def __init__(self, folder: Path, columns: Sequence[str], real: Sequence[bool]) -> None:
+    file = RESULTS_FILE
+    rows_stay = True
+    """Whether rows that have been written can be read if no more follow."""
+
+    def __init__(
+        self,
+        folder: Path,
+        columns: Sequence[str],
+        real: Sequence[bool],
+        units: Mapping[str, str | None] | None = None,
+    ) -> None:
+        super().__init__(columns, real)
         self.folder = folder
-        self.written = 0
-        self._order = [0, *_order(real)]
-        self._block = np.zeros((BLOCK, 1 + sum(real)))
-        self.rows = list(self._block)
-        self.others: list[list[Value]] = []
+        self.units = dict(units or {})
         self._home = folder.absolute()  # an FMU may change the working directory
-        self._path = self._home / f"{RESULTS_FILE}.part"
+        self._path = self._home / f"{self.file}.part"
         self._run_path = self._home / f"{RUN_FILE}.part"
-        header = io.StringIO()
-        csv.writer(header, lineterminator="\n").writerow(["time", *columns])
         self._lock: int | None = None
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -63,13 +85,19 @@ class Recorder:
             raise ResultsError(f"{folder}: results cannot be written here: it is no folder.") from None
         except OSError as error:
             self._unlock()
-            raise ResultsError(f"{folder}: results cannot be written here: {_reason(error)}.") from None
+            raise ResultsError(f"{folder}: results cannot be written here: {reason(error)}.") from None
         self._size = 0
         try:
-            self._append(header.getvalue().encode())
+            self._begin()
         except ResultsError:
             self.discard()
             raise
+
+    def _begin(self) -> None:
+        """Write what stands before the rows."""
+        header = io.StringIO()
+        csv.writer(header, lineterminator="\n").writerow(["time", *self.columns])
+        self._append(header.getvalue().encode())
 
     def write(self, count: int) -> None:
         """Write the first `count` of `rows`; they are then free again."""
@@ -100,9 +128,7 @@ class Recorder:
                 view = view[self._file.write(view) :]
         except OSError as error:
             self._cut_back(data[: len(data) - len(view)])
-            raise ResultsError(
-                f"{self.folder / RESULTS_FILE}: cannot be written: {_reason(error)}."
-            ) from None
+            raise ResultsError(f"{self.folder / self.file}: cannot be written: {reason(error)}.") from None
         self._size += len(data)
 
     def _cut_back(self, arrived: bytes) -> None:
@@ -119,6 +145,7 @@ class Recorder:
         On a full disk the last rows give way to the record, without which the others are no use.
         """
         try:
+            self._complete(run)
             try:
                 self._write_record(run)
             except OSError as error:
@@ -128,15 +155,23 @@ class Recorder:
             self._file.close()
             target = self._home / RUN_FILE
             target.unlink(missing_ok=True)  # from here on the earlier results are gone as a whole
-            os.replace(self._path, self._home / RESULTS_FILE)
+            os.replace(self._path, self._home / self.file)
+            for other in FILES.values():
+                if other != self.file:
+                    (self._home / other).unlink(missing_ok=True)
             os.replace(self._run_path, target)
             self._unlock()
         except OSError as error:
             self.discard()
-            raise ResultsError(f"{self.folder}: results cannot be written: {_reason(error)}.") from None
+            raise ResultsError(f"{self.folder}: results cannot be written: {reason(error)}.") from None
+
+    def _complete(self, run: dict[str, Any]) -> None:
+        """Write what stands behind the rows."""
 
     def _write_record(self, run: dict[str, Any]) -> None:
         run = {**run, "rows": self.written}
+        if self.file != RESULTS_FILE:
+            run["results"] = self.file
         text = json.dumps(_plain(run), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
         # a path that is no UTF-8 comes as lone surrogates, which JSON writes as \\udcxx
         self._run_path.write_text(text, encoding="utf-8", errors="backslashreplace")
@@ -199,7 +234,8 @@ def _order(real: Sequence[bool]) -> list[int]:
     return order
 
 
-def _reason(error: OSError) -> str:
+def reason(error: OSError) -> str:
+    """Return why something cannot be written, in words."""
     if error.errno == errno.ENOSPC:
         return "the disk is full"
     return f"{error.strerror or error}"

@@ -19,7 +19,8 @@ from typing import Any
 from ..errors import ResultsError, ScenarioError, YawbenchError
 from ..master.interrupts import StopFlag, interrupts
 from ..plan import Algorithm, Plan
-from ..results.read import RESULTS_FILE, RUN_FILE, Results, load_results
+from ..results.formats import FILES, RUN_FILE
+from ..results.read import Results, load_results
 from ..wording import hint
 
 GRACE = 5.0
@@ -42,6 +43,7 @@ class Job:
     algorithm: Algorithm | None = None
     fmus: Path | None = None
     record: tuple[str, ...] = ()  # unit.variable; default: what the scenario records
+    format: str = "csv"  # of the results
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,8 @@ class Outcome:
     problems: tuple[str, ...] = ()
     exit_status: int = 0
     seconds: float = 0.0  # of the process, start to end
+    value: Any = None  # what the process returned
+    died: bool = False  # the process ended without a word
 
     @property
     def ok(self) -> bool:
@@ -115,14 +119,14 @@ def _problems(job: Job) -> list[str]:
 
 
 def run_job(job: Job) -> None:
-    """Make one run in this process.
+    """Make one run in this process; return nothing, for the results are on disk.
 
     Raises:
         YawbenchError: the scenario is wrong or the run failed.
     """
     from ..master.simulate import simulate
 
-    simulate(plan_of(job), job.out)
+    simulate(plan_of(job), job.out, format=job.format)
 
 
 def default_workers() -> int:
@@ -148,7 +152,8 @@ def execute(
         jobs: what to run.
         workers: processes at a time; default: one per core.
         done: called with every outcome as it comes.
-        run: what a process does with its job; importable by name.
+        run: what a process does with its job; importable by name. What it returns becomes the
+            outcome's value.
 
     Raises:
         KeyboardInterrupt: Ctrl-C or SIGTERM, when all runs have ended.
@@ -210,7 +215,7 @@ class _Running:
 
     @classmethod
     def start(cls, number: int, job: Job, context: Any, run: Callable[[Job], Any]) -> _Running:
-        for name in (RESULTS_FILE, RUN_FILE):
+        for name in (*FILES.values(), RUN_FILE):
             with suppress(OSError):
                 (job.out / name).unlink()
         ours, theirs = context.Pipe(duplex=False)
@@ -222,13 +227,14 @@ class _Running:
     def outcome(self) -> Outcome:
         """Return what the process reported, or how it died if it did not."""
         try:
-            status, problems = self.pipe.recv()
+            (status, problems, value), died = self.pipe.recv(), False
             self.end()
-        except EOFError:
+        except (EOFError, OSError):
             self.end()
-            status, problems = 1, (_death(self.process.exitcode),)
+            (status, problems, value), died = (1, (_death(self.process.exitcode),), None), True
         self.pipe.close()
-        return Outcome(self.job, tuple(problems), status, time.monotonic() - self.began)
+        seconds = time.monotonic() - self.began
+        return Outcome(self.job, tuple(problems), status, seconds, value, died)
 
     def end(self) -> None:
         """Wait for the process to end; kill one that does not, because a unit never comes back."""
@@ -242,13 +248,12 @@ def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:
     if hasattr(os, "setpgrp"):
         os.setpgrp()  # Ctrl-C on the terminal is for the caller, who ends this process
     try:
-        run(job)
-        report: tuple[int, list[str]] = (0, [])
+        report: tuple[int, list[str], Any] = (0, [], run(job))
     except YawbenchError as error:
-        report = (error.exit_status, error.problems or [type(error).__name__])
+        report = (error.exit_status, error.problems or [type(error).__name__], None)
     except BaseException as error:
         sys.excepthook(type(error), error, error.__traceback__)
-        report = (1, [f"{type(error).__name__}: {error}"])
+        report = (1, [f"{type(error).__name__}: {error}"], None)
     pipe.send(report)
     pipe.close()
 

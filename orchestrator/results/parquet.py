@@ -1,0 +1,72 @@
+"""Results as Parquet: a column per variable, its measurement unit in the field's metadata."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ResultsError
+from .columnar import ColumnRecorder, plain
+from .formats import FILES, Table
+from .recorder import reason
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+UNIT = b"unit"
+"""Key of the measurement unit in a field's metadata."""
+
+
+class ParquetRecorder(ColumnRecorder):
+    """The results of one run as Parquet. The file can be read once the run has ended."""
+
+    file = FILES["parquet"]
+    CHUNK = 32_768  # rows of a row group; chosen: 2 MB of 64 columns in memory are soon compressed
+
+    def _begin(self) -> None:
+        super()._begin()
+        self._writer: Any = None
+
+    def _pass_on(self) -> None:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        arrays = [pa.array(array) for array in self._columns.arrays()]
+        self._columns.clear()
+        if self._writer is None:
+            names = ["time", *self.columns]
+            fields = [_field(n, a, self.units.get(n)) for n, a in zip(names, arrays, strict=True)]
+            self._schema = pa.schema(fields)
+            self._writer = pq.ParquetWriter(self._file, self._schema, compression="zstd")
+        try:
+            self._writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
+        except OSError as error:
+            path = self.folder / self.file
+            raise ResultsError(f"{path}: cannot be written: {reason(error)}.") from None
+
+    def _complete(self, run: dict[str, Any]) -> None:
+        if self._columns.rows or self._writer is None:
+            self._pass_on()
+        self._writer.close()
+
+
+def _field(name: str, array: pa.Array, unit: str | None) -> pa.Field:
+    import pyarrow as pa
+
+    return pa.field(name, array.type, metadata={UNIT: unit or ""})
+
+
+def read_parquet(path: Path) -> Table:
+    """Return the columns of a Parquet file.
+
+    Raises:
+        OSError, ValueError: it cannot be read.
+    """
+    import pyarrow.parquet as pq
+
+    if not path.exists():
+        raise FileNotFoundError(path)
+    table = pq.ParquetFile(path).read()  # by itself, whatever the folder above is called
+    return {
+        name: plain(column.to_numpy()) for name, column in zip(table.column_names, table.columns, strict=True)
+    }
