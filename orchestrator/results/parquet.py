@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ResultsError
 from .columnar import ColumnRecorder, plain
 from .formats import FILES, Table
-from .recorder import reason
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -26,6 +26,7 @@ class ParquetRecorder(ColumnRecorder):
     def _begin(self) -> None:
         super()._begin()
         self._writer: Any = None
+        self._lost: ResultsError | None = None
 
     def _pass_on(self) -> None:
         import pyarrow as pa
@@ -37,17 +38,39 @@ class ParquetRecorder(ColumnRecorder):
             names = ["time", *self.columns]
             fields = [_field(n, a, self.units.get(n)) for n, a in zip(names, arrays, strict=True)]
             self._schema = pa.schema(fields)
-            self._writer = pq.ParquetWriter(self._file, self._schema, compression="zstd")
+            sink = pa.PythonFile(_Sink(self._append), mode="w")
+            self._writer = pq.ParquetWriter(sink, self._schema, compression="zstd")
         try:
             self._writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
-        except OSError as error:
-            path = self.folder / self.file
-            raise ResultsError(f"{path}: cannot be written: {reason(error)}.") from None
+        except ResultsError as error:
+            self._lost = error
+            raise
 
     def _complete(self, run: dict[str, Any]) -> None:
+        if self._lost is not None:  # a file with a hole is no use
+            raise ResultsError(self._lost.problems)
         if self._columns.rows or self._writer is None:
             self._pass_on()
         self._writer.close()
+
+
+class _Sink:
+    """What pyarrow writes into. It takes no notice of a file that accepts less than it is given."""
+
+    closed = False
+
+    def __init__(self, append: Callable[[bytes], None]) -> None:
+        self._append = append
+
+    def write(self, data: bytes) -> int:
+        self._append(data)
+        return len(data)
+
+    def flush(self) -> None:
+        """Nothing: the file has no buffer."""
+
+    def close(self) -> None:
+        """Nothing: the recorder closes its file."""
 
 
 def _field(name: str, array: pa.Array, unit: str | None) -> pa.Field:

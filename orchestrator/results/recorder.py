@@ -161,6 +161,9 @@ class Recorder(Block):
                     (self._home / other).unlink(missing_ok=True)
             os.replace(self._run_path, target)
             self._unlock()
+        except ResultsError:
+            self.discard()
+            raise
         except OSError as error:
             self.discard()
             raise ResultsError(f"{self.folder}: results cannot be written: {reason(error)}.") from None

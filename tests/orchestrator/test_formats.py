@@ -1,0 +1,232 @@
+"""Results as Parquet and as MDF: the same numbers, to the bit, as from CSV; with units."""
+
+from __future__ import annotations
+
+import builtins
+import json
+import math
+import sys
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from orchestrator.cli import main
+from orchestrator.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
+from orchestrator.master.simulate import simulate, simulate_in_memory
+from orchestrator.results import parquet
+from orchestrator.results.columnar import MemoryRecorder
+from orchestrator.results.formats import FILES, recorder_of
+from orchestrator.results.read import load_results
+from orchestrator.results.recorder import BLOCK
+
+from .fakes import Clock, Function, Stage, make_plan
+from .recorded import car, write
+
+COLUMNS = ["a.n", "a.x", "a.s", "a.y", "a.b"]
+REAL = [False, True, False, True, False]
+UNITS = {"time": "s", "a.x": "rad/s", "a.y": "N.m", "a.n": None}
+OTHERS = ["parquet", "mf4"]
+
+
+def fill(writer, rows):
+    """Give a recorder rows of all types, with every kind of float."""
+    odd = [0.1, -0.0, math.inf, -math.inf, math.nan, 5e-324, 1.7976931348623157e308, 1 / 3]
+    for begin in range(0, rows, BLOCK):
+        count = min(BLOCK, rows - begin)
+        for k in range(count):
+            i = begin + k
+            writer.rows[k][:] = [0.001 * i, odd[i % len(odd)], -math.pi * i]
+            writer.others.append([i - 3, "trocken" if i % 2 else "naß", i % 3 == 0])
+        writer.write(count)
+
+
+def record(folder, rows, name):
+    writer = recorder_of(name)(folder, COLUMNS, REAL, UNITS)
+    fill(writer, rows)
+    units = {k: UNITS.get(k) for k in ("time", *COLUMNS)}
+    started = "2024-01-02T03:04:05+00:00"
+    writer.finish({"status": "completed", "title": "Sine", "started": started, "units": units})
+    return load_results(folder)
+
+
+def alike(one, other):
+    assert list(one) == list(other)
+    assert one.time.tobytes() == other.time.tobytes()
+    for column in one:
+        assert one[column].dtype == other[column].dtype
+        assert one[column].tobytes() == other[column].tobytes()
+    assert one.units == other.units
+
+
+@pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.parametrize("rows", [0, 1, BLOCK, 2 * BLOCK + 7])
+def test_every_format_reads_back_as_csv_does_to_the_last_bit(rows, name, tmp_path):
+    expected = record(tmp_path / "csv", rows, "csv")
+    found = record(tmp_path / name, rows, name)
+    alike(found, expected)
+    assert sorted(p.name for p in (tmp_path / name).iterdir()) == sorted([FILES[name], "run.json"])
+
+
+def test_results_in_memory_are_those_on_disk(tmp_path):
+    expected = record(tmp_path, 700, "csv")
+    memory = MemoryRecorder(COLUMNS, REAL, UNITS)
+    fill(memory, 700)
+    memory.finish({"status": "completed"})
+    alike(memory.results, expected)
+    assert memory.results.run == {"status": "completed", "rows": 700}
+
+
+def test_parquet_files_carry_units_and_row_groups(tmp_path, monkeypatch):
+    monkeypatch.setattr(parquet.ParquetRecorder, "CHUNK", BLOCK)
+    record(tmp_path, 3 * BLOCK + 1, "parquet")
+    file = pq.ParquetFile(tmp_path / "results.parquet")
+    units = {field.name: field.metadata[b"unit"].decode() for field in file.schema_arrow}
+    assert units == {"time": "s", "a.n": "", "a.x": "rad/s", "a.s": "", "a.y": "N.m", "a.b": ""}
+    assert [str(field.type) for field in file.schema_arrow] == [
+        "double", "int64", "double", "string", "double", "bool",
+    ]  # fmt: skip
+    assert file.metadata.num_row_groups == 4
+
+
+def test_mdf_files_carry_units_the_title_and_the_start(tmp_path):
+    asammdf = pytest.importorskip("asammdf")
+    record(tmp_path, 20, "mf4")
+    with asammdf.MDF(tmp_path / "results.mf4") as mdf:
+        assert mdf.version == "4.10"
+        assert mdf.get("a.x").unit == "rad/s"
+        assert mdf.get("a.y").timestamps[1] == 0.001
+        assert mdf.header.start_time.isoformat() == "2024-01-02T03:04:05+00:00"
+        assert "Sine" in mdf.groups[0].channel_group.comment
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_results_of_another_format_are_replaced_as_a_whole(name, tmp_path):
+    record(tmp_path, 5, name)
+    assert len(record(tmp_path, 7, "csv").time) == 7
+    assert not (tmp_path / FILES[name]).exists()
+    record(tmp_path, 9, name)
+    assert not (tmp_path / "results.csv").exists()
+    assert len(load_results(tmp_path).time) == 9
+
+
+def units(fail_at=math.inf):
+    """A unit that puts out sin(t), and from some time [s] on what stops the run."""
+    return {
+        "a": Clock(y=lambda t: math.sin(t) if t < fail_at else math.nan),
+        "b": Function(lambda t, u: {"z": u["y"]}, ["y"], ["z"]),
+    }
+
+
+def plan(n_steps=1200):
+    return make_plan(units(), ["a.y -> b.y"], step="1/1000", n_steps=n_steps)
+
+
+@pytest.mark.parametrize("name", ["csv", *OTHERS])
+def test_a_run_writes_the_format_that_it_is_told(name, tmp_path):
+    simulate(plan(), tmp_path, opener=Stage(units()), format=name)
+    found = load_results(tmp_path)
+    assert found.file == tmp_path / FILES[name]
+    assert len(found.time) == 1201
+    alike(found, simulate_in_memory(plan(), opener=Stage(units())))
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_a_run_that_fails_keeps_what_it_has_recorded(name, tmp_path):
+    with pytest.raises(SimulationError) as error:
+        simulate(plan(), tmp_path, opener=Stage(units(fail_at=0.9)), format=name)
+    assert error.value.problems[1] == f"What was recorded until then: {tmp_path}"
+    found = load_results(tmp_path)
+    assert found.run["status"] == "failed"
+    assert found.time[-1] == 0.899
+
+
+def test_a_run_in_memory_that_fails_says_nothing_of_files():
+    with pytest.raises(SimulationError) as error:
+        simulate_in_memory(plan(), opener=Stage(units(fail_at=0.9)))
+    assert error.value.problems == ["a: y is not a number at t = 0.9 s, on the wire a.y -> b.y"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on the size of files")
+@pytest.mark.parametrize("name", OTHERS)
+def test_a_disk_without_room_is_one_sentence_and_keeps_the_earlier_results(name, tmp_path, monkeypatch):
+    import resource
+
+    monkeypatch.setattr(parquet.ParquetRecorder, "CHUNK", BLOCK)
+    simulate(plan(50), tmp_path, opener=Stage(units()), format=name)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (9_000, limits[1]))
+    try:
+        with pytest.raises(YawbenchError) as caught:
+            simulate(plan(), tmp_path, opener=Stage(units()), format=name)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert "cannot be written: File too large" in caught.value.problems[0]
+    assert "rows that fit" not in str(caught.value)
+    assert "recorded until" not in str(caught.value)
+    assert len(load_results(tmp_path).time) == 51
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted([FILES[name], "run.json"])
+
+
+def test_an_unknown_format_names_those_there_are():
+    with pytest.raises(
+        ScenarioError, match=r"^--format hdf5: no such format; there are: csv, parquet and mf4$"
+    ):
+        recorder_of("hdf5")
+
+
+def test_mdf_without_its_package_says_how_to_get_it(tmp_path, monkeypatch):
+    found = builtins.__import__
+
+    def without(name, *args, **kwargs):
+        if name.startswith("asammdf"):
+            raise ImportError(name)
+        return found(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(ResultsError, match=r"need the package asammdf: pip install 'yawbench\[mdf\]'$"):
+        recorder_of("mf4")
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_damaged_files_are_one_sentence(name, tmp_path):
+    record(tmp_path, 20, name)
+    (tmp_path / FILES[name]).write_bytes(b"neither one nor the other")
+    with pytest.raises(ResultsError, match=rf"{FILES[name]}: cannot be read: ") as error:
+        load_results(tmp_path)
+    assert "\n" not in str(error.value)
+    (tmp_path / FILES[name]).unlink()
+    with pytest.raises(ResultsError, match=rf"{FILES[name]}: is missing, though run.json is there\.$"):
+        load_results(tmp_path)
+
+
+def test_a_record_that_names_another_file_is_refused(tmp_path):
+    folder = write(car(n=5), tmp_path / "run")
+    run = json.loads((folder / "run.json").read_text())
+    (folder / "run.json").write_text(json.dumps({**run, "results": "../secret.csv"}))
+    with pytest.raises(ResultsError, match=r"names '\.\./secret\.csv' as the file of results"):
+        load_results(folder)
+
+
+def test_plot_draws_results_of_every_format(tmp_path):
+    recorded = car(n=801)
+    for name in FILES:
+        columns = list(recorded.columns)
+        writer = recorder_of(name)(tmp_path / name, columns, [True] * len(columns), recorded.units)
+        table = np.column_stack([recorded.time, *recorded.columns.values()])
+        for begin in range(0, len(table), BLOCK):
+            block = table[begin : begin + BLOCK]
+            for row, values in zip(writer.rows, block, strict=False):
+                row[:] = values
+            writer.write(len(block))
+        writer.finish({**recorded.run, "units": recorded.units})
+    for name in FILES:
+        main_ok(["plot", str(tmp_path / name)])
+    pictures = [(tmp_path / name / "overview.png").read_bytes() for name in FILES]
+    assert pictures[0] == pictures[1] == pictures[2]
+
+
+def main_ok(arguments):
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    assert end.value.code in (0, None)
