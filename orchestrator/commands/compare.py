@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .batch import Jobs
-from .options import Fmus, Out, ScenarioFile, Set
+from .options import Fmus, Format, Out, ScenarioFile, Set
 
 Swaps = Annotated[
     list[str],
@@ -28,19 +28,24 @@ def compare(
     out: Out = None,
     fmus: Fmus = None,
     jobs: Jobs = None,
+    format_: Format = "csv",
 ) -> None:
     """Run a scenario once per FMU; overlay the runs in figures and put their metrics side by side.
 
     Without --out, results go to results/<folder of the scenario>/<its name>-compare. A run that
     fails is named and takes no other with it.
     """
+    from dataclasses import replace
+
+    from ..results.formats import check_format
     from ..studies.compare import judge_comparison, metric_table, variants, write_comparison
     from .batch import print_tables, run_all, say
     from .run import default_folder
 
     default: Path = default_folder(scenario)
     folder = out or default.with_name(f"{default.name}-compare")
-    work = variants(scenario, swap, set_ or (), folder, fmus)
+    check_format(format_)
+    work = [replace(job, format=format_) for job in variants(scenario, swap, set_ or (), folder, fmus)]
     outcomes = run_all(work, folder, workers=jobs)
     comparison = judge_comparison(outcomes)
     title = str(comparison.runs[0].results.run.get("title") or "") if comparison.runs else ""

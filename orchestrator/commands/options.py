@@ -21,3 +21,11 @@ Fmus = Annotated[
     Path | None,
     typer.Option("--fmus", metavar="DIR", help="Folder of the FMUs; default: the nearest fmus/ folder."),
 ]
+Format = Annotated[
+    str,
+    typer.Option(
+        "--format",
+        metavar="FORMAT",
+        help="Of the results: csv; parquet or mf4 (ASAM MDF 4), smaller and with units.",
+    ),
+]

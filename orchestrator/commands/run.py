@@ -6,10 +6,23 @@ import contextlib
 import os
 import sys
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Annotated
 
-from .options import Fmus, Out, ScenarioFile, Set, Swap
+import typer
+
+from .options import Fmus, Format, Out, ScenarioFile, Set, Swap
+
+Metrics = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--metric",
+        metavar="NAME",
+        help="Print a metric of the run, such as 'peak(sideslip)'; 'standard' prints the usual ones. "
+        "Repeatable.",
+    ),
+]
 
 SHOWN = 5
 """Warnings shown; all are in run.json."""
@@ -18,7 +31,13 @@ BESIDE = 36
 
 
 def run(
-    scenario: ScenarioFile, swap: Swap = None, set_: Set = None, out: Out = None, fmus: Fmus = None
+    scenario: ScenarioFile,
+    swap: Swap = None,
+    set_: Set = None,
+    out: Out = None,
+    fmus: Fmus = None,
+    format_: Format = "csv",
+    metric: Metrics = None,
 ) -> None:
     """Run a scenario and write results.csv and run.json.
 
@@ -26,20 +45,39 @@ def run(
     there are replaced.
     """
     from ..master.simulate import simulate
+    from ..results.formats import check_format
     from ..scenario.load import load_scenario
     from ..wiring.make_plan import make_plan
 
+    check_format(format_)
+    metrics = _metric_names(metric or ())
     plan = make_plan(load_scenario(scenario, swaps=swap or (), settings=set_ or ()), fmus=fmus)
     for note in plan.notes:
         _say(f"note: {note}")
     folder = out or default_folder(scenario)
     with _bar(plan.title or scenario.stem) as progress:
-        info = simulate(plan, folder, progress=progress)
+        info = simulate(plan, folder, progress=progress, format=format_)
     for message in info.warnings[:SHOWN]:
         _say(f"warning: {message.unit} at t = {message.time:.9g} s: {message.text}")
     if len(info.warnings) > SHOWN:
         _say(f"warning: {len(info.warnings) - SHOWN} more, see {folder / 'run.json'}")
     _say(f"{folder}: {info.rows} rows of {info.columns} variables in {info.wall_time:.2f} s")
+    if metrics:
+        from ..results.read import load_results
+        from ..studies.tables import metrics_of_run
+        from .batch import print_tables
+
+        print_tables([metrics_of_run(load_results(folder), metrics)])
+
+
+def _metric_names(given: Sequence[str]) -> list[str]:
+    """Return the metrics that `--metric` names, each once."""
+    if not given:
+        return []
+    from ..metrics.run_metrics import STANDARD, metric
+
+    names = [name for one in given for name in (STANDARD if one == "standard" else [metric(one).name])]
+    return list(dict.fromkeys(names))
 
 
 def default_folder(scenario: Path) -> Path:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .batch import Jobs
-from .options import Fmus, Out
+from .options import Fmus, Format, Out
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file (YAML).", metavar="STUDY")]
 NoRun = Annotated[
@@ -17,13 +17,21 @@ NoRun = Annotated[
 
 
 def study(
-    file: StudyFile, out: Out = None, fmus: Fmus = None, jobs: Jobs = None, no_run: NoRun = False
+    file: StudyFile,
+    out: Out = None,
+    fmus: Fmus = None,
+    jobs: Jobs = None,
+    format_: Format = "csv",
+    no_run: NoRun = False,
 ) -> None:
     """Run a study: its scenarios, a table of metrics, a verdict per claim, figures.
 
     Without --out, results go to results/<folder of the study>/<its name>. Every run has a process
     of its own; one that fails is named in the table and takes no other with it.
     """
+    from dataclasses import replace
+
+    from ..results.formats import check_format
     from ..studies.jobs import Outcome, pool
     from ..studies.study import all_tables, judge_study
     from ..studies.study_file import load_study
@@ -31,11 +39,12 @@ def study(
     from .batch import print_tables, run_all, say, stoppable
     from .run import default_folder
 
+    check_format(format_)
     loaded = load_study(file)
     folder = out or default_folder(file)
     outcomes: list[Outcome] = []
     if not no_run:
-        work = [run.job(folder, fmus) for run in loaded.runs.values()]
+        work = [replace(run.job(folder, fmus), format=format_) for run in loaded.runs.values()]
         outcomes = run_all(work, folder, workers=jobs)
     with stoppable(folder), pool(jobs) as workers:
         findings = judge_study(loaded, folder, outcomes, each=workers.map)

@@ -11,10 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..figures.display import shown
-from ..metrics.run_metrics import Value
+from ..metrics.run_metrics import Value, evaluate_all, metric
 
 if TYPE_CHECKING:
     import rich.table
+
+    from ..results.read import Results
 
 MIN_HEADING = 12
 """Characters of a heading over numbers before it is broken at a space."""
@@ -81,6 +83,18 @@ def for_markdown(table: Table) -> str:
     head = [f"**{table.title}**", ""] if table.title else []
     notes = ["", *(f"{note}  " for note in table.notes)] if table.notes else []
     return "\n".join([*head, line(table.headings), line(rule), *map(line, table.text()), *notes]) + "\n"
+
+
+def metrics_of_run(results: Results, names: Sequence[str]) -> Table:
+    """Return a table of the metrics of one run, one row each; those it has no signals for are left out."""
+    values = evaluate_all(results, names)
+    rows: list[Sequence[Cell]] = [
+        [metric(name).title, metric(name).formula, value] for name, value in values.items()
+    ]
+    title = str(results.run.get("title") or results.folder)
+    missing = [name for name in names if name not in values]
+    notes = [f"No number for {', '.join(missing)}."] if missing else []
+    return Table(title, ["metric", "", "value"], rows, notes)
 
 
 def write_csv(path: Path, headings: Sequence[str], rows: Sequence[Sequence[Cell]]) -> None:
