@@ -39,16 +39,28 @@ class FuzzyPidParameters(PidParameters):
         choices=("mirrored", "printed"),
     )
     yaw_rate_error_range: float = parameter(
-        0.05, "rad/s", "Yaw-rate error beyond which the outer sets saturate; chosen", minimum=1e-6
+        0.05,
+        "rad/s",
+        "Yaw-rate error beyond which the outer sets saturate; chosen: twice that of paper C's runs",
+        minimum=1e-6,
     )
     yaw_rate_error_rate_range: float = parameter(
-        1.0, "rad/s2", "Rate of the yaw-rate error beyond which the outer sets saturate; chosen", minimum=1e-6
+        1.0,
+        "rad/s2",
+        "Rate of the yaw-rate error beyond which the outer sets saturate; chosen: twice the runs'",
+        minimum=1e-6,
     )
     sideslip_error_range: float = parameter(
-        0.02, "rad", "Sideslip error beyond which the outer sets saturate; chosen", minimum=1e-6
+        0.02,
+        "rad",
+        "Sideslip error beyond which the outer sets saturate; chosen: that of paper C's runs",
+        minimum=1e-6,
     )
     sideslip_error_rate_range: float = parameter(
-        1.0, "rad/s", "Rate of the sideslip error beyond which the outer sets saturate; chosen", minimum=1e-6
+        1.0,
+        "rad/s",
+        "Rate of the sideslip error beyond which the outer sets saturate; chosen: far beyond the runs'",
+        minimum=1e-6,
     )
     yaw_rate_proportional_range: float = parameter(
         40000.0,
@@ -60,7 +72,7 @@ class FuzzyPidParameters(PidParameters):
         0.0, "N.m/rad", "Range of dK_i of the yaw rate; chosen: none", minimum=0.0
     )
     yaw_rate_derivative_range: float = parameter(
-        100.0, "N.m.s2/rad", "Range of dK_d of the yaw rate; chosen", minimum=0.0
+        100.0, "N.m.s2/rad", "Range of dK_d of the yaw rate; chosen: as K_d", minimum=0.0
     )
     sideslip_proportional_range: float = parameter(
         30000.0, "N.m/rad", "Range of dK_p of the sideslip; chosen: see the yaw rate's", minimum=0.0
@@ -69,7 +81,7 @@ class FuzzyPidParameters(PidParameters):
         0.0, "N.m/(rad.s)", "Range of dK_i of the sideslip; chosen: none", minimum=0.0
     )
     sideslip_derivative_range: float = parameter(
-        100.0, "N.m.s/rad", "Range of dK_d of the sideslip; chosen", minimum=0.0
+        100.0, "N.m.s/rad", "Range of dK_d of the sideslip; chosen: as K_d", minimum=0.0
     )
 
 
