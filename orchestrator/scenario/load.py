@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -25,6 +25,8 @@ def load_scenario(
     stop_time: Fraction | float | str | None = None,
     step_size: Fraction | float | str | None = None,
     algorithm: Algorithm | None = None,
+    vehicle: Path | None = None,
+    read: Callable[..., Document] = yaml_lines.read,
 ) -> Scenario:
     """Read a scenario file.
 
@@ -34,12 +36,16 @@ def load_scenario(
         settings: `unit.parameter=value`, as given to --set.
         stop_time, step_size: in place of the file's [s].
         algorithm: in place of the file's.
+        vehicle: vehicle file in place of the scenario's, relative to the working directory.
+        read: how to read a file, called as `yaml_lines.read`; what it returns is changed.
 
     Raises:
         ScenarioError: with everything that is wrong with the file, its vehicle file, the options.
     """
-    document = yaml_lines.read(Path(path), what="scenario file")
-    vehicle_document = _read_vehicle(document)
+    document = read(Path(path), what="scenario file")
+    if vehicle is not None:
+        overrides.apply_values(document, {"vehicle": str(vehicle.absolute())})
+    vehicle_document = _read_vehicle(document, read)
     replaced = overrides.apply_swaps(document, swaps) if document.data is not None else {}
     if document.data is not None:
         overrides.apply_settings(document, vehicle_document, settings)
@@ -47,28 +53,28 @@ def load_scenario(
     overrides.apply_values(document, values)
 
     scenario = strict.validate(Scenario, document)
-    vehicle = strict.validate(Vehicle, vehicle_document)
+    parameters = strict.validate(Vehicle, vehicle_document)
     if isinstance(document.data, dict):
         _check_time_grid(document)
         _check_unit_names(document)
     problems = document.sentences() + vehicle_document.sentences()
-    if problems or scenario is None or vehicle is None:
+    if problems or scenario is None or parameters is None:
         raise ScenarioError(problems)
     scenario._document, scenario._vehicle_document = document, vehicle_document
-    scenario._vehicle, scenario._replaced = vehicle, replaced
+    scenario._vehicle, scenario._replaced = parameters, replaced
     return scenario
 
 
-def _read_vehicle(document: Document) -> Document:
+def _read_vehicle(document: Document, read: Callable[..., Document]) -> Document:
     name = document.data.get("vehicle") if isinstance(document.data, dict) else None
     if not isinstance(name, str):
         return Document(document.path, data={})
     vehicle = Path(os.path.normpath(document.path.parent / name))
     if not vehicle.exists():
-        missing = yaml_lines.read(vehicle, what="vehicle file").problems[0][1]
+        missing = read(vehicle, what="vehicle file").problems[0][1]
         document.report(("vehicle",), missing)
         return Document(vehicle, data={})
-    return yaml_lines.read(vehicle, what="vehicle file")
+    return read(vehicle, what="vehicle file")
 
 
 def _check_time_grid(document: Document) -> None:

@@ -51,7 +51,7 @@ def variants(
     """
     choices = _choices(swaps)
     if all(len(names) == 1 for names in choices.values()):
-        swapped = [f"{unit}={_parts(names[0])[0]}" for unit, names in choices.items()]
+        swapped = [f"{unit}={fmu_and_settings(names[0])[0]}" for unit, names in choices.items()]
         own = load_scenario(scenario, swaps=swapped, settings=settings).replaced
         for unit, names in choices.items():
             fmu = str(scenario.absolute().parent / own[unit]) if is_path(own[unit]) else own[unit]
@@ -65,8 +65,8 @@ def variants(
         label = " + ".join(_label(chosen[unit]) for unit in named)
         repeated = sum(job.label.partition(" (")[0] == label for job in jobs)
         label += f" ({repeated + 1})" if repeated else ""
-        options = tuple(f"{unit}={_parts(text)[0]}" for unit, text in chosen.items())
-        brought = tuple(f"{unit}.{one}" for unit, text in chosen.items() for one in _parts(text)[1])
+        options = tuple(f"{unit}={fmu_and_settings(text)[0]}" for unit, text in chosen.items())
+        brought = tuple(f"{unit}.{one}" for unit, text in chosen.items() for one in fmu_and_settings(text)[1])
         folder = out / label.replace(" ", "")
         jobs.append(Job(label, scenario, folder, options, (*settings, *brought), fmus=fmus))
     return jobs
@@ -85,7 +85,7 @@ def _choices(swaps: Sequence[str]) -> dict[str, list[str]]:
     return choices
 
 
-def _parts(text: str) -> tuple[str, list[str]]:
+def fmu_and_settings(text: str) -> tuple[str, list[str]]:
     """Return the FMU and the settings of `fmu:parameter=value:parameter=value`."""
     match = re.fullmatch(r"(.*?)((?::\w+=[^:]*)*)", text)
     assert match is not None
@@ -93,7 +93,7 @@ def _parts(text: str) -> tuple[str, list[str]]:
 
 
 def _label(text: str) -> str:
-    fmu, settings = _parts(text)
+    fmu, settings = fmu_and_settings(text)
     return " ".join([Path(fmu).stem if is_path(fmu) else fmu, *settings])
 
 

@@ -18,9 +18,11 @@ from typing import Any
 
 from ..errors import ResultsError, ScenarioError, YawbenchError
 from ..master.interrupts import StopFlag, interrupts
-from ..plan import Algorithm, Plan
+from ..plan import Algorithm, Fmu, Plan
 from ..results.formats import FILES, RUN_FILE
 from ..results.read import Results, load_results
+from ..scenario import yaml_lines
+from ..scenario.yaml_lines import Document
 from ..wording import hint
 
 GRACE = 5.0
@@ -44,6 +46,7 @@ class Job:
     fmus: Path | None = None
     record: tuple[str, ...] = ()  # unit.variable; default: what the scenario records
     format: str = "csv"  # of the results
+    vehicle: Path | None = None  # vehicle file in place of the scenario's
 
 
 @dataclass(frozen=True)
@@ -71,12 +74,22 @@ NEEDED = ("orchestrator.wiring.make_plan", "orchestrator.master.simulate", "matp
 """Modules that take long to import."""
 
 
-def plan_of(job: Job) -> Plan:
+def plan_of(
+    job: Job,
+    *,
+    read: Callable[..., Document] = yaml_lines.read,
+    open_: Callable[[Path], Fmu] | None = None,
+) -> Plan:
     """Return the plan of a job's run.
+
+    Args:
+        job: the job.
+        read, open_: how to read a YAML file and to open an FMU, for many plans of the same ones.
 
     Raises:
         YawbenchError: the scenario, an option or an FMU is wrong.
     """
+    from ..fmu.archive import open_fmu
     from ..scenario.load import load_scenario
     from ..wiring.make_plan import make_plan
 
@@ -87,8 +100,10 @@ def plan_of(job: Job) -> Plan:
         stop_time=job.stop_time,
         step_size=job.step_size,
         algorithm=job.algorithm,
+        vehicle=job.vehicle,
+        read=read,
     )
-    plan = make_plan(scenario, fmus=job.fmus)
+    plan = make_plan(scenario, fmus=job.fmus, open_=open_ or open_fmu)
     if not job.record:
         return plan
     recorded = {f"{unit}.{variable}": (unit, variable) for unit, variable in plan.record}

@@ -28,18 +28,21 @@ from .order import evaluate
 from .parameters import Parameters
 
 
-def make_plan(scenario: Scenario, *, fmus: Path | None = None) -> Plan:
+def make_plan(
+    scenario: Scenario, *, fmus: Path | None = None, open_: Callable[[Path], Fmu] = open_fmu
+) -> Plan:
     """Open the scenario's FMUs and connect them.
 
     Args:
         scenario: as loaded.
         fmus: the folder that holds FMUs given by name; None: the nearest `fmus/` that holds any.
+        open_: how to open an archive, called as `open_fmu`.
 
     Raises:
         ModelDescriptionError: FMUs that are missing, damaged or not supported.
         WiringError: everything that is wrong with parameters and connections.
     """
-    opened, replaced = _open_all(scenario, fmus)
+    opened, replaced = _open_all(scenario, fmus, open_)
     notes: list[str] = []
     parameters = Parameters(scenario, opened, replaced, notes).of_units()
     connector = Connector(scenario, opened, replaced, notes)
@@ -80,7 +83,9 @@ def make_plan(scenario: Scenario, *, fmus: Path | None = None) -> Plan:
     )
 
 
-def _open_all(scenario: Scenario, fmus: Path | None) -> tuple[dict[str, Fmu], Callable[[str], Fmu | None]]:
+def _open_all(
+    scenario: Scenario, fmus: Path | None, open_: Callable[[Path], Fmu]
+) -> tuple[dict[str, Fmu], Callable[[str], Fmu | None]]:
     """Return the FMU of each unit, and a function that gives the one a swap has replaced, if it is there."""
     document = scenario.document
     problems: dict[str, None] = {}
@@ -92,7 +97,7 @@ def _open_all(scenario: Scenario, fmus: Path | None) -> tuple[dict[str, Fmu], Ca
 
     @cache
     def opened(fmu: str) -> Fmu:
-        return open_fmu(find_fmu(fmu, scenario=scenario.path, fmus=folder))
+        return open_(find_fmu(fmu, scenario=scenario.path, fmus=folder))
 
     def replaced(unit: str) -> Fmu | None:
         try:
