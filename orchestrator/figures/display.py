@@ -36,6 +36,7 @@ WORDS: dict[str, str] = {
     "steer_angle": "Steer angle",
     "steering_wheel_angle": "Hand-wheel angle",
     "sideslip": "Sideslip angle",
+    "sideslip_rate": "Sideslip rate",
     "yaw_rate": "Yaw rate",
     "yaw_angle": "Yaw angle",
     "roll_angle": "Roll angle",
@@ -84,6 +85,14 @@ def symbol(signal: str) -> str:
     if name.endswith("_ref"):
         return f"{symbol(name.removesuffix('_ref'))}_ref"
     return SYMBOLS.get(name, name)
+
+
+def in_formula(signal: str) -> str:
+    """Return the symbol of a signal as matplotlib sets it, or nothing where the field has none."""
+    if symbol(signal) == variable_of(signal):
+        return ""
+    head, _, index = symbol(signal).partition("_")
+    return f"${head}_\\mathrm{{{index}}}$" if index else f"${head}$"
 
 
 def words(signal: str) -> str:

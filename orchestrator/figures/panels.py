@@ -1,13 +1,13 @@
 """The panels of figures: what one pair of axes shows, of one run or of several laid over each other.
 
 A panel is named by what it shows: a signal (over its reference, where the run recorded one),
-`<signal>_error`, `path`, or a signal of four wheels (`wheel_torque_*`: one panel with four lines for
-one run, four panels for several). A panel whose signals no run has does not exist.
+`<signal>_error`, `path`, one signal over another (`yaw_rate(sideslip)`), or a signal of four wheels
+(`wheel_torque_*`: one panel with four lines for one run, four panels for several). A panel whose
+signals no run has does not exist.
 """
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -17,8 +17,9 @@ import numpy as np
 
 from ..metrics.run_metrics import columns_of, reference_of
 from ..results.read import Results
-from .display import digits_of, shown_unit, symbol, variable_of, words
-from .style import QUIET, REFERENCE, ROW, WIDTH, line_style
+from .display import digits_of, in_formula, shown_unit, words
+from .portrait import curves_of, draw_portrait, signals_of
+from .style import REFERENCE, ROW, WIDTH, line_style, note_above
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
 WHEEL_NAMES = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 POINTS = 1500
 """Buckets a line is thinned to; each keeps its smallest and its largest value."""
-
-NOTE_WIDTH = 72
-"""Characters of a note above a panel of half the figure's width."""
 
 OFF_SCALE = 8.0
 """A line that exceeds what must be seen by this factor may leave the axes if another one stays."""
@@ -50,20 +48,30 @@ class Run:
 class Panel:
     """One pair of axes: its name, whether it takes a whole row, and how it is filled.
 
-    Panels of one `scale` get the same limits.
+    Panels of one `scale` get the same limits. A panel that is not over time keeps its label below,
+    and is `rows` rows high.
     """
 
     name: str
     wide: bool
     draw: Callable[[Axes], None]
     scale: str = ""
+    over_time: bool = True
+    rows: int = 1
 
 
 def panels_of(runs: Sequence[Run], name: str) -> list[Panel]:
     """Return the panels that a name stands for: none if no run has the signals, four for wheels."""
     if name == "path":
         drawn = [run for run in runs if _path_columns(run)]
-        return [Panel(name, True, lambda axes: _draw_path(axes, runs))] if drawn else []
+        return [Panel(name, True, lambda axes: _draw_path(axes, runs), over_time=False)] if drawn else []
+    if signals := signals_of(name):
+        named = [(run.label, run.results) for run in runs]
+        if not curves_of(named, *signals):
+            return []
+        return [
+            Panel(name, False, lambda axes: draw_portrait(axes, named, *signals), over_time=False, rows=2)
+        ]
     if name.endswith("_error"):
         signal = name.removesuffix("_error")
         if all(_error(run, signal) is None for run in runs):
@@ -122,7 +130,7 @@ def _draw_signal(axes: Axes, runs: Sequence[Run], name: str) -> None:
     for number, run, column, _ in lines:
         unit = run.results.units[column]
         _line(axes, run.results.time, run.results[column], unit, line_style(number))
-    _finish(axes, f"{words(name)} {_maths(name)}", unit)
+    _finish(axes, f"{words(name)} {in_formula(name)}", unit)
     if references:
         peaks = [(run.label, _peak(run.results[column])) for _, run, column, _ in lines]
         wanted = max(_peak(reference) for reference in references)
@@ -141,12 +149,7 @@ def _limit(axes: Axes, scale: float, lines: list[tuple[str, float]], unit: str) 
     largest = 1.5 * factor * max(scale, *(peak for _, peak in lines if peak <= OFF_SCALE * scale))
     axes.set_ylim(-largest, largest)
     note = "; ".join(f"{label}, up to {digits_of(peak * factor)} {text}" for label, peak in lost)
-    rows = textwrap.wrap(f"beyond the axes: {note}", NOTE_WIDTH)
-    axes.set_title(axes.get_title(loc="left"), pad=6 + 10 * len(rows))
-    axes.annotate(
-        "\n".join(rows), (0, 1), (0, 4), xycoords="axes fraction",
-        textcoords="offset points", fontsize=7.5, color=QUIET,
-    )  # fmt: skip
+    note_above(axes, f"beyond the axes: {note}")
 
 
 def _draw_error(axes: Axes, runs: Sequence[Run], signal: str) -> None:
@@ -157,7 +160,7 @@ def _draw_error(axes: Axes, runs: Sequence[Run], signal: str) -> None:
         if error is not None:
             _line(axes, run.results.time, error, "%", line_style(number))
             peaks.append((run.label, _peak(error)))
-    _finish(axes, f"{words(signal)}, error in % of max|{_maths(signal + '_ref')}|", "")
+    _finish(axes, f"{words(signal)}, error in % of max|{in_formula(signal + '_ref')}|", "")
     _limit(axes, max(SEEN_ERROR, min(peak for _, peak in peaks)), peaks, "%")
 
 
@@ -175,7 +178,7 @@ def _draw_wheels(axes: Axes, run: Run, name: str) -> None:
     unit = run.results.units[columns[0]]
     for k, (column, wheel) in enumerate(zip(columns, WHEEL_NAMES, strict=True)):
         _line(axes, run.results.time, run.results[column], unit, {**line_style(k), "label": wheel})
-    _finish(axes, f"{words(name)} {_maths(name)}", unit)
+    _finish(axes, f"{words(name)} {in_formula(name)}", unit)
     axes.legend(
         loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, handlelength=2.4,
         columnspacing=1.2, borderpad=0.2,
@@ -242,13 +245,6 @@ def _finish(axes: Axes, heading: str, unit: str) -> None:
     low, high = axes.get_ylim()
     if all(np.ptp(line.get_ydata()) == 0 for line in axes.get_lines()):
         axes.set_ylim(min(low, -1.0), max(high, 1.0))
-
-
-def _maths(signal: str) -> str:
-    head, _, index = symbol(signal).partition("_")
-    if symbol(signal) == variable_of(signal):
-        return ""
-    return f"${head}_\\mathrm{{{index}}}$" if index else f"${head}$"
 
 
 def _peak(x: np.ndarray) -> float:

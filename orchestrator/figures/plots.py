@@ -62,7 +62,8 @@ def draw(
     with matplotlib.rc_context(RC):
         figure = Figure(layout="constrained")
         FigureCanvasAgg(figure)
-        grid = figure.add_gridspec(len(rows), 2)
+        heights = [max(panel.rows for panel in row) for row in rows]
+        grid = figure.add_gridspec(len(rows), 2, height_ratios=heights)
         first: dict[str, Axes] = {}
         for i, row in enumerate(rows):
             for k, panel in enumerate(row):
@@ -74,21 +75,26 @@ def draw(
                     first[panel.scale] = axes
                 panel.draw(axes)
                 below = rows[i + 1] if i + 1 < len(rows) else []
-                if below and below[0].name != "path":
+                if panel.over_time and below and below[0].over_time:
                     axes.set_xlabel("")  # the same time axis stands below
         foot = provenance(runs) if note is None else note
-        frame(figure, ROW * len(rows), _legend(figure, runs), title or title_of(runs), foot)
+        frame(figure, ROW * sum(heights), _legend(figure, runs), title or title_of(runs), foot)
     return figure
 
 
 def _rows(panels: Sequence[Panel]) -> list[list[Panel]]:
     rows: list[list[Panel]] = []
     for panel in panels:
-        if not panel.wide and rows and len(rows[-1]) == 1 and not rows[-1][0].wide:
+        if rows and len(rows[-1]) == 1 and _pair(rows[-1][0], panel):
             rows[-1].append(panel)
         else:
             rows.append([panel])
     return rows
+
+
+def _pair(left: Panel, right: Panel) -> bool:
+    """Return whether two panels may stand side by side."""
+    return not left.wide and not right.wide and left.over_time == right.over_time
 
 
 def _legend(figure: Figure, runs: Sequence[Run]) -> list[Line2D]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ResultsError
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
@@ -57,6 +58,10 @@ QUIET = "#666666"
 """The colour of what may be overlooked: provenance, guides."""
 
 
+NOTE_WIDTH = 72
+"""Characters of a note above a panel of half the figure's width."""
+
+
 def line_style(number: int) -> dict[str, Any]:
     """Return the style of the run of that number, counted from 0; they repeat after the last."""
     return dict(LINES[number % len(LINES)])
@@ -84,6 +89,16 @@ def save(figure: Figure, stem: Path) -> list[Path]:
             reason = error.strerror or error
             raise ResultsError(f"{stem}: the figure cannot be written: {reason}.") from None
     return paths
+
+
+def note_above(axes: Axes, note: str) -> None:
+    """Write a note between a panel and its title."""
+    rows = textwrap.wrap(note, NOTE_WIDTH)
+    axes.set_title(axes.get_title(loc="left"), pad=6 + 10 * len(rows))
+    axes.annotate(
+        "\n".join(rows), (0, 1), (0, 4), xycoords="axes fraction",
+        textcoords="offset points", fontsize=7.5, color=QUIET,
+    )  # fmt: skip
 
 
 def frame(figure: Figure, height: float, handles: Sequence[Line2D], title: str, note: str) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import ResultsError
-from orchestrator.figures.panels import NOTE_WIDTH, Run, thinned
+from orchestrator.figures.panels import Run, thinned
 from orchestrator.figures.plots import draw, provenance, title_of
-from orchestrator.figures.style import LINES, REFERENCE, save
+from orchestrator.figures.style import LINES, NOTE_WIDTH, REFERENCE, save
 
 from .recorded import car, results
 
@@ -248,3 +248,35 @@ def test_a_title_that_the_font_cannot_show_is_no_warning(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         save(figure, tmp_path / "overview")
+
+
+def test_a_portrait_shows_one_signal_over_the_other_with_references_and_ends():
+    run = car(0.9)
+    figure = draw([Run("a", run)], ["yaw_rate(sideslip)"])
+    (axes,) = figure.axes
+    reference, curve, end = axes.get_lines()
+    degrees = 180 / np.pi
+    assert np.allclose(curve.get_xdata(), degrees * run["plant.sideslip"])
+    assert np.allclose(curve.get_ydata(), degrees * run["plant.yaw_rate"])
+    assert np.allclose(reference.get_xdata(), degrees * run["reference.sideslip_ref"])
+    assert end.get_xdata()[0] == pytest.approx(degrees * run["plant.sideslip"][-1])
+    assert axes.get_xlabel() == "$β$ in °"
+    assert axes.get_ylabel() == "$r$ in °/s"
+
+
+def test_a_portrait_of_a_lost_car_leaves_the_axes_to_the_one_that_is_not():
+    axes = draw([Run("lost", car(60.0)), Run("held", car(0.9))], ["yaw_rate(sideslip)"]).axes[0]
+    held = 180 / np.pi * np.max(np.abs(car(0.9)["plant.sideslip"]))
+    assert held < axes.get_xlim()[1] < 2 * held
+    assert any("lost, up to" in text.get_text() for text in axes.texts)
+
+
+def test_portraits_stand_side_by_side_and_keep_the_labels_of_their_axes():
+    figure = draw([Run("a", car())], ["yaw_rate(sideslip)", "sideslip(yaw_rate)", "yaw_rate"])
+    left, right, below = figure.axes
+    assert left.get_xlabel() and right.get_xlabel() and below.get_xlabel() == "$t$ in s"
+
+
+def test_a_portrait_of_a_signal_that_was_not_recorded_does_not_exist():
+    with pytest.raises(ResultsError):
+        draw([Run("a", car())], ["yaw_rate(roll_angle)"])

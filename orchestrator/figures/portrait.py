@@ -1,0 +1,123 @@
+"""One signal over another: phase portraits, written `yaw_rate(sideslip)` for yaw rate over sideslip.
+
+Every run is a curve with a dot at its end, over the curve of the references where both signals have
+one. A curve that leaves the others far behind leaves the axes, and a note says how far it goes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..metrics.run_metrics import columns_of, reference_of
+from ..results.read import Results
+from .display import digits_of, in_formula, shown_unit, words
+from .style import REFERENCE, line_style, note_above
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+POINTS = 4000
+"""Samples a curve is thinned to."""
+FAR = 4.0
+"""A curve that goes so many times as far as another one may leave the axes."""
+MARGIN = 1.2
+"""Room around the curves that stay."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A run's y over x, both as shown, and its references if it has both."""
+
+    number: int
+    label: str
+    x: np.ndarray
+    y: np.ndarray
+    reference: tuple[np.ndarray, np.ndarray] | None
+
+
+def signals_of(name: str) -> tuple[str, str] | None:
+    """Return (x, y) of a panel's name `y(x)`, or None if it is not of that form."""
+    match = re.fullmatch(r"([\w.]+)\(([\w.]+)\)", name.replace(" ", ""))
+    return (match[2], match[1]) if match else None
+
+
+def curves_of(runs: Sequence[tuple[str, Results]], x: str, y: str) -> list[Curve]:
+    """Return the curves of the runs (label, results) that recorded both signals."""
+    curves = []
+    for number, (label, results) in enumerate(runs):
+        across, up = columns_of(results, x), columns_of(results, y)
+        if not across or not up:
+            continue
+        wanted = reference_of(results, across[0]), reference_of(results, up[0])
+        reference = None
+        if wanted[0] and wanted[1]:
+            reference = _shown(results, wanted[0]), _shown(results, wanted[1])
+        curves.append(Curve(number, label, _shown(results, across[0]), _shown(results, up[0]), reference))
+    return curves
+
+
+def _shown(results: Results, column: str) -> np.ndarray:
+    every = max(1, results.time.size // POINTS)
+    kept = np.append(results[column][:-1:every], results[column][-1:])
+    return kept * shown_unit(results.units[column])[1]
+
+
+def draw_portrait(axes: Axes, runs: Sequence[tuple[str, Results]], x: str, y: str) -> None:
+    """Draw y over x of all runs."""
+    curves = curves_of(runs, x, y)
+    drawn: list[tuple[np.ndarray, np.ndarray]] = []
+    for curve in curves:
+        if curve.reference and not any(_alike(curve.reference, one) for one in drawn):
+            drawn.append(curve.reference)
+            axes.plot(*curve.reference, **REFERENCE, label="reference")
+    for curve in curves:
+        style: dict[str, Any] = line_style(curve.number)
+        axes.plot(curve.x, curve.y, **style)
+        axes.plot(curve.x[-1:], curve.y[-1:], "o", ms=3.5, color=style["color"])
+    results = next(results for _, results in runs if columns_of(results, x) and columns_of(results, y))
+    units = [shown_unit(results.units[columns_of(results, name)[0]])[0] for name in (x, y)]
+    axes.set_title(f"{words(y)} over {words(x)[0].lower()}{words(x)[1:]}")
+    axes.set_xlabel(_label(x, units[0]))
+    axes.set_ylabel(_label(y, units[1]))
+    _limit(axes, curves, drawn, units)
+
+
+def _label(signal: str, unit: str) -> str:
+    name = in_formula(signal) or words(signal)
+    return f"{name} in {unit}" if unit else name
+
+
+def _alike(one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> bool:
+    return all(
+        a.shape == b.shape and np.ptp(a - b) <= 0.01 * max(np.ptp(b), 1e-300)
+        for a, b in zip(one, other, strict=True)
+    )
+
+
+def _limit(
+    axes: Axes, curves: Sequence[Curve], references: Sequence[tuple[np.ndarray, np.ndarray]], units: list[str]
+) -> None:
+    """Keep the axes to what is near; say how far the others go."""
+    reach = [np.array([np.max(np.abs(curve.x)), np.max(np.abs(curve.y))]) for curve in curves]
+    nearest = np.min(reach, axis=0)
+    for x, y in references:
+        nearest = np.maximum(nearest, [np.max(np.abs(x)), np.max(np.abs(y))])
+    stay = [bool(np.all(far <= FAR * nearest)) for far in reach]
+    if all(stay) or not any(stay):
+        return
+    limits = MARGIN * np.maximum(
+        nearest, np.max([far for far, near in zip(reach, stay, strict=True) if near], axis=0)
+    )
+    axes.set_xlim(-limits[0], limits[0])
+    axes.set_ylim(-limits[1], limits[1])
+    gone = [
+        f"{curve.label}, up to {digits_of(far[0])} {units[0]} and {digits_of(far[1])} {units[1]}"
+        for curve, far, near in zip(curves, reach, stay, strict=True)
+        if not near
+    ]
+    note_above(axes, f"beyond the axes: {'; '.join(gone)}")

@@ -1,0 +1,56 @@
+"""Any controller on any car on any tyre: only `--swap` between them, two seconds of a lane change each."""
+
+from __future__ import annotations
+
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fmus.build import build_all
+from orchestrator.master.simulate import simulate
+from orchestrator.results.read import load_results
+from orchestrator.scenario.load import load_scenario
+from orchestrator.wiring.make_plan import make_plan
+
+SCENARIO = Path(__file__).parents[2] / "scenarios" / "fuzzy_sliding_mode" / "high_friction.yaml"
+CONTROLLERS = (
+    "off", "fuzzy_sideslip", "fnn", "sliding_mode", "fuzzy_sliding_mode", "pid", "fuzzy_pid", "fuzzy_feedback",
+)  # fmt: skip
+PLANTS = ("seven_dof", "eight_dof", "fourteen_dof")
+TYRES = ("dugoff", "linear", "magic_formula", "magic_formula_1987")
+UNITS = (
+    "driver_sine", "reference_single_track", "allocator_load_proportional", "wheel_control_slip", "actuator_lag",
+    *(f"controller_{name}" for name in CONTROLLERS),
+    *(f"plant_{name}" for name in PLANTS),
+    *(f"tyre_{name}" for name in TYRES),
+)  # fmt: skip
+ON_THE_ROAD = {"plant.sideslip": 0.5, "plant.yaw_rate": 1.5}
+"""What a car that has not been lost stays within: rad, rad/s."""
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory):
+    """A folder with all FMUs of the matrix."""
+    folder = tmp_path_factory.mktemp("matrix")
+    build_all(folder, components=UNITS)
+    return folder
+
+
+@pytest.mark.parametrize(("plant", "tyre"), list(product(PLANTS, TYRES)))
+def test_every_controller_runs_on_this_car_and_tyre(fmus, tmp_path, plant, tyre):
+    for controller in CONTROLLERS:
+        swaps = (f"controller=controller_{controller}", f"plant=plant_{plant}", f"tyre=tyre_{tyre}")
+        plan = make_plan(load_scenario(SCENARIO, swaps=swaps, stop_time=2.0), fmus=fmus)
+        simulate(plan, tmp_path / controller)
+        results = load_results(tmp_path / controller)
+        assert results.run["status"] == "completed", (controller, results.run["error"])
+        assert results.time[-1] == 2.0
+        for name, column in results.columns.items():
+            assert np.all(np.isfinite(column)), (controller, name)
+        moment = np.max(np.abs(results["controller.yaw_moment"]))
+        assert (moment == 0.0) if controller == "off" else (100.0 < moment < 1e5), (controller, moment)
+        if controller != "off":
+            for name, limit in ON_THE_ROAD.items():
+                assert np.max(np.abs(results[name])) < limit, (controller, name)
