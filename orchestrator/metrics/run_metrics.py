@@ -141,22 +141,36 @@ def evaluate(results: Results, chosen: Metric, window: tuple[float, float] | Non
     first, last = window or (-math.inf, math.inf)
     inside = (results.time >= first - 1e-9) & (results.time <= last + 1e-9)
     t = results.time[inside]
-    columns = columns_of(results, chosen.signal)
-    if t.size < 2 or not columns:
+    signals = _signals(results, chosen)
+    if t.size < 2 or not signals:
         return None
-    numbers = []
-    for column in columns:
-        samples = [results.columns[column][inside]]
-        if chosen.measure.needs_reference:
-            reference = reference_of(results, column)
-            if reference is None:
-                return None
-            samples.append(results.columns[reference][inside])
-        numbers.append(chosen.measure.function(t, *samples))
+    numbers = [
+        chosen.measure.function(t, *(results.columns[column][inside] for column in columns))
+        for columns in signals
+    ]
     number = float(np.max(numbers))  # a NaN of one wheel is not lost
     if math.isnan(number):
         return None
-    return Value(number, chosen.unit(results.units[columns[0]]))
+    return Value(number, chosen.unit(results.units[signals[0][0]]))
+
+
+def has_signals(results: Results, chosen: Metric) -> bool:
+    """Return whether a run has recorded what a metric is computed from."""
+    return bool(_signals(results, chosen))
+
+
+def _signals(results: Results, chosen: Metric) -> list[list[str]]:
+    """Return the columns that each function call takes, one call per wheel; empty if any is missing."""
+    signals = []
+    for column in columns_of(results, chosen.signal):
+        columns = [column]
+        if chosen.measure.needs_reference:
+            reference = reference_of(results, column)
+            if reference is None:
+                return []
+            columns.append(reference)
+        signals.append(columns)
+    return signals
 
 
 def reference_of(results: Results, column: str) -> str | None:

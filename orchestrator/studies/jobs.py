@@ -58,7 +58,7 @@ class Outcome:
     exit_status: int = 0
     seconds: float = 0.0  # of the process, start to end
     value: Any = None  # what the process returned
-    died: bool = False  # the process ended without a word
+    died: bool = False  # the process ended without a word, or because it was told to
 
     @property
     def ok(self) -> bool:
@@ -242,11 +242,11 @@ class _Running:
     def outcome(self) -> Outcome:
         """Return what the process reported, or how it died if it did not."""
         try:
-            (status, problems, value), died = self.pipe.recv(), False
+            status, problems, value, died = self.pipe.recv()
             self.end()
         except (EOFError, OSError):
             self.end()
-            (status, problems, value), died = (1, (_death(self.process.exitcode),), None), True
+            status, problems, value, died = 1, (_death(self.process.exitcode),), None, True
         self.pipe.close()
         seconds = time.monotonic() - self.began
         return Outcome(self.job, tuple(problems), status, seconds, value, died)
@@ -260,15 +260,18 @@ class _Running:
 
 def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:
     """Do one job in a process of its own and report how it ended."""
+    from ..master.master import Interrupted
+
     if hasattr(os, "setpgrp"):
         os.setpgrp()  # Ctrl-C on the terminal is for the caller, who ends this process
     try:
-        report: tuple[int, list[str], Any] = (0, [], run(job))
+        report: tuple[int, list[str], Any, bool] = (0, [], run(job), False)
     except YawbenchError as error:
-        report = (error.exit_status, error.problems or [type(error).__name__], None)
+        told = isinstance(error, Interrupted)
+        report = (error.exit_status, error.problems or [type(error).__name__], None, told)
     except BaseException as error:
         sys.excepthook(type(error), error, error.__traceback__)
-        report = (1, [f"{type(error).__name__}: {error}"], None)
+        report = (1, [f"{type(error).__name__}: {error}"], None, False)
     pipe.send(report)
     pipe.close()
 

@@ -1,0 +1,205 @@
+"""Runs of a sweep on a Dask cluster.
+
+The workers need this program, in this version, and nothing else: plans travel with their tasks, the
+FMUs once to every worker, which unpacks them into its own cache. As on this machine every run has a
+process of its own, so a unit that crashes takes no worker with it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import multiprocessing
+import os
+import platform
+import signal
+import tempfile
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from ..errors import ResultsError, ScenarioError
+from ..fmu.archive import open_fmu
+from ..plan import Fmu, Plan
+from ..studies.jobs import Outcome, execute
+from ..wording import listed
+from .local import TRIES, Done
+from .measuring import Measurement, measure
+
+TIMEOUT = 10.0
+"""Time that a scheduler has to answer [s]."""
+AHEAD = 4
+"""Runs handed to the cluster ahead of time, for each thread of its workers."""
+
+_LOCAL: dict[str, Path] = {}
+"""On a worker: hash of an FMU -> where it is unpacked."""
+
+
+def run_on_cluster(
+    jobs: Sequence[Measurement], done: Done, *, scheduler: str, fmus: Mapping[str, Fmu]
+) -> None:
+    """Make all runs on the workers of a Dask scheduler.
+
+    Args:
+        jobs: what to run.
+        done: called with every outcome as it comes.
+        scheduler: its address, tcp://host:port.
+        fmus: hash -> FMU, of all that the jobs use.
+
+    Raises:
+        ScenarioError: distributed is not installed, no scheduler answers, its workers do not fit.
+        ResultsError: the cluster was lost on the way.
+        KeyboardInterrupt: Ctrl-C or SIGTERM.
+    """
+    with _connected(scheduler) as client, _told_to_end():
+        threads = _check_workers(client, scheduler)
+        client.register_plugin(_Archives({digest: fmu.path.read_bytes() for digest, fmu in fmus.items()}))
+        _submit_all(client, jobs, done, scheduler, AHEAD * threads)
+
+
+def _submit_all(client: Any, jobs: Sequence[Measurement], done: Done, scheduler: str, ahead: int) -> None:
+    from distributed import as_completed
+
+    waiting = iter(jobs)
+    named: dict[str, Measurement] = {}
+
+    def submit(job: Measurement) -> Any:
+        future = client.submit(_make, job, key=f"yawbench-{os.getpid()}-{job.key}", pure=False, retries=0)
+        named[future.key] = job
+        return future
+
+    futures = [submit(job) for job, _ in zip(waiting, range(ahead), strict=False)]
+    completed = as_completed(futures)
+    try:
+        for future in completed:
+            done(_outcome(future, named.pop(future.key), scheduler))
+            future.release()
+            if (following := next(waiting, None)) is not None:
+                completed.add(submit(following))
+    except KeyboardInterrupt:
+        client.cancel(list(completed.futures))
+        raise
+
+
+def _outcome(future: Any, job: Measurement, scheduler: str) -> Outcome:
+    """Return what a worker handed back, or why it handed back nothing."""
+    from distributed import KilledWorker
+
+    if future.status == "cancelled" or future.status == "lost":
+        raise ResultsError(f"{scheduler}: the cluster was lost; what it had finished is kept.")
+    error = future.exception() if future.status == "error" else None
+    if isinstance(error, KilledWorker):
+        return Outcome(job, ("the workers that made this run died",), 1, died=True)
+    if error is not None:
+        text = " ".join(str(error).split())
+        raise ResultsError(f"{scheduler}: a worker failed: {type(error).__name__}: {text}")
+    return replace(future.result(), job=job)
+
+
+def _make(job: Measurement) -> Outcome:
+    """Make a run on a worker, in a process of its own."""
+    assert job.plan is not None
+    here = replace(job, plan=_unpacked_here(job.plan))
+    multiprocessing.current_process().daemon = False  # daemons may have no children
+    for _ in range(TRIES):
+        (outcome,) = execute([here], workers=1, run=measure)
+        if not outcome.died:
+            break
+    return replace(outcome, job=replace(job, plan=None))  # the plan is known where it came from
+
+
+def _unpacked_here(plan: Plan) -> Plan:
+    units = tuple(
+        replace(unit, fmu=replace(unit.fmu, directory=_LOCAL[unit.fmu.sha256])) for unit in plan.units
+    )
+    return replace(plan, units=units)
+
+
+class _Archives:
+    """A plugin of Dask's workers that unpacks FMUs before the first run starts.
+
+    Args:
+        archives: hash -> content.
+    """
+
+    def __init__(self, archives: dict[str, bytes]) -> None:
+        self.archives = archives
+        self.name = "yawbench-fmus"
+        self.idempotent = False
+
+    def setup(self, worker: Any) -> None:
+        """Called on every worker, those too that join later."""
+        with tempfile.TemporaryDirectory() as folder:
+            for digest, content in self.archives.items():
+                path = Path(folder, f"{digest}.fmu")
+                path.write_bytes(content)
+                _LOCAL[digest] = open_fmu(path).directory
+
+    def teardown(self, worker: Any) -> None:
+        """Nothing: the cache is the worker's own."""
+
+
+@contextlib.contextmanager
+def _connected(address: str) -> Iterator[Any]:
+    """Connect to a scheduler while the block runs."""
+    try:
+        import distributed
+    except ImportError:
+        raise ScenarioError(
+            "--scheduler needs the package distributed: pip install 'yawbench[cluster]'"
+        ) from None
+    try:
+        client = distributed.Client(address, timeout=TIMEOUT, set_as_default=False)
+    except (OSError, TimeoutError, asyncio.TimeoutError, ValueError, TypeError) as error:
+        reason = f": {' '.join(str(error).split())}" if isinstance(error, ValueError) else ""
+        raise ScenarioError(
+            f"--scheduler {address}: no Dask scheduler answers there within {TIMEOUT:g} s{reason}"
+        ) from None
+    with client:
+        yield client
+
+
+def _check_workers(client: Any, address: str) -> int:
+    """Return the number of threads of all workers, after making sure that they can do the work."""
+    threads = sum(client.nthreads().values())
+    if not threads:
+        raise ScenarioError(f"--scheduler {address}: this scheduler has no workers")
+    try:
+        found = client.run(versions)
+    except Exception as error:  # whatever a worker without this program says
+        text = " ".join(str(error).split())
+        raise ScenarioError(
+            f"--scheduler {address}: its workers cannot run this program; is yawbench installed there? ({text})"
+        ) from None
+    ours = versions()
+    for worker, theirs in found.items():
+        differs = [f"{k} {theirs.get(k)} there, {ours[k]} here" for k in ours if theirs.get(k) != ours[k]]
+        if differs:
+            raise ScenarioError(f"--scheduler {address}: worker {worker} does not fit: {listed(differs)}")
+    return threads
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that must be the same on every worker."""
+    python = ".".join(platform.python_version_tuple()[:2])
+    return {"Python": python, "yawbench": version("yawbench"), "pythonfmu": version("pythonfmu")}
+
+
+@contextlib.contextmanager
+def _told_to_end() -> Iterator[None]:
+    """Let SIGTERM end the block as Ctrl-C does."""
+
+    def stop(number: int, frame: Any) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    earlier = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, earlier)

@@ -1,0 +1,132 @@
+"""Which runs of a sweep are finished, and what they came to: one line per run, written as it ends.
+
+The file is only ever appended to, each line is on the disk before the next run is counted, and a
+line that a kill has cut off is dropped when the sweep goes on. One sweep at a time may write it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import ResultsError
+from ..results.recorder import reason
+from .measuring import Measured
+
+FILE = "runs.jsonl"
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Record:
+    """What became of a run: its metrics, or why there are none."""
+
+    values: Measured
+    problems: tuple[str, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        return not self.problems
+
+
+class Journal:
+    """The finished runs of the sweep whose results go to a folder.
+
+    Args:
+        folder: made if it does not exist.
+        identity: of the sweep; a folder that holds another one is refused.
+        fresh: forget all runs that are finished, whichever sweep they are of.
+
+    Raises:
+        ResultsError: the folder holds another sweep, one is running there, or it cannot be written.
+    """
+
+    def __init__(self, folder: Path, identity: str, *, fresh: bool = False) -> None:
+        self.folder = folder
+        self.records: dict[str, Record] = {}
+        path = folder / FILE
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        except OSError as error:
+            raise ResultsError(f"{folder}: results cannot be written here: {reason(error)}.") from None
+        try:
+            self._lock()
+            if fresh:
+                os.ftruncate(self._file, 0)
+            lines, whole = _whole_lines(path.read_bytes())
+            os.ftruncate(self._file, whole)
+            self._take_over(lines, identity)
+        except BaseException:
+            self.close()
+            raise
+
+    def _lock(self) -> None:
+        try:
+            import fcntl
+        except ImportError:  # Windows
+            return
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise ResultsError(f"{self.folder}: another sweep is running here.") from None
+        except OSError:  # some network drives cannot lock
+            return
+
+    def _take_over(self, lines: list[bytes], identity: str) -> None:
+        path = self.folder / FILE
+        if not lines:
+            self._append({"sweep": identity, "format": FORMAT})
+            return
+        number = 1
+        try:
+            self._check(json.loads(lines[0]), identity)
+            for number, line in enumerate(lines[1:], start=2):
+                entry = json.loads(line)
+                values = {
+                    key: value and (float(value[0]), str(value[1])) for key, value in entry["values"].items()
+                }
+                self.records[entry["key"]] = Record(values, tuple(entry["problems"]))
+        except (ValueError, KeyError, TypeError, AttributeError, IndexError):
+            raise ResultsError(f"{path}: line {number} is damaged; --fresh begins the sweep anew.") from None
+
+    def _check(self, entry: dict[str, Any], identity: str) -> None:
+        if entry["sweep"] != identity or entry["format"] != FORMAT:
+            other = entry["sweep"] if entry["sweep"] != identity else "an earlier version of this program"
+            raise ResultsError(
+                f"{self.folder}: holds the sweep of {other}; give another folder with --out, "
+                "or --fresh to begin anew."
+            )
+
+    def add(self, key: str, record: Record) -> None:
+        """Note that a run is finished.
+
+        Raises:
+            ResultsError: the journal cannot be written.
+        """
+        self._append({"key": key, "values": record.values, "problems": record.problems})
+        self.records[key] = record
+
+    def _append(self, entry: dict[str, Any]) -> None:
+        line = json.dumps(entry, ensure_ascii=False).encode("utf-8", "backslashreplace") + b"\n"
+        try:
+            view = memoryview(line)
+            while view:
+                view = view[os.write(self._file, view) :]
+            os.fsync(self._file)
+        except OSError as error:
+            path = self.folder / FILE
+            raise ResultsError(f"{path}: cannot be written: {reason(error)}.") from None
+
+    def close(self) -> None:
+        """Let go of the file."""
+        os.close(self._file)
+
+
+def _whole_lines(data: bytes) -> tuple[list[bytes], int]:
+    """Return the lines that have an end, and where the last of them ends."""
+    whole = data.rfind(b"\n") + 1
+    return data[:whole].splitlines(), whole

@@ -1,0 +1,47 @@
+"""What a process does with a run of a sweep: simulate it, hand back its metrics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ..metrics.run_metrics import evaluate, metric
+from ..plan import Plan
+from ..studies.jobs import Job
+
+Metrics = tuple[tuple[str, str, tuple[float, float] | None], ...]
+"""(key, metric, window) of each metric."""
+
+Measured = dict[str, tuple[float, str] | None]
+"""Key of a metric -> its value and unit, None where the run gives none."""
+
+
+@dataclass(frozen=True)
+class Measurement(Job):
+    """A job whose plan is made; it hands back metrics, and keeps its results only if told so."""
+
+    key: str = ""
+    plan: Plan | None = None
+    metrics: Metrics = ()
+    keep: bool = False
+
+
+def measure(job: Any) -> Measured:
+    """Make the run of a `Measurement` in this process; return its metrics.
+
+    Raises:
+        YawbenchError: the run failed.
+    """
+    from ..master.simulate import simulate, simulate_in_memory
+    from ..results.read import load_results
+
+    if job.keep:
+        simulate(job.plan, job.out, format=job.format)
+        results = load_results(job.out)
+    else:
+        results = simulate_in_memory(job.plan)
+    measured: Measured = {}
+    for key, name, window in job.metrics:
+        value = evaluate(results, metric(name), window)
+        measured[key] = None if value is None else (value.number, value.unit)
+    return measured

@@ -1,0 +1,207 @@
+"""All runs of a sweep planned before the first one starts, and what tells two runs apart.
+
+A run's key is a hash of everything that its metrics follow from: the content of its FMUs, all
+parameters and constants, wires, time grid, algorithm, metrics, this program's version. Runs of one
+key are one run, whatever file, folder or axis they come from.
+"""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import ScenarioError, YawbenchError
+from ..fmu.archive import open_fmu
+from ..metrics.run_metrics import has_signals, metric
+from ..plan import Fmu, Plan
+from ..results.read import Results
+from ..scenario import quantities, yaml_lines
+from ..scenario.yaml_lines import Document
+from ..studies.jobs import Job, plan_of
+from .design import Level, Point
+from .schema import AxisSpec
+from .sweep_file import Sweep
+
+MANY = 10
+"""Problems shown; more are only counted."""
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """A run that can start."""
+
+    number: int  # from 0, in the order of the design
+    point: Point
+    job: Job
+    plan: Plan
+    key: str
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A sweep whose runs can all start."""
+
+    sweep: Sweep
+    runs: list[PlannedRun]
+    units: dict[str, str]  # axis of numbers -> measurement unit in tables, an SI unit; "" if it has none
+
+    def number(self, name: str, level: Level) -> float:
+        """Return the value of an axis of numbers in the unit of `units`."""
+        axis = self.sweep.spec.axes[name]
+        if axis.unit is None:
+            return float(level.value)
+        return float(quantities.convert(f"{level.value!r} {axis.unit}", self.units[name]))
+
+    @property
+    def fmus(self) -> dict[str, Fmu]:
+        """Return all FMUs that any run uses, by hash."""
+        return {unit.fmu.sha256: unit.fmu for run in self.runs for unit in run.plan.units}
+
+
+def plan_sweep(
+    sweep: Sweep,
+    out: Path,
+    fmus: Path | None = None,
+    *,
+    progress: Callable[[int], None] = lambda done: None,
+) -> Planned:
+    """Plan all runs.
+
+    Args:
+        sweep: as loaded.
+        out: folder of the results of runs that keep them.
+        fmus: folder of FMUs given by name.
+        progress: told how many runs are planned.
+
+    Raises:
+        ScenarioError: with everything that is wrong with any run, each problem once.
+    """
+    once = _Once()
+    metrics = [
+        (key, spec.metric, list(spec.window) if spec.window else None)
+        for key, spec in sweep.spec.metrics.items()
+    ]
+    runs: list[PlannedRun] = []
+    problems: dict[str, str] = {}
+    for number, point in enumerate(sweep.points):
+        job = sweep.job(number, out, fmus)
+        try:
+            plan = plan_of(job, read=once.read, open_=once.open)
+            runs.append(PlannedRun(number, point, job, plan, run_key(plan, metrics)))
+        except YawbenchError as error:
+            for problem in error.problems:
+                problems.setdefault(*_of_axis(sweep, problem))
+        progress(number + 1)
+    if problems:
+        raise ScenarioError(_first(problems.values()))
+    _check_metrics(sweep, runs)
+    return Planned(sweep, runs, _units(sweep, runs))
+
+
+class _Once:
+    """Files read and FMUs opened once for many plans."""
+
+    def __init__(self) -> None:
+        self._documents: dict[Path, Document] = {}
+        self._fmus: dict[Path, Fmu] = {}
+
+    def read(self, path: Path, *, what: str) -> Document:
+        """Return what `yaml_lines.read` does, a copy each time."""
+        if path not in self._documents:
+            self._documents[path] = yaml_lines.read(path, what=what)
+        return copy.deepcopy(self._documents[path])
+
+    def open(self, path: Path) -> Fmu:
+        """Return what `open_fmu` does."""
+        if path not in self._fmus:
+            self._fmus[path] = open_fmu(path)
+        return self._fmus[path]
+
+
+def _of_axis(sweep: Sweep, problem: str) -> tuple[str, str]:
+    """Return a problem without the value of its axis, and the same with its place in the sweep file."""
+    for name, axis in sweep.spec.axes.items():
+        for place in axis.vary:
+            if problem.startswith((f"--set {place}=", f"--swap {place}=")):
+                return f"{name}{problem.partition(': ')[2]}", f"{sweep.path}: axes.{name}: {problem}"
+    return problem, problem
+
+
+def _first(problems: Iterable[str]) -> list[str]:
+    listed = list(problems)
+    more = [f"and {len(listed) - MANY} more problems"] if len(listed) > MANY else []
+    return listed[:MANY] + more
+
+
+def run_key(plan: Plan, metrics: Any) -> str:
+    """Return the hash of everything that a run's metrics follow from."""
+    content = {
+        "yawbench": version("yawbench"),
+        "units": [[u.name, u.fmu.sha256, u.period, u.parameters, u.constants] for u in plan.units],
+        "wires": [[w.source, w.output, w.target, w.input] for w in plan.wires],
+        "record": plan.record,
+        "step": str(plan.step),
+        "n_steps": plan.n_steps,
+        "algorithm": plan.algorithm,
+        "metrics": metrics,
+    }
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
+
+
+def _check_metrics(sweep: Sweep, runs: list[PlannedRun]) -> None:
+    """Raise if a metric's signals are recorded in no run."""
+    made_up = {tuple(run.plan.record): _recorded(run.plan) for run in runs}.values()
+    problems = []
+    for key, spec in sweep.spec.metrics.items():
+        chosen = metric(spec.metric)
+        if not any(has_signals(results, chosen) for results in made_up):
+            problems.append(f"{sweep.path}: metrics.{key}: no run records the signals of {chosen.name}")
+    if problems:
+        raise ScenarioError(problems)
+
+
+def _recorded(plan: Plan) -> Results:
+    """Return results without rows: the columns that a plan will record."""
+    units = {unit.name: unit for unit in plan.units}
+    variables = {f"{u}.{name}": units[u].fmu.variables[name] for u, name in plan.record}
+    columns = {name: np.empty(0, float if v.type != "String" else str) for name, v in variables.items()}
+    names = {name: {"name": unit.fmu.name} for name, unit in units.items()}
+    return Results(
+        Path(), np.empty(0), columns, {n: v.unit or "" for n, v in variables.items()}, {"fmus": names}
+    )
+
+
+def _units(sweep: Sweep, runs: list[PlannedRun]) -> dict[str, str]:
+    """Return the measurement unit of every axis of numbers.
+
+    Raises:
+        ScenarioError: the unit that the file names does not fit; a run would have said so before.
+    """
+    plans = {tuple(unit.fmu.sha256 for unit in run.plan.units): run.plan for run in runs}.values()
+    return {
+        name: next((unit for plan in plans if (unit := _unit(axis, plan))), "")
+        for name, axis in sweep.spec.axes.items()
+        if axis.numeric
+    }
+
+
+def _unit(axis: AxisSpec, plan: Plan) -> str | None:
+    """Return the measurement unit of what an axis varies, if the plan has it."""
+    holder, _, name = axis.vary[0].partition(".")
+    for unit in plan.units:
+        given = unit.constants if holder == "inputs" else unit.parameters
+        if holder not in ("inputs", "vehicle", unit.name):
+            continue
+        for variable in given:
+            if fnmatchcase(variable, name) or fnmatchcase(f"{unit.name}.{variable}", name):
+                return unit.fmu.variables[variable].unit
+    return None
