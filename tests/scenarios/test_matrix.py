@@ -16,12 +16,14 @@ from orchestrator.wiring.make_plan import make_plan
 
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "fuzzy_sliding_mode" / "high_friction.yaml"
 CONTROLLERS = (
-    "off", "fuzzy_sideslip", "fnn", "sliding_mode", "fuzzy_sliding_mode", "pid", "fuzzy_pid", "fuzzy_feedback",
+    "off", "fuzzy_sideslip", "fnn", "sliding_mode", "fuzzy_sliding_mode", "pid", "fuzzy_pid",
+    "fuzzy_feedback",
 )  # fmt: skip
 PLANTS = ("seven_dof", "eight_dof", "fourteen_dof")
 TYRES = ("dugoff", "linear", "magic_formula", "magic_formula_1987")
 UNITS = (
-    "driver_sine", "reference_single_track", "allocator_load_proportional", "wheel_control_slip", "actuator_lag",
+    "driver_sine", "reference_single_track", "allocator_load_proportional", "wheel_control_slip",
+    "actuator_lag",
     *(f"controller_{name}" for name in CONTROLLERS),
     *(f"plant_{name}" for name in PLANTS),
     *(f"tyre_{name}" for name in TYRES),
