@@ -11,8 +11,8 @@ import typer
 
 from .errors import YawbenchError
 
-COMMANDS = ("build", "check", "run", "compare", "plot", "converge", "study")
-"""Each a module of `orchestrator.commands` with a function of the same name."""
+COMMANDS = ("build", "check", "run", "compare", "plot", "converge", "study", "export-ssp")
+"""Each a module of `orchestrator.commands` with a function of the same name, `_` for `-`."""
 
 
 def _application() -> typer.Typer:
@@ -25,8 +25,9 @@ def _application() -> typer.Typer:
         rich_markup_mode=None,
     )
     for name in COMMANDS:
-        module = importlib.import_module(f".commands.{name}", __package__)
-        app.command(name)(getattr(module, name))
+        function = name.replace("-", "_")
+        module = importlib.import_module(f".commands.{function}", __package__)
+        app.command(name)(getattr(module, function))
     return app
 
 

@@ -1,0 +1,34 @@
+"""`yawbench export-ssp`: a scenario as an archive that other programs can run."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import Fmus, ScenarioFile, Set, Swap
+
+Archive = Annotated[
+    Path | None, typer.Option("--out", metavar="FILE", help="The archive; default: <scenario>.ssp, here.")
+]
+
+
+def export_ssp(
+    scenario: ScenarioFile, swap: Swap = None, set_: Set = None, out: Archive = None, fmus: Fmus = None
+) -> None:
+    """Write a scenario and its FMUs as a System Structure and Parameterization archive (SSP 1.0).
+
+    `yawbench run` reads it back and gives the same numbers.
+    """
+    from ..interop.ssp_write import write_ssp
+    from ..scenario.load import load_scenario
+    from ..wiring.make_plan import make_plan
+
+    plan = make_plan(load_scenario(scenario, swaps=swap or (), settings=set_ or ()), fmus=fmus)
+    for note in plan.notes:
+        print(f"note: {note}", file=sys.stderr)
+    path = out or Path(f"{scenario.stem}.ssp")
+    write_ssp(plan, path)
+    print(f"{path}: {len(plan.units)} units, {len(plan.wires)} connections", file=sys.stderr)

@@ -1,0 +1,20 @@
+"""Names that the SSP archives written here and those read here have in common."""
+
+from __future__ import annotations
+
+DESCRIPTION_FILE = "SystemStructure.ssd"
+RESOURCES = "resources"
+PARAMETER_SET = "scenario"
+"""One set for all components: other programs apply a set by its name."""
+
+SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
+SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
+SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
+OWN = "urn:yawbench:ssp:1"
+NAMESPACES = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP, "yawbench": OWN}
+"""All declared at the root, with the prefixes that libcosim and Ecos take for granted: they compare
+text, and libcosim takes a declaration further down for content."""
+
+OSP_ANNOTATION = "com.opensimulationplatform"
+OWN_ANNOTATION = "yawbench"

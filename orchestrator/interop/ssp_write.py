@@ -1,0 +1,269 @@
+"""A plan as an SSP 1.0 archive that other programs, and this one, can run.
+
+SSP has no place for the communication step, the units' own steps and the algorithm. They stand in
+annotations: the steps in those of the Open Simulation Platform, which libcosim understands, all
+that `yawbench run` needs beyond them in one of our own.
+
+Only what is connected has a connector. A constant is a parameter value by the name of its input:
+that is how libcosim and Ecos take it, and fmpy gives an input connector without a connection the
+value of another one. Equal plans give equal bytes.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import tempfile
+import zipfile
+from collections.abc import Iterable, Mapping
+from fractions import Fraction
+from importlib.metadata import version
+from pathlib import Path
+
+from lxml import etree
+from lxml.etree import SubElement, _Element
+
+from ..errors import ResultsError
+from ..plan import Fmu, Plan, Unit, Value, Variable
+from ..scenario import quantities
+from .ssp_names import (
+    DESCRIPTION_FILE,
+    NAMESPACES,
+    OSP,
+    OSP_ANNOTATION,
+    OWN,
+    OWN_ANNOTATION,
+    PARAMETER_SET,
+    RESOURCES,
+    SSC,
+    SSD,
+    SSV,
+)
+
+_FILE_TIME = (1980, 1, 1, 0, 0, 0)
+_BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+
+
+def write_ssp(plan: Plan, path: Path) -> None:
+    """Write the plan and its FMUs into the archive `path`.
+
+    Raises:
+        ResultsError: it cannot be written.
+    """
+    sources = _sources(plan)
+    description = etree.tostring(
+        system_structure(plan), xml_declaration=True, encoding="UTF-8", pretty_print=True
+    )
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, scratch = tempfile.mkstemp(prefix=path.name, suffix=".part", dir=path.parent)
+        try:
+            with os.fdopen(handle, "wb") as stream, zipfile.ZipFile(stream, "w") as archive:
+                _put(archive, DESCRIPTION_FILE, description)
+                for sha256, source in sorted(sources.items(), key=lambda item: item[1]):
+                    fmu = next(unit.fmu for unit in plan.units if unit.fmu.sha256 == sha256)
+                    _put(archive, source, fmu.path.read_bytes())
+            os.chmod(scratch, 0o644)
+            os.replace(scratch, path)
+        finally:
+            Path(scratch).unlink(missing_ok=True)
+    except OSError as error:
+        raise ResultsError(f"{path}: cannot write this archive: {error.strerror or error}") from None
+
+
+def _put(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
+    info = zipfile.ZipInfo(name, _FILE_TIME)
+    info.compress_type = zipfile.ZIP_DEFLATED
+    info.external_attr = 0o644 << 16
+    archive.writestr(info, content)
+
+
+def system_structure(plan: Plan) -> _Element:
+    """Return the system structure description of a plan."""
+    root = etree.Element(f"{{{SSD}}}SystemStructureDescription", nsmap=NAMESPACES)
+    root.set("version", "1.0")
+    root.set("name", plan.title or "scenario")
+    if plan.scenario.get("source"):
+        root.set("description", str(plan.scenario["source"]))
+    root.set("generationTool", f"yawbench {version('yawbench')}")
+    units = _in_order_of_scenario(plan)
+    spelled = _spelled_units(plan)
+    sources = _sources(plan)
+    enumerations: dict[str, Mapping[str, int]] = {}
+    system = SubElement(root, f"{{{SSD}}}System", name="system")
+    elements = SubElement(system, f"{{{SSD}}}Elements")
+    for unit in units:
+        _add_component(elements, unit, plan, sources[unit.fmu.sha256], spelled, enumerations)
+    if plan.wires:
+        connections = SubElement(system, f"{{{SSD}}}Connections")
+        for wire in plan.wires:
+            SubElement(
+                connections,
+                f"{{{SSD}}}Connection",
+                startElement=wire.source,
+                startConnector=wire.output,
+                endElement=wire.target,
+                endConnector=wire.input,
+            )
+    _add_enumerations(root, enumerations)
+    _add_units(root, spelled)
+    _add_experiment(root, plan)
+    return root
+
+
+def _in_order_of_scenario(plan: Plan) -> list[Unit]:
+    """Return the units as the scenario lists them: of equals, the first is evaluated first."""
+    given = list(plan.scenario.get("units", ()))
+    return sorted(plan.units, key=lambda unit: given.index(unit.name) if unit.name in given else len(given))
+
+
+def _sources(plan: Plan) -> dict[str, str]:
+    """Return where in the archive each FMU is, by its hash; names without a character to be escaped."""
+    sources: dict[str, str] = {}
+    for unit in plan.units:
+        stem = re.sub(r"[^A-Za-z0-9_-]", "_", unit.fmu.name)
+        source = f"{RESOURCES}/{stem}.fmu"
+        if source in sources.values() and unit.fmu.sha256 not in sources:
+            source = f"{RESOURCES}/{stem}_{unit.fmu.sha256[:8]}.fmu"
+        sources.setdefault(unit.fmu.sha256, source)
+    return sources
+
+
+def _add_component(
+    elements: _Element,
+    unit: Unit,
+    plan: Plan,
+    source: str,
+    spelled: Mapping[str, quantities.Measure],
+    enumerations: dict[str, Mapping[str, int]],
+) -> None:
+    component = SubElement(
+        elements, f"{{{SSD}}}Component", name=unit.name, type="application/x-fmu-sharedlibrary"
+    )
+    component.set("source", source)
+    component.set("implementation", "CoSimulation")
+    if unit.fmu.description:
+        component.set("description", unit.fmu.description)
+    driven = {wire.input for wire in plan.wires if wire.target == unit.name}
+    shown = [v for v in unit.fmu.of("input") if v.name in driven] + unit.fmu.of("output")
+    if shown:
+        connectors = SubElement(component, f"{{{SSD}}}Connectors")
+        for variable in shown:
+            connector = SubElement(
+                connectors, f"{{{SSD}}}Connector", name=variable.name, kind=variable.causality
+            )
+            if variable.description:
+                connector.set("description", variable.description)
+            kind = SubElement(connector, f"{{{SSC}}}{variable.type}")
+            if variable.type == "Real" and variable.unit in spelled:
+                kind.set("unit", str(variable.unit))
+            elif variable.type == "Enumeration":
+                name = f"{unit.name}.{variable.name}"
+                enumerations[name] = variable.items or {}
+                kind.set("name", name)
+    values = {**unit.parameters, **unit.constants}
+    if values:
+        bindings = SubElement(component, f"{{{SSD}}}ParameterBindings")
+        binding = SubElement(bindings, f"{{{SSD}}}ParameterBinding")
+        _add_values(SubElement(binding, f"{{{SSD}}}ParameterValues"), values, unit.fmu, spelled)
+    if unit.period > 1:
+        annotation = _annotation(component, OSP_ANNOTATION)
+        hint = SubElement(annotation, f"{{{OSP}}}StepSizeHint")
+        hint.set("value", _decimal(unit.period * plan.step))
+
+
+def _add_values(
+    above: _Element, values: Mapping[str, Value], fmu: Fmu, spelled: Mapping[str, quantities.Measure]
+) -> None:
+    parameter_set = SubElement(above, f"{{{SSV}}}ParameterSet", version="1.0", name=PARAMETER_SET)
+    parameters = SubElement(parameter_set, f"{{{SSV}}}Parameters")
+    present = []
+    for name, value in values.items():
+        variable = fmu.variables[name]
+        parameter = SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
+        kind = SubElement(parameter, f"{{{SSV}}}{variable.type}", value=_text(variable, value))
+        if variable.type == "Real" and variable.unit in spelled:
+            kind.set("unit", str(variable.unit))
+            present.append(variable.unit)
+    _add_units(parameter_set, {unit: spelled[unit] for unit in spelled if unit in present})
+
+
+def _text(variable: Variable, value: Value) -> str:
+    if variable.type == "Boolean":
+        return "true" if value else "false"
+    if variable.type == "Real":
+        return repr(float(value))
+    if variable.type == "Enumeration":
+        return next((name for name, number in (variable.items or {}).items() if number == value), str(value))
+    return str(value)
+
+
+def _spelled_units(plan: Plan) -> dict[str, quantities.Measure]:
+    """Return the units of measurement that appear in the plan and can be put in base units."""
+    names = sorted({v.unit for unit in plan.units for v in unit.fmu.variables.values() if v.unit})
+    return {name: measure for name in names if (measure := _measure(name)) is not None}
+
+
+def _measure(unit: str) -> quantities.Measure | None:
+    try:
+        return quantities.parse_unit(unit)
+    except ValueError:
+        return None
+
+
+def _add_units(above: _Element, spelled: Mapping[str, quantities.Measure]) -> None:
+    if not spelled:
+        return
+    units = SubElement(above, f"{{{SSD if above.tag.startswith('{' + SSD) else SSV}}}Units")
+    for name, measure in spelled.items():
+        unit = SubElement(units, f"{{{SSC}}}Unit", name=name)
+        base = SubElement(unit, f"{{{SSC}}}BaseUnit")
+        for symbol, power in zip(_BASE_UNITS, measure.powers, strict=True):
+            if power:
+                base.set(symbol, str(power))
+        factor = float(measure.factor) * math.pi**measure.pi
+        if factor != 1.0:
+            base.set("factor", repr(factor))
+
+
+def _add_enumerations(root: _Element, enumerations: Mapping[str, Mapping[str, int]]) -> None:
+    if not enumerations:
+        return
+    group = SubElement(root, f"{{{SSD}}}Enumerations")
+    for name, items in enumerations.items():
+        enumeration = SubElement(group, f"{{{SSC}}}Enumeration", name=name)
+        for item, number in items.items():
+            SubElement(enumeration, f"{{{SSC}}}Item", name=item, value=str(number))
+
+
+def _add_experiment(root: _Element, plan: Plan) -> None:
+    experiment = SubElement(root, f"{{{SSD}}}DefaultExperiment")
+    experiment.set("startTime", "0.0")
+    experiment.set("stopTime", repr(plan.time(plan.n_steps)))
+    algorithm = SubElement(_annotation(experiment, OSP_ANNOTATION), f"{{{OSP}}}Algorithm")
+    SubElement(algorithm, f"{{{OSP}}}FixedStepAlgorithm", baseStepSize=_decimal(plan.step))
+    own = SubElement(_annotation(experiment, OWN_ANNOTATION), f"{{{OWN}}}Scenario")
+    own.set("stepSize", _decimal(plan.step))
+    own.set("algorithm", plan.algorithm)
+    for pattern in _recorded(plan):
+        SubElement(own, f"{{{OWN}}}Record", variable=pattern)
+
+
+def _recorded(plan: Plan) -> Iterable[str]:
+    """Return what the scenario says is recorded: nothing if that is all outputs."""
+    return () if plan.scenario.get("record") is None else (f"{unit}.{name}" for unit, name in plan.record)
+
+
+def _annotation(above: _Element, kind: str) -> _Element:
+    """Return a new annotation, the element that its content goes into."""
+    group = above.find(f"{{{SSD}}}Annotations")
+    if group is None:
+        group = SubElement(above, f"{{{SSD}}}Annotations")
+    return SubElement(group, f"{{{SSC}}}Annotation", type=kind)
+
+
+def _decimal(seconds: Fraction) -> str:
+    """Return a time as the shortest decimal that is read back as the same fraction."""
+    text = repr(float(seconds))
+    return text if Fraction(text) == seconds else f"{seconds.numerator}/{seconds.denominator}"
