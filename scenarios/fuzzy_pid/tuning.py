@@ -6,7 +6,7 @@
 Without the second part gains would grow until the brakes chatter. Six gains each are moved in logarithms
 by a (1 + 1) evolution strategy with the 1/5 success rule (I. Rechenberg, Evolutionsstrategie, 1973), with
 the same seeds and number of evaluations. Steps of 5 ms, the controllers' own, move J by less than 0.001.
-Run it from the checkout; one search takes about a minute on two cores:
+Run it from the checkout; either takes two to three minutes on two cores:
 
     .venv/bin/python scenarios/fuzzy_pid/tuning.py pid
     .venv/bin/python scenarios/fuzzy_pid/tuning.py fuzzy_pid
@@ -55,8 +55,8 @@ START = {
 }
 """Controller -> what is tuned, from the defaults on.
 
-Of fuzzy PID those six that served it best: with ranges of dK_d in place of the error ranges J is higher by
-0.003."""
+They end at J = 0.8664 (PID) and 0.8656 (fuzzy PID). Of fuzzy PID those six that served it best: ranges of
+dK_d in place of the error ranges end at 0.8688, all its twelve gains and ranges at 0.8678."""
 
 Found = dict[str, tuple[np.ndarray, float]]
 """Run -> its peaks, and its chatter [N.m/s]."""
