@@ -11,7 +11,7 @@ import typer
 
 from .errors import YawbenchError
 
-COMMANDS = ("build", "check", "run", "compare", "plot", "converge", "study", "export-ssp")
+COMMANDS = ("build", "check", "run", "compare", "plot", "converge", "study", "sweep", "export-ssp")
 """Each a module of `orchestrator.commands` with a function of the same name, `_` for `-`."""
 
 

@@ -32,6 +32,8 @@ Progress = Callable[[int, int], None]
 Opener = Callable[[Unit, Log, set[Path]], Slave]
 """Makes the instance of a unit (see `unit.FmuSlave`)."""
 
+KEPT = "What was recorded until then"
+"""How the sentence begins that names the results of a run that failed."""
 REPORT_EVERY = 0.2
 """Time between two reports of progress [s], while a single step does not take longer."""
 
@@ -198,7 +200,7 @@ class _Run:
             problems += lost.problems
         else:
             if self.recorder.folder is not None:
-                problems.append(f"What was recorded until then: {self.recorder.folder}")
+                problems.append(f"{KEPT}: {self.recorder.folder}")
 
     def abandon(self) -> None:
         """Leave at once: somebody insists, perhaps because a unit never comes back."""

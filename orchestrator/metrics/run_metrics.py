@@ -154,9 +154,10 @@ def evaluate(results: Results, chosen: Metric, window: tuple[float, float] | Non
     return Value(number, chosen.unit(results.units[signals[0][0]]))
 
 
-def has_signals(results: Results, chosen: Metric) -> bool:
-    """Return whether a run has recorded what a metric is computed from."""
-    return bool(_signals(results, chosen))
+def unit_in(results: Results, chosen: Metric) -> str | None:
+    """Return the unit of a metric in a run, None if the run has not recorded its signals."""
+    signals = _signals(results, chosen)
+    return chosen.unit(results.units[signals[0][0]]) if signals else None
 
 
 def _signals(results: Results, chosen: Metric) -> list[list[str]]:

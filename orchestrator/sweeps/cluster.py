@@ -1,4 +1,4 @@
-"""Runs of a sweep on a Dask cluster.
+"""Runs of a sweep on a Dask cluster; needs the package distributed.
 
 The workers need this program, in this version, and nothing else: plans travel with their tasks, the
 FMUs once to every worker, which unpacks them into its own cache. As on this machine every run has a
@@ -20,6 +20,8 @@ from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+
+import distributed
 
 from ..errors import ResultsError, ScenarioError
 from ..fmu.archive import open_fmu
@@ -50,7 +52,7 @@ def run_on_cluster(
         fmus: hash -> FMU, of all that the jobs use.
 
     Raises:
-        ScenarioError: distributed is not installed, no scheduler answers, its workers do not fit.
+        ScenarioError: no scheduler answers, or its workers do not fit.
         ResultsError: the cluster was lost on the way.
         KeyboardInterrupt: Ctrl-C or SIGTERM.
     """
@@ -61,8 +63,6 @@ def run_on_cluster(
 
 
 def _submit_all(client: Any, jobs: Sequence[Measurement], done: Done, scheduler: str, ahead: int) -> None:
-    from distributed import as_completed
-
     waiting = iter(jobs)
     named: dict[str, Measurement] = {}
 
@@ -72,7 +72,7 @@ def _submit_all(client: Any, jobs: Sequence[Measurement], done: Done, scheduler:
         return future
 
     futures = [submit(job) for job, _ in zip(waiting, range(ahead), strict=False)]
-    completed = as_completed(futures)
+    completed = distributed.as_completed(futures)
     try:
         for future in completed:
             done(_outcome(future, named.pop(future.key), scheduler))
@@ -86,12 +86,10 @@ def _submit_all(client: Any, jobs: Sequence[Measurement], done: Done, scheduler:
 
 def _outcome(future: Any, job: Measurement, scheduler: str) -> Outcome:
     """Return what a worker handed back, or why it handed back nothing."""
-    from distributed import KilledWorker
-
     if future.status == "cancelled" or future.status == "lost":
         raise ResultsError(f"{scheduler}: the cluster was lost; what it had finished is kept.")
     error = future.exception() if future.status == "error" else None
-    if isinstance(error, KilledWorker):
+    if isinstance(error, distributed.KilledWorker):
         return Outcome(job, ("the workers that made this run died",), 1, died=True)
     if error is not None:
         text = " ".join(str(error).split())
@@ -118,7 +116,7 @@ def _unpacked_here(plan: Plan) -> Plan:
     return replace(plan, units=units)
 
 
-class _Archives:
+class _Archives(distributed.WorkerPlugin):
     """A plugin of Dask's workers that unpacks FMUs before the first run starts.
 
     Args:
@@ -138,19 +136,10 @@ class _Archives:
                 path.write_bytes(content)
                 _LOCAL[digest] = open_fmu(path).directory
 
-    def teardown(self, worker: Any) -> None:
-        """Nothing: the cache is the worker's own."""
-
 
 @contextlib.contextmanager
 def _connected(address: str) -> Iterator[Any]:
     """Connect to a scheduler while the block runs."""
-    try:
-        import distributed
-    except ImportError:
-        raise ScenarioError(
-            "--scheduler needs the package distributed: pip install 'yawbench[cluster]'"
-        ) from None
     try:
         client = distributed.Client(address, timeout=TIMEOUT, set_as_default=False)
     except (OSError, TimeoutError, asyncio.TimeoutError, ValueError, TypeError) as error:
@@ -172,7 +161,8 @@ def _check_workers(client: Any, address: str) -> int:
     except Exception as error:  # whatever a worker without this program says
         text = " ".join(str(error).split())
         raise ScenarioError(
-            f"--scheduler {address}: its workers cannot run this program; is yawbench installed there? ({text})"
+            f"--scheduler {address}: its workers cannot run this program; "
+            f"is yawbench installed there? ({text})"
         ) from None
     ours = versions()
     for worker, theirs in found.items():

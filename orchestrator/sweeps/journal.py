@@ -81,17 +81,16 @@ class Journal:
         if not lines:
             self._append({"sweep": identity, "format": FORMAT})
             return
-        number = 1
+        entry = 0
         try:
             self._check(json.loads(lines[0]), identity)
-            for number, line in enumerate(lines[1:], start=2):
-                entry = json.loads(line)
-                values = {
-                    key: value and (float(value[0]), str(value[1])) for key, value in entry["values"].items()
-                }
-                self.records[entry["key"]] = Record(values, tuple(entry["problems"]))
+            for entry in range(1, len(lines)):
+                key, record = _record(json.loads(lines[entry]))
+                self.records[key] = record
         except (ValueError, KeyError, TypeError, AttributeError, IndexError):
-            raise ResultsError(f"{path}: line {number} is damaged; --fresh begins the sweep anew.") from None
+            raise ResultsError(
+                f"{path}: line {entry + 1} is damaged; --fresh begins the sweep anew."
+            ) from None
 
     def _check(self, entry: dict[str, Any], identity: str) -> None:
         if entry["sweep"] != identity or entry["format"] != FORMAT:
@@ -101,13 +100,19 @@ class Journal:
                 "or --fresh to begin anew."
             )
 
-    def add(self, key: str, record: Record) -> None:
+    def add(self, key: str, record: Record, *, last: bool = True) -> None:
         """Note that a run is finished.
+
+        Args:
+            key: of the run.
+            record: what became of it.
+            last: False if the run is to be made again when the sweep goes on; nothing is written then.
 
         Raises:
             ResultsError: the journal cannot be written.
         """
-        self._append({"key": key, "values": record.values, "problems": record.problems})
+        if last:
+            self._append({"key": key, "values": record.values, "problems": record.problems})
         self.records[key] = record
 
     def _append(self, entry: dict[str, Any]) -> None:
@@ -124,6 +129,11 @@ class Journal:
     def close(self) -> None:
         """Let go of the file."""
         os.close(self._file)
+
+
+def _record(entry: dict[str, Any]) -> tuple[str, Record]:
+    values = {key: value and (float(value[0]), str(value[1])) for key, value in entry["values"].items()}
+    return str(entry["key"]), Record(values, tuple(entry["problems"]))
 
 
 def _whole_lines(data: bytes) -> tuple[list[bytes], int]:

@@ -21,12 +21,13 @@ import numpy as np
 
 from ..errors import ScenarioError, YawbenchError
 from ..fmu.archive import open_fmu
-from ..metrics.run_metrics import has_signals, metric
+from ..metrics.run_metrics import metric, unit_in
 from ..plan import Fmu, Plan
 from ..results.read import Results
 from ..scenario import quantities, yaml_lines
 from ..scenario.yaml_lines import Document
 from ..studies.jobs import Job, plan_of
+from ..studies.study_schema import si_number
 from .design import Level, Point
 from .schema import AxisSpec
 from .sweep_file import Sweep
@@ -53,6 +54,7 @@ class Planned:
     sweep: Sweep
     runs: list[PlannedRun]
     units: dict[str, str]  # axis of numbers -> measurement unit in tables, an SI unit; "" if it has none
+    metric_units: dict[str, str]  # key of a metric -> its unit
 
     def number(self, name: str, level: Level) -> float:
         """Return the value of an axis of numbers in the unit of `units`."""
@@ -103,8 +105,7 @@ def plan_sweep(
         progress(number + 1)
     if problems:
         raise ScenarioError(_first(problems.values()))
-    _check_metrics(sweep, runs)
-    return Planned(sweep, runs, _units(sweep, runs))
+    return Planned(sweep, runs, _units(sweep, runs), _metric_units(sweep, runs))
 
 
 class _Once:
@@ -157,16 +158,46 @@ def run_key(plan: Plan, metrics: Any) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
 
 
-def _check_metrics(sweep: Sweep, runs: list[PlannedRun]) -> None:
-    """Raise if a metric's signals are recorded in no run."""
+def _metric_units(sweep: Sweep, runs: list[PlannedRun]) -> dict[str, str]:
+    """Return the unit of every metric.
+
+    Raises:
+        ScenarioError: no run records a metric's signals, or a bound is in a unit that it does not have.
+    """
     made_up = {tuple(run.plan.record): _recorded(run.plan) for run in runs}.values()
+    units: dict[str, str] = {}
     problems = []
     for key, spec in sweep.spec.metrics.items():
-        chosen = metric(spec.metric)
-        if not any(has_signals(results, chosen) for results in made_up):
-            problems.append(f"{sweep.path}: metrics.{key}: no run records the signals of {chosen.name}")
+        found = (unit_in(results, metric(spec.metric)) for results in made_up)
+        unit = next((unit for unit in found if unit is not None), None)
+        if unit is None:
+            problems.append(f"{sweep.path}: metrics.{key}: no run records the signals of {spec.metric}")
+        else:
+            units[key] = unit
+    for place, key, bound in _bounds(sweep):
+        try:
+            si_number(bound, units.get(key, "1"))
+        except ValueError as error:  # noqa: PERF203 - all problems are collected
+            problems += [f"{sweep.path}: {place}: {error}"] if key in units else []
     if problems:
         raise ScenarioError(problems)
+    return units
+
+
+def _bounds(sweep: Sweep) -> list[tuple[str, str, float | str]]:
+    """Return (place, metric, bound) of all bounds in the file."""
+    limits = [
+        (f"limits.{name}.holds_if[{i}]", condition.metric, condition.bound)
+        for name, limit in sweep.spec.limits.items()
+        for i, condition in enumerate(limit.holds_if)
+    ]
+    figures = [
+        (f"figures[{i}].{name}", figure.metric, given)
+        for i, figure in enumerate(sweep.spec.figures)
+        for name in ("largest", "mark")
+        if figure.metric and (given := getattr(figure, name)) is not None
+    ]
+    return limits + figures
 
 
 def _recorded(plan: Plan) -> Results:

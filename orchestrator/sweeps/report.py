@@ -1,0 +1,69 @@
+"""What a sweep leaves on disk beside its journal: the table, figures, a page that shows them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..errors import ResultsError
+from ..figures.style import save
+from ..metrics.run_metrics import metric
+from ..studies.tables import Cell, Table, for_markdown
+from .figures import draw
+from .limits import limit_table
+from .table import TABLE, Swept, point_text, write_table
+
+REPORT, FIGURES = "sweep.md", "figures"
+
+
+def write_sweep(swept: Swept, out: Path) -> list[str]:
+    """Write table, figures and report into `out`; return what could not be drawn.
+
+    Raises:
+        ResultsError: a file cannot be written.
+    """
+    write_table(swept, out / TABLE)
+    spec = swept.planned.sweep.spec
+    drawn: dict[str, str] = {}
+    problems = []
+    for figure in spec.figures:
+        try:
+            made = draw(swept, figure)
+        except ResultsError as error:
+            problems.append(f"figure {figure.name}: {error}")
+            continue
+        save(made, out / FIGURES / figure.name)
+        drawn[figure.title or figure.name] = f"{FIGURES}/{figure.name}.png"
+    (out / REPORT).write_text(_page(swept, drawn), encoding="utf-8")
+    return problems
+
+
+def limit_tables(swept: Swept) -> list[Table]:
+    """Return the tables of all limits."""
+    return [limit_table(swept, name) for name in swept.planned.sweep.spec.limits]
+
+
+def _page(swept: Swept, drawn: dict[str, str]) -> str:
+    spec = swept.planned.sweep.spec
+    runs, failed = swept.planned.runs, swept.failed
+    count = f"{len(runs)} runs, {len(failed)} failed" if failed else f"{len(runs)} runs"
+    head = [f"# {spec.title}", "", *([spec.source, ""] if spec.source else [])]
+    head += [f"{count} of `{spec.scenario}`, one row each in `{TABLE}`.", ""]
+    parts = ["\n".join(head), for_markdown(_metrics(swept))]
+    parts += [for_markdown(table) for table in limit_tables(swept)]
+    parts += [f"![{title}]({path})\n" for title, path in drawn.items()]
+    if failed:
+        rows: list[list[Cell]] = [
+            [point_text(swept.planned, run), "; ".join(swept.record(run).problems)] for run in failed
+        ]
+        parts.append(for_markdown(Table("Runs that failed", ["run", "why"], [*rows])))
+    return "\n".join(parts)
+
+
+def _metrics(swept: Swept) -> Table:
+    table = Table("Metrics", ["column", "what it is", "", "unit"])
+    for key, spec in swept.planned.sweep.spec.metrics.items():
+        chosen = metric(spec.metric)
+        window = f", {spec.window[0]:g} to {spec.window[1]:g} s" if spec.window else ""
+        unit = swept.unit(key)
+        table.rows.append([key, f"{chosen.definition}{window}", chosen.formula, "" if unit == "1" else unit])
+    return table
