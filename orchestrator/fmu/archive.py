@@ -121,10 +121,25 @@ def _read(path: Path) -> bytes:
         else:
             more = f"; {path.parent} holds {listed(names)}" if names else ""
         raise ModelDescriptionError(f"{path}: no such FMU{more}") from None
+    except NotADirectoryError:
+        return _read_member(path)
     except OSError as error:
         raise ModelDescriptionError(f"{path}: cannot read this FMU: {error.strerror}") from None
     except ValueError as error:  # a null character in the path
         raise ModelDescriptionError(f"{str(path)!r}: cannot read this FMU: {error}") from None
+
+
+def _read_member(path: Path) -> bytes:
+    """Return an FMU in an archive, such as system.ssp/resources/plant.fmu."""
+    outer = next(above for above in path.parents if above.is_file())
+    member = path.relative_to(outer).as_posix()
+    try:
+        with zipfile.ZipFile(outer) as archive:
+            return archive.read(member)
+    except KeyError:
+        raise ModelDescriptionError(f"{path}: no such FMU: {outer} does not hold it") from None
+    except _DAMAGE as error:
+        raise ModelDescriptionError(f"{path}: cannot read this FMU: {error}") from None
 
 
 def _load(entry: Path, path: Path) -> Fmu | None:

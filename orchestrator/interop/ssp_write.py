@@ -27,7 +27,7 @@ from lxml.etree import SubElement, _Element
 from ..errors import ResultsError
 from ..plan import Fmu, Plan, Unit, Value, Variable
 from ..scenario import quantities
-from .ssp_names import (
+from ..scenario.ssp_names import (
     DESCRIPTION_FILE,
     NAMESPACES,
     OSP,

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..errors import ScenarioError
 from ..plan import Algorithm
 from ..wording import hint, listed
-from . import overrides, quantities, strict, yaml_lines
+from . import overrides, quantities, ssp_read, strict, yaml_lines
 from .schema import Connection, Endpoint, Scenario, UnitSpec, Vehicle, endpoint
 from .yaml_lines import Document, Key
 
@@ -28,10 +28,10 @@ def load_scenario(
     vehicle: Path | None = None,
     read: Callable[..., Document] = yaml_lines.read,
 ) -> Scenario:
-    """Read a scenario file.
+    """Read a scenario file, or an SSP archive.
 
     Args:
-        path: the YAML file.
+        path: the YAML file, or the archive.
         swaps: `unit=fmu`, as given to --swap.
         settings: `unit.parameter=value`, as given to --set.
         stop_time, step_size: in place of the file's [s].
@@ -42,7 +42,8 @@ def load_scenario(
     Raises:
         ScenarioError: with everything that is wrong with the file, its vehicle file, the options.
     """
-    document = read(Path(path), what="scenario file")
+    archive = Path(path).suffix.lower() == ".ssp"
+    document = ssp_read.read(Path(path)) if archive else read(Path(path), what="scenario file")
     if vehicle is not None:
         overrides.apply_values(document, {"vehicle": str(vehicle.absolute())})
     vehicle_document = _read_vehicle(document, read)
@@ -62,6 +63,7 @@ def load_scenario(
         raise ScenarioError(problems)
     scenario._document, scenario._vehicle_document = document, vehicle_document
     scenario._vehicle, scenario._replaced = parameters, replaced
+    scenario._explicit = archive
     return scenario
 
 

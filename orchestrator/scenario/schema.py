@@ -109,6 +109,7 @@ class Scenario(Strict):
     _vehicle_document: Document = PrivateAttr()
     _vehicle: Vehicle = PrivateAttr()
     _replaced: dict[str, str] = PrivateAttr()
+    _explicit: bool = PrivateAttr(default=False)
 
     @property
     def path(self) -> Path:
@@ -134,6 +135,14 @@ class Scenario(Strict):
     def replaced(self) -> dict[str, str]:
         """Unit -> the FMU that the file names, for units swapped by an option."""
         return self._replaced
+
+    @property
+    def explicit(self) -> bool:
+        """Whether only what `connections` names is connected, and start values stand for the rest.
+
+        So it is in SSP archives, but for units swapped by an option.
+        """
+        return self._explicit
 
     def as_run(self) -> dict[str, Any]:
         """Return everything that the file, the vehicle file and the options say, as JSON-ready data."""

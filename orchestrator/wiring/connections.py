@@ -1,7 +1,8 @@
 """One source for every input: wires by connections, by equal names, constants for what is left.
 
 An input that its unit declares as optional, and that nothing drives, keeps its start value: it counts
-among the constants, so it is shown and recorded like them.
+among the constants, so it is shown and recorded like them. So does any input in an SSP archive, where
+nothing is connected by equal names.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ class Connector:
             for name, variable in inputs.items():
                 if (unit, name) in fed:
                     continue
-                if variable.optional and variable.start is not None:
+                if (variable.optional or self._explicit(unit)) and variable.start is not None:
                     constants[(unit, name)] = variable.start
                 else:
                     self._report(("units", unit), self._undriven(unit, variable))
@@ -68,6 +69,10 @@ class Connector:
         for (unit, name), value in constants.items():
             by_unit[unit][name] = value
         return [wire for wire, _ in wires.values()], by_unit
+
+    def _explicit(self, unit: str) -> bool:
+        """Return whether only the scenario's connections count for the inputs of a unit."""
+        return self._scenario.explicit and unit not in self._scenario.replaced
 
     def _report(self, key: Key, sentence: str) -> None:
         self._found.append((key, sentence))
@@ -134,6 +139,8 @@ class Connector:
         ambiguous = set()
         for unit, inputs in self._inputs.items():
             for name in inputs:
+                if self._explicit(unit):
+                    break
                 sources = [s for s, outputs in self._outputs.items() if name in outputs and s != unit]
                 if (unit, name) in wires or not sources:
                     continue

@@ -10,6 +10,7 @@ PARAMETER_SET = "scenario"
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+SSM = "http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
 OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
 OWN = "urn:yawbench:ssp:1"
 NAMESPACES = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP, "yawbench": OWN}
