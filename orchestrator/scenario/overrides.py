@@ -2,7 +2,8 @@
 
 `--swap unit=fmu` replaces a unit's FMU; `--set unit.parameter=value` gives a parameter. Two names
 that no unit may have stand for more: `--set vehicle.mass=1200` changes the parameter set that all
-units share, `--set inputs.friction*=0.3` a constant. Whatever is changed this way remembers its
+units share, `--set inputs.friction*=0.3` a constant. `--set stop_time=2`, `step_size` and `algorithm`
+change the run, `--set unit.step_size=0.01` the step of a unit. Whatever is changed this way remembers its
 option, so that later messages name the option in place of a line.
 """
 
@@ -12,12 +13,14 @@ import os
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ..wording import hint
+from ..wording import hint, listed
 from . import yaml_lines
 from .yaml_lines import Document
 
 RESERVED = ("vehicle", "inputs")
 """Words that `--set` understands in place of a unit."""
+OF_RUN = ("stop_time", "step_size", "algorithm")
+"""What `--set` gives without a unit."""
 
 
 def is_path(fmu: str) -> bool:
@@ -54,14 +57,23 @@ def apply_settings(document: Document, vehicle: Document, settings: Iterable[str
         option = f"--set {text}"
         target, equals, raw = (part.strip() for part in text.partition("="))
         unit, dot, name = target.partition(".")
-        if not (unit and dot and name and equals):
-            document.problems.append((0, f"{option}: write --set UNIT.PARAMETER=VALUE"))
-            continue
         value = yaml_lines.scalar(raw)
+        if target in OF_RUN and equals and isinstance(document.data, dict):
+            document.data[target] = value
+            document.overrides[(target,)] = option
+            continue
+        if not (unit and dot and name and equals):
+            document.problems.append(
+                (0, f"{option}: write --set UNIT.PARAMETER=VALUE, or {listed(OF_RUN, last='or')}=VALUE")
+            )
+            continue
         if unit == "vehicle":
             _put(vehicle, (), "parameters", name, value, option)
         elif unit == "inputs":
             _put(document, (), "inputs", name, value, option)
+        elif isinstance(units.get(unit), dict) and name == "step_size":
+            units[unit][name] = value
+            document.overrides[("units", unit, name)] = option
         elif isinstance(units.get(unit), dict):
             _put(document, ("units", unit), "parameters", name, value, option)
         else:

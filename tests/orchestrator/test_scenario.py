@@ -309,6 +309,16 @@ def test_settings_change_parameters_constants_and_the_vehicle(file: Path) -> Non
     assert scenario.vehicle_parameters == {"mass": "1200 kg"}
 
 
+def test_settings_change_times_and_algorithm_of_the_run_and_steps_of_units(file: Path) -> None:
+    scenario = load_scenario(
+        file,
+        settings=["stop_time=2 s", "step_size=5 ms", "algorithm=jacobi", "controller.step_size=0.01"],
+    )
+    assert (scenario.stop_time, scenario.step_size) == (2, Fraction(1, 200))
+    assert scenario.algorithm == "jacobi"
+    assert scenario.units["controller"].step_size == Fraction(1, 100)
+
+
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
@@ -323,7 +333,15 @@ def test_settings_change_parameters_constants_and_the_vehicle(file: Path) -> Non
             "--set tyre.mu=1: the scenario has no unit 'tyre'; it has: "
             "driver, controller, plant, vehicle and inputs",
         ),
-        ({"settings": ["stop_time=3"]}, "--set stop_time=3: write --set UNIT.PARAMETER=VALUE"),
+        (
+            {"settings": ["stop=3"]},
+            "--set stop=3: write --set UNIT.PARAMETER=VALUE, or stop_time, step_size or algorithm=VALUE",
+        ),
+        (
+            {"settings": ["step_size=0.0015"]},
+            "a.yaml:2: stop_time: 8 s is no integer multiple of the communication step 0.0015 s "
+            "(--set step_size=0.0015); nearest allowed: 7.9995 s or 8.001 s",
+        ),
         ({"settings": ["driver.amplitude="]}, None),
         (
             {"settings": ["driver.amplitude=.inf"]},
