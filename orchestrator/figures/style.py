@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ResultsError
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 LINES: tuple[dict[str, Any], ...] = (
     {"color": "#0072B2", "linestyle": "-", "linewidth": 1.6},
@@ -101,7 +101,7 @@ def note_above(axes: Axes, note: str) -> None:
     )  # fmt: skip
 
 
-def frame(figure: Figure, height: float, handles: Sequence[Line2D], title: str, note: str) -> None:
+def frame(figure: Figure, height: float, handles: Sequence[Artist], title: str, note: str) -> None:
     """Set title and legend above the panels and the note below, in room of their own.
 
     Args:

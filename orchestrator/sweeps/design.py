@@ -27,6 +27,8 @@ class Level:
 
 def levels_of(axis: AxisSpec) -> list[Level]:
     """Return the levels of an axis that lists or counts them."""
+    if axis.variants:
+        return [Level(words, words) for words in axis.variants]
     if axis.values is not None:
         return [Level(value, words) for value, words in axis.values.items()]
     assert axis.start is not None
@@ -75,7 +77,7 @@ def latin_hypercube(axes: Sequence[AxisSpec], runs: int, seed: int) -> list[Poin
 
 def _at(axis: AxisSpec, place: float) -> Level:
     """Return the level at a place between 0 and 1."""
-    if axis.values is not None or axis.count is not None:
+    if axis.variants or axis.values is not None or axis.count is not None:
         levels = levels_of(axis)
         return levels[min(int(place * len(levels)), len(levels) - 1)]
     assert axis.start is not None

@@ -131,7 +131,7 @@ class _Once:
 def _of_axis(sweep: Sweep, problem: str) -> tuple[str, str]:
     """Return a problem without the value of its axis, and the same with its place in the sweep file."""
     for name, axis in sweep.spec.axes.items():
-        for place in axis.vary:
+        for place in axis.places:
             if problem.startswith((f"--set {place}=", f"--swap {place}=")):
                 return f"{name}{problem.partition(': ')[2]}", f"{sweep.path}: axes.{name}: {problem}"
     return problem, problem

@@ -19,7 +19,13 @@
 
 What an axis varies is written as on the command line: `unit.parameter`, `vehicle.parameter` and
 `inputs.pattern` take values, a unit alone takes FMUs (`fmu:parameter=value` brings parameters along),
-`vehicle` takes vehicle files. Several places may share an axis.
+`vehicle` takes vehicle files. Several places may share an axis. In place of `vary` and `values`,
+`variants` change several things at once:
+
+    control:
+      variants:
+        no control: {swap: {controller: controller_off}}
+        with slip control: {swap: {wheel_control: wheel_control_slip}, set: {driver.amplitude: 0.04}}
 """
 
 from __future__ import annotations
@@ -37,7 +43,7 @@ from ..scenario.strict import Strict
 from ..studies.study_schema import OPERATORS, MetricSpec, text_of
 from ..wording import listed, short
 
-Kind = Literal["setting", "fmu", "vehicle"]
+Kind = Literal["setting", "fmu", "vehicle", "variant"]
 
 
 def _places(value: object) -> list[str]:
@@ -88,10 +94,24 @@ Number = Annotated[float | int, PlainValidator(_number)]
 Quantity = Annotated[float | int | str, PlainValidator(_quantity)]
 
 
-class AxisSpec(Strict):
-    """What is varied, and the values it takes: listed, or so many from one to another."""
+class VariantSpec(Strict):
+    """Changes that belong together."""
 
-    vary: Places = Field(description="unit.parameter, inputs.pattern, a unit (its FMU) or vehicle")
+    swap: dict[str, str] = Field({}, description="Unit -> FMU")
+    set: dict[str, Scalar] = Field({}, description="unit.parameter -> value")
+    vehicle: str | None = Field(None, description="Vehicle file, relative to the sweep file")
+
+    @property
+    def places(self) -> list[str]:
+        """What the variant changes."""
+        return [*self.swap, *self.set, *(["vehicle"] if self.vehicle else [])]
+
+
+class AxisSpec(Strict):
+    """What is varied, and the values it takes: listed, or so many from one to another; or variants."""
+
+    vary: Places = Field([], description="unit.parameter, inputs.pattern, a unit (its FMU) or vehicle")
+    variants: dict[str, VariantSpec] = Field({}, description="Words -> changes that belong together")
     values: Levels | None = Field(None, description="A list, or a mapping of values to words")
     start: Number | None = Field(None, alias="from", description="The first of `count` values")
     end: Number | None = Field(None, alias="to", description="The last")
@@ -103,8 +123,15 @@ class AxisSpec(Strict):
     @property
     def kind(self) -> Kind:
         """What the axis varies."""
+        if self.variants:
+            return "variant"
         place = self.vary[0]
         return "setting" if "." in place else "vehicle" if place == "vehicle" else "fmu"
+
+    @property
+    def places(self) -> list[str]:
+        """What the axis changes."""
+        return self.vary or list(dict.fromkeys(p for one in self.variants.values() for p in one.places))
 
     @property
     def numeric(self) -> bool:
@@ -117,6 +144,13 @@ class AxisSpec(Strict):
 
     @model_validator(mode="after")
     def _consistent(self) -> AxisSpec:
+        if bool(self.vary) == bool(self.variants):
+            raise ValueError("needs either vary or variants")
+        if self.variants:
+            given = (self.values, self.start, self.end, self.count, self.unit)
+            if any(one is not None for one in given):
+                raise ValueError("variants have no values, from, to, count or unit")
+            return self
         if "inputs" in self.vary:
             raise ValueError("vary: inputs needs a name, for example inputs.friction*")
         if "." not in self.vary[0] and len(self.vary) > 1:
@@ -258,7 +292,8 @@ class SweepSpec(Strict):
     def _check_lengths(self) -> None:
         lengths = {}
         for name, axis in self.axes.items():
-            lengths[name] = axis.count if axis.values is None else len(axis.values)
+            levels = axis.variants or axis.values
+            lengths[name] = axis.count if levels is None else len(levels)
             if lengths[name] is None:
                 raise ValueError(f"axes.{name}: needs count")
         if self.design == "list" and len(set(lengths.values())) > 1:

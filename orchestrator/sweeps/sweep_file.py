@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from ..errors import ScenarioError
+from ..plan import Value
 from ..scenario import overrides, yaml_lines
 from ..scenario.strict import validate
 from ..scenario.yaml_lines import Document
@@ -43,16 +45,19 @@ class Sweep:
     def job(self, number: int, out: Path, fmus: Path | None) -> Job:
         """Return the job of a point's run; if it keeps its results, they go below `out`."""
         spec, folder = self.spec, self.path.parent
-        swaps = [f"{unit}={_resolved(fmu, folder)}" for unit, fmu in spec.swap.items()]
-        settings = [f"{place}={text_of(value)}" for place, value in spec.set.items()]
+        swaps, settings = _changes(spec.swap, spec.set, folder)
         vehicle = None
         for axis, level in zip(spec.axes.values(), self.points[number], strict=True):
             if axis.kind == "vehicle":
                 vehicle = folder / str(level.value)
+            elif axis.kind == "variant":
+                variant = axis.variants[str(level.value)]
+                vehicle = folder / variant.vehicle if variant.vehicle else vehicle
+                more = _changes(variant.swap, variant.set, folder)
+                swaps, settings = swaps + more[0], settings + more[1]
             elif axis.kind == "fmu":
-                fmu, brought = fmu_and_settings(str(level.value))
-                swaps.append(f"{axis.vary[0]}={_resolved(fmu, folder)}")
-                settings += [f"{axis.vary[0]}.{one}" for one in brought]
+                more = _changes({axis.vary[0]: str(level.value)}, {}, folder)
+                swaps, settings = swaps + more[0], settings + more[1]
             else:
                 settings += [f"{place}={_given(axis, level)}" for place in axis.vary]
         width = len(str(len(self.points)))
@@ -63,8 +68,14 @@ class Sweep:
         )  # fmt: skip
 
 
-def _resolved(fmu: str, folder: Path) -> str:
-    return str(folder / fmu) if overrides.is_path(fmu) else fmu
+def _changes(swap: Mapping[str, str], set_: Mapping[str, Value], folder: Path) -> tuple[list[str], list[str]]:
+    """Return swaps and settings as the command line takes them; an FMU may bring settings along."""
+    swaps, settings = [], [f"{place}={text_of(value)}" for place, value in set_.items()]
+    for unit, text in swap.items():
+        fmu, brought = fmu_and_settings(text)
+        swaps.append(f"{unit}={folder / fmu if overrides.is_path(fmu) else fmu}")
+        settings += [f"{unit}.{one}" for one in brought]
+    return swaps, settings
 
 
 def _given(axis: AxisSpec, level: Level) -> str:
@@ -96,10 +107,10 @@ def _check_axes(spec: SweepSpec, document: Document) -> None:
     """Report a place that two axes, or an axis and `set` or `swap`, would both give a value."""
     seen: dict[str, str] = dict.fromkeys([*spec.set, *spec.swap], "set and swap")
     for name, axis in spec.axes.items():
-        for place in axis.vary:
+        for place in axis.places:
             if place in seen:
                 also = f"axis {seen[place]!r}" if seen[place] in spec.axes else "set or swap"
-                document.report(("axes", name, "vary"), f"{place} is given by {also} already")
+                document.report(("axes", name), f"{place} is given by {also} already")
             seen[place] = name
         if name in COLUMNS or name in spec.metrics:
             document.report(("axes", name), f"{name!r} is the name of another column of the table")

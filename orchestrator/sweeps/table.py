@@ -80,7 +80,7 @@ def write_table(swept: Swept, path: Path) -> None:
          [run.number + 1 for run in runs])
     ]  # fmt: skip
     for i, (name, axis) in enumerate(spec.axes.items()):
-        about = {"description": axis.says or ", ".join(axis.vary), "varies": ", ".join(axis.vary)}
+        about = {"description": axis.says or ", ".join(axis.places), "varies": ", ".join(axis.places)}
         if axis.numeric:
             about["unit"] = swept.planned.units[name]
             numbers = [swept.planned.number(name, run.point[i]) for run in runs]

@@ -1,0 +1,101 @@
+"""What all figures of a sweep share: which runs a panel holds, what axes and levels are called."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from ..figures.display import variable_of, words
+from ..figures.style import QUIET
+from .design import Level
+from .planning import PlannedRun
+from .schema import FigureSpec
+from .table import Swept, axis_unit
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FAILED: dict[str, Any] = {"marker": "x", "color": "#111111", "linestyle": "", "markersize": 6}
+"""A run that gives no number: a cross, never a gap that could pass for nothing."""
+GUIDE: dict[str, Any] = {"color": QUIET, "linewidth": 0.9, "linestyle": (0, (4, 2))}
+
+
+class Drawing:
+    """A figure of a sweep: `fill` draws a panel, `finish` what panels share, `handles` explain."""
+
+    def __init__(self, swept: Swept, spec: FigureSpec) -> None:
+        self.swept = swept
+        self.spec = spec
+        self.sweep = swept.planned.sweep.spec
+        self.names = list(self.sweep.axes)
+        self.what = ""  # what is drawn, without its unit
+        self.failed = False  # whether a cross has been drawn
+
+    def fill(self, axes: Axes, runs: Sequence[PlannedRun]) -> None:
+        """Draw the runs of a panel."""
+        raise NotImplementedError
+
+    def finish(self, figure: Figure, drawn: Sequence[Axes], left: Sequence[Axes]) -> None:
+        """Set what all panels share; `left` are those with a scale of their own."""
+        raise NotImplementedError
+
+    def handles(self) -> list[Artist]:
+        """Return what the legend explains."""
+        from matplotlib.lines import Line2D
+
+        return [Line2D([], [], label="no number: the run failed", **FAILED)] if self.failed else []
+
+    def panels(self) -> list[tuple[str, list[PlannedRun]]]:
+        """Return the heading and the runs of each panel."""
+        runs = self.swept.planned.runs
+        if not self.spec.panels:
+            return [("", runs)]
+        return [
+            (
+                self.name_of(self.spec.panels, level),
+                [r for r in runs if self.at(r, self.spec.panels) == level],
+            )
+            for level in self.levels(self.spec.panels)
+        ]
+
+    def at(self, run: PlannedRun, axis: str) -> Level:
+        """Return where a run stands on an axis."""
+        return run.point[self.names.index(axis)]
+
+    def levels(self, axis: str) -> list[Level]:
+        """Return the levels of an axis that runs have, in their order."""
+        return list(dict.fromkeys(self.at(run, axis) for run in self.swept.planned.runs))
+
+    def place(self, level: Level, axis: str) -> float:
+        """Return where a level is drawn: numbers as they are, names at 0, 1, 2."""
+        if self.sweep.axes[axis].numeric:
+            return float(level.value)
+        return float(self.levels(axis).index(level))
+
+    def label(self, axis: str) -> str:
+        """Return an axis in words, with its unit."""
+        spec = self.sweep.axes[axis]
+        said = spec.says or (words(variable_of(spec.vary[0]).replace("*", "")) if spec.vary else axis)
+        unit = self.unit_of(axis)
+        return f"{said.strip()} in {unit}" if unit else said.strip()
+
+    def unit_of(self, axis: str) -> str:
+        """Return the unit that an axis counts in, as people write it."""
+        return axis_unit(self.swept.planned, axis).strip(" []").replace(".", "·")
+
+    def name_of(self, axis: str, level: Level) -> str:
+        """Return a level of an axis in words."""
+        spec = self.sweep.axes[axis]
+        return (
+            f"{spec.says or axis} {level.words} {self.unit_of(axis)}".strip() if spec.numeric else level.words
+        )
+
+    def scale_x(self, axes: Axes) -> None:
+        """Set the scale and, for an axis of names, the ticks of x."""
+        if not self.sweep.axes[self.spec.x].numeric:
+            every = self.levels(self.spec.x)
+            axes.set_xticks(range(len(every)), [level.words for level in every])
+        elif self.sweep.axes[self.spec.x].spacing == "log":
+            axes.set_xscale("log")

@@ -1,0 +1,98 @@
+"""How far an axis may go, over another: a line through the last values that hold, and a band up to the
+first that do not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..figures.style import QUIET, line_style
+from .drawing import Drawing
+from .limits import Limit, limits_of
+from .metric_drawing import MARKERS
+from .planning import PlannedRun
+from .schema import FigureSpec
+from .table import Swept
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+HATCHES = ("", "///", "...", "\\\\\\", "xxx")
+"""Of the bands, so that they differ in grey print."""
+NONE_HOLDS: dict[str, Any] = {"marker": "v", "mfc": "white", "markersize": 8, "linestyle": ""}
+ALL_HOLD: dict[str, Any] = {"marker": "^", "mfc": "white", "markersize": 8, "linestyle": ""}
+
+
+class Limits(Drawing):
+    """A limit of a sweep."""
+
+    def __init__(self, swept: Swept, spec: FigureSpec) -> None:
+        super().__init__(swept, spec)
+        self.limit = self.sweep.limits[spec.limit]
+        self.what = self.limit.says
+        self._found = limits_of(swept, self.limit)
+        tried = [float(level.value) for level in self.levels(self.limit.of)]
+        self._smallest, self._largest = min(tried), max(tried)
+        self._none = any(limit.largest is None for limit in self._found)
+        self._all = any(limit.beyond is None for limit in self._found)
+
+    def fill(self, axes: Axes, runs: Sequence[PlannedRun]) -> None:
+        of = self.names.index(self.limit.of)
+        settings = {run.point[:of] + run.point[of + 1 :] for run in runs}
+        mine = [limit for limit in self._found if tuple(limit.others.values()) in settings]
+        for number, level in enumerate(self.levels(self.spec.lines) if self.spec.lines else [None]):
+            self._line(
+                axes, [one for one in mine if level is None or one.others[self.spec.lines] == level], number
+            )
+        self.scale_x(axes)
+
+    def _line(self, axes: Axes, limits: Sequence[Limit], number: int) -> None:
+        placed = sorted(
+            ((self.place(one.others[self.spec.x], self.spec.x), one) for one in limits), key=lambda p: p[0]
+        )
+        x = np.array([place for place, _ in placed])
+        low = np.array([self._smallest if one.largest is None else one.largest for _, one in placed])
+        high = np.array([self._largest if one.beyond is None else one.beyond for _, one in placed])
+        style = self._style(number)
+        band = {
+            "color": style["color"],
+            "alpha": 0.16,
+            "linewidth": 0.0,
+            "hatch": HATCHES[number % len(HATCHES)],
+        }
+        axes.fill_between(x, low, high, **band)
+        axes.plot(x, low, **style)
+        for mark, chosen in (
+            (NONE_HOLDS, [one.largest is None for _, one in placed]),
+            (ALL_HOLD, [one.beyond is None for _, one in placed]),
+        ):
+            axes.plot(x[chosen], low[chosen], color=style["color"], **mark)
+
+    def _style(self, number: int) -> dict[str, Any]:
+        return {**line_style(number), "marker": MARKERS[number % len(MARKERS)], "markersize": 4.5}
+
+    def finish(self, figure: Figure, drawn: Sequence[Axes], left: Sequence[Axes]) -> None:
+        for axes in left:
+            axes.set_ylabel(self.label(self.limit.of))
+        margin = 0.06 * (self._largest - self._smallest)
+        drawn[0].set_ylim(self._smallest - margin, self._largest + margin)
+
+    def handles(self) -> list[Artist]:
+        from matplotlib.lines import Line2D
+        from matplotlib.patches import Patch
+
+        levels = self.levels(self.spec.lines) if self.spec.lines else []
+        found: list[Artist] = [
+            Line2D([], [], label=self.name_of(self.spec.lines, level), **self._style(number))
+            for number, level in enumerate(levels)
+        ]
+        found.append(Patch(color=QUIET, alpha=0.25, linewidth=0.0, label="up to the first value that fails"))
+        if self._all:
+            found.append(Line2D([], [], color=QUIET, label="all values tried hold", **ALL_HOLD))
+        if self._none:
+            found.append(Line2D([], [], color=QUIET, label="none holds", **NONE_HOLDS))
+        return found
