@@ -1,0 +1,97 @@
+"""`yawbench second-opinion`: the same scenario in masters that others wrote."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .options import Fmus, ScenarioFile, Set, Swap
+
+if TYPE_CHECKING:
+    from ..interop.second_opinion import Opinion
+
+Masters = Annotated[
+    list[str] | None,
+    typer.Option("--master", metavar="NAME", help="libcosim, Ecos or fmpy; repeatable. Default: all."),
+]
+Pinned = Annotated[
+    bool, typer.Option("--one-core/--no-one-core", help="Measure every master also on one processor core.")
+]
+
+
+def second_opinion(
+    scenario: ScenarioFile,
+    swap: Swap = None,
+    set_: Set = None,
+    fmus: Fmus = None,
+    master: Masters = None,
+    one_core: Pinned = True,
+) -> None:
+    """Run a scenario in libcosim, Ecos and fmpy; compare every signal, and the time per step.
+
+    Exit status 1 if one that should agree does not: libcosim and Ecos run what `jacobi` runs here.
+    """
+    from ..errors import ScenarioError, SimulationError
+    from ..interop.second_opinion import MASTERS, second_opinion
+    from ..scenario.load import load_scenario
+    from ..wiring.make_plan import make_plan
+    from ..wording import hint
+
+    known = {one.title.lower(): one for one in MASTERS}
+    for name in master or ():
+        if name.lower() not in known:
+            raise ScenarioError(f"--master {name}: there is no such master{hint(name, known, lead='known')}")
+    chosen = [known[name.lower()] for name in master or known]
+    plan = make_plan(load_scenario(scenario, swaps=swap or (), settings=set_ or ()), fmus=fmus)
+    with tempfile.TemporaryDirectory(prefix="yawbench-") as folder:
+        try:
+            opinions = second_opinion(
+                plan,
+                Path(folder),
+                masters=chosen,
+                pinned=one_core,
+                said=lambda text: print(f"running in {text}", file=sys.stderr),
+            )
+        except RuntimeError as error:
+            raise SimulationError(str(error), unit=None, time=0.0) from None
+    show(opinions)
+    wrong = [one for one in opinions if not one.agrees and one.master.title != "fmpy"]
+    if wrong:
+        names = " and ".join(one.master.title for one in wrong)
+        raise SimulationError(f"{scenario}: no agreement with {names}, see above", unit=None, time=0.0)
+
+
+def show(opinions: list[Opinion]) -> None:
+    """Print the differences by signal, the times per step, and what has to be known."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, width=None if sys.stdout.isatty() else 140)
+    found = [one for one in opinions if not one.problem]
+    if found:
+        table = Table("largest difference / range", box=None, pad_edge=False, header_style="bold")
+        for one in found:
+            table.add_column(one.master.title, justify="right")
+        for signal in found[0].differences:
+            table.add_row(signal, *(f"{one.differences[signal]:.1e}" for one in found))
+        table.add_row("largest", *(f"{one.largest:.1e}" for one in found), style="bold")
+        console.print(table)
+        times = Table("us per communication step", box=None, pad_edge=False, header_style="bold")
+        keys = list(found[0].seconds)
+        for key in keys:
+            times.add_column(key, justify="right")
+        for one in found:
+            times.add_row(one.master.title, *(f"{1e6 * one.seconds[key]:.0f}" for key in keys))
+        console.print()
+        console.print(times)
+        console.print()
+    for one in opinions:
+        if one.problem:
+            console.print(f"{one.master.title}: {one.problem}", markup=False)
+        elif one.one_step or one.master.note:
+            step = "compared with one step for all units: " if one.one_step else ""
+            console.print(f"{one.master.title}: {step}{one.master.note}", markup=False)

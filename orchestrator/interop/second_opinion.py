@@ -1,0 +1,204 @@
+"""A scenario run by other masters, and how far their numbers are from those of ours.
+
+Everything is exported as an SSP archive and every master runs it in a process of its own, so one
+that crashes or never ends costs a sentence. Samples are counted, not read off time labels: after k
+steps is after k steps, whatever a program calls that instant. What is compared is `jacobi`, the
+algorithm that they all have; a difference is relative to the signal's range in our run.
+
+A master that cannot give a unit a step of its own gets the system with one step for all, and is
+compared with our run of that system.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..plan import Plan
+from .masters.request import Recording, Request
+from .ssp_write import write_ssp
+
+AGREEMENT = 1e-9
+"""Difference, relative to a signal's range, below which two runs are the same run: rounding, and that
+one program counts time in nanoseconds and another adds steps up."""
+LIMIT = 900.0
+"""Time that a master may take [s]."""
+
+
+@dataclass(frozen=True)
+class OtherMaster:
+    """A program that runs SSP archives: its module, its package, what has to be known of it."""
+
+    title: str
+    module: str
+    package: str
+    one_step: bool  # cannot give a unit a step of its own
+    note: str = ""
+
+
+MASTERS = (
+    OtherMaster("libcosim", "libcosim", "libcosimpy", False),
+    OtherMaster(
+        "Ecos",
+        "ecos",
+        "ecospy",
+        True,
+        "it calls a unit with a longer step less often, but only for one communication step",
+    ),
+    OtherMaster(
+        "fmpy",
+        "fmpy_ssp",
+        "fmpy",
+        True,
+        "its SSP simulation steps all units alike, exchanges nothing before the first step (all inputs "
+        "are 0 in it) and sets no texts, so it starts elsewhere and its differences stay",
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Opinion:
+    """What another master made of a system, beside what ours made of the same archive."""
+
+    master: OtherMaster
+    one_step: bool  # the system was given one step for all units
+    problem: str = ""
+    differences: dict[str, float] = field(default_factory=dict)  # unit.variable -> largest, over range
+    seconds: dict[str, float] = field(default_factory=dict)  # per step: "theirs", "ours", "... on one core"
+
+    @property
+    def largest(self) -> float:
+        """The largest difference of all signals."""
+        return max(self.differences.values(), default=0.0)
+
+    @property
+    def agrees(self) -> bool:
+        return not self.problem and self.largest <= AGREEMENT
+
+
+def installed(master: OtherMaster) -> bool:
+    """Return whether the program's package is there."""
+    return importlib.util.find_spec(master.package) is not None
+
+
+def second_opinion(
+    plan: Plan,
+    folder: Path,
+    *,
+    masters: Sequence[OtherMaster] = MASTERS,
+    pinned: bool = True,
+    said: Callable[[str], None] = lambda text: None,
+) -> list[Opinion]:
+    """Run a plan in other masters and compare.
+
+    Args:
+        plan: its algorithm does not matter, `jacobi` is compared.
+        folder: for archives and recordings.
+        masters: which ones; those not installed get a sentence.
+        pinned: also measure every master on one processor core.
+        said: told what is being run.
+
+    Raises:
+        ResultsError: the archive cannot be written.
+        RuntimeError: our own run failed.
+    """
+    ours: dict[bool, tuple[Request, dict[str, Recording]]] = {}
+    opinions = []
+    for master in masters:
+        one_step = master.one_step and any(unit.period > 1 for unit in plan.units)
+        if not installed(master):
+            says = f"{master.package} is not installed: pip install 'yawbench[interop]'"
+            opinions.append(Opinion(master, one_step, says))
+            continue
+        if one_step not in ours:
+            request = _request(plan, one_step, folder)
+            said(f"yawbench{', one step for all units' if one_step else ''}")
+            found = {key: _run("own", at, folder) for key, at in _variants(request, pinned)}
+            for one in found.values():
+                if isinstance(one, str):
+                    raise RuntimeError(one)
+            ours[one_step] = request, {k: r for k, r in found.items() if isinstance(r, Recording)}
+        request, own = ours[one_step]
+        said(master.title)
+        theirs = {key: _run(master.module, at, folder) for key, at in _variants(request, pinned)}
+        opinions.append(_compare(master, one_step, request, own, theirs))
+    return opinions
+
+
+def _request(plan: Plan, one_step: bool, folder: Path) -> Request:
+    """Write the archive; return what is to be run."""
+    if one_step:
+        plan = replace(plan, units=tuple(replace(unit, period=1) for unit in plan.units))
+    path = folder / ("one_step.ssp" if one_step else "system.ssp")
+    write_ssp(plan, path)
+    units = {unit.name: unit.fmu for unit in plan.units}
+    columns = [(u, name) for u, name in plan.record if units[u].variables[name].type == "Real"]
+    return Request(str(path), float(plan.step), plan.n_steps, columns)
+
+
+def _variants(request: Request, pinned: bool) -> list[tuple[str, Request]]:
+    variants = [("", request)]
+    if pinned and hasattr(os, "sched_getaffinity"):
+        variants.append((" on one core", replace(request, core=max(os.sched_getaffinity(0)))))
+    return variants
+
+
+def _run(module: str, request: Request, folder: Path) -> Recording | str:
+    """Run one master in a process of its own; return a sentence if it has no result."""
+    asked, answered = folder / "request.json", folder / "recording.npz"
+    request.write(asked)
+    answered.unlink(missing_ok=True)
+    command = [sys.executable, "-m", "orchestrator.interop.masters", module, str(asked), str(answered)]
+    paths = [str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=LIMIT, env=environment, check=False)
+    except subprocess.TimeoutExpired:
+        return f"it did not end within {LIMIT:g} s"
+    if done.returncode == 0 and answered.exists():
+        return Recording.read(answered)
+    if done.returncode < 0:
+        with suppress(ValueError):
+            return f"it died of {signal.Signals(-done.returncode).name}"
+    lines = done.stderr.decode(errors="replace").strip().splitlines()
+    return lines[-1] if lines else f"it ended without a word, exit status {done.returncode}"
+
+
+def _compare(
+    master: OtherMaster,
+    one_step: bool,
+    request: Request,
+    own: dict[str, Recording],
+    theirs: dict[str, Recording | str],
+) -> Opinion:
+    seconds: dict[str, float] = {}
+    for key, recording in theirs.items():
+        if isinstance(recording, str):
+            return Opinion(master, one_step, recording)
+        seconds |= {f"theirs{key}": recording.seconds, f"ours{key}": own[key].seconds}
+    first = theirs[""]
+    assert isinstance(first, Recording)
+    return Opinion(master, one_step, "", differences(request, own[""].values, first.values), seconds)
+
+
+def differences(request: Request, own: np.ndarray, other: np.ndarray) -> dict[str, float]:
+    """Return each signal's largest difference over its range in our run; one that stays constant: over 1.
+
+    A row that the other master has no value for at all, such as the first, does not count; a single
+    value that is not finite counts as infinite.
+    """
+    there = ~np.all(np.isnan(other), axis=1)
+    gap = np.abs(other[there] - own[there])
+    gap = np.where(np.isfinite(gap), gap, np.inf)
+    span = np.ptp(own, axis=0)
+    relative = np.max(gap, axis=0) / np.where(span > 0, span, 1.0)
+    return {f"{unit}.{name}": float(d) for (unit, name), d in zip(request.columns, relative, strict=True)}
