@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..figures.display import variable_of, words
 from ..figures.style import QUIET
+from ..studies.study_schema import text_of
 from .design import Level
 from .planning import PlannedRun
 from .schema import FigureSpec
@@ -30,6 +32,12 @@ class Drawing:
         self.spec = spec
         self.sweep = swept.planned.sweep.spec
         self.names = list(self.sweep.axes)
+        only = {axis: set(map(text_of, values)) for axis, values in spec.only.items()}
+        self.runs = [
+            run
+            for run in swept.planned.runs
+            if all(text_of(self.at(run, axis).value) in values for axis, values in only.items())
+        ]
         self.what = ""  # what is drawn, without its unit
         self.failed = False  # whether a cross has been drawn
 
@@ -66,7 +74,7 @@ class Drawing:
 
     def levels(self, axis: str) -> list[Level]:
         """Return the levels of an axis that runs have, in their order."""
-        return list(dict.fromkeys(self.at(run, axis) for run in self.swept.planned.runs))
+        return list(dict.fromkeys(self.at(run, axis) for run in self.runs))
 
     def place(self, level: Level, axis: str) -> float:
         """Return where a level is drawn: numbers as they are, names at 0, 1, 2."""
@@ -91,6 +99,11 @@ class Drawing:
         return (
             f"{spec.says or axis} {level.words} {self.unit_of(axis)}".strip() if spec.numeric else level.words
         )
+
+    def name_y(self, left: Sequence[Axes], text: str) -> None:
+        """Write what stands upwards beside the panels on the left, broken to their height."""
+        for axes in left:
+            axes.set_ylabel("\n".join(textwrap.wrap(text, 34)))
 
     def scale_x(self, axes: Axes) -> None:
         """Set the scale and, for an axis of names, the ticks of x."""

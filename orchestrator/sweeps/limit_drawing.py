@@ -37,8 +37,7 @@ class Limits(Drawing):
         self._found = limits_of(swept, self.limit)
         tried = [float(level.value) for level in self.levels(self.limit.of)]
         self._smallest, self._largest = min(tried), max(tried)
-        self._none = any(limit.largest is None for limit in self._found)
-        self._all = any(limit.beyond is None for limit in self._found)
+        self._none = self._all = False  # whether such marks have been drawn
 
     def fill(self, axes: Axes, runs: Sequence[PlannedRun]) -> None:
         of = self.names.index(self.limit.of)
@@ -66,18 +65,18 @@ class Limits(Drawing):
         }
         axes.fill_between(x, low, high, **band)
         axes.plot(x, low, **style)
-        for mark, chosen in (
-            (NONE_HOLDS, [one.largest is None for _, one in placed]),
-            (ALL_HOLD, [one.beyond is None for _, one in placed]),
-        ):
+        none, every = (np.array([end is None for end in ends]) for ends in (
+            [one.largest for _, one in placed], [one.beyond for _, one in placed],
+        ))  # fmt: skip
+        self._none, self._all = self._none or bool(none.any()), self._all or bool(every.any())
+        for mark, chosen in ((NONE_HOLDS, none), (ALL_HOLD, every)):
             axes.plot(x[chosen], low[chosen], color=style["color"], **mark)
 
     def _style(self, number: int) -> dict[str, Any]:
         return {**line_style(number), "marker": MARKERS[number % len(MARKERS)], "markersize": 4.5}
 
     def finish(self, figure: Figure, drawn: Sequence[Axes], left: Sequence[Axes]) -> None:
-        for axes in left:
-            axes.set_ylabel(self.label(self.limit.of))
+        self.name_y(left, self.label(self.limit.of))
         margin = 0.06 * (self._largest - self._smallest)
         drawn[0].set_ylim(self._smallest - margin, self._largest + margin)
 

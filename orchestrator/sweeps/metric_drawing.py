@@ -40,7 +40,7 @@ class MetricDrawing(Drawing):
         chosen = self.sweep.metrics[spec.metric]
         self.what = chosen.heading or metric(chosen.metric).title
         self.unit, self.factor = shown_unit(swept.unit(spec.metric))
-        numbers = [number for run in swept.planned.runs if math.isfinite(number := self.number(run))]
+        numbers = [number for run in self.runs if math.isfinite(number := self.number(run))]
         if spec.scale == "log":
             numbers = [number for number in numbers if number > 0]
         if not numbers:
@@ -92,8 +92,7 @@ class Curves(MetricDrawing):
         return {**style, "linestyle": ""} if self.sweep.design == "latin_hypercube" else style
 
     def finish(self, figure: Figure, drawn: Sequence[Axes], left: Sequence[Axes]) -> None:
-        for axes in left:
-            axes.set_ylabel(self.measured)
+        self.name_y(left, self.measured)
         drawn[0].set_yscale(self.spec.scale)
         if self.spec.largest is not None:
             drawn[0].set_ylim(self.low if self.spec.scale == "log" else min(self.low, 0.0), self.high)
@@ -155,8 +154,7 @@ class Map(MetricDrawing):
         return {"cmap": COLOURS, "norm": kind(low, self.high if self.high > low else low + 1.0)}
 
     def finish(self, figure: Figure, drawn: Sequence[Axes], left: Sequence[Axes]) -> None:
-        for axes in left:
-            axes.set_ylabel(self.label(self.spec.y))
+        self.name_y(left, self.label(self.spec.y))
         beyond = "max" if self.spec.largest is not None else "neither"
         bar = figure.colorbar(drawn[0].collections[0], ax=list(drawn), pad=0.02, fraction=0.05, extend=beyond)
         bar.set_label(self.measured)
@@ -164,7 +162,7 @@ class Map(MetricDrawing):
     def handles(self) -> list[Artist]:
         from matplotlib.lines import Line2D
 
-        label = f"{self.mark_text()} is exceeded beyond" if self.mark is not None else ""
+        label = f"beyond this line more than {self.mark_text()}" if self.mark is not None else ""
         found: list[Artist] = [Line2D([], [], color="#111111", linewidth=1.6, label=label)] if label else []
         return found + super().handles()
 

@@ -13,6 +13,7 @@ import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -143,10 +144,15 @@ def _first(problems: Iterable[str]) -> list[str]:
     return listed[:MANY] + more
 
 
+@cache
+def _version() -> str:
+    return version("yawbench")
+
+
 def run_key(plan: Plan, metrics: Any) -> str:
     """Return the hash of everything that a run's metrics follow from."""
     content = {
-        "yawbench": version("yawbench"),
+        "yawbench": _version(),
         "units": [[u.name, u.fmu.sha256, u.period, u.parameters, u.constants] for u in plan.units],
         "wires": [[w.source, w.output, w.target, w.input] for w in plan.wires],
         "record": plan.record,

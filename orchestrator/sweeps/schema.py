@@ -238,6 +238,7 @@ class FigureSpec(Strict):
     y: str = Field("", description="Axis upwards, of a map")
     lines: str = Field("", description="Axis with a line per value, of curves and limits")
     panels: str = Field("", description="Axis with a panel per value")
+    only: dict[str, list[Scalar]] = Field({}, description="Axis -> those of its values that are drawn")
     scale: Literal["linear", "log"] = Field("linear", description="Of the metric")
     largest: Quantity | None = Field(None, description="Where the metric's scale ends")
     mark: Quantity | None = Field(None, description="A value of the metric to draw a line at")

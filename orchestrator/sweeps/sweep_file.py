@@ -16,7 +16,7 @@ from ..studies.compare import fmu_and_settings
 from ..studies.jobs import Job
 from ..studies.study_schema import text_of
 from ..wording import hint
-from .design import Level, Point, points
+from .design import Level, Point, levels_of, points
 from .schema import AxisSpec, FigureSpec, SweepSpec
 
 COLUMNS = ("run", "status", "reason", "key")
@@ -141,6 +141,15 @@ def _check_names(spec: SweepSpec, document: Document) -> None:
         if figure.limit:
             _known(document, ("figures", i, "limit"), figure.limit, spec.limits, "limit", "limits")
         _check_places(spec, document, i, figure)
+        for axis, chosen in figure.only.items():
+            _known(document, ("figures", i, "only", axis), axis, spec.axes, "axis", "axes")
+            if axis not in spec.axes or (spec.design == "latin_hypercube" and spec.axes[axis].numeric):
+                continue
+            words = {text_of(level.value): level for level in levels_of(spec.axes[axis])}
+            for value in chosen:
+                if text_of(value) not in words:
+                    sentence = f"{axis} has no value {value!r}" + hint(text_of(value), words, lead="it has")
+                    document.report(("figures", i, "only", axis), sentence)
 
 
 def _check_places(spec: SweepSpec, document: Document, i: int, figure: FigureSpec) -> None:
