@@ -11,11 +11,14 @@ import sys
 import tempfile
 from collections import defaultdict
 from collections.abc import Callable
+from dataclasses import replace
+from math import nan
 from pathlib import Path
 from time import perf_counter, perf_counter_ns
 
 import numpy as np
 
+from orchestrator.interop.second_opinion import MASTERS, installed, second_opinion
 from orchestrator.master.interrupts import StopFlag
 from orchestrator.master.log import Log
 from orchestrator.master.master import Master
@@ -131,6 +134,28 @@ def bench(path: Path) -> None:
     print(f"  yawbench run, process start to files written: {process(path):.2f} s\n")
 
 
+def masters(path: Path) -> None:
+    """Print the time per step of other masters on the same FMUs, each beside ours."""
+    installed_ones = [one for one in MASTERS if installed(one)]
+    plan = make_plan(load_scenario(path))
+    plan = replace(plan, n_steps=min(STEPS, plan.n_steps))
+    with tempfile.TemporaryDirectory() as folder:
+        runs = [second_opinion(plan, Path(folder), masters=installed_ones) for _ in range(REPEATS)]
+    print(f"{path}: us per communication step, `jacobi`, each master in a process of its own\n")
+    print(f"  {'':10s}{'default':>10s}{'ours':>8s}{'ratio':>8s}   {'one core':>10s}{'ours':>8s}{'ratio':>8s}")
+    for k, master in enumerate(installed_ones):
+        if problem := runs[0][k].problem:
+            print(f"  {master.title:10s}{problem}")
+            continue
+        best = {key: 1e6 * min(run[k].seconds[key] for run in runs) for key in runs[0][k].seconds}
+        cells = ""
+        for key in ("", " on one core"):
+            theirs, ours = best.get(f"theirs{key}", nan), best.get(f"ours{key}", nan)
+            cells += f"{theirs:10.0f}{ours:8.0f}{ours / theirs:8.2f}   "
+        print(f"  {master.title:10s}{cells}{'one step for all units' if runs[0][k].one_step else ''}")
+    print()
+
+
 def imports() -> float:
     """Return the time [s] to import what a run needs, in a fresh interpreter."""
     code = (
@@ -159,3 +184,4 @@ def process(path: Path) -> float:
 if __name__ == "__main__":
     for scenario_file in [Path(argument) for argument in sys.argv[1:]] or [DEFAULT]:
         bench(scenario_file)
+        masters(scenario_file)

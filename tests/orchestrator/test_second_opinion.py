@@ -1,0 +1,107 @@
+"""The same systems in libcosim, Ecos and fmpy, which others wrote."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fmus.build import build_all
+from orchestrator.cli import main
+from orchestrator.interop import second_opinion as module
+from orchestrator.interop.masters.request import Request
+from orchestrator.interop.second_opinion import AGREEMENT, MASTERS, OtherMaster, differences, second_opinion
+from orchestrator.scenario.load import load_scenario
+from orchestrator.wiring.make_plan import make_plan
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+PAPERS = {  # until the car moves as hard as in the whole run
+    "fnn_sideslip/25mps.yaml": 2.5,
+    "fuzzy_sliding_mode/high_friction.yaml": 1.5,
+    "fuzzy_pid/sine.yaml": 2.5,
+    "fuzzy_feedback/single_sine.yaml": 1.5,
+}
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("fmus")
+    build_all(folder)
+    return folder
+
+
+def plan_of(fmus, scenario="fuzzy_feedback/single_sine.yaml", stop_time=0.1):
+    return make_plan(load_scenario(SCENARIOS / scenario, stop_time=stop_time), fmus=fmus)
+
+
+@pytest.mark.parametrize("scenario", PAPERS)
+def test_libcosim_and_ecos_agree_with_jacobi_to_a_billionth_of_every_signals_range(scenario, fmus, tmp_path):
+    plan = plan_of(fmus, scenario, PAPERS[scenario])
+    opinions = second_opinion(plan, tmp_path, masters=MASTERS[:2], pinned=False)
+    assert [one.problem for one in opinions] == ["", ""]
+    for one in opinions:
+        assert len(one.differences) == len(plan.record)
+        assert one.largest <= AGREEMENT
+
+
+def test_a_unit_half_asleep_in_ecos_would_be_noticed(fmus, tmp_path, monkeypatch):
+    as_is = OtherMaster("Ecos", "ecos", "ecospy", one_step=False)
+    (one,) = second_opinion(plan_of(fmus, stop_time=1.0), tmp_path, masters=[as_is], pinned=False)
+    assert not one.problem
+    assert one.largest > 1e-3
+
+
+def test_fmpy_runs_the_archive_from_another_start(fmus, tmp_path):
+    (one,) = second_opinion(plan_of(fmus), tmp_path, masters=MASTERS[2:], pinned=False)
+    assert not one.problem
+    assert one.differences["driver.steer_angle"] <= AGREEMENT  # follows no input
+    assert not one.agrees
+
+
+def test_differences_are_relative_to_the_range_and_infinite_where_a_value_is_missing():
+    request = Request("x.ssp", 0.1, 2, [("a", "x"), ("a", "still"), ("a", "lost")])
+    own = np.array([[0.0, 5.0, 0.0], [1.0, 5.0, 1.0], [4.0, 5.0, 2.0]])
+    other = own + np.array([[0.0, 0.0, 0.0], [0.0, 0.5, np.nan], [0.4, 0.0, 0.0]])
+    other[0] = np.nan  # this master has no value before its first step
+    found = differences(request, own, other)
+    assert found == {"a.x": pytest.approx(0.1), "a.still": pytest.approx(0.5), "a.lost": np.inf}
+
+
+def test_a_master_that_is_not_installed_costs_a_sentence(fmus, tmp_path):
+    missing = OtherMaster("Nobody", "nobody", "nobody_at_all", one_step=False)
+    (one,) = second_opinion(plan_of(fmus), tmp_path, masters=[missing])
+    assert one.problem == "nobody_at_all is not installed: pip install 'yawbench[interop]'"
+
+
+def test_a_master_that_fails_costs_a_sentence(fmus, tmp_path):
+    broken = OtherMaster("Broken", "no_such_module", "json", one_step=False)
+    (one,) = second_opinion(plan_of(fmus), tmp_path, masters=[broken], pinned=False)
+    assert one.problem.startswith("ModuleNotFoundError: ")
+
+
+def test_a_master_that_never_ends_costs_a_sentence(fmus, tmp_path, monkeypatch):
+    plan = plan_of(fmus)
+    request = module._request(plan, False, tmp_path)
+    monkeypatch.setattr(module, "LIMIT", 0.01)
+    assert module._run("own", request, tmp_path) == "it did not end within 0.01 s"
+
+
+def test_the_command_prints_every_signal_and_the_times(fmus, capsys):
+    arguments = [str(SCENARIOS / "fuzzy_feedback/single_sine.yaml"), "--fmus", str(fmus)]
+    options = ["--set", "stop_time=0.1", "--master", "libcosim", "--no-one-core"]
+    with pytest.raises(SystemExit) as exit_:
+        main(["second-opinion", *arguments, *options])
+    assert not exit_.value.code
+    said = capsys.readouterr().out
+    assert "plant.yaw_rate" in said
+    assert "us per communication step" in said
+
+
+def test_an_unknown_master_is_refused(capsys):
+    with pytest.raises(SystemExit) as exit_:
+        main(["second-opinion", "any.yaml", "--master", "libcosmi"])
+    assert exit_.value.code == 2
+    assert capsys.readouterr().err.strip() == (
+        "--master libcosmi: there is no such master; did you mean 'libcosim'?"
+    )
