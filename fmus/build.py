@@ -181,7 +181,7 @@ def _bring_up_to_date(recipe: _Recipe, target: Path, launcher: bytes | None, for
         if not force and read_mark(target) == mark:
             return False
         content, modules = _make(recipe, files, launcher, mark)
-        _put(target, content, modules)
+        put(target, content, *modules)
     except BuildError as error:
         raise BuildError([f"{recipe.name}: {problem}" for problem in error.problems]) from None
     except OSError as error:
@@ -235,8 +235,12 @@ def _make(
     return to_bytes(packed, mark), (package, entry)
 
 
-def _put(target: Path, content: bytes, modules: tuple[str, str]) -> None:
-    """Check an FMU and put it in its place in one stroke."""
+def put(target: Path, content: bytes, *modules: str) -> None:
+    """Check an FMU, whose Python modules are called `modules`, and put it in its place in one stroke.
+
+    Raises:
+        BuildError: what is wrong with it; the place is left as it was.
+    """
     from .check import defects  # fmpy takes its time; nobody waits for it if everything is current
 
     target.parent.mkdir(parents=True, exist_ok=True)

@@ -11,7 +11,7 @@ import typer
 
 from .errors import YawbenchError
 
-COMMANDS = ("build", "check", "run", "compare", "plot", "converge", "study", "sweep", "export-ssp")
+COMMANDS = ("new", "build", "check", "run", "compare", "plot", "converge", "study", "sweep", "export-ssp", "second-opinion")
 """Each a module of `orchestrator.commands` with a function of the same name, `_` for `-`."""
 
 

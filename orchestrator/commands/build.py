@@ -8,11 +8,14 @@ from typing import Annotated
 
 import typer
 
+from ..errors import BuildError
+
 Components = Annotated[
     list[str] | None,
     typer.Argument(
         metavar="[COMPONENT]...",
-        help="What to build: names of FMUs (controller_fnn) or Python files; default: every component.",
+        help="What to build: names of FMUs (controller_fnn), Python files, folders of units in C; "
+        "default: every component.",
     ),
 ]
 Target = Annotated[
@@ -25,30 +28,41 @@ Force = Annotated[bool, typer.Option("--force", help="Build also what has not ch
 def build(components: Components = None, out: Target = None, force: Force = False) -> None:
     """Build the FMUs whose sources have changed."""
     from fmus.build import HERE, build_all, build_component, find_components
+    from fmus.c.build import build_all_c, build_c, find_c_components
 
     target = out or HERE
-    files = [name for name in components or () if name.endswith(".py")]
-    names = [name for name in components or () if name not in files]
-    known = find_components()
-    for name in names:
-        if name not in known:
-            raise typer.BadParameter(f"there is no component {name!r}; there are: {', '.join(known)}")
-    for name in files:
-        fmu = build_component(Path(name), target, force=force)
+    in_python, in_c = find_components(), find_c_components()
+    named = list(components or ())
+    names = [name for name in named if name in in_python or name in in_c]
+    for name in named:
+        if name in names:
+            continue
+        if not name.endswith(".py") and not Path(name).is_dir():
+            known = ", ".join(sorted([*in_python, *in_c]))
+            raise typer.BadParameter(f"there is no component {name!r}; there are: {known}")
+        fmu = (build_component if name.endswith(".py") else build_c)(Path(name), target, force=force)
         print(f"{fmu.stem}: built from {name}", file=sys.stderr)
-    if files and not names:
+    if named and not names:
         return
-    report = build_all(target, components=names or None, force=force, progress=_show)
-    if report.warning and report.built:
-        print(
-            f"warning: these FMUs load in Python only, they have no launcher: {report.warning}",
-            file=sys.stderr,
-        )
-    if report.current:
-        print(
-            f"{len(report.current)} of {len(report.built) + len(report.current)} FMUs up to date",
-            file=sys.stderr,
-        )
+    problems: list[str] = []
+    built = current = 0
+    for every, known_to_it in ((build_all, in_python), (build_all_c, in_c)):
+        chosen = [name for name in names if name in known_to_it] if names else None
+        if chosen == []:
+            continue
+        try:
+            report = every(target, components=chosen, force=force, progress=_show)
+        except BuildError as error:
+            problems += error.problems
+            continue
+        built, current = built + len(report.built), current + len(report.current)
+        if report.warning and report.built:
+            why = f"these FMUs load in Python only, they have no launcher: {report.warning}"
+            print(f"warning: {why}", file=sys.stderr)
+    if problems:
+        raise BuildError(problems)
+    if current:
+        print(f"{current} of {built + current} FMUs up to date", file=sys.stderr)
 
 
 def _show(name: str, what: str) -> None:

@@ -1,0 +1,1 @@
+"""Units written in C: what they share, and how they are built."""

@@ -1,0 +1,305 @@
+/* A co-simulation unit in C: every function of FMI 2.0, around what the unit's own file defines.
+ *
+ * The unit's file includes variables.h, which `yawbench build` makes from modelDescription.xml
+ * (`Variables`: one double per variable, by name), and then defines
+ *
+ *     State                                           what it remembers from step to step
+ *     void start(State *, const Variables *, double t)              the state at start time
+ *     void advance(State *, const Variables *, double t, double h)  the state from t to t + h
+ *     void output(const State *, Variables *, double t)             all outputs at t
+ *
+ * all static, and includes this file last. Like a component in Python, the unit computes its outputs
+ * whenever somebody asks for them until initialization ends, and after every step from then on;
+ * parameters out of their range are refused in one sentence. State and variables are saved and
+ * restored as they lie in memory, so a State must not hold pointers. */
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "fmi2.h"
+
+#if defined _WIN32
+#define FMI2_EXPORT __declspec(dllexport)
+#else
+#define FMI2_EXPORT __attribute__((visibility("default")))
+#endif
+
+typedef struct {
+    Variables v;
+    State state;
+    double start_time;
+    int initializing; /* until initialization ends, outputs follow what is set */
+    int stale;        /* something has been set since the outputs were computed */
+} Content;
+
+typedef struct {
+    fmi2CallbackFunctions host;
+    char name[256];
+    Content now;
+} Unit;
+
+/* Send a sentence to the host's log. Log text is a printf format, so '%' is doubled. */
+static fmi2Status fail(const Unit *unit, const char *format, ...)
+{
+    char text[512], safe[2 * sizeof text], *end = safe;
+    va_list values;
+    va_start(values, format);
+    vsnprintf(text, sizeof text, format, values);
+    va_end(values);
+    for (const char *c = text; *c != '\0'; c++) {
+        *end++ = *c;
+        if (*c == '%') {
+            *end++ = '%';
+        }
+    }
+    *end = '\0';
+    if (unit->host.logger != NULL) {
+        unit->host.logger(unit->host.componentEnvironment, unit->name, fmi2Error, "logStatusError", safe);
+    }
+    return fmi2Error;
+}
+
+static void begin(Content *content)
+{
+    double *values = (double *)&content->v;
+    memset(content, 0, sizeof *content);
+    for (size_t i = 0; i < N_VARIABLES; i++) {
+        values[i] = DECLARED[i].start;
+    }
+    content->initializing = 1;
+    content->stale = 1;
+}
+
+static fmi2Status refresh(Unit *unit)
+{
+    const double *values = (const double *)&unit->now.v;
+    for (size_t i = 0; i < N_VARIABLES; i++) {
+        const char *name = DECLARED[i].name;
+        if (DECLARED[i].causality != PARAMETER) {
+            continue;
+        }
+        if (!isfinite(values[i])) {
+            return fail(unit, "%s must be a finite number (got %g)", name, values[i]);
+        }
+        if (values[i] < DECLARED[i].min) {
+            return fail(unit, "%s must be at least %g (got %g)", name, DECLARED[i].min, values[i]);
+        }
+        if (values[i] > DECLARED[i].max) {
+            return fail(unit, "%s must be at most %g (got %g)", name, DECLARED[i].max, values[i]);
+        }
+    }
+    memset(&unit->now.state, 0, sizeof unit->now.state);
+    start(&unit->now.state, &unit->now.v, unit->now.start_time);
+    output(&unit->now.state, &unit->now.v, unit->now.start_time);
+    unit->now.stale = 0;
+    return fmi2OK;
+}
+
+/* ---- life cycle ---- */
+
+FMI2_EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
+FMI2_EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
+
+FMI2_EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
+                                          const fmi2CallbackFunctions *host, fmi2Boolean visible,
+                                          fmi2Boolean logging_on)
+{
+    (void)resources, (void)visible, (void)logging_on;
+    Unit *unit = calloc(1, sizeof *unit);
+    if (unit == NULL) {
+        return NULL;
+    }
+    unit->host = *host;
+    snprintf(unit->name, sizeof unit->name, "%s", name);
+    if (type != fmi2CoSimulation || strcmp(guid, GUID) != 0) {
+        fail(unit, type != fmi2CoSimulation ? "this unit is for co-simulation"
+                                            : "the model description belongs to another build of this unit");
+        free(unit);
+        return NULL;
+    }
+    begin(&unit->now);
+    return unit;
+}
+
+FMI2_EXPORT void fmi2FreeInstance(fmi2Component c)
+{
+    free(c);
+}
+
+FMI2_EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance,
+                                           fmi2Real start_time, fmi2Boolean stop_defined, fmi2Real stop_time)
+{
+    (void)tolerance_defined, (void)tolerance, (void)stop_defined, (void)stop_time;
+    ((Unit *)c)->now.start_time = start_time;
+    ((Unit *)c)->now.stale = 1;
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
+{
+    (void)c;
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
+{
+    Unit *unit = c;
+    fmi2Status status = unit->now.stale ? refresh(unit) : fmi2OK;
+    unit->now.initializing = 0;
+    return status;
+}
+
+FMI2_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean keep)
+{
+    (void)keep;
+    Content *now = &((Unit *)c)->now;
+    advance(&now->state, &now->v, t, h);
+    output(&now->state, &now->v, t + h);
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2Terminate(fmi2Component c)
+{
+    (void)c;
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2Reset(fmi2Component c)
+{
+    begin(&((Unit *)c)->now);
+    return fmi2OK;
+}
+
+/* ---- values ---- */
+
+FMI2_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2Real values[])
+{
+    Unit *unit = c;
+    for (size_t i = 0; i < n; i++) {
+        if (r[i] >= N_VARIABLES) {
+            return fail(unit, "there is no Real with the value reference %u", r[i]);
+        }
+        if (DECLARED[r[i]].causality == OUTPUT && unit->now.initializing && unit->now.stale &&
+            refresh(unit) != fmi2OK) {
+            return fmi2Error;
+        }
+        values[i] = ((const double *)&unit->now.v)[r[i]];
+    }
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Real values[])
+{
+    Unit *unit = c;
+    for (size_t i = 0; i < n; i++) {
+        if (r[i] >= N_VARIABLES) {
+            return fail(unit, "there is no Real with the value reference %u", r[i]);
+        }
+        if (DECLARED[r[i]].causality == OUTPUT) {
+            return fail(unit, "%s cannot be set", DECLARED[r[i]].name);
+        }
+        if (DECLARED[r[i]].causality == PARAMETER && !unit->now.initializing) {
+            return fail(unit, "%s cannot be set after initialization", DECLARED[r[i]].name);
+        }
+        ((double *)&unit->now.v)[r[i]] = values[i];
+    }
+    unit->now.stale = 1;
+    return fmi2OK;
+}
+
+/* ---- state ---- */
+
+FMI2_EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
+{
+    Unit *unit = c;
+    if (*state == NULL) {
+        *state = calloc(1, sizeof unit->now);
+    }
+    if (*state == NULL) {
+        return fail(unit, "there is no memory for the state");
+    }
+    memcpy(*state, &unit->now, sizeof unit->now);
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
+{
+    memcpy(&((Unit *)c)->now, state, sizeof(Content));
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
+{
+    (void)c;
+    free(*state);
+    *state = NULL;
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
+{
+    (void)c, (void)state;
+    *size = sizeof(Content);
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+{
+    if (size < sizeof(Content)) {
+        return fail(c, "a saved state has %zu bytes, not %zu", sizeof(Content), size);
+    }
+    memcpy(bytes, state, sizeof(Content));
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
+                                               fmi2FMUstate *state)
+{
+    if (size != sizeof(Content)) {
+        return fail(c, "a saved state has %zu bytes, not %zu", sizeof(Content), size);
+    }
+    fmi2Status status = fmi2GetFMUstate(c, state);
+    if (status == fmi2OK) {
+        memcpy(*state, bytes, size);
+    }
+    return status;
+}
+
+/* ---- what such a unit does not have ---- */
+
+#define FMI2_NOTHING(name, parameters)                                                                      \
+    FMI2_EXPORT fmi2Status fmi2##name parameters                                                            \
+    {                                                                                                       \
+        (void)values;                                                                                       \
+        return n == 0 ? fmi2OK : fail(c, "all variables of this unit are Real");                            \
+    }
+FMI2_NOTHING(GetInteger, (fmi2Component c, const fmi2ValueReference *r, size_t n, fmi2Integer values[]))
+FMI2_NOTHING(GetBoolean, (fmi2Component c, const fmi2ValueReference *r, size_t n, fmi2Boolean values[]))
+FMI2_NOTHING(GetString, (fmi2Component c, const fmi2ValueReference *r, size_t n, fmi2String values[]))
+FMI2_NOTHING(SetInteger, (fmi2Component c, const fmi2ValueReference *r, size_t n, const fmi2Integer values[]))
+FMI2_NOTHING(SetBoolean, (fmi2Component c, const fmi2ValueReference *r, size_t n, const fmi2Boolean values[]))
+FMI2_NOTHING(SetString, (fmi2Component c, const fmi2ValueReference *r, size_t n, const fmi2String values[]))
+
+FMI2_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String names[])
+{
+    (void)c, (void)on, (void)n, (void)names;
+    return fmi2OK; /* only errors are logged, and they always are */
+}
+
+#define FMI2_UNSUPPORTED(name, parameters)                                                                  \
+    FMI2_EXPORT fmi2Status fmi2##name parameters { return fail(c, "fmi2%s is not supported", #name); }
+FMI2_UNSUPPORTED(GetDirectionalDerivative,
+                 (fmi2Component c, const fmi2ValueReference u[], size_t n_u, const fmi2ValueReference k[], size_t n_k,
+                  const fmi2Real d_k[], fmi2Real d_u[]))
+FMI2_UNSUPPORTED(SetRealInputDerivatives, (fmi2Component c, const fmi2ValueReference r[], size_t n,
+                                           const fmi2Integer order[], const fmi2Real values[]))
+FMI2_UNSUPPORTED(GetRealOutputDerivatives, (fmi2Component c, const fmi2ValueReference r[], size_t n,
+                                            const fmi2Integer order[], fmi2Real values[]))
+FMI2_UNSUPPORTED(CancelStep, (fmi2Component c))
+FMI2_UNSUPPORTED(GetStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Status *value))
+FMI2_UNSUPPORTED(GetRealStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Real *value))
+FMI2_UNSUPPORTED(GetIntegerStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value))
+FMI2_UNSUPPORTED(GetBooleanStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value))
+FMI2_UNSUPPORTED(GetStringStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2String *value))

@@ -1,0 +1,1 @@
+"""Files for somebody who brings an idea of their own."""

@@ -1,0 +1,43 @@
+"""A copy of the checkout to try things in: its sources and built FMUs, and the environment of the tests."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+PARTS = ("components", "docs", "fmus", "orchestrator", "scenarios", "tests")
+FILES = ("README.md", "CHANGELOG.md", "LICENSE", "Makefile", "mkdocs.yml", "pyproject.toml")
+
+
+def copy_checkout(folder: Path) -> Path:
+    """Copy the checkout into `folder`, with `.venv` as a link to the environment in use; return it."""
+    forgotten = shutil.ignore_patterns("__pycache__", ".*", "*.draft")
+    for part in PARTS:
+        shutil.copytree(ROOT / part, folder / part, ignore=forgotten)
+    for file in FILES:
+        if (ROOT / file).exists():
+            shutil.copy(ROOT / file, folder / file)
+    (folder / ".venv").symlink_to(sys.prefix, target_is_directory=True)
+    return folder
+
+
+def run_in(folder: Path, *command: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a command in a folder, with the sources of the checkout that it belongs to, if it is one.
+
+    `yawbench` and `python` are those of the environment in use.
+    """
+    named = {"yawbench": [sys.executable, "-m", "orchestrator.cli"], "python": [sys.executable]}
+    first, *others = map(str, command)
+    sources = folder if (folder / "orchestrator").is_dir() else ROOT
+    return subprocess.run(
+        [*named.get(Path(first).name, [first]), *others],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(sources), "PYTHONDONTWRITEBYTECODE": "1"} | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )

@@ -1,0 +1,182 @@
+"""Units written in C: built from a folder, with one sentence for whatever is wrong."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from fmus.archive import read_mark
+from fmus.build import HERE as FMUS
+from fmus.c.build import build_all_c, build_c
+from orchestrator.errors import BuildError
+from orchestrator.scaffold.controller import controller_files, layout
+from tests.fmus.bare import ERROR, OK, Fmu, Refused, Unit
+from tests.fmus.programs import run
+
+pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+
+
+@pytest.fixture
+def root(tmp_path):
+    """A folder of components with one controller in C, `idea`."""
+    for path, text in controller_files("idea", "c", layout("idea", "c", in_checkout=True)).items():
+        file = tmp_path / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+    return tmp_path / "components"
+
+
+@pytest.fixture
+def folder(root):
+    return root / "controllers" / "idea"
+
+
+@pytest.fixture
+def unit(folder, tmp_path, unpack):
+    """An instance of it, and its library loaded."""
+    return Unit(Fmu(unpack(build_c(folder, tmp_path / "out"))), logging_on=True)
+
+
+def edited(file: Path, old: str, new: str) -> None:
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+
+
+def problems(folder: Path) -> str:
+    with pytest.raises(BuildError) as error:
+        build_c(folder, folder.parents[2] / "out")
+    assert not (folder.parents[2] / "out" / "controller_idea.fmu").exists()
+    return str(error.value)
+
+
+def test_the_same_sources_give_the_same_bytes_wherever_they_stand(folder, tmp_path):
+    first = build_c(folder, tmp_path / "a").read_bytes()
+    elsewhere = tmp_path / "other" / "controllers" / "idea"
+    shutil.copytree(folder, elsewhere)
+    assert build_c(elsewhere, tmp_path / "b").read_bytes() == first
+
+
+def test_only_what_has_changed_is_built_again(root, folder, tmp_path):
+    assert build_all_c(tmp_path / "out", root=root).built == ["controller_idea"]
+    assert build_all_c(tmp_path / "out", root=root).current == ["controller_idea"]
+    edited(folder / "idea.c", "s->x = 0.0", "s->x = 0.5")
+    assert build_all_c(tmp_path / "out", root=root).built == ["controller_idea"]
+
+
+def test_an_fmu_whose_sources_are_gone_or_broken_is_removed(root, folder, tmp_path):
+    target = tmp_path / "out" / "controller_idea.fmu"
+    build_all_c(tmp_path / "out", root=root)
+    edited(folder / "idea.c", "s->x = 0.0;", "s->x = nothing;")
+    with pytest.raises(BuildError, match=r"controller_idea: idea\.c:.*nothing"):
+        build_all_c(tmp_path / "out", root=root)
+    assert not target.exists()
+    edited(folder / "idea.c", "nothing", "0.0")
+    build_all_c(tmp_path / "out", root=root)
+    assert (read_mark(target) or "").startswith("c-component ")
+    shutil.rmtree(folder)
+    assert build_all_c(tmp_path / "out", root=root).removed == ["controller_idea"]
+    assert not target.exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("</fmiModelDescription>", "", "is not well-formed XML"),
+        ('modelIdentifier="controller_idea"', 'modelIdentifier="x"', 'modelIdentifier="controller_idea"'),
+        ('valueReference="5"', 'valueReference="7"', "moment_limit must have the value reference 5"),
+        ('name="yaw_moment"', 'name="moment"', "a controller must declare the output yaw_moment"),
+        ('name="yaw_rate"', 'name="yaw rate"', "'yaw rate' can be no name in C"),
+        ('causality="input"', 'causality="local"', "yaw_rate must be an input, an output or a parameter"),
+        ('<Real unit="N.m" start', "<Integer start", "moment_limit is not Real"),
+        ('min="0"', 'min="none"', "min is no number: 'none'"),
+        ('unit="N.m/rad" start', 'unit="N/rad" start', 'unit "N/rad"'),
+    ],
+)
+def test_a_wrong_model_description_is_told_in_one_sentence(folder, old, new, sentence):
+    edited(folder / "modelDescription.xml", old, new)
+    assert sentence in problems(folder)
+
+
+def test_what_is_missing_is_named(folder, root, monkeypatch):
+    edited(folder / "idea.c", "fabs(law(s, v))", "strange(law(s, v))")
+    assert "strange" in problems(folder)
+    (folder / "idea.c").unlink()
+    assert problems(folder).endswith("holds no C file")
+    (root / "controllers" / "idea.py").touch()
+    assert "there are both idea.py and idea/" in problems(folder)
+    monkeypatch.setenv("CC", "no-such-compiler")
+    (root / "controllers" / "idea.py").unlink()
+    assert "there is no C compiler (no-such-compiler)" in problems(folder)
+
+
+def test_a_folder_without_a_role_or_a_model_description_is_refused(folder, tmp_path):
+    with pytest.raises(BuildError, match=r"holds no modelDescription\.xml"):
+        build_c(tmp_path, tmp_path / "out")
+    moved = shutil.copytree(folder, tmp_path / "idea")
+    with pytest.raises(BuildError, match="which role"):
+        build_c(moved, tmp_path / "out")
+
+
+def test_outputs_follow_inputs_and_parameters_until_initialization_ends(unit):
+    unit.set(yaw_rate_ref=0.1, proportional_gain=1000.0)
+    assert unit.outputs() == [100.0]
+    unit.set(yaw_rate_ref=0.2)
+    unit.start()
+    assert unit.outputs() == [200.0]
+
+
+def test_a_parameter_out_of_its_range_is_refused_in_one_sentence(unit):
+    unit.set(proportional_gain=-1.0)
+    with pytest.raises(Refused):
+        unit.start()
+    assert unit.messages == ["proportional_gain must be at least 0 (got -1)"]
+
+
+def test_a_parameter_cannot_be_set_later_and_an_output_never(unit):
+    with pytest.raises(Refused):
+        unit.set(yaw_moment=1.0)
+    unit.start()
+    with pytest.raises(Refused):
+        unit.set(integral_gain=1.0)
+    assert unit.messages[-1] == "integral_gain cannot be set after initialization"
+
+
+def test_a_restored_state_goes_on_as_the_first_time(unit):
+    unit.set(yaw_rate_ref=0.05)
+    unit.start()
+    unit.step(0.0, 0.1)
+    saved = unit.save()
+    unit.step(0.1, 0.1)
+    expected = unit.outputs()
+    unit.step(0.2, 0.1)
+    assert unit.outputs() != expected
+    unit.restore(saved)
+    unit.step(0.1, 0.1)
+    assert unit.outputs() == expected
+
+
+def test_what_it_cannot_do_is_an_error_with_a_message_not_a_crash(unit):
+    assert unit.call("fmi2CancelStep") == ERROR
+    assert unit.messages[-1] == "fmi2CancelStep is not supported"
+    assert unit.call("fmi2GetInteger", None, 0, None) == OK
+
+
+def test_it_runs_in_a_c_host_without_python(folder, tmp_path, unpack, host):
+    unpacked = Fmu(unpack(build_c(folder, tmp_path / "out")))
+    program = [str(host), str(unpacked.binary), (unpacked.folder / "resources").as_uri(), unpacked.guid]
+    done = run([*program, "0", "6", "0=0.1"], tmp_path)
+    assert done.returncode == 0, done.stderr
+    moment = float(done.stdout.split()[2])
+    assert moment == pytest.approx(20000.0 * 0.1 + 50000.0 * 0.1 * 0.01)
+    if shutil.which("valgrind"):
+        strict = ["valgrind", "-q", "--leak-check=full", "--error-exitcode=9"]
+        assert run([*strict, *program, "0", "6", "0=0.1"], tmp_path).returncode == 0
+
+
+def test_the_shared_part_compiles_without_warnings(folder, tmp_path, capfd):
+    build_c(folder, tmp_path / "out")
+    assert capfd.readouterr().err == ""
+    assert (FMUS / "c" / "unit.h").is_file()

@@ -1,0 +1,149 @@
+"""`yawbench new controller`: what it writes works as it stands, in Python and in C."""
+
+from __future__ import annotations
+
+import shlex
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fmus.build import build_all
+from orchestrator.cli import main
+from orchestrator.results.read import load_results
+from tests.checkout import copy_checkout, run_in
+
+UNITS = (
+    "driver_sine", "reference_steady_state", "controller_off", "allocator_load_proportional",
+    "wheel_control_direct", "plant_seven_dof", "tyre_dugoff",
+)  # fmt: skip
+
+pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+
+
+@pytest.fixture
+def new(tmp_path, monkeypatch, capsys):
+    """Call `yawbench new controller` in an empty folder: exit status, printed commands, messages."""
+
+    def call(*arguments: str) -> tuple[int, list[str], str]:
+        monkeypatch.chdir(tmp_path)
+        with pytest.raises(SystemExit) as exit_:
+            main(["new", "controller", *arguments])
+        said = capsys.readouterr()
+        return int(exit_.value.code or 0), said.out.splitlines(), said.err
+
+    return call
+
+
+def files(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory):
+    """A folder outside the checkout with a controller in Python and one in C, taken as far as a run."""
+    folder = tmp_path_factory.mktemp("project")
+    printed = {}
+    for name, language in (("follow", "python"), ("follow_c", "c")):
+        done = run_in(folder, "yawbench", "new", "controller", name, "--language", language)
+        assert done.returncode == 0, done.stderr
+        printed[name] = [shlex.split(line) for line in done.stdout.splitlines()]
+    everything, *of_python, _ = printed["follow"]
+    assert everything[1:] == ["build", "--out", "fmus"]
+    build_all(folder / "fmus", components=UNITS)  # quicker than everything
+    for command in (*of_python, *printed["follow_c"][1:-1]):
+        done = run_in(folder, *command)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert "pytest" not in command or "5 passed" in done.stdout
+    return folder, printed
+
+
+def test_it_writes_a_source_a_test_and_a_scenario(tmp_path, new):
+    new("idea")
+    assert files(tmp_path) == {"controllers/idea.py", "tests/test_idea.py", "scenarios/idea/25mps.yaml"}
+
+
+def test_in_c_the_source_is_a_folder_with_the_model_description(tmp_path, new):
+    new("idea", "--language", "c")
+    expected = {"controllers/idea/idea.c", "controllers/idea/modelDescription.xml"}
+    assert files(tmp_path) == expected | {"tests/test_idea.py", "scenarios/idea/25mps.yaml"}
+
+
+def test_it_prints_how_to_build_test_run_and_compare(project):
+    _, printed = project
+    build, test, run, compare = (" ".join(command[1:]) for command in printed["follow_c"][1:])
+    assert build == "build controllers/follow_c --out fmus"
+    assert test == "-m pytest tests/test_follow_c.py"
+    assert run == "run scenarios/follow_c/25mps.yaml"
+    assert compare == f"compare {run[4:]} --swap controller=controller_off,controller_follow_c"
+
+
+def test_python_and_c_agree_in_the_closed_loop(project):
+    folder, _ = project
+    runs = [load_results(folder / "results" / name / "25mps") for name in ("follow", "follow_c")]
+    assert np.abs(runs[0].columns["controller.yaw_moment"]).max() > 100.0
+    for column, values in runs[0].columns.items():
+        scale = max(np.ptp(values), 1.0)
+        assert np.abs(runs[1].columns[column] - values).max() <= 1e-12 * scale, column
+
+
+def test_in_a_checkout_the_files_stand_among_its_own_and_build_finds_them(tmp_path):
+    checkout = copy_checkout(tmp_path / "checkout")
+    inside = checkout / "scenarios"
+    for name, language in (("idea", "python"), ("idea_c", "c")):
+        done = run_in(inside, "yawbench", "new", "controller", name, "--language", language,
+                      PYTHONPATH=str(checkout))  # fmt: skip
+        assert done.returncode == 0, done.stderr
+    assert (checkout / "components/controllers/idea.py").is_file()
+    assert (checkout / "components/controllers/idea_c/idea_c.c").is_file()
+    said = run_in(checkout, "yawbench", "build").stderr
+    assert "controller_idea: built\n" in said
+    assert "controller_idea_c: built\n" in said
+    for name in ("idea", "idea_c"):
+        done = run_in(checkout, "yawbench", "check", f"scenarios/{name}/25mps.yaml")
+        assert done.returncode == 0, done.stderr
+    tests = [f"tests/components/test_{name}.py" for name in ("idea", "idea_c")]
+    assert "10 passed" in run_in(checkout, "python", "-m", "pytest", "-q", *tests).stdout
+    shutil.rmtree(checkout / "components/controllers/idea_c")
+    assert "controller_idea_c: removed\n" in run_in(checkout, "yawbench", "build").stderr
+
+
+def test_nothing_is_overwritten_and_nothing_is_written_beside_what_exists(tmp_path, new):
+    scenario = tmp_path / "scenarios" / "idea" / "25mps.yaml"
+    scenario.parent.mkdir(parents=True)
+    scenario.write_text("mine")
+    status, _, said = new("idea")
+    assert status == 2
+    assert said == (".: scenarios/idea/25mps.yaml exists already; nothing is overwritten, nothing written\n")
+    assert files(tmp_path) == {"scenarios/idea/25mps.yaml"}
+    assert scenario.read_text() == "mine"
+
+
+def test_the_other_language_does_not_overwrite_either(tmp_path, new):
+    new("idea", "--language", "c")
+    status, _, said = new("idea")
+    assert status == 2
+    assert "tests/test_idea.py" in said
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("MyIdea", "for example 'my_idea'"),
+        ("my-idea", "for example 'my_idea'"),
+        ("2nd", "a letter first"),
+        ("lambda", "no word of Python"),
+        ("../idea", "for example 'idea'"),
+        ("", "a letter first"),
+        ("x" * 51, "up to 50"),
+        ("idéa", "lower-case letters, digits and _"),
+        ("controller_idea", "leave out 'controller', the FMU gets it by itself: 'idea'"),
+        ("fnn", "there is a controller 'fnn' already"),
+    ],
+)
+def test_a_name_that_cannot_be_is_refused_in_one_sentence(tmp_path, new, name, sentence):
+    status, commands, said = new(name)
+    assert (status, commands, files(tmp_path)) == (2, [], set())
+    assert sentence in said
+    assert said.count("\n") == 1
