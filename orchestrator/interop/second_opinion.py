@@ -159,7 +159,10 @@ def _run(module: str, request: Request, folder: Path) -> Recording | str:
     answered.unlink(missing_ok=True)
     command = [sys.executable, "-m", "orchestrator.interop.masters", module, str(asked), str(answered)]
     paths = [str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join(filter(None, paths)),
+        "TMPDIR": str(folder),  # Ecos leaves what it has unpacked
+    }
     try:
         done = subprocess.run(command, capture_output=True, timeout=LIMIT, env=environment, check=False)
     except subprocess.TimeoutExpired:
