@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 READY_TO_TEST := $(VENV)/.ready-to-test
 SCENARIO ?= scenarios/fnn_sideslip/25mps.yaml
 
-.PHONY: setup fmus demo run test bench lint clean
+.PHONY: setup fmus demo run test bench lint docs clean
 
 setup: $(READY)
 
@@ -40,5 +40,9 @@ lint: $(READY_TO_TEST)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+docs: $(READY_TO_TEST) fmus
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict
+	@echo "The docs: site/index.html"
+
 clean:
-	rm -rf $(VENV) build fmus/*.fmu *.egg-info .pytest_cache .ruff_cache .mypy_cache
+	rm -rf $(VENV) build site fmus/*.fmu *.egg-info .pytest_cache .ruff_cache .mypy_cache

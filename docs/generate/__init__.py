@@ -1,0 +1,1 @@
+"""Reference pages, each made from the part of the program it describes."""

@@ -1,0 +1,108 @@
+"""The references of scenario, study and sweep files, from the schemas that read them."""
+
+from __future__ import annotations
+
+import inspect
+import typing
+from fractions import Fraction
+from pathlib import Path
+from types import NoneType
+from typing import Any, Literal
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from orchestrator.scenario import schema as scenario
+from orchestrator.studies import study_schema
+from orchestrator.sweeps import schema as sweep
+
+from .text import NOTE, cell, code, docstring, table
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "scenarios" / "fnn_sideslip" / "25mps.yaml"
+
+
+def scenario_page() -> str:
+    """Return the page of scenario files and vehicle files."""
+    example = f"## An example\n\n`scenarios/fnn_sideslip/25mps.yaml`:\n\n```yaml\n{EXAMPLE.read_text('utf-8')}```"
+    return _page("Scenario files", scenario, [scenario.Scenario, scenario.Vehicle], example)
+
+
+def study_page() -> str:
+    """Return the page of study files."""
+    return _page("Study files", study_schema, [study_schema.StudySpec])
+
+
+def sweep_page() -> str:
+    """Return the page of sweep files."""
+    return _page("Sweep files", sweep, [sweep.SweepSpec])
+
+
+def _page(title: str, module: Any, roots: list[type[BaseModel]], more: str = "") -> str:
+    parts = [f"# {title}", NOTE, docstring(inspect.getdoc(module) or "")]
+    models = _reachable(roots)
+    parts += [more] if more else []
+    for model in models:
+        parts += [f"## {_title(model)}", cell(inspect.getdoc(model) or ""), _fields(model, models)]
+    return "\n\n".join(parts)
+
+
+def _title(model: type[BaseModel]) -> str:
+    return model.__name__.removesuffix("Spec")
+
+
+def _reachable(models: list[type[BaseModel]]) -> list[type[BaseModel]]:
+    """Return the models and all that their fields are made of, in the order met."""
+    found = list(models)
+    for model in found:
+        for field in model.model_fields.values():
+            found += [inner for inner in _models_in(field.annotation) if inner not in found]
+    return found
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return list(dict.fromkeys(m for arm in typing.get_args(annotation) for m in _models_in(arm)))
+
+
+def _fields(model: type[BaseModel], models: list[type[BaseModel]]) -> str:
+    rows = []
+    for name, field in model.model_fields.items():
+        kind = _kind(field.annotation, models)
+        rows.append((code(field.alias or name), kind, _default(field), cell(field.description or "")))
+    return table(("key", "kind", "default", "meaning"), rows)
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "**required**"
+    value = field.get_default(call_default_factory=True)
+    return "" if value is None or value in ("", {}, []) else code(str(value))
+
+
+_WORDS = {str: "text", int: "whole number", float: "number", bool: "true or false", Fraction: "time: s, or with its unit"}
+
+
+def _kind(annotation: Any, models: list[type[BaseModel]]) -> str:
+    """Return a type in words, with links to the models."""
+    origin, arms = typing.get_origin(annotation), typing.get_args(annotation)
+    if annotation in models:
+        return f"[{_title(annotation)}](#{_title(annotation).lower()})"
+    if annotation is scenario.Endpoint:
+        return "text: unit.variable"
+    if origin is typing.Annotated:
+        return _kind(arms[0], models)
+    if origin is Literal:
+        return " or ".join(code(str(arm)) for arm in arms)
+    if origin is dict:
+        return f"mapping: name → {_kind(arms[1], models)}"
+    if origin in (list, set):
+        return f"list of {_kind(arms[0], models)}"
+    if origin is tuple:
+        return "[" + ", ".join(_kind(arm, models) for arm in arms) + "]"
+    if arms:
+        words = dict.fromkeys(_kind(arm, models) for arm in arms if arm is not NoneType)
+        if "number" in words:
+            words.pop("whole number", None)
+        return " or ".join(words)
+    return _WORDS.get(annotation, "any value")

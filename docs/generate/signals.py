@@ -1,0 +1,33 @@
+"""The signals that units exchange and the roles they play, from the dictionaries of the components."""
+
+from __future__ import annotations
+
+from components.core import roles, signals
+from components.core.roles import ROLES
+from components.core.signals import SIGNALS
+
+from .text import NOTE, cell, code, docstring, table
+
+
+def page() -> str:
+    """Return the page of the signal dictionary and the roles."""
+    dictionary = [(code(name), code(unit), cell(text)) for name, (unit, text) in SIGNALS.items()]
+    contract = [
+        (code(f"{role.name}_*"), code(f"components/{folder}/"), _names(role.inputs), _names(role.outputs))
+        for folder, role in ROLES.items()
+    ]
+    return "\n\n".join([
+        "# Signals and roles",
+        NOTE,
+        docstring(signals.__doc__ or ""),
+        table(("signal", "unit", "meaning"), dictionary),
+        "## Roles",
+        docstring(roles.__doc__ or ""),
+        "An output of one unit feeds every input of the same name. What stands here must be declared by every "
+        "FMU of the role; it may declare more.",
+        table(("FMU", "folder", "inputs", "outputs"), contract),
+    ])  # fmt: skip
+
+
+def _names(names: tuple[str, ...]) -> str:
+    return ", ".join(map(code, names))

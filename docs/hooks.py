@@ -1,0 +1,32 @@
+"""What mkdocs does beside copying pages: reference pages made from the program, formulas as MathML."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from generate import commands, formulas, metrics, schemas, signals, units  # mkdocs puts docs/ on the path
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+
+PAGES = {
+    "reference/commands.md": commands.page,
+    "reference/scenario.md": schemas.scenario_page,
+    "reference/study.md": schemas.study_page,
+    "reference/sweep.md": schemas.sweep_page,
+    "reference/signals.md": signals.page,
+    "reference/units.md": units.page,
+    "reference/metrics.md": metrics.page,
+}
+"""Path in the docs -> what writes its text."""
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the pages that are made from the program as it is."""
+    for path, write in PAGES.items():
+        files.append(File.generated(config, path, content=write()))
+    return files
+
+
+def on_page_content(html: str, **_: Any) -> str:
+    """Turn formulas into MathML, which browsers draw without any script."""
+    return formulas.to_mathml(html)
