@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..metrics.run_metrics import columns_of, reference_of
+from ..metrics.signals import words
 from ..results.read import Results
-from .display import digits_of, in_formula, shown_unit, words
+from .display import digits_of, in_formula, shown_unit
 from .portrait import curves_of, draw_portrait, signals_of
 from .style import REFERENCE, ROW, WIDTH, line_style, note_above
 

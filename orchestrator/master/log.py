@@ -12,6 +12,7 @@ import itertools
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 from fmpy import calloc, free
 from fmpy.fmi2 import (
@@ -24,6 +25,8 @@ from fmpy.fmi2 import (
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 
+WRITTEN = 100
+"""Warnings written into run.json; more are only counted."""
 KEPT = 1000
 """Messages kept per unit; a unit that goes on is only counted."""
 
@@ -71,6 +74,17 @@ class Log:
     def warnings(self) -> Iterable[Message]:
         """Return the warnings of all units."""
         return [m for m in self.messages if m.status == WARNING]
+
+    def record(self) -> dict[str, Any]:
+        """Return what run.json says of the warnings."""
+        warnings = list(self.warnings())
+        return {
+            "warnings": [
+                {"unit": m.unit, "time": m.time, "status": STATUS[m.status], "text": m.text}
+                for m in warnings[:WRITTEN]
+            ],
+            "more_warnings": max(0, len(warnings) - WRITTEN) + self.dropped,
+        }
 
 
 _listeners: dict[int, tuple[Log, str, fmi2CallbackFunctions]] = {}

@@ -217,7 +217,7 @@ class _Run:
     def save(self, status: str, error: BaseException | None = None) -> None:
         """Write the record of the run and put the results in place."""
         self._writing = True
-        record = run_record(self.plan, self.log, status=status, started=self._started)
+        record = run_record(self.plan, status=status, started=self._started) | self.log.record()
         record |= {"wall_time": self.wall_time, "error": self._explained(error)}
         self.recorder.finish(record)
 

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import ResultsError, ScenarioError
-from ..figures.display import symbol, variable_of, words
 from ..wording import WHEELS, hint
 from .measures import MEASURES, Measure
+from .signals import symbol, variable_of, words
 
 if TYPE_CHECKING:
     from ..results.read import Results

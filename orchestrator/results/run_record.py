@@ -7,15 +7,11 @@ from datetime import datetime
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from ..master.log import STATUS, Log
 from ..plan import Plan, Unit
 
-WARNINGS = 100
-"""Warnings written out; more are only counted."""
 
-
-def run_record(plan: Plan, log: Log, *, status: str, started: datetime) -> dict[str, Any]:
-    """Return the record of a run without its end: wall time, error and rows come later.
+def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
+    """Return the record of a run without what comes later: wall time, error, rows and warnings.
 
     Args:
         status: "completed", "failed" or "interrupted".
@@ -23,7 +19,6 @@ def run_record(plan: Plan, log: Log, *, status: str, started: datetime) -> dict[
     """
     units = {unit.name: unit for unit in plan.units}
     columns = {f"{u}.{name}": units[u].fmu.variables[name].unit for u, name in plan.record}
-    warnings = list(log.warnings())
     return {
         "status": status,
         "error": None,
@@ -40,11 +35,6 @@ def run_record(plan: Plan, log: Log, *, status: str, started: datetime) -> dict[
         "connections": [f"{w.source}.{w.output} -> {w.target}.{w.input}" for w in plan.wires],
         "scenario": plan.scenario,
         "versions": versions(),
-        "warnings": [
-            {"unit": m.unit, "time": m.time, "status": STATUS[m.status], "text": m.text}
-            for m in warnings[:WARNINGS]
-        ],
-        "more_warnings": max(0, len(warnings) - WARNINGS) + log.dropped,
     }
 
 

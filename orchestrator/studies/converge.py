@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import ResultsError, ScenarioError
-from ..figures.display import words
 from ..figures.style import QUIET, RC, frame, line_style
 from ..metrics.run_metrics import Value
+from ..metrics.signals import words
 from ..plan import Algorithm
 from ..scenario.load import load_scenario
 from .jobs import Job, Outcome, read_back

@@ -6,8 +6,8 @@ import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ..figures.display import variable_of, words
 from ..figures.style import QUIET
+from ..metrics.signals import variable_of, words
 from ..studies.study_schema import text_of
 from .design import Level
 from .planning import PlannedRun

@@ -1,0 +1,74 @@
+"""The stages of the orchestrator import one way only."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+ORCHESTRATOR = Path(__file__).parents[2] / "orchestrator"
+STAGES = (
+    {"errors", "wording", "plan"},  # what all share
+    {"scenario"},
+    {"fmu"},
+    {"wiring"},
+    {"results"},
+    {"master"},  # hands rows to a recorder of `results`
+    {"metrics"},
+    {"figures"},
+    {"studies"},
+    {"interop", "sweeps", "scaffold"},
+    {"pages"},
+    {"commands"},
+    {"cli"},
+)
+"""Folders and modules, each set allowed to import those before it; a folder also itself."""
+RANK = {name: rank for rank, stage in enumerate(STAGES) for name in stage}
+SOURCES = sorted(ORCHESTRATOR.rglob("*.py"))
+
+
+def imported_by(path: Path) -> Iterator[tuple[int, str]]:
+    """Yield (line, absolute dotted name) of every import of a module, also of those inside functions."""
+    package = ("orchestrator", *path.relative_to(ORCHESTRATOR).parent.parts)
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else ()
+            module = [*base, *([node.module] if node.module else [])]
+            for alias in node.names:
+                yield node.lineno, ".".join([*module, alias.name])
+
+
+def stage_of(dotted: str) -> str | None:
+    """Return the stage an import of the orchestrator belongs to, None of anything else."""
+    parts = dotted.split(".")
+    return parts[1] if parts[0] == "orchestrator" and len(parts) > 1 else None
+
+
+def all_imports() -> Iterator[tuple[str, str, str]]:
+    """Yield (stage of the module, file:line, what it imports)."""
+    for path in SOURCES:
+        relative = path.relative_to(ORCHESTRATOR)
+        for line, dotted in imported_by(path):
+            yield relative.parts[0].removesuffix(".py"), f"{relative}:{line}", dotted
+
+
+def test_every_folder_and_module_has_a_place_among_the_stages():
+    found = {path.relative_to(ORCHESTRATOR).parts[0].removesuffix(".py") for path in SOURCES}
+    assert found - {"__init__"} <= set(RANK)
+
+
+def test_a_module_imports_only_its_own_stage_and_those_before_it():
+    backwards = []
+    for own, where, dotted in all_imports():
+        stage = stage_of(dotted)
+        if stage is None or stage == own:
+            continue
+        if not (RANK[stage] < RANK[own] or RANK[stage] == RANK[own] == 0):
+            backwards.append(f"{where} imports {dotted}")
+    assert backwards == []
+
+
+def test_the_orchestrator_never_imports_components():
+    assert [where for _, where, dotted in all_imports() if dotted.split(".")[0] == "components"] == []
