@@ -48,6 +48,8 @@ def _fmu(unit: Unit, plan: Plan) -> dict[str, Any]:
         "generation_tool": fmu.generation_tool,
         "step_size": float(unit.period * plan.step),
         "parameters": dict(unit.parameters),
+        # what the FMU has for the others
+        "defaults": {v.name: v.start for v in fmu.of("parameter") if v.name not in unit.parameters},
         "constants": dict(unit.constants),
     }
 

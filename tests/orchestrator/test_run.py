@@ -149,6 +149,8 @@ def test_the_record_tells_everything_needed_to_repeat_the_run(yawbench, fmus, tm
         assert fmu["generation_tool"].startswith("yawbench")
         assert fmu["guid"]
     assert run["fmus"]["driver"]["parameters"]["amplitude"] == 0.02
+    assert run["fmus"]["plant"]["defaults"]["low_speed"] == 0.5
+    assert "amplitude" not in run["fmus"]["driver"]["defaults"]
     assert run["fmus"]["controller"]["step_size"] == 0.002
     assert run["fmus"]["tyre"]["constants"] == {f"friction_{w}": 0.65 for w in ("fl", "fr", "rl", "rr")}
     assert run["scenario"]["units"]["driver"]["parameters"]["amplitude"] == 0.02
