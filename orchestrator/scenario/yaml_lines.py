@@ -9,6 +9,10 @@ from typing import Any
 
 from ..wording import closest, listed
 
+ALIASED = 100_000
+"""Values that the aliases of a file may repeat: aliases of aliases multiply, and a few lines could fill
+the memory. Chosen: a hundred times what a study of a hundred runs needs."""
+
 Key = tuple[str | int, ...]
 """Where a value stands: ('connections', 3, 'from')."""
 
@@ -105,7 +109,13 @@ def read(path: Path, *, what: str) -> Document:
         return fail(0, f"cannot read this {what}: it is nested too deeply")
     document.lines[()] = 1
     if node is not None:
-        document.data = _Reader(document, yaml.constructor).value(node, (), ())
+        try:
+            document.data = _Reader(document, yaml.constructor).value(node, (), ())
+        except _TooManyAliasesError as error:
+            document.report(error.key[:1], f"aliases repeat more than {ALIASED} values")
+            return document
+        except RecursionError:  # aliases of aliases are deeper than the text
+            return fail(0, f"cannot read this {what}: it is nested too deeply")
     if document.data is None and not document.problems:
         return fail(0, f"this {what} is empty")
     return document
@@ -126,17 +136,29 @@ def scalar(text: str) -> Any:
     return _Reader(Document(Path(text)), yaml.constructor).value(node, (), ())
 
 
+class _TooManyAliasesError(Exception):
+    def __init__(self, key: Key) -> None:
+        self.key = key
+
+
 @dataclass
 class _Reader:
     """Turns YAML nodes into plain values, noting lines and problems on the way."""
 
     document: Document
     constructor: Any
+    seen: set[int] = field(default_factory=set)
+    repeated: int = 0
 
     def value(self, node: Any, key: Key, above: tuple[int, ...]) -> Any:
         if id(node) in above:
             self.document.report(key, "this alias contains itself")
             return None
+        if id(node) in self.seen:
+            self.repeated += 1
+            if self.repeated > ALIASED:
+                raise _TooManyAliasesError(key)
+        self.seen.add(id(node))
         above = (*above, id(node))
         if isinstance(node.value, str):
             return self._scalar(node, key)
@@ -166,20 +188,37 @@ class _Reader:
         path, lines, problems = self.document.path, self.document.lines, self.document.problems
         mapping: dict[str, Any] = {}
         for name, item in node.value:
+            if name.tag.endswith(":merge"):
+                for other in reversed(self._merged(name, item)):  # of several, the first one counts
+                    mapping.update(self.value(other, key, above) or {})
+        own: dict[str, int] = {}
+        for name, item in node.value:
             line = name.start_mark.line + 1
             if not isinstance(name.value, str):
                 problems.append((line, f"{path}:{line}: a key must be text, not a collection"))
                 continue
+            if name.tag.endswith(":merge"):
+                continue
             below = (*key, name.value)
-            if name.value in mapping:
-                first = lines[below]
+            if name.value in own:
+                first = own[name.value]
                 problems.append(
                     (line, f"{path}:{line}: {dotted(below)} is given twice, first in line {first}")
                 )
                 continue
-            lines[below] = line
+            own[name.value] = lines[below] = line
             mapping[name.value] = self.value(item, below, above)
         return mapping
+
+    def _merged(self, name: Any, item: Any) -> list[Any]:
+        """Return the mappings that a merge key takes in: one, or several in a list."""
+        nodes = item.value if item.tag.endswith(":seq") else [item]
+        if all(one.tag.endswith(":map") for one in nodes):
+            return list(nodes)
+        line = name.start_mark.line + 1
+        sentence = "<<: write an alias of a mapping, or a list of such aliases"
+        self.document.problems.append((line, f"{self.document.path}:{line}: {sentence}"))
+        return []
 
 
 def _neighbours(path: Path) -> str:

@@ -1,0 +1,81 @@
+"""Aliases and merge keys of YAML files: what they come to, and where they end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from orchestrator.scenario.yaml_lines import ALIASED, Document, read
+
+
+@pytest.fixture
+def document(tmp_path, monkeypatch):
+    """Read a text as the file a.yaml."""
+    monkeypatch.chdir(tmp_path)
+
+    def read_text(text: str) -> Document:
+        Path("a.yaml").write_text(text, encoding="utf-8")
+        return read(Path("a.yaml"), what="scenario file")
+
+    return read_text
+
+
+def test_a_merge_key_takes_in_what_the_mapping_does_not_give_itself(document):
+    made = document("a: &a {x: 1, y: {z: 2}}\nb:\n  y: 3\n  <<: *a\n  w: 4\n")
+    assert made.data["b"] == {"x": 1, "y": 3, "w": 4}
+    assert made.problems == []
+
+
+def test_of_several_merged_mappings_the_first_one_counts(document):
+    made = document("a: &a {x: 1}\nb: &b {x: 2, y: 2}\nc: {<<: [*a, *b]}\n")
+    assert made.data["c"] == {"x": 1, "y": 2}
+
+
+def test_a_merged_value_has_the_line_it_stands_in_and_a_given_one_its_own(document):
+    made = document("a: &a\n  x: 1\n  y: 2\nb:\n  <<: *a\n  y: 3\n")
+    assert made.place(("b", "x")) == "a.yaml:2: b.x"
+    assert made.place(("b", "y")) == "a.yaml:6: b.y"
+
+
+def test_a_quoted_merge_key_is_a_name_like_any_other(document):
+    assert document("a: {'<<': 1}\n").data == {"a": {"<<": 1}}
+
+
+@pytest.mark.parametrize("value", ["1", "[1]", "[*a, 2]"])
+def test_a_merge_key_takes_nothing_but_mappings(document, value):
+    made = document(f"a: &a {{x: 1}}\nb: {{<<: {value}}}\n")
+    assert made.sentences() == ["a.yaml:2: <<: write an alias of a mapping, or a list of such aliases"]
+
+
+def test_a_mapping_that_merges_itself_is_refused(document):
+    assert document("a: &a {x: 1, <<: *a}\n").sentences() == ["a.yaml:1: a: this alias contains itself"]
+
+
+def test_aliases_of_aliases_that_would_fill_the_memory_are_refused(document):
+    lines = ["x0: &x0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]"]
+    lines += [f"x{n}: &x{n} [{', '.join([f'*x{n - 1}'] * 10)}]" for n in range(1, 10)]
+    made = document("\n".join(lines))
+    assert made.data is None
+    assert made.sentences() == [f"a.yaml:5: x4: aliases repeat more than {ALIASED} values"]
+
+
+def test_merge_keys_that_would_fill_the_memory_are_refused(document):
+    lines = ["x0: &x0 {a: 1}"]
+    lines += [f"x{n}: &x{n} {{<<: [{', '.join([f'*x{n - 1}'] * 10)}]}}" for n in range(1, 10)]
+    assert document("\n".join(lines)).sentences() == [
+        f"a.yaml:6: x5: aliases repeat more than {ALIASED} values"
+    ]
+
+
+def test_a_chain_of_aliases_too_deep_to_follow_is_refused(document):
+    opened, closed = "[" * 100, "]" * 100
+    lines = [f"x0: &x0 {opened}{closed}", *(f"x{n}: &x{n} {opened}*x{n - 1}{closed}" for n in range(1, 20))]
+    sentence = "a.yaml: cannot read this scenario file: it is nested too deeply"
+    assert document("\n".join(lines)).sentences() == [sentence]
+
+
+def test_a_long_list_without_aliases_is_no_bomb(document, monkeypatch):
+    monkeypatch.setattr("orchestrator.scenario.yaml_lines.ALIASED", 50)
+    numbers = list(range(100))
+    assert document(f"a: {numbers}").data == {"a": numbers}
