@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import multiprocessing
 import os
 import platform
@@ -71,7 +72,7 @@ def _submit_all(client: Any, jobs: Sequence[Measurement], done: Done, scheduler:
         named[future.key] = job
         return future
 
-    futures = [submit(job) for job, _ in zip(waiting, range(ahead), strict=False)]
+    futures = [submit(job) for job in itertools.islice(waiting, ahead)]
     completed = distributed.as_completed(futures)
     try:
         for future in completed:
@@ -141,7 +142,7 @@ class _Archives(distributed.WorkerPlugin):
 def _connected(address: str) -> Iterator[Any]:
     """Connect to a scheduler while the block runs."""
     try:
-        client = distributed.Client(address, timeout=TIMEOUT, set_as_default=False)
+        client = distributed.Client(address, timeout=TIMEOUT)
     except (OSError, TimeoutError, asyncio.TimeoutError, ValueError, TypeError) as error:
         reason = f": {' '.join(str(error).split())}" if isinstance(error, ValueError) else ""
         raise ScenarioError(

@@ -94,6 +94,8 @@ class Curves(MetricDrawing):
     def finish(self, figure: Figure, drawn: Sequence[Axes], left: Sequence[Axes]) -> None:
         self.name_y(left, self.measured)
         drawn[0].set_yscale(self.spec.scale)
+        if self.spec.scale == "log":
+            drawn[0].yaxis.set_major_formatter(lambda value, _: f"{value:g}")
         if self.spec.largest is not None:
             drawn[0].set_ylim(self.low if self.spec.scale == "log" else min(self.low, 0.0), self.high)
         elif self.spec.scale == "linear" and self.low >= 0:
