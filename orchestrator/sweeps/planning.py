@@ -134,7 +134,9 @@ def _of_axis(sweep: Sweep, problem: str) -> tuple[str, str]:
     for name, axis in sweep.spec.axes.items():
         for place in axis.places:
             if problem.startswith((f"--set {place}=", f"--swap {place}=")):
-                return f"{name}{problem.partition(': ')[2]}", f"{sweep.path}: axes.{name}: {problem}"
+                option, _, sentence = problem.partition(": ")
+                value = option.partition("=")[2]
+                return f"{name}{sentence.replace(value, '')}", f"{sweep.path}: axes.{name}: {problem}"
     return problem, problem
 
 

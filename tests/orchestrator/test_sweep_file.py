@@ -1,0 +1,290 @@
+"""Sweep files: what they may say, what is refused, and the points and plans they come to."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import qmc
+
+from fmus.build import build_all
+from orchestrator.errors import ScenarioError
+from orchestrator.sweeps.planning import plan_sweep
+from orchestrator.sweeps.sweep_file import load_sweep
+
+UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
+
+SCENARIO = """
+title: Half a car
+vehicle: car.yaml
+stop_time: 0.4
+step_size: 0.01
+inputs: {velocity_x: 20, friction: 0.7, sideslip: 0.001, sideslip_rate: 0}
+units:
+  driver:     {fmu: driver_sine, parameters: {frequency: 2, start_time: 0}}
+  reference:  {fmu: reference_steady_state}
+  controller: {fmu: controller_fuzzy_sideslip}
+"""
+CAR = "parameters: {mass: 1100}\n"
+HEAVY = "parameters: {mass: 1500}\n"
+
+SWEEP = """
+title: Half a sweep
+scenario: half.yaml
+axes:
+  amplitude: {vary: driver.amplitude, values: [0.01, 0.02, 0.03]}
+  control: {vary: controller, values: {controller_off: no control, controller_fuzzy_sideslip: fuzzy}}
+metrics:
+  moment: {metric: peak(yaw_moment)}
+"""
+
+
+@pytest.fixture(scope="session")
+def fmus(tmp_path_factory):
+    """A folder with the FMUs of a controller in an open loop."""
+    folder = tmp_path_factory.mktemp("fmus")
+    build_all(folder, components=UNITS)
+    return folder
+
+
+@pytest.fixture
+def sweep(tmp_path):
+    """Write a sweep file with lines replaced and return it as loaded."""
+
+    def make(*changes, text=SWEEP):
+        (tmp_path / "half.yaml").write_text(SCENARIO)
+        (tmp_path / "car.yaml").write_text(CAR)
+        (tmp_path / "heavy.yaml").write_text(HEAVY)
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        (tmp_path / "sweep.yaml").write_text(text)
+        return load_sweep(tmp_path / "sweep.yaml")
+
+    return make
+
+
+AMPLITUDE = "{vary: driver.amplitude, values: [0.01, 0.02, 0.03]}"
+CONTROL = "{vary: controller, values: {controller_off: no control, controller_fuzzy_sideslip: fuzzy}}"
+
+
+def values(loaded):
+    return [tuple(level.value for level in point) for point in loaded.points]
+
+
+def test_a_grid_has_every_combination_and_the_last_axis_changes_first(sweep):
+    found = [tuple(level.words for level in point) for point in sweep().points]
+    assert found == [(a, c) for a in ("0.01", "0.02", "0.03") for c in ("no control", "fuzzy")]
+
+
+def test_equal_steps_are_the_decimal_numbers_that_people_expect(sweep):
+    loaded = sweep((AMPLITUDE, "{vary: driver.amplitude, from: 0.1, to: 1.0, count: 10}"))
+    found = list(dict.fromkeys(value[0] for value in values(loaded)))
+    assert found == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]
+
+
+def test_logarithmic_steps_have_equal_factors(sweep):
+    loaded = sweep((AMPLITUDE, "{vary: driver.amplitude, from: 0.001, to: 1, count: 4, spacing: log}"))
+    found = list(dict.fromkeys(value[0] for value in values(loaded)))
+    assert found == pytest.approx([0.001, 0.01, 0.1, 1.0], rel=1e-15)
+
+
+def test_a_list_takes_the_first_with_the_first(sweep):
+    loaded = sweep(("[0.01, 0.02, 0.03]", "[0.01, 0.02]"), ("axes:", "design: list\naxes:"))
+    assert values(loaded) == [(0.01, "controller_off"), (0.02, "controller_fuzzy_sideslip")]
+
+
+HYPERCUBE = """
+title: A cube
+scenario: half.yaml
+design: latin_hypercube
+runs: 12
+seed: {seed}
+axes:
+  amplitude: {{vary: driver.amplitude, from: 0, to: 0.06}}
+  frequency: {{vary: driver.frequency, from: 0.1, to: 10, spacing: log}}
+  control: {{vary: controller, values: [controller_off, controller_fuzzy_sideslip]}}
+metrics:
+  moment: {{metric: peak(yaw_moment)}}
+"""
+
+
+def test_a_latin_hypercube_has_one_point_in_each_part_of_every_axis(sweep):
+    found = values(sweep(text=HYPERCUBE.format(seed=1)))
+    amplitude = np.array([point[0] for point in found]) / 0.06
+    frequency = (np.log10([point[1] for point in found]) + 1) / 2
+    for unit in (amplitude, frequency):
+        assert sorted((12 * unit).astype(int)) == list(range(12))
+    assert [point[2] for point in found].count("controller_off") == 6
+    # no more uneven than scipy's own hypercubes are
+    ours = qmc.discrepancy(np.column_stack([amplitude, frequency]))
+    theirs = [qmc.discrepancy(qmc.LatinHypercube(2, rng=seed).random(12)) for seed in range(50)]
+    assert ours < max(theirs)
+
+
+def test_a_seed_gives_the_same_points_and_another_seed_others(sweep):
+    first, again, other = (values(sweep(text=HYPERCUBE.format(seed=seed))) for seed in (1, 1, 2))
+    assert first == again
+    assert first != other
+
+
+def test_plans_hold_what_the_axes_say(sweep, fmus, tmp_path):
+    text = SWEEP.replace(CONTROL, "{vary: vehicle, values: {car.yaml: light, heavy.yaml: heavy}}").replace(
+        AMPLITUDE,
+        "{vary: inputs.velocity_x, values: [36, 72], unit: km/h}\n"
+        "  both: {vary: [driver.amplitude, driver.start_time], values: [0.01, 0.05]}\n"
+        "  fmu: {vary: controller, values: ['controller_off', 'controller_fuzzy_sideslip:moment_range=500']}",
+    )
+    planned = plan_sweep(sweep(text=text), tmp_path / "runs", fmus)
+    assert len(planned.runs) == 16
+    units = [{unit.name: unit for unit in run.plan.units} for run in planned.runs]
+    assert [unit["reference"].constants["velocity_x"] for unit in units] == [10.0] * 8 + [20.0] * 8
+    assert {(u["driver"].parameters["amplitude"], u["driver"].parameters["start_time"]) for u in units} == {
+        (0.01, 0.01), (0.05, 0.05),
+    }  # fmt: skip
+    assert [unit["reference"].parameters["mass"] for unit in units[:2]] == [1100, 1500]
+    assert [unit["controller"].parameters.get("moment_range") for unit in units[:4]] == [None, None, 500, 500]
+    assert planned.units == {"amplitude": "m/s", "both": "rad"}
+    assert planned.number("amplitude", planned.runs[0].point[0]) == 10.0
+    assert len({run.key for run in planned.runs}) == 16
+
+
+def test_a_variant_changes_several_things_at_once(sweep, fmus, tmp_path):
+    variants = (
+        "{variants: {as it is: {}, soft: {swap: {controller: controller_off}, set: {driver.amplitude: 0.2}, "
+        "vehicle: heavy.yaml}}}"
+    )
+    loaded = sweep((AMPLITUDE, "{vary: driver.frequency, values: [1, 2]}"), (CONTROL, variants))
+    first, second = (
+        {unit.name: unit for unit in run.plan.units}
+        for run in plan_sweep(loaded, tmp_path / "runs", fmus).runs[:2]
+    )
+    assert first["controller"].fmu.name == "controller_fuzzy_sideslip"
+    assert "amplitude" not in first["driver"].parameters
+    assert second["controller"].fmu.name == "controller_off"
+    assert second["driver"].parameters["amplitude"] == 0.2
+    assert second["reference"].parameters["mass"] == 1500
+
+
+def test_the_key_of_a_run_changes_with_whatever_its_metrics_follow_from(sweep, fmus, tmp_path):
+    def key(*changes):
+        return plan_sweep(sweep(*changes), tmp_path / "runs", fmus).runs[0].key
+
+    same = key()
+    assert key(("title: Half a sweep", "title: Another")) == same
+    assert key(("0.03]", "0.04]")) == same
+    others = [
+        key(("[0.01, 0.02", "[0.011, 0.02")),
+        key(("axes:", "set: {driver.frequency: 3}\naxes:")),
+        key(("axes:", "set: {vehicle.mass: 1200}\naxes:")),
+        key(("axes:", "stop_time: 0.3\naxes:")),
+        key(("axes:", "step_size: 0.005\naxes:")),
+        key(("axes:", "algorithm: jacobi\naxes:")),
+        key(("peak(yaw_moment)}", "peak(yaw_moment), window: [0, 0.2]}")),
+    ]
+    assert len({same, *others}) == 8
+
+
+REFUSED = [
+    ("[0.01, 0.02, 0.03]", "[]", "axes.amplitude.values: has no values"),
+    ("[0.01, 0.02, 0.03]", "[0.01, 0.02, 0.01]", "names 0.01 twice"),
+    (AMPLITUDE, "{vary: driver.amplitude, from: 0.3, to: 0.1, count: 3}", "from must be below to"),
+    (AMPLITUDE, "{vary: driver.amplitude, from: 0.1, to: 0.3}", "axes.amplitude: needs count"),
+    (AMPLITUDE, "{vary: driver.amplitude, from: 0, to: 1, count: 3, spacing: log}", "above 0 where spacing"),
+    (AMPLITUDE, "{vary: driver.amplitude}", "needs values, or from, to and count"),
+    (AMPLITUDE, "{vary: driver.amplitude, values: [1], count: 3}", "give either values, or from"),
+    (AMPLITUDE, "{values: [1]}", "needs either vary or variants"),
+    (AMPLITUDE, "{vary: inputs, values: [1]}", "inputs needs a name, for example inputs.friction*"),
+    (AMPLITUDE, "{vary: [driver.a, controller], values: [1]}", "only several unit.parameter may share"),
+    (AMPLITUDE, "{vary: vehicle, values: [1]}", "vehicle takes names of files or FMUs"),
+    (AMPLITUDE, "{vary: driver.amplitude, values: ['1 deg']}", "give plain numbers, and their unit in"),
+    (AMPLITUDE, "{vary: driver.amplitude, values: [1], unit: furlong}", "'furlong' is not a unit"),
+    ("  control:", "  amplitude:", "axes.amplitude is given twice"),
+    (CONTROL, AMPLITUDE, "driver.amplitude is given by axis 'amplitude' already"),
+    ("axes:", "set: {driver.amplitude: 1}\naxes:", "driver.amplitude is given by set or swap already"),
+    ("  control:", "  moment:", "'moment' is the name of another column of the table"),
+    ("  control:", "  status:", "'status' is the name of another column of the table"),
+    ("axes:", "seed: 3\naxes:", "runs and seed belong to a latin_hypercube; the design is grid"),
+    ("axes:", "design: latin_hypercube\naxes:", "a latin_hypercube needs runs and seed"),
+    ("axes:", "design: list\naxes:", "must have equally many values (amplitude has 3, control has 2)"),
+    ("axes:", "desing: list\naxes:", "desing: unknown key; did you mean 'design'?"),
+    ("peak(yaw_moment)", "peek(yaw_moment)", "there is no measure 'peek'"),
+    (AMPLITUDE, "{vary: driver.amplitude, from: 0, to: 1, count: 90000}", "180000 runs; at most 100000"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "sentence"), REFUSED, ids=[one[2][:40] for one in REFUSED])
+def test_a_sweep_file_that_is_wrong_is_one_sentence_with_its_place(old, new, sentence, sweep, tmp_path):
+    with pytest.raises(ScenarioError) as error:
+        sweep((old, new))
+    (problem,) = error.value.problems
+    assert sentence in problem
+    assert problem.startswith(f"{tmp_path / 'sweep.yaml'}:")
+
+
+FIGURES = """
+limits:
+  gentle: {says: Gentle, of: amplitude, holds_if: [{metric: moment, at_most: 100 N.m}]}
+figures:
+  - {name: one, kind: curve, metric: moment, x: amplitude, lines: control}
+  - {name: two, kind: limit, limit: gentle, x: control}
+"""
+FIGURES_REFUSED = [
+    ("lines: control", "lines: contrl", "there is no axis 'contrl'; did you mean 'control'?"),
+    (", lines: control", "", "the axis 'control' has no place in this figure: make it lines or panels"),
+    ("metric: moment, x", "metric: momet, x", "there is no metric 'momet'; did you mean 'moment'?"),
+    ("limit: gentle", "limit: gentel", "there is no limit 'gentel'; did you mean 'gentle'?"),
+    ("name: two", "name: one", "there is already a figure 'one'"),
+    ("kind: curve", "kind: map", "a map needs y"),
+    ("kind: limit, limit: gentle, x: control", "kind: map, metric: moment, x: amplitude, y: control",
+     "the values of 'control' are no numbers"),
+    ("x: control}", "x: amplitude}", "'amplitude' is what the limit 'gentle' is of"),
+    ("of: amplitude", "of: control", "the values of 'control' are no numbers"),
+    ("at_most: 100 N.m", "at_most: 100 N.m, above: 1", "needs exactly one of above, at_least, below"),
+    ("at_most: 100 N.m", "at_most: many", "must be a number, or a number with its unit"),
+    ("kind: limit, limit: gentle", "kind: limit, limit: gentle, metric: moment", "needs limit and no metric"),
+    ("lines: control}", "lines: control, only: {amplitude: [0.07]}}", "amplitude has no value 0.07; did you mean"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"), FIGURES_REFUSED, ids=[one[2][:40] for one in FIGURES_REFUSED]
+)
+def test_figures_and_limits_must_name_what_there_is(old, new, sentence, sweep, tmp_path):
+    sweep(text=SWEEP + FIGURES)
+    with pytest.raises(ScenarioError) as error:
+        sweep((old, new), text=SWEEP + FIGURES)
+    assert any(sentence in problem for problem in error.value.problems)
+    assert len(error.value.problems) <= 2
+
+
+PLANS_REFUSED = [
+    ("driver.amplitude", "driver.amplitud", "axes.amplitude: --set driver.amplitud=0.01: "),
+    ("vary: driver.amplitude", "vary: drivr.amplitude", "the scenario has no unit 'drivr'; did you mean"),
+    ("vary: controller,", "vary: contrller,", "the scenario has no unit 'contrller'; did you mean"),
+    ("controller_off:", "controller_of:", "no FMU 'controller_of'"),
+    ("peak(yaw_moment)", "peak(roll_angle)", "metrics.moment: no run records the signals of peak"),
+    ("scenario: half.yaml", "scenario: hlf.yaml", "no such scenario file; did you mean"),
+    (AMPLITUDE, "{vary: driver.amplitude, values: [1, 2], unit: km/h}", "'1 km/h' is not a value in rad"),
+    (CONTROL, "{vary: vehicle, values: [heavier.yaml]}", "no such vehicle file; did you mean"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"), PLANS_REFUSED, ids=[one[2][:40] for one in PLANS_REFUSED]
+)
+def test_what_no_run_could_start_with_is_said_once_and_not_once_per_run(
+    old, new, sentence, sweep, fmus, tmp_path
+):
+    loaded = sweep((old, new))
+    with pytest.raises(ScenarioError) as error:
+        plan_sweep(loaded, tmp_path / "runs", fmus)
+    assert sentence in error.value.problems[0]
+    assert len(error.value.problems) == 1
+
+
+def test_a_bound_in_a_unit_that_its_metric_does_not_have_is_refused_before_any_run(sweep, fmus, tmp_path):
+    loaded = sweep(("100 N.m", "100 km/h"), text=SWEEP + FIGURES)
+    with pytest.raises(
+        ScenarioError, match=r"limits\.gentle\.holds_if\[0\]: '100 km/h' is not a value in N\.m"
+    ):
+        plan_sweep(loaded, tmp_path / "runs", fmus)
