@@ -179,10 +179,7 @@ class Component(Fmi2Slave):
             n = self._n_in
             u = values[:n]
             self.advance(current_time, step_size, u)
-            y = list(map(float, self.output(current_time + step_size, u)))
-            if n + len(y) != self._n_io:
-                raise TypeError(f"output() gave {len(y)} values for {self._n_io - n} outputs")
-            values[n : self._n_io] = y
+            values[n : self._n_io] = self._checked_output(current_time + step_size, u)
             return True
         except BaseException:
             self._fail("step failed", current_time)
@@ -209,11 +206,18 @@ class Component(Fmi2Slave):
         n = self._n_in
         u = values[:n]
         self.start(self._start_time, u)
-        y = list(map(float, self.output(self._start_time, u)))
-        if n + len(y) != self._n_io:
-            raise TypeError(f"output() gave {len(y)} values for {self._n_io - n} outputs")
-        values[n : self._n_io] = y
+        values[n : self._n_io] = self._checked_output(self._start_time, u)
         self._stale = False
+
+    def _checked_output(self, t: float, u: list[float]) -> list[float]:
+        """Return what `output` gives, checked."""
+        given: Any = self.output(t, u)
+        if given is None:
+            raise TypeError("output() returned nothing; it must return all outputs in declared order")
+        y = list(map(float, given))
+        if len(y) != self._n_io - self._n_in:
+            raise TypeError(f"output() gave {len(y)} values for {self._n_io - self._n_in} outputs")
+        return y
 
     def _fail(self, what: str, t: float) -> None:
         """Log the exception being handled, once as a sentence and once in full; stop for good."""
@@ -223,12 +227,16 @@ class Component(Fmi2Slave):
             core = os.path.dirname(os.path.abspath(__file__))
             home = os.path.dirname(core)
             machinery = [os.path.join(core, name) for name in ("component.py", "variables.py")]
+            lines = [(frame.filename, frame.lineno, frame.name) for frame in traceback.extract_tb(trace)]
+            if lines and lines[-1][2] == "_checked_output":  # what `output` returned is wrong
+                code = type(self).output.__code__
+                lines.append((code.co_filename, code.co_firstlineno, code.co_name))
             where = ""
-            for frame in traceback.extract_tb(trace):
-                path = os.path.abspath(frame.filename)
+            for file, line, _ in lines:
+                path = os.path.abspath(file)
                 if path.startswith(home + os.sep) and path not in machinery:
                     relative = path[len(home) + 1 :].replace(os.sep, "/")
-                    where = f" ({relative}:{frame.lineno})"
+                    where = f" ({relative}:{line})"
             given = ", ".join(
                 f"{v.name} = {x!r}" for v, x in zip(self.variables[: self._n_in], self._values, strict=False)
             )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ctypes
+import inspect
 import math
 
 import pytest
 
 from tests.fmus.bare import ERROR, FATAL, OK, Refused, Unit
+from tests.fmus.samples.controllers.failing import Failing
 
 DITCH = "ValueError: 50 % of the wheels (100%s, %n) are in the Gräben: größer als 1 µm"
 
@@ -79,7 +81,7 @@ def test_the_traceback_is_logged_for_those_who_ask(failing, sample):
         ("recursion", "RecursionError"),
         ("surrogate", r"half a character: \ud800, and a \0 in between"),
         ("unprintable", "step failed (ValueError while reporting it)"),
-        ("none", "TypeError: 'NoneType' object is not iterable"),
+        ("none", "TypeError: output() returned nothing; it must return all outputs in declared order (cont"),
         ("count", "TypeError: output() gave 2 values for 1 outputs"),
         ("text", "ValueError: could not convert string to float: 'far'"),
     ],
@@ -90,6 +92,15 @@ def test_any_other_failure_of_a_step_is_an_error_with_a_sentence(failing, how, w
     assert unit.try_step(0.0) == ERROR
     assert what in unit.messages[0]
     assert unit.get("yaw_moment") == [0.0]  # the last good value
+
+
+@pytest.mark.parametrize("how", ["none", "count", "text"])
+def test_what_output_returns_wrongly_is_told_with_the_line_of_output(failing, how):
+    unit = failing(where="output", how=how)
+    unit.start()
+    assert unit.try_step(0.0) == ERROR
+    line = inspect.getsourcelines(Failing.output)[1]
+    assert unit.messages[0].endswith(f" (controllers/failing.py:{line}); inputs: yaw_rate = 0.0")
 
 
 def test_a_nan_is_handed_to_the_host_as_it_is(failing):
