@@ -39,11 +39,8 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def docstring(text: str) -> str:
     """Return a docstring as Markdown: paragraphs as they are, indented lines as code."""
     lines = []
-    listed = False
     for line in text.strip().splitlines():
-        indented = line.startswith("    ")
-        listed = (listed and not line.strip()) or line.lstrip().startswith(("* ", "- ")) or (listed and indented)
-        if indented and not listed:
+        if line.startswith("    "):
             lines.append(line)
         elif re.match(r"[*-] ", line):
             lines.append("- " + plain(line[2:]))
