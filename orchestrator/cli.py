@@ -11,7 +11,20 @@ import typer
 
 from .errors import YawbenchError
 
-COMMANDS = ("new", "build", "check", "run", "compare", "plot", "converge", "study", "sweep", "export-ssp", "second-opinion")
+COMMANDS = (
+    "new",
+    "build",
+    "check",
+    "run",
+    "compare",
+    "plot",
+    "animate",
+    "converge",
+    "study",
+    "sweep",
+    "export-ssp",
+    "second-opinion",
+)
 """Each a module of `orchestrator.commands` with a function of the same name, `_` for `-`."""
 
 

@@ -1,0 +1,162 @@
+"""One or two runs seen from above, as a part of a page or a page of its own, with no server.
+
+    {{ assets() }}              once a page: style and script
+    {{ fragment(runs) }}        as often as there are animations
+
+What is drawn is what was recorded, thinned; between two moments kept the browser interpolates.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from ..errors import ResultsError
+from ..figures.display import shown_unit
+from ..figures.style import line_style
+from ..results.read import Results
+from .animation_frames import WHEELS, Frames, frames_of
+
+SCRIPTS = ("frames", "draw", "scene", "close_up", "strip", "player")
+READOUTS = (
+    ("speed", "Speed", "m/s", 1),
+    ("sideslip", "Sideslip angle", "rad", 2),
+    ("yaw_rate", "Yaw rate", "rad/s", 1),
+    ("steer_angle", "Steer angle", "rad", 2),
+    ("yaw_moment", "Yaw moment", "N.m", 0),
+    ("cone_overrun", "Beyond the cones", "m", 2),
+)
+"""Channel, words, SI unit, decimals shown."""
+STRIP = ("sideslip", "yaw_rate", "steer_angle")
+"""What the curve above the slider may show: the first that was recorded."""
+MOST = 2
+"""Runs in one animation; chosen: outlines of three cannot be told apart."""
+
+Runs = Sequence[tuple[str, Results]]
+
+
+def fragment(runs: Runs, *, title: str = "", autoplay: bool = False) -> Markup:
+    """Return the animation of one or two runs (label, results) as a part of a page.
+
+    Raises:
+        ResultsError: a run's position or yaw angle was not recorded.
+    """
+    return Markup(_render("animation.html.j2", **_facts(runs, title, autoplay)))
+
+
+def assets() -> Markup:
+    """Return the style and the script that all animations of a page share."""
+    static = files(__package__) / "static"
+    style = (static / "animation.css").read_text(encoding="utf-8")
+    parts = [(static / f"animation_{part}.js").read_text(encoding="utf-8") for part in SCRIPTS]
+    script = "\n".join(parts)
+    return Markup(f"<style>\n{style}</style>\n<script>\n(() => {{\n'use strict';\n{script}}})();\n</script>")
+
+
+def page(runs: Runs, *, title: str) -> str:
+    """Return a page of its own; it plays by itself unless the reader has asked for less motion."""
+    return _render("animation_page.html.j2", assets=assets(), **_facts(runs, title, True))
+
+
+def _facts(runs: Runs, title: str, autoplay: bool) -> dict[str, Any]:
+    if not 1 <= len(runs) <= MOST:
+        raise ResultsError(f"an animation shows one or two runs, not {len(runs)}.")
+    shown = [(label, frames_of(results)) for label, results in runs]
+    data = {"autoplay": autoplay, **data_of(shown)}
+    return {"title": title or " and ".join(label for label, _ in shown), "data": data}
+
+
+def data_of(runs: Sequence[tuple[str, Frames]]) -> dict[str, Any]:
+    """Return what the script draws: see `animation_frames.js` for how it is read."""
+    every = [frames for _, frames in runs]
+    return {
+        "runs": [_run(number, label, frames) for number, (label, frames) in enumerate(runs)],
+        "still": still_of(every),
+        "metres_per_newton": force_scale(every),
+        "readouts": [
+            {"channel": channel, "label": label, "decimals": decimals}
+            | dict(zip(("unit", "factor"), shown_unit(unit), strict=True))
+            for channel, label, unit, decimals in READOUTS
+            if any(channel in frames.channels for frames in every)
+        ],
+        "strip": next((name for name in STRIP if any(name in f.channels for f in every)), None),
+    }
+
+
+def _run(number: int, label: str, frames: Frames) -> dict[str, Any]:
+    style = line_style(number)
+    dash = style["linestyle"][1] if isinstance(style["linestyle"], tuple) else ()
+    return {
+        "label": label,
+        "colour": style["color"],
+        "dash": list(dash),
+        "car": asdict(frames.car),
+        "lanes": [list(lane) for lane in frames.lanes],
+        "notes": list(frames.notes),
+        "channels": {name: packed(values) for name, values in frames.channels.items()},
+    }
+
+
+def packed(values: np.ndarray) -> str:
+    """Return an array as base64 of little-endian 32-bit floats."""
+    return base64.b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode("ascii")
+
+
+def still_of(runs: Sequence[Frames]) -> float:
+    """Return the moment [s] that tells most when nothing moves: that of the largest sideslip angle.
+
+    Without sideslip, that of the largest yaw rate; without both, the middle.
+    """
+    for name in STRIP[:2]:
+        peaks = []
+        for frames in runs:
+            size = np.nan_to_num(np.abs(frames.channels.get(name, np.zeros(0))), posinf=0.0)
+            if size.size and size.max() > 0:
+                peaks.append((float(size.max()), float(frames.channels["time"][np.argmax(size)])))
+        if peaks:
+            return max(peaks)[1]
+    time = runs[0].channels["time"]
+    return float(0.5 * (time[0] + time[-1]))
+
+
+def force_scale(runs: Sequence[Frames]) -> float:
+    """Return the length [m/N] that forces are drawn at, one for all wheels and runs.
+
+    Friction circles of an axle never overlap; without circles, no arrow is longer than half the track.
+    """
+    largest = 0.0
+    for frames in runs:
+        channels, track = frames.channels, frames.car.track
+        for left, right in (WHEELS[:2], WHEELS[2:]):
+            if f"grip_{left}" in channels:
+                pair = channels[f"grip_{left}"] + channels[f"grip_{right}"]
+                largest = max(largest, _peak(pair) / (0.96 * track))
+        if "grip_fl" not in channels:
+            for wheel in WHEELS if "force_x_fl" in channels else ():
+                force = np.hypot(channels[f"force_x_{wheel}"], channels[f"force_y_{wheel}"])
+                largest = max(largest, _peak(force) / (0.5 * track))
+    return 1 / largest if largest > 0 and math.isfinite(largest) else 0.0
+
+
+def _peak(values: np.ndarray) -> float:
+    finite = values[np.isfinite(values)]
+    return float(finite.max()) if finite.size else 0.0
+
+
+def _render(template: str, **facts: Any) -> str:
+    environment = Environment(
+        loader=PackageLoader("orchestrator.pages"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(template).render(facts)

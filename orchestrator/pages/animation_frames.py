@@ -1,0 +1,204 @@
+"""What an animation shows of a run: the car's motion and forces over at most 600 recorded moments."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import ResultsError
+from ..metrics.run_metrics import columns_of
+from ..results.read import Results
+from ..wording import WHEELS, listed
+from .lanes import Lane, lanes_of
+
+FRAMES = 600
+"""Moments kept of a run; chosen: 75 per second of an 8 s manoeuvre, more than a screen shows."""
+OVERHANG_FRONT, OVERHANG_REAR = 0.85, 1.0
+"""Outline beyond the axles [m], where no driver knows its car's ends; chosen: a saloon."""
+BESIDE = 0.2
+"""Body's width beyond the track width [m]; chosen: a tyre's width."""
+USUAL = {"cg_to_front_axle": 1.3, "cg_to_rear_axle": 1.4, "track_width": 1.55}
+"""The car of a plant that tells no sizes [m]; chosen: a mid-size car."""
+
+POSE = ("position_x", "position_y", "yaw_angle")
+SIGNALS = ("sideslip", "yaw_rate", "steer_angle", "yaw_moment", "cone_overrun")
+
+
+@dataclass(frozen=True)
+class Car:
+    """A car seen from above: its axles and ends from the centre of mass, its widths [m]."""
+
+    front_axle: float
+    rear_axle: float
+    track: float
+    front_end: float
+    rear_end: float
+    width: float
+
+
+@dataclass(frozen=True)
+class Frames:
+    """A run at the moments kept.
+
+    `channels` are SI arrays of one length: time, x, y, yaw, and as recorded speed, sideslip, yaw_rate,
+    steer_angle, yaw_moment, cone_overrun, path_y (the path the driver follows, at x), and per wheel
+    `force_x_fl` .. `force_y_rr` (vehicle axes) and `grip_fl` .. `grip_rr` (friction times load).
+    """
+
+    car: Car
+    channels: dict[str, np.ndarray]
+    lanes: tuple[Lane, ...]
+    notes: tuple[str, ...]  # what could not be drawn
+
+
+def frames_of(results: Results) -> Frames:
+    """Return the frames of a run; those of a failed run end where its position was last a number.
+
+    Raises:
+        ResultsError: the position or the yaw angle was not recorded, or of no moment at all.
+    """
+    time, pose = _pose(results)
+    kept = thinned(time)
+    x, y, yaw = (values[kept] for values in pose)
+    channels = {"time": time[kept], "x": x, "y": y, "yaw": yaw}
+    found = {name: values[kept] for name in SIGNALS if (values := _signal(results, name)) is not None}
+    if (speed := _speed(results)) is not None:
+        channels["speed"] = speed[kept]
+    channels |= found
+    if (offset := _signal(results, "path_offset")) is not None:
+        channels["path_y"] = y - offset[kept]
+    steer = found.get("steer_angle", np.zeros(kept.size))
+    forces = _forces(results, kept, steer)
+    grip = _grip(results, kept)
+    notes = []
+    if not forces:
+        notes.append("tyre forces were not recorded")
+    elif "steer_angle" not in found:
+        notes.append("the steer angle was not recorded: the front wheels are drawn straight")
+    if forces and not grip:
+        notes.append("friction or vertical loads were not recorded: no friction circles")
+    car, known = _car(results)
+    if not known:
+        notes.append("the plant tells no sizes: a mid-size car is drawn")
+    return Frames(car, channels | forces | grip, tuple(_lanes(results)), tuple(notes))
+
+
+def thinned(time: np.ndarray, most: int = FRAMES) -> np.ndarray:
+    """Return the indices of at most so many rows [at least 2], even in time, the ends among them."""
+    if time.size <= most:
+        return np.arange(time.size)
+    wanted = np.linspace(time[0], time[-1], most)
+    after = np.clip(np.searchsorted(time, wanted), 1, time.size - 1)
+    nearest = after - (wanted - time[after - 1] < time[after] - wanted)
+    nearest[0], nearest[-1] = 0, time.size - 1
+    return np.unique(nearest)
+
+
+def rotated(along: np.ndarray, across: np.ndarray, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return a vector given in axes turned by `angle` [rad] in the axes they were turned from."""
+    c, s = np.cos(angle), np.sin(angle)
+    return along * c - across * s, along * s + across * c
+
+
+def _pose(results: Results) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Return time, and x, y, yaw from the start to where one of them ends to be a number."""
+    pose = [_signal(results, name) for name in POSE]
+    there = [values for values in pose if values is not None]
+    if len(there) < len(pose):
+        missing = [name for name, values in zip(POSE, pose, strict=True) if values is None]
+        verb = "was" if len(missing) == 1 else "were"
+        raise ResultsError(
+            f"{results.file}: cannot be animated: {listed(missing)} {verb} not recorded; "
+            f"a car seen from above needs {listed(POSE)}."
+        )
+    sound = np.all(np.isfinite([results.time, *there]), axis=0)
+    rows = sound.size if sound.all() else int(np.argmin(sound))
+    if rows == 0:
+        raise ResultsError(f"{results.file}: cannot be animated: no moment with a position was recorded.")
+    x, y, yaw = (values[:rows] for values in there)
+    return results.time[:rows], [x, y, np.unwrap(yaw)]
+
+
+def _signal(results: Results, name: str) -> np.ndarray | None:
+    columns = columns_of(results, name)
+    return results.columns[columns[0]] if columns else None
+
+
+def _speed(results: Results) -> np.ndarray | None:
+    along, across = _signal(results, "velocity_x"), _signal(results, "velocity_y")
+    return along if along is None or across is None else np.hypot(along, across)
+
+
+def _forces(results: Results, kept: np.ndarray, steer: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the tyre forces in vehicle axes, N."""
+    along, across = columns_of(results, "tyre_force_x_*"), columns_of(results, "tyre_force_y_*")
+    if not along or not across:
+        return {}
+    forces = {}
+    for wheel, x, y in zip(WHEELS, along, across, strict=True):
+        angle = steer if wheel.startswith("f") else np.zeros(kept.size)
+        pair = rotated(results.columns[x][kept], results.columns[y][kept], angle)
+        forces[f"force_x_{wheel}"], forces[f"force_y_{wheel}"] = pair
+    return forces
+
+
+def _grip(results: Results, kept: np.ndarray) -> dict[str, np.ndarray]:
+    """Return friction times load of every wheel, N: the radius of its friction circle."""
+    loads = columns_of(results, "vertical_load_*")
+    frictions = [_friction(results, wheel) for wheel in WHEELS]
+    if not loads or any(friction is None for friction in frictions):
+        return {}
+    grip = {}
+    for wheel, load, friction in zip(WHEELS, loads, frictions, strict=True):
+        mu = np.broadcast_to(np.asarray(friction, float), results.time.shape)[kept]
+        grip[f"grip_{wheel}"] = mu * np.maximum(results.columns[load][kept], 0.0)
+    return grip
+
+
+def _friction(results: Results, wheel: str) -> np.ndarray | float | None:
+    """Return the friction at a wheel: as recorded, or the constant of the tyre's input."""
+    for name in (f"friction_{wheel}", "friction"):
+        if (recorded := _signal(results, name)) is not None:
+            return recorded
+        fmus: dict[str, dict[str, Any]] = results.run.get("fmus", {})
+        for unit in [*results.units_of_role("tyre"), *fmus]:
+            constant = fmus[unit].get("constants", {}).get(name)
+            if isinstance(constant, (int, float)):
+                return float(constant)
+    return None
+
+
+def _parameters(results: Results, unit: str) -> Mapping[str, Any]:
+    fmu = results.run["fmus"][unit]
+    return {**fmu.get("defaults", {}), **fmu.get("parameters", {})}
+
+
+def _car(results: Results) -> tuple[Car, bool]:
+    """Return the car's sizes, and False if the plant tells none of them."""
+    told: dict[str, float] = {}
+    for unit in results.units_of_role("plant"):
+        told |= {
+            name: float(value)
+            for name, value in _parameters(results, unit).items()
+            if name in USUAL and isinstance(value, (int, float)) and math.isfinite(value) and value > 0
+        }
+    front, rear, track = (told.get(name, usual) for name, usual in USUAL.items())
+    ends = {"front": front + OVERHANG_FRONT, "rear": rear + OVERHANG_REAR, "width": track + BESIDE}
+    for unit in results.units_of_role("driver"):  # whom the cones are measured with
+        known = _parameters(results, unit)
+        if lanes_of(known):
+            ends["width"] = float(known["vehicle_width"])
+            ends["front"] = float(known.get("cg_to_front_end", ends["front"]))
+            ends["rear"] = float(known.get("cg_to_rear_end", ends["rear"]))
+    return Car(front, rear, track, ends["front"], ends["rear"], ends["width"]), bool(told)
+
+
+def _lanes(results: Results) -> list[Lane]:
+    for unit in results.units_of_role("driver"):
+        if lanes := lanes_of(_parameters(results, unit)):
+            return lanes
+    return []

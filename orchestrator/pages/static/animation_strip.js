@@ -1,0 +1,33 @@
+// One signal over the whole time above the slider, with a line at the moment shown.
+
+const THUMB = 8; // half the width of the slider's thumb: its ends lie so far inside
+
+function drawStrip(canvas, density, runs, states, channel, readout, from, to, t) {
+  const {context: c, width, height} = surface(canvas, density);
+  if (!width || !height) return;
+  const drawn = runs.filter((run) => channel in run.channels);
+  const [low, high] = drawn.reduce((range, run) => extremes(run.channels[channel], range), [0, 0]);
+  const span = high - low || 1;
+  const across = (time) => THUMB + ((time - from) / (to - from || 1)) * (width - 2 * THUMB);
+  const up = (value) => height - 6 - ((value - low) / span) * (height - 26);
+  c.beginPath();
+  c.moveTo(THUMB, up(0));
+  c.lineTo(width - THUMB, up(0));
+  stroke(c, '#ccc', 1, 1);
+  for (const run of drawn) {
+    polyline(c, run.channels.time.map(across), run.channels[channel].map(up), 0, run.channels.time.length - 1);
+    stroke(c, run.colour, 1.6, 1, run.dash);
+  }
+  c.beginPath();
+  c.moveTo(across(t), 16);
+  c.lineTo(across(t), height);
+  stroke(c, INK, 1, 1);
+  const range = [low, high].map((value) => (value * readout.factor).toFixed(readout.decimals)).join(' to ');
+  text(c, `${readout.label}, ${range} ${readout.unit}`, THUMB, 8, {size: 12});
+}
+
+function timeUnder(canvas, event, from, to) {
+  const box = canvas.getBoundingClientRect();
+  const part = (event.clientX - box.left - THUMB) / (box.width - 2 * THUMB);
+  return from + Math.min(Math.max(part, 0), 1) * (to - from);
+}
