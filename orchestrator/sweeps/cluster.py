@@ -165,9 +165,9 @@ def _check_workers(client: Any, address: str) -> int:
             f"--scheduler {address}: its workers cannot run this program; "
             f"is yawbench installed there? ({text})"
         ) from None
-    ours = versions()
+    here = ours()
     for worker, theirs in found.items():
-        differs = [f"{k} {theirs.get(k)} there, {ours[k]} here" for k in ours if theirs.get(k) != ours[k]]
+        differs = [f"{k} {theirs.get(k)} there, {here[k]} here" for k in here if theirs.get(k) != here[k]]
         if differs:
             raise ScenarioError(f"--scheduler {address}: worker {worker} does not fit: {listed(differs)}")
     return threads
@@ -177,6 +177,10 @@ def versions() -> dict[str, str]:
     """Return the versions that must be the same on every worker."""
     python = ".".join(platform.python_version_tuple()[:2])
     return {"Python": python, "yawbench": version("yawbench"), "pythonfmu": version("pythonfmu")}
+
+
+ours = versions
+"""What the workers' versions are compared with."""
 
 
 @contextlib.contextmanager

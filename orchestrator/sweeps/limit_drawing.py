@@ -77,7 +77,7 @@ class Limits(Drawing):
 
     def finish(self, figure: Figure, drawn: Sequence[Axes], left: Sequence[Axes]) -> None:
         self.name_y(left, self.label(self.limit.of))
-        margin = 0.06 * (self._largest - self._smallest)
+        margin = 0.06 * (self._largest - self._smallest) or 1.0
         drawn[0].set_ylim(self._smallest - margin, self._largest + margin)
 
     def handles(self) -> list[Artist]:

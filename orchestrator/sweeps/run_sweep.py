@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from ..errors import ResultsError
 from ..master.simulate import KEPT
 from ..results.formats import RUN_FILE
 from ..results.read import load_results
@@ -79,3 +80,5 @@ def finish(
         told(outcome)
 
     runner(left, done)
+    if any(job.key not in journal.records for job in left):
+        raise ResultsError(f"{journal.folder}: not all runs were made; start the sweep again.")

@@ -1,0 +1,333 @@
+"""Sweeps from the file to the table: processes, failures, kills, resuming, a Dask cluster."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import pyarrow.parquet as pq
+import pytest
+
+from fmus.build import build_all, build_component
+from orchestrator.cli import main
+from orchestrator.errors import ResultsError
+from orchestrator.results.read import load_results
+from orchestrator.sweeps.journal import Journal, Record
+
+UNIT = '''
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from components.core.component import Component
+from components.core.variables import parameter
+
+HERE = Path({folder!r})
+
+
+@dataclass(frozen=True)
+class Levels:
+    level: float = parameter(0.0, "N.m", "What it does")
+
+
+class Moody(Component):
+    """A controller that does what its level says."""
+
+    Parameters = Levels
+    inputs = ("steer_angle",)
+    outputs = ("yaw_moment",)
+    sampled = True
+
+    def advance(self, t, h, u):
+        level = self.p.level
+        if t < 0.045:
+            return
+        if level == 20:
+            raise ValueError("twenty is too much")
+        if level == 30:
+            os.kill(os.getpid(), signal.SIGKILL)
+        if level in (40, 50) and not (HERE / str(int(level))).exists():
+            (HERE / str(int(level))).touch()
+            os.kill(os.getpid(), signal.SIGKILL if level == 40 else signal.SIGTERM)
+        if level >= 60 and (HERE / "slow").exists():
+            if t < 0.055:
+                (HERE / "slow").write_text("it has begun")  # waits for somebody to read
+            time.sleep(0.05)
+
+    def output(self, t, u):
+        return (self.p.level * t,)
+'''
+
+SCENARIO = """
+title: A moody pair
+stop_time: 0.1
+step_size: 0.01
+units:
+  driver: {{fmu: driver_sine, parameters: {{frequency: 2.5, start_time: 0}}}}
+  controller: {{fmu: {controller}}}
+"""
+
+SWEEP = """
+title: Moods
+source: made up
+scenario: pair.yaml
+axes:
+  level: {{vary: controller.level, values: {levels}, says: Level}}
+  amplitude: {{vary: driver.amplitude, from: 1, to: 3, count: {count}, unit: deg}}
+metrics:
+  moment: {{metric: peak(yaw_moment), heading: Largest moment}}
+  steer: {{metric: peak(steer_angle)}}
+limits:
+  calm: {{says: Calm up to, of: level, holds_if: [{{metric: moment, at_most: 3.5 N.m}}]}}
+"""
+
+FIGURES = """
+figures:
+  - {name: curve, kind: curve, metric: moment, x: level, lines: amplitude, mark: 2 N.m}
+  - {name: map, kind: map, metric: moment, x: level, y: amplitude, mark: 2 N.m}
+  - {name: limit, kind: limit, limit: calm, x: amplitude}
+"""
+
+
+@pytest.fixture(scope="module")
+def driver(tmp_path_factory):
+    """A folder with the driver's FMU."""
+    folder = tmp_path_factory.mktemp("fmus")
+    build_all(folder, components=("driver_sine",))
+    return folder
+
+
+@pytest.fixture
+def moods(tmp_path, driver):
+    """Write a sweep over levels; return its file."""
+    (tmp_path / "moody.py").write_text(UNIT.format(folder=str(tmp_path)), encoding="utf-8")
+    fmu = build_component(tmp_path / "moody.py", tmp_path, role="controllers")
+    (tmp_path / "pair.yaml").write_text(SCENARIO.format(controller=fmu.name))
+
+    def make(*levels, count=2):
+        file = tmp_path / "moods.yaml"
+        file.write_text(SWEEP.format(levels=list(levels), count=count))
+        return file
+
+    return make
+
+
+@pytest.fixture
+def yawbench(driver, capfd, tmp_path):
+    """Run a sweep by the command line into a folder; return exit status, stdout and stderr."""
+
+    def run(file, out, *arguments):
+        with pytest.raises(SystemExit) as end:
+            main(["sweep", str(file), "--out", str(tmp_path / out), "--fmus", str(driver), *arguments])
+        told = capfd.readouterr()
+        return end.value.code or 0, told.out, told.err
+
+    return run
+
+
+def rows(folder):
+    return pq.read_table(folder / "sweep.parquet").to_pylist()
+
+
+def journal(folder):
+    return [json.loads(line) for line in (folder / "runs.jsonl").read_text().splitlines()[1:]]
+
+
+def test_one_row_per_run_with_units_and_figures_and_a_page(moods, yawbench, tmp_path):
+    file = moods(10, 40, 60)
+    file.write_text(file.read_text() + FIGURES)
+    status, out, err = yawbench(file, "out")
+    assert status == 0, err
+    table = pq.read_table(tmp_path / "out" / "sweep.parquet")
+    assert table.column_names == [
+        "run", "level", "amplitude", "status", "reason", "moment", "steer", "key",
+    ]  # fmt: skip
+    units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in table.schema}
+    assert units["level"] == units["moment"] == "N.m"
+    assert units["amplitude"] == units["steer"] == "rad"
+    found = table.to_pylist()
+    assert [row["run"] for row in found] == [1, 2, 3, 4, 5, 6]
+    assert [row["moment"] for row in found] == pytest.approx([1, 1, 4, 4, 6, 6])
+    assert [row["steer"] for row in found] == pytest.approx([row["amplitude"] for row in found], rel=1e-9)
+    assert {row["status"] for row in found} == {"completed"}
+    about = json.loads(table.schema.metadata[b"sweep"])
+    assert about["sweep"]["title"] == "Moods"
+    assert len(about["fmus"]) == 2
+    assert "Calm up to [N.m]" in out
+    figures = {path.name for path in (tmp_path / "out" / "figures").iterdir()}
+    assert figures == {f"{name}.{kind}" for name in ("curve", "map", "limit") for kind in ("png", "svg")}
+    page = (tmp_path / "out" / "sweep.md").read_text()
+    assert "# Moods" in page
+    assert "6 runs of `pair.yaml`" in page
+    assert "![curve](figures/curve.png)" in page
+
+
+def test_the_table_is_the_same_to_the_byte_however_many_workers(moods, yawbench, tmp_path):
+    file = moods(5, 10, 20, 60, count=3)
+    for workers in ("1", "2", "3"):
+        assert yawbench(file, workers, "--jobs", workers)[0] == 1  # level 20 fails
+    tables = {(tmp_path / workers / "sweep.parquet").read_bytes() for workers in "123"}
+    assert len(tables) == 1
+
+
+def test_a_run_that_fails_is_a_row_with_its_reason_and_is_not_made_again(moods, yawbench, tmp_path):
+    file = moods(10, 20)
+    status, _, err = yawbench(file, "out")
+    assert status == 1
+    failed = [row for row in rows(tmp_path / "out") if row["status"] == "failed"]
+    assert [row["level"] for row in failed] == [20, 20]
+    assert failed[0]["moment"] is None
+    assert failed[0]["reason"].startswith(
+        "controller: step failed at t = 0.05 s: ValueError: twenty is too much"
+    )
+    assert "level 20 N.m, amplitude 1 deg failed: controller: step failed" in err
+    assert "Runs that failed" in (tmp_path / "out" / "sweep.md").read_text()
+    before = (tmp_path / "out" / "runs.jsonl").read_bytes()
+    table = (tmp_path / "out" / "sweep.parquet").read_bytes()
+    status, _, err = yawbench(file, "out")
+    assert status == 1
+    assert "all finished before" in err
+    assert (tmp_path / "out" / "runs.jsonl").read_bytes() == before
+    assert (tmp_path / "out" / "sweep.parquet").read_bytes() == table
+
+
+@pytest.mark.parametrize("level", [40, 50])
+def test_a_run_whose_process_is_killed_is_made_again(level, moods, yawbench, tmp_path):
+    status, _, err = yawbench(moods(10, level, count=2), "out", "--jobs", "1")
+    assert status == 0, err
+    assert (tmp_path / str(level)).exists()  # it was killed
+    assert [row["moment"] for row in rows(tmp_path / "out")] == pytest.approx([1, 1, level / 10, level / 10])
+
+
+def test_a_run_that_kills_its_process_every_time_is_named_and_tried_again_next_time(
+    moods, yawbench, tmp_path
+):
+    file = moods(10, 30)
+    assert yawbench(file, "out")[0] == 1
+    found = rows(tmp_path / "out")
+    assert [row["status"] for row in found] == ["completed"] * 2 + ["failed"] * 2
+    assert found[2]["reason"] == "the process of this run died of signal SIGKILL"
+    assert len(journal(tmp_path / "out")) == 2
+    assert "4 runs, 2 finished before" in yawbench(file, "out")[2]
+
+
+def test_more_levels_add_runs_and_repeat_none(moods, yawbench, tmp_path):
+    yawbench(moods(10), "out")
+    assert "4 runs, 2 finished before" in yawbench(moods(10, 15), "out")[2]
+    assert len({entry["key"] for entry in journal(tmp_path / "out")}) == len(journal(tmp_path / "out")) == 4
+    yawbench(moods(10, 15), "anew")
+    assert rows(tmp_path / "out") == rows(tmp_path / "anew")
+
+
+def test_fresh_makes_all_runs_again(moods, yawbench, tmp_path):
+    file = moods(10)
+    yawbench(file, "out")
+    assert "finished before" not in yawbench(file, "out", "--fresh")[2]
+    assert len(journal(tmp_path / "out")) == 2
+
+
+def test_kept_results_can_be_loaded_in_every_format_and_are_made_once(moods, yawbench, tmp_path):
+    file = moods(10)
+    yawbench(file, "out")
+    assert not (tmp_path / "out" / "runs").exists()
+    assert "finished before" not in yawbench(file, "out", "--keep", "--format", "parquet")[2]
+    results = load_results(tmp_path / "out" / "runs" / "2")
+    assert results.file.name == "results.parquet"
+    assert results["controller.yaw_moment"][-1] == pytest.approx(1.0)
+    assert "all finished before" in yawbench(file, "out", "--keep")[2]
+
+
+def interrupted(file, out, driver, tmp_path, number):
+    """Start a sweep in a process, stop it by a signal once its slow runs have begun; return its stderr."""
+    os.mkfifo(tmp_path / "slow")
+    command = [sys.executable, "-m", "orchestrator.cli", "sweep", str(file), "--out", str(tmp_path / out)]
+    process = subprocess.Popen(
+        [*command, "--fmus", str(driver), "--jobs", "1"], stderr=subprocess.PIPE, text=True
+    )
+    assert (tmp_path / "slow").read_text() == "it has begun"
+    process.send_signal(number)
+    told = process.communicate()[1]
+    (tmp_path / "slow").unlink()
+    return process.returncode, told
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_a_sweep_that_was_stopped_goes_on_where_it_was(number, moods, yawbench, driver, tmp_path):
+    file = moods(5, 10, 60, 70)
+    status, told = interrupted(file, "out", driver, tmp_path, number)
+    assert status == (-number if number == signal.SIGKILL else 1)
+    if number != signal.SIGKILL:
+        assert f"Interrupted; what was recorded until then: {tmp_path / 'out'}" in told
+    before = journal(tmp_path / "out")
+    assert len(before) == 4
+    status, _, told = yawbench(file, "out")
+    assert status == 0
+    assert "8 runs, 4 finished before" in told
+    after = journal(tmp_path / "out")
+    assert after[:4] == before
+    assert len({entry["key"] for entry in after}) == len(after) == 8
+    yawbench(file, "whole")
+    assert (tmp_path / "out" / "sweep.parquet").read_bytes() == (
+        tmp_path / "whole" / "sweep.parquet"
+    ).read_bytes()
+
+
+def test_a_folder_of_another_sweep_is_refused(moods, yawbench, tmp_path):
+    file = moods(10)
+    yawbench(file, "out")
+    other = file.with_name("other.yaml")
+    other.write_text(file.read_text())
+    status, _, err = yawbench(other, "out")
+    assert status == 2
+    assert f"{tmp_path / 'out'}: holds the sweep of {tmp_path.name}/moods.yaml; give another folder" in err
+    assert yawbench(other, "out", "--fresh")[0] == 0
+
+
+def test_two_sweeps_cannot_write_into_one_folder(tmp_path):
+    first = Journal(tmp_path, "a/b.yaml")
+    with pytest.raises(ResultsError, match="another sweep is running here"):
+        Journal(tmp_path, "a/b.yaml")
+    first.close()
+    Journal(tmp_path, "a/b.yaml").close()
+
+
+def test_a_line_that_a_kill_has_cut_off_is_dropped(tmp_path):
+    first = Journal(tmp_path, "a/b.yaml")
+    first.add("one", Record({"x": (float("inf"), "s"), "y": None, "z": (0.1, "m")}))
+    first.add("two", Record({}, ("plant: step failed", "and more")))
+    first.close()
+    with (tmp_path / "runs.jsonl").open("ab") as stream:
+        stream.write(b'{"key": "three", "val')
+    again = Journal(tmp_path, "a/b.yaml")
+    assert again.records == first.records
+    again.add("three", Record({"x": (1.0, "s")}))
+    again.close()
+    last = Journal(tmp_path, "a/b.yaml")
+    assert list(last.records) == ["one", "two", "three"]
+    last.close()
+
+
+def test_a_damaged_journal_is_one_sentence(tmp_path):
+    Journal(tmp_path, "a/b.yaml").close()
+    with (tmp_path / "runs.jsonl").open("ab") as stream:
+        stream.write(b"nonsense\n")
+    with pytest.raises(
+        ResultsError, match=r"runs\.jsonl: line 2 is damaged; --fresh begins the sweep anew\.$"
+    ):
+        Journal(tmp_path, "a/b.yaml")
+
+
+def test_a_sweep_file_that_is_wrong_makes_no_run(moods, yawbench, tmp_path):
+    file = moods(10)
+    file.write_text(file.read_text().replace("controller.level", "controller.levle"))
+    status, _, err = yawbench(file, "out")
+    assert status == 2
+    assert len(err.splitlines()) == 1
+    assert "axes.level: --set controller.levle=10: " in err
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,109 @@
+"""Sweeps on a Dask cluster whose workers are processes of this machine."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+
+import pytest
+
+from orchestrator.cli import main
+from orchestrator.sweeps.planning import plan_sweep
+from orchestrator.sweeps.run_sweep import left_to_do
+from orchestrator.sweeps.sweep_file import load_sweep
+
+from .test_sweep import driver, moods, rows, yawbench  # noqa: F401
+
+distributed = pytest.importorskip("distributed")
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """A scheduler and two workers, each a process."""
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+    ) as made:
+        yield made
+
+
+def test_a_cluster_gives_the_table_of_this_machine_to_the_byte(moods, yawbench, cluster, tmp_path):  # noqa: F811
+    file = moods(5, 10, 20, 60, count=4)
+    yawbench(file, "here")
+    status, _, err = yawbench(file, "there", "--scheduler", cluster.scheduler_address)
+    assert status == 1, err  # level 20 fails
+    assert "16 runs\n" in err
+    assert (tmp_path / "here" / "sweep.parquet").read_bytes() == (
+        tmp_path / "there" / "sweep.parquet"
+    ).read_bytes()
+    assert "all finished before" in yawbench(file, "there", "--scheduler", cluster.scheduler_address)[2]
+
+
+def test_a_run_that_kills_its_process_leaves_the_workers_alone(moods, yawbench, cluster, tmp_path):  # noqa: F811
+    client = distributed.Client(cluster)
+    before = client.run(os.getpid)
+    status, _, err = yawbench(moods(10, 30, 40), "out", "--scheduler", cluster.scheduler_address)
+    assert status == 1, err
+    assert [row["status"] for row in rows(tmp_path / "out")] == ["completed"] * 2 + ["failed"] * 2 + [
+        "completed"
+    ] * 2
+    assert client.run(os.getpid) == before
+    client.close()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
+def test_a_worker_that_is_killed_costs_no_run(moods, driver, cluster, tmp_path):  # noqa: F811
+    from orchestrator.sweeps.cluster import run_on_cluster
+
+    planned = plan_sweep(load_sweep(moods(1, 2, 3, 4, 5, 6)), tmp_path / "runs", driver)
+    told = []
+
+    def done(outcome):
+        if not told:
+            client = distributed.Client(cluster, set_as_default=False)
+            os.kill(min(client.run(os.getpid).values()), signal.SIGKILL)
+            client.close()
+        told.append(outcome)
+
+    left = left_to_do(planned, {})
+    run_on_cluster(left, done, scheduler=cluster.scheduler_address, fmus=planned.fmus)
+    assert sorted(outcome.job.key for outcome in told) == sorted(job.key for job in left)
+    assert all(outcome.ok for outcome in told)
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense"])
+def test_a_scheduler_that_does_not_answer_is_one_sentence(address, moods, yawbench, tmp_path, monkeypatch):  # noqa: F811
+    monkeypatch.setattr("orchestrator.sweeps.cluster.TIMEOUT", 0.5)
+    status, _, err = yawbench(moods(10), "out", "--scheduler", address)
+    assert status == 2
+    assert f"--scheduler {address}: no Dask scheduler answers there within 0.5 s" in err.splitlines()[-1]
+    assert "Traceback" not in err
+
+
+def test_a_scheduler_without_workers_is_one_sentence(moods, yawbench, tmp_path):  # noqa: F811
+    with distributed.LocalCluster(n_workers=0, dashboard_address=None, silence_logs=50) as empty:
+        status, _, err = yawbench(moods(10), "out", "--scheduler", empty.scheduler_address)
+    assert status == 2
+    assert err.splitlines()[-1] == f"--scheduler {empty.scheduler_address}: this scheduler has no workers"
+
+
+def test_workers_of_another_version_are_refused(moods, yawbench, cluster, monkeypatch):  # noqa: F811
+    from orchestrator.sweeps import cluster as module
+
+    ours = {**module.versions(), "yawbench": "99.0"}
+    monkeypatch.setattr(module, "ours", lambda: ours)
+    status, _, err = yawbench(moods(10), "out", "--scheduler", cluster.scheduler_address)
+    assert status == 2
+    assert "does not fit: yawbench 0.1.0 there, 99.0 here" in err.splitlines()[-1]
+
+
+def test_without_its_package_the_option_says_how_to_get_it(moods, driver, capsys, tmp_path, monkeypatch):  # noqa: F811
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    monkeypatch.delitem(sys.modules, "orchestrator.sweeps.cluster", raising=False)
+    arguments = ["--fmus", str(driver), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:9"]
+    with pytest.raises(SystemExit) as end:
+        main(["sweep", str(moods(10)), *arguments])
+    assert end.value.code == 2
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        "--scheduler needs the package distributed: pip install 'yawbench[cluster]'"
+    )
