@@ -13,7 +13,9 @@ def page() -> str:
     for name, m in measures.MEASURES.items():
         formula = m.formula.replace("{x_ref}", "x_ref").replace("{x}", "x")
         unit = "of the signal" if m.unit == "{x}" else m.unit.replace("{x}", "unit")
-        rows.append((code(name), code(formula), cell(m.definition), cell(unit), "yes" if m.needs_reference else ""))
+        rows.append(
+            (code(name), code(formula), cell(m.definition), cell(unit), "yes" if m.needs_reference else "")
+        )
     standard = []
     for name in run_metrics.STANDARD:
         metric = run_metrics.metric(name)

@@ -23,7 +23,9 @@ EXAMPLE = Path(__file__).resolve().parents[2] / "scenarios" / "fnn_sideslip" / "
 
 def scenario_page() -> str:
     """Return the page of scenario files and vehicle files."""
-    example = f"## An example\n\n`scenarios/fnn_sideslip/25mps.yaml`:\n\n```yaml\n{EXAMPLE.read_text('utf-8')}```"
+    example = (
+        f"## An example\n\n`scenarios/fnn_sideslip/25mps.yaml`:\n\n```yaml\n{EXAMPLE.read_text('utf-8')}```"
+    )
     return _page("Scenario files", scenario, [scenario.Scenario, scenario.Vehicle], example)
 
 
@@ -80,7 +82,13 @@ def _default(field: FieldInfo) -> str:
     return "" if value is None or value in ("", {}, []) else code(str(value))
 
 
-_WORDS = {str: "text", int: "whole number", float: "number", bool: "true or false", Fraction: "time: s, or with its unit"}
+_WORDS = {
+    str: "text",
+    int: "whole number",
+    float: "number",
+    bool: "true or false",
+    Fraction: "time: s, or with its unit",
+}
 
 
 def _kind(annotation: Any, models: list[type[BaseModel]]) -> str:

@@ -49,7 +49,7 @@ def _unit(name: str, folder: str, file: str) -> str:
     with zipfile.ZipFile(path) as archive:
         source = _source(archive, folder, file)
     if source:
-        parts.append(f"??? note \"The model\"\n\n{_indented(docstring(source))}")
+        parts.append(f'??? note "The model"\n\n{_indented(docstring(source))}')
     follows = {u.variable.name: [d.name for d in u.dependencies or ()] for u in description.outputs}
     parts.append(_signals("input", variables, {}))
     parts.append(_signals("output", variables, follows))
@@ -88,7 +88,9 @@ def _parameters(parameters: list[Any]) -> str:
         limits = [f"≥ {_number(v.min)}"] if v.min is not None else []
         limits += [f"≤ {_number(v.max)}"] if v.max is not None else []
         value = _number(v.start) if v.type == "Real" else str(v.start)
-        rows.append((code(v.name), code(value), code(v.unit or ""), ", ".join(limits), cell(v.description or "")))
+        rows.append(
+            (code(v.name), code(value), code(v.unit or ""), ", ".join(limits), cell(v.description or ""))
+        )
     return table(("parameter", "default", "unit", "allowed", "meaning and origin"), rows)
 
 
