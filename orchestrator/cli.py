@@ -6,6 +6,8 @@ import importlib
 import io
 import os
 import sys
+from importlib.metadata import version
+from typing import Annotated
 
 import typer
 
@@ -31,17 +33,32 @@ COMMANDS = (
 def _application() -> typer.Typer:
     app = typer.Typer(
         name="yawbench",
-        help="A test bench for vehicle yaw-stability control made of FMI units.",
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
     )
+    app.callback()(_options)
     for name in COMMANDS:
         function = name.replace("-", "_")
         module = importlib.import_module(f".commands.{function}", __package__)
         app.command(name)(getattr(module, function))
     return app
+
+
+def _tell_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"yawbench {version('yawbench')}")
+        raise typer.Exit
+
+
+def _options(
+    _: Annotated[
+        bool,
+        typer.Option("--version", callback=_tell_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    """A test bench for vehicle yaw-stability control made of FMI units."""
 
 
 def main(arguments: list[str] | None = None) -> None:

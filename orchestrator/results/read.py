@@ -109,7 +109,12 @@ def load_results(folder: Path | str) -> Results:
             f"{folder}: no results here, {RUN_FILE} is missing; "
             f"make them with 'yawbench run SCENARIO --out {folder}'."
         ) from None
-    except (OSError, ValueError) as error:
+    except NotADirectoryError:
+        holds = f", {folder.parent}" if folder.name in (RUN_FILE, *FILES.values()) else ""
+        raise ResultsError(f"{folder}: is a file; name the folder that holds the results{holds}.") from None
+    except OSError as error:
+        raise ResultsError(f"{run_file}: cannot be read: {error.strerror or error}.") from None
+    except ValueError as error:
         raise ResultsError(f"{run_file}: cannot be read: {error}") from None
     if not isinstance(run, dict):
         raise ResultsError(f"{run_file}: is not the record of a run.")

@@ -80,8 +80,8 @@ def _choices(swaps: Sequence[str]) -> dict[str, list[str]]:
         names = [fmus] if Path(fmus).is_file() else [name.strip() for name in fmus.split(",")]
         if not (unit.strip() and equals and all(names)):
             raise ScenarioError(f"--swap {text}: write --swap UNIT=FMU or --swap UNIT=FMU,FMU,...")
-        known = choices.setdefault(unit.strip(), [])
-        known += [name for name in names if name not in known]
+        known = choices.get(unit.strip(), [])
+        choices[unit.strip()] = list(dict.fromkeys([*known, *names]))
     return choices
 
 

@@ -233,6 +233,11 @@ def test_plot_says_what_is_wrong(yawbench, folder):
     assert status == 2
     assert said.startswith("nowhere: no results here")
     yawbench("study", "study.yaml", "--out", "o")
+    status, _, said = yawbench("plot", "o/off/results.csv")
+    assert status == 2
+    assert said == "o/off/results.csv: is a file; name the folder that holds the results, o/off.\n"
+    status, _, said = yawbench("plot", "half.yaml")
+    assert (status, said) == (2, "half.yaml: is a file; name the folder that holds the results.\n")
     status, _, said = yawbench("plot", "o/off", "--panel", "roll_angle")
     assert (status, said) == (2, "o/off: nothing to draw, no run recorded any of roll_angle.\n")
     status, _, said = yawbench("plot", "o/off", "--label", "a", "--label", "b")

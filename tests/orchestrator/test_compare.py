@@ -46,6 +46,13 @@ def test_a_repeated_option_adds_to_the_list(scenario):
     assert labels(scenario, "controller=a", "controller=b", "controller=a") == ["a", "b"]
 
 
+def test_an_fmu_named_twice_runs_once(scenario):
+    assert labels(scenario, "controller=a,b,a") == ["a", "b"]
+    assert labels(scenario, "controller=controller_off,controller_off") == labels(
+        scenario, "controller=controller_off"
+    )
+
+
 def test_one_fmu_alone_is_compared_with_the_scenarios_own(scenario):
     assert labels(scenario, "controller=controller_off") == ["controller_fnn", "controller_off"]
     jobs = variants(scenario, ["tyre=tyre_linear"], (), Path("out"), None)
