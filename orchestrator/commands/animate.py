@@ -36,8 +36,11 @@ def animate(folders: Folders, label: Labels = None, out: Page = None) -> None:
     if label and len(label) != len(folders):
         raise ScenarioError(f"--label: needs one for each run ({len(label)} for {len(folders)} given)")
     runs = list(zip(label or distinct(folders), map(load_results, folders), strict=True))
-    titles = dict.fromkeys(str(results.run.get("title") or name) for name, results in runs)
-    text = page(runs, title=" / ".join(titles))
+    titles = [str(results.run.get("title") or name) for name, results in runs]
+    if len(runs) == 1:
+        text = page(runs, title=titles[0])
+    else:
+        text = page(runs, below="; ".join(dict.fromkeys(titles)))
     target = folders[0]
     if len(folders) > 1:
         target = Path(os.path.commonpath([folder.absolute().parent for folder in folders]))

@@ -43,13 +43,13 @@ MOST = 2
 Runs = Sequence[tuple[str, Results]]
 
 
-def fragment(runs: Runs, *, title: str = "", autoplay: bool = False) -> Markup:
-    """Return the animation of one or two runs (label, results) as a part of a page.
+def fragment(runs: Runs, *, title: str = "") -> Markup:
+    """Return the animation of one or two runs (label, results) as a part of a page; it waits to be played.
 
     Raises:
         ResultsError: a run's position or yaw angle was not recorded.
     """
-    return Markup(_render("animation.html.j2", **_facts(runs, title, autoplay)))
+    return Markup(_render("animation.html.j2", **_facts(runs, title)))
 
 
 def assets() -> Markup:
@@ -61,24 +61,49 @@ def assets() -> Markup:
     return Markup(f"<style>\n{style}</style>\n<script>\n(() => {{\n'use strict';\n{script}}})();\n</script>")
 
 
-def page(runs: Runs, *, title: str) -> str:
-    """Return a page of its own; it plays by itself unless the reader has asked for less motion."""
-    return _render("animation_page.html.j2", assets=assets(), **_facts(runs, title, True))
+def page(runs: Runs, *, title: str = "", below: str = "") -> str:
+    """Return a page of its own; it plays by itself unless the reader has asked for less motion.
+
+    Args:
+        runs: one or two (label, results).
+        title: of the page; default: the labels.
+        below: a line under the title.
+
+    Raises:
+        ResultsError: a run's position or yaw angle was not recorded.
+    """
+    return _render("animation_page.html.j2", assets=assets(), below=below, **_facts(runs, title, alone=True))
 
 
-def _facts(runs: Runs, title: str, autoplay: bool) -> dict[str, Any]:
+def _facts(runs: Runs, title: str, *, alone: bool = False) -> dict[str, Any]:
     if not 1 <= len(runs) <= MOST:
         raise ResultsError(f"an animation shows one or two runs, not {len(runs)}.")
     shown = [(label, frames_of(results)) for label, results in runs]
-    data = {"autoplay": autoplay, **data_of(shown)}
-    return {"title": title or " and ".join(label for label, _ in shown), "data": data}
+    data = {"alone": alone, **data_of(shown)}
+    names = " and ".join(label for label, _ in shown)
+    return {"title": title or names, "data": data, "key": _key([frames for _, frames in shown])}
+
+
+def _key(runs: Sequence[Frames]) -> str:
+    """Return what the signs of the drawing mean, those that are drawn."""
+    drawn = {name for frames in runs for name in frames.channels}
+    signs = (
+        ("path_y", "grey dashes: the path the driver follows"),
+        ("grip_fl", "circles: friction times load"),
+        ("force_x_fl", "black arrows: tyre forces" + (", in % of it" if "grip_fl" in drawn else "")),
+        ("sideslip", "arrow from the centre of mass: where it moves"),
+        ("yaw_moment", "grey arc: yaw moment asked for"),
+    )
+    key = "; ".join(sign for name, sign in signs if name in drawn)
+    return f"{key[:1].upper()}{key[1:]}." if key else ""
 
 
 def data_of(runs: Sequence[tuple[str, Frames]]) -> dict[str, Any]:
     """Return what the script draws: see `animation_frames.js` for how it is read."""
     every = [frames for _, frames in runs]
+    end = max(frames.channels["time"][-1] for frames in every)
     return {
-        "runs": [_run(number, label, frames) for number, (label, frames) in enumerate(runs)],
+        "runs": [_run(number, label, frames, end) for number, (label, frames) in enumerate(runs)],
         "still": still_of(every),
         "metres_per_newton": force_scale(every),
         "readouts": [
@@ -91,7 +116,10 @@ def data_of(runs: Sequence[tuple[str, Frames]]) -> dict[str, Any]:
     }
 
 
-def _run(number: int, label: str, frames: Frames) -> dict[str, Any]:
+def _run(number: int, label: str, frames: Frames, end: float) -> dict[str, Any]:
+    """Return one run; `end` [s] is that of the longest."""
+    last = frames.channels["time"][-1]
+    early = [f"this run ends at {last:.2f} s"] if last < end - 1e-6 and not frames.failed else []
     style = line_style(number)
     dash = style["linestyle"][1] if isinstance(style["linestyle"], tuple) else ()
     return {
@@ -100,7 +128,7 @@ def _run(number: int, label: str, frames: Frames) -> dict[str, Any]:
         "dash": list(dash),
         "car": asdict(frames.car),
         "lanes": [list(lane) for lane in frames.lanes],
-        "notes": list(frames.notes),
+        "notes": [*frames.notes, *early],
         "channels": {name: packed(values) for name, values in frames.channels.items()},
     }
 

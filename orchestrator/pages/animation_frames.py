@@ -53,6 +53,7 @@ class Frames:
     channels: dict[str, np.ndarray]
     lanes: tuple[Lane, ...]
     notes: tuple[str, ...]  # what could not be drawn
+    failed: bool = False
 
 
 def frames_of(results: Results) -> Frames:
@@ -84,7 +85,9 @@ def frames_of(results: Results) -> Frames:
     car, known = _car(results)
     if not known:
         notes.append("the plant tells no sizes: a mid-size car is drawn")
-    return Frames(car, channels | forces | grip, tuple(_lanes(results)), tuple(notes))
+    if failed := results.run.get("status", "completed") != "completed":
+        notes.append(f"the run did not end as planned; shown until {time[-1]:.2f} s")
+    return Frames(car, channels | forces | grip, tuple(_lanes(results)), tuple(notes), failed)
 
 
 def thinned(time: np.ndarray, most: int = FRAMES) -> np.ndarray:

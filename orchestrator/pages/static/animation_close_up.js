@@ -9,12 +9,12 @@ function drawCloseUp(canvas, density, run, number, state, scale, strongest) {
   const {context: c, width, height} = surface(canvas, density);
   if (!width || !height) return;
   const car = run.car;
-  const reach = Math.max(0.6 * car.track, 0.7);
+  const reach = Math.max(run.widest * scale, 0.55 * car.track);
   const front = Math.max(car.front_end, car.front_axle + reach);
   const rear = Math.max(car.rear_end, car.rear_axle + reach);
-  const zoom = Math.min(width / (car.track + 2 * reach + 0.1), (height - 40) / (front + rear));
+  const zoom = Math.min(width / (car.track + 2 * reach + 0.1), (height - 60) / (front + rear));
   const px = 1 / zoom;
-  const middle = 8 + front * zoom;
+  const middle = 18 + front * zoom;
   const onPage = (x, y) => [width / 2 - y * zoom, middle - x * zoom];
   c.save();
   c.translate(width / 2, middle);
@@ -30,12 +30,9 @@ function drawCloseUp(canvas, density, run, number, state, scale, strongest) {
   if ('grip_fl' in state && 'force_x_fl' in state) {
     for (const [name, [x, y]] of Object.entries(wheelsOf(car))) {
       const share = utilisation(state, name);
-      const [across] = onPage(x, y);
-      const out = x > 0 ? x + reach * 0.72 : x - reach * 0.72;
-      if (share >= 0) {
-        text(c, `${(100 * share).toFixed(0)} %`, across + (y > 0 ? -0.42 : 0.42) * reach * zoom, onPage(out, 0)[1],
-          {align: 'center', colour: INK, size: 13});
-      }
+      if (!(share >= 0)) continue;
+      const [across, down] = onPage(x + Math.sign(x) * reach, y + Math.sign(y) * 0.3 * reach);
+      text(c, `${(100 * share).toFixed(0)} %`, across, down - 8 * Math.sign(x), {align: 'center', colour: INK, size: 13});
     }
   }
   if (scale > 0) {

@@ -13,7 +13,8 @@ function unpackRun(run) {
   const channels = {};
   for (const [name, text] of Object.entries(run.channels)) channels[name] = unpack(text);
   const time = channels.time;
-  return {...run, channels, start: time[0], end: time[time.length - 1]};
+  const grips = WHEELS.map((wheel) => extremes(channels['grip_' + wheel] || [0])[1]);
+  return {...run, channels, start: time[0], end: time[time.length - 1], widest: Math.max(...grips)};
 }
 
 // Index of the last moment at or before t, and how far t is on the way to the next.
@@ -47,6 +48,11 @@ function wheelsOf(car) {
     fl: [car.front_axle, half], fr: [car.front_axle, -half],
     rl: [-car.rear_axle, half], rr: [-car.rear_axle, -half],
   };
+}
+
+function decimal(value, decimals) {
+  const shown = value.toFixed(decimals);
+  return Number(shown) === 0 ? shown.replace('-', '') : shown.replace('-', '−');
 }
 
 function extremes(values, from = [Infinity, -Infinity]) {

@@ -27,7 +27,7 @@ class Player {
     this.listen(find);
     this.draw();
     const calm = window.matchMedia('(prefers-reduced-motion: reduce)').matches;
-    if (data.autoplay && !calm) this.play();
+    if (data.alone && !calm) this.play();
   }
 
   listen(find) {
@@ -52,7 +52,8 @@ class Player {
     strip.addEventListener('pointermove', (event) => {
       if (strip.hasPointerCapture(event.pointerId)) this.seek(timeUnder(strip, event, this.start, this.end));
     });
-    this.root.addEventListener('keydown', (event) => this.key(event));
+    const keys = this.data.alone ? document : this.root;
+    keys.addEventListener('keydown', (event) => this.key(event));
     new ResizeObserver(() => this.draw()).observe(this.root);
     window.addEventListener('beforeprint', () => { this.pause(); this.draw(3); });
     window.addEventListener('afterprint', () => this.draw());
@@ -135,9 +136,8 @@ class Player {
     this.slider.setAttribute('aria-valuetext', words);
     this.data.readouts.forEach(({channel, factor, decimals}, row) => {
       this.states.forEach((state, i) => {
-        const value = (state[channel] * factor).toFixed(decimals);
-        const shown = Number.isFinite(state[channel]) ? value.replace(/^-(0\.?0*)$/, '$1').replace('-', '−') : '–';
-        this.cells[row][i].textContent = shown;
+        const value = state[channel];
+        this.cells[row][i].textContent = Number.isFinite(value) ? decimal(value * factor, decimals) : '–';
       });
     });
   }

@@ -26,7 +26,7 @@ function look(view, runs, states, width, height) {
   }
   const xs = extremes(states.map((state) => state.x));
   const ys = extremes(states.map((state) => state.y));
-  const fits = Math.min(width / (xs[1] - xs[0] + 10), height / (ys[1] - ys[0] + 8));
+  const fits = Math.min((width - 100) / (xs[1] - xs[0]), (height - 100) / (ys[1] - ys[0]));
   return {x: (xs[0] + xs[1]) / 2, y: (ys[0] + ys[1]) / 2, scale: Math.min(usual, fits)};
 }
 
@@ -53,11 +53,11 @@ function gridWords(c, eye, step, width, height) {
   const up = height / 2 / eye.scale;
   for (let x = Math.ceil((eye.x - across) / step) * step; x <= eye.x + across; x += step) {
     const at = width / 2 + (x - eye.x) * eye.scale;
-    if (at > 60 && at < width - 24) text(c, `${+x.toFixed(3)} m`, at, height - 10, {align: 'center', size: 11});
+    if (at > 60 && at < width - 24) text(c, `${decimal(x, 0)} m`, at, height - 10, {align: 'center', size: 11});
   }
   for (let y = Math.ceil((eye.y - up) / step) * step; y <= eye.y + up; y += step) {
     const at = height / 2 - (y - eye.y) * eye.scale;
-    if (at > 14 && at < height - 24) text(c, `${+y.toFixed(3)} m`, 6, at, {size: 11});
+    if (at > 14 && at < height - 24) text(c, `${decimal(y, 0)} m`, 6, at, {size: 11});
   }
 }
 

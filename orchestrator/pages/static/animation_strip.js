@@ -22,7 +22,7 @@ function drawStrip(canvas, density, runs, states, channel, readout, from, to, t)
   c.moveTo(across(t), 16);
   c.lineTo(across(t), height);
   stroke(c, INK, 1, 1);
-  const range = [low, high].map((value) => (value * readout.factor).toFixed(readout.decimals)).join(' to ');
+  const range = [low, high].map((value) => decimal(value * readout.factor, readout.decimals)).join(' to ');
   text(c, `${readout.label}, ${range} ${readout.unit}`, THUMB, 8, {size: 12});
 }
 
