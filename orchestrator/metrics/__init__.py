@@ -1,1 +1,5 @@
 """Stage five: what a run is judged by."""
+
+from .measures import Entry, catalogue
+
+__all__ = ["Entry", "catalogue"]

@@ -1,7 +1,8 @@
 """The table of measures: a number for a signal, or for a signal and its reference.
 
 All functions take time `t` [s] and samples of equal shape (n,), n >= 2, in SI units, and give SI
-units. Integrals are taken by the trapezoidal rule, so uneven samples are right too.
+units. Integrals are taken by the trapezoidal rule, so uneven samples are right too. Measures of the
+phase plane take the signal and its rate: the recorded one, else the difference quotient.
 """
 
 from __future__ import annotations
@@ -14,6 +15,16 @@ import numpy as np
 
 SETTLING_BAND = 0.05
 """Half-width of the band a settled signal stays in, relative to the reference's peak."""
+
+RETURN_RATE = 4.0
+"""Slope of the lines that bound the stable strip in the plane of sideslip and its rate [1/s]."""
+BOUNDARY = math.radians(24.0)
+"""Sideslip rate at which these lines cross the axis [rad/s].
+
+The strip |B1 beta + B2 dbeta/dt| < 1 is that of He, Crolla, Levesley, Manning, Coordination of active
+steering, driveline, and braking for integrated vehicle dynamics, Proc. IMechE D 220 (2006). Chosen:
+B1 = 4/24 and B2 = 1/24 s per degree, values in common use; they are not measured on these cars.
+"""
 
 
 def integral(t: np.ndarray, x: np.ndarray) -> float:
@@ -108,6 +119,27 @@ def slope_variation_rate(t: np.ndarray, x: np.ndarray) -> float:
     return float(np.sum(np.abs(np.diff(np.diff(x) / np.diff(t))))) / float(t[-1] - t[0])
 
 
+def rms(t: np.ndarray, x: np.ndarray) -> float:
+    """Return the root of the mean square over time."""
+    return rms_error(t, x, np.zeros_like(x))
+
+
+def phase_area(t: np.ndarray, x: np.ndarray, x_rate: np.ndarray) -> float:
+    """Return the area that closed loops of (x, dx/dt) enclose: the integral of dx/dt over x, by time."""
+    return integral(t, x_rate**2)
+
+
+def stability_index(t: np.ndarray, x: np.ndarray, x_rate: np.ndarray) -> float:
+    """Return how far the sideslip leaves the stable strip of the phase plane; up to 1 it is inside."""
+    return float(np.max(np.abs(x_rate + RETURN_RATE * x))) / BOUNDARY
+
+
+def time_beyond(t: np.ndarray, x: np.ndarray, x_rate: np.ndarray) -> float:
+    """Return the share of the time that the sideslip is outside the stable strip, by whole samples."""
+    outside = np.abs(x_rate + RETURN_RATE * x) > BOUNDARY
+    return float(np.sum(np.diff(t)[outside[:-1]])) / float(t[-1] - t[0])
+
+
 @dataclass(frozen=True)
 class Measure:
     """A row of the table of measures."""
@@ -117,6 +149,8 @@ class Measure:
     definition: str
     unit: str  # "{x}" the signal's, "{x}/s" per second, "%" a ratio shown in per cent, or a unit
     needs_reference: bool = False
+    needs_rate: bool = False
+    signal_unit: str | None = None  # the only unit of a signal that it means anything for
 
 
 MEASURES: dict[str, Measure] = {
@@ -174,5 +208,63 @@ MEASURES: dict[str, Measure] = {
         "chatter of the rate: total variation per second of dx/dt",
         "{x}/s2",
     ),
+    "rms": Measure(rms, "√(1/T ∫{x}² dt)", "root mean square", "{x}"),
+    "phase_area": Measure(
+        phase_area,
+        "∫(d{x}/dt)² dt",
+        "phase plane: area that loops of the signal and its rate enclose",
+        "{x}2/s",
+        needs_rate=True,
+    ),
+    "stability_index": Measure(
+        stability_index,
+        "max|d{x}/dt + 4 {x}/s| / (24 °/s)",
+        "phase plane: largest distance from the middle of the stable strip; 1 is its edge",
+        "1",
+        needs_rate=True,
+        signal_unit="rad",
+    ),
+    "time_beyond": Measure(
+        time_beyond,
+        "share of T with |d{x}/dt + 4 {x}/s| > 24 °/s",
+        "phase plane: share of the time outside the stable strip",
+        "%",
+        needs_rate=True,
+        signal_unit="rad",
+    ),
 }
 """All measures, the one table that definitions and units are taken from."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A measure as a table of the documentation shows it."""
+
+    name: str
+    definition: str
+    formula: str  # of x, its reference x_ref, its duration T
+    unit: str  # in words: "of the signal", "of the signal, per s"
+    needs: str  # what it takes beside the signal, in words
+
+
+_UNITS = {
+    "{x}": "of the signal",
+    "{x}/s": "of the signal, per s",
+    "{x}/s2": "of the signal, per s2",
+    "{x}.s": "of the signal, times s",
+    "{x}2/s": "of the signal squared, per s",
+}
+
+
+def catalogue() -> list[Entry]:
+    """Return all measures with their definitions, formulas and units."""
+    return [
+        Entry(
+            name,
+            one.definition,
+            one.formula.replace("{x_ref}", "x_ref").replace("{x}", "x"),
+            _UNITS.get(one.unit, one.unit),
+            "a reference" if one.needs_reference else "its rate" if one.needs_rate else "",
+        )
+        for name, one in MEASURES.items()
+    ]

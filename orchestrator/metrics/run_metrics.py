@@ -30,6 +30,7 @@ STANDARD = (
     "mean_error(sideslip)",
     "rms_error(sideslip)",
     "peak(sideslip)",
+    "stability_index(sideslip)",
     "relative_peak_error(yaw_rate)",
     "mean_error(yaw_rate)",
     "rms_error(yaw_rate)",
@@ -74,7 +75,7 @@ class Metric:
     @property
     def title(self) -> str:
         """The signal and the measure in few words."""
-        return f"{words(self.signal)}: {self.name.partition('(')[0].replace('_', ' ')}"
+        return f"{words(self.signal)}: {self.name.partition('(')[0].replace('_', ' ').replace('rms', 'RMS')}"
 
     def unit(self, signal_unit: str) -> str:
         """Return the metric's unit for a signal in `signal_unit`."""
@@ -84,6 +85,8 @@ class Metric:
         if form == "{x}/s2":
             once = _PER_SECOND.get(x, f"{x}/s")
             return _PER_SECOND.get(once, f"{x}/s2")
+        if form == "{x}2/s":
+            return f"{x}2/s" if x.isalpha() else f"({x})2/s"
         if form == "{x}.s":
             return _TIMES_SECOND.get(x, f"{x}.s")
         return form.replace("{x}", x)
@@ -144,10 +147,12 @@ def evaluate(results: Results, chosen: Metric, window: tuple[float, float] | Non
     signals = _signals(results, chosen)
     if t.size < 2 or not signals:
         return None
-    numbers = [
-        chosen.measure.function(t, *(results.columns[column][inside] for column in columns))
-        for columns in signals
-    ]
+    numbers = []
+    for columns in signals:
+        samples = [results.columns[column][inside] for column in columns]
+        if chosen.measure.needs_rate and len(samples) == 1:
+            samples.append(np.gradient(samples[0], t))
+        numbers.append(chosen.measure.function(t, *samples))
     number = float(np.max(numbers))  # a NaN of one wheel is not lost
     if math.isnan(number):
         return None
@@ -164,7 +169,11 @@ def _signals(results: Results, chosen: Metric) -> list[list[str]]:
     """Return the columns that each function call takes, one call per wheel; empty if any is missing."""
     signals = []
     for column in columns_of(results, chosen.signal):
+        if chosen.measure.signal_unit not in (None, results.units[column]):
+            return []
         columns = [column]
+        rate = _column(results, f"{variable_of(column)}_rate") if chosen.measure.needs_rate else None
+        columns += [rate] if rate else []
         if chosen.measure.needs_reference:
             reference = reference_of(results, column)
             if reference is None:

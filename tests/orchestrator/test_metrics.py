@@ -9,7 +9,7 @@ import pytest
 
 from orchestrator.errors import ScenarioError
 from orchestrator.figures.display import digits_of, shown
-from orchestrator.metrics import measures
+from orchestrator.metrics import catalogue, measures
 from orchestrator.metrics.run_metrics import STANDARD, evaluate, evaluate_all, metric
 
 from .recorded import UNITS, car, results
@@ -81,6 +81,58 @@ def test_displacement_counts_from_the_first_value_peak_from_zero():
     assert measures.final(T, 10 - T) == pytest.approx(8.0)
 
 
+def test_rms_of_a_sine_is_its_amplitude_over_root_two():
+    assert measures.rms(T, 3 * SINE) == pytest.approx(3 / math.sqrt(2), rel=1e-9)
+
+
+def test_phase_area_of_a_sine_is_that_of_its_ellipse_once_per_period():
+    rate = 2 * math.pi * np.cos(2 * np.pi * T)
+    assert measures.phase_area(T, 0.3 * SINE, 0.3 * rate) == pytest.approx(
+        2 * math.pi * 0.3 * 0.3 * 2 * math.pi, rel=1e-9
+    )
+
+
+def test_the_stability_index_is_one_on_the_edge_of_the_strip():
+    ones = np.ones_like(T)
+    edge = math.radians(24)
+    assert measures.stability_index(T, edge / 4 * ones, 0 * ones) == pytest.approx(1.0)
+    assert measures.stability_index(T, 0 * ones, -edge * ones) == pytest.approx(1.0)
+    assert measures.stability_index(T, edge / 4 * ones, -edge * ones) == pytest.approx(0.0)
+
+
+def test_time_beyond_is_the_share_of_time_outside_the_strip():
+    beyond = np.where((T >= 0.5) & (T < 0.9), 1.0, 0.0)
+    assert measures.time_beyond(T, beyond, 0 * T) == pytest.approx(0.2, rel=1e-9)
+    assert measures.time_beyond(T, 0 * T, 0 * T) == 0.0
+
+
+def test_a_recorded_rate_goes_before_the_difference_quotient():
+    sideslip = 0.05 * SINE
+    index = metric("stability_index(sideslip)")
+    rate = 0.1 * np.pi * np.cos(2 * np.pi * T)
+    by_quotient = evaluate(results({"plant.sideslip": sideslip}, T), index)
+    columns = {"plant.sideslip": sideslip, "plant.sideslip_rate": rate}
+    assert by_quotient.number == pytest.approx(evaluate(results(columns, T), index).number, rel=1e-5)
+    columns["plant.sideslip_rate"] = 3 * rate
+    assert evaluate(results(columns, T), index).number > 2 * by_quotient.number
+
+
+def test_the_strip_of_the_phase_plane_is_for_angles_only():
+    run = results({"plant.yaw_rate": SINE, "plant.sideslip": SINE}, T)
+    assert evaluate(run, metric("stability_index(yaw_rate)")) is None
+    assert evaluate(run, metric("phase_area(yaw_rate)")).unit == "(rad/s)2/s"
+    assert evaluate(run, metric("phase_area(sideslip)")).unit == "rad2/s"
+
+
+def test_the_catalogue_names_every_measure_with_definition_formula_and_unit():
+    found = {entry.name: entry for entry in catalogue()}
+    assert list(found) == list(measures.MEASURES)
+    assert all(entry.definition and entry.formula and entry.unit for entry in found.values())
+    assert not any("{" in entry.formula + entry.unit for entry in found.values())
+    assert found["total_variation_rate"].unit == "of the signal, per s"
+    assert found["overshoot"].needs == "a reference"
+
+
 def test_every_standard_metric_applies_to_a_complete_car():
     assert list(evaluate_all(car())) == list(STANDARD)
 
@@ -112,12 +164,13 @@ def test_metrics_find_signals_whatever_the_units_are_called():
 
 def test_metrics_without_their_signals_are_absent():
     without_reference = results({"plant.sideslip": SINE}, T)
-    assert set(evaluate_all(without_reference)) == {"peak(sideslip)"}
+    assert set(evaluate_all(without_reference)) == {"peak(sideslip)", "stability_index(sideslip)"}
 
 
 def test_a_relative_error_against_a_reference_of_zero_is_absent():
     straight = results({"plant.sideslip": SINE, "reference.sideslip_ref": 0 * SINE}, T)
-    assert set(evaluate_all(straight)) == {"mean_error(sideslip)", "rms_error(sideslip)", "peak(sideslip)"}
+    without = {"mean_error(sideslip)", "rms_error(sideslip)", "peak(sideslip)", "stability_index(sideslip)"}
+    assert set(evaluate_all(straight)) == without
 
 
 def test_a_window_limits_a_metric_to_its_samples():
