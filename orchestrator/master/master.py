@@ -21,7 +21,7 @@ from .initialization import initialize
 from .interrupts import StopFlag
 from .log import OK, WARNING, Log
 from .memory import Memory
-from .program import Programs
+from .program import Operation, Programs
 from .unit import Slave, Status
 
 
@@ -52,6 +52,7 @@ class Master:
                 ctypes.c_double(float(period * plan.step)),
             )
         self.programs = Programs(memory)
+        self._operations: dict[int, list[Operation]] = {}  # of the stretch being stepped, by phase
         real = [memory.index[key] for key in plan.record if key in memory.index]
         self._recorded = np.array([memory.time_at, *real], np.intp)
         self._recorded_others = [key for key in plan.record if key not in memory.index]
@@ -84,10 +85,9 @@ class Master:
         p, q = self.plan.step.numerator, self.plan.step.denominator
         stop = self.stop
         first, cycle = self.completed + 1, self.programs.cycle
-        calls = {
-            k % cycle: [operation.call for operation in self.programs.at(k)]
-            for k in range(first, min(end, first + cycle - 1) + 1)
-        }
+        points = range(first, min(end, first + cycle - 1) + 1)
+        self._operations = {k % cycle: self.programs.at(k) for k in points}
+        calls = {phase: [op.call for op in operations] for phase, operations in self._operations.items()}
         clocks = list(self._clocks.items())
         total, ones, finite = self.memory.now.dot, self._ones, math.isfinite
         take, recorded, time = self.memory.pool.take, self._recorded, self.memory.time
@@ -134,7 +134,8 @@ class Master:
 
     def _answer(self, k: int, call: Callable[[], Status | None], status: Status) -> None:
         """Judge a call of the step from `k` - 1 to `k` that did not return OK."""
-        operation = next(op for op in self.programs.at(k) if op.call is call)
+        operations = self._operations[k % self.programs.cycle]
+        operation = next(op for op in operations if op.call is call)
         station = self.memory.of[operation.unit]
         station.slave.note(status)
         if status == WARNING:

@@ -10,13 +10,17 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from .coupling import Weights, weights
 from .memory import Memory, Station
 from .unit import OK, Status
+
+KEPT = 1024
+"""Programs kept. Periods without a common factor have cycles longer than any run; then every program is
+needed once, and made anew. Chosen: more than the phases of any usual set of periods."""
 
 Kind = Literal["gather", "set", "step", "keep", "get"]
 
@@ -42,6 +46,7 @@ class Programs:
         """Return what is to be done from communication point `k` - 1 to `k`."""
         phase = k % self.cycle
         if phase not in self._made:
+            _make_room(self._made)
             jacobi = self._memory.plan.algorithm == "jacobi"
             self._made[phase] = self._jacobi(phase) if jacobi else self._in_sequence(phase)
         return self._made[phase]
@@ -90,11 +95,17 @@ class Programs:
                 per_input.append(weights(m.plan.algorithm, relation, k + 2 * self.cycle))
         key = (s.name, *per_input)
         if key not in self._gathers:
+            _make_room(self._gathers)
             operations = [Operation(s.name, "gather", _gather(m, s, per_input))]
             if any(w.kept for w in per_input):
                 operations.append(Operation(s.name, "keep", _held(m, s.sources, s.kept)))
             self._gathers[key] = operations
         return self._gathers[key]
+
+
+def _make_room(kept: dict[Any, list[Operation]]) -> None:
+    if len(kept) >= KEPT:
+        del kept[next(iter(kept))]  # the oldest, which is the last one to be needed again
 
 
 def _gather(m: Memory, s: Station, per_input: list[Weights]) -> Callable[[], Status]:

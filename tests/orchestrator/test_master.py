@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import SimulationError
+from orchestrator.master import master, program
 from orchestrator.master.simulate import simulate
 from orchestrator.results.read import load_results
 
@@ -83,6 +84,34 @@ def test_a_linear_signal_arrives_exactly_at_the_middle_and_the_end_of_the_step(n
     for t, h, middle, end in settled:
         assert middle == pytest.approx(3.0 + 2.0 * (t + h / 2), abs=1e-12)
         assert end == pytest.approx(3.0 + 2.0 * (t + h), abs=1e-12)
+
+
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
+def test_periods_without_a_common_factor_keep_few_programs_and_change_no_number(
+    algorithm, tmp_path, monkeypatch
+):
+    made = []
+
+    def programs(memory):
+        made.append(program.Programs(memory))
+        return made[-1]
+
+    def positions():
+        units = {"mass": Mass(), "spring": spring(), "late": Integrator(), "clock": Clock(y=math.cos)}
+        wires = ["mass.x -> spring.x", "spring.force -> mass.force", "mass.v -> late.rate"]
+        _, results = run(
+            units, wires, tmp_path, step="1/512", n_steps=1500, algorithm=algorithm,
+            periods={"mass": 7, "spring": 11, "late": 13},
+        )  # fmt: skip
+        return results["mass.x"], results["late.x"]
+
+    monkeypatch.setattr(master, "Programs", programs)
+    usual = positions()
+    monkeypatch.setattr(program, "KEPT", 5)
+    few = positions()
+    assert (made[0].cycle, len(made[0]._made), len(made[1]._made)) == (1001, 1001, 5)
+    assert len(made[1]._gathers) <= 5
+    assert all(np.array_equal(a, b) for a, b in zip(usual, few, strict=True))
 
 
 def test_the_first_step_holds_what_has_no_history(tmp_path):
