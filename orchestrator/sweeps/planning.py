@@ -236,6 +236,8 @@ def _units(sweep: Sweep, runs: list[PlannedRun]) -> dict[str, str]:
 def _unit(axis: AxisSpec, plan: Plan) -> str | None:
     """Return the measurement unit of what an axis varies, if the plan has it."""
     holder, _, name = axis.vary[0].partition(".")
+    if (name or holder) in ("stop_time", "step_size"):
+        return "s"
     for unit in plan.units:
         given = unit.constants if holder == "inputs" else unit.parameters
         if holder not in ("inputs", "vehicle", unit.name):

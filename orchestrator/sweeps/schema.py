@@ -18,9 +18,9 @@
       - {name: sideslip, kind: map, metric: sideslip, x: friction, y: speed, panels: control}
 
 What an axis varies is written as on the command line: `unit.parameter`, `vehicle.parameter` and
-`inputs.pattern` take values, a unit alone takes FMUs (`fmu:parameter=value` brings parameters along),
-`vehicle` takes vehicle files. Several places may share an axis. In place of `vary` and `values`,
-`variants` change several things at once:
+`inputs.pattern` take values, as do `stop_time`, `step_size` and `algorithm`; a unit alone takes FMUs
+(`fmu:parameter=value` brings parameters along), `vehicle` takes vehicle files. Several places may
+share an axis. In place of `vary` and `values`, `variants` change several things at once:
 
     control:
       variants:
@@ -37,6 +37,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PlainValidator, model_validator
 
 from ..plan import Algorithm, Value
+from ..scenario.overrides import OF_RUN
 from ..scenario.quantities import parse_unit
 from ..scenario.schema import Scalar, Time
 from ..scenario.strict import Strict
@@ -126,7 +127,7 @@ class AxisSpec(Strict):
         if self.variants:
             return "variant"
         place = self.vary[0]
-        return "setting" if "." in place else "vehicle" if place == "vehicle" else "fmu"
+        return "setting" if _is_setting(place) else "vehicle" if place == "vehicle" else "fmu"
 
     @property
     def places(self) -> list[str]:
@@ -153,9 +154,7 @@ class AxisSpec(Strict):
             return self
         if "inputs" in self.vary:
             raise ValueError("vary: inputs needs a name, for example inputs.friction*")
-        if "." not in self.vary[0] and len(self.vary) > 1:
-            raise ValueError("vary: only several unit.parameter may share an axis")
-        if any(("." in place) != ("." in self.vary[0]) for place in self.vary):
+        if len(self.vary) > 1 and not all(map(_is_setting, self.vary)):
             raise ValueError("vary: only several unit.parameter may share an axis")
         ends = (self.start, self.end)
         if self.values is not None and (ends != (None, None) or self.count is not None):
@@ -185,6 +184,10 @@ class AxisSpec(Strict):
             raise ValueError(f"from must be below to (got {self.start:g} and {self.end:g})")
         if self.spacing == "log" and self.start <= 0:
             raise ValueError("from must be above 0 where spacing is log")
+
+
+def _is_setting(place: str) -> bool:
+    return "." in place or place in OF_RUN
 
 
 def _is_quantity(value: object) -> bool:

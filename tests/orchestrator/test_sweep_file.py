@@ -148,6 +148,19 @@ def test_plans_hold_what_the_axes_say(sweep, fmus, tmp_path):
     assert len({run.key for run in planned.runs}) == 16
 
 
+def test_steps_and_algorithms_can_be_varied(sweep, fmus, tmp_path):
+    loaded = sweep(
+        (AMPLITUDE, "{vary: step_size, values: [10, 5], unit: ms}"),
+        (CONTROL, "{vary: algorithm, values: [jacobi, extrapolated]}"),
+    )
+    planned = plan_sweep(loaded, tmp_path / "runs", fmus)
+    assert [(float(run.plan.step), run.plan.algorithm) for run in planned.runs] == [
+        (0.01, "jacobi"), (0.01, "extrapolated"), (0.005, "jacobi"), (0.005, "extrapolated"),
+    ]  # fmt: skip
+    assert planned.units == {"amplitude": "s"}
+    assert planned.number("amplitude", planned.runs[-1].point[0]) == 0.005
+
+
 def test_a_variant_changes_several_things_at_once(sweep, fmus, tmp_path):
     variants = (
         "{variants: {as it is: {}, soft: {swap: {controller: controller_off}, set: {driver.amplitude: 0.2}, "
