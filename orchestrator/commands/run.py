@@ -46,15 +46,17 @@ def run(
     """
     from ..master.simulate import simulate
     from ..results.formats import check_format
+    from ..results.size import size_note
     from ..scenario.load import load_scenario
     from ..wiring.make_plan import make_plan
 
     check_format(format_)
     metrics = _metric_names(metric or ())
     plan = make_plan(load_scenario(scenario, swaps=swap or (), settings=set_ or ()), fmus=fmus)
-    for note in plan.notes:
-        _say(f"note: {note}")
     folder = out or default_folder(scenario)
+    for note in (*plan.notes, size_note(plan, folder, format_)):
+        if note:
+            _say(f"note: {note}")
     with _bar(plan.title or scenario.stem) as progress:
         info = simulate(plan, folder, progress=progress, format=format_)
     for message in info.warnings[:SHOWN]:

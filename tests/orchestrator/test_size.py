@@ -1,0 +1,63 @@
+"""The note on huge results before a run starts."""
+
+from __future__ import annotations
+
+import shutil
+from collections import namedtuple
+
+import pytest
+
+from fmus.build import build_all
+from orchestrator.cli import main
+from orchestrator.results import size
+from orchestrator.results.formats import FILES
+from orchestrator.results.size import BYTES, expected_size, size_note
+
+from .fakes import Clock, make_plan
+
+Usage = namedtuple("Usage", "total used free")
+
+
+@pytest.fixture
+def plan_of():
+    """A plan of so many steps that records nine variables."""
+    clock = Clock(**{f"y{n}": float for n in range(9)})
+    return lambda n_steps: make_plan({"a": clock}, [], step="1/1000", n_steps=n_steps)
+
+
+def test_every_format_has_an_expected_size():
+    assert set(BYTES) == set(FILES)
+
+
+def test_the_expected_size_counts_time_and_the_first_row(plan_of):
+    assert expected_size(plan_of(99), "csv") == 100 * 10 * 17
+
+
+def test_huge_results_are_announced_with_a_way_out(plan_of, tmp_path, monkeypatch):
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(1e13, 0, 1e13))
+    assert size_note(plan_of(10**6), tmp_path, "csv") is None
+    assert size_note(plan_of(2 * 10**7), tmp_path, "csv") == (
+        f"{tmp_path}/results.csv will take about 3.4 GB (20000001 rows of 9 variables); name the variables "
+        "that you need under 'record:' in the scenario, or take --format parquet (1.4 GB)"
+    )
+    assert size_note(plan_of(2 * 10**7), tmp_path, "parquet") is None
+
+
+def test_results_that_do_not_fit_are_announced_whatever_their_size(plan_of, tmp_path, monkeypatch):
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(1e13, 1e13, 4e6))
+    note = size_note(plan_of(10**5), tmp_path / "not" / "yet", "mf4")
+    assert note is not None
+    assert "results.mf4 will take about 5 MB (100001 rows of 9 variables), and 4 MB are free there" in note
+
+
+def test_run_tells_before_it_starts(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(size, "HUGE", 1000)
+    build_all(tmp_path, components=["driver_sine"])
+    (tmp_path / "a.yaml").write_text("stop_time: 1\nstep_size: 0.01\nunits: {driver: {fmu: driver_sine}}\n")
+    out = tmp_path / "out"
+    with pytest.raises(SystemExit) as exit_:
+        main(["run", str(tmp_path / "a.yaml"), "--out", str(out), "--fmus", str(tmp_path)])
+    assert not exit_.value.code
+    first, last = capsys.readouterr().err.splitlines()
+    assert first.startswith(f"note: {out}/results.csv will take about 0 MB (101 rows of ")
+    assert last.startswith(f"{out}: 101 rows")
