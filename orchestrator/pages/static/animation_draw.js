@@ -10,10 +10,12 @@ function surface(canvas, density) {
   const width = canvas.clientWidth;
   const height = canvas.clientHeight;
   const ratio = density || window.devicePixelRatio || 1;
-  const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
-  if (canvas.width !== w || canvas.height !== h) [canvas.width, canvas.height] = [w, h];
+  [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
   const context = canvas.getContext('2d');
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.beginPath();
+  context.rect(0, 0, width, height);
+  context.clip(); // in print a canvas is no picture: what leaves it would show
   context.fillStyle = GROUND;
   context.fillRect(0, 0, width, height);
   return {context, width, height};
