@@ -30,7 +30,7 @@ def page() -> str:
     return "\n\n".join(parts)
 
 
-_INTRODUCTION = """Called as `.venv/bin/yawbench` in a checkout, `--help` says the same on a terminal. Exit status
-0: fine, 1: a run failed, 2: the input is wrong. Tables go to standard output, everything else that is said
-to standard error.
+_INTRODUCTION = """Called as `.venv/bin/yawbench` in a checkout; `--help` says the same on a terminal. Exit
+status 0: fine, 1: a run failed, 2: the input is wrong. Tables go to standard output, everything else that
+is said to standard error.
 """

@@ -13,6 +13,11 @@ _MATH = re.compile(
 )
 
 
+_FUNCTION = re.compile(r"<mi>(cos|sin|tan|tanh|arctan|exp)</mi>(?!<mo|<mrow><mo)")
+"""A function whose argument follows without a bracket; TeX leaves a thin space there, browsers do not."""
+_GAP = '<mspace width="0.17em"></mspace>'
+
+
 def to_mathml(page: str) -> str:
     """Return a page with the formulas that arithmatex has marked turned into MathML.
 
@@ -29,4 +34,5 @@ def _replace(match: re.Match[str]) -> str:
         made = convert(tex, display="block" if block else "inline")
     except Exception as error:
         raise ValueError(f"this formula cannot be shown: {tex}: {error}") from None
+    made = _FUNCTION.sub(rf"{_GAP}<mi>\1</mi>{_GAP}", made)
     return f'<div class="formula">{made}</div>' if block else made

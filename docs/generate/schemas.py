@@ -39,20 +39,21 @@ def sweep_page() -> str:
     return _page("Sweep files", sweep, [sweep.SweepSpec])
 
 
-def _page(title: str, module: Any, roots: list[type[BaseModel]], more: str = "") -> str:
-    parts = [f"# {title}", NOTE, docstring(inspect.getdoc(module) or "")]
-    models = _reachable(roots)
+def _page(heading: str, module: Any, roots: list[type[BaseModel]], more: str = "") -> str:
+    parts = [f"# {heading}", NOTE, docstring(inspect.getdoc(module) or "")]
+    models = reachable(roots)
     parts += [more] if more else []
     for model in models:
-        parts += [f"## {_title(model)}", cell(inspect.getdoc(model) or ""), _fields(model, models)]
+        parts += [f"## {title(model)}", cell(inspect.getdoc(model) or ""), _fields(model, models)]
     return "\n\n".join(parts)
 
 
-def _title(model: type[BaseModel]) -> str:
+def title(model: type[BaseModel]) -> str:
+    """Return the heading under which a model's keys are told."""
     return model.__name__.removesuffix("Spec")
 
 
-def _reachable(models: list[type[BaseModel]]) -> list[type[BaseModel]]:
+def reachable(models: list[type[BaseModel]]) -> list[type[BaseModel]]:
     """Return the models and all that their fields are made of, in the order met."""
     found = list(models)
     for model in found:
@@ -95,7 +96,7 @@ def _kind(annotation: Any, models: list[type[BaseModel]]) -> str:
     """Return a type in words, with links to the models."""
     origin, arms = typing.get_origin(annotation), typing.get_args(annotation)
     if annotation in models:
-        return f"[{_title(annotation)}](#{_title(annotation).lower()})"
+        return f"[{title(annotation)}](#{title(annotation).lower()})"
     if annotation is scenario.Endpoint:
         return "text: unit.variable"
     if origin is typing.Annotated:

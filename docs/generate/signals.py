@@ -23,8 +23,8 @@ def page() -> str:
         table(("signal", "unit", "meaning"), dictionary),
         "## Roles",
         docstring(roles.__doc__ or ""),
-        "An output of one unit feeds every input of the same name. What stands here must be declared by every "
-        "FMU of the role; it may declare more.",
+        "An output of one unit feeds every input of the same name. What stands here must be declared by "
+        "every FMU of the role; it may declare more.",
         table(("FMU", "folder", "inputs", "outputs"), contract),
     ])  # fmt: skip
 

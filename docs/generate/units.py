@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import io
 import zipfile
-from pathlib import Path
 from typing import Any
 
 from components.core.roles import ROLES
@@ -31,8 +30,9 @@ def page() -> str:
     return "\n\n".join(parts)
 
 
-_INTRODUCTION = """Everything that an FMU shows to the outside; `*` stands for the four wheels `fl`, `fr`, `rl`, `rr`.
-A scenario sets parameters by these names, and a vehicle file gives each to every unit that has it.
+_INTRODUCTION = """Everything that an FMU shows to the outside; `*` stands for the four wheels `fl`, `fr`,
+`rl`, `rr`. A scenario sets parameters by these names, and a vehicle file gives each to every unit that has
+it.
 """
 
 
