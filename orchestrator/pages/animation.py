@@ -150,7 +150,7 @@ def still_of(runs: Sequence[Frames]) -> float:
             if size.size and size.max() > 0:
                 peaks.append((float(size.max()), float(frames.channels["time"][np.argmax(size)])))
         if peaks:
-            return max(peaks)[1]
+            return max(peaks, key=lambda peak: (peak[0], -peak[1]))[1]
     time = runs[0].channels["time"]
     return float(0.5 * (time[0] + time[-1]))
 

@@ -1,0 +1,55 @@
+"""A made-up run with all that an animation can show."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from orchestrator.results.read import Results
+from tests.orchestrator.recorded import car, results
+
+WHEELS = ("fl", "fr", "rl", "rr")
+SIZES = {"cg_to_front_axle": 1.2, "cg_to_rear_axle": 1.5, "track_width": 1.6}
+MU = 0.5
+
+
+def whole_car(gain: float = 1.0, *, mirrored: bool = False, n: int = 801) -> Results:
+    """Return a made-up run with all that an animation can show; `mirrored`: left and right exchanged."""
+    made = car(gain, n=n)
+    side = -1.0 if mirrored else 1.0
+    columns = {name: values * (side if odd(name) else 1.0) for name, values in made.columns.items()}
+    steer = columns["driver.steer_angle"]
+    for wheel in WHEELS:
+        same = {"l": "r", "r": "l"}[wheel[1]] if mirrored else wheel[1]
+        share = (1.1 if wheel[0] == "f" else 0.9) * (1.2 if same == "l" else 0.8)
+        columns[f"plant.vertical_load_{wheel}"] = 3000.0 * share * np.ones(n)
+        columns[f"tyre.tyre_force_x_{wheel}"] = 200.0 * share * np.ones(n)
+        columns[f"tyre.tyre_force_y_{wheel}"] = 20000.0 * share * steer
+    recorded = results(columns, made.time)
+    fmus = {
+        "plant": {"name": "plant_made_up", "parameters": SIZES, "constants": {}},
+        "tyre": {"name": "tyre_made_up", "constants": {f"friction_{w}": MU for w in WHEELS}},
+    }
+    return replace(recorded, run={**recorded.run, "fmus": {**recorded.run["fmus"], **fmus}})
+
+
+def odd(column: str) -> bool:
+    """Return whether the mirror turns the sign of a quantity."""
+    return bool(re.search(r"steer|sideslip|yaw|acceleration_y|position_y", column))
+
+
+def without(recorded: Results, *parts: str) -> Results:
+    """Return the run without the columns whose names contain one of the parts."""
+    kept = {k: v for k, v in recorded.columns.items() if not any(part in k for part in parts)}
+    return replace(recorded, columns=kept)
+
+
+def data_in(html: str) -> dict[str, Any]:
+    """Return what a page carries."""
+    found = re.search(r'<script type="application/json">(.*?)</script>', html, re.DOTALL)
+    assert found
+    return json.loads(found[1])

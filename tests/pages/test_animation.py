@@ -1,0 +1,239 @@
+"""`yawbench animate`, and what a browser makes of an animation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from components.core.lane_change import LaneChangeParameters
+from orchestrator.cli import main
+from orchestrator.pages.animation import assets, fragment, page
+from orchestrator.pages.animation_frames import FRAMES
+from tests.orchestrator.recorded import write
+
+from .browser import DESK, PHONE, Browser
+from .made_up import data_in, whole_car, without
+
+PLAYER = "const player = document.querySelector('.yb-animation').player;"
+
+
+@pytest.fixture
+def yawbench(capsys):
+    """Call the command line and return its exit status and what it said."""
+
+    def call(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            main(list(arguments))
+        return ended.value.code, capsys.readouterr().err
+
+    return call
+
+
+def test_animate_writes_one_page_of_one_run_or_two(yawbench, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, gain in (("fnn", 1.0), ("off", 2.0)):
+        write(whole_car(gain), tmp_path / "runs" / name)
+    status, said = yawbench("animate", "runs/fnn")
+    assert (status, said.split(":")[0]) == (0, "runs/fnn/animation.html")
+    status, said = yawbench("animate", "runs/fnn", "runs/off", "--out", "two.html")
+    assert (status, said.split(":")[0]) == (0, "two.html")
+    html = Path("two.html").read_text(encoding="utf-8")
+    assert [run["label"] for run in data_in(html)["runs"]] == ["fnn", "off"]
+    assert "<title>fnn and off</title>" in html
+    assert "<p>Sine at 25 m/s</p>" in html
+
+
+def test_animate_refuses_what_it_cannot_show(yawbench, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write(without(whole_car(), "position"), tmp_path / "still")
+    status, said = yawbench("animate", "still")
+    assert status == 2
+    assert said.count("\n") == 1
+    assert "cannot be animated: position_x and position_y were not recorded" in said
+    assert yawbench("animate", "a", "b", "c") == (2, "an animation shows one or two runs, not 3\n")
+    status, said = yawbench("animate", "nowhere")
+    assert (status, "no results here" in said) == (2, True)
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory) -> Path:
+    """A page of two runs with lanes."""
+    one = whole_car()
+    driver = {"name": "driver_double_lane_change", "parameters": vars(LaneChangeParameters())}
+    run = {**one.run, "fmus": {**one.run["fmus"], "driver": driver}}
+    file = tmp_path_factory.mktemp("page") / "two.html"
+    file.write_text(page([("fuzzy neural network", replace(one, run=run)), ("off", whole_car(2.0))]), "utf-8")
+    return file
+
+
+def inked(chromium: Browser, canvas: str) -> float:
+    """Return the share of a canvas's pixels that are not white."""
+    return chromium.run(
+        "const canvas = document.querySelector(arguments[0]);"
+        "const {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);"
+        "let n = 0; for (let i = 0; i < data.length; i += 4) n += data[i] + data[i + 1] + data[i + 2] < 720;"
+        "return n / (data.length / 4);",
+        canvas,
+    )
+
+
+@pytest.mark.parametrize("width", [PHONE, 768, DESK])
+def test_the_page_is_drawn_at_every_width_without_complaint(chromium, two, width):
+    chromium.open(two, width=width)
+    assert chromium.console() == []
+    assert chromium.requests() == []
+    assert chromium.overflow() <= 0
+    for canvas in (".yb-scene", ".yb-strip", ".yb-close canvas"):
+        assert inked(chromium, canvas) > 0.002, canvas
+    sizes = chromium.run(
+        "return [...document.querySelectorAll('canvas')].map((c) => [c.width / c.clientWidth, c.clientWidth])"
+    )
+    assert all(ratio == pytest.approx(2.0, rel=0.02) for ratio, _ in sizes)  # crisp: device pixels
+    assert all(wide > 120 for _, wide in sizes)
+
+
+def test_the_slider_moves_the_cars_and_the_numbers(chromium, two):
+    chromium.open(two)
+    script = (
+        PLAYER + "const slider = document.querySelector('.yb-slider'); slider.value = arguments[0];"
+        "slider.dispatchEvent(new Event('input'));"
+        "return {x: player.states[0].x, time: document.querySelector('.yb-time').textContent,"
+        " spoken: slider.getAttribute('aria-valuetext'), cells: [...document.querySelectorAll('tbody td')]"
+        ".map((cell) => cell.textContent)};"
+    )
+    recorded = whole_car()
+    for time in (2.0, 6.5):
+        shown = chromium.run(script, time)
+        assert shown["time"] == shown["spoken"] == f"{time:.2f} s"
+        assert shown["x"] == pytest.approx(
+            np.interp(time, recorded.time, recorded["plant.position_x"]), abs=0.02
+        )
+        speed = np.interp(time, recorded.time, recorded["plant.velocity_x"]) * 3.6
+        assert float(shown["cells"][0]) == pytest.approx(speed, abs=0.051)
+        slip = np.degrees(np.interp(time, recorded.time, recorded["plant.sideslip"]))
+        assert float(shown["cells"][2].replace("−", "-")) == pytest.approx(slip, abs=0.011)
+    assert shown["cells"][1] == shown["cells"][0]
+
+
+def test_the_picture_changes_with_time(chromium, two):
+    chromium.open(two)
+    look = PLAYER + "player.seek(arguments[0]); return player.scene.toDataURL();"
+    assert chromium.run(look, 1.0) != chromium.run(look, 4.0)
+    assert chromium.run(look, 4.0) == chromium.run(look, 4.0)
+
+
+def test_the_keyboard_plays_steps_and_zooms(chromium, two):
+    from selenium.webdriver.common.keys import Keys
+
+    chromium.open(two)
+    state = PLAYER + "return [player.time, player.playing, player.view.zoom]"
+    chromium.press(Keys.HOME)
+    assert chromium.run(state) == [0, False, 1]
+    chromium.press(Keys.ARROW_RIGHT)
+    assert chromium.run(state)[0] == pytest.approx(8.0 / (FRAMES - 1))
+    chromium.press(Keys.END)
+    assert chromium.run(state)[0] == 8
+    chromium.press("+")
+    assert chromium.run(state)[2] > 1
+    chromium.press(" ")
+    assert chromium.run(state)[1] is True
+    chromium.press(" ")
+    assert chromium.run(state)[1] is False
+
+
+def test_controls_are_reached_in_order_and_have_names(chromium, two):
+    from selenium.webdriver.common.keys import Keys
+
+    chromium.open(two)
+    reached = []
+    for _ in range(7):
+        chromium.press(Keys.TAB)
+        reached.append(chromium.run("return document.activeElement.className"))
+    assert reached == ["yb-scene", "yb-play", "yb-rate", "yb-camera", "yb-out", "yb-in", "yb-slider"]
+    names = [
+        element.accessible_name
+        for element in chromium.driver.find_elements("css selector", "button, select, input")
+    ]
+    assert all(names), names
+
+
+def test_it_plays_by_itself_unless_less_motion_is_asked_for(chromium, two):
+    chromium.open(two, calm=False)
+    chromium.wait_for("document.querySelector('.yb-animation').player.time > 0.05")
+    assert chromium.run(PLAYER + "return player.playing") is True
+    chromium.open(two, calm=True)
+    assert chromium.run(PLAYER + "return [player.playing, player.time === player.data.still]") == [
+        False,
+        True,
+    ]
+
+
+def test_a_run_plays_to_its_end_and_stops(chromium, two):
+    chromium.open(two)
+    chromium.run(PLAYER + "player.seek(7.9); player.rate = 2; player.play();")
+    chromium.wait_for("!document.querySelector('.yb-animation').player.playing")
+    assert chromium.run(PLAYER + "return [player.time, player.button.textContent]") == [8, "Play"]
+
+
+def test_a_finger_on_the_curve_chooses_the_moment(chromium, two):
+    chromium.open(two, width=PHONE)
+    where = chromium.run(
+        "const strip = document.querySelector('.yb-strip'); strip.scrollIntoView({block: 'center'});"
+        "const box = strip.getBoundingClientRect(); return [box.left + box.width / 2, box.top + 30];"
+    )
+    point = [{"x": where[0], "y": where[1]}]
+    chromium.driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": point})
+    chromium.driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    chromium.wait_for("document.querySelector('.yb-animation').player.touched")
+    assert chromium.run(PLAYER + "return player.time") == pytest.approx(4.0, abs=0.05)
+
+
+def test_every_view_keeps_what_it_follows_in_sight(chromium, two):
+    chromium.open(two, width=PHONE)
+    for view, followed in (("cars", (0, 1)), ("0", (0,)), ("1", (1,)), ("whole", (0, 1))):
+        for time in (0.0, 4.0, 8.0):
+            places, size = chromium.run(
+                PLAYER + "const camera = document.querySelector('.yb-camera'); camera.value = arguments[0];"
+                "camera.dispatchEvent(new Event('change')); player.seek(arguments[1]);"
+                "const {clientWidth, clientHeight} = player.scene;"
+                "return [player.states.map((state) => state.screen), [clientWidth, clientHeight]]",
+                view,
+                time,
+            )
+            for run in followed:
+                assert all(0 < at < limit for at, limit in zip(places[run], size, strict=True)), (view, time)
+
+
+def test_runs_differ_in_grey_print(two):
+    runs = data_in(two.read_text(encoding="utf-8"))["runs"]
+    assert runs[0]["dash"] != runs[1]["dash"]
+
+
+def test_several_animations_share_a_page(chromium, tmp_path):
+    parts = [fragment([("one", whole_car())]), fragment([("a", whole_car()), ("b", whole_car(2.0))])]
+    file = tmp_path / "report.html"
+    head = '<!DOCTYPE html><html lang="en"><meta charset="utf-8"><link rel="icon" href="data:,">'
+    file.write_text(f"{head}<title>report</title>{assets()}{''.join(parts)}</html>", "utf-8")
+    chromium.open(file, calm=False)
+    assert chromium.console() == []
+    players = "[...document.querySelectorAll('.yb-animation')].map((root) => root.player)"
+    assert chromium.run(f"return {players}.map((player) => player.playing)") == [False, False]
+    chromium.run(f"{players}[0].seek(1)")
+    times = chromium.run(f"return {players}.map((player) => player.time)")
+    assert times[0] == 1 and times[1] != 1
+
+
+def test_a_bare_run_is_drawn_without_complaint(chromium, tmp_path):
+    file = tmp_path / "bare.html"
+    bare = without(whole_car(), "tyre_force", "load", "sideslip", "yaw_rate", "moment", "velocity", "steer")
+    file.write_text(page([("bare", bare)]), "utf-8")
+    chromium.open(file, width=PHONE)
+    assert chromium.console() == []
+    assert chromium.overflow() <= 0
+    assert inked(chromium, ".yb-scene") > 0.002
+    assert chromium.run("return document.querySelector('figcaption').textContent").endswith(
+        "tyre forces were not recorded"
+    )
