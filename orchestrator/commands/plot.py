@@ -24,8 +24,8 @@ Panels = Annotated[
     typer.Option(
         "--panel",
         metavar="NAME",
-        help="A signal (yaw_rate, plant.roll_angle, wheel_torque_*), its error (sideslip_error) or path; "
-        "repeatable. Default: all the papers draw.",
+        help="A signal (yaw_rate, plant.roll_angle, wheel_torque_*), its error (sideslip_error), one over "
+        "another (yaw_rate(sideslip)) or path; repeatable. Default: all the papers draw.",
     ),
 ]
 

@@ -289,7 +289,11 @@ class FigureSpec(Strict):
     name: str = Field(description="Name of its files", pattern=r"^[\w.+-]+$")
     title: str = ""
     runs: Patterns
-    panels: list[str] = Field(list(OVERVIEW), description="Signals and other panels, in order", min_length=1)
+    panels: list[str] = Field(
+        list(OVERVIEW),
+        description="In order: a signal, its error (`x_error`), one over another (`y(x)`) or `path`",
+        min_length=1,
+    )
 
 
 class StudySpec(Strict):

@@ -38,7 +38,7 @@ def test_the_controller_of_the_readme_runs_and_follows_the_yaw_rate(tmp_path, ca
 
 
 def test_the_readme_names_every_command():
-    table = re.findall(r"^\| `(\w+)` \|", README, re.MULTILINE)
+    table = re.findall(r"^\| `([\w-]+)` \|", README, re.MULTILINE)
     assert set(table) == set(COMMANDS)
 
 
