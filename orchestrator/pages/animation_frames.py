@@ -151,28 +151,26 @@ def _forces(results: Results, kept: np.ndarray, steer: np.ndarray) -> dict[str, 
 
 def _grip(results: Results, kept: np.ndarray) -> dict[str, np.ndarray]:
     """Return friction times load of every wheel, N: the radius of its friction circle."""
-    loads = columns_of(results, "vertical_load_*")
-    frictions = [_friction(results, wheel) for wheel in WHEELS]
-    if not loads or any(friction is None for friction in frictions):
+    loads, forces = columns_of(results, "vertical_load_*"), columns_of(results, "tyre_force_x_*")
+    if not loads or not forces:
         return {}
     grip = {}
-    for wheel, load, friction in zip(WHEELS, loads, frictions, strict=True):
+    for wheel, load, force in zip(WHEELS, loads, forces, strict=True):
+        friction = _friction(results, wheel, tyre=force.partition(".")[0])
+        if friction is None:
+            return {}
         mu = np.broadcast_to(np.asarray(friction, float), results.time.shape)[kept]
         grip[f"grip_{wheel}"] = mu * np.maximum(results.columns[load][kept], 0.0)
     return grip
 
 
-def _friction(results: Results, wheel: str) -> np.ndarray | float | None:
-    """Return the friction at a wheel: as recorded, or the constant of the tyre's input."""
-    for name in (f"friction_{wheel}", "friction"):
-        if (recorded := _signal(results, name)) is not None:
-            return recorded
-        fmus: dict[str, dict[str, Any]] = results.run.get("fmus", {})
-        for unit in [*results.units_of_role("tyre"), *fmus]:
-            constant = fmus[unit].get("constants", {}).get(name)
-            if isinstance(constant, (int, float)):
-                return float(constant)
-    return None
+def _friction(results: Results, wheel: str, *, tyre: str) -> np.ndarray | float | None:
+    """Return the friction at a wheel: as a road recorded it, or the constant that the tyre was given."""
+    if (recorded := _signal(results, f"friction_{wheel}")) is not None:
+        return recorded
+    constants = results.run.get("fmus", {}).get(tyre, {}).get("constants", {})
+    friction = constants.get(f"friction_{wheel}", constants.get("friction"))
+    return float(friction) if isinstance(friction, (int, float)) else None
 
 
 def _parameters(results: Results, unit: str) -> Mapping[str, Any]:

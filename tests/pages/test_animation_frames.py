@@ -83,6 +83,18 @@ def test_the_radius_of_a_friction_circle_is_friction_times_load():
     assert channels["grip_rr"][[0, -1]] == pytest.approx([0.2 * 2160.0, 0.8 * 2160.0])
 
 
+def test_the_friction_that_a_controller_believes_in_makes_no_circle():
+    recorded = whole_car()
+    fmus = {
+        **recorded.run["fmus"],
+        "reference": {"name": "reference_made_up", "constants": {"friction": 0.4}},
+    }
+    fmus["tyre"] = {"name": "tyre_made_up", "constants": {}}
+    frames = frames_of(replace(recorded, run={**recorded.run, "fmus": fmus}))
+    assert "grip_fl" not in frames.channels
+    assert frames.notes == ("friction or vertical loads were not recorded: no friction circles",)
+
+
 def test_friction_circles_of_an_axle_touch_at_most():
     runs = [frames_of(whole_car()), frames_of(whole_car(2.0))]
     scale = force_scale(runs)

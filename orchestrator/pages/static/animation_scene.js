@@ -125,12 +125,12 @@ function drawScene(canvas, density, runs, states, view, scale) {
   runs.forEach((run, i) => {
     const at = [width / 2 + (states[i].x - eye.x) * eye.scale, height / 2 - (states[i].y - eye.y) * eye.scale];
     states[i].screen = at;
-    marker(c, run, at, eye, width, height, states[i]);
+    marker(c, run, i, at, eye, width, height, states[i]);
   });
 }
 
 // A dot on a car that is too small to see, an arrow at the edge towards one that is out of sight.
-function marker(c, run, [x, y], eye, width, height, state) {
+function marker(c, run, number, [x, y], eye, width, height, state) {
   const [inX, inY] = [Math.min(Math.max(x, 16), width - 16), Math.min(Math.max(y, 16), height - 16)];
   if (Math.hypot(x - inX, y - inY) > 3 * eye.scale + 10) {
     const [dx, dy] = [x - width / 2, y - height / 2];
@@ -143,7 +143,8 @@ function marker(c, run, [x, y], eye, width, height, state) {
   } else if (eye.scale < 4) {
     c.beginPath();
     c.arc(x, y, 5, 0, 2 * Math.PI);
-    c.fillStyle = run.colour;
+    c.fillStyle = number === 0 ? run.colour : GROUND;
     c.fill();
+    stroke(c, run.colour, 2, 1);
   }
 }
