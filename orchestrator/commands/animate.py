@@ -10,7 +10,7 @@ import typer
 
 Folders = Annotated[
     list[Path],
-    typer.Argument(help="Folders of results: one, or two laid over each other.", metavar="RUN [RUN]"),
+    typer.Argument(help="Folders of results: one, or two laid over each other.", metavar="RUN"),
 ]
 Labels = Annotated[
     list[str] | None,
