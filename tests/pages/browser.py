@@ -35,7 +35,7 @@ class Browser:
         metrics = {"width": width, "height": height, "deviceScaleFactor": 2, "mobile": width < 600}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         wish = {"name": "prefers-reduced-motion", "value": "reduce" if calm else "no-preference"}
-        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [wish]})
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": [wish]})
         self.driver.get(file.resolve().as_uri())
 
     def run(self, script: str, *arguments: Any) -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -237,3 +239,19 @@ def test_a_bare_run_is_drawn_without_complaint(chromium, tmp_path):
     assert chromium.run("return document.querySelector('figcaption').textContent").endswith(
         "tyre forces were not recorded"
     )
+
+
+def test_print_holds_the_moment_and_shows_no_controls(chromium, two):
+    chromium.open(two, calm=False)
+    chromium.wait_for("document.querySelector('.yb-animation').player.time > 0.02")
+    chromium.run("document.querySelector('.yb-animation').player.rate = 0.01")  # far from its end
+    pdf = base64.b64decode(chromium.driver.execute_cdp_cmd("Page.printToPDF", {})["data"])
+    assert len(re.findall(rb"/Type\s*/Page\b", pdf)) == 1
+    assert chromium.run(PLAYER + "return player.playing") is False
+    chromium.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    hidden = "return getComputedStyle(document.querySelector(arguments[0])).display"
+    shown = {
+        name: chromium.run(hidden, f".yb-{name}") for name in ("play", "slider", "scene", "time", "readouts")
+    }
+    assert shown["play"] == shown["slider"] == "none"
+    assert "none" not in (shown["scene"], shown["time"], shown["readouts"])
