@@ -25,7 +25,9 @@ Scheduler = Annotated[
     str | None,
     typer.Option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster: tcp://host:port."),
 ]
-Keep = Annotated[bool, typer.Option("--keep", help="Keep the results of every run, in runs/<number>.")]
+Keep = Annotated[
+    bool, typer.Option("--keep", help="Keep the results of every run, in runs/<its key in the table>.")
+]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Make all runs anew, those too that are finished.")]
 SHOWN = 10
 """Failed runs named on the terminal; all are in the table."""

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 FAILED: dict[str, Any] = {"marker": "x", "color": "#111111", "linestyle": "", "markersize": 6}
 """A run that gives no number: a cross, never a gap that could pass for nothing."""
+PLAIN = "{x:g}"
+"""How numbers stand at an axis, logarithmic ones too."""
 GUIDE: dict[str, Any] = {"color": QUIET, "linewidth": 0.9, "linestyle": (0, (4, 2))}
 
 
@@ -53,7 +55,7 @@ class Drawing:
         """Return what the legend explains."""
         from matplotlib.lines import Line2D
 
-        return [Line2D([], [], label="no number: the run failed", **FAILED)] if self.failed else []
+        return [Line2D([], [], label="no number: failed, or never", **FAILED)] if self.failed else []
 
     def panels(self) -> list[tuple[str, list[PlannedRun]]]:
         """Return the heading and the runs of each panel."""
@@ -110,5 +112,7 @@ class Drawing:
         if not self.sweep.axes[self.spec.x].numeric:
             every = self.levels(self.spec.x)
             axes.set_xticks(range(len(every)), [level.words for level in every])
+            axes.set_xlim(-0.5, len(every) - 0.5)
         elif self.sweep.axes[self.spec.x].spacing == "log":
             axes.set_xscale("log")
+            axes.xaxis.set_major_formatter(PLAIN)

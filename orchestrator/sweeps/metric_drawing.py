@@ -17,7 +17,7 @@ from ..errors import ResultsError
 from ..figures.display import shown, shown_unit
 from ..figures.style import line_style
 from ..metrics.run_metrics import metric
-from .drawing import FAILED, GUIDE, Drawing
+from .drawing import FAILED, GUIDE, PLAIN, Drawing
 from .planning import PlannedRun
 from .schema import FigureSpec
 from .table import Swept
@@ -52,9 +52,11 @@ class MetricDrawing(Drawing):
         self.mark = None if spec.mark is None else self.factor * swept.bound(spec.metric, spec.mark)
 
     def number(self, run: PlannedRun) -> float:
-        """Return the metric of a run in the unit shown, NaN if there is none."""
+        """Return the metric of a run in the unit shown, NaN if there is none that can be drawn."""
         value = self.swept.value(run, self.spec.metric)
-        return math.nan if value is None else self.factor * value.number
+        if value is None or not math.isfinite(value.number):
+            return math.nan
+        return self.factor * value.number
 
     @property
     def measured(self) -> str:
@@ -95,7 +97,7 @@ class Curves(MetricDrawing):
         self.name_y(left, self.measured)
         drawn[0].set_yscale(self.spec.scale)
         if self.spec.scale == "log":
-            drawn[0].yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+            drawn[0].yaxis.set_major_formatter(PLAIN)
         if self.spec.largest is not None:
             drawn[0].set_ylim(self.low if self.spec.scale == "log" else min(self.low, 0.0), self.high)
         elif self.spec.scale == "linear" and self.low >= 0:
@@ -128,6 +130,7 @@ class Map(MetricDrawing):
         self.scale_x(axes)
         if self.sweep.axes[self.spec.y].spacing == "log":
             axes.set_yscale("log")
+            axes.yaxis.set_major_formatter(PLAIN)
         lost = [(a, b) for a, b, value in zip(x, y, values, strict=True) if math.isnan(value)]
         if lost:
             self.failed = True

@@ -11,7 +11,7 @@ import copy
 import hashlib
 import json
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cache
 from importlib.metadata import version
@@ -99,7 +99,8 @@ def plan_sweep(
         job = sweep.job(number, out, fmus)
         try:
             plan = plan_of(job, read=once.read, open_=once.open)
-            runs.append(PlannedRun(number, point, job, plan, run_key(plan, metrics)))
+            key = run_key(plan, metrics)
+            runs.append(PlannedRun(number, point, replace(job, out=out / key[:12]), plan, key))
         except YawbenchError as error:
             for problem in error.problems:
                 problems.setdefault(*_of_axis(sweep, problem))

@@ -236,10 +236,14 @@ def test_kept_results_can_be_loaded_in_every_format_and_are_made_once(moods, yaw
     yawbench(file, "out")
     assert not (tmp_path / "out" / "runs").exists()
     assert "finished before" not in yawbench(file, "out", "--keep", "--format", "parquet")[2]
-    results = load_results(tmp_path / "out" / "runs" / "2")
+    results = load_results(tmp_path / "out" / "runs" / rows(tmp_path / "out")[1]["key"][:12])
     assert results.file.name == "results.parquet"
     assert results["controller.yaw_moment"][-1] == pytest.approx(1.0)
     assert "all finished before" in yawbench(file, "out", "--keep")[2]
+    more = moods(5, 10)  # what was the first run is the third now
+    assert "4 runs, 2 finished before" in yawbench(more, "out", "--keep")[2]
+    kept = [load_results(tmp_path / "out" / "runs" / row["key"][:12]) for row in rows(tmp_path / "out")]
+    assert [run["controller.yaw_moment"][-1] for run in kept] == pytest.approx([0.5, 0.5, 1.0, 1.0])
 
 
 def interrupted(file, out, driver, tmp_path, number):
