@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
 from orchestrator.master.simulate import simulate, simulate_in_memory
@@ -230,3 +231,65 @@ def main_ok(arguments):
     with pytest.raises(SystemExit) as end:
         main(arguments)
     assert end.value.code in (0, None)
+
+
+SCENARIO = """
+title: A driver alone
+stop_time: 1
+step_size: 0.01
+units:
+  driver: {fmu: driver_sine, parameters: {amplitude: 0.1, frequency: 1, start_time: 0}}
+"""
+
+
+@pytest.fixture(scope="module")
+def driver(tmp_path_factory):
+    """A folder with the driver's FMU."""
+    folder = tmp_path_factory.mktemp("fmus")
+    build_all(folder, components=("driver_sine",))
+    return folder
+
+
+def test_run_and_compare_write_the_format_they_are_told_and_print_metrics(driver, tmp_path, capsys):
+    (tmp_path / "alone.yaml").write_text(SCENARIO)
+    common = [str(tmp_path / "alone.yaml"), "--fmus", str(driver), "--format", "parquet"]
+    main_ok(["run", *common, "--out", str(tmp_path / "run"), "--metric", "peak(steer_angle)"])
+    told = capsys.readouterr().out
+    assert "Steer angle: peak" in told
+    assert "5.73 °" in told
+    assert load_results(tmp_path / "run").file.name == "results.parquet"
+    swap = "driver=driver_sine,driver_sine:amplitude=0.2"
+    main_ok(["compare", *common, "--swap", swap, "--out", str(tmp_path / "both")])
+    files = sorted(path.name for path in (tmp_path / "both").glob("*/results.*"))
+    assert files == ["results.parquet", "results.parquet"]
+
+
+@pytest.mark.parametrize(
+    ("option", "sentence"),
+    [
+        (["--format", "hdf5"], "--format hdf5: no such format; there are: csv, parquet and mf4"),
+        (
+            ["--metric", "peek(sideslip)"],
+            "'peek(sideslip)': there is no measure 'peek'; did you mean 'peak'?",
+        ),
+    ],
+)
+def test_a_format_or_a_metric_that_there_is_not_is_said_before_the_run(
+    option, sentence, driver, tmp_path, capsys
+):
+    (tmp_path / "alone.yaml").write_text(SCENARIO)
+    with pytest.raises(SystemExit) as end:
+        main(
+            [
+                "run",
+                str(tmp_path / "alone.yaml"),
+                "--fmus",
+                str(driver),
+                "--out",
+                str(tmp_path / "out"),
+                *option,
+            ]
+        )
+    assert end.value.code == 2
+    assert capsys.readouterr().err == f"{sentence}\n"
+    assert not (tmp_path / "out").exists()
