@@ -21,36 +21,21 @@ import sys
 import tempfile
 import uuid
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
-from components.core.roles import ROLES, Role
+from components.core.roles import ROLES
 from orchestrator.errors import BuildError
 from orchestrator.fmu.archive import platform
 
 from ..archive import read_mark, to_bytes
 from ..build import COMPONENTS, Progress, Report, put
-from ..staging import missing_signals
+from .declaration import DESCRIPTION, header, read_declaration
 
 HERE = Path(__file__).resolve().parent
-DESCRIPTION = "modelDescription.xml"
 FLAGS = ("-std=c11", "-O2", "-Wall", "-Wextra", "-Wno-unused-parameter", "-fPIC", "-shared")
 EXACT = ("-fvisibility=hidden", "-ffp-contract=off")  # no fused multiply-add: the same numbers everywhere
 LINUX = ("-Wl,--build-id=none", "-Wl,-z,defs", "-s")
-
-
-@dataclass(frozen=True)
-class _Variable:
-    """A variable as the model description declares it."""
-
-    name: str
-    causality: str
-    unit: str
-    description: str
-    start: float
-    minimum: float | None
-    maximum: float | None
 
 
 def find_c_components(root: Path = COMPONENTS) -> dict[str, Path]:
@@ -136,9 +121,9 @@ def _bring_up_to_date(name: str, folder: Path, target: Path, *, kind: str, force
         mark = f"{kind} {_key(name, compiler, sources | {DESCRIPTION: description})}"
         if not force and read_mark(target) == mark:
             return False
-        root, variables = _read(description, name, ROLES[folder.parent.name])
+        root, variables = read_declaration(description, name, ROLES[folder.parent.name])
         root.set("guid", _guid(root, sources))
-        binary = _compile(compiler, folder, sources, _header(variables, root.get("guid", "")))
+        binary = _compile(compiler, folder, sources, header(variables, root.get("guid", "")))
         system, suffix = platform()
         files = {
             DESCRIPTION: ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n",
@@ -163,7 +148,13 @@ def _key(name: str, compiler: list[str], sources: dict[str, bytes]) -> str:
     """Return a hash of all that decides what the FMU's bytes are."""
     version = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False).stdout
     content = hashlib.sha256("\0".join([name, *compiler, version, *FLAGS, *EXACT]).encode())
-    shared = [HERE / "build.py", HERE / "unit.h", HERE.parent / "fmi2.h", HERE.parent / "archive.py"]
+    shared = [
+        HERE / "build.py",
+        HERE / "declaration.py",
+        HERE / "unit.h",
+        HERE.parent / "fmi2.h",
+        HERE.parent / "archive.py",
+    ]
     for path, data in [*((file.name, file.read_bytes()) for file in shared), *sources.items()]:
         content.update(f"{path}\0{len(data)}\0".encode() + data)
     return content.hexdigest()[:32]
@@ -175,75 +166,6 @@ def _guid(root: ElementTree.Element, sources: dict[str, bytes]) -> str:
     for name, data in sources.items():
         content.update(name.encode() + b"\0" + hashlib.sha256(data).digest())
     return f"{{{uuid.UUID(bytes=content.digest()[:16])}}}"
-
-
-def _read(xml: bytes, name: str, role: Role) -> tuple[ElementTree.Element, list[_Variable]]:
-    """Return the model description and its variables, after checking what the C side relies on."""
-    try:
-        root = ElementTree.fromstring(xml)
-    except ElementTree.ParseError as error:
-        raise BuildError(f"{DESCRIPTION} is not well-formed XML: {error}") from None
-    simulation = root.find("CoSimulation")
-    if simulation is None or simulation.get("modelIdentifier") != name:
-        raise BuildError(f'{DESCRIPTION}: needs <CoSimulation modelIdentifier="{name}" ...>')
-    variables, problems = [], []
-    for i, element in enumerate(root.iterfind("ModelVariables/ScalarVariable")):
-        own = element.get("name") or ""
-        real = element.find("Real")
-        if real is None:
-            problems.append(f"{DESCRIPTION}: {own} is not Real; a unit in C has only Real variables")
-        elif element.get("causality") not in ("input", "output", "parameter"):
-            problems.append(f"{DESCRIPTION}: {own} must be an input, an output or a parameter")
-        elif element.get("valueReference") != str(i):
-            problems.append(f"{DESCRIPTION}: {own} must have the value reference {i}: they count from 0")
-        elif not (own.isidentifier() and own.isascii()):
-            problems.append(f"{DESCRIPTION}: {own!r} can be no name in C; use letters, digits and _")
-        else:
-            variables.append(_variable(element, real))
-    problems += [f"{DESCRIPTION}: {problem}" for problem in missing_signals(role, variables)]
-    if problems:
-        raise BuildError(problems)
-    return root, variables
-
-
-def _variable(element: ElementTree.Element, real: ElementTree.Element) -> _Variable:
-    def number(key: str) -> float | None:
-        given = real.get(key)
-        try:
-            return None if given is None else float(given)
-        except ValueError:
-            raise BuildError(f"{DESCRIPTION}: {element.get('name')}: {key} is no number: {given!r}") from None
-
-    return _Variable(
-        name=element.get("name") or "",
-        causality=element.get("causality") or "",
-        unit=real.get("unit") or "1",
-        description=element.get("description") or "",
-        start=number("start") or 0.0,
-        minimum=number("min"),
-        maximum=number("max"),
-    )
-
-
-def _header(variables: list[_Variable], guid: str) -> str:
-    """Return variables.h: the variables as members of a struct, and what is declared of each."""
-    members, declared = [], []
-    for v in variables:
-        text = " ".join(v.description.replace("*/", "* /").split())
-        members.append(f"    double {v.name}; /* {v.causality}, {v.unit}: {text} */")
-        low = "-INFINITY" if v.minimum is None else repr(v.minimum)
-        high = "INFINITY" if v.maximum is None else repr(v.maximum)
-        declared.append(f'    {{"{v.name}", {v.causality.upper()}, {v.start!r}, {low}, {high}}},')
-    return "\n".join([
-        f"/* Made from {DESCRIPTION} by yawbench build. */",
-        "#include <math.h>",
-        "typedef struct {", *members, "} Variables;",
-        "enum { INPUT, OUTPUT, PARAMETER };",
-        f"enum {{ N_VARIABLES = {len(variables)} }};",
-        "static const struct { const char *name; int causality; double start, min, max; } DECLARED[] = {",
-        *declared, "};",
-        f'#define GUID "{guid}"', "",
-    ])  # fmt: skip
 
 
 def _compile(compiler: list[str], folder: Path, sources: dict[str, bytes], header: str) -> bytes:

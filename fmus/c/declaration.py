@@ -1,0 +1,99 @@
+"""What a unit in C declares: its model description, read, checked, and made into a C header."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+from components.core.roles import Role
+from orchestrator.errors import BuildError
+
+from ..staging import missing_signals
+
+DESCRIPTION = "modelDescription.xml"
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable as the model description declares it."""
+
+    name: str
+    causality: str
+    unit: str
+    description: str
+    start: float
+    minimum: float | None
+    maximum: float | None
+
+
+def read_declaration(xml: bytes, name: str, role: Role) -> tuple[ElementTree.Element, list[Variable]]:
+    """Return the model description and its variables, after checking what the C side relies on.
+
+    Raises:
+        BuildError: not XML, or with a sentence per variable that a unit in C cannot have.
+    """
+    try:
+        root = ElementTree.fromstring(xml)
+    except ElementTree.ParseError as error:
+        raise BuildError(f"{DESCRIPTION} is not well-formed XML: {error}") from None
+    simulation = root.find("CoSimulation")
+    if simulation is None or simulation.get("modelIdentifier") != name:
+        raise BuildError(f'{DESCRIPTION}: needs <CoSimulation modelIdentifier="{name}" ...>')
+    variables, problems = [], []
+    for i, element in enumerate(root.iterfind("ModelVariables/ScalarVariable")):
+        own = element.get("name") or ""
+        real = element.find("Real")
+        if real is None:
+            problems.append(f"{DESCRIPTION}: {own} is not Real; a unit in C has only Real variables")
+        elif element.get("causality") not in ("input", "output", "parameter"):
+            problems.append(f"{DESCRIPTION}: {own} must be an input, an output or a parameter")
+        elif element.get("valueReference") != str(i):
+            problems.append(f"{DESCRIPTION}: {own} must have the value reference {i}: they count from 0")
+        elif not (own.isidentifier() and own.isascii()):
+            problems.append(f"{DESCRIPTION}: {own!r} can be no name in C; use letters, digits and _")
+        else:
+            variables.append(_variable(element, real))
+    problems += [f"{DESCRIPTION}: {problem}" for problem in missing_signals(role, variables)]
+    if problems:
+        raise BuildError(problems)
+    return root, variables
+
+
+def _variable(element: ElementTree.Element, real: ElementTree.Element) -> Variable:
+    def number(key: str) -> float | None:
+        given = real.get(key)
+        try:
+            return None if given is None else float(given)
+        except ValueError:
+            raise BuildError(f"{DESCRIPTION}: {element.get('name')}: {key} is no number: {given!r}") from None
+
+    return Variable(
+        name=element.get("name") or "",
+        causality=element.get("causality") or "",
+        unit=real.get("unit") or "1",
+        description=element.get("description") or "",
+        start=number("start") or 0.0,
+        minimum=number("min"),
+        maximum=number("max"),
+    )
+
+
+def header(variables: list[Variable], guid: str) -> str:
+    """Return the text of variables.h: the variables as members of a struct, and what is declared of each."""
+    members, declared = [], []
+    for v in variables:
+        text = " ".join(v.description.replace("*/", "* /").split())
+        members.append(f"    double {v.name}; /* {v.causality}, {v.unit}: {text} */")
+        low = "-INFINITY" if v.minimum is None else repr(v.minimum)
+        high = "INFINITY" if v.maximum is None else repr(v.maximum)
+        declared.append(f'    {{"{v.name}", {v.causality.upper()}, {v.start!r}, {low}, {high}}},')
+    return "\n".join([
+        f"/* Made from {DESCRIPTION} by yawbench build. */",
+        "#include <math.h>",
+        "typedef struct {", *members, "} Variables;",
+        "enum { INPUT, OUTPUT, PARAMETER };",
+        f"enum {{ N_VARIABLES = {len(variables)} }};",
+        "static const struct { const char *name; int causality; double start, min, max; } DECLARED[] = {",
+        *declared, "};",
+        f'#define GUID "{guid}"', "",
+    ])  # fmt: skip
