@@ -50,6 +50,7 @@ def sweep(
     it was; nothing that is finished is run again.
     """
     from ..results.formats import check_format
+    from ..studies.jobs import pool
     from ..sweeps.journal import Journal
     from ..sweeps.planning import plan_sweep
     from ..sweeps.report import REPORT, limit_tables, write_sweep
@@ -73,7 +74,8 @@ def sweep(
             with _bar(loaded.path.stem, total, total - len(left)) as progress:
                 finish(left, journal, runner=runner, told=_counted(progress, total - len(left)))
             swept = Swept(planned, dict(journal.records))
-            problems = write_sweep(swept, folder)
+            with pool(jobs) as workers:
+                problems = write_sweep(swept, folder, each=workers.map)
     for problem in problems:
         say(problem)
     print_tables(limit_tables(swept))

@@ -56,6 +56,7 @@ class Planned:
     runs: list[PlannedRun]
     units: dict[str, str]  # axis of numbers -> measurement unit in tables, an SI unit; "" if it has none
     metric_units: dict[str, str]  # key of a metric -> its unit
+    fmus: dict[str, Fmu]  # hash -> FMU, of all that any run uses
 
     def number(self, name: str, level: Level) -> float:
         """Return the value of an axis of numbers in the unit of `units`."""
@@ -63,11 +64,6 @@ class Planned:
         if axis.unit is None:
             return float(level.value)
         return float(quantities.convert(f"{level.value!r} {axis.unit}", self.units[name]))
-
-    @property
-    def fmus(self) -> dict[str, Fmu]:
-        """Return all FMUs that any run uses, by hash."""
-        return {unit.fmu.sha256: unit.fmu for run in self.runs for unit in run.plan.units}
 
 
 def plan_sweep(
@@ -107,7 +103,8 @@ def plan_sweep(
         progress(number + 1)
     if problems:
         raise ScenarioError(_first(problems.values()))
-    return Planned(sweep, runs, _units(sweep, runs), _metric_units(sweep, runs))
+    used = {unit.fmu.sha256: unit.fmu for run in runs for unit in run.plan.units}
+    return Planned(sweep, runs, _units(sweep, runs), _metric_units(sweep, runs), used)
 
 
 class _Once:

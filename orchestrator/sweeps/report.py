@@ -7,34 +7,48 @@ from pathlib import Path
 from ..errors import ResultsError
 from ..figures.style import save
 from ..metrics.run_metrics import metric
+from ..studies.study import Each
 from ..studies.tables import Cell, Table, for_markdown
 from .figures import draw
 from .limits import limit_table
+from .schema import FigureSpec
 from .table import TABLE, Swept, point_text, write_table
 
 REPORT, FIGURES = "sweep.md", "figures"
 
 
-def write_sweep(swept: Swept, out: Path) -> list[str]:
+def write_sweep(swept: Swept, out: Path, *, each: Each = map) -> list[str]:
     """Write table, figures and report into `out`; return what could not be drawn.
+
+    Args:
+        swept: the sweep.
+        out: its folder of results.
+        each: how to draw all figures.
 
     Raises:
         ResultsError: a file cannot be written.
     """
     write_table(swept, out / TABLE)
-    spec = swept.planned.sweep.spec
+    figures, light = swept.planned.sweep.spec.figures, swept.light()
+    wanted = [(light, figure, out / FIGURES / figure.name) for figure in figures]
     drawn: dict[str, str] = {}
     problems = []
-    for figure in spec.figures:
-        try:
-            made = draw(swept, figure)
-        except ResultsError as error:
-            problems.append(f"figure {figure.name}: {error}")
-            continue
-        save(made, out / FIGURES / figure.name)
-        drawn[figure.title or figure.name] = f"{FIGURES}/{figure.name}.png"
+    for figure, problem in zip(figures, each(_draw, wanted), strict=True):
+        if problem:
+            problems.append(f"figure {figure.name}: {problem}")
+        else:
+            drawn[figure.title or figure.name] = f"{FIGURES}/{figure.name}.png"
     (out / REPORT).write_text(_page(swept, drawn), encoding="utf-8")
     return problems
+
+
+def _draw(wanted: tuple[Swept, FigureSpec, Path]) -> str | None:
+    swept, figure, stem = wanted
+    try:
+        save(draw(swept, figure), stem)
+    except ResultsError as error:
+        return str(error)
+    return None
 
 
 def limit_tables(swept: Swept) -> list[Table]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +43,11 @@ class Swept:
     def bound(self, key: str, given: float | str) -> float:
         """Return a bound of a metric in SI."""
         return si_number(given, self.unit(key))
+
+    def light(self) -> Swept:
+        """Return the sweep without the plans of its runs, to be handed to other processes."""
+        runs = [replace(run, plan=None) for run in self.planned.runs]  # type: ignore[arg-type]
+        return Swept(replace(self.planned, runs=runs), self.records)
 
     @property
     def failed(self) -> list[PlannedRun]:

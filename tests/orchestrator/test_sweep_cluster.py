@@ -22,7 +22,7 @@ distributed = pytest.importorskip("distributed")
 def cluster():
     """A scheduler and two workers, each a process."""
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
     ) as made:
         yield made
 
@@ -81,7 +81,7 @@ def test_a_scheduler_that_does_not_answer_is_one_sentence(address, moods, yawben
 
 
 def test_a_scheduler_without_workers_is_one_sentence(moods, yawbench, tmp_path):  # noqa: F811
-    with distributed.LocalCluster(n_workers=0, dashboard_address=None, silence_logs=50) as empty:
+    with distributed.LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=50) as empty:
         status, _, err = yawbench(moods(10), "out", "--scheduler", empty.scheduler_address)
     assert status == 2
     assert err.splitlines()[-1] == f"--scheduler {empty.scheduler_address}: this scheduler has no workers"

@@ -69,7 +69,7 @@ def swept(tmp_path):
             values = {} if found is None else {"sideslip": (math.radians(found), "rad")}
             records[key] = Record(values, () if values else ("plant: it failed",))
         units = {"friction": "1", "speed": "m/s"}
-        return Swept(Planned(sweep, runs, units, {"sideslip": "rad"}), records)
+        return Swept(Planned(sweep, runs, units, {"sideslip": "rad"}, {}), records)
 
     return make
 
