@@ -12,6 +12,9 @@ from orchestrator.cli import _application
 
 from .text import NOTE, cell, code, plain, table
 
+_KIND = re.compile(r" <(?:path|str|text|list\[\w+\])>$")
+"""What typer says of an argument's type; `<python|c>`, its choices, stays."""
+
 
 def page() -> str:
     """Return the page of all subcommands with their arguments and options."""
@@ -25,7 +28,7 @@ def page() -> str:
         for parameter in command.params:
             record = parameter.get_help_record(context)
             if record is not None and parameter.name != "help":
-                rows.append((code(re.sub(r" <\w+>$", "", record[0])), cell(record[1])))
+                rows.append((code(_KIND.sub("", record[0])), cell(record[1])))
         parts.append(table(("argument or option", "meaning"), rows))
     return "\n\n".join(parts)
 

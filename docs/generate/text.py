@@ -25,7 +25,7 @@ def cell(text: str) -> str:
 
 def code(text: str) -> str:
     """Return text as code in a cell of a table."""
-    return f"`{text}`".replace("|", "\\|") if text else ""
+    return f"`{text}`" if text else ""
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
