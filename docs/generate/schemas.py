@@ -80,7 +80,11 @@ def _default(field: FieldInfo) -> str:
     if field.is_required():
         return "**required**"
     value = field.get_default(call_default_factory=True)
-    return "" if value is None or value in ("", {}, []) else code(str(value))
+    if value is None or value in ("", {}, []):
+        return ""
+    if isinstance(value, (list, tuple)):
+        return ", ".join(code(str(item)) for item in value)
+    return code(str(value))
 
 
 _WORDS = {
