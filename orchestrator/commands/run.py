@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from .options import Fmus, Format, Out, ScenarioFile, Set, Swap
+from .options import CallLimit, Fmus, Format, Isolate, Out, ScenarioFile, Set, Swap, isolation
 
 Metrics = Annotated[
     list[str] | None,
@@ -38,12 +38,15 @@ def run(
     fmus: Fmus = None,
     format_: Format = "csv",
     metric: Metrics = None,
+    isolate: Isolate = False,
+    call_limit: CallLimit = None,
 ) -> None:
     """Run a scenario and write results.csv and run.json.
 
     Without --out, results go to results/<folder of the scenario>/<its name>; those of an earlier run
     there are replaced.
     """
+    from ..master.isolation import opener_of
     from ..master.simulate import simulate
     from ..results.formats import check_format
     from ..results.size import size_note
@@ -52,13 +55,15 @@ def run(
 
     check_format(format_)
     metrics = _metric_names(metric or ())
-    plan = make_plan(load_scenario(scenario, swaps=swap or (), settings=set_ or ()), fmus=fmus)
+    limit = isolation(isolate, call_limit)
+    loaded = load_scenario(scenario, swaps=swap or (), settings=set_ or ())
+    plan = make_plan(loaded, fmus=fmus, isolated=isolate)
     folder = out or default_folder(scenario)
     for note in (*plan.notes, size_note(plan, folder, format_)):
         if note:
             _say(f"note: {note}")
-    with _bar(plan.title or scenario.stem) as progress:
-        info = simulate(plan, folder, progress=progress, format=format_)
+    with _bar(plan.title or scenario.stem) as progress, opener_of(plan, limit) as opener:
+        info = simulate(plan, folder, progress=progress, opener=opener, format=format_)
     for message in info.warnings[:SHOWN]:
         _say(f"warning: {message.unit} at t = {message.time:.9g} s: {message.text}")
     if len(info.warnings) > SHOWN:

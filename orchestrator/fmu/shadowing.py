@@ -15,18 +15,23 @@ from pathlib import Path
 from ..plan import Fmu
 
 
-def shadowed_modules(fmus: Mapping[str, Fmu]) -> list[str]:
-    """Return a sentence for every unit that would run another unit's, or this program's, module."""
+def shadowed_modules(fmus: Mapping[str, Fmu], *, isolated: bool = False) -> list[str]:
+    """Return a sentence for every unit that would run another unit's, or this program's, module.
+
+    Args:
+        fmus: unit -> FMU.
+        isolated: each unit has a process of its own, and so no other's modules.
+    """
     problems = []
     seen: dict[str, tuple[str, str]] = {}
     for unit, fmu in fmus.items():
         for module, content in fmu.python_modules.items():
             other, its_content = seen.setdefault(module, (unit, content))
-            if its_content != content:
+            if its_content != content and not isolated:
                 problems.append(
                     f"{unit} ({fmu.name}) would run code of {other} ({fmus[other].name}): both FMUs bring "
                     f"a Python module {module!r}, and a process has room for one; rebuild one of them "
-                    "with another module name"
+                    "with another module name, or run with --isolate"
                 )
             elif module in sys.stdlib_module_names:
                 problems.append(

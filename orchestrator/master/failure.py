@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from .log import PENDING, STATUS, Log
+from .log import PENDING, PROCESS, STATUS, Log
 from .unit import Status
 
 _TELLS_WHEN = re.compile(r"^[^:]* failed at t = [^:]* s: ")
@@ -23,7 +23,8 @@ def describe(unit: str, what: str, time: float, status: Status, log: Log) -> str
     elif not errors:
         reason = f"the FMU returned {STATUS[status]} and gave no reason"
     else:
-        reason = " ".join(errors[0].text.split())
+        ended = (m for m in errors if m.category == PROCESS)  # what the unit said before is told with it
+        reason = " ".join(next(ended, errors[0]).text.split())
         if _TELLS_WHEN.match(reason):  # a component of this project: it knows where and when
             return f"{unit}: {reason.partition('; inputs: ')[0]}"
     return f"{unit}: {what} failed at t = {time:.9g} s: {reason}"

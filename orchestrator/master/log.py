@@ -29,6 +29,8 @@ WRITTEN = 100
 """Warnings written into run.json; more are only counted."""
 KEPT = 1000
 """Messages kept per unit; a unit that goes on is only counted."""
+PROCESS = "yawbench process"
+"""Category of the message that says how the process of an isolated unit ended; always kept."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class Log:
         if status == OK:
             return
         self._counts[unit] += 1
-        if self._counts[unit] > KEPT:
+        if self._counts[unit] > KEPT and category != PROCESS:
             self.dropped += 1
             return
         self.messages.append(Message(unit, self.time.value, status, category, text.rstrip()))

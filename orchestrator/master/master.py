@@ -138,13 +138,14 @@ class Master:
         operation = next(op for op in operations if op.call is call)
         station = self.memory.of[operation.unit]
         station.slave.note(status)
+        kind = station.slave.part(operation.kind)
         if status == WARNING:
             if not any(m.unit == operation.unit for m in self.log.warnings()):
-                self.log.add(operation.unit, WARNING, "", f"the {operation.kind} returned Warning")
+                self.log.add(operation.unit, WARNING, "", f"the {kind} returned Warning")
             return
         self._check_finite(k)  # a value that went wrong upstream explains this failure
         time = self.plan.time(k - station.unit.period)
-        sentence = describe(operation.unit, _WORDS[operation.kind], time, status, self.log)
+        sentence = describe(operation.unit, _WORDS[kind], time, status, self.log)
         raise SimulationError(sentence, unit=operation.unit, time=time)
 
     def _check_finite(self, k: int) -> None:

@@ -53,6 +53,9 @@ class Slave(Protocol):
         `step` takes the instance from `time` [s] to `time` + `step` [s], both read at the call.
         """
 
+    def part(self, kind: str) -> str:
+        """Return which kind of call (set, step, get) has failed when one of `kind` did not return OK."""
+
     def put(self, kind: str, references: Sequence[int], values: Sequence[Value]) -> Status:
         """Set variables of one type."""
 
@@ -156,6 +159,9 @@ class FmuSlave:
         function = self._library[name]
         function.restype = ctypes.c_int
         return function
+
+    def part(self, kind: str) -> str:
+        return kind
 
     def put(self, kind: str, references: Sequence[int], values: Sequence[Value]) -> Status:
         name, c_type = _TYPES[kind]

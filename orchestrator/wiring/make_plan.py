@@ -29,7 +29,11 @@ from .parameters import Parameters
 
 
 def make_plan(
-    scenario: Scenario, *, fmus: Path | None = None, open_: Callable[[Path], Fmu] = open_fmu
+    scenario: Scenario,
+    *,
+    fmus: Path | None = None,
+    open_: Callable[[Path], Fmu] = open_fmu,
+    isolated: bool = False,
 ) -> Plan:
     """Open the scenario's FMUs and connect them.
 
@@ -37,6 +41,7 @@ def make_plan(
         scenario: as loaded.
         fmus: the folder that holds FMUs given by name; None: the nearest `fmus/` that holds any.
         open_: how to open an archive, called as `open_fmu`.
+        isolated: each unit will have a process of its own (see `master.isolation`).
 
     Raises:
         ModelDescriptionError: FMUs that are missing, damaged or not supported.
@@ -48,12 +53,13 @@ def make_plan(
     connector = Connector(scenario, opened, replaced, notes)
     wires, constants = connector.connect()
     record = connector.recorded()
-    _check_instances(scenario, opened)
+    if not isolated:
+        _check_instances(scenario, opened)
     evaluation = evaluate(opened, wires)
     problems = scenario.document.sentences()
     if scenario.vehicle_document is not scenario.document:
         problems += scenario.vehicle_document.sentences()
-    problems += [f"{scenario.path}: {text}" for text in shadowed_modules(opened)]
+    problems += [f"{scenario.path}: {text}" for text in shadowed_modules(opened, isolated=isolated)]
     problems += [
         f"{scenario.path}: algebraic loop: {loop}; these values would define each other at one instant, so "
         "one of these units has to give an output that does not follow its input directly"
@@ -125,7 +131,8 @@ def _check_instances(scenario: Scenario, fmus: Mapping[str, Fmu]) -> None:
         if fmu.once_per_process and other != name:
             scenario.document.report(
                 ("units", name, "fmu"),
-                f"{fmu.name} can be instantiated only once per process, and {other} uses it already",
+                f"{fmu.name} can be instantiated only once per process, and {other} uses it already; "
+                "with --isolate each unit has a process of its own",
             )
 
 

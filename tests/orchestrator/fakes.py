@@ -79,6 +79,9 @@ class FakeSlave:
             self.behaviour.start(self.values)
         self.values.update(self.behaviour.output(self.time, self.values))
 
+    def part(self, kind: str) -> str:
+        return kind
+
     def put(self, kind: str, references: Sequence[int], values: Sequence[Any]) -> int:
         self.calls.append(("put", kind, tuple(self.names[r] for r in references), tuple(values)))
         self.values.update(zip((self.names[r] for r in references), values, strict=True))

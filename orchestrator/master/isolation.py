@@ -1,0 +1,236 @@
+"""Units in processes of their own: a crash or a call that never comes back ends a run, not the master.
+
+To the master an isolated unit is a `Slave` like any other. Its numbers are those of the same unit in
+this process, for the process at the other end runs the same `FmuSlave` on the same values. Setting
+inputs waits for the step and outputs come back with it, so a unit costs one exchange per step.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import functools
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import ModelDescriptionError, SimulationError
+from ..plan import Plan, Unit, Value
+from .exchange import GET, SET, STEP, Board
+from .log import FATAL, OK, PROCESS, WARNING, Log
+from .process import Lost, UnitProcess
+from .unit import Calls, FmuSlave, Slave, Status
+
+CALL_LIMIT = 10.0
+"""Time that a call of an FMU may take [s]; chosen: ten thousand times what a step takes, and still
+within the patience of somebody who waits."""
+
+_PARTS = {SET: ("set", "fmi2SetReal"), STEP: ("step", "fmi2DoStep"), GET: ("get", "fmi2GetReal")}
+"""Part of an exchange -> kind of the master's operation, and function of the FMU."""
+
+
+class IsolatedSlave:
+    """An instance of an FMU in a process of its own."""
+
+    def __init__(self, unit: Unit, log: Log, process: UnitProcess) -> None:
+        """Let the process load the library and instantiate.
+
+        Raises:
+            ModelDescriptionError, SimulationError: as `FmuSlave`; also if the process dies of it.
+        """
+        self.name = unit.name
+        self._log = log
+        self._process: UnitProcess | None = process
+        self._stepping = False
+        self._part = ""
+        process.log = functools.partial(log.add, unit.name)
+        try:
+            process.wait_until_ready()
+        except Lost as lost:
+            raise self._refused(f"{unit.name}: {lost.in_('its start')}") from None
+        try:
+            # what the process needs of the FMU, which leaves out some hundred variables
+            failed = process.ask("open", replace(unit, fmu=replace(unit.fmu, variables={})))
+        except Lost as lost:
+            reason = lost.in_("fmi2Instantiate or before")
+            raise self._refused(f"{unit.name}: {unit.fmu.path} cannot be instantiated: {reason}") from None
+        if failed is not None:
+            process.end()
+            kind, problems = failed
+            if kind == ModelDescriptionError.__name__:
+                raise ModelDescriptionError(problems)
+            raise self._refused(problems[0])
+
+    def _refused(self, sentence: str) -> SimulationError:
+        return SimulationError(sentence, unit=self.name, time=0.0)
+
+    def connect(
+        self,
+        inputs: np.ndarray,
+        input_references: Sequence[int],
+        outputs: np.ndarray,
+        output_references: Sequence[int],
+        time: ctypes.c_double,
+        step: ctypes.c_double,
+    ) -> Calls:
+        assert self._process is not None
+        board = Board(self._process.memory, len(input_references), len(output_references))
+        self._board = board
+        self._ask("", None, "connect", list(input_references), list(output_references))
+        board.step.value = step.value
+        give = _copy(inputs, board.inputs)
+        take = _copy(board.outputs, outputs)
+        step_and_get = STEP | GET if len(outputs) else STEP
+        waiting, fresh = 0, False
+
+        def set_inputs() -> Status:
+            nonlocal waiting
+            give()
+            if self._stepping:
+                waiting = SET
+                return OK
+            return self._exchange(SET)
+
+        def take_step() -> Status:
+            nonlocal waiting, fresh
+            board.time.value = time.value
+            parts, waiting = waiting | step_and_get, 0
+            fresh = True
+            return self._exchange(parts)
+
+        def get_outputs() -> Status:
+            nonlocal fresh
+            status = OK if fresh else self._exchange(GET)
+            fresh = False
+            take()
+            return status
+
+        def flush() -> Status:
+            nonlocal waiting
+            parts, waiting = waiting, 0
+            return self._exchange(parts) if parts else OK
+
+        self._flush: Callable[[], Status] = flush
+        return Calls(set_inputs, take_step, get_outputs)
+
+    def _exchange(self, parts: int) -> Status:
+        if self._process is None:
+            return FATAL
+        try:
+            answer = self._process.exchange(_BYTES[parts])
+        except Lost as lost:
+            self._part, function = _PARTS.get(self._board.part.value, ("", ""))
+            return self._lose(lost, function)
+        if answer == OK:
+            return OK
+        self._part = _PARTS[answer >> 4][0]
+        return answer & 15
+
+    def part(self, kind: str) -> str:
+        return self._part or kind
+
+    def put(self, kind: str, references: Sequence[int], values: Sequence[Value]) -> Status:
+        status = self._flush() if self._stepping else OK  # inputs are set in the order of the calls
+        if status > WARNING:
+            return status
+        return max(status, self._ask(f"fmi2Set{kind}", FATAL, "put", kind, list(references), list(values)))
+
+    def fetch(self, kind: str, references: Sequence[int]) -> tuple[Status, list[Value]]:
+        failed: tuple[Status, list[Value]] = (FATAL, [0] * len(references))
+        return self._ask(f"fmi2Get{kind}", failed, "fetch", kind, list(references))
+
+    def enter(self, stop_time: float) -> Status:
+        return self._ask("fmi2SetupExperiment or fmi2EnterInitializationMode", FATAL, "enter", stop_time)
+
+    def exit(self) -> Status:
+        status = self._ask("fmi2ExitInitializationMode", FATAL, "exit")
+        self._stepping = True
+        return status
+
+    def note(self, status: Status) -> Status:
+        return status  # the process has noted it
+
+    def _ask(self, function: str, failed: Any, request: str, *arguments: Any) -> Any:
+        """Return the answer to a request, or `failed` if the process did not survive it."""
+        if self._process is None:
+            return failed
+        self._part = ""
+        try:
+            return self._process.ask(request, *arguments)
+        except Lost as lost:
+            self._lose(lost, function)
+            return failed
+
+    def _lose(self, lost: Lost, function: str) -> Status:
+        """Tell how the process was lost."""
+        self._process = None
+        said = self._log.errors(self.name)
+        before = f"; before that it said: {' '.join(said[-1].text.split())}" if said else ""
+        self._log.add(self.name, FATAL, PROCESS, lost.in_(function) + before)
+        return FATAL
+
+    def free(self) -> None:
+        process, self._process = self._process, None
+        if process is None:
+            return
+        try:
+            process.ask("free")
+        except Lost as lost:  # the results are not the worse for it
+            self._log.add(self.name, WARNING, PROCESS, lost.in_("fmi2Terminate or fmi2FreeInstance"))
+        else:
+            process.leave()
+
+
+_BYTES = [bytes([parts]) for parts in range(SET + STEP + GET + 1)]
+
+
+def _copy(source: np.ndarray, target: np.ndarray) -> Callable[[], None]:
+    return functools.partial(target.data.__setitem__, slice(None), source.data)
+
+
+class Isolation:
+    """Opens units (see `simulate.Opener`) in processes of their own; all end with the `with` block."""
+
+    def __init__(self, units: Sequence[Unit], limit: float = CALL_LIMIT) -> None:
+        """Say which units there will be, for their processes to start at the same time.
+
+        Args:
+            limit: time that a call of an FMU may take [s].
+        """
+        self._units = units
+        self._limit = limit
+        self._processes: dict[str, UnitProcess] = {}
+
+    def __enter__(self) -> Isolation:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        for process in self._processes.values():
+            process.end()
+
+    def __call__(self, unit: Unit, log: Log, corrupted: set[Path]) -> Slave:
+        """Return the unit's instance. One that returns Fatal spoils no other: they share nothing."""
+        if not self._processes:
+            for each in self._units:
+                self._processes[each.name] = UnitProcess(len(each.fmu.variables), self._limit)
+        return IsolatedSlave(unit, log, self._processes[unit.name])
+
+
+@contextlib.contextmanager
+def opener_of(plan: Plan, call_limit: float | None) -> Iterator[Callable[[Unit, Log, set[Path]], Slave]]:
+    """Yield what opens the units of a plan: in this process, or isolated if calls have a limit [s].
+
+    Raises:
+        SimulationError: this operating system has not what isolation needs.
+    """
+    if call_limit is None:
+        yield FmuSlave
+        return
+    if sys.platform == "win32":
+        raise SimulationError("--isolate needs Linux or macOS.", unit=None, time=0.0)
+    with Isolation(plan.units, call_limit) as isolation:
+        yield isolation
