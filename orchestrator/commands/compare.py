@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .batch import Jobs
-from .options import Fmus, Format, Out, ScenarioFile, Set
+from .options import CallLimit, Fmus, Format, Isolate, Out, ScenarioFile, Set, isolation
 
 Swaps = Annotated[
     list[str],
@@ -29,6 +29,8 @@ def compare(
     fmus: Fmus = None,
     jobs: Jobs = None,
     format_: Format = "csv",
+    isolate: Isolate = False,
+    call_limit: CallLimit = None,
 ) -> None:
     """Run a scenario once per FMU; overlay the runs in figures and put their metrics side by side.
 
@@ -45,7 +47,9 @@ def compare(
     default: Path = default_folder(scenario)
     folder = out or default.with_name(f"{default.name}-compare")
     check_format(format_)
-    work = [replace(job, format=format_) for job in variants(scenario, swap, set_ or (), folder, fmus)]
+    limit = isolation(isolate, call_limit)
+    made = variants(scenario, swap, set_ or (), folder, fmus)
+    work = [replace(job, format=format_, call_limit=limit) for job in made]
     outcomes = run_all(work, folder, workers=jobs)
     comparison = judge_comparison(outcomes)
     title = str(comparison.runs[0].results.run.get("title") or "") if comparison.runs else ""

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .batch import Jobs
-from .options import Fmus, Format, Out
+from .options import CallLimit, Fmus, Format, Isolate, Out, isolation
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file (YAML).", metavar="STUDY")]
 NoRun = Annotated[
@@ -23,6 +23,8 @@ def study(
     jobs: Jobs = None,
     format_: Format = "csv",
     no_run: NoRun = False,
+    isolate: Isolate = False,
+    call_limit: CallLimit = None,
 ) -> None:
     """Run a study: its scenarios, a table of metrics, a verdict per claim, figures.
 
@@ -40,11 +42,13 @@ def study(
     from .run import default_folder
 
     check_format(format_)
+    limit = isolation(isolate, call_limit)
     loaded = load_study(file)
     folder = out or default_folder(file)
     outcomes: list[Outcome] = []
     if not no_run:
-        work = [replace(run.job(folder, fmus), format=format_) for run in loaded.runs.values()]
+        made = [run.job(folder, fmus) for run in loaded.runs.values()]
+        work = [replace(job, format=format_, call_limit=limit) for job in made]
         outcomes = run_all(work, folder, workers=jobs)
     with stoppable(folder), pool(jobs) as workers:
         findings = judge_study(loaded, folder, outcomes, each=workers.map)

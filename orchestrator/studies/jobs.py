@@ -47,6 +47,7 @@ class Job:
     record: tuple[str, ...] = ()  # unit.variable; default: what the scenario records
     format: str = "csv"  # of the results
     vehicle: Path | None = None  # vehicle file in place of the scenario's
+    call_limit: float | None = None  # of a call of an FMU [s], in a process per unit; None: units share one
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,8 @@ def plan_of(
         vehicle=job.vehicle,
         read=read,
     )
-    plan = make_plan(scenario, fmus=job.fmus, open_=open_ or open_fmu)
+    isolated = job.call_limit is not None
+    plan = make_plan(scenario, fmus=job.fmus, open_=open_ or open_fmu, isolated=isolated)
     if not job.record:
         return plan
     recorded = {f"{unit}.{variable}": (unit, variable) for unit, variable in plan.record}
@@ -139,9 +141,12 @@ def run_job(job: Job) -> None:
     Raises:
         YawbenchError: the scenario is wrong or the run failed.
     """
+    from ..master.isolation import opener_of
     from ..master.simulate import simulate
 
-    simulate(plan_of(job), job.out, format=job.format)
+    plan = plan_of(job)
+    with opener_of(plan, job.call_limit) as opener:
+        simulate(plan, job.out, opener=opener, format=job.format)
 
 
 def default_workers() -> int:
