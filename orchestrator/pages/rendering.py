@@ -1,0 +1,40 @@
+"""From facts to HTML: the templates of all pages, their style, and how tables become HTML."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from ..studies.study import FAILS, HOLDS, NOT_JUDGED
+
+SIGNS = {HOLDS: ("good", "✓"), NOT_JUDGED: ("open", "–"), **{word: ("bad", "✗") for word in FAILS.values()}}
+"""Verdict -> class of its style, sign: told apart without colours too."""
+
+
+def render(template: str, **facts: Any) -> str:
+    """Return a template filled with facts; a fact that it lacks is an error, not an empty place."""
+    environment = Environment(
+        loader=PackageLoader("orchestrator.pages"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["verdict"] = verdict_sign
+    return environment.get_template(template).render(facts)
+
+
+def style() -> Markup:
+    """Return the style of all pages with text."""
+    return Markup((files(__package__) / "static" / "page.css").read_text(encoding="utf-8"))
+
+
+def verdict_sign(word: str) -> Markup:
+    """Return a verdict as a sign with its word; other text as it is."""
+    if word not in SIGNS:
+        return Markup.escape(word)
+    kind, sign = SIGNS[word]
+    return Markup('<span class="verdict {}"><b aria-hidden="true">{}</b> {}</span>').format(kind, sign, word)
