@@ -32,6 +32,8 @@ POINTS = 1500
 OFF_SCALE = 8.0
 """A line that exceeds what must be seen by this factor may leave the axes if another one stays."""
 
+PATH_ROOM = (ROW - 0.75) / (WIDTH - 1.0)
+"""Height over width of a path's axes in a figure."""
 
 SEEN_ERROR = 0.02
 """An error, relative to the reference's peak, that need not be magnified further."""
@@ -65,7 +67,7 @@ def panels_of(runs: Sequence[Run], name: str) -> list[Panel]:
     """Return the panels that a name stands for: none if no run has the signals, four for wheels."""
     if name == "path":
         drawn = [run for run in runs if _path_columns(run)]
-        return [Panel(name, True, lambda axes: _draw_path(axes, runs), over_time=False)] if drawn else []
+        return [Panel(name, True, lambda axes: draw_path(axes, runs), over_time=False)] if drawn else []
     if signals := signals_of(name):
         named = [(run.label, run.results) for run in runs]
         if not curves_of(named, *signals):
@@ -191,8 +193,14 @@ def _path_columns(run: Run) -> tuple[str, str] | None:
     return (x[0], y[0]) if x and y else None
 
 
-def _draw_path(axes: Axes, runs: Sequence[Run]) -> None:
-    """Draw the paths seen from above; the lateral axis is stretched as far as the shape needs it."""
+def draw_path(axes: Axes, runs: Sequence[Run], *, room: float = PATH_ROOM) -> None:
+    """Draw the paths seen from above; the lateral axis is stretched as far as the shape needs it.
+
+    Args:
+        axes: what to draw into.
+        runs: those that recorded a position are drawn.
+        room: height of the axes over their width.
+    """
     drawn = [(k, run.results, c) for k, run in enumerate(runs) if (c := _path_columns(run))]
     for number, results, (x, y) in drawn:
         every = max(1, results.time.size // POINTS)
@@ -201,7 +209,7 @@ def _draw_path(axes: Axes, runs: Sequence[Run]) -> None:
         axes.plot(results[x][-1:], results[y][-1:], "o", ms=3.5, color=line_style(number)["color"])
     length = _span([results[x] for _, results, (x, _) in drawn])
     breadth = _span([results[y] for _, results, (_, y) in drawn])
-    stretch = _stretch(length, breadth, room=(ROW - 0.75) / (WIDTH - 1.0))
+    stretch = _stretch(length, breadth, room=room)
     axes.set_aspect(stretch, adjustable="datalim")
     scale = (
         "both axes to the same scale" if stretch == 1 else f"lateral scale {stretch} times the longitudinal"

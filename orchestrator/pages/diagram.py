@@ -149,8 +149,8 @@ def stack(system: System, title: str) -> Markup:
     y = 1.0
     for block in system.blocks:
         content: list[tuple[str, float, str, str]] = [(block.name, NAME, ' font-weight="600"', "")]
-        for line in textwrap.wrap(", ".join(block.fmus), characters, break_on_hyphens=False):
-            content.append((line, SMALL, ' fill="#444"', ""))
+        fmus = textwrap.wrap(", ".join(block.fmus), characters, break_on_hyphens=False)
+        content += [(line, SMALL, ' fill="#444"', "") for line in fmus]
         for source in system.sources_of(block.name):
             said = f"{source}: {', '.join(system.signals[source, block.name])}"
             rows = textwrap.wrap(said, characters, subsequent_indent="  ", break_on_hyphens=False)
@@ -174,7 +174,9 @@ def stack(system: System, title: str) -> Markup:
         x, colour, ends = lane[name], style["color"], [leaves[name], *enters[name]]
         lines.append(_line([(right, leaves[name]), (x, leaves[name])], colour, 1.6))
         lines.append(_line([(x, min(ends)), (x, max(ends))], colour, 1.6, dashes))
-        lines.append(Markup('<circle cx="{:.1f}" cy="{:.1f}" r="2.6" fill="{}"/>').format(right, leaves[name], colour))
+        lines.append(
+            Markup('<circle cx="{:.1f}" cy="{:.1f}" r="2.6" fill="{}"/>').format(right, leaves[name], colour)
+        )
         for end in enters[name]:
             lines.append(_line([(x, end), (right + ARROW - 1, end)], colour, 1.3))
             lines.append(_arrow(right + 0.8, end, -1, 0, colour))

@@ -1,0 +1,69 @@
+"""Whether recorded results are those that a run made now would give: same scenario, FMUs and programs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from ..plan import Plan
+from ..results.formats import RUN_FILE
+from ..results.run_record import run_record
+
+COMPARED = {
+    "algorithm": "the algorithm has changed",
+    "step_size": "the communication step has changed",
+    "stop_time": "the stop time has changed",
+    "evaluation_order": "the order of the units has changed",
+    "connections": "the wires have changed",
+    "units": "what is recorded has changed",
+    "title": "the scenario has changed",
+}
+"""Key of a run's record -> what it means if it differs from the plan's."""
+PROGRAMS = ("yawbench", "fmpy", "pythonfmu", "numpy")
+"""Programs whose version has a say in the numbers."""
+
+
+def staleness(plan: Plan, folder: Path) -> str | None:
+    """Return why the results in a folder are not those of the plan, None if they are.
+
+    A change of the orchestrator that leaves its version alone is not noticed.
+    """
+    try:
+        recorded = json.loads((folder / RUN_FILE).read_text(encoding="utf-8"))
+    except OSError:
+        return "no results yet"
+    except ValueError:
+        return "the record cannot be read"
+    if not isinstance(recorded, dict) or recorded.get("status") != "completed":
+        return "the run did not reach its end"
+    if not (folder / str(recorded.get("results", "results.csv"))).is_file():
+        return "the results are missing"
+    planned = run_record(plan, status="completed", started=datetime.now(timezone.utc))
+    wanted = json.loads(json.dumps(planned, default=str))
+    for key, sentence in COMPARED.items():
+        if recorded.get(key) != wanted[key]:
+            return sentence
+    return _changed_fmu(recorded.get("fmus", {}), wanted["fmus"]) or _changed_program(
+        recorded.get("versions", {}), wanted["versions"]
+    )
+
+
+def _changed_fmu(recorded: Mapping[str, Any], wanted: Mapping[str, Any]) -> str | None:
+    for unit, fmu in wanted.items():
+        known = recorded.get(unit, {})
+        if known.get("sha256") != fmu["sha256"]:
+            return f"{unit}: another {fmu['name']}.fmu"
+        for key, words in (("parameters", "parameters"), ("constants", "constants"), ("step_size", "step")):
+            if known.get(key) != fmu[key]:
+                return f"{unit}: other {words}"
+    return None
+
+
+def _changed_program(recorded: Mapping[str, str], wanted: Mapping[str, str]) -> str | None:
+    for program in PROGRAMS:
+        if recorded.get(program) != wanted[program]:
+            return f"{program} {wanted[program]} in place of {recorded.get(program, 'an unknown one')}"
+    return None

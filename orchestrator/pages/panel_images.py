@@ -1,0 +1,141 @@
+"""The panels of a figure one by one, as small SVG images that a page puts side by side or below each other.
+
+What stands above a panel in a figure, title and legend, is text of the page here, so that it can be read
+on a phone.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+from markupsafe import Markup
+
+from ..figures.panels import Panel, Run, draw_path, shown_by, thinned
+from ..figures.style import RC, REFERENCE, line_style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH, ROW = 4.7, 2.15
+"""Width of a panel and height of a row [inches]; chosen: 9 points of type stay 7 on a phone."""
+BUCKETS = 450
+"""Buckets that a line over time is thinned to; chosen: one per pixel of a panel."""
+LOOK: Any = {**RC, "svg.fonttype": "none", "axes.titlesize": 9}
+"""As in figures, but with text as text."""
+
+
+@dataclass(frozen=True)
+class PanelImage:
+    """A panel: what it shows, and its image as the address of an `<img>`."""
+
+    name: str
+    heading: Markup
+    address: str
+    tall: bool
+
+
+@dataclass(frozen=True)
+class LegendEntry:
+    """What a line stands for; its colour, width [px] and dashes (SVG)."""
+
+    label: str
+    colour: str
+    width: float
+    dashes: str
+
+
+def panel_images(runs: Sequence[Run], names: Sequence[str]) -> tuple[list[PanelImage], list[LegendEntry]]:
+    """Return the panels that the runs have the signals for, and the legend that they share."""
+    import matplotlib
+
+    panels = [_path_beside(panel, runs) for panel in shown_by(runs, names)]
+    with matplotlib.rc_context(LOOK):
+        drawn = [_draw(panel) for panel in panels]
+        for scale in {panel.scale for panel in panels if panel.scale}:
+            _share(
+                [figure.axes[0] for panel, figure in zip(panels, drawn, strict=True) if panel.scale == scale]
+            )
+        legend = _legend(runs, drawn)
+        images = [_image(panel, figure) for panel, figure in zip(panels, drawn, strict=True)]
+    return images, legend
+
+
+def _path_beside(panel: Panel, runs: Sequence[Run]) -> Panel:
+    """Return the panel; a path as one of the shape of the others."""
+    if panel.name != "path":
+        return panel
+    room = (ROW - 0.5) / (WIDTH - 0.6)
+    return replace(panel, draw=lambda axes: draw_path(axes, runs, room=room))
+
+
+def _draw(panel: Panel) -> Figure:
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, ROW * panel.rows), layout="constrained")
+    FigureCanvasSVG(figure)
+    axes = figure.add_subplot()
+    panel.draw(axes)
+    for line in axes.get_lines():
+        x, y = line.get_data()
+        if panel.over_time:
+            line.set_data(*thinned(x, y, BUCKETS))  # type: ignore[arg-type]
+    if (legend := axes.get_legend()) is not None:
+        legend.set_ncols(2)
+    return figure
+
+
+def _share(every: Sequence[Axes]) -> None:
+    """Give axes the same limits."""
+    limits = [axes.get_ylim() for axes in every]
+    for axes in every:
+        axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
+
+
+def _legend(runs: Sequence[Run], drawn: Sequence[Figure]) -> list[LegendEntry]:
+    entries = [_entry(run.label, line_style(k)) for k, run in enumerate(runs) if len(runs) > 1]
+    pale = [
+        line for figure in drawn for line in figure.axes[0].get_lines() if line.get_label() == "reference"
+    ]
+    if pale:
+        own = any(line.get_color() != REFERENCE["color"] for line in pale)
+        entries.append(_entry("wide and pale: the run's own reference" if own else "reference", REFERENCE))
+    return entries
+
+
+def _entry(label: str, style: dict[str, Any]) -> LegendEntry:
+    dashes = style["linestyle"][1] if isinstance(style["linestyle"], tuple) else ()
+    width = float(style["linewidth"])
+    return LegendEntry(label, style["color"], width, " ".join(f"{part * width:.3g}" for part in dashes))
+
+
+def _image(panel: Panel, figure: Figure) -> PanelImage:
+    axes = figure.axes[0]
+    heading = axes.get_title(loc="left")
+    axes.set_title("", loc="left")
+    text = io.StringIO()
+    figure.savefig(text, format="svg", metadata={"Date": None})
+    svg = text.getvalue()
+    svg = svg[svg.index("<svg") :]
+    svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
+    svg = re.sub(r"(\.\d\d)\d+", r"\1", svg)
+    svg = re.sub(r"\s*\n\s*", "\n", svg)
+    address = "data:image/svg+xml," + quote(svg, safe=" =:/'\"(),;.-+*!?#@&$[]{}|^`~\n".replace("#", ""))
+    return PanelImage(panel.name, in_html(heading), address.replace('"', "'"), panel.rows > 1)
+
+
+def in_html(title: str) -> Markup:
+    """Return a title of matplotlib as HTML: `$β_\\mathrm{ref}$` with its index below."""
+
+    def formula(match: re.Match[str]) -> str:
+        plain = re.sub(r"\\mathrm\{(.*?)\}", r"\1", match[1])
+        return re.sub(r"_(\w+)", r"<sub>\1</sub>", f"<i>{plain}</i>")
+
+    escaped = str(Markup.escape(title.replace("'", "’")))
+    return Markup(re.sub(r"\$(.*?)\$", formula, " ".join(escaped.split())))

@@ -1,0 +1,224 @@
+"""Where every parameter's value comes from: a paper, a choice, an erratum, or the study itself.
+
+What a value stands for is said where it stands: at the end of its description in the FMU, in the comment
+beside it in the scenario or vehicle file, or in that file's `source`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..plan import Plan, Unit, Value
+from ..scenario.load import Scenario
+from ..scenario.yaml_lines import Document, Key
+from ..wording import fold
+
+PAPER, LITERATURE, CHOSEN, ERRATUM, VARIED, NEUTRAL = (
+    "paper", "literature", "chosen", "erratum", "varied", "neutral",
+)  # fmt: skip
+_ERRATUM = re.compile(r"printed as|cannot be right|implausible|erratum|as printed", re.IGNORECASE)
+_CHOSEN = re.compile(r"\bchosen\b", re.IGNORECASE)
+_PAPER = re.compile(r"\bpapers?\b", re.IGNORECASE)
+_LITERATURE = re.compile(r"\b(ISO|SAE|Pacejka|table|equation)\b")
+_COMMENT = re.compile(r"#\s*(.*?)\s*$")
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a value comes from: its kind, and the words of the source."""
+
+    kind: str
+    says: str
+
+
+@dataclass
+class Parameter:
+    """A parameter in all runs of a study."""
+
+    name: str
+    meaning: str
+    unit: str
+    default: Origin  # of the FMU's own value
+    given: Origin | None = None  # of the value that the scenario or the vehicle file gives
+    set_by_study: bool = False
+    values: dict[str, None] = field(default_factory=dict)  # as text, each once
+    takers: dict[str, None] = field(default_factory=dict)  # units that take it
+
+    @property
+    def origin(self) -> Origin:
+        """Where the value comes from that stands where the study sets no other."""
+        return self.given or self.default
+
+    def note(self, origin: Origin | None) -> None:
+        """Note where the value of one run comes from."""
+        if origin is not None and origin.kind == VARIED:
+            self.set_by_study = True
+        else:
+            self.given = self.given or origin
+
+
+@dataclass
+class Group:
+    """The parameters of a vehicle file, of a unit's FMU, or the constants of a scenario."""
+
+    title: str
+    below: str
+    parameters: dict[str, Parameter] = field(default_factory=dict)
+
+
+def kind_of(words: str) -> str:
+    """Return what kind of source the words name; "" if they name none."""
+    for kind, pattern in (
+        (ERRATUM, _ERRATUM), (CHOSEN, _CHOSEN), (PAPER, _PAPER), (LITERATURE, _LITERATURE),
+    ):  # fmt: skip
+        if pattern.search(words):
+            return kind
+    return ""
+
+
+def meaning_and_origin(description: str) -> tuple[str, Origin]:
+    """Return the two parts of a parameter's description in an FMU, `meaning; where it comes from`."""
+    meaning, _, rest = description.partition("; ")
+    words = re.sub(r"\s*\(one of: .*\)$", "", rest)
+    kind = kind_of(words)
+    if not kind and (kind := kind_of(meaning)):
+        words = ""
+    return (meaning if kind or not rest else description), Origin(kind or NEUTRAL, words)
+
+
+def groups_of(runs: Sequence[tuple[Scenario, Plan]]) -> list[Group]:
+    """Return all parameters of the runs: the vehicles', then those of every unit's FMUs, then constants."""
+    vehicles: dict[str, Group] = {}
+    units: dict[tuple[str, str], Group] = {}
+    constants = Group("Constant inputs", "no unit gives them")
+    order: dict[str, None] = {}
+    for scenario, plan in runs:
+        comments = _Comments()
+        by_name = {unit.name: unit for unit in plan.units}
+        for name in [name for name in scenario.units if name in by_name]:
+            order[name] = None
+            unit = by_name[name]
+            own = units.setdefault(
+                (name, unit.fmu.name), Group(f"{name}: {unit.fmu.name}", unit.fmu.description)
+            )
+            for variable in unit.fmu.of("parameter"):
+                from_vehicle = (
+                    variable.name in scenario.vehicle_parameters
+                    and variable.name not in scenario.units[name].parameters
+                )
+                value = unit.parameters.get(variable.name, variable.start)
+                group, origin = own, _origin(scenario, unit, variable.name, comments)
+                if from_vehicle:
+                    file = scenario.vehicle_document.path
+                    group = vehicles.setdefault(str(file), _vehicle_group(scenario, file))
+                meaning, default = meaning_and_origin(variable.description)
+                row = group.parameters.setdefault(
+                    variable.name, Parameter(variable.name, meaning, variable.unit or "", default)
+                )
+                row.note(origin)
+                row.values[text_of(value)] = None
+                row.takers[name] = None
+            _constants(constants, scenario, unit, comments)
+    ordered = [units[key] for name in order for key in units if key[0] == name]
+    return [group for group in (*vehicles.values(), *ordered, constants) if group.parameters]
+
+
+def _vehicle_group(scenario: Scenario, file: Path) -> Group:
+    vehicle = scenario._vehicle
+    return Group(f"The car: {vehicle.title or file.stem}", f"{file.name}; {vehicle.source}")
+
+
+def _constants(group: Group, scenario: Scenario, unit: Unit, comments: _Comments) -> None:
+    for name in fold(list(unit.constants)):
+        first = next(n for n in unit.constants if n == name or n.startswith(name.rstrip("*")))
+        variable = unit.fmu.variables[first]
+        meaning, default = meaning_and_origin(variable.description)
+        said: Origin | None = None
+        for pattern in scenario.inputs:
+            key: Key = ("inputs", pattern)
+            if re.fullmatch(re.escape(pattern).replace(r"\*", ".*"), first):
+                if scenario.document.override(key):
+                    said = Origin(VARIED, "set by the study")
+                else:
+                    words = comments.beside(scenario.document, key)
+                    said = Origin(
+                        kind_of(words) or kind_of(scenario.source) or NEUTRAL, words or scenario.source
+                    )
+        row = group.parameters.setdefault(
+            f"{unit.name}.{name}", Parameter(f"{unit.name}.{name}", meaning, variable.unit or "", default)
+        )
+        row.note(said)
+        row.values[text_of(unit.constants[first])] = None
+
+
+def _origin(scenario: Scenario, unit: Unit, name: str, comments: _Comments) -> Origin | None:
+    """Return where a value comes from if the scenario or the vehicle gives it, None if the FMU does."""
+    if name in scenario.units[unit.name].parameters and name in unit.parameters:
+        key: Key = ("units", unit.name, "parameters", name)
+        if scenario.document.override(key):
+            return Origin(VARIED, "set by the study")
+        words = comments.beside(scenario.document, key) or comments.above(
+            scenario.document, ("units", unit.name)
+        )
+        return Origin(kind_of(words) or kind_of(scenario.source) or NEUTRAL, words or scenario.source)
+    if name in scenario.vehicle_parameters and name in unit.parameters:
+        key = ("parameters", name)
+        if scenario.vehicle_document.override(key):
+            return Origin(VARIED, "set by the study")
+        measure = unit.fmu.variables[name].unit or "1"
+        words = comments.beside(scenario.vehicle_document, key)
+        words = re.sub(rf"^{re.escape(measure)}(?![\w/.])[,;]?\s*", "", words)
+        return Origin(kind_of(words) or kind_of(scenario._vehicle.source) or NEUTRAL, words)
+    return None
+
+
+class _Comments:
+    """The comments of YAML files."""
+
+    def __init__(self) -> None:
+        self._lines: dict[Path, list[str]] = {}
+
+    def beside(self, document: Document, key: Key) -> str:
+        """Return the comment in the line of a value, nothing if there is none."""
+        return self._of(document, document.lines.get(key, 0))
+
+    def above(self, document: Document, key: Key) -> str:
+        """Return the comment lines right above a key."""
+        number = document.lines.get(key, 1) - 1
+        lines = self._read(document.path)
+        found: list[str] = []
+        while number >= 1 and lines[number - 1].lstrip().startswith("#"):
+            found.insert(0, lines[number - 1].lstrip().lstrip("# ").rstrip())
+            number -= 1
+        return " ".join(found)
+
+    def _of(self, document: Document, number: int) -> str:
+        lines = self._read(document.path)
+        match = _COMMENT.search(lines[number - 1]) if 0 < number <= len(lines) else None
+        return match[1] if match else ""
+
+    def _read(self, path: Path) -> list[str]:
+        if path not in self._lines:
+            try:
+                self._lines[path] = path.read_text(encoding="utf-8").splitlines()
+            except (OSError, ValueError):  # an SSP archive
+                self._lines[path] = []
+        return self._lines[path]
+
+
+def text_of(value: Value | None) -> str:
+    """Return a value as a scenario file would have it, numbers with six digits."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def count_kinds(groups: Iterable[Group]) -> dict[str, int]:
+    """Return how many parameters there are of each kind of origin."""
+    kinds = [p.origin.kind for group in groups for p in group.parameters.values()]
+    return {
+        kind: kinds.count(kind) for kind in (PAPER, ERRATUM, CHOSEN, LITERATURE, NEUTRAL) if kind in kinds
+    }
