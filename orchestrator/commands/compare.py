@@ -32,13 +32,18 @@ def compare(
     isolate: Isolate = False,
     call_limit: CallLimit = None,
 ) -> None:
-    """Run a scenario once per FMU; overlay the runs in figures and put their metrics side by side.
+    """Run a scenario once per FMU; overlay the runs, put their metrics side by side, tell where they part.
+
+    All of it stands in one page, compare.html, that needs no server.
 
     Without --out, results go to results/<folder of the scenario>/<its name>-compare. A run that
     fails is named and takes no other with it.
     """
+    import shlex
+    import sys
     from dataclasses import replace
 
+    from ..pages.compare_page import write_page
     from ..results.formats import check_format
     from ..studies.compare import judge_comparison, metric_table, variants, write_comparison
     from .batch import print_tables, run_all, say
@@ -57,6 +62,9 @@ def compare(
     table = metric_table(comparison, f"{title or scenario.stem} ({exchanged} exchanged)")
     files = write_comparison(comparison, table, folder)
     print_tables([table])
+    command = shlex.join(["yawbench", *sys.argv[1:]])
+    page = write_page(comparison, work, folder, title=table.title, command=command)
     say(f"{folder}: {', '.join(files)}")
+    say(f"The page: {page}")
     if comparison.failed:
         raise typer.Exit(max(outcome.exit_status for outcome in outcomes) or 1)

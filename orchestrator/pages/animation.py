@@ -16,7 +16,6 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from ..errors import ResultsError
@@ -24,6 +23,7 @@ from ..figures.display import shown_unit
 from ..figures.style import line_style
 from ..results.read import Results
 from .animation_frames import WHEELS, Frames, frames_of
+from .rendering import render
 
 SCRIPTS = ("frames", "draw", "scene", "close_up", "strip", "player")
 READOUTS = (
@@ -49,7 +49,7 @@ def fragment(runs: Runs, *, title: str = "") -> Markup:
     Raises:
         ResultsError: a run's position or yaw angle was not recorded.
     """
-    return Markup(_render("animation.html.j2", **_facts(runs, title)))
+    return Markup(render("animation.html.j2", **_facts(runs, title)))
 
 
 def assets() -> Markup:
@@ -72,7 +72,7 @@ def page(runs: Runs, *, title: str = "", below: str = "") -> str:
     Raises:
         ResultsError: a run's position or yaw angle was not recorded.
     """
-    return _render("animation_page.html.j2", assets=assets(), below=below, **_facts(runs, title, alone=True))
+    return render("animation_page.html.j2", assets=assets(), below=below, **_facts(runs, title, alone=True))
 
 
 def _facts(runs: Runs, title: str, *, alone: bool = False) -> dict[str, Any]:
@@ -177,14 +177,3 @@ def force_scale(runs: Sequence[Frames]) -> float:
 def _peak(values: np.ndarray) -> float:
     finite = values[np.isfinite(values)]
     return float(finite.max()) if finite.size else 0.0
-
-
-def _render(template: str, **facts: Any) -> str:
-    environment = Environment(
-        loader=PackageLoader("orchestrator.pages"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template(template).render(facts)

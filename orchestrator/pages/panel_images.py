@@ -36,7 +36,7 @@ class PanelImage:
 
     name: str
     heading: Markup
-    address: str
+    address: Markup
     tall: bool
 
 
@@ -121,13 +121,18 @@ def _image(panel: Panel, figure: Figure) -> PanelImage:
     axes.set_title("", loc="left")
     text = io.StringIO()
     figure.savefig(text, format="svg", metadata={"Date": None})
-    svg = text.getvalue()
+    return PanelImage(panel.name, in_html(heading), address_of(text.getvalue()), panel.rows > 1)
+
+
+def address_of(svg: str) -> Markup:
+    """Return an SVG image as a `data:` address for an attribute in double quotes, as short as it can be."""
     svg = svg[svg.index("<svg") :]
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
+    svg = re.sub(r"(?<=>)[^<]+(?=<)", lambda text: text[0].replace("'", "’"), svg)
+    svg = svg.replace("'", "").replace('"', "'")
     svg = re.sub(r"(\.\d\d)\d+", r"\1", svg)
     svg = re.sub(r"\s*\n\s*", "\n", svg)
-    address = "data:image/svg+xml," + quote(svg, safe=" =:/'\"(),;.-+*!?#@&$[]{}|^`~\n".replace("#", ""))
-    return PanelImage(panel.name, in_html(heading), address.replace('"', "'"), panel.rows > 1)
+    return Markup("data:image/svg+xml," + quote(svg, safe=" =:/'(),;.-+*!?@$[]{}|^`~"))
 
 
 def in_html(title: str) -> Markup:

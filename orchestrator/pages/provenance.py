@@ -20,7 +20,7 @@ PAPER, LITERATURE, CHOSEN, ERRATUM, VARIED, NEUTRAL = (
     "paper", "literature", "chosen", "erratum", "varied", "neutral",
 )  # fmt: skip
 _ERRATUM = re.compile(r"printed as|cannot be right|implausible|erratum|as printed", re.IGNORECASE)
-_CHOSEN = re.compile(r"\bchosen\b", re.IGNORECASE)
+_CHOSEN = re.compile(r"\bchosen\b|\bpaper (has|names|gives) none\b", re.IGNORECASE)
 _PAPER = re.compile(r"\bpapers?\b", re.IGNORECASE)
 _LITERATURE = re.compile(r"\b(ISO|SAE|Pacejka|table|equation)\b")
 _COMMENT = re.compile(r"#\s*(.*?)\s*$")

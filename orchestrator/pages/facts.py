@@ -1,0 +1,105 @@
+"""What report and comparison pages share: figures, animations, FMUs and settings as facts for templates."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timezone
+
+from markupsafe import Markup
+
+from ..errors import ResultsError
+from ..figures.panels import Run
+from ..plan import Plan
+from ..results.read import Results
+from ..results.run_record import versions
+from ..scenario.load import Scenario, load_scenario
+from ..studies.jobs import Job, plan_of
+from .animation import fragment
+from .panel_images import LegendEntry, PanelImage, panel_images
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure as a page shows it, panel by panel."""
+
+    id: str
+    title: str
+    panels: list[PanelImage]
+    legend: list[LegendEntry]
+    files: tuple[str, ...] = ()
+
+
+@dataclass
+class FmuFact:
+    """An FMU that took part, by its content."""
+
+    name: str
+    sha256: str
+    units: dict[str, None]  # it stood for
+
+
+def figure_of(wanted: tuple[str, str, Sequence[Run], Sequence[str], tuple[str, ...]]) -> Figure | None:
+    """Return a figure of (id, title, runs, panels, files); None if the runs recorded nothing of it."""
+    name, title, runs, panels, files = wanted
+    images, legend = panel_images(runs, panels)
+    return Figure(name, title, images, legend, files) if images else None
+
+
+def animation_of(runs: Sequence[tuple[str, Results]], title: str) -> Markup | None:
+    """Return the animation of one or two runs (label, results); None if they recorded no positions."""
+    try:
+        return fragment(runs, title=title)
+    except ResultsError:
+        return None
+
+
+def planned(job: Job) -> tuple[Scenario, Plan]:
+    """Return a job's scenario with all that is changed in it, and its plan.
+
+    Raises:
+        YawbenchError: the scenario or an FMU is wrong.
+    """
+    scenario = load_scenario(
+        job.scenario,
+        swaps=job.swaps,
+        settings=job.settings,
+        stop_time=job.stop_time,
+        step_size=job.step_size,
+        algorithm=job.algorithm,
+        vehicle=job.vehicle,
+    )
+    return scenario, plan_of(job)
+
+
+def fmus_of(recorded: Iterable[Results]) -> list[FmuFact]:
+    """Return every FMU that took part in the runs, as their records say."""
+    found: dict[str, FmuFact] = {}
+    for results in recorded:
+        for unit, fmu in results.run.get("fmus", {}).items():
+            name, sha256 = str(fmu.get("name", unit)), str(fmu.get("sha256", ""))
+            found.setdefault(f"{name} {sha256}", FmuFact(name, sha256, {})).units[unit] = None
+    return sorted(found.values(), key=lambda fmu: (min(fmu.units), fmu.name))
+
+
+def programs_of(recorded: Iterable[Results]) -> dict[str, str]:
+    """Return the versions of the programs that made the runs, as their records say."""
+    found: dict[str, dict[str, None]] = {}
+    for results in recorded:
+        for name, version in results.run.get("versions", {}).items():
+            found.setdefault(name, {})[str(version)] = None
+    return {name: " and ".join(several) for name, several in found.items()}
+
+
+def made_by() -> dict[str, object]:
+    """Return what the foot of every page says."""
+    return {
+        "versions": versions(),
+        "made": f"{datetime.now(timezone.utc):%Y-%m-%d %H:%M} UTC",
+    }
+
+
+def anchor(text: str) -> str:
+    """Return a text as the name of a place in a page."""
+    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
