@@ -10,7 +10,7 @@ from pathlib import Path
 from ..errors import ScenarioError
 from ..plan import Algorithm
 from ..wording import hint, listed
-from . import overrides, quantities, ssp_read, strict, yaml_lines
+from . import overrides, quantities, strict, yaml_lines
 from .schema import Connection, Endpoint, Scenario, UnitSpec, Vehicle, endpoint
 from .yaml_lines import Document, Key
 
@@ -43,7 +43,7 @@ def load_scenario(
         ScenarioError: with everything that is wrong with the file, its vehicle file, the options.
     """
     archive = Path(path).suffix.lower() == ".ssp"
-    document = ssp_read.read(Path(path)) if archive else read(Path(path), what="scenario file")
+    document = _read_archive(Path(path)) if archive else read(Path(path), what="scenario file")
     if vehicle is not None:
         overrides.apply_values(document, {"vehicle": str(vehicle.absolute())})
     vehicle_document = _read_vehicle(document, read)
@@ -65,6 +65,12 @@ def load_scenario(
     scenario._vehicle, scenario._replaced = parameters, replaced
     scenario._explicit = archive
     return scenario
+
+
+def _read_archive(path: Path) -> Document:
+    from . import ssp_read  # lxml takes long to import, and scenario files do not need it
+
+    return ssp_read.read(path)
 
 
 def _read_vehicle(document: Document, read: Callable[..., Document]) -> Document:
