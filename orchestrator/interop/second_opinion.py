@@ -30,6 +30,9 @@ from .ssp_write import write_ssp
 AGREEMENT = 1e-9
 """Difference, relative to a signal's range, below which two runs are the same run: rounding, and that
 one program counts time in nanoseconds and another adds steps up."""
+ROUNDING = 1e-12
+"""Range, relative to a signal's magnitude, up to which it counts as constant; chosen: thousands of
+roundings, far below what any signal here does."""
 LIMIT = 900.0
 """Time that a master may take [s]."""
 
@@ -194,14 +197,16 @@ def _compare(
 
 
 def differences(request: Request, own: np.ndarray, other: np.ndarray) -> dict[str, float]:
-    """Return each signal's largest difference over its range in our run; one that stays constant: over 1.
+    """Return each signal's largest difference over its range in our run.
 
-    A row that the other master has no value for at all, such as the first, does not count; a single
-    value that is not finite counts as infinite.
+    One that stays constant but for rounding (`ROUNDING`) has no range: over its magnitude, over 1 if
+    that is 0. A row that the other master has no value for at all, such as the first, does not count;
+    a single value that is not finite counts as infinite.
     """
     there = ~np.all(np.isnan(other), axis=1)
     gap = np.abs(other[there] - own[there])
     gap = np.where(np.isfinite(gap), gap, np.inf)
-    span = np.ptp(own, axis=0)
-    relative = np.max(gap, axis=0) / np.where(span > 0, span, 1.0)
+    span, magnitude = np.ptp(own, axis=0), np.max(np.abs(own), axis=0)
+    scale = np.where(span > ROUNDING * magnitude, span, np.where(magnitude > 0, magnitude, 1.0))
+    relative = np.max(gap, axis=0) / scale
     return {f"{unit}.{name}": float(d) for (unit, name), d in zip(request.columns, relative, strict=True)}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import multiprocessing
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +12,12 @@ import pytest
 from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.interop import second_opinion as module
-from orchestrator.interop.masters.request import Request
+from orchestrator.interop.masters.request import Recording, Request
 from orchestrator.interop.second_opinion import AGREEMENT, MASTERS, OtherMaster, differences, second_opinion
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
+
+from . import fmpy_exchanging
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 PAPERS = {  # until the car moves as hard as in the whole run
@@ -31,8 +35,8 @@ def fmus(tmp_path_factory):
     return folder
 
 
-def plan_of(fmus, scenario="fuzzy_feedback/single_sine.yaml", stop_time=0.1):
-    return make_plan(load_scenario(SCENARIOS / scenario, stop_time=stop_time), fmus=fmus)
+def plan_of(fmus, scenario="fuzzy_feedback/single_sine.yaml", stop_time=0.1, settings=()):
+    return make_plan(load_scenario(SCENARIOS / scenario, stop_time=stop_time, settings=settings), fmus=fmus)
 
 
 @pytest.mark.parametrize("scenario", PAPERS)
@@ -59,13 +63,34 @@ def test_fmpy_runs_the_archive_from_another_start(fmus, tmp_path):
     assert not one.agrees
 
 
+@pytest.mark.parametrize("scenario", PAPERS)
+def test_fmpy_differs_by_its_start_and_by_texts_and_by_nothing_else(scenario, fmus, tmp_path):
+    without_texts = ["reference.mode=steady_state"] if "fuzzy_feedback" in scenario else []
+    plan = plan_of(fmus, scenario, 0.6, without_texts)
+    request = module._request(plan, True, tmp_path)
+    own, as_it_is = (module._run(master, request, tmp_path) for master in ("own", "fmpy_ssp"))
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        exchanging = pool.submit(fmpy_exchanging.drive, request).result()
+    assert isinstance(own, Recording)
+    assert isinstance(as_it_is, Recording)
+    assert max(differences(request, own.values, as_it_is.values).values()) > 1e-6
+    assert max(differences(request, own.values, exchanging.values).values()) <= AGREEMENT
+
+
 def test_differences_are_relative_to_the_range_and_infinite_where_a_value_is_missing():
-    request = Request("x.ssp", 0.1, 2, [("a", "x"), ("a", "still"), ("a", "lost")])
-    own = np.array([[0.0, 5.0, 0.0], [1.0, 5.0, 1.0], [4.0, 5.0, 2.0]])
-    other = own + np.array([[0.0, 0.0, 0.0], [0.0, 0.5, np.nan], [0.4, 0.0, 0.0]])
+    request = Request("x.ssp", 0.1, 2, [("a", "x"), ("a", "lost")])
+    own = np.array([[0.0, 0.0], [1.0, 1.0], [4.0, 2.0]])
+    other = own + np.array([[0.0, 0.0], [0.0, np.nan], [0.4, 0.0]])
     other[0] = np.nan  # this master has no value before its first step
+    assert differences(request, own, other) == {"a.x": pytest.approx(0.1), "a.lost": np.inf}
+
+
+def test_differences_of_a_signal_constant_but_for_rounding_are_relative_to_its_magnitude():
+    request = Request("x.ssp", 0.1, 1, [("a", "still"), ("a", "rounded"), ("a", "zero")])
+    own = np.array([[5.0, 5.0, 0.0], [5.0, np.nextafter(5.0, 6.0), 0.0]])
+    other = np.array([[5.0, 5.0, 0.0], [5.5, 5.0, 0.25]])
     found = differences(request, own, other)
-    assert found == {"a.x": pytest.approx(0.1), "a.still": pytest.approx(0.5), "a.lost": np.inf}
+    assert found == {"a.still": pytest.approx(0.1), "a.rounded": pytest.approx(1.8e-16, 0.1), "a.zero": 0.25}
 
 
 def test_a_master_that_is_not_installed_costs_a_sentence(fmus, tmp_path):
