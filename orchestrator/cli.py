@@ -23,6 +23,7 @@ COMMANDS = (
     "animate",
     "converge",
     "study",
+    "report",
     "sweep",
     "export-ssp",
     "second-opinion",

@@ -24,9 +24,11 @@ from .system import system_of
 
 PAGE = "compare.html"
 """Name of the page, beside the runs' folders."""
+AT_ONCE = 8
+"""Partings that are shown; the others unfold. Chosen: more than the wires around one unit."""
 RULE = (
-    f"A difference counts from {SAME:g} of the signal's largest value; curves can be seen to part from "
-    f"{100 * SEEN:g} %."
+    f"A difference counts from {SAME * 1e9:g} billionth of the signal's largest value; curves can be seen to "
+    f"part from {100 * SEEN:g} %."
 )
 
 
@@ -138,7 +140,8 @@ def _parted(label: str, first: str, one: Results, other: Results) -> dict[str, A
     return {
         "title": f"{label} against {first}",
         "summary": parting_summary(found),
-        "table": parting_table(found),
+        "table": parting_table(found.partings[:AT_ONCE]),
+        "rest": parting_table(found.partings[AT_ONCE:]),
         "notes": found.notes,
     }
 
@@ -163,10 +166,10 @@ def parting_summary(found: Divergence) -> str:
     return f"The first to differ is {first.signal}, at {first.first:g} s{others}.{told}"
 
 
-def parting_table(found: Divergence) -> Table:
-    """Return a table of all signals that differ, in the order in which they part."""
+def parting_table(partings: Sequence[Parting]) -> Table:
+    """Return a table of signals that differ, in the order in which they part."""
     headings = ["signal", "goes to", "differs from", "seen from", "largest difference", "at"]
-    rows: list[Sequence[Cell]] = [_parting_row(one) for one in found.partings]
+    rows: list[Sequence[Cell]] = [_parting_row(one) for one in partings]
     return Table("", headings, rows, numbers={2, 3, 4, 5} if rows else set())
 
 

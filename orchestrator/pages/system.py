@@ -49,9 +49,9 @@ def system_of(plans: Iterable[Plan]) -> System:
     return System(tuple(Block(name, tuple(found)) for name, found in fmus.items()), signals)
 
 
-def systems_of(plans: Sequence[Plan]) -> list[System]:
-    """Return one system for each set of units that the plans have."""
-    groups: dict[frozenset[str], list[Plan]] = {}
-    for plan in plans:
-        groups.setdefault(frozenset(unit.name for unit in plan.units), []).append(plan)
-    return [system_of(group) for group in groups.values()]
+def systems_of(plans: Sequence[Plan]) -> list[tuple[System, list[int]]]:
+    """Return one system for each set of units that the plans have, with the numbers of its plans."""
+    groups: dict[frozenset[str], list[int]] = {}
+    for number, plan in enumerate(plans):
+        groups.setdefault(frozenset(unit.name for unit in plan.units), []).append(number)
+    return [(system_of([plans[k] for k in numbers]), numbers) for numbers in groups.values()]

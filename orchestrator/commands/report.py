@@ -1,0 +1,88 @@
+"""`yawbench report`: one page that reproduces the papers."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .batch import Jobs
+from .options import Fmus, Format
+
+Studies = Annotated[
+    list[Path] | None,
+    typer.Argument(help="Study files (YAML); default: all in scenarios/*/.", metavar="STUDY"),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Folder for the page, with results and figures below it."),
+]
+Again = Annotated[bool, typer.Option("--again", help="Make all runs again, also those with good results.")]
+NoRun = Annotated[bool, typer.Option("--no-run", help="Run nothing: report what stands in the results.")]
+
+
+def report(
+    studies: Studies = None,
+    out: Out = None,
+    fmus: Fmus = None,
+    jobs: Jobs = None,
+    format_: Format = "csv",
+    again: Again = False,
+    no_run: NoRun = False,
+) -> None:
+    """Write report.html: per study the system, parameters and their source, figures, tables, verdicts.
+
+    One file that needs no server; figures lie beside it as SVG and PNG. Runs whose results are missing,
+    or were made from another scenario or FMU, are made first. Without --out, the page of one study lies in
+    its folder below results/, that of several in results/.
+    """
+    from ..errors import ScenarioError
+    from ..pages.chapter import chapter
+    from ..pages.report import PAGE, found_studies, report_page, still_stale, wanted
+    from ..results.formats import check_format
+    from ..studies.jobs import Outcome, pool
+    from ..studies.study import judge_study
+    from ..studies.study_report import write_study
+    from .batch import run_all, say, stoppable
+    from .run import default_folder
+
+    if again and no_run:
+        raise ScenarioError("--again and --no-run contradict each other")
+    check_format(format_)
+    paths = studies or found_studies()
+    folders = [default_folder(path) for path in paths]
+    page_folder = out or (folders[0] if len(folders) == 1 else Path(os.path.commonpath(folders)))
+    if out is not None:
+        below = [out / path.absolute().parent.name / path.stem for path in paths]
+        folders = [out] if len(paths) == 1 else below
+    every = [
+        wanted(path, folder, fmus=fmus, format=format_) for path, folder in zip(paths, folders, strict=True)
+    ]
+    chapters, failed = [], False
+    for one in every:
+        work = [job for name, job in one.jobs.items() if again or name in one.stale]
+        outcomes: list[Outcome] = []
+        if not no_run:
+            good = len(one.jobs) - len(work)
+            say(f"{one.study.spec.title}: {len(work)} runs to make, {good} with good results")
+            outcomes = run_all(work, one.folder, workers=jobs) if work else []
+        with stoppable(one.folder), pool(jobs) as workers:
+            findings = judge_study(one.study, one.folder, outcomes, each=workers.map)
+            for problem in write_study(findings, one.folder, each=workers.map):
+                say(problem)
+            facts = chapter(
+                findings, one.plans, still_stale(one), folder=one.folder, shown_in=page_folder,
+                each=workers.map,
+            )  # fmt: skip
+        chapters.append(facts)
+        failed = failed or bool(findings.failed)
+        verdicts = ", ".join(f"{count} {word}" for word, count in facts["counts"].items())
+        say(f"{one.study.spec.title}: {verdicts or 'no claims'}")
+    page_folder.mkdir(parents=True, exist_ok=True)
+    page = page_folder / PAGE
+    page.write_text(report_page(chapters), encoding="utf-8")
+    say(f"The report: {page} ({page.stat().st_size / 1e6:.1f} MB)")
+    if failed:
+        raise typer.Exit(1)
