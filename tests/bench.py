@@ -1,11 +1,12 @@
 """What a run costs: `make bench`, or `python -m tests.bench [SCENARIO ...]`.
 
 Prints, and asserts nothing: times depend on the machine and on who else uses it. Every figure is
-the best of several runs, which is the one least disturbed.
+the best of several runs, which is the one least disturbed, if nothing else is said.
 """
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -135,25 +136,54 @@ def bench(path: Path) -> None:
 
 
 def masters(path: Path) -> None:
-    """Print the time per step of other masters on the same FMUs, each beside ours."""
-    installed_ones = [one for one in MASTERS if installed(one)]
+    """Print the time per step of other masters on the same FMUs, each beside ours.
+
+    Their default runs get the span of all repeats, not the best: they step units in threads, which
+    compete for the interpreter and are slower the more cores are free for them.
+    """
+    there = [one for one in MASTERS if installed(one)]
     plan = make_plan(load_scenario(path))
     plan = replace(plan, n_steps=min(STEPS, plan.n_steps))
+    begin, used = perf_counter(), busy()
     with tempfile.TemporaryDirectory() as folder:
-        runs = [second_opinion(plan, Path(folder), masters=installed_ones) for _ in range(REPEATS)]
-    print(f"{path}: us per communication step, `jacobi`, each master in a process of its own\n")
-    print(f"  {'':10s}{'default':>10s}{'ours':>8s}{'ratio':>8s}   {'one core':>10s}{'ours':>8s}{'ratio':>8s}")
-    for k, master in enumerate(installed_ones):
-        if problem := runs[0][k].problem:
+        runs = [second_opinion(plan, Path(folder), masters=there) for _ in range(REPEATS)]
+    others = (busy() - used) / (perf_counter() - begin)
+    print(f"{path}: us per communication step, `jacobi`, each master in a process of its own")
+    print(f"  {processors()} cores, of which other programs kept {others:.2f} busy; with none free, threads")
+    print("  take turns, and a default run costs hardly more than one on one core\n")
+    print(
+        f"  {'':10s}{'default':>14s}{'ours':>7s}{'ratio':>12s}   {'one core':>10s}{'ours':>7s}{'ratio':>7s}"
+    )
+    for k, master in enumerate(there):
+        if problem := next((run[k].problem for run in runs if run[k].problem), ""):
             print(f"  {master.title:10s}{problem}")
             continue
-        best = {key: 1e6 * min(run[k].seconds[key] for run in runs) for key in runs[0][k].seconds}
-        cells = ""
-        for key in ("", " on one core"):
-            theirs, ours = best.get(f"theirs{key}", nan), best.get(f"ours{key}", nan)
-            cells += f"{theirs:10.0f}{ours:8.0f}{ours / theirs:8.2f}   "
-        print(f"  {master.title:10s}{cells}{'one step for all units' if runs[0][k].one_step else ''}")
+        times = {key: sorted(1e6 * run[k].seconds[key] for run in runs) for key in runs[0][k].seconds}
+        theirs, ours = times["theirs"], times["ours"][0]
+        span = f"{theirs[0]:.0f} .. {theirs[-1]:.0f}"
+        ratio = f"{ours / theirs[-1]:.2f} .. {ours / theirs[0]:.2f}"
+        line = f"  {master.title:10s}{span:>14s}{ours:7.0f}{ratio:>14s}"
+        if "theirs on one core" in times:
+            theirs_1, ours_1 = times["theirs on one core"][0], times["ours on one core"][0]
+            line += f" {theirs_1:10.0f}{ours_1:7.0f}{ours_1 / theirs_1:7.2f}"
+        print(line + ("   one step for all units" if runs[0][k].one_step else ""))
     print()
+
+
+def processors() -> int:
+    """Return how many processor cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def busy() -> float:
+    """Return the processor time [s] that programs other than this one and its children have used so far."""
+    try:
+        spent = [int(word) for word in Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:9]]
+    except OSError:
+        return nan
+    user, nice, system, _idle, _waiting, *interrupts = spent
+    everything = (user + nice + system + sum(interrupts)) / os.sysconf("SC_CLK_TCK")
+    return everything - sum(os.times()[:4])
 
 
 def imports() -> float:
