@@ -43,9 +43,9 @@ def report(
     from ..pages.report import PAGE, found_studies, report_page, still_stale, wanted
     from ..results.formats import check_format
     from ..studies.jobs import Outcome, pool
-    from ..studies.study import judge_study
+    from ..studies.study import all_tables, judge_study
     from ..studies.study_report import write_study
-    from .batch import run_all, say, stoppable
+    from .batch import print_tables, run_all, say, stoppable
     from .run import default_folder
 
     if again and no_run:
@@ -78,8 +78,10 @@ def report(
             )  # fmt: skip
         chapters.append(facts)
         failed = failed or bool(findings.failed)
-        verdicts = ", ".join(f"{count} {word}" for word, count in facts["counts"].items())
-        say(f"{one.study.spec.title}: {verdicts or 'no claims'}")
+        if len(every) == 1:
+            print_tables(all_tables(findings))
+        verdicts = ", ".join(f"{word}: {count}" for word, count in facts["counts"].items())
+        say(f"{one.study.spec.title}: {verdicts or 'no claims of its own'}")
     page_folder.mkdir(parents=True, exist_ok=True)
     page = page_folder / PAGE
     page.write_text(report_page(chapters), encoding="utf-8")

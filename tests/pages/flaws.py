@@ -1,0 +1,90 @@
+"""What a careful reader of a page would complain of: things cut, overlapping, empty, too wide."""
+
+from __future__ import annotations
+
+from .browser import Browser
+
+CUT = """
+const hidden = (e) => e.closest('thead') && getComputedStyle(e.closest('thead')).position === 'absolute';
+return [...document.querySelectorAll('body *')].filter((e) => {
+  const box = e.getBoundingClientRect();
+  if (!box.width || !box.height || !e.checkVisibility() || e.closest('svg') || hidden(e)) return false;
+  const clips = ['hidden', 'clip'].includes(getComputedStyle(e).overflowX);
+  const clipped = clips && e.scrollWidth > e.clientWidth + 1;
+  return box.right > innerWidth + 1 || box.left < -1 || clipped;
+}).map((e) => `${e.tagName} ${e.className}: ${e.textContent.trim().slice(0, 60)}`);
+"""
+OVERLAPPING = """
+const leaves = 'p, li, h1, h2, h3, h4, summary, figcaption, caption, img, canvas, button, select, td, th';
+const boxes = [...document.querySelectorAll(leaves)]
+  .filter((e) => !e.querySelector(leaves) && !e.closest('svg') && e.checkVisibility())
+  .filter((e) => !(e.closest('thead') && getComputedStyle(e.closest('thead')).position === 'absolute'))
+  .map((e) => ({e, box: e.getBoundingClientRect()}))
+  .filter(({box}) => box.width > 0 && box.height > 0)
+  .sort((a, b) => a.box.top - b.box.top);
+const found = [];
+boxes.forEach(({e, box}, i) => {
+  for (let k = i + 1; k < boxes.length && boxes[k].box.top < box.bottom - 1; k += 1) {
+    const other = boxes[k].box;
+    if (other.left < box.right - 1 && box.left < other.right - 1) {
+      const named = [e, boxes[k].e].map((one) => `${one.tagName} ${one.textContent.trim().slice(0, 40)}`);
+      found.push(named.join(' / '));
+    }
+  }
+});
+return found;
+"""
+TEXTS_ON_EACH_OTHER = """
+const found = [];
+for (const svg of document.querySelectorAll('svg.diagonal, svg.stack')) {
+  const frame = svg.getBoundingClientRect();
+  if (!frame.width) continue;
+  const texts = [...svg.querySelectorAll('text')].map((e) => [e.textContent, e.getBoundingClientRect()]);
+  texts.forEach(([text, box], i) => {
+    const inside = box.left > frame.left - 1 && box.right < frame.right + 1 && box.bottom < frame.bottom + 1;
+    if (!inside) found.push(`outside: ${text}`);
+    for (const [other, place] of texts.slice(i + 1)) {
+      const across = Math.min(box.right, place.right) - Math.max(box.left, place.left);
+      const down = Math.min(box.bottom, place.bottom) - Math.max(box.top, place.top);
+      if (across > 1 && down > 0.4 * box.height) found.push(`${text} / ${other}`);
+    }
+  });
+}
+return found;
+"""
+EMPTY = """
+const done = arguments[0];
+const inked = (image) => {
+  const canvas = document.createElement('canvas');
+  [canvas.width, canvas.height] = [240, 120];
+  const context = canvas.getContext('2d');
+  context.drawImage(image, 0, 0, 240, 120);
+  const {data} = context.getImageData(0, 0, 240, 120);
+  let count = 0;
+  for (let i = 0; i < data.length; i += 4) {
+    count += data[i + 3] > 0 && data[i] + data[i + 1] + data[i + 2] < 700;
+  }
+  return count / (240 * 120);
+};
+Promise.all([...document.images].map(async (image) => {
+  try { await image.decode(); } catch { return `broken: ${image.alt}`; }
+  return inked(image) > 0.01 ? null : `empty: ${image.alt}`;
+})).then((said) => done(said.filter(Boolean)));
+"""
+
+
+def flaws(chromium: Browser) -> list[str]:
+    """Return all that is wrong with the page that is open, as sentences."""
+    found = [f"console: {said}" for said in chromium.console()]
+    found += [f"fetched: {name[:60]}" for name in chromium.requests() if not name.startswith("data:")]
+    if (wide := chromium.overflow()) > 0:
+        found.append(f"wider than the window by {wide} px")
+    for what, script in (("cut", CUT), ("overlap", OVERLAPPING), ("drawing", TEXTS_ON_EACH_OTHER)):
+        found += [f"{what}: {said}" for said in chromium.run(script)]
+    chromium.driver.set_script_timeout(60)
+    return found + chromium.driver.execute_async_script(EMPTY)
+
+
+def open_all(chromium: Browser) -> None:
+    """Unfold everything that unfolds."""
+    chromium.run("document.querySelectorAll('details').forEach((one) => { one.open = true; });")

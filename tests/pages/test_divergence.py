@@ -1,0 +1,112 @@
+"""Where two runs part."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from orchestrator.metrics.run_metrics import Value
+from orchestrator.pages.compare_page import difference, parting_summary
+from orchestrator.pages.divergence import SAME, divergence, targets_of
+from tests.orchestrator.recorded import car, results
+
+T = np.linspace(0.0, 1.0, 101)
+
+
+def two(**changed):
+    """Return two runs of the same signals, the second with changes from a time on."""
+    columns = {"plant.yaw_rate": np.sin(6 * T), "controller.yaw_moment": 1000 * np.cos(6 * T)}
+    other = {name: values.copy() for name, values in columns.items()}
+    for name, (start, amount) in changed.items():
+        full = next(column for column in columns if column.endswith(name))
+        other[full] += np.where(start - 1e-12 <= T, amount, 0.0)
+    order = {"evaluation_order": ["controller", "plant"]}
+    wires = {"connections": ["controller.yaw_moment -> plant.yaw_moment"]}
+    made = [results(one, T) for one in (columns, other)]
+    return [replace(one, run={**one.run, **order, **wires}) for one in made]
+
+
+def test_a_run_does_not_part_from_itself():
+    found = divergence(car(), car())
+    assert found.partings == ()
+    assert found.compared == len(car().columns)
+    assert "the same throughout" in parting_summary(found)
+
+
+def test_the_first_moment_and_the_largest_difference_are_found():
+    (one,) = divergence(*two(yaw_rate=(0.4, 0.25))).partings
+    assert one.signal == "plant.yaw_rate"
+    assert one.first == one.seen == pytest.approx(0.4)
+    assert one.largest == pytest.approx(0.25)
+    assert one.unit == "rad/s"
+
+
+def test_a_difference_that_no_curve_shows_is_told_apart_from_one_that_can_be_seen():
+    (one,) = divergence(*two(yaw_rate=(0.2, 1e-4))).partings
+    assert (one.first, one.seen) == (pytest.approx(0.2), None)
+    assert "In no curve can it be seen" in parting_summary(divergence(*two(yaw_rate=(0.2, 1e-4))))
+
+
+def test_rounding_is_no_difference():
+    assert divergence(*two(yaw_rate=(0.2, 0.5 * SAME))).partings == ()
+
+
+def test_what_parts_first_stands_first_and_in_one_instant_the_cause():
+    found = divergence(*two(yaw_rate=(0.3, 0.1), yaw_moment=(0.5, 10.0)))
+    assert [one.signal for one in found.partings] == ["plant.yaw_rate", "controller.yaw_moment"]
+    together = divergence(*two(yaw_rate=(0.5, 0.1), yaw_moment=(0.5, 10.0)))
+    assert [one.signal for one in together.partings] == ["controller.yaw_moment", "plant.yaw_rate"]
+    said = parting_summary(together)
+    assert said.startswith("The first to differ is controller.yaw_moment, at 0.5 s, then plant.yaw_rate")
+
+
+def test_a_signal_is_shown_with_the_units_that_take_it():
+    one, other = two(yaw_moment=(0.5, 10.0))
+    assert divergence(one, other).partings[0].targets == ("plant",)
+    assert targets_of(one.run, "plant.yaw_rate") == ()
+
+
+def test_four_wheels_are_one_signal_with_the_earliest_moment():
+    a = {f"tyre.tyre_force_x_{w}": np.ones_like(T) for w in ("fl", "fr", "rl", "rr")}
+    b = {name: values + np.where(0.2 * k <= T, 0.5 * k, 0.0) for k, (name, values) in enumerate(a.items())}
+    (one,) = divergence(results(a, T), results(b, T)).partings
+    assert (one.signal, one.first, one.largest) == ("tyre.tyre_force_x_*", pytest.approx(0.2), 1.5)
+
+
+def test_a_run_that_ends_in_no_number_parts_where_it_does():
+    one, other = two()
+    other.columns["plant.yaw_rate"][70:] = np.nan
+    (parting,) = divergence(one, other).partings
+    assert (parting.first, parting.largest) == (pytest.approx(0.7), np.inf)
+
+
+def test_runs_with_other_steps_are_compared_where_both_have_samples():
+    fine, coarse = car(n=801), car(n=401)
+    found = divergence(fine, coarse)
+    assert found.notes[-1] == "compared at the 401 times that both runs have"
+    exact = [
+        one.signal for one in found.partings if "position" not in one.signal and "angle" not in one.signal
+    ]
+    assert exact == []  # the others are closed forms; these are sums over steps
+
+
+def test_signals_of_one_run_alone_are_named():
+    one, other = two()
+    del other.columns["controller.yaw_moment"]
+    assert divergence(one, other).notes == ("only the first recorded controller.yaw_moment",)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "text"),
+    [
+        (Value(2.0, "m/s2"), Value(2.5, "m/s2"), "+0.500 m/s²"),
+        (Value(1.4, "%"), Value(0.2, "%"), "−120 points"),
+        (Value(0.1, "rad"), Value(0.1, "rad"), "the same"),
+        (Value(1.0, "s"), Value(float("inf"), "s"), ""),
+        (None, Value(1.0, "s"), ""),
+    ],
+)
+def test_differences_carry_their_sign_and_unit(first, second, text):
+    assert difference(first, second) == text

@@ -1,0 +1,174 @@
+"""Where parameters come from, and whether results are still good."""
+
+from __future__ import annotations
+
+import json
+from datetime import datetime, timezone
+from pathlib import Path
+
+import pytest
+
+from fmus.build import build_all
+from orchestrator.pages.freshness import staleness
+from orchestrator.pages.provenance import (
+    CHOSEN,
+    ERRATUM,
+    LITERATURE,
+    NEUTRAL,
+    PAPER,
+    groups_of,
+    kind_of,
+    meaning_and_origin,
+)
+from orchestrator.results.run_record import run_record
+from orchestrator.scenario.load import load_scenario
+from orchestrator.wiring.make_plan import make_plan
+
+UNITS = ("driver_sine", "reference_steady_state", "controller_fnn")
+SCENARIO = """
+title: Half a car
+source: "paper A, section 3"
+vehicle: car.yaml
+stop_time: 0.1
+step_size: 0.01
+inputs:
+  velocity_x: 20                 # chosen: a middle speed
+  friction: 0.7
+  sideslip: 0
+  sideslip_rate: 0
+units:
+  # One period of 5 s; chosen: slow.
+  driver: {fmu: driver_sine, parameters: {amplitude: 0.05, frequency: 0.2}}
+  reference: {fmu: reference_steady_state, parameters: {sideslip_limit: 0.2}}  # chosen: wide
+  controller: {fmu: controller_fnn}
+"""
+CAR = """
+title: A car
+source: "paper A, table 1, unless a line says otherwise"
+parameters:
+  mass: 1100                     # kg
+  cg_to_front_axle: 1.2          # m; printed as 12
+  cg_to_rear_axle: 1.4           # m; chosen: a guess
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "kind"),
+    [
+        ("paper B, table 1", PAPER),
+        ("chosen: the paper names none", CHOSEN),
+        ("the paper has none, 0.1 holds the car", CHOSEN),
+        ("chosen: the 1.36 m of paper C's table 1 cannot be right", ERRATUM),
+        ("printed as 5600, which barely exceeds 4356", ERRATUM),
+        ("Pacejka 2006, table A3.1", LITERATURE),
+        ("false freezes the weights", ""),
+    ],
+)
+def test_a_source_is_told_by_its_words(words, kind):
+    assert kind_of(words) == kind
+
+
+def test_a_description_is_split_into_meaning_and_source():
+    meaning, origin = meaning_and_origin("Rule table; chosen: the standard one (one of: standard, gentle)")
+    assert (meaning, origin.kind, origin.says) == ("Rule table", CHOSEN, "chosen: the standard one")
+    meaning, origin = meaning_and_origin("Learn on line; false freezes the weights")
+    assert (meaning, origin.kind) == ("Learn on line; false freezes the weights", NEUTRAL)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """A folder with a scenario, its car and its FMUs."""
+    folder = tmp_path_factory.mktemp("provenance")
+    (folder / "half.yaml").write_text(SCENARIO)
+    (folder / "car.yaml").write_text(CAR)
+    build_all(folder / "fmus", components=UNITS)
+    return folder
+
+
+def planned(folder, *settings, **values):
+    scenario = load_scenario(folder / "half.yaml", settings=settings, **values)
+    return scenario, make_plan(scenario, fmus=folder / "fmus")
+
+
+@pytest.fixture(scope="module")
+def groups(folder):
+    runs = [planned(folder), planned(folder, "driver.amplitude=0.1")]
+    return {group.title: group.parameters for group in groups_of(runs)}
+
+
+def test_the_car_s_parameters_come_from_its_file_line_by_line(groups):
+    car = groups["The car: A car"]
+    assert car["mass"].origin.kind == PAPER
+    assert (car["cg_to_front_axle"].origin.kind, car["cg_to_front_axle"].origin.says) == (
+        ERRATUM,
+        "printed as 12",
+    )
+    assert (car["cg_to_rear_axle"].origin.kind, car["cg_to_rear_axle"].origin.says) == (
+        CHOSEN,
+        "chosen: a guess",
+    )
+    assert list(car["mass"].takers) == ["reference"]
+
+
+def test_a_unit_s_parameters_come_from_the_scenario_or_else_from_the_fmu(groups):
+    driver, reference = groups["driver: driver_sine"], groups["reference: reference_steady_state"]
+    assert driver["frequency"].origin.says == "One period of 5 s; chosen: slow."
+    assert reference["sideslip_limit"].origin.says == "chosen: wide"
+    assert "mass" not in reference
+    learning = groups["controller: controller_fnn"]["learning_rate"]
+    assert (learning.origin.kind, list(learning.values)) == (PAPER, ["2"])
+
+
+def test_what_a_study_varies_keeps_its_source_and_shows_all_values(groups):
+    amplitude = groups["driver: driver_sine"]["amplitude"]
+    assert list(amplitude.values) == ["0.05", "0.1"]
+    assert amplitude.set_by_study and amplitude.origin.kind == CHOSEN
+    assert not groups["driver: driver_sine"]["frequency"].set_by_study
+
+
+def test_constant_inputs_are_named_with_their_source(groups):
+    constants = groups["Constant inputs"]
+    assert constants["reference.velocity_x"].origin.says == "chosen: a middle speed"
+    assert constants["reference.friction"].origin.kind == PAPER  # as the scenario
+
+
+def recorded(plan, folder: Path, **changes) -> Path:
+    """Write what a run of a plan leaves, with changes."""
+    folder.mkdir(parents=True, exist_ok=True)
+    record = run_record(plan, status="completed", started=datetime.now(timezone.utc)) | changes
+    (folder / "run.json").write_text(json.dumps(record))
+    (folder / "results.csv").touch()
+    return folder
+
+
+def test_results_of_the_same_plan_are_fresh(folder, tmp_path):
+    _, plan = planned(folder)
+    assert staleness(plan, recorded(plan, tmp_path)) is None
+
+
+def test_results_of_another_plan_are_stale_and_say_why(folder, tmp_path):
+    _, plan = planned(folder)
+    made = recorded(plan, tmp_path)
+    assert staleness(planned(folder, "driver.amplitude=0.1")[1], made) == "driver: other parameters"
+    assert staleness(planned(folder, "inputs.friction=0.3")[1], made) == "reference: other constants"
+    assert staleness(planned(folder, stop_time=0.2)[1], made) == "the stop time has changed"
+    assert staleness(planned(folder, "controller.step_size=0.02")[1], made) == "controller: other step"
+
+
+def test_results_of_another_fmu_or_program_are_stale(folder, tmp_path):
+    _, plan = planned(folder)
+    record = json.loads((recorded(plan, tmp_path) / "run.json").read_text())
+    record["fmus"]["driver"]["sha256"] = "0" * 64
+    assert staleness(plan, recorded(plan, tmp_path, fmus=record["fmus"])) == "driver: another driver_sine.fmu"
+    old = {**record["versions"], "numpy": "1.0"}
+    assert staleness(plan, recorded(plan, tmp_path, versions=old)).endswith("in place of 1.0")
+
+
+def test_missing_failed_and_damaged_results_are_stale(folder, tmp_path):
+    _, plan = planned(folder)
+    assert staleness(plan, tmp_path / "none") == "no results yet"
+    assert staleness(plan, recorded(plan, tmp_path / "a", status="failed")) == "the run did not reach its end"
+    (recorded(plan, tmp_path / "b") / "results.csv").unlink()
+    assert staleness(plan, tmp_path / "b") == "the results are missing"
+    (tmp_path / "b" / "run.json").write_text("{")
+    assert staleness(plan, tmp_path / "b") == "the record cannot be read"

@@ -1,0 +1,89 @@
+"""The system that a page draws: what it holds, and that every wire is drawn."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from lxml import etree
+
+from orchestrator.pages.diagram import diagonal, diagrams, stack
+from orchestrator.pages.system import system_of, systems_of
+from orchestrator.plan import Fmu, Plan, Unit, Wire
+
+WHEELS = ("fl", "fr", "rl", "rr")
+
+
+def plan(controller: str = "controller_off", *, extra: bool = False) -> Plan:
+    """Return a plan of three units, with a road or without."""
+    names = {"driver": "driver_sine", "controller": controller, "plant": "plant_seven_dof"}
+    if extra:
+        names["road"] = "road_patches"
+    wires = [
+        Wire("driver", "steer_angle", "plant", "steer_angle"),
+        Wire("plant", "yaw_rate", "controller", "yaw_rate"),
+    ]
+    wires += [Wire("controller", f"torque_request_{w}", "plant", f"wheel_torque_{w}") for w in WHEELS]
+    if extra:
+        wires.append(Wire("road", "friction", "controller", "friction"))
+    fmus = {
+        name: Fmu(fmu, Path(fmu), Path(fmu), "0" * 64, "", fmu, "", False, {}) for name, fmu in names.items()
+    }
+    units = tuple(Unit(name, fmus[name], 1, {}, {}) for name in reversed(names))  # evaluation order
+    scenario = {"units": dict.fromkeys(names)}
+    return Plan(units, tuple(wires), (), Fraction(1, 1000), 1000, "extrapolated", "made up", scenario)
+
+
+def texts(svg: str) -> list[str]:
+    """Return all texts of a drawing, which must be well-formed."""
+    return [element.text for element in etree.fromstring(str(svg)).iter("text")]
+
+
+def test_blocks_stand_in_the_order_of_the_scenario_not_of_evaluation():
+    assert [block.name for block in system_of([plan()]).blocks] == ["driver", "controller", "plant"]
+
+
+def test_runs_that_differ_in_an_fmu_are_one_system_with_a_choice():
+    ((found, numbers),) = systems_of([plan(), plan("controller_fnn"), plan()])
+    assert numbers == [0, 1, 2]
+    assert found.blocks[1].fmus == ("controller_off", "controller_fnn")
+
+
+def test_runs_with_other_units_are_another_system():
+    assert [numbers for _, numbers in systems_of([plan(), plan(extra=True), plan()])] == [[0, 2], [1]]
+
+
+def test_the_wires_of_four_wheels_are_one_signal():
+    signals = system_of([plan()]).signals
+    assert signals["controller", "plant"] == ("torque_request_* → wheel_torque_*",)
+    assert signals["driver", "plant"] == ("steer_angle",)
+
+
+@pytest.mark.parametrize("draw", [diagonal, stack])
+def test_every_unit_fmu_and_signal_is_in_the_drawing(draw):
+    said = " ".join(texts(draw(system_of([plan(extra=True)]), "title"))).replace("  ", " ")
+    for word in ("driver", "plant_seven_dof", "road_patches", "yaw_rate", "friction", "torque_request_*"):
+        assert word in said
+
+
+def test_the_diagonal_has_an_arrow_for_every_pair_of_units():
+    system = system_of([plan(extra=True)])
+    root = etree.fromstring(str(diagonal(system, "title")))
+    assert len(list(root.iter("polygon"))) == len(system.signals)
+    assert len(list(etree.fromstring(str(stack(system, "title"))).iter("polygon"))) == len(system.signals)
+
+
+def test_feedback_enters_from_below_and_what_goes_forward_from_above():
+    root = etree.fromstring(str(diagonal(system_of([plan()]), "title")))
+    ends = [
+        [tuple(map(float, p.split(","))) for p in line.get("points").split()]
+        for line in root.iter("polyline")
+    ]
+    down = [points for points in ends if points[-1][1] > points[-2][1]]
+    assert len(down) == 2 and len(ends) == 3
+
+
+def test_names_cannot_break_out_of_the_drawing():
+    nasty = plan("<script>alert(1)</script>")
+    assert "<script" not in diagrams(system_of([nasty]), '"><script>')
