@@ -1,0 +1,198 @@
+"""Units in processes of their own, and FMUs from elsewhere that crash, hang or fail there."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fmus.build import build_all
+from fmus.c.build import build_c
+from orchestrator.cli import main
+from orchestrator.errors import SimulationError
+from orchestrator.master.isolation import Isolation
+from orchestrator.master.simulate import simulate
+from orchestrator.results.read import load_results
+from orchestrator.scaffold.controller import controller_files, layout
+from orchestrator.scenario.load import load_scenario
+from orchestrator.wiring.make_plan import make_plan
+
+ROOT = Path(__file__).parents[2]
+CAR = ROOT / "scenarios" / "fnn_sideslip" / "25mps.yaml"
+UNITS = (
+    "driver_sine", "reference_steady_state", "controller_fnn", "allocator_load_proportional",
+    "wheel_control_direct", "plant_seven_dof", "tyre_dugoff",
+)  # fmt: skip
+STEP = "if (fabs(law(s, v)) < v->moment_limit)"
+"""Where the controller in C gets something to do that it should not."""
+
+needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="--isolate needs Linux or macOS")
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("fmus")
+    build_all(folder, components=UNITS)
+    return folder
+
+
+@pytest.fixture
+def foreign(tmp_path):
+    """Build a controller in C that does `act` from t = 0.05 s on; return its path."""
+
+    def build(act):
+        for path, text in controller_files("idea", "c", layout("idea", "c", in_checkout=True)).items():
+            file = tmp_path / path
+            file.parent.mkdir(parents=True, exist_ok=True)
+            if file.name == "idea.c":
+                assert STEP in text
+                text = text.replace(STEP, f"if (t > 0.0495) {{ {act} }}\n    {STEP}")
+                text = f"#include <signal.h>\n#include <stdlib.h>\n{text}"
+            file.write_text(text)
+        return build_c(tmp_path / "components" / "controllers" / "idea", tmp_path / "built")
+
+    return build
+
+
+@pytest.fixture
+def run(fmus, tmp_path, capsys):
+    """Run paper A's car with a controller, isolated; return exit status, what was said, the results."""
+
+    def go(controller, *arguments, isolate=True):
+        out = tmp_path / "out"
+        options = ["--fmus", str(fmus), "--out", str(out), "--set", "stop_time=0.1"]
+        options += ["--swap", f"controller={controller}", *arguments, *(["--isolate"] if isolate else [])]
+        with pytest.raises(SystemExit) as exit_:
+            main(["run", str(CAR), *options])
+        return exit_.value.code, capsys.readouterr().err, load_results(out)
+
+    return go
+
+
+def plan_of(fmus, **options):
+    return make_plan(load_scenario(CAR, settings=["driver.start_time=0"], **options), fmus=fmus)
+
+
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
+def test_isolated_units_give_the_same_numbers_to_the_last_bit(algorithm, fmus, tmp_path):
+    plan = plan_of(fmus, stop_time=0.3, algorithm=algorithm)
+    simulate(plan, tmp_path / "together")
+    with Isolation(plan.units) as isolation:
+        simulate(plan, tmp_path / "apart", opener=isolation)
+    together, apart = ((tmp_path / name / "results.csv").read_bytes() for name in ("together", "apart"))
+    assert together == apart
+
+
+def test_no_process_outlives_a_run(fmus, tmp_path):
+    plan = plan_of(fmus, stop_time=0.01)
+    with Isolation(plan.units) as isolation:
+        simulate(plan, tmp_path, opener=isolation)
+        processes = [process._popen for process in isolation._processes.values()]
+    assert len(processes) == len(UNITS)
+    assert all(process.poll() is not None for process in processes)
+
+
+def test_units_end_when_the_master_is_killed(fmus, tmp_path):
+    code = (
+        "import sys, os, signal; from pathlib import Path\n"
+        "from orchestrator.scenario.load import load_scenario\n"
+        "from orchestrator.wiring.make_plan import make_plan\n"
+        "from orchestrator.master.isolation import Isolation\n"
+        "from orchestrator.master.simulate import simulate\n"
+        f"plan = make_plan(load_scenario({str(CAR)!r}, stop_time=0.01), fmus=Path({str(fmus)!r}))\n"
+        "isolation = Isolation(plan.units)\n"
+        f"simulate(plan, {str(tmp_path)!r}, opener=isolation)\n"
+        "again = Isolation(plan.units)\n"
+        "from orchestrator.master.log import Log\n"
+        "[again(unit, Log(), set()) for unit in plan.units]\n"
+        "print(*(p._popen.pid for p in again._processes.values()), flush=True)\n"
+        "os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    # they have inherited the pipe: that this comes back shows that all of them have ended
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT, timeout=60)
+    assert len(done.stdout.split()) == len(UNITS), done.stderr
+
+
+@needs_cc
+def test_an_fmu_that_crashes_costs_the_run_and_not_its_results(foreign, run):
+    status, said, results = run(foreign("raise(SIGSEGV);"))
+    assert status == 1
+    assert "controller: step failed at t = 0.05 s: its process died of SIGSEGV in fmi2DoStep\n" in said
+    assert results.run["status"] == "failed"
+    assert results.run["error"]["unit"] == "controller"
+    assert 0.049 <= results.time[-1] <= 0.052
+    assert np.all(np.isfinite(results["plant.velocity_x"]))
+
+
+@needs_cc
+def test_an_fmu_that_never_comes_back_is_ended_at_the_limit_of_a_call(foreign, run):
+    status, said, results = run(foreign("for (;;) {}"), "--call-limit", "300 ms")
+    assert status == 1
+    assert "controller: " in said
+    assert "fmi2DoStep did not come back within 0.3 s, the limit of a call" in said
+    assert 0.049 <= results.time[-1] <= 0.052
+
+
+@needs_cc
+def test_an_fmu_that_ends_the_process_is_named(foreign, run):
+    status, said, _ = run(foreign("exit(3);"))
+    assert status == 1
+    assert "its process ended itself with exit status 3 in fmi2DoStep" in said
+
+
+@needs_cc
+def test_without_isolation_the_same_crash_takes_the_process_with_it(foreign, fmus, tmp_path):
+    fmu = foreign("raise(SIGSEGV);")
+    done = subprocess.run(
+        [
+            sys.executable, "-m", "orchestrator.cli", "run", str(CAR), "--fmus", str(fmus),
+            "--out", str(tmp_path / "out"), "--set", "stop_time=0.1", "--swap", f"controller={fmu}",
+        ],
+        capture_output=True, cwd=ROOT, check=False,
+    )  # fmt: skip
+    assert done.returncode < 0
+
+
+@needs_cc
+def test_a_foreign_controller_in_c_runs_isolated_as_it_runs_together(foreign, run):
+    fmu = foreign(";")
+    _, _, apart = run(fmu)
+    _, _, together = run(fmu, isolate=False)
+    assert apart.run["status"] == "completed"
+    for name in together.columns:
+        assert np.array_equal(apart[name], together[name]), name
+
+
+def test_a_failure_in_an_isolated_unit_is_the_sentence_of_one_that_is_not(fmus, tmp_path):
+    sentences = []
+    for opened in (None, Isolation):
+        plan = plan_of(fmus, stop_time=0.01)
+        broken = {"plant": {"mass": -1.0}}
+        units = [u for u in plan.units if u.name in broken]
+        units[0].parameters.update(broken["plant"])
+        with pytest.raises(SimulationError) as error:
+            if opened is None:
+                simulate(plan, tmp_path / "a")
+            else:
+                with opened(plan.units) as isolation:
+                    simulate(plan, tmp_path / "a", opener=isolation)
+        sentences.append(error.value.problems[0])
+    assert sentences[0] == sentences[1]
+    assert "plant" in sentences[0]
+
+
+@pytest.mark.parametrize(
+    ("option", "says"),
+    [("0 s", "--call-limit"), ("soon", "--call-limit")],
+)
+def test_a_limit_that_is_no_time_is_refused(option, says, capsys):
+    with pytest.raises(SystemExit) as exit_:
+        main(["run", str(CAR), "--isolate", "--call-limit", option])
+    assert exit_.value.code == 2
+    assert says in capsys.readouterr().err
