@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 READY_TO_TEST := $(VENV)/.ready-to-test
 SCENARIO ?= scenarios/fnn_sideslip/25mps.yaml
 
-.PHONY: setup fmus demo run test bench lint docs clean
+.PHONY: setup fmus demo report run test bench lint docs clean
 
 setup: $(READY)
 
@@ -24,7 +24,10 @@ fmus: setup
 	$(BIN)/yawbench build
 
 demo: fmus
-	$(BIN)/yawbench study scenarios/fnn_sideslip/study.yaml
+	$(BIN)/yawbench report scenarios/fnn_sideslip/study.yaml
+
+report: fmus
+	$(BIN)/yawbench report
 
 run: fmus
 	$(BIN)/yawbench run $(SCENARIO)

@@ -1,4 +1,4 @@
-"""The study of paper A, run as `make demo` runs it, with FMUs built for the test."""
+"""The study of paper A, with FMUs built for the test."""
 
 from __future__ import annotations
 
