@@ -87,7 +87,9 @@ def test_compare_puts_the_runs_side_by_side(yawbench, folder):
     assert "Half a car (controller exchanged)" in out
     heading = next(line for line in out.splitlines() if "metric" in line)
     assert heading.split()[1:] == ["controller_off", "controller_fuzzy_sideslip"]
-    assert said.splitlines()[-1].startswith("o: overview.svg, overview.png, metrics.csv, compare.md")
+    *_, files, page = said.splitlines()
+    assert files.startswith("o: overview.svg, overview.png, metrics.csv, compare.md")
+    assert page.startswith("The page: o/compare.html")
     rows = {row["run"]: row for row in csv.DictReader((folder / "o/metrics.csv").open())}
     assert float(rows["controller_off"]["peak(yaw_moment) [N.m]"]) == 0.0
     assert float(rows["controller_fuzzy_sideslip"]["peak(yaw_moment) [N.m]"]) > 1.0

@@ -206,8 +206,10 @@ def test_an_fmu_for_one_instance_is_not_used_twice(folder: Path) -> None:
     make_fmu(folder / "lonely.fmu", once=True)
     path = scenario(UNITS + "  one: {fmu: lonely}\n  two: {fmu: lonely}\n")
     assert problems(path) == [
-        "a.yaml:9: units.two.fmu: lonely can be instantiated only once per process, and one uses it already"
+        "a.yaml:9: units.two.fmu: lonely can be instantiated only once per process, and one uses it already; "
+        "with --isolate each unit has a process of its own"
     ]
+    assert len(make_plan(load_scenario(path), isolated=True).units) == 6
 
 
 def test_units_that_would_run_each_others_code_are_refused(folder: Path) -> None:
@@ -219,7 +221,7 @@ def test_units_that_would_run_each_others_code_are_refused(folder: Path) -> None
     path = scenario(UNITS + "  a: {fmu: one}\n  b: {fmu: two}\n  c: {fmu: four}\n")
     assert problems(path) == [
         "a.yaml: b (two) would run code of a (one): both FMUs bring a Python module 'model_of_mine', and a "
-        "process has room for one; rebuild one of them with another module name",
+        "process has room for one; rebuild one of them with another module name, or run with --isolate",
         "a.yaml: c (four) would run other code: its Python module 'json' has the name of one of Python's "
         "own; rebuild it with another module name",
     ]
