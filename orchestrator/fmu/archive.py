@@ -57,7 +57,7 @@ def open_fmu(path: Path | str) -> Fmu:
         ModelDescriptionError: missing, damaged, not supported, or no room to unpack it.
     """
     path = Path(path).absolute()
-    raw = _read(path)
+    raw = read_archive(path)
     folder = cache_folder()
     entry = folder / f"{hashlib.sha256(raw).hexdigest()[:32]}-{FORMAT}"
     fmu = _load(entry, path)
@@ -110,7 +110,12 @@ def platform() -> tuple[str, str]:
     return f"{system}{64 if sys.maxsize > 2**32 else 32}", suffix
 
 
-def _read(path: Path) -> bytes:
+def read_archive(path: Path) -> bytes:
+    """Return an FMU's bytes; it may be in an archive itself, such as system.ssp/resources/plant.fmu.
+
+    Raises:
+        ModelDescriptionError: it cannot be read.
+    """
     try:
         return path.read_bytes()
     except FileNotFoundError:
@@ -130,7 +135,7 @@ def _read(path: Path) -> bytes:
 
 
 def _read_member(path: Path) -> bytes:
-    """Return an FMU in an archive, such as system.ssp/resources/plant.fmu."""
+    """Return an FMU that is a member of an archive."""
     outer = next(above for above in path.parents if above.is_file())
     member = path.relative_to(outer).as_posix()
     try:

@@ -25,6 +25,7 @@ from lxml import etree
 from lxml.etree import SubElement, _Element
 
 from ..errors import ResultsError
+from ..fmu.archive import read_archive
 from ..plan import Fmu, Plan, Unit, Value, Variable
 from ..scenario import quantities
 from ..scenario.ssp_names import (
@@ -49,12 +50,15 @@ def write_ssp(plan: Plan, path: Path) -> None:
     """Write the plan and its FMUs into the archive `path`.
 
     Raises:
-        ResultsError: it cannot be written.
+        ResultsError: it cannot be written, or not in XML.
+        ModelDescriptionError: an FMU is not there any more.
     """
     sources = _sources(plan)
-    description = etree.tostring(
-        system_structure(plan), xml_declaration=True, encoding="UTF-8", pretty_print=True
-    )
+    try:
+        structure = system_structure(plan)
+    except ValueError as error:  # a control character in a text
+        raise ResultsError(f"{path}: cannot write this archive: {error}") from None
+    description = etree.tostring(structure, xml_declaration=True, encoding="UTF-8", pretty_print=True)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, scratch = tempfile.mkstemp(prefix=path.name, suffix=".part", dir=path.parent)
@@ -63,7 +67,7 @@ def write_ssp(plan: Plan, path: Path) -> None:
                 _put(archive, DESCRIPTION_FILE, description)
                 for sha256, source in sorted(sources.items(), key=lambda item: item[1]):
                     fmu = next(unit.fmu for unit in plan.units if unit.fmu.sha256 == sha256)
-                    _put(archive, source, fmu.path.read_bytes())
+                    _put(archive, source, read_archive(fmu.path))
             os.chmod(scratch, 0o644)
             os.replace(scratch, path)
         finally:
@@ -80,7 +84,11 @@ def _put(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
 
 
 def system_structure(plan: Plan) -> _Element:
-    """Return the system structure description of a plan."""
+    """Return the system structure description of a plan.
+
+    Raises:
+        ValueError: XML cannot hold what the plan holds.
+    """
     root = etree.Element(f"{{{SSD}}}SystemStructureDescription", nsmap=NAMESPACES)
     root.set("version", "1.0")
     root.set("name", plan.title or "scenario")
@@ -266,4 +274,6 @@ def _annotation(above: _Element, kind: str) -> _Element:
 def _decimal(seconds: Fraction) -> str:
     """Return a time as the shortest decimal that is read back as the same fraction."""
     text = repr(float(seconds))
-    return text if Fraction(text) == seconds else f"{seconds.numerator}/{seconds.denominator}"
+    if Fraction(text) != seconds:
+        raise ValueError(f"a step of {text} s that has more digits is not the same in other programs")
+    return text

@@ -52,6 +52,8 @@ def load_scenario(
         overrides.apply_settings(document, vehicle_document, settings)
     values = {"stop_time": stop_time, "step_size": step_size, "algorithm": algorithm}
     overrides.apply_values(document, values)
+    if archive and isinstance(document.data, dict):
+        _ask_for_times(document)
 
     scenario = strict.validate(Scenario, document)
     parameters = strict.validate(Vehicle, vehicle_document)
@@ -71,6 +73,15 @@ def _read_archive(path: Path) -> Document:
     from . import ssp_read  # lxml takes long to import, and scenario files do not need it
 
     return ssp_read.read(path)
+
+
+def _ask_for_times(document: Document) -> None:
+    """Refuse an archive that lacks a time, as those from elsewhere do, if no option gives it."""
+    from . import ssp_read
+
+    missing = ssp_read.missing_times(document)
+    if missing:
+        raise ScenarioError(document.sentences() + missing)
 
 
 def _read_vehicle(document: Document, read: Callable[..., Document]) -> Document:

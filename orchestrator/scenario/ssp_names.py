@@ -17,5 +17,9 @@ NAMESPACES = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP, "yawbench": OWN}
 """All declared at the root, with the prefixes that libcosim and Ecos take for granted: they compare
 text, and libcosim takes a declaration further down for content."""
 
+FMU_TYPE = "application/x-fmu-sharedlibrary"
+VALUES_TYPE = "application/x-ssp-parameter-set"
+MAPPING_TYPE = "application/x-ssp-parameter-mapping"
+
 OSP_ANNOTATION = "com.opensimulationplatform"
 OWN_ANNOTATION = "yawbench"

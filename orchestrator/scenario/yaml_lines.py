@@ -27,6 +27,8 @@ class Document:
     overrides: dict[Key, str] = field(default_factory=dict)
     """Values that came from an option of the command line -> that option."""
     problems: list[tuple[int, str]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    """Remarks on what is no mistake, for the plan."""
 
     def report(self, key: Key, sentence: str) -> None:
         """Note a problem with the value (or the missing value) at `key`."""

@@ -25,7 +25,7 @@ from typing import Any
 import distributed
 
 from ..errors import ResultsError, ScenarioError
-from ..fmu.archive import open_fmu
+from ..fmu.archive import open_fmu, read_archive
 from ..plan import Fmu, Plan
 from ..studies.jobs import Outcome, execute
 from ..wording import listed
@@ -59,7 +59,7 @@ def run_on_cluster(
     """
     with _connected(scheduler) as client, _told_to_end():
         threads = _check_workers(client, scheduler)
-        client.register_plugin(_Archives({digest: fmu.path.read_bytes() for digest, fmu in fmus.items()}))
+        client.register_plugin(_Archives({digest: read_archive(fmu.path) for digest, fmu in fmus.items()}))
         _submit_all(client, jobs, done, scheduler, AHEAD * threads)
 
 

@@ -48,7 +48,7 @@ def make_plan(
         WiringError: everything that is wrong with parameters and connections.
     """
     opened, replaced = _open_all(scenario, fmus, open_)
-    notes: list[str] = []
+    notes: list[str] = list(scenario.document.notes)
     parameters = Parameters(scenario, opened, replaced, notes).of_units()
     connector = Connector(scenario, opened, replaced, notes)
     wires, constants = connector.connect()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import zipfile
+from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 
 import fmpy.ssp
@@ -11,12 +13,14 @@ from lxml import etree
 
 from fmus.build import build_all
 from orchestrator.cli import main
-from orchestrator.errors import YawbenchError
+from orchestrator.errors import ResultsError, YawbenchError
 from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.master.simulate import simulate
 from orchestrator.scenario.load import load_scenario
-from orchestrator.scenario.ssp_names import DESCRIPTION_FILE, SSD, SSM, SSV
+from orchestrator.scenario.ssp_names import DESCRIPTION_FILE, SSC, SSD, SSM, SSV
 from orchestrator.wiring.make_plan import make_plan
+
+from .fake_fmus import make_fmu
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 PAPERS = (
@@ -66,9 +70,46 @@ def rewritten(archive, target, *changes, without=()):
     return target
 
 
-def problem(archive, fmus):
+def described(archive):
+    with zipfile.ZipFile(archive) as held:
+        return etree.fromstring(held.read(DESCRIPTION_FILE))
+
+
+def redescribed(archive, target, root, members=None):
+    """Copy an archive with another description, and more members."""
+    with zipfile.ZipFile(archive) as old, zipfile.ZipFile(target, "w") as new:
+        for name in old.namelist():
+            if name not in (members or {}):
+                new.writestr(name, etree.tostring(root) if name == DESCRIPTION_FILE else old.read(name))
+        for name, content in (members or {}).items():
+            new.writestr(name, content)
+    return target
+
+
+def parameter_set(name, value, unit="m/s"):
+    return (
+        f'<ssv:ParameterSet xmlns:ssv="{SSV}" version="1.0" name="v"><ssv:Parameters>'
+        f'<ssv:Parameter name="{name}"><ssv:Real value="{value}" unit="{unit}"/></ssv:Parameter>'
+        "</ssv:Parameters></ssv:ParameterSet>"
+    )
+
+
+def bound(inner, **attributes):
+    """Return the bindings of an element as text, with one binding."""
+    listed = "".join(f' {key}="{value}"' for key, value in attributes.items())
+    return (
+        f"<ssd:ParameterBindings><ssd:ParameterBinding{listed}>{inner}"
+        "</ssd:ParameterBinding></ssd:ParameterBindings>"
+    )
+
+
+def unit_of(plan, name):
+    return next(unit for unit in plan.units if unit.name == name)
+
+
+def problem(archive, fmus, **options):
     with pytest.raises(YawbenchError) as error:
-        make_plan(load_scenario(archive), fmus=fmus)
+        make_plan(load_scenario(archive, **options), fmus=fmus)
     (sentence,) = error.value.problems
     return sentence
 
@@ -135,58 +176,167 @@ def test_units_of_an_archive_are_swapped_and_set_as_those_of_a_scenario(feedback
     assert results_of(swapped, tmp_path / "a") == results_of(same, tmp_path / "b")
 
 
+def test_an_archive_of_an_archive_is_the_same_to_the_last_byte(feedback, fmus, tmp_path):
+    write_ssp(make_plan(load_scenario(feedback)), tmp_path / "again.ssp")
+    assert (tmp_path / "again.ssp").read_bytes() == feedback.read_bytes()
+
+
+def test_a_text_that_xml_cannot_hold_is_refused(fmus, tmp_path):
+    plan = replace(plan_of(SCENARIOS / PAPERS[3], fmus), title="bell \a")
+    with pytest.raises(ResultsError, match="control characters"):
+        write_ssp(plan, tmp_path / "system.ssp")
+    assert not (tmp_path / "system.ssp").exists()
+
+
 def test_an_input_that_an_archive_leaves_alone_keeps_its_start_value(feedback, fmus, tmp_path):
-    with zipfile.ZipFile(feedback) as archive:
-        root = etree.fromstring(archive.read(DESCRIPTION_FILE))
+    root = described(feedback)
     for connection in root.findall(".//{*}Connection"):
         if connection.get("endConnector") == "yaw_moment":
             connection.getparent().remove(connection)
-    target = tmp_path / "open.ssp"
-    with zipfile.ZipFile(feedback) as old, zipfile.ZipFile(target, "w") as new:
-        for name in old.namelist():
-            new.writestr(name, etree.tostring(root) if name == DESCRIPTION_FILE else old.read(name))
-    plan = make_plan(load_scenario(target), fmus=fmus)
-    plant = next(unit for unit in plan.units if unit.name == "plant")
-    assert plant.constants["yaw_moment"] == 0.0
+    plan = make_plan(load_scenario(redescribed(feedback, tmp_path / "open.ssp", root)), fmus=fmus)
+    assert unit_of(plan, "plant").constants["yaw_moment"] == 0.0
+
+
+def test_start_and_end_of_a_connection_say_nothing_of_its_direction(feedback, fmus, tmp_path):
+    root = described(feedback)
+    for one in root.findall(".//{*}Connection"):
+        for what in ("Element", "Connector"):
+            start, end = one.get(f"start{what}"), one.get(f"end{what}")
+            one.set(f"start{what}", end)
+            one.set(f"end{what}", start)
+    turned = make_plan(load_scenario(redescribed(feedback, tmp_path / "turned.ssp", root)), fmus=fmus)
+    assert turned.wires == make_plan(load_scenario(feedback), fmus=fmus).wires
+
+
+def nested(feedback, element):
+    """Return a description with one component in a system of its own, behind connectors of it."""
+    root = described(feedback)
+    component = root.find(f".//{{*}}Component[@name='{element}']")
+    inner = etree.Element(f"{{{SSD}}}System", name="inner")
+    component.getparent().replace(component, inner)
+    inner.append(deepcopy(component.find("{*}Connectors")))
+    etree.SubElement(inner, f"{{{SSD}}}Elements").append(component)
+    connections = etree.SubElement(inner, f"{{{SSD}}}Connections")
+    for connector in component.iterfind("{*}Connectors/{*}Connector"):
+        name = connector.get("name")
+        ends = {"startConnector": name, "endElement": element, "endConnector": name}
+        etree.SubElement(connections, f"{{{SSD}}}Connection", ends)
+    for connection in root.iterfind("{*}System/{*}Connections/{*}Connection"):
+        for end in ("startElement", "endElement"):
+            if connection.get(end) == element:
+                connection.set(end, "inner")
+    return root
+
+
+@pytest.mark.parametrize("element", ["controller", "tyre"])
+def test_a_system_in_the_system_is_laid_flat(element, feedback, fmus, tmp_path):
+    root = nested(feedback, element)
+    etree.XMLSchema(file=str(SCHEMAS / "SystemStructureDescription.xsd")).assertValid(root)
+    path = redescribed(feedback, tmp_path / "nested.ssp", root)
+    plan = make_plan(load_scenario(path), fmus=fmus)
+    assert any(f"inner_{element} (inner.{element})" in note for note in plan.notes)
+    inside = results_of(plan, tmp_path / "inside").replace(b"inner_", b"")
+    assert inside == results_of(make_plan(load_scenario(feedback), fmus=fmus), tmp_path / "outside")
+
+
+def test_a_value_at_a_systems_connector_reaches_the_inputs_behind_it(feedback, fmus, tmp_path):
+    root = nested(feedback, "tyre")
+    inner = root.find(".//{*}System[@name='inner']")
+    connections = inner.find("{*}Connections")
+    for i, name in enumerate(("friction_fl", "friction_fr")):
+        connector = etree.Element(f"{{{SSD}}}Connector", name=f"road_{i}", kind="input")
+        inner.find("{*}Connectors").append(connector)
+        ends = {"startConnector": f"road_{i}", "endElement": "tyre", "endConnector": name}
+        etree.SubElement(connections, f"{{{SSD}}}Connection", ends)
+    values = bound(f"<ssd:ParameterValues>{parameter_set('inner.road_0', 0.25, '1')}</ssd:ParameterValues>")
+    top = root.find("{*}System")
+    top.insert(0, etree.fromstring(f'<a xmlns:ssd="{SSD}">{values}</a>')[0])
+    path = redescribed(feedback, tmp_path / "road.ssp", root)
+    constants = unit_of(make_plan(load_scenario(path), fmus=fmus), "inner_tyre").constants
+    assert [constants[f"friction_{wheel}"] for wheel in ("fl", "fr", "rl", "rr")] == [0.25, 0.5, 0.5, 0.5]
+
+
+def test_names_that_cannot_name_a_unit_are_changed(feedback, fmus, tmp_path):
+    path = rewritten(
+        feedback, tmp_path / "named.ssp", ('name="plant"', 'name="vehicle"'), ('t="plant"', 't="vehicle"'),
+        ('name="tyre"', 'name="Four tyres.v2"'), ('t="tyre"', 't="Four tyres.v2"'),
+    )  # fmt: skip
+    root = described(path)
+    own = root.find(".//{urn:yawbench:ssp:1}Scenario")
+    for record in list(own):
+        own.remove(record)
+    path = redescribed(path, tmp_path / "recorded.ssp", root)
+    plan = make_plan(load_scenario(path), fmus=fmus)
+    assert {unit.name for unit in plan.units} == {
+        "driver",
+        "reference",
+        "controller",
+        "_vehicle",
+        "Four_tyres_v2",
+    }
+    assert any("_vehicle (vehicle), Four_tyres_v2" in n or "_vehicle (vehicle) and" in n for n in plan.notes)
 
 
 def test_a_parameter_in_another_unit_is_converted(feedback, fmus, tmp_path):
-    other = rewritten(
-        feedback,
-        tmp_path / "kmh.ssp",
-        ('<ssv:Real value="25.0" unit="m/s"/>', '<ssv:Real value="90" unit="km/h"/>'),
-    )
-    plan = make_plan(load_scenario(other), fmus=fmus)
-    assert next(u for u in plan.units if u.name == "plant").parameters["initial_speed"] == 25.0
+    before = '<ssv:Real value="25.0" unit="m/s"/>'
+    path = rewritten(feedback, tmp_path / "kmh.ssp", (before, '<ssv:Real value="90" unit="km/h"/>'))
+    assert unit_of(make_plan(load_scenario(path), fmus=fmus), "plant").parameters["initial_speed"] == 25.0
 
 
-def test_values_may_stand_at_the_system_with_a_prefix_in_a_file_of_their_own_under_mapped_names(
-    feedback, fmus, tmp_path
+OUTERMOST = '<ssd:System name="system">'
+SPEED_MAPPED = (
+    f'<ssm:ParameterMapping xmlns:ssm="{SSM}" version="1.0">'
+    '<ssm:MappingEntry source="car.speed" target="plant.initial_speed">{}</ssm:MappingEntry>'
+    "</ssm:ParameterMapping>"
+)
+
+
+@pytest.mark.parametrize(
+    ("transformation", "speed"),
+    [("", 20.0), (f'<ssc:LinearTransformation xmlns:ssc="{SSC}" factor="1.5" offset="-4"/>', 26.0)],
+)
+def test_values_of_a_file_reach_what_they_are_mapped_to_and_go_before_those_of_components(
+    transformation, speed, feedback, fmus, tmp_path
 ):
-    binding = (
-        '<ssd:ParameterBindings><ssd:ParameterBinding source="values.ssv" prefix="plant.">'
-        '<ssd:ParameterMapping source="names.ssm"/></ssd:ParameterBinding></ssd:ParameterBindings>'
-    )
-    target = rewritten(
+    binding = bound('<ssd:ParameterMapping source="names.ssm"/>', source="values.ssv", prefix="car.")
+    path = rewritten(
         feedback,
         tmp_path / "mapped.ssp",
         ('<ssd:System name="system">', f'<ssd:System name="system">{binding}'),
-        ('<ssv:Parameter name="initial_speed">', '<ssv:Parameter name="mass">'),
     )
-    with zipfile.ZipFile(target, "a") as archive:
-        archive.writestr(
-            "values.ssv",
-            f'<ssv:ParameterSet xmlns:ssv="{SSV}" version="1.0" name="v">'
-            '<ssv:Parameters><ssv:Parameter name="speed"><ssv:Real value="20" unit="m/s"/>'
-            "</ssv:Parameter></ssv:Parameters></ssv:ParameterSet>",
-        )
-        archive.writestr(
-            "names.ssm",
-            f'<ssm:ParameterMapping xmlns:ssm="{SSM}" version="1.0">'
-            '<ssm:MappingEntry source="speed" target="initial_speed"/></ssm:ParameterMapping>',
-        )
-    plan = make_plan(load_scenario(target, settings=["plant.mass=1500"]), fmus=fmus)
-    assert next(u for u in plan.units if u.name == "plant").parameters["initial_speed"] == 20.0
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("values.ssv", parameter_set("speed", 72, "km/h"))
+        archive.writestr("names.ssm", SPEED_MAPPED.format(transformation))
+    plan = make_plan(load_scenario(path, settings=["plant.mass=1500"]), fmus=fmus)
+    assert unit_of(plan, "plant").parameters["initial_speed"] == speed
+    assert unit_of(plan, "plant").parameters["mass"] == 1500.0
+
+
+def test_a_mapping_may_forbid_to_convert_units(feedback, fmus, tmp_path):
+    entry = SPEED_MAPPED.format("").replace("target=", 'suppressUnitConversion="true" target=')
+    inner = (
+        f"<ssd:ParameterValues>{parameter_set('car.speed', 30, 'km/h')}</ssd:ParameterValues>"
+        f"<ssd:ParameterMapping>{entry}</ssd:ParameterMapping>"
+    )
+    path = rewritten(
+        feedback,
+        tmp_path / "as_is.ssp",
+        ('<ssd:System name="system">', f'<ssd:System name="system">{bound(inner)}'),
+    )
+    assert unit_of(make_plan(load_scenario(path), fmus=fmus), "plant").parameters["initial_speed"] == 30.0
+
+
+def test_a_value_for_what_nothing_has_is_passed_over_with_a_note(feedback, fmus, tmp_path):
+    path = rewritten(feedback, tmp_path / "typo.ssp", ('name="initial_speed"', 'name="speed"'))
+    plan = make_plan(load_scenario(path), fmus=fmus)
+    assert "initial_speed" not in unit_of(plan, "plant").parameters
+    assert any("gives values to plant.speed" in note for note in plan.notes)
+
+
+def test_a_start_value_of_a_connected_input_counts_for_nothing(feedback, fmus, tmp_path):
+    path = rewritten(feedback, tmp_path / "start.ssp", ('name="initial_speed"', 'name="steer_angle"'))
+    plan = make_plan(load_scenario(path), fmus=fmus)
+    assert "steer_angle" not in unit_of(plan, "plant").constants | unit_of(plan, "plant").parameters
 
 
 @pytest.mark.parametrize(
@@ -197,18 +347,38 @@ def test_values_may_stand_at_the_system_with_a_prefix_in_a_file_of_their_own_und
         ("resources/plant_two_dof.fmu", "resources/nothing.fmu", "there is no resources/nothing.fmu"),
         ("resources/plant_two_dof.fmu", "plant.ssd", "only FMUs are supported"),
         ('implementation="CoSimulation"', 'implementation="ModelExchange"', "only CoSimulation is supported"),
-        ("<ssd:Elements>", '<ssd:Elements><ssd:System name="inner"/>', "a system in the system (inner)"),
+        ("<ssd:Elements>", '<ssd:Elements><ssd:Other name="x"/>', "an element of kind Other (x)"),
+        ('name="tyre"', 'name="plant"', "two elements are called 'plant'"),
+        (
+            'startConnector="steer_angle" endElement="plant"',
+            'startConnector="steer" endElement="plant"',
+            "driver has no output 'steer'",
+        ),
+        (
+            'startConnector="steer_angle" endElement="plant" endConnector="steer_angle"',
+            'startConnector="velocity_x" endElement="plant" endConnector="steer_angle"',
+            "cannot connect driver.velocity_x and plant.steer_angle: each takes a value",
+        ),
+        (
+            'endElement="plant" endConnector="tyre_force_x_fr"',
+            'endElement="plant" endConnector="tyre_force_x_fl"',
+            "plant.tyre_force_x_fl has more than one source: tyre.tyre_force_x_fl and tyre.tyre_force_x_fr",
+        ),
         (
             "<ssd:Elements>",
             '<ssd:Elements><ssd:SignalDictionaryReference name="bus" dictionary="d"/>',
             "a signal dictionary (bus)",
         ),
         ('startElement="driver"', 'startElement="nobody"', "'nobody': there is no such component"),
-        ('startElement="driver"', "", "the system's own connector"),
+        ('startElement="driver"', "", "the connector 'steer_angle': the system has none of this name"),
+        (
+            'source="resources/plant_two_dof.fmu"',
+            'source="a.fmu" sourceBase="component"',
+            "is in a component",
+        ),
         ('startTime="0.0"', 'startTime="1.0"', "runs begin at 0 s"),
         ('value="25.0"', 'value="fast"', "'fast' is not of type Real"),
         ("</ssd:System>", "", "not well-formed"),
-        ('name="initial_speed"', 'name="speed"', "no parameter 'speed'"),
     ],
 )
 def test_what_an_archive_cannot_mean_here_is_said_in_one_sentence(
@@ -227,18 +397,56 @@ def test_a_transformation_is_refused(feedback, fmus, tmp_path):
     first = first[: first.index("/>") + 2]
     changed = first[:-2] + '><ssc:LinearTransformation factor="2"/></ssd:Connection>'
     archive = rewritten(feedback, tmp_path / "changed.ssp", (first, changed))
-    assert "LinearTransformation is not supported" in problem(archive, fmus)
+    assert "LinearTransformation in a connection is not supported" in problem(archive, fmus)
 
 
-def test_an_archive_without_a_step_says_so_and_takes_one(feedback, fmus, tmp_path):
-    archive = rewritten(
+def test_an_archive_without_a_step_asks_for_one_and_takes_it(feedback, fmus, tmp_path):
+    path = rewritten(
         feedback,
         tmp_path / "no_step.ssp",
         ("osp:FixedStepAlgorithm", "osp:Other"),
         ("yawbench:Scenario", "ssc:Other"),
     )
-    assert "step_size" in problem(archive, fmus)
-    assert make_plan(load_scenario(archive, step_size=0.0025), fmus=fmus).n_steps == 240
+    asks = f"{path}: the archive says no communication step: give one in s, such as --set step_size=0.001"
+    assert problem(path, fmus) == asks
+    plan = make_plan(load_scenario(path, settings=["step_size=0.0025"]), fmus=fmus)
+    assert (plan.n_steps, plan.algorithm) == (240, "extrapolated")
+
+
+def test_an_archive_without_a_stop_time_asks_for_one(feedback, fmus, tmp_path):
+    path = rewritten(feedback, tmp_path / "endless.ssp", ('stopTime="0.6"', ""))
+    assert "the archive says no stop time" in problem(path, fmus)
+    assert make_plan(load_scenario(path, stop_time=0.2), fmus=fmus).n_steps == 200
+
+
+@pytest.mark.parametrize(
+    ("xml", "says"),
+    [
+        ('<fmiModelDescription fmiVersion="1.0"/>', "FMI 1.0"),
+        ('<fmiModelDescription fmiVersion="3.0"><CoSimulation/></fmiModelDescription>', "FMI 3.0"),
+        ("<fmiModel", "modelDescription.xml"),
+    ],
+)
+def test_a_component_that_cannot_be_run_is_named(xml, says, feedback, fmus, tmp_path):
+    member = "resources/plant_two_dof.fmu"
+    content = make_fmu(tmp_path / "plant.fmu", xml=xml).read_bytes()
+    path = redescribed(feedback, tmp_path / "other.ssp", described(feedback), {member: content})
+    sentence = problem(path, fmus)
+    assert member in sentence
+    assert says in sentence
+
+
+def test_entities_are_not_expanded_and_no_file_is_read_for_them(feedback, fmus, tmp_path):
+    secret = tmp_path / "secret"
+    secret.write_text("90")
+    declared = f'<!DOCTYPE a [<!ENTITY e SYSTEM "{secret.as_uri()}">]><ssd:SystemStructureDescription '
+    path = rewritten(
+        feedback,
+        tmp_path / "entity.ssp",
+        ("<ssd:SystemStructureDescription ", declared),
+        ('<ssv:Real value="25.0" unit="m/s"/>', "&e;"),
+    )
+    assert "has no value" in problem(path, fmus)
 
 
 @pytest.mark.parametrize("content", [b"", b"no zip", b"PK\x03\x04 cut off"])
