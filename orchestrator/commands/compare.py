@@ -40,7 +40,6 @@ def compare(
     fails is named and takes no other with it.
     """
     import shlex
-    import sys
     from dataclasses import replace
 
     from ..pages.compare_page import write_page
@@ -62,7 +61,13 @@ def compare(
     table = metric_table(comparison, f"{title or scenario.stem} ({exchanged} exchanged)")
     files = write_comparison(comparison, table, folder)
     print_tables([table])
-    command = shlex.join(["yawbench", *sys.argv[1:]])
+    given = [
+        part
+        for option, values in (("--swap", swap), ("--set", set_ or ()))
+        for v in values
+        for part in (option, v)
+    ]
+    command = shlex.join(["yawbench", "compare", str(scenario), *given])
     page = write_page(comparison, work, folder, title=table.title, command=command)
     say(f"{folder}: {', '.join(files)}")
     say(f"The page: {page}")

@@ -62,7 +62,12 @@ def panel_images(runs: Sequence[Run], names: Sequence[str]) -> tuple[list[PanelI
                 [figure.axes[0] for panel, figure in zip(panels, drawn, strict=True) if panel.scale == scale]
             )
         legend = _legend(runs, drawn)
-        images = [_image(panel, figure) for panel, figure in zip(panels, drawn, strict=True)]
+        headings = [_take_title(figure.axes[0]) for figure in drawn]
+        _align(drawn)
+        images = [
+            PanelImage(panel.name, heading, _address(figure), panel.rows > 1)
+            for panel, heading, figure in zip(panels, headings, drawn, strict=True)
+        ]
     return images, legend
 
 
@@ -98,6 +103,18 @@ def _share(every: Sequence[Axes]) -> None:
         axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
 
 
+def _align(drawn: Sequence[Figure]) -> None:
+    """Give the axes of all panels the same left and right ends."""
+    for figure in drawn:
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
+    places = [figure.axes[0].get_position(original=True) for figure in drawn]
+    left = max((place.x0 for place in places), default=0.0)
+    right = min((place.x1 for place in places), default=1.0)
+    for figure, place in zip(drawn, places, strict=True):
+        figure.axes[0].set_position((left, place.y0, right - left, place.height))
+
+
 def _legend(runs: Sequence[Run], drawn: Sequence[Figure]) -> list[LegendEntry]:
     entries = [_entry(run.label, line_style(k)) for k, run in enumerate(runs) if len(runs) > 1]
     pale = [
@@ -115,13 +132,17 @@ def _entry(label: str, style: dict[str, Any]) -> LegendEntry:
     return LegendEntry(label, style["color"], width, " ".join(f"{part * width:.3g}" for part in dashes))
 
 
-def _image(panel: Panel, figure: Figure) -> PanelImage:
-    axes = figure.axes[0]
+def _take_title(axes: Axes) -> Markup:
+    """Take the title away from the axes and return it for the page."""
     heading = axes.get_title(loc="left")
     axes.set_title("", loc="left")
+    return in_html(heading)
+
+
+def _address(figure: Figure) -> Markup:
     text = io.StringIO()
     figure.savefig(text, format="svg", metadata={"Date": None})
-    return PanelImage(panel.name, in_html(heading), address_of(text.getvalue()), panel.rows > 1)
+    return address_of(text.getvalue())
 
 
 def address_of(svg: str) -> Markup:

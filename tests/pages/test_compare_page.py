@@ -1,0 +1,93 @@
+"""The page of a comparison, from the command line to the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from lxml import html
+
+from fmus.build import build_all
+from orchestrator.cli import main
+
+from .browser import DESK, PHONE
+from .flaws import flaws, open_all
+
+ROOT = Path(__file__).parents[2]
+UNITS = (
+    "driver_sine", "reference_single_track", "controller_off", "controller_fuzzy_feedback", "plant_two_dof",
+    "tyre_magic_formula_1987",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory) -> Path:
+    """The page that `yawbench compare` writes of paper D's scenario with three controllers."""
+    folder = tmp_path_factory.mktemp("compare")
+    build_all(folder / "fmus", components=UNITS)
+    fuzzy = "controller_fuzzy_feedback"
+    with pytest.raises(SystemExit) as ended:
+        main([
+            "compare", str(ROOT / "scenarios/fuzzy_feedback/single_sine.yaml"), "--set", "stop_time=3",
+            "--swap", f"controller=controller_off,{fuzzy},{fuzzy}:rule_table=gentle",
+            "--fmus", str(folder / "fmus"), "--out", str(folder / "out"), "--format", "parquet",
+        ])  # fmt: skip
+    assert not ended.value.code
+    return folder / "out" / "compare.html"
+
+
+@pytest.fixture(scope="module")
+def tree(page):
+    return html.fromstring(page.read_text(encoding="utf-8"))
+
+
+def texts(tree, path: str) -> list[str]:
+    return [" ".join(element.text_content().split()) for element in tree.cssselect(path)]
+
+
+def test_metrics_stand_side_by_side_with_their_difference_from_the_first(tree):
+    fuzzy = "controller_fuzzy_feedback"
+    (table,) = tree.cssselect("table.first-free")
+    assert texts(table, "thead th")[2:] == ["controller_off", fuzzy, f"{fuzzy} rule_table=gentle"]
+    rows = {row[0].text_content(): row for row in table.cssselect("tbody tr")}
+    cells = [" ".join(cell.text_content().split()) for cell in rows["Yaw moment: peak"][2:]]
+    assert cells[0] == "0 N·m"
+    value, _, difference = cells[1].partition(" N·m")
+    assert float(value) > 1000
+    assert difference == f"+{value} N·m"
+
+
+def test_it_tells_where_the_runs_part(tree):
+    headings = [text for text in texts(tree, "h3") if " against " in text]
+    assert len(headings) == 2
+    said = tree.text_content()
+    assert "The first to differ is controller.yaw_moment, at 0.505 s" in " ".join(said.split())
+
+
+def test_it_shows_the_system_its_parameters_and_how_to_repeat_it(tree):
+    assert texts(tree, "h2") == [
+        "Overlays", "Seen from above", "What the runs come to", "Where the runs part", "The system",
+        "To repeat this",
+    ]  # fmt: skip
+    assert len(tree.cssselect("svg.diagonal, svg.stack")) == 2
+    assert "controller_fuzzy_feedback" in texts(tree, "svg.diagonal text")
+    assert len(tree.cssselect(".hash")) == len(UNITS)
+    (command,) = texts(tree, "pre")
+    assert command.startswith("yawbench compare ")
+    assert "--swap controller=controller_off,controller_fuzzy_feedback" in command
+    assert command.endswith("--set stop_time=3")
+
+
+@pytest.mark.parametrize("width", [PHONE, 768, DESK])
+def test_nothing_is_cut_overlapping_or_empty_at_any_width(chromium, page, width):
+    chromium.open(page, width=width)
+    assert flaws(chromium) == []
+    open_all(chromium)
+    assert flaws(chromium) == []
+
+
+def test_the_animation_in_the_page_plays(chromium, page):
+    chromium.open(page, calm=False)
+    chromium.run("document.querySelector('.yb-play').click()")
+    chromium.wait_for("document.querySelector('.yb-animation').player.time > 0.02")
+    assert chromium.console() == []

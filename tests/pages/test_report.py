@@ -1,0 +1,262 @@
+"""`yawbench report`: what its page says, what it runs, how it looks in a browser and in print."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from lxml import html
+
+from fmus.build import build_all
+from orchestrator.cli import main
+from orchestrator.errors import ScenarioError
+from orchestrator.pages.report import found_studies
+from orchestrator.studies.study_file import load_study
+
+from .browser import DESK, PHONE
+from .flaws import flaws, open_all
+
+ROOT = Path(__file__).parents[2]
+UNITS = (
+    "driver_sine", "reference_single_track", "controller_off", "controller_fuzzy_feedback", "plant_two_dof",
+    "tyre_magic_formula_1987",
+)  # fmt: skip
+HALF = """
+title: Half a paper
+source: Somebody, a journal
+runs:
+  - for: {amplitude: [0.02, 0.05]}
+    name: "amplitude/{amplitude}"
+    scenario: half.yaml
+    set: {driver.amplitude: "{amplitude}"}
+metrics:
+  steer: {metric: peak(steer_angle), heading: steer angle}
+tables:
+  - {title: Angles, runs: ["*"], metrics: [steer]}
+claims:
+  - {says: More is more., source: page 1, holds_if: [{run: amplitude/0.05, metric: steer, above: 2 deg}]}
+  - {says: Less is more., source: page 2, holds_if: [{run: amplitude/0.02, metric: steer, above: 2 deg}]}
+figures:
+  - {name: angles, runs: ["*"], panels: [steer_angle, yaw_rate_ref]}
+"""
+SCENARIO = """
+title: Half a car
+stop_time: 1
+step_size: 0.01
+inputs: {velocity_x: 20, friction: 0.7}
+units:
+  driver: {fmu: driver_sine, parameters: {frequency: 1, start_time: 0}}
+  reference: {fmu: reference_single_track}
+"""
+
+
+@pytest.fixture(scope="session")
+def fmus(tmp_path_factory):
+    """A folder with the FMUs of paper D."""
+    folder = tmp_path_factory.mktemp("fmus")
+    build_all(folder, components=UNITS)
+    return folder
+
+
+@pytest.fixture
+def report(fmus, capsys):
+    """Call `yawbench report`; return its status and what it said."""
+
+    def call(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            main(["report", *map(str, arguments), "--fmus", str(fmus)])
+        return ended.value.code or 0, capsys.readouterr().err
+
+    return call
+
+
+@pytest.fixture
+def half(tmp_path, monkeypatch):
+    """A working directory with one small study."""
+    folder = tmp_path / "scenarios" / "half"
+    folder.mkdir(parents=True)
+    (folder / "study.yaml").write_text(HALF)
+    (folder / "half.yaml").write_text(SCENARIO)
+    monkeypatch.chdir(tmp_path)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def paper(tmp_path_factory, fmus):
+    """The report of paper D, and the record of its study."""
+    folder = tmp_path_factory.mktemp("report")
+    study = ROOT / "scenarios" / "fuzzy_feedback" / "study.yaml"
+    with pytest.raises(SystemExit) as ended:
+        main(["report", str(study), "--out", str(folder), "--fmus", str(fmus), "--format", "parquet"])
+    assert not ended.value.code
+    page = folder / "report.html"
+    return SimpleNamespace(
+        folder=folder,
+        page=page,
+        tree=html.fromstring(page.read_text(encoding="utf-8")),
+        record=json.loads((folder / "study.json").read_text(encoding="utf-8")),
+    )
+
+
+def texts(tree, path: str) -> list[str]:
+    """Return what stands at a path, as a reader sees it."""
+    return [" ".join(element.text_content().split()) for element in tree.cssselect(path)]
+
+
+def test_every_claim_stands_beside_what_was_measured_with_its_verdict(paper):
+    rows = paper.tree.cssselect("table.claims tbody tr")
+    judged = [*paper.record["claims"], *paper.record["checks"]]
+    assert len(rows) == len(judged) > 4
+    for row, claim in zip(rows, judged, strict=True):
+        says, measured, verdict = (" ".join(cell.text_content().split()) for cell in row)
+        conditions = texts(row, "details li")
+        assert says.startswith(claim["says"])
+        assert all(" ".join(number.split()) in measured for number in claim["measured"])
+        assert conditions == [" ".join(condition.split()) for condition in claim["holds_if"]]
+        assert verdict.endswith(claim["verdict"])
+
+
+def test_every_fmu_is_named_with_its_whole_hash(paper):
+    told = set(texts(paper.tree, ".hash"))
+    recorded = {sha for run in paper.record["runs"].values() for sha in run["fmus"].values()}
+    assert told == recorded
+    assert all(re.fullmatch("[0-9a-f]{64}", sha) for sha in told)
+
+
+def test_every_figure_of_the_study_is_in_the_page_and_beside_it(paper):
+    assert texts(paper.tree, "figure > figcaption")[: len(paper.record["figures"])] == [
+        *paper.record["figures"].values()
+    ]
+    named = [file for text in paper.tree.cssselect("figure code") for file in [text.text_content()]]
+    assert len(named) == 2 * len(paper.record["figures"])
+    assert all((paper.folder / file).stat().st_size > 5000 for file in named)
+
+
+def test_the_panels_stand_in_the_order_of_the_study(paper):
+    study = load_study(ROOT / "scenarios" / "fuzzy_feedback" / "study.yaml")
+    alts = [image.get("alt") for image in paper.tree.cssselect("figure .panel img")]
+    assert len(alts) == sum(len(figure.panels) for figure in study.spec.figures)
+    assert [alt.split(" ")[0] for alt in alts[:6]] == ["Steer", "Yaw", "Sideslip", "Yaw", "Lateral", "Path"]
+
+
+def test_parameters_tell_their_source(paper):
+    rows = {row[0].text_content(): row for row in paper.tree.cssselect("table.parameters tbody tr")}
+    assert rows["mass"][1].text_content() == "1820 kg"
+    assert rows["mass"].cssselect(".kind.paper")
+    assert rows["sideslip_moment"].cssselect(".kind.chosen")
+    assert "varied" in texts(rows["rule_table"], ".kind")
+    assert rows["tyre.friction_*"][1].text_content() == "0.5"
+
+
+def test_the_page_needs_nothing_from_elsewhere(paper):
+    page = paper.page.read_text(encoding="utf-8")
+    assert not re.search(r"""(?:src|href)=(?!["'](?:data:|#))|@import|url\((?!#|%23)|fetch\(""", page)
+    assert len(page.encode()) < 3_000_000
+
+
+@pytest.mark.parametrize("width", [PHONE, 768, 900, DESK])
+def test_nothing_is_cut_overlapping_or_empty_at_any_width(chromium, paper, width):
+    chromium.open(paper.page, width=width)
+    assert flaws(chromium) == []
+    open_all(chromium)
+    assert flaws(chromium) == []
+
+
+def test_the_system_is_drawn_for_the_width_of_the_page(chromium, paper):
+    shown = (
+        "return ['diagonal', 'stack'].map((kind) => document.querySelector('svg.' + kind).clientWidth > 0)"
+    )
+    chromium.open(paper.page, width=DESK)
+    assert chromium.run(shown) == [True, False]
+    chromium.open(paper.page, width=PHONE)
+    assert chromium.run(shown) == [False, True]
+
+
+def test_in_print_everything_is_unfolded(chromium, paper):
+    chromium.open(paper.page)
+    folded = "return document.querySelectorAll('details:not([open])').length"
+    assert chromium.run(folded) > 5
+    chromium.run("dispatchEvent(new Event('beforeprint'))")
+    assert chromium.run(folded) == 0
+    chromium.run("dispatchEvent(new Event('afterprint'))")
+    assert chromium.run(folded) > 5
+    pdf = base64.b64decode(chromium.driver.execute_cdp_cmd("Page.printToPDF", {})["data"])
+    assert 3 < len(re.findall(rb"/Type\s*/Page\b", pdf)) < 30
+
+
+def test_only_missing_or_stale_runs_are_made(report, half):
+    page = Path("results/half/study/report.html")
+    status, said = report()
+    assert status == 0
+    assert "2 runs to make, 0 with good results" in said
+    assert said.splitlines()[-1].startswith(f"The report: {page}")
+    assert "0 runs to make, 2 with good results" in report()[1]
+    text = (half / "study.yaml").read_text()
+    (half / "study.yaml").write_text(text.replace("amplitude: [0.02, 0.05]", "amplitude: [0.02, 0.05, 0.1]"))
+    assert "1 runs to make, 2 with good results" in report()[1]
+    (half / "half.yaml").write_text(SCENARIO.replace("velocity_x: 20", "velocity_x: 25"))
+    assert "3 runs to make, 0 with good results" in report()[1]
+    assert "3 runs to make" in report("--again")[1]
+
+
+def test_stale_results_are_shown_as_such_where_nothing_may_run(report, half):
+    report()
+    (half / "half.yaml").write_text(SCENARIO.replace("velocity_x: 20", "velocity_x: 25"))
+    assert report("--no-run")[0] == 0
+    tree = html.fromstring(Path("results/half/study/report.html").read_text(encoding="utf-8"))
+    assert any("not what a run would give now" in text for text in texts(tree, ".verdict.bad"))
+    assert "amplitude/0.02: driver: other constants" in tree.text_content()
+
+
+def test_a_run_that_failed_is_named_and_its_claims_are_not_judged(report, half):
+    report()
+    record = json.loads(Path("results/half/study/amplitude/0.05/run.json").read_text())
+    record |= {"status": "failed", "error": {"message": "the wheel came off"}}
+    Path("results/half/study/amplitude/0.05/run.json").write_text(json.dumps(record))
+    assert report("--no-run")[0] == 1
+    tree = html.fromstring(Path("results/half/study/report.html").read_text(encoding="utf-8"))
+    assert "the wheel came off" in tree.text_content()
+    verdicts = [row[2].text_content().split(maxsplit=1)[1] for row in tree.cssselect("table.claims tbody tr")]
+    assert verdicts == ["not judged", "does not reproduce"]
+
+
+def test_several_studies_make_one_page_with_an_overview(report, half):
+    other = half.parent / "whole"
+    shutil.copytree(half, other)
+    (other / "study.yaml").write_text(HALF.replace("Half a paper", "A paper before"))
+    (other / "extra.yaml").write_text(HALF.replace("Half a paper", "A paper before, more"))
+    status, said = report()
+    assert (status, said.splitlines()[-1].partition(" (")[0]) == (0, "The report: results/report.html")
+    tree = html.fromstring(Path("results/report.html").read_text(encoding="utf-8"))
+    titles = ["A paper before", "A paper before, more", "Half a paper"]
+    assert texts(tree, ".chapter > h2") == titles
+    assert texts(tree, "table.overview tbody th") == titles
+    places = {element.get("id") for element in tree.cssselect("[id]")}
+    assert {link.get("href")[1:] for link in tree.cssselect("a[href^='#']")} <= places
+    first = tree.cssselect("figure code")[0].text_content()
+    assert Path("results", first).is_file()
+
+
+def test_the_four_papers_are_found_and_their_order_is_theirs():
+    found = [path.relative_to(ROOT / "scenarios").as_posix() for path in found_studies(ROOT / "scenarios")]
+    assert found == [
+        "fnn_sideslip/study.yaml",
+        "fuzzy_sliding_mode/study.yaml",
+        "fuzzy_sliding_mode/distribution.yaml",
+        "fuzzy_pid/study.yaml",
+        "fuzzy_feedback/study.yaml",
+    ]
+
+
+def test_without_any_study_it_says_where_it_looked(tmp_path):
+    with pytest.raises(ScenarioError, match="no study file was named, and there is none in"):
+        found_studies(tmp_path)
+
+
+def test_two_wishes_that_exclude_each_other_are_refused(report, half):
+    assert report("--again", "--no-run") == (2, "--again and --no-run contradict each other\n")
