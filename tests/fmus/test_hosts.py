@@ -26,6 +26,8 @@ from tests.fmus.programs import (
 NAMES = list(find_components())
 BARE = Path(__file__).with_name("bare.py")
 SUPPRESSIONS = Path(__file__).with_name("python.supp")
+ALL = bool(os.environ.get("YAWBENCH_TEST_ALL_FMUS"))
+"""Whether what takes long is done with every FMU, not with one or two that stand for all."""
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -54,7 +56,7 @@ def test_each_fmu_is_complete(archive, unpack, tmp_path, name):
 
 
 @pytest.mark.parametrize("interpreter", interpreters())
-@pytest.mark.parametrize("name", [NAMES[0], NAMES[-1]])
+@pytest.mark.parametrize("name", NAMES if ALL else [NAMES[0], NAMES[-1]])
 def test_fmus_run_in_any_other_python_that_has_nothing_installed(
     archive, unpack, tmp_path, interpreter, name
 ):
@@ -113,11 +115,12 @@ def test_python_is_found_beside_an_interpreter_on_path(host, archive, unpack, tm
     assert done.returncode == 0, done.stderr
 
 
-def test_valgrind_finds_nothing_on_our_side(host, archive, unpack, tmp_path):
+@pytest.mark.parametrize("name", NAMES if ALL else ["driver_sine"])
+def test_valgrind_finds_nothing_on_our_side(host, archive, unpack, tmp_path, name):
     valgrind = shutil.which("valgrind")
     if valgrind is None:
         pytest.skip("valgrind is not installed")
-    folder = unpack(archive("driver_sine"))
+    folder = unpack(archive(name))
     options = ["-q", "--error-exitcode=9", "--keep-debuginfo=yes", f"--suppressions={SUPPRESSIONS}"]
     options += ["--leak-check=full", "--show-leak-kinds=definite", "--errors-for-leak-kinds=definite"]
     command = [valgrind, *options, *host_command(host, folder)]
