@@ -190,7 +190,7 @@ class _Comments:
         number = document.lines.get(key, 1) - 1
         lines = self._read(document.path)
         found: list[str] = []
-        while number >= 1 and lines[number - 1].lstrip().startswith("#"):
+        while 1 <= number <= len(lines) and lines[number - 1].lstrip().startswith("#"):
             found.insert(0, lines[number - 1].lstrip().lstrip("# ").rstrip())
             number -= 1
         return " ".join(found)
