@@ -3,7 +3,8 @@
 Every component becomes a unit whose FMU is the member of the archive. Only what the archive connects
 is connected, and an input that it neither connects nor gives a value keeps its FMU's start value, as
 the standard has it. The communication step and the units' own come from the annotations of the Open
-Simulation Platform, all that SSP cannot say from our own; archives from elsewhere may lack both.
+Simulation Platform or of OMSimulator, all that SSP cannot say from our own; archives from elsewhere may
+lack them.
 
 What has no counterpart here is refused by name: signal dictionaries, transformations in connections,
 components that are no FMUs.
@@ -21,7 +22,7 @@ from lxml.etree import _Element
 from ..wording import fold, listed
 from .overrides import RESERVED
 from .ssp_archive import Archive, Refused
-from .ssp_names import DESCRIPTION_FILE, OSP, OWN, SSD
+from .ssp_names import DESCRIPTION_FILE, OMS, OSP, OWN, SSD
 from .ssp_structure import End, Structure, read_structure
 from .ssp_structure import Path as ElementPath
 from .ssp_values import Given, number, read_values
@@ -146,9 +147,13 @@ def _experiment(root: _Element) -> dict[str, Any]:
             raise Refused("runs begin at 0 s: another startTime is not supported", experiment)
         if experiment.get("stopTime") is not None:
             found["stop_time"] = number(experiment, "stopTime")
-    algorithm = root.find(f".//{{{OSP}}}FixedStepAlgorithm")
-    if algorithm is not None and algorithm.get("baseStepSize"):
-        found["step_size"] = number(algorithm, "baseStepSize")
+    for tag, attribute in (
+        (f"{{{OMS}}}FixedStepMaster", "stepSize"),
+        (f"{{{OSP}}}FixedStepAlgorithm", "baseStepSize"),
+    ):
+        step = root.find(f".//{tag}")
+        if step is not None and step.get(attribute):
+            found["step_size"] = number(step, attribute)
     own = root.find(f".//{{{OWN}}}Scenario")
     if own is not None:
         found["step_size"] = number(own, "stepSize")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import zipfile
 from copy import deepcopy
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import fmpy.ssp
@@ -17,7 +18,7 @@ from orchestrator.errors import ResultsError, YawbenchError
 from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.master.simulate import simulate
 from orchestrator.scenario.load import load_scenario
-from orchestrator.scenario.ssp_names import DESCRIPTION_FILE, SSC, SSD, SSM, SSV
+from orchestrator.scenario.ssp_names import DESCRIPTION_FILE, OMS, SSC, SSD, SSM, SSV
 from orchestrator.wiring.make_plan import make_plan
 
 from .fake_fmus import make_fmu
@@ -161,6 +162,14 @@ def test_the_command_exports_and_run_runs_what_it_exports(fmus, tmp_path, monkey
         assert not exit_.value.code
     numbers = [(tmp_path / name / "results.csv").read_bytes() for name in ("from_ssp", "from_yaml")]
     assert numbers[0] == numbers[1]
+
+
+def test_runs_of_an_archive_are_compared(feedback, fmus, tmp_path):
+    short, swap = ["--set", "stop_time=0.1"], ["--swap", "controller=controller_off"]
+    with pytest.raises(SystemExit) as exit_:
+        main(["compare", str(feedback), *swap, *short, "--fmus", str(fmus), "--out", str(tmp_path / "c")])
+    assert not exit_.value.code
+    assert "controller_off" in (tmp_path / "c" / "compare.md").read_text()
 
 
 def test_units_of_an_archive_are_swapped_and_set_as_those_of_a_scenario(feedback, fmus, tmp_path):
@@ -411,6 +420,16 @@ def test_an_archive_without_a_step_asks_for_one_and_takes_it(feedback, fmus, tmp
     assert problem(path, fmus) == asks
     plan = make_plan(load_scenario(path, settings=["step_size=0.0025"]), fmus=fmus)
     assert (plan.n_steps, plan.algorithm) == (240, "extrapolated")
+
+
+def test_the_step_of_an_archive_of_omsimulator_is_taken(feedback, fmus, tmp_path):
+    path = rewritten(
+        feedback,
+        tmp_path / "oms.ssp",
+        ("<osp:FixedStepAlgorithm", f'<oms:FixedStepMaster xmlns:oms="{OMS}" stepSize="0.000500"'),
+        ("yawbench:Scenario", "ssc:Other"),
+    )
+    assert make_plan(load_scenario(path), fmus=fmus).step == Fraction(1, 2000)
 
 
 def test_an_archive_without_a_stop_time_asks_for_one(feedback, fmus, tmp_path):
