@@ -51,7 +51,7 @@ def report(
     if again and no_run:
         raise ScenarioError("--again and --no-run contradict each other")
     check_format(format_)
-    paths = studies or found_studies()
+    paths = list(dict.fromkeys(studies or found_studies()))
     folders = [default_folder(path) for path in paths]
     page_folder = out or (folders[0] if len(folders) == 1 else Path(os.path.commonpath(folders)))
     if out is not None:

@@ -56,7 +56,7 @@ def chapter(
         each: how to draw many panels.
     """
     study = findings.study
-    name = anchor(study.spec.title)
+    name = anchor(f"{study.path.absolute().parent.name} {study.path.stem}")
     groups = groups_of(list(plans.values()))
     return {
         "id": name,

@@ -26,6 +26,8 @@ WIDTH, ROW = 4.7, 2.15
 """Width of a panel and height of a row [inches]; chosen: 9 points of type stay 7 on a phone."""
 BUCKETS = 450
 """Buckets that a line over time is thinned to; chosen: one per pixel of a panel."""
+CURLY = str.maketrans("'\"", "’”")
+"""Quotes in a text, so that those of the markup can be told from them."""
 LOOK: Any = {**RC, "svg.fonttype": "none", "axes.titlesize": 9}
 """As in figures, but with text as text."""
 
@@ -149,7 +151,7 @@ def address_of(svg: str) -> Markup:
     """Return an SVG image as a `data:` address for an attribute in double quotes, as short as it can be."""
     svg = svg[svg.index("<svg") :]
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
-    svg = re.sub(r"(?<=>)[^<]+(?=<)", lambda text: text[0].replace("'", "’"), svg)
+    svg = re.sub(r"(?<=>)[^<]+(?=<)", lambda text: text[0].translate(CURLY), svg)
     svg = svg.replace("'", "").replace('"', "'")
     svg = re.sub(r"(\.\d\d)\d+", r"\1", svg)
     svg = re.sub(r"\s*\n\s*", "\n", svg)
