@@ -91,3 +91,14 @@ def test_the_animation_in_the_page_plays(chromium, page):
     chromium.run("document.querySelector('.yb-play').click()")
     chromium.wait_for("document.querySelector('.yb-animation').player.time > 0.02")
     assert chromium.console() == []
+
+
+def test_on_a_phone_tables_become_cards_but_for_that_of_the_animation(chromium, page):
+    chromium.open(page, width=PHONE)
+    display = "return getComputedStyle(document.querySelector(arguments[0])).display"
+    assert chromium.run(display, "table.first-free tbody tr") == "block"
+    assert chromium.run(display, ".yb-readouts td") == "table-cell"
+    open_all(chromium)
+    assert chromium.run(display, "table.parameters td.none") == "none"
+    chips = "return [...document.querySelectorAll('.kind.chosen')].map((one) => one.clientWidth)"
+    assert max(chromium.run(chips)) < 100
