@@ -80,9 +80,9 @@ def _compare(
 
 
 def _range(known: Sequence[Value], missing: bool) -> str:
-    """Return the value, or the smallest and the largest."""
-    ends = [known[0], known[-1]] if len(known) > 1 else known
-    text = " to ".join(shown(value.number, value.unit) for value in ends)
+    """Return the value, or the smallest and the largest where they read differently."""
+    ends = dict.fromkeys(shown(value.number, value.unit) for value in (*known[:1], *known[-1:]))
+    text = " to ".join(ends)
     return " and ".join(filter(None, [text, "no result" if missing else ""]))
 
 
