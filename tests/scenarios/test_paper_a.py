@@ -85,16 +85,25 @@ def rows(text):
     return [row for row in cells if row[0].endswith(("control", "fuzzy", "network"))]
 
 
-def test_the_readme_tells_what_the_study_found_to_one_per_cent(study):
+def test_the_readme_tells_what_the_study_found(study, metric):
+    readme = (STUDY.parents[2] / "README.md").read_text(encoding="utf-8")
     found = rows((study["folder"] / "study.md").read_text(encoding="utf-8"))
-    told = rows((STUDY.parents[2] / "README.md").read_text(encoding="utf-8"))
+    told = rows(readme)
     assert len(told) == 9
-    for (name, error, says, verdict, chatter), row in zip(told, found, strict=True):
-        assert [name, says, verdict] == [row[0], row[2].partition(" (")[0], row[3]]
-        for shown, measured in ((error, row[1]), (chatter, row[-1])):
-            number, unit = shown.split()
-            assert float(number) == pytest.approx(float(measured.split()[0]), rel=0.01)
-            assert unit == measured.split()[1]
+    assert told == [[row[0], row[1], row[2].partition(" (")[0], row[3], row[-1]] for row in found]
+    prose = " ".join(readme.partition("What comes out")[2].partition("###")[0].split())
+    learning, frozen = (
+        [f"{100 * metric(f'three_periods/15mps/{run}', f'period_{k}'):.1f}" for k in (1, 3)]
+        for run in ("learning_true", "learning_false")
+    )
+    assert f"the error falls from {' to '.join(learning)} % over three periods" in prose
+    assert f"with frozen weights from {' to '.join(frozen)} %" in prose
+    harm, calm, recalled = (
+        f"{100 * metric(f'harsh/{run}', 'error'):.0f} %"
+        for run in ("learning_true", "learning_false", "recall")
+    )
+    assert f"its error reaches {harm}, where frozen weights stay at {calm}" in prose
+    assert f"holds it at {recalled}" in prose
 
 
 def test_all_figures_are_drawn(study):
