@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .batch import Jobs
-from .options import Fmus, Format, Out
+from .options import CallLimit, Fmus, Format, Isolate, Out, isolation
 
 if TYPE_CHECKING:
     from ..studies.jobs import Outcome
@@ -42,6 +42,8 @@ def sweep(
     keep: Keep = False,
     format_: Format = "csv",
     fresh: Fresh = False,
+    isolate: Isolate = False,
+    call_limit: CallLimit = None,
 ) -> None:
     """Run a scenario over a grid, a list or a Latin hypercube of conditions; table and draw its metrics.
 
@@ -61,11 +63,12 @@ def sweep(
     from .run import default_folder
 
     check_format(format_)
+    limit = isolation(isolate, call_limit)
     loaded = load_sweep(file)
     folder = out or default_folder(file)
     with stoppable(folder):
         with _bar("planning", len(loaded.points), quiet=True) as planning:
-            planned = plan_sweep(loaded, folder / "runs", fmus, progress=planning)
+            planned = plan_sweep(loaded, folder / "runs", fmus, call_limit=limit, progress=planning)
         runner = _runner(planned, jobs, scheduler)
         with contextlib.closing(Journal(folder, loaded.identity, fresh=fresh)) as journal:
             left = left_to_do(planned, journal.records, keep=keep, format=format_)

@@ -32,14 +32,16 @@ def measure(job: Any) -> Measured:
     Raises:
         YawbenchError: the run failed.
     """
+    from ..master.isolation import opener_of
     from ..master.simulate import simulate, simulate_in_memory
     from ..results.read import load_results
 
-    if job.keep:
-        simulate(job.plan, job.out, format=job.format)
-        results = load_results(job.out)
-    else:
-        results = simulate_in_memory(job.plan)
+    with opener_of(job.plan, job.call_limit) as opener:
+        if job.keep:
+            simulate(job.plan, job.out, opener=opener, format=job.format)
+            results = load_results(job.out)
+        else:
+            results = simulate_in_memory(job.plan, opener=opener)
     measured: Measured = {}
     for key, name, window in job.metrics:
         value = evaluate(results, metric(name), window)

@@ -71,6 +71,7 @@ def plan_sweep(
     out: Path,
     fmus: Path | None = None,
     *,
+    call_limit: float | None = None,
     progress: Callable[[int], None] = lambda done: None,
 ) -> Planned:
     """Plan all runs.
@@ -79,6 +80,7 @@ def plan_sweep(
         sweep: as loaded.
         out: folder of the results of runs that keep them.
         fmus: folder of FMUs given by name.
+        call_limit: of a call of an FMU [s], in a process per unit; None: units share one.
         progress: told how many runs are planned.
 
     Raises:
@@ -92,7 +94,7 @@ def plan_sweep(
     runs: list[PlannedRun] = []
     problems: dict[str, str] = {}
     for number, point in enumerate(sweep.points):
-        job = sweep.job(number, out, fmus)
+        job = replace(sweep.job(number, out, fmus), call_limit=call_limit)
         try:
             plan = plan_of(job, read=once.read, open_=once.open)
             key = run_key(plan, metrics)

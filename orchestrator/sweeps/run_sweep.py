@@ -39,7 +39,7 @@ def left_to_do(
         job = run.job
         left[run.key] = Measurement(
             job.label, job.scenario, job.out.absolute(), format=format, key=run.key, plan=run.plan,
-            metrics=metrics, keep=keep,
+            metrics=metrics, keep=keep, call_limit=job.call_limit,
         )  # fmt: skip
     return list(left.values())
 

@@ -51,6 +51,8 @@ class Moody(Component):
             raise ValueError("twenty is too much")
         if level == 30:
             os.kill(os.getpid(), signal.SIGKILL)
+        while level == 35:
+            time.sleep(1)
         if level in (40, 50) and not (HERE / str(int(level))).exists():
             (HERE / str(int(level))).touch()
             os.kill(os.getpid(), signal.SIGKILL if level == 40 else signal.SIGTERM)
@@ -194,6 +196,20 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_is_not_made_again(moods, 
     assert "all finished before" in err
     assert (tmp_path / "out" / "runs.jsonl").read_bytes() == before
     assert (tmp_path / "out" / "sweep.parquet").read_bytes() == table
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="--isolate needs Linux or macOS")
+def test_isolated_runs_that_hang_or_crash_are_rows_that_name_the_unit(moods, yawbench, tmp_path):
+    file = moods(10, 30, 35)
+    status, _, err = yawbench(file, "out", "--isolate", "--call-limit", "3 s")
+    assert status == 1, err
+    *calm, crashed, _, hung, _ = rows(tmp_path / "out")
+    assert "controller" in crashed["reason"]
+    assert "SIGKILL" in crashed["reason"]
+    assert "controller" in hung["reason"]
+    assert "did not come back within 3 s" in hung["reason"]
+    yawbench(moods(10), "together")
+    assert calm == rows(tmp_path / "together")
 
 
 @pytest.mark.parametrize("level", [40, 50])
