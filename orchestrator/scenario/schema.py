@@ -13,7 +13,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import AfterValidator, Field, PlainValidator, PrivateAttr, WithJsonSchema
+from pydantic import AfterValidator, Field, PlainSerializer, PlainValidator, PrivateAttr, WithJsonSchema
 
 from ..plan import Algorithm, Value
 from ..wording import short
@@ -63,7 +63,9 @@ def _plain(value: object) -> Value:
 _SCALAR_SCHEMA = {"type": ["number", "boolean", "string"]}
 _TIME_SCHEMA = {"type": ["number", "string"]}
 Scalar = Annotated[Value, PlainValidator(_plain), WithJsonSchema(_SCALAR_SCHEMA)]
-Time = Annotated[Fraction, PlainValidator(quantities.seconds), WithJsonSchema(_TIME_SCHEMA)]
+Time = Annotated[
+    Fraction, PlainValidator(quantities.seconds), PlainSerializer(float), WithJsonSchema(_TIME_SCHEMA)
+]
 Variables = Annotated[Endpoint, PlainValidator(endpoint), WithJsonSchema({"type": "string"})]
 UnitName = Annotated[str, AfterValidator(_unit_name)]
 

@@ -169,6 +169,19 @@ def test_one_row_per_run_with_units_and_figures_and_a_page(moods, yawbench, tmp_
     assert "![curve](figures/curve.png)" in page
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_sweep_with_a_stop_time_of_its_own_tells_it_in_the_table_and_warns_of_nothing(
+    moods, yawbench, tmp_path
+):
+    file = moods(10)
+    file.write_text(file.read_text() + "stop_time: 0.05\n")
+    status, _, err = yawbench(file, "out")
+    assert status == 0, err
+    assert "Warning" not in err
+    about = json.loads(pq.read_schema(tmp_path / "out" / "sweep.parquet").metadata[b"sweep"])
+    assert about["sweep"]["stop_time"] == 0.05
+
+
 def test_the_table_is_the_same_to_the_byte_however_many_workers(moods, yawbench, tmp_path):
     file = moods(5, 10, 20, 60, count=3)
     for workers in ("1", "2", "3"):
