@@ -1,4 +1,4 @@
-"""`yawbench plot`: draw figures of recorded results."""
+"""`yawbench plot`: draw figures of recorded results, or of a scenario's run."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from typing import Annotated
 
 import typer
 
-from .options import Out
+from .options import Fmus, Out, Set, Swap
 
-Folders = Annotated[
+Sources = Annotated[
     list[Path],
-    typer.Argument(help="Folders of results; several are laid over each other.", metavar="RESULTS..."),
+    typer.Argument(
+        help="Folders of results, or scenario files; several are laid over each other.", metavar="RESULTS..."
+    ),
 ]
 Labels = Annotated[
     list[str] | None,
@@ -30,11 +32,24 @@ Panels = Annotated[
 ]
 
 
-def plot(folders: Folders, label: Labels = None, panel: Panels = None, out: Out = None) -> None:
+SCENARIOS = (".yaml", ".yml", ".ssp")
+"""Endings of files that are scenarios."""
+
+
+def plot(
+    sources: Sources,
+    label: Labels = None,
+    panel: Panels = None,
+    swap: Swap = None,
+    set_: Set = None,
+    out: Out = None,
+    fmus: Fmus = None,
+) -> None:
     """Draw the figures of a run, or of several laid over each other, as SVG and PNG.
 
-    Without --out, the figure of one run goes into its folder, that of several into the folder that
-    holds them all.
+    A scenario is run first if its results (those of `yawbench run` without --out) are missing or were
+    made from another scenario or FMU. Without --out, the figure of one run goes into its folder, that of
+    several into the folder that holds them all.
     """
     from ..errors import ScenarioError
     from ..figures.panels import Run, shown_by
@@ -44,11 +59,12 @@ def plot(folders: Folders, label: Labels = None, panel: Panels = None, out: Out 
     from ..studies.compare import FIGURES
     from .batch import say
 
-    if label and len(label) != len(folders):
+    if label and len(label) != len(sources):
         given = (
-            f"{len(label)} label{'s' * (len(label) != 1)}, {len(folders)} folder{'s' * (len(folders) != 1)}"
+            f"{len(label)} label{'s' * (len(label) != 1)}, {len(sources)} folder{'s' * (len(sources) != 1)}"
         )
         raise ScenarioError(f"--label: needs one for each folder of results ({given})")
+    folders = _recorded(sources, swap or [], set_ or [], fmus)
     labels = label or distinct(folders)
     runs = [Run(name, load_results(folder)) for name, folder in zip(labels, folders, strict=True)]
     figures: dict[str, Sequence[str]] = {"overview": panel or OVERVIEW}
@@ -60,6 +76,35 @@ def plot(folders: Folders, label: Labels = None, panel: Panels = None, out: Out 
     for name, panels in figures.items():
         paths = save(draw(runs, panels), (out or target) / name)
         say(f"{paths[0]}, {paths[1].name}")
+
+
+def _recorded(
+    sources: Sequence[Path], swaps: list[str], settings: list[str], fmus: Path | None
+) -> list[Path]:
+    """Return the folders of all results, after making the runs of scenarios that have none.
+
+    Raises:
+        ScenarioError: a scenario or an option is wrong.
+    """
+    from ..errors import ScenarioError
+    from ..pages.freshness import staleness
+    from ..studies.jobs import Job, plan_of
+    from .batch import run_all
+    from .run import default_folder
+
+    scenarios = [source for source in sources if source.suffix in SCENARIOS and not source.is_dir()]
+    if (swaps or settings) and not scenarios:
+        raise ScenarioError("--swap and --set change a scenario; only folders of results are given")
+    jobs = {
+        source: Job(source.stem, source, default_folder(source), tuple(swaps), tuple(settings), fmus=fmus)
+        for source in scenarios
+    }
+    stale = [job for job in jobs.values() if staleness(plan_of(job), job.out)]
+    outcomes = run_all(stale, Path("results"), workers=None) if stale else []
+    for outcome in outcomes:
+        if not outcome.ok:
+            raise typer.Exit(outcome.exit_status)
+    return [jobs[source].out if source in jobs else source for source in sources]
 
 
 def distinct(folders: Sequence[Path]) -> list[str]:

@@ -68,9 +68,7 @@ def yawbench(fmus, folder, capsys):
     """Run the command line; return its exit status, its output and what it said on stderr."""
 
     def run(*arguments):
-        given = [str(argument) for argument in arguments]
-        if given[0] != "plot":
-            given += ["--fmus", str(fmus)]
+        given = [*map(str, arguments), "--fmus", str(fmus)]
         with pytest.raises(SystemExit) as exit_:
             main(given)
         captured = capsys.readouterr()
@@ -230,6 +228,24 @@ def test_plot_draws_one_run_into_its_folder_and_several_beside_them(yawbench, fo
     assert (status, said) == (0, "elsewhere/overview.svg, overview.png\n")
 
 
+def test_plot_runs_a_scenario_whose_results_are_missing_or_of_another_controller(yawbench, folder):
+    out = f"results/{folder.name}/half"
+
+    def controller():
+        return json.loads((folder / out / "run.json").read_text())["fmus"]["controller"]["name"]
+
+    status, _, said = yawbench("plot", "half.yaml")
+    assert status == 0
+    assert said.splitlines()[0].startswith("[1/1] half: ")
+    assert said.splitlines()[1] == f"{out}/overview.svg, overview.png"
+    assert controller() == "controller_fuzzy_sideslip"
+    status, _, said = yawbench("plot", "half.yaml")
+    assert (status, said) == (0, f"{out}/overview.svg, overview.png\n")
+    status, _, said = yawbench("plot", "half.yaml", "--swap", "controller=controller_off")
+    assert (status, said.count("\n")) == (0, 2)
+    assert controller() == "controller_off"
+
+
 def test_plot_says_what_is_wrong(yawbench, folder):
     status, _, said = yawbench("plot", "nowhere")
     assert status == 2
@@ -238,8 +254,11 @@ def test_plot_says_what_is_wrong(yawbench, folder):
     status, _, said = yawbench("plot", "o/off/results.csv")
     assert status == 2
     assert said == "o/off/results.csv: is a file; name the folder that holds the results, o/off.\n"
-    status, _, said = yawbench("plot", "half.yaml")
-    assert (status, said) == (2, "half.yaml: is a file; name the folder that holds the results.\n")
+    status, _, said = yawbench("plot", "o/off", "--set", "driver.amplitude=0.01")
+    assert (status, said) == (2, "--swap and --set change a scenario; only folders of results are given\n")
+    status, _, said = yawbench("plot", "half.yaml", "--swap", "brake=controller_off")
+    assert status == 2
+    assert said.startswith("--swap brake=controller_off: ")
     status, _, said = yawbench("plot", "o/off", "--panel", "roll_angle")
     assert (status, said) == (2, "o/off: nothing to draw, no run recorded any of roll_angle.\n")
     status, _, said = yawbench("plot", "o/off", "--label", "a", "--label", "b")
