@@ -14,7 +14,8 @@ Understanding the limitations of different vehicle models for roll dynamics stud
 Dynamics 45(3), 2007, 191-216: rigid body, vertical wheel travel, linear springs and dampers at the
 wheels, no bump stops, no camber, no steering by roll. Ours differs: yaw axis vertical, roll and pitch to
 second order in the kinetic energy, roll centres as slopes of the wheels' paths. Wheels share the
-body's horizontal motion at `unsprung_height`, no anti-dive. Derivation: docs/plant_fourteen_dof.md.
+body's horizontal motion at `unsprung_height`, no anti-dive. Derivation: docs/plant_fourteen_dof.md. A car
+that rolls over, beyond 45 degrees of roll or pitch, is an error.
 Drag acts at the centre of mass, rolling resistance as in `plants.eight_dof`.
 
 How it couples. Vertical loads follow from the tyre springs, that is from the state: there is no loop of
@@ -27,6 +28,8 @@ springs are stiff or the step is long.
 
 from __future__ import annotations
 
+from math import degrees, pi
+
 from ..core import carry
 from ..core.car_signals import INPUTS, MOTION, WHEELS, initial_motion, motion_outputs, wheel_outputs
 from ..core.component import Component
@@ -37,6 +40,9 @@ from ..core.ride import AT_REST, RESOLVED, loads, move_ride
 from ..core.sprung_car import FourteenDofParameters, G, ride_of
 from ..core.variables import output
 from ..core.wheel_spin import spin_wheels
+
+ROLLED_OVER = 0.25 * pi
+"""Roll or pitch [rad] from which on these equations are wrong; chosen: half way on to its side."""
 
 HEAVE = output("heave", unit="m", text="Height of the sprung mass's centre above its place at rest")
 
@@ -80,6 +86,12 @@ class FourteenDof(Component):
         x, y = held.x, held.y
         v_x, v_y, r = self.motion[:3]
         r_end, *body = move_ride(r, self.body, h, held=held, ride=self.ride, longest=self.longest)
+        _, roll, pitch = body[:3]
+        if abs(roll) >= ROLLED_OVER or abs(pitch) >= ROLLED_OVER:
+            raise ValueError(
+                f"the car has rolled over: roll {degrees(roll):.3g}, pitch {degrees(pitch):.3g} degrees; "
+                f"its equations end at {degrees(ROLLED_OVER):g}"
+            )
         middle = v_x + 0.5 * h * (self.end[0] + v_y * r)
         resisting = resistance(middle, drag=self.drag, rolling=self.rolling, fade=p.rolling_fade_speed)
         self.motion = move(self.motion, h, a_x=(x - resisting) / p.mass, a_y=y / p.mass, dr=(r_end - r) / h)

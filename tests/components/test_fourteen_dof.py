@@ -448,6 +448,18 @@ def test_a_car_on_two_wheels_does_not_blow_up_and_stands_on_four_again():
     assert run[3:, -1].min() > 3000.0
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_car_that_rolls_over_is_an_error_with_a_sentence(side):
+    stand = Stand(FourteenDof, cg_height=0.9)
+    force = 0.25 * side * 1830.0 * 1.5 * 9.81  # 1.5 g; it tips from d / 2h = 0.9 g on
+    inputs = four("tyre_force_y", *[force] * 4)
+    stand.start(**inputs)
+    with pytest.raises(AssertionError, match=r"rolled over: roll -?4\d\S*, pitch \S+ degrees; .* end at 45"):
+        for _ in range(3000):
+            assert abs(stand.step(0.001, **inputs)["roll_angle"]) < 0.8
+    assert stand["roll_angle"] * side > 0.7
+
+
 def test_nothing_is_ever_infinite_or_undefined_whatever_the_forces():
     random = np.random.default_rng(7)
     for speed in (0.0, 1e-9, 0.1, -3.0, 60.0):
