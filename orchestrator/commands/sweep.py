@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .batch import Jobs
-from .options import CallLimit, Fmus, Format, Isolate, Out, isolation
+from .options import CallLimit, Fmus, Format, Isolate, Out, Set, Swap, isolation
 
 if TYPE_CHECKING:
     from ..studies.jobs import Outcome
@@ -35,6 +35,8 @@ SHOWN = 10
 
 def sweep(
     file: SweepFile,
+    swap: Swap = None,
+    set_: Set = None,
     out: Out = None,
     fmus: Fmus = None,
     jobs: Jobs = None,
@@ -64,7 +66,7 @@ def sweep(
 
     check_format(format_)
     limit = isolation(isolate, call_limit)
-    loaded = load_sweep(file)
+    loaded = load_sweep(file, swaps=swap or [], settings=set_ or [])
     folder = out or default_folder(file)
     with stoppable(folder):
         with _bar("planning", len(loaded.points), quiet=True) as planning:

@@ -21,6 +21,8 @@ RESERVED = ("vehicle", "inputs")
 """Words that `--set` understands in place of a unit."""
 OF_RUN = ("stop_time", "step_size", "algorithm")
 """What `--set` gives without a unit."""
+SET = f"write --set UNIT.PARAMETER=VALUE, or {listed(OF_RUN, last='or')}=VALUE"
+"""How to write it."""
 
 
 def is_path(fmu: str) -> bool:
@@ -58,14 +60,11 @@ def apply_settings(document: Document, vehicle: Document, settings: Iterable[str
         target, equals, raw = (part.strip() for part in text.partition("="))
         unit, dot, name = target.partition(".")
         value = yaml_lines.scalar(raw)
-        if target in OF_RUN and equals and isinstance(document.data, dict):
-            document.data[target] = value
-            document.overrides[(target,)] = option
+        if target in OF_RUN and equals:
+            _give(document, target, value, option)
             continue
         if not (unit and dot and name and equals):
-            document.problems.append(
-                (0, f"{option}: write --set UNIT.PARAMETER=VALUE, or {listed(OF_RUN, last='or')}=VALUE")
-            )
+            document.problems.append((0, f"{option}: {SET}"))
             continue
         if unit == "vehicle":
             _put(vehicle, (), "parameters", name, value, option)
@@ -81,12 +80,37 @@ def apply_settings(document: Document, vehicle: Document, settings: Iterable[str
             document.problems.append((0, sentence + hint(unit, (*units, *RESERVED), lead="it has")))
 
 
+def apply_to_all_runs(document: Document, swaps: Iterable[str], settings: Iterable[str]) -> None:
+    """Enter options into the `swap` and `set` of a file that has many runs of a scenario."""
+    for text in swaps:
+        option = f"--swap {text}"
+        unit, equals, fmu = (part.strip() for part in text.partition("="))
+        if unit and equals and fmu:
+            _put(document, (), "swap", unit, os.path.abspath(fmu) if is_path(fmu) else fmu, option)
+        else:
+            document.problems.append((0, f"{option}: write --swap UNIT=FMU"))
+    for text in settings:
+        option = f"--set {text}"
+        target, equals, raw = (part.strip() for part in text.partition("="))
+        if target in OF_RUN and equals:
+            _give(document, target, yaml_lines.scalar(raw), option)
+        elif "." in target and equals:
+            _put(document, (), "set", target, yaml_lines.scalar(raw), option)
+        else:
+            document.problems.append((0, f"{option}: {SET}"))
+
+
 def apply_values(document: Document, values: Mapping[str, Any]) -> None:
     """Set top-level keys, such as step_size, where the value is not None."""
     for name, value in values.items():
-        if value is not None and isinstance(document.data, dict):
-            document.data[name] = value
-            document.overrides[(name,)] = f"{name} = {value}"
+        if value is not None:
+            _give(document, name, value, f"{name} = {value}")
+
+
+def _give(document: Document, name: str, value: Any, option: str) -> None:
+    if isinstance(document.data, dict):
+        document.data[name] = value
+        document.overrides[(name,)] = option
 
 
 def _put(document: Document, above: tuple[str, ...], group: str, name: str, value: Any, option: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -83,13 +83,19 @@ def _given(axis: AxisSpec, level: Level) -> str:
     return f"{text_of(level.value)} {axis.unit}" if axis.unit else text_of(level.value)
 
 
-def load_sweep(path: Path | str) -> Sweep:
+def load_sweep(path: Path | str, *, swaps: Iterable[str] = (), settings: Iterable[str] = ()) -> Sweep:
     """Read a sweep file.
+
+    Args:
+        path: of the file.
+        swaps: `unit=fmu` for all runs, as given to --swap; a path is relative to the working directory.
+        settings: `unit.parameter=value` for all runs, as given to --set.
 
     Raises:
         ScenarioError: with everything that is wrong with it.
     """
     document = yaml_lines.read(Path(path), what="sweep file")
+    overrides.apply_to_all_runs(document, swaps, settings)
     spec = validate(SweepSpec, document)
     if spec is None or document.problems:
         raise ScenarioError(document.sentences())

@@ -301,3 +301,40 @@ def test_a_bound_in_a_unit_that_its_metric_does_not_have_is_refused_before_any_r
         ScenarioError, match=r"limits\.gentle\.holds_if\[0\]: '100 km/h' is not a value in N\.m"
     ):
         plan_sweep(loaded, tmp_path / "runs", fmus)
+
+
+def test_options_change_all_runs_as_the_file_would(sweep, tmp_path, fmus):
+    path = sweep(("axes:\n", "set: {driver.frequency: 1}\naxes:\n")).path
+    settings = ["driver.frequency=3 Hz", "stop_time=0.2", "vehicle.mass=1300", "driver.start_time=0.1"]
+    planned = plan_sweep(load_sweep(path, settings=settings), tmp_path / "runs", fmus)
+    written = sweep(
+        ("axes:\n", "set: {driver.frequency: 3 Hz, vehicle.mass: 1300, driver.start_time: 0.1}\naxes:\n"),
+        ("axes:\n", "stop_time: 0.2\naxes:\n"),
+    )
+    assert [run.key for run in planned.runs] == [
+        run.key for run in plan_sweep(written, tmp_path / "runs", fmus).runs
+    ]
+    swapped = load_sweep(
+        sweep(("  control: {vary: controller, values: {controller_off: no control, "
+               "controller_fuzzy_sideslip: fuzzy}}\n", "")).path,
+        swaps=[f"controller={fmus / 'controller_off.fmu'}"],
+    )  # fmt: skip
+    for run in plan_sweep(swapped, tmp_path / "runs", fmus).runs:
+        assert {unit.name: unit.fmu.name for unit in run.plan.units}["controller"] == "controller_off"
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"swaps": ["controller=controller_off"]}, "controller is given by set or swap already"),
+        ({"swaps": ["controller"]}, "--swap controller: write --swap UNIT=FMU"),
+        ({"settings": ["amplitude=3"]}, "--set amplitude=3: write --set UNIT.PARAMETER=VALUE, or stop_time"),
+        ({"settings": ["driver.amplitude=3"]}, "driver.amplitude is given by set or swap already"),
+        ({"settings": ["stop_time="]}, "--set stop_time="),
+    ],
+)
+def test_options_that_are_wrong_are_said(options, sentence, sweep):
+    path = sweep().path
+    with pytest.raises(ScenarioError) as error:
+        load_sweep(path, **options)
+    assert sentence in str(error.value)
