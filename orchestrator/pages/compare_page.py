@@ -151,7 +151,10 @@ def parting_summary(found: Divergence) -> str:
     if not found.compared:
         return "The runs have no signal in common."
     if not found.partings:
-        return f"All {found.compared} signals are the same throughout."
+        which = (
+            "The only signal they share is" if found.compared == 1 else f"All {found.compared} signals are"
+        )
+        return f"{which} the same throughout."
     first = found.partings[0]
     together = [one.signal for one in found.partings if one.first == first.first]
     others = f", then {', '.join(together[1:4])}{' and others' if len(together) > 4 else ''} in the same step"

@@ -11,10 +11,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ..figures.panels import WHEEL_NAMES
 from ..plan import Plan, Unit, Value
 from ..scenario.load import Scenario
 from ..scenario.yaml_lines import Document, Key
-from ..wording import fold
+from ..wording import WHEELS, fold
 
 PAPER, LITERATURE, CHOSEN, ERRATUM, VARIED, NEUTRAL = (
     "paper", "literature", "chosen", "erratum", "varied", "neutral",
@@ -132,26 +133,43 @@ def _vehicle_group(scenario: Scenario, file: Path) -> Group:
 
 
 def _constants(group: Group, scenario: Scenario, unit: Unit, comments: _Comments) -> None:
-    for name in fold(list(unit.constants)):
-        first = next(n for n in unit.constants if n == name or n.startswith(name.rstrip("*")))
-        variable = unit.fmu.variables[first]
-        meaning, default = meaning_and_origin(variable.description)
-        said: Origin | None = None
-        for pattern in scenario.inputs:
-            key: Key = ("inputs", pattern)
-            if re.fullmatch(re.escape(pattern).replace(r"\*", ".*"), first):
-                if scenario.document.override(key):
-                    said = Origin(VARIED, "set by the study")
-                else:
-                    words = comments.beside(scenario.document, key)
-                    said = Origin(
-                        kind_of(words) or kind_of(scenario.source) or NEUTRAL, words or scenario.source
-                    )
-        row = group.parameters.setdefault(
-            f"{unit.name}.{name}", Parameter(f"{unit.name}.{name}", meaning, variable.unit or "", default)
-        )
-        row.note(said)
-        row.values[text_of(unit.constants[first])] = None
+    alike: dict[str, list[str]] = {}
+    for name, value in unit.constants.items():
+        alike.setdefault(text_of(value), []).append(name)
+    for value_text, names in alike.items():
+        for name in fold(names):
+            _constant(group, scenario, unit, comments, name, value_text)
+
+
+def _constant(
+    group: Group, scenario: Scenario, unit: Unit, comments: _Comments, name: str, value: str
+) -> None:
+    """Note a constant, or one of four wheels that are alike: their name ends with `*`."""
+    first = name.removesuffix("*") + WHEELS[0] if name.endswith("*") else name
+    variable = unit.fmu.variables[first]
+    meaning, default = meaning_and_origin(variable.description)
+    if first != name:
+        meaning = meaning.removesuffix(f", {WHEEL_NAMES[WHEELS[0]]}")
+    said: Origin | None = None
+    given = [pattern for pattern in scenario.inputs if _names(pattern, unit.name, first)]
+    if given:
+        key: Key = ("inputs", max(given, key=lambda pattern: ("*" not in pattern, "." in pattern)))
+        if scenario.document.override(key):
+            said = Origin(VARIED, "set by the study")
+        else:
+            words = comments.beside(scenario.document, key)
+            said = Origin(kind_of(words) or kind_of(scenario.source) or NEUTRAL, words or scenario.source)
+    row = group.parameters.setdefault(
+        f"{unit.name}.{name}", Parameter(f"{unit.name}.{name}", meaning, variable.unit or "", default)
+    )
+    row.note(said)
+    row.values[value] = None
+
+
+def _names(pattern: str, unit: str, name: str) -> bool:
+    """Return whether a pattern of the scenario's inputs, `[unit.]name` with a `*`, means an input."""
+    whole = f"{unit}.{name}" if "." in pattern else name
+    return re.fullmatch(re.escape(pattern).replace(r"\*", ".*"), whole) is not None
 
 
 def _origin(scenario: Scenario, unit: Unit, name: str, comments: _Comments) -> Origin | None:

@@ -132,6 +132,38 @@ def test_constant_inputs_are_named_with_their_source(groups):
     assert constants["reference.friction"].origin.kind == PAPER  # as the scenario
 
 
+def test_constants_are_shown_with_their_own_values_and_meanings(folder):
+    build_all(folder / "fmus", components=("tyre_dugoff", "controller_sliding_mode"))
+    constants = """\
+  "friction*": 0.5               # chosen: all but one
+  tyre.friction_fl: 0.2          # chosen: ice
+  "slip_*": 0
+  "vertical_load_*": 3000
+  yaw_rate: 0.3
+"""
+    (folder / "split.yaml").write_text(
+        SCENARIO.replace("  friction: 0.7\n", constants)
+        .replace("controller_fnn", "controller_sliding_mode") + "  tyre: {fmu: tyre_dugoff}\n"
+    )  # fmt: skip
+    scenario = load_scenario(folder / "split.yaml")
+    (found,) = [
+        group.parameters
+        for group in groups_of([(scenario, make_plan(scenario, fmus=folder / "fmus"))])
+        if group.title == "Constant inputs"
+    ]
+    values = {name: next(iter(one.values)) for name, one in found.items()}
+    assert values["tyre.friction_fl"] == "0.2"
+    assert values["tyre.friction_fr"] == values["tyre.friction_rr"] == "0.5"
+    assert "tyre.friction_*" not in found
+    assert found["tyre.friction_fl"].origin.says == "chosen: ice"
+    assert found["tyre.friction_fr"].origin.says == "chosen: all but one"
+    assert found["tyre.friction_fl"].meaning.endswith("front left")
+    assert values["tyre.vertical_load_*"] == "3000"
+    assert "left" not in found["tyre.vertical_load_*"].meaning
+    assert values["controller.yaw_rate"] == "0.3"
+    assert "driver" not in found["controller.yaw_rate"].meaning
+
+
 def recorded(plan, folder: Path, **changes) -> Path:
     """Write what a run of a plan leaves, with changes."""
     folder.mkdir(parents=True, exist_ok=True)
