@@ -56,5 +56,9 @@ def test_the_printed_reference_asks_for_more_sideslip_than_the_road_allows_the_l
     assert metric("unlimited/fuzzy_feedback", "sideslip") > 5 * metric("both", "sideslip")
 
 
-def test_every_claim_and_check_holds(study):
-    assert {entry["verdict"] for entry in study["claims"] + study["checks"]} == {"holds"}
+def test_every_check_and_every_claim_holds_but_that_the_sideslip_coincides_with_its_reference(study, metric):
+    assert {check["verdict"] for check in study["checks"]} == {"holds"}
+    for claim in study["claims"]:
+        lost = "the sideslip practically coincides" in claim["says"]
+        assert claim["verdict"] == ("does not reproduce" if lost else "holds"), claim["says"]
+    assert metric("both", "sideslip_rms") > 0.10  # one moment, two references
