@@ -62,3 +62,14 @@ def test_every_check_and_every_claim_holds_but_that_the_sideslip_coincides_with_
         lost = "the sideslip practically coincides" in claim["says"]
         assert claim["verdict"] == ("does not reproduce" if lost else "holds"), claim["says"]
     assert metric("both", "sideslip_rms") > 0.10  # one moment, two references
+
+
+def test_the_readme_tells_what_the_study_found(metric):
+    section = (STUDY.parents[2] / "README.md").read_text(encoding="utf-8").partition("### Paper D")[2]
+    told = " ".join(section.partition("## ")[0].split())
+    assert f"({metric('off', 'sideslip') / DEGREE:.0f} degrees of sideslip)" in told
+    assert f"({100 * metric('both', 'rms'):.1f} % RMS of the peak)" in told
+    assert f"({100 * metric('both', 'sideslip_rms'):.0f} % RMS)" in told
+    assert f"reaches {metric('both', 'sideslip') / DEGREE:.1f} degrees" in told
+    assert f"the {metric('both', 'sideslip_ref') / DEGREE:.1f} of its reference" in told
+    assert f"and {metric('unlimited/fuzzy_feedback', 'sideslip') / DEGREE:.1f} with the reference" in told
