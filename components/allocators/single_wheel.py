@@ -13,6 +13,10 @@ way. Three readings:
     guarded     only if the wheel's moment has the sign of M, else brake none
     moment      put -M in the place of dr: the side follows the moment, the axle the driving state
 
+Straight ahead, delta = 0, the printed rule brakes a front wheel against one side and a rear wheel against
+the other. `guarded` and `moment` take the front wheel: who does not steer asks for no turn, so all of it is
+oversteer, and left and right are alike.
+
 Dead band with hysteresis: braking begins when |M| and |dr| both exceed their thresholds, and ends when
 one of them falls below `release_share` of its own.
 
@@ -21,7 +25,7 @@ The driver's force comes on top, equal left and right, braked wheel or not.
 Source: Nie, Xiong, Pan, Multi-condition co-simulations of vehicle stability control via fuzzy PID
 algorithm, Journal of Dynamics and Control 19(3), 2021, table 3, equations (7)-(9). Erratum: (7)-(9) share
 the moment between two wheels, which would give the single wheel of section 2.3 only half. Ours differs:
-the true arm, the guard, the dead band.
+the true arm, the guard, straight ahead, the dead band.
 """
 
 from __future__ import annotations
@@ -70,10 +74,16 @@ class SingleWheelParameters:
     )
 
 
-def chosen_wheel(delta: float, dr: float) -> int:
-    """Return the number of the wheel of table 3 from steer angle [rad] and yaw-rate error [rad/s]."""
+def chosen_wheel(delta: float, dr: float, *, printed: bool = False) -> int:
+    """Return the number of the wheel of table 3 from steer angle [rad] and yaw-rate error [rad/s].
+
+    Args:
+        printed: read the rule as printed also straight ahead.
+    """
     if delta > 0.0:
         return FR if dr > 0.0 else RL
+    if delta == 0.0 and not printed:
+        return FR if dr > 0.0 else FL
     return RR if dr > 0.0 else FL
 
 
@@ -120,10 +130,11 @@ class SingleWheel(Component):
         forces = NO_FORCE
         if self.braking:
             choice = -moment if p.wheel_choice == "moment" else r - r_ref
+            printed = p.wheel_choice == "printed"
             forces = brake_forces(
                 moment,
-                chosen_wheel(delta, choice),
-                guarded=p.wheel_choice != "printed",
+                chosen_wheel(delta, choice, printed=printed),
+                guarded=not printed,
                 delta=delta,
                 a=p.cg_to_front_axle,
                 half_track=0.5 * p.track_width,

@@ -33,6 +33,18 @@ def test_the_rule_names_the_wheel_of_each_row(delta, dr, wheel):
     assert chosen_wheel(delta, dr) == wheel
 
 
+def test_straight_ahead_left_and_right_are_alike_but_as_printed():
+    for choice in ("guarded", "moment"):
+        braked = [
+            request(moment=-900.0 * side, delta=0.0, dr=0.1 * side, wheel_choice=choice)
+            for side in (1.0, -1.0)
+        ]
+        assert [[i for i, f in enumerate(found) if f] for found in braked] == [[FR], [FL]]
+        assert braked[0][FR] == braked[1][FL] < 0.0
+    assert request(moment=-900.0, delta=0.0, dr=0.1, wheel_choice="printed")[RR] < 0.0
+    assert request(moment=900.0, delta=0.0, dr=-0.1, wheel_choice="printed")[FL] < 0.0
+
+
 @pytest.mark.parametrize(
     "moment, delta, dr, wheel",
     [(-900.0, 0.05, 0.1, FR), (900.0, 0.05, -0.1, RL), (-900.0, -0.05, 0.1, RR), (900.0, -0.05, -0.1, FL)],
