@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import itertools
+import logging
 import multiprocessing
 import os
 import platform
@@ -148,8 +149,14 @@ def _connected(address: str) -> Iterator[Any]:
         raise ScenarioError(
             f"--scheduler {address}: no Dask scheduler answers there within {TIMEOUT:g} s{reason}"
         ) from None
-    with client:
-        yield client
+    log = logging.getLogger("distributed.client")
+    level = log.level
+    log.setLevel(logging.CRITICAL)  # it logs tracebacks when the scheduler is lost; the runs tell of that
+    try:
+        with client:
+            yield client
+    finally:
+        log.setLevel(level)
 
 
 def _check_workers(client: Any, address: str) -> int:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
+import subprocess
 import sys
 
 import pytest
@@ -69,6 +71,43 @@ def test_a_worker_that_is_killed_costs_no_run(moods, driver, cluster, tmp_path):
     run_on_cluster(left, done, scheduler=cluster.scheduler_address, fmus=planned.fmus)
     assert sorted(outcome.job.key for outcome in told) == sorted(job.key for job in left)
     assert all(outcome.ok for outcome in told)
+
+
+def test_a_cluster_that_dies_is_one_sentence_and_keeps_what_is_finished(moods, driver, capfd, tmp_path):  # noqa: F811
+    from orchestrator.errors import ResultsError
+    from orchestrator.sweeps.cluster import run_on_cluster
+
+    planned = plan_sweep(load_sweep(moods(1, 2, 3, 4, 5, 6)), tmp_path / "runs", driver)
+    told, file = [], str(tmp_path / "scheduler.json")
+    with _dask("scheduler", file, "--host", "127.0.0.1", "--port", "0") as scheduler, _dask("worker", file):
+        with distributed.Client(scheduler_file=file, set_as_default=False) as client:
+            client.wait_for_workers(1)
+            address = client.scheduler.address
+
+        def done(outcome):
+            scheduler.kill()
+            told.append(outcome)
+
+        with pytest.raises(ResultsError, match="the cluster was lost; what it had finished is kept"):
+            run_on_cluster(left_to_do(planned, {}), done, scheduler=address, fmus=planned.fmus)
+    assert 1 <= len(told) < len(planned.runs)
+    assert "Traceback" not in capfd.readouterr().err
+
+
+@contextlib.contextmanager
+def _dask(what, file, *options):
+    """A scheduler or a worker in a process of its own."""
+    command = [
+        sys.executable,
+        "-m",
+        f"distributed.cli.dask_{what}",
+        "--scheduler-file",
+        file,
+        "--no-dashboard",
+    ]
+    with subprocess.Popen([*command, *options], stderr=subprocess.DEVNULL) as process:
+        yield process
+        process.kill()
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense"])
