@@ -92,6 +92,11 @@ class Hydraulic(Component):
 
     def configure(self):
         p = self.p
+        if p.full_release_slip < p.release_slip:
+            raise ValueError(
+                f"full_release_slip must be at least release_slip = {p.release_slip:g} "
+                f"(got {p.full_release_slip:g})"
+            )
         front, rear = p.brake_factor_front, p.brake_factor_rear
         self.factors = (front, front, rear, rear)
 

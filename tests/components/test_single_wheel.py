@@ -116,6 +116,14 @@ def test_a_slipping_wheel_is_released_and_a_creeping_one_held():
     assert asked_pressure(2000.0, 0.0, 25.0, **ask) == 0.0
 
 
+def test_a_release_that_ends_before_it_begins_is_refused():
+    with pytest.raises(
+        AssertionError, match=r"full_release_slip must be at least release_slip = 0\.05 \(got 0"
+    ):
+        Stand(Hydraulic, full_release_slip=0.01).start()
+    Stand(Hydraulic, full_release_slip=0.05).start()  # a switch
+
+
 def test_the_drive_part_of_a_request_is_kept():
     stand = Stand(Hydraulic)
     assert stand.start(force_request_rl=1000.0)["torque_request_rl"] == pytest.approx(
