@@ -171,6 +171,23 @@ def test_the_coupling_error_of_the_sine_at_1_ms_is_small(fmus, tmp_path):
         assert 0.0 < error / np.max(np.abs(fine)) <= most
 
 
+@pytest.mark.parametrize(
+    ("run", "setting"), [("sine", "driver.amplitude=-1.5"), ("double_lane_change", "driver.lane_offset=-3.5")]
+)
+def test_the_mirrored_manoeuvre_gives_the_mirrored_motion(study, fmus, tmp_path, run, setting):
+    out = tmp_path / run
+    (outcome,) = execute([Job(run, FOLDER / f"{run}.yaml", out, settings=(setting,), fmus=fmus)])
+    assert outcome.ok
+    there, mirrored = load_results(study["folder"] / run / "fuzzy_pid"), load_results(out)
+    for name in ("yaw_rate", "sideslip", "roll_angle", "position_y"):
+        left, right = there[f"plant.{name}"], mirrored[f"plant.{name}"]
+        assert np.max(np.abs(left + right)) <= 1e-9 * np.max(np.abs(left))
+    for axle in "fr":
+        left, right = (f"wheel_control.brake_pressure_{axle}{side}" for side in "lr")
+        assert there[left].max() > 0.0
+        assert np.max(np.abs(there[left] - mirrored[right])) <= 1e-9 * there[left].max()
+
+
 def test_the_readme_tells_what_the_study_found(metric, derived):
     readme = (FOLDER.parents[1] / "README.md").read_text(encoding="utf-8")
     rows = dict(zip(SCENARIOS, ("double lane change", "hand-wheel sine", "hand-wheel ramp"), strict=True))
