@@ -188,6 +188,20 @@ def test_the_mirrored_manoeuvre_gives_the_mirrored_motion(study, fmus, tmp_path,
         assert np.max(np.abs(there[left] - mirrored[right])) <= 1e-9 * there[left].max()
 
 
+def test_with_combined_slip_by_similarity_the_sine_loses_the_car_without_control_alone(fmus, tmp_path):
+    jobs = [
+        Job(
+            controller, FOLDER / "sine.yaml", tmp_path / controller, (f"controller=controller_{controller}",),
+            ("tyre.low_friction=similarity",), fmus=fmus, record=("plant.sideslip",),
+        )
+        for controller in ("off", *CONTROLLERS)
+    ]  # fmt: skip
+    assert all(outcome.ok for outcome in execute(jobs))
+    off, *held = (np.degrees(np.max(np.abs(load_results(job.out)["plant.sideslip"]))) for job in jobs)
+    assert off > 90.0
+    assert max(held) < 2.5
+
+
 def test_the_readme_tells_what_the_study_found(metric, derived):
     readme = (FOLDER.parents[1] / "README.md").read_text(encoding="utf-8")
     rows = dict(zip(SCENARIOS, ("double lane change", "hand-wheel sine", "hand-wheel ramp"), strict=True))
