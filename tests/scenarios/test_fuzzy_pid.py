@@ -115,8 +115,8 @@ def test_the_gains_of_the_study_are_those_that_tuning_prefers(study):
         for controller in CONTROLLERS
         for name in (controller, f"{controller}_tuned")
     }
-    assert cost["pid_tuned"] == pytest.approx(0.8664, abs=0.001)  # as tuning.py prints it
-    assert cost["fuzzy_pid_tuned"] == pytest.approx(0.8656, abs=0.001)
+    assert cost["pid_tuned"] == pytest.approx(0.8671, abs=0.001)  # as tuning.py prints it
+    assert cost["fuzzy_pid_tuned"] == pytest.approx(0.8663, abs=0.001)
     assert cost["pid_tuned"] < cost["fuzzy_pid"] < cost["pid"]
 
 
