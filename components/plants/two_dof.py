@@ -9,6 +9,9 @@ Each wheel has its own slip angle and its own load, quasi-static from a_y = Y / 
 longitudinal slip is 0, and longitudinal tyre forces, which the role has as inputs, are left out as in
 the paper. The controller's yaw moment M acts on the body from outside.
 
+Whatever holds v_x does work: a car that spins gains speed here, v_x / cos(beta), at 60 degrees of sideslip
+twice its own. Beyond some 20 degrees the model says that the car is lost, not how it moves.
+
 Source: Xie, Li, Zheng, Pei, Synthesized feedback control of the ESP system based on fuzzy technology,
 2-DOF model with four wheels. The height h is the paper's 0.5 m.
 
