@@ -49,7 +49,7 @@ class FourteenDofParameters:
     track_width: float = parameter(
         1.6,
         "m",
-        "Track width d; chosen: paper C prints 1.36, implausible with this wheelbase; peaks change by 1-2 %",
+        "Track width d; chosen: paper C prints 1.36, implausible with this wheelbase; peaks change by 1-4 %",
         minimum=0.1,
     )
     cg_height: float = parameter(
