@@ -71,14 +71,16 @@ def two(tmp_path_factory) -> Path:
     return file
 
 
-def inked(chromium: Browser, canvas: str) -> float:
-    """Return the share of a canvas's pixels that are not white."""
+def inked(chromium: Browser, canvas: str, bright: int = 720) -> float:
+    """Return the share of a canvas's pixels that are not white, or darker than a sum of their colours."""
     return chromium.run(
         "const canvas = document.querySelector(arguments[0]);"
         "const {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);"
-        "let n = 0; for (let i = 0; i < data.length; i += 4) n += data[i] + data[i + 1] + data[i + 2] < 720;"
+        "let n = 0;"
+        "for (let i = 0; i < data.length; i += 4) n += data[i] + data[i + 1] + data[i + 2] < arguments[1];"
         "return n / (data.length / 4);",
         canvas,
+        bright,
     )
 
 
@@ -239,6 +241,41 @@ def test_a_bare_run_is_drawn_without_complaint(chromium, tmp_path):
     assert chromium.run("return document.querySelector('figcaption').textContent").endswith(
         "tyre forces were not recorded"
     )
+
+
+def test_a_sideslip_angle_beyond_half_a_turn_comes_back_at_the_other_end(chromium, tmp_path):
+    spun = whole_car()
+    turned = np.linspace(np.pi - 0.2, np.pi + 0.2, spun.time.size)
+    spun.columns["plant.sideslip"][:] = (turned + np.pi) % (2 * np.pi) - np.pi
+    file = tmp_path / "spun.html"
+    file.write_text(page([("spun", spun)]), "utf-8")
+    chromium.open(file)
+    middle = float(np.interp(np.pi, turned, spun.time))
+    script = PLAYER + "player.seek(arguments[0]); return player.states[0].sideslip"
+    for time in np.linspace(middle - 0.1, middle + 0.1, 41):
+        assert abs(chromium.run(script, float(time))) > 3.1
+    drawn = chromium.run(
+        "const c = document.querySelector('.yb-strip'), p = c.getContext('2d');"
+        "const row = Math.round(c.height * 0.4), {data} = p.getImageData(0, row, c.width, 1);"
+        "let n = 0; for (let i = 0; i < data.length; i += 4) n += data[i] < 150 && data[i + 2] > 120;"
+        "return n;"
+    )
+    assert drawn == 0  # no line from one end to the other
+
+
+def test_a_standing_car_is_drawn_without_an_arrow_of_its_motion(chromium, tmp_path):
+    pictures = []
+    for name, speed in (("standing", 0.0), ("driving", 20.0)):
+        car = whole_car()
+        for column in car.columns:
+            if "velocity" in column:
+                car.columns[column][:] = speed if column.endswith("velocity_x") else 0.0
+        file = tmp_path / f"{name}.html"
+        file.write_text(page([("car", car)]), "utf-8")
+        chromium.open(file)
+        chromium.run(PLAYER + "player.seek(0)")
+        pictures.append(inked(chromium, ".yb-close canvas", 450))
+    assert pictures[0] < pictures[1]
 
 
 def test_print_holds_the_moment_and_shows_no_controls(chromium, two):

@@ -35,10 +35,22 @@ function stateAt(run, t) {
   const [i, part] = place(run.channels.time, t);
   const state = {index: i};
   for (const [name, values] of Object.entries(run.channels)) {
-    state[name] = part > 0 ? values[i] + part * (values[i + 1] - values[i]) : values[i];
+    state[name] = part > 0 ? between(name, values[i], values[i + 1], part) : values[i];
   }
   state.steer = state.steer_angle || 0;
   return state;
+}
+
+// Whether a step is that of an angle which leaves its range at one end and comes back at the other.
+function turns(channel, step) {
+  return channel === 'sideslip' && Math.abs(step) > Math.PI;
+}
+
+function between(channel, from, to, part) {
+  const turn = 2 * Math.PI * Math.sign(to - from);
+  if (!turns(channel, to - from)) return from + part * (to - from);
+  const value = from + part * (to - turn - from);
+  return Math.abs(value) > Math.PI ? value + turn : value;
 }
 
 // Where the wheels are, from the centre of mass, in vehicle axes (x forward, y left).

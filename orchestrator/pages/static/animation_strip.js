@@ -15,8 +15,14 @@ function drawStrip(canvas, density, runs, states, channel, readout, from, to, t)
   c.lineTo(width - THUMB, up(0));
   stroke(c, '#ccc', 1, 1);
   for (const run of drawn) {
-    polyline(c, run.channels.time.map(across), run.channels[channel].map(up), 0, run.channels.time.length - 1);
-    stroke(c, run.colour, 1.6, 1, run.dash);
+    const values = run.channels[channel];
+    const [times, heights] = [run.channels.time.map(across), values.map(up)];
+    for (let first = 0, i = 1; i <= values.length; i++) {
+      if (i < values.length && !turns(channel, values[i] - values[i - 1])) continue;
+      polyline(c, times, heights, first, i - 1);
+      stroke(c, run.colour, 1.6, 1, run.dash);
+      first = i;
+    }
   }
   c.beginPath();
   c.moveTo(across(t), 16);
