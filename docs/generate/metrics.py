@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from orchestrator.metrics import measures, run_metrics
+from orchestrator.metrics import catalogue, run_metrics
 
 from .text import NOTE, cell, code, docstring, table
 
 
 def page() -> str:
     """Return the page of all measures, of the metrics that are shown unasked, of what stands in for what."""
-    rows = []
-    for name, m in measures.MEASURES.items():
-        formula = m.formula.replace("{x_ref}", "x_ref").replace("{x}", "x")
-        unit = "of the signal" if m.unit == "{x}" else m.unit.replace("{x}", "unit")
-        meaning = f"{cell(m.definition)}<br>{code(formula)}"
-        rows.append((code(name), meaning, cell(unit), "yes" if m.needs_reference else ""))
+    rows = [
+        (code(one.name), f"{cell(one.definition)}<br>{code(one.formula)}", cell(one.unit), cell(one.needs))
+        for one in catalogue()
+    ]
     standard = []
     for name in run_metrics.STANDARD:
         metric = run_metrics.metric(name)
@@ -23,9 +21,11 @@ def page() -> str:
         "# Metrics",
         NOTE,
         docstring(run_metrics.__doc__ or ""),
-        "x is the signal, x_ref its reference, T the duration of the run or of the window.",
+        "x is the signal, x_ref its reference, T the duration of the run or of the window. A signal's rate "
+        "is the recorded one, `x_rate`, else the difference quotient. A measure that has no number, such as "
+        "an error relative to a reference of zero, is absent.",
         "## Measures",
-        table(("measure", "definition", "unit", "needs x_ref"), rows),
+        table(("measure", "definition", "unit", "needs besides"), rows),
         "## Shown where nobody has chosen others",
         table(("metric", "definition"), standard),
     ])  # fmt: skip
