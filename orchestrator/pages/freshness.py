@@ -8,8 +8,10 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
+from ..errors import ResultsError
 from ..plan import Plan
-from ..results.formats import RUN_FILE
+from ..results.formats import RESULTS_FILE, RUN_FILE
+from ..results.read import load_results
 from ..results.run_record import run_record
 
 COMPARED = {
@@ -39,8 +41,11 @@ def staleness(plan: Plan, folder: Path) -> str | None:
         return "the record cannot be read"
     if not isinstance(recorded, dict) or recorded.get("status") != "completed":
         return "the run did not reach its end"
-    if not (folder / str(recorded.get("results", "results.csv"))).is_file():
+    results = folder / str(recorded.get("results", RESULTS_FILE))
+    if not results.is_file():
         return "the results are missing"
+    if not _whole(results, recorded.get("rows", 0)):
+        return "the results are cut off"
     planned = run_record(plan, status="completed", started=datetime.now(timezone.utc))
     wanted = json.loads(json.dumps(planned, default=str))
     for key, sentence in COMPARED.items():
@@ -49,6 +54,16 @@ def staleness(plan: Plan, folder: Path) -> str | None:
     return _changed_fmu(recorded.get("fmus", {}), wanted["fmus"]) or _changed_program(
         recorded.get("versions", {}), wanted["versions"]
     )
+
+
+def _whole(results: Path, rows: int) -> bool:
+    """Return whether a file of results holds all rows that its run has written."""
+    try:
+        if results.suffix == ".csv":
+            return not rows or results.read_bytes().count(b"\n") > rows  # the first line is the header
+        return load_results(results.parent).time.size >= rows
+    except (OSError, ResultsError):
+        return False
 
 
 def _changed_fmu(recorded: Mapping[str, Any], wanted: Mapping[str, Any]) -> str | None:

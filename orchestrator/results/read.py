@@ -98,7 +98,7 @@ def load_results(folder: Path | str) -> Results:
     """Read the results of one run; those of a failed run too, as far as they go.
 
     Raises:
-        ResultsError: a file is missing, unreadable or not what `yawbench run` writes.
+        ResultsError: a file is missing, unreadable, cut off or not what `yawbench run` writes.
     """
     folder = Path(folder)
     run_file = folder / RUN_FILE
@@ -131,6 +131,9 @@ def load_results(folder: Path | str) -> Results:
         raise ResultsError(f"{path}: cannot be read: {error}") from None
     if next(iter(columns), "") != "time":
         raise ResultsError(f"{path}: the first column must be 'time'.")
+    rows = columns["time"].size
+    if run.get("status") == "completed" and rows < run.get("rows", 0):
+        raise ResultsError(f"{path}: holds {rows} of the {run['rows']} rows of its run; run it again.")
     units = {name: str(run.get("units", {}).get(name) or "") for name in columns}
     return Results(folder, columns.pop("time"), columns, units, run)
 

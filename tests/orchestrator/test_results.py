@@ -87,6 +87,14 @@ def test_results_without_rows_have_empty_columns(folder):
     assert results.time.shape == results["car.yaw_rate"].shape == (0,)
 
 
+def test_results_that_were_cut_off_are_no_results(folder):
+    (folder / "run.json").write_text(json.dumps({**RUN, "rows": 3}))
+    with pytest.raises(
+        ResultsError, match=r"results\.csv: holds 2 of the 3 rows of its run; run it again\.$"
+    ):
+        load_results(folder)
+
+
 @pytest.mark.parametrize(
     ("name", "text", "sentence"),
     [

@@ -202,5 +202,10 @@ def test_missing_failed_and_damaged_results_are_stale(folder, tmp_path):
     assert staleness(plan, recorded(plan, tmp_path / "a", status="failed")) == "the run did not reach its end"
     (recorded(plan, tmp_path / "b") / "results.csv").unlink()
     assert staleness(plan, tmp_path / "b") == "the results are missing"
+    cut = recorded(plan, tmp_path / "c", rows=2) / "results.csv"
+    cut.write_text("time,x\n0.0,1.0\n0.1,2.0\n")
+    assert staleness(plan, cut.parent) is None
+    cut.write_text("time,x\n0.0,1.0\n0.1,2.")
+    assert staleness(plan, cut.parent) == "the results are cut off"
     (tmp_path / "b" / "run.json").write_text("{")
     assert staleness(plan, tmp_path / "b") == "the record cannot be read"
