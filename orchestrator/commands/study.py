@@ -56,6 +56,20 @@ def study(
     for problem in problems:
         say(problem)
     print_tables(all_tables(findings))
+    if no_run:
+        for name, why in _stale(file, folder, fmus).items():
+            say(f"{name}: not what a run would give now: {why}")
     say(f"Results, figures and tables: {folder} (begin with {folder / REPORT})")
     if findings.failed:
         raise typer.Exit(1)
+
+
+def _stale(file: Path, folder: Path, fmus: Path | None) -> dict[str, str]:
+    """Return run -> why its results are not those of a run made now, as far as that can be told."""
+    from ..errors import YawbenchError
+    from ..pages.report import still_stale, wanted
+
+    try:
+        return still_stale(wanted(file, folder, fmus=fmus, format="csv"))
+    except YawbenchError:  # scenarios or FMUs are not here: results can be judged without them
+        return {}

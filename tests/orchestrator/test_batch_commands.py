@@ -186,6 +186,20 @@ def test_study_judges_what_is_there_without_running(yawbench, folder):
     assert "not judged" in out
 
 
+def test_study_without_running_tells_which_results_are_of_another_run(yawbench, folder):
+    assert "not what a run would give now" not in yawbench("study", "study.yaml", "--out", "o")[2]
+    assert "not what a run would give now" not in yawbench("study", "study.yaml", "--out", "o", "--no-run")[2]
+    scenario = folder / "half.yaml"
+    scenario.write_text(scenario.read_text() + "# the same\n")
+    assert "not what a run would give now" not in yawbench("study", "study.yaml", "--out", "o", "--no-run")[2]
+    scenario.write_text(SCENARIO.replace("stop_time: ", "stop_time: 1"))
+    status, _, said = yawbench("study", "study.yaml", "--out", "o", "--no-run")
+    assert status == 0
+    assert "off: not what a run would give now: the stop time has changed\n" in said
+    scenario.unlink()
+    assert yawbench("study", "study.yaml", "--out", "o", "--no-run")[0] == 0
+
+
 def test_study_finds_a_wrong_scenario_before_anything_runs(yawbench, folder):
     (folder / "half.yaml").write_text(SCENARIO.replace("frequency", "frequenzy"))
     status, _, said = yawbench("study", "study.yaml", "--out", "o")
