@@ -66,7 +66,8 @@ def report(
         outcomes: list[Outcome] = []
         if not no_run:
             good = len(one.jobs) - len(work)
-            say(f"{one.study.spec.title}: {len(work)} runs to make, {good} with good results")
+            count = "1 run" if len(work) == 1 else f"{len(work)} runs"
+            say(f"{one.study.spec.title}: {count} to make, {good} with good results")
             outcomes = run_all(work, one.folder, workers=jobs) if work else []
         with stoppable(one.folder), pool(jobs) as workers:
             findings = judge_study(one.study, one.folder, outcomes, each=workers.map)

@@ -59,9 +59,10 @@ def limit_tables(swept: Swept) -> list[Table]:
 def _page(swept: Swept, drawn: dict[str, str]) -> str:
     spec = swept.planned.sweep.spec
     runs, failed = swept.planned.runs, swept.failed
-    count = f"{len(runs)} runs, {len(failed)} failed" if failed else f"{len(runs)} runs"
+    count = "1 run" if len(runs) == 1 else f"{len(runs)} runs"
+    ended = f"; {len(failed)} failed" if failed else ""
     head = [f"# {spec.title}", "", *([spec.source, ""] if spec.source else [])]
-    head += [f"{count} of `{spec.scenario}`, one row each in `{TABLE}`.", ""]
+    head += [f"{count} of `{spec.scenario}`, one row each in `{TABLE}`{ended}.", ""]
     parts = ["\n".join(head), for_markdown(_metrics(swept))]
     parts += [for_markdown(table) for table in limit_tables(swept)]
     parts += [f"![{title}]({path})\n" for title, path in drawn.items()]

@@ -200,7 +200,7 @@ def test_only_missing_or_stale_runs_are_made(report, half):
     assert "0 runs to make, 2 with good results" in report()[1]
     text = (half / "study.yaml").read_text()
     (half / "study.yaml").write_text(text.replace("amplitude: [0.02, 0.05]", "amplitude: [0.02, 0.05, 0.1]"))
-    assert "1 runs to make, 2 with good results" in report()[1]
+    assert "1 run to make, 2 with good results" in report()[1]
     (half / "half.yaml").write_text(SCENARIO.replace("velocity_x: 20", "velocity_x: 25"))
     assert "3 runs to make, 0 with good results" in report()[1]
     assert "3 runs to make" in report("--again")[1]
