@@ -14,7 +14,7 @@ from ..figures.display import shown
 from ..metrics.run_metrics import Value, evaluate_all, metric
 
 if TYPE_CHECKING:
-    import rich.table
+    import rich.console
 
     from ..results.read import Results
 
@@ -50,17 +50,14 @@ def _shown(cell: Cell) -> str:
     return shown(cell.number, cell.unit) if isinstance(cell, Value) else cell
 
 
-def for_terminal(table: Table) -> rich.table.Table:
-    """Return the table for a rich console."""
+def for_terminal(table: Table) -> rich.console.Group:
+    """Return the table for a rich console; title and notes may be wider than the columns."""
     import rich.table
     from rich import box
+    from rich.console import Group
     from rich.text import Text
 
-    caption = Text("\n".join(table.notes)) if table.notes else None
-    shape = rich.table.Table(
-        title=Text(table.title), title_justify="left", title_style="bold", caption=caption,
-        caption_justify="left", caption_style="", box=box.SIMPLE_HEAD, pad_edge=False,
-    )  # fmt: skip
+    shape = rich.table.Table(box=box.SIMPLE_HEAD, pad_edge=False)
     rows = table.text()
     for i, heading in enumerate(table.headings):
         number = table.is_number(i)
@@ -70,7 +67,8 @@ def for_terminal(table: Table) -> rich.table.Table:
         shape.add_column(Text(heading), justify="right" if number else "left", no_wrap=number)
     for row in rows:
         shape.add_row(*(Text(cell) for cell in row))
-    return shape
+    notes = [Text(note) for note in table.notes]
+    return Group(*([Text(table.title, "bold")] if table.title else []), shape, *notes)
 
 
 def for_markdown(table: Table) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from orchestrator.errors import ScenarioError
 from orchestrator.metrics.run_metrics import Value
@@ -409,7 +410,18 @@ def test_what_is_wrong_with_grids_and_derived_numbers_is_said(with_grid, old, ne
 
 def test_a_long_heading_over_numbers_is_broken_on_the_terminal():
     table = Table("", ["run", "controller_sliding_mode switching=saturation"], [["a", Value(1.0, "N.m")]])
-    assert str(for_terminal(table).columns[1].header) == "controller_sliding_mode\nswitching=saturation"
+    (shape,) = for_terminal(table).renderables
+    assert str(shape.columns[1].header) == "controller_sliding_mode\nswitching=saturation"
+
+
+def test_notes_below_a_narrow_table_take_the_width_of_the_terminal():
+    note = "No number for settling_time(acceleration_y), peak(slip_ratio_*)."
+    console = Console(width=80)
+    with console.capture() as printed:
+        console.print(for_terminal(Table("A title that is wider than the table", ["m"], [["1"]], [note])))
+    lines = [line.rstrip() for line in printed.get().splitlines()]
+    assert lines[0] == "A title that is wider than the table"
+    assert lines[-1] == note
 
 
 def test_expressions_are_arithmetic():
