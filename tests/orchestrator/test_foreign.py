@@ -1,0 +1,163 @@
+"""FMUs in C from elsewhere, from the archive through the command line to the results, also isolated."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import fmpy
+import pytest
+
+from orchestrator.cli import main
+from orchestrator.results.read import load_results
+
+HERE = Path(__file__).parent
+INPUT, OUTPUT, ANSWER = 1000001, 4000000000, 7
+WORDS = {1: "warning", 2: "discard", 3: "error", 4: "fatal"}
+STARTS = {"Real": "0", "Integer": "0", "Boolean": "false", "String": "", "Enumeration": "1"}
+MODES = """
+<TypeDefinitions><SimpleType name="Mode"><Enumeration>
+  <Item name="dry" value="1"/><Item name="wet" value="2"/><Item name="ice" value="4"/>
+</Enumeration></SimpleType></TypeDefinitions>"""
+
+SCENARIO = """
+title: Two strangers
+stop_time: 0.5
+step_size: 0.05
+inputs: {constants}
+units:
+  a: {{fmu: ./{fmu}}}
+  b: {{fmu: ./{fmu}, parameters: {{answer: {answer}}}}}
+connections:
+{connections}
+"""
+KINDS = {"Real": 0.75, "Integer": -21, "Boolean": "true", "String": "größer"}
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux")
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    """The compiled library: it doubles what it is given, and answers a step as its parameter says."""
+    file = tmp_path_factory.mktemp("foreign") / "foreign.so"
+    compiler = shlex.split(os.environ.get("CC", "cc"))
+    include = HERE.parents[1] / "fmus"
+    source = HERE / "foreign.c"
+    subprocess.run([*compiler, "-shared", "-fPIC", "-w", f"-I{include}", source, "-o", file], check=True)
+    return file
+
+
+def description(*kinds):
+    """Return a model description without optional capabilities, with large and sparse references."""
+    variables = [
+        f'<ScalarVariable name="answer" valueReference="{ANSWER}" causality="parameter"'
+        ' variability="tunable"><Integer start="0" min="0" max="4"/></ScalarVariable>'
+    ]
+    for kind in kinds:
+        change = "" if kind == "Real" else ' variability="discrete"'
+        mode = ' declaredType="Mode"' if kind == "Enumeration" else ""
+        variables += [
+            f'<ScalarVariable name="{kind}_in" valueReference="{INPUT}" causality="input"{change}>'
+            f'<{kind}{mode} start="{STARTS[kind]}"/></ScalarVariable>',
+            f'<ScalarVariable name="{kind}_out" valueReference="{OUTPUT}" causality="output"{change}>'
+            f"<{kind}{mode}/></ScalarVariable>",
+        ]
+    outputs = "".join(f'<Unknown index="{3 + 2 * i}" dependencies="{2 + 2 * i}"/>' for i in range(len(kinds)))
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n'
+        '<fmiModelDescription fmiVersion="2.0" modelName="foreign" guid="{good}">'
+        f'<CoSimulation modelIdentifier="foreign"/>{MODES if "Enumeration" in kinds else ""}'
+        f"<ModelVariables>{''.join(variables)}</ModelVariables>"
+        f"<ModelStructure><Outputs>{outputs}</Outputs><InitialUnknowns>{outputs}</InitialUnknowns>"
+        "</ModelStructure></fmiModelDescription>"
+    )
+
+
+@pytest.fixture
+def run(library, tmp_path, capsys):
+    """Run two units of an FMU, the second fed by the first; return status, words and results."""
+
+    def go(*arguments, answer=0, given=KINDS):
+        with zipfile.ZipFile(tmp_path / "foreign.fmu", "w") as archive:
+            archive.writestr("modelDescription.xml", description(*given))
+            archive.write(library, f"binaries/{fmpy.platform}/foreign.so")
+        constants = ", ".join(f"a.{kind}_in: {value}" for kind, value in given.items())
+        (tmp_path / "two.yaml").write_text(
+            SCENARIO.format(
+                constants=f"{{{constants}}}",
+                fmu="foreign.fmu",
+                answer=answer,
+                connections="\n".join(f"  - {{from: a.{kind}_out, to: b.{kind}_in}}" for kind in given),
+            ),
+            encoding="utf-8",
+        )
+        out = tmp_path / "out"
+        with pytest.raises(SystemExit) as exit_:
+            main(["run", str(tmp_path / "two.yaml"), "--out", str(out), *arguments])
+        said = capsys.readouterr().err
+        results = load_results(out) if (out / "run.json").exists() else None
+        return exit_.value.code or 0, said, results
+
+    return go
+
+
+together_and_apart = pytest.mark.parametrize("isolate", [[], ["--isolate"]], ids=["together", "apart"])
+
+
+@together_and_apart
+def test_all_types_pass_through_without_optional_capabilities(run, isolate):
+    status, said, results = run(*isolate)
+    assert status == 0, said
+    assert {name: column[-1] for name, column in results.columns.items()} == {
+        "a.Real_out": 1.5,
+        "a.Integer_out": -42,
+        "a.Boolean_out": 0,
+        "b.Real_out": 3.0,
+        "b.Integer_out": -84,
+        "b.Boolean_out": 1,
+    }  # fmt: skip; text is not recorded, see below
+
+
+@together_and_apart
+def test_enumerations_are_wired_and_given_by_name(run, isolate):
+    status, said, results = run(*isolate, given={"Enumeration": "dry"})
+    assert status == 0, said
+    assert set(results["a.Enumeration_out"]) == {2}
+    assert set(results["b.Enumeration_out"]) == {4}
+    status, said, _ = run(*isolate, given={"Enumeration": "snow"})
+    assert status == 2
+    assert "must be one of dry, wet or ice" in said
+
+
+@together_and_apart
+@pytest.mark.parametrize("answer", [2, 3, 4], ids=WORDS.get)
+def test_a_step_that_fails_is_a_sentence_and_the_results_so_far(run, isolate, answer):
+    status, said, results = run(*isolate, answer=answer)
+    assert status == 1
+    assert "b: step failed at t = 0.25 s: valve 3 of b is 99.5% open, größer als gedacht\n" in said
+    assert results.run["status"] == "failed"
+    assert results.time[-1] == 0.25
+    assert results.run["error"]["inputs"] == {
+        "Real_in": 1.5, "Integer_in": -42, "Boolean_in": False, "String_in": "<größer>",
+    }  # fmt: skip
+
+
+@together_and_apart
+def test_a_warning_is_said_and_the_run_goes_on(run, isolate):
+    status, said, results = run(*isolate, answer=1)
+    assert status == 0
+    assert "valve 3 of b is 99.5% open, größer als gedacht" in said
+    assert results.time[-1] == 0.5
+
+
+def test_a_tunable_parameter_is_given_as_any_other(run):
+    assert run("--set", "b.answer=3")[0] == 1  # it reaches the FMU, which then fails
+    assert run("--set", "b.answer=3", "--set", "b.answer=0")[0] == 0
+    status, said, _ = run("--set", "b.answer=5")
+    assert status == 2
+    assert "--set b.answer=5" in said
+    assert "4" in said
