@@ -140,8 +140,17 @@ def _column(results: Results, name: str) -> str | None:
 
 
 def evaluate(results: Results, chosen: Metric, window: tuple[float, float] | None = None) -> Value | None:
-    """Return a metric of a run over the whole run or a window [s], or None if the run has no such signal."""
+    """Return a metric of a run over the whole run or a window [s].
+
+    None if the run has no such signal or does not last for the window: part of it is another metric.
+    """
     first, last = window or (-math.inf, math.inf)
+    if (
+        window
+        and results.time.size
+        and not results.time[0] - 1e-9 <= first <= last <= results.time[-1] + 1e-9
+    ):
+        return None
     inside = (results.time >= first - 1e-9) & (results.time <= last + 1e-9)
     t = results.time[inside]
     signals = _signals(results, chosen)

@@ -180,6 +180,13 @@ def test_a_window_limits_a_metric_to_its_samples():
     assert evaluate(ramp, metric("peak(sideslip)"), (5.0, 6.0)) is None
 
 
+def test_a_window_that_the_run_does_not_last_for_gives_no_number():
+    ramp = results({"plant.sideslip": T}, T)
+    assert evaluate(ramp, metric("peak(sideslip)"), (0.5, float(T[-1]))) is not None
+    assert evaluate(ramp, metric("peak(sideslip)"), (0.5, float(T[-1]) + 0.5)) is None
+    assert evaluate(ramp, metric("peak(sideslip)"), (float(T[0]) - 0.5, 0.5)) is None
+
+
 def test_the_largest_of_four_wheels_counts():
     columns = {f"actuator.wheel_torque_{w}": k * T for k, w in enumerate(("fl", "fr", "rl", "rr"))}
     wheels = results(columns, T, dict.fromkeys(columns, "N.m"))
