@@ -22,7 +22,7 @@ def page() -> str:
         NOTE,
         docstring(run_metrics.__doc__ or ""),
         "x is the signal, x_ref its reference, T the duration of the run or of the window. A signal's rate "
-        "is the recorded one, `x_rate`, else the difference quotient. A measure that has no number is absent: "
+        "is the recorded one, `x_rate`, else the difference quotient. A measure without a number is absent: "
         "an error relative to a reference of zero, a window that the run does not last for.",
         "## Measures",
         table(("measure", "definition", "unit", "needs besides"), rows),
