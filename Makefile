@@ -5,6 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 READY_TO_TEST := $(VENV)/.ready-to-test
 SCENARIO ?= scenarios/fnn_sideslip/25mps.yaml
+unexport PYTHONDONTWRITEBYTECODE  # runs are processes: modules are compiled once, not in each of them
 
 .PHONY: setup fmus demo report run test bench lint docs clean
 

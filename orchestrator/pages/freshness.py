@@ -24,15 +24,12 @@ COMPARED = {
     "title": "the scenario has changed",
 }
 """Key of a run's record -> what it means if it differs from the plan's."""
-PROGRAMS = ("yawbench", "fmpy", "pythonfmu", "numpy")
-"""Programs whose version has a say in the numbers."""
+PROGRAMS = ("yawbench", "orchestrator", "fmpy", "pythonfmu", "numpy")
+"""Programs whose version, or sources, have a say in the numbers."""
 
 
 def staleness(plan: Plan, folder: Path) -> str | None:
-    """Return why the results in a folder are not those of the plan, None if they are.
-
-    A change of the orchestrator that leaves its version alone is not noticed.
-    """
+    """Return why the results in a folder are not those of the plan, None if they are."""
     try:
         recorded = json.loads((folder / RUN_FILE).read_text(encoding="utf-8"))
     except OSError:

@@ -8,6 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from ..plan import Plan, Unit
+from ..sources import OF_RESULTS, sources_hash
 
 
 def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
@@ -60,6 +61,7 @@ def versions() -> dict[str, str]:
     return {
         "python": platform.python_version(),
         **{package: _version(package) for package in packages},
+        "orchestrator": f"sources {sources_hash(OF_RESULTS)}",
         "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
     }
 

@@ -28,6 +28,7 @@ import distributed
 from ..errors import ResultsError, ScenarioError
 from ..fmu.archive import open_fmu, read_archive
 from ..plan import Fmu, Plan
+from ..sources import OF_METRICS, sources_hash
 from ..studies.jobs import Outcome, execute
 from ..wording import listed
 from .local import TRIES, Done
@@ -183,7 +184,12 @@ def _check_workers(client: Any, address: str) -> int:
 def versions() -> dict[str, str]:
     """Return the versions that must be the same on every worker."""
     python = ".".join(platform.python_version_tuple()[:2])
-    return {"Python": python, "yawbench": version("yawbench"), "pythonfmu": version("pythonfmu")}
+    return {
+        "Python": python,
+        "yawbench": version("yawbench"),
+        "orchestrator": f"sources {sources_hash(OF_METRICS)}",
+        "pythonfmu": version("pythonfmu"),
+    }
 
 
 ours = versions

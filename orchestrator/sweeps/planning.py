@@ -1,8 +1,8 @@
 """All runs of a sweep planned before the first one starts, and what tells two runs apart.
 
 A run's key is a hash of everything that its metrics follow from: the content of its FMUs, all
-parameters and constants, wires, time grid, algorithm, metrics, this program's version. Runs of one
-key are one run, whatever file, folder or axis they come from.
+parameters and constants, wires, time grid, algorithm, metrics, this program's version and code. Runs of
+one key are one run, whatever file, folder or axis they come from.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from ..plan import Fmu, Plan
 from ..results.read import Results
 from ..scenario import quantities, yaml_lines
 from ..scenario.yaml_lines import Document
+from ..sources import OF_METRICS, sources_hash
 from ..studies.jobs import Job, plan_of
 from ..studies.study_schema import si_number
 from .design import Level, Point
@@ -154,7 +155,7 @@ def _version() -> str:
 def run_key(plan: Plan, metrics: Any) -> str:
     """Return the hash of everything that a run's metrics follow from."""
     content = {
-        "yawbench": _version(),
+        "yawbench": [_version(), sources_hash(OF_METRICS)],
         "units": [[u.name, u.fmu.sha256, u.period, u.parameters, u.constants] for u in plan.units],
         "wires": [[w.source, w.output, w.target, w.input] for w in plan.wires],
         "record": plan.record,

@@ -155,7 +155,9 @@ def test_the_record_tells_everything_needed_to_repeat_the_run(yawbench, fmus, tm
     assert run["fmus"]["controller"]["step_size"] == 0.002
     assert run["fmus"]["tyre"]["constants"] == {f"friction_{w}": 0.65 for w in ("fl", "fr", "rl", "rr")}
     assert run["scenario"]["units"]["driver"]["parameters"]["amplitude"] == 0.02
-    assert set(run["versions"]) == {"python", "yawbench", "fmpy", "pythonfmu", "numpy", "platform"}
+    assert set(run["versions"]) == {
+        "python", "yawbench", "orchestrator", "fmpy", "pythonfmu", "numpy", "platform",
+    }  # fmt: skip
     assert run["wall_time"] > 0
 
 

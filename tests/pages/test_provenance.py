@@ -194,6 +194,10 @@ def test_results_of_another_fmu_or_program_are_stale(folder, tmp_path):
     assert staleness(plan, recorded(plan, tmp_path, fmus=record["fmus"])) == "driver: another driver_sine.fmu"
     old = {**record["versions"], "numpy": "1.0"}
     assert staleness(plan, recorded(plan, tmp_path, versions=old)).endswith("in place of 1.0")
+    old = {**record["versions"], "orchestrator": "sources 0123456789ab"}
+    assert staleness(plan, recorded(plan, tmp_path, versions=old)) == (
+        f"orchestrator {record['versions']['orchestrator']} in place of sources 0123456789ab"
+    )
 
 
 def test_missing_failed_and_damaged_results_are_stale(folder, tmp_path):

@@ -1,0 +1,37 @@
+"""The hash of the program's own code."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+
+from orchestrator import sources
+
+
+@pytest.fixture
+def copy(tmp_path, monkeypatch):
+    """A copy of the code in place of the program's own."""
+    here = sources._HERE
+    shutil.copytree(here, tmp_path / "copy", ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(sources, "_HERE", tmp_path / "copy")
+    sources.sources_hash.cache_clear()
+    yield tmp_path / "copy"
+    sources.sources_hash.cache_clear()
+
+
+def hashes():
+    sources.sources_hash.cache_clear()
+    return sources.sources_hash(sources.OF_RESULTS), sources.sources_hash(sources.OF_METRICS)
+
+
+def test_code_that_has_a_say_in_the_numbers_changes_the_hash_and_no_other(copy):
+    results, metrics = hashes()
+    (copy / "pages" / "report.py").write_text("")
+    assert hashes() == (results, metrics)
+    with (copy / "metrics" / "measures.py").open("a") as file:
+        file.write("# changed")
+    assert hashes()[0] == results
+    assert hashes()[1] != metrics
+    (copy / "master" / "log.py").rename(copy / "master" / "logs.py")
+    assert hashes()[0] != results
