@@ -20,10 +20,11 @@ Page = Annotated[Path | None, typer.Option("--out", metavar="FILE.html", help="T
 
 
 def animate(folders: Folders, label: Labels = None, out: Page = None) -> None:
-    """Write a page that plays one or two runs seen from above: cars, paths, lanes, tyre forces.
+    """Write a page that plays one or two runs seen from above.
 
-    Without --out, the page of one run is animation.html in its folder; that of two lies in the folder
-    that holds them both.
+    Cars, paths, lanes, steer angles, tyre forces and their friction circles. Without --out, the
+    page of one run is animation.html in its folder; that of two lies in the folder that holds them
+    both.
     """
     from ..errors import ResultsError, ScenarioError
     from ..pages.animation import MOST, page

@@ -19,7 +19,7 @@ PIPE_WIDTH = 140
 
 
 def check(scenario: ScenarioFile, swap: Swap = None, set_: Set = None, fmus: Fmus = None) -> None:
-    """Validate a scenario; show units in evaluation order, wires and constants."""
+    """Validate a scenario; show units, wires and their order."""
     from ..scenario.load import load_scenario
     from ..wiring.make_plan import make_plan
 

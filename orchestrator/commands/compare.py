@@ -32,9 +32,10 @@ def compare(
     isolate: Isolate = False,
     call_limit: CallLimit = None,
 ) -> None:
-    """Run a scenario once per FMU; overlay the runs, put their metrics side by side, tell where they part.
+    """Run a scenario with several FMUs for a unit.
 
-    All of it stands in one page, compare.html, that needs no server.
+    Overlays, metrics side by side and where the runs part stand in one page, compare.html, that
+    needs no server.
 
     Without --out, results go to results/<folder of the scenario>/<its name>-compare. A run that
     fails is named and takes no other with it.

@@ -34,10 +34,11 @@ def converge(
     out: Out = None,
     fmus: Fmus = None,
 ) -> None:
-    """Run a scenario at its step size, half of it, and so on: error against the finest, order, cost.
+    """Halve the step size again and again; show error and order.
 
-    Units with a step size of their own keep it. Runs follow each other, so that their wall times
-    can be compared. Without --out, results go to results/<folder of the scenario>/<its name>-converge.
+    The error is that against the finest run. Units with a step size of their own keep it. Runs
+    follow each other, so that their wall times can be compared. Without --out, results go to
+    results/<folder of the scenario>/<its name>-converge.
     """
     from typing import get_args
 

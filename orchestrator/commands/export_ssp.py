@@ -18,9 +18,9 @@ Archive = Annotated[
 def export_ssp(
     scenario: ScenarioFile, swap: Swap = None, set_: Set = None, out: Archive = None, fmus: Fmus = None
 ) -> None:
-    """Write a scenario and its FMUs as a System Structure and Parameterization archive (SSP 1.0).
+    """Write a scenario and its FMUs as an SSP 1.0 archive.
 
-    `yawbench run` reads it back and gives the same numbers.
+    SSP: System Structure and Parameterization. `yawbench run` reads it back and gives the same numbers.
     """
     from ..interop.ssp_write import write_ssp
     from ..scenario.load import load_scenario

@@ -44,10 +44,11 @@ Project = Annotated[
 
 
 def new(kind: What, name: Name, language: Written = Language.python, out: Project = None) -> None:
-    """Write a working controller, its test and a scenario that uses it; print what to do next.
+    """Write a working controller, its test and a scenario.
 
-    In a checkout of yawbench the files stand among its own, so `yawbench build` finds them; elsewhere in
-    folders controllers, tests and scenarios. Nothing is ever overwritten.
+    What to do next is printed. In a checkout of yawbench the files stand among its own, so
+    `yawbench build` finds them; elsewhere in folders controllers, tests and scenarios. Nothing is
+    ever overwritten.
     """
     from fmus.build import COMPONENTS, find_components
     from fmus.c.build import find_c_components

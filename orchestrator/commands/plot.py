@@ -45,11 +45,11 @@ def plot(
     out: Out = None,
     fmus: Fmus = None,
 ) -> None:
-    """Draw the figures of a run, or of several laid over each other, as SVG and PNG.
+    """Draw runs, one or several laid over each other.
 
-    A scenario is run first if its results (those of `yawbench run` without --out) are missing or were
-    made from another scenario or FMU. Without --out, the figure of one run goes into its folder, that of
-    several into the folder that holds them all.
+    Figures are written as SVG and PNG. A scenario is run first if its results (those of `yawbench
+    run` without --out) are missing or were made from another scenario or FMU. Without --out, the
+    figure of one run goes into its folder, that of several into the folder that holds them all.
     """
     from ..errors import ScenarioError
     from ..figures.panels import Run, shown_by

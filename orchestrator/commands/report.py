@@ -32,11 +32,12 @@ def report(
     again: Again = False,
     no_run: NoRun = False,
 ) -> None:
-    """Write report.html: per study the system, parameters and their source, figures, tables, verdicts.
+    """Write one page that reproduces the papers.
 
-    One file that needs no server; figures lie beside it as SVG and PNG. Runs whose results are missing,
-    or were made from another scenario or FMU, are made first. Without --out, the page of one study lies in
-    its folder below results/, that of several in results/.
+    report.html: per study the system, parameters and their source, figures, tables, verdicts. One
+    file that needs no server; figures lie beside it as SVG and PNG. Runs whose results are missing,
+    or were made from another scenario or FMU, are made first. Without --out, the page of one study
+    lies in its folder below results/, that of several in results/.
     """
     from ..errors import ScenarioError
     from ..pages.chapter import chapter

@@ -58,6 +58,10 @@ def run(
     limit = isolation(isolate, call_limit)
     loaded = load_scenario(scenario, swaps=swap or (), settings=set_ or ())
     plan = make_plan(loaded, fmus=fmus, isolated=isolate)
+    if named := [name for name in metric or () if name != "standard"]:
+        from ..metrics import run_metrics
+
+        run_metrics.check_metrics(plan, map(run_metrics.metric, named))
     folder = out or default_folder(scenario)
     for note in (*plan.notes, size_note(plan, folder, format_)):
         if note:

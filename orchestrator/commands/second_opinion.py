@@ -31,9 +31,10 @@ def second_opinion(
     master: Masters = None,
     one_core: Pinned = True,
 ) -> None:
-    """Run a scenario in libcosim, Ecos and fmpy; compare every signal, and the time per step.
+    """Run a scenario in libcosim, Ecos and fmpy, and compare.
 
-    Exit status 1 if one that should agree does not: libcosim and Ecos run what `jacobi` runs here.
+    Every signal, and the time per step. Exit status 1 if one that should agree does not: libcosim
+    and Ecos run what `jacobi` runs here.
     """
     from ..errors import ScenarioError, SimulationError
     from ..interop.second_opinion import MASTERS, second_opinion

@@ -26,7 +26,7 @@ def study(
     isolate: Isolate = False,
     call_limit: CallLimit = None,
 ) -> None:
-    """Run a study: its scenarios, a table of metrics, a verdict per claim, figures.
+    """Run a study: tables, figures, a verdict per claim.
 
     Without --out, results go to results/<folder of the study>/<its name>. Every run has a process
     of its own; one that fails is named in the table and takes no other with it.

@@ -47,11 +47,12 @@ def sweep(
     isolate: Isolate = False,
     call_limit: CallLimit = None,
 ) -> None:
-    """Run a scenario over a grid, a list or a Latin hypercube of conditions; table and draw its metrics.
+    """Run a scenario over a grid, list or Latin hypercube.
 
-    Without --out, results go to results/<folder of the sweep file>/<its name>: sweep.parquet, one row
-    per run; sweep.md; figures. Every run has a process of its own. An interrupted sweep goes on where
-    it was; nothing that is finished is run again.
+    Its metrics become a table, limits, curves and maps. Without --out, results go to
+    results/<folder of the sweep file>/<its name>: sweep.parquet, one row per run; sweep.md;
+    figures. Every run has a process of its own. An interrupted sweep goes on where it was; nothing
+    that is finished is run again.
     """
     from ..results.formats import check_format
     from ..studies.jobs import pool

@@ -13,16 +13,18 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import ResultsError, ScenarioError
-from ..wording import WHEELS, hint
+from ..wording import WHEELS, fold, hint
 from .measures import MEASURES, Measure
 from .signals import symbol, variable_of, words
 
 if TYPE_CHECKING:
+    from ..plan import Plan
     from ..results.read import Results
 
 STANDARD = (
@@ -166,6 +168,40 @@ def evaluate(results: Results, chosen: Metric, window: tuple[float, float] | Non
     if math.isnan(number):
         return None
     return Value(number, chosen.unit(results.units[signals[0][0]]))
+
+
+def results_to_be(plan: Plan) -> Results:
+    """Return results without rows: the columns that a plan will record."""
+    from ..results.read import Results
+
+    units = {unit.name: unit for unit in plan.units}
+    variables = {f"{u}.{name}": units[u].fmu.variables[name] for u, name in plan.record}
+    columns = {name: np.empty(0, float if v.type != "String" else str) for name, v in variables.items()}
+    names = {name: {"name": unit.fmu.name} for name, unit in units.items()}
+    return Results(
+        Path(), np.empty(0), columns, {n: v.unit or "" for n, v in variables.items()}, {"fmus": names}
+    )
+
+
+def check_metrics(plan: Plan, chosen: Iterable[Metric]) -> None:
+    """Make sure that a run of a plan will record what metrics are made of.
+
+    Raises:
+        ScenarioError: with a sentence for each metric that it will not.
+    """
+    results = results_to_be(plan)
+    names = fold(list(dict.fromkeys(variable_of(column) for column in results)))
+    problems = []
+    for one in chosen:
+        if columns_of(results, one.signal):
+            if unit_in(results, one) is None:
+                why = f"{one.signal} has no reference or not the right unit"
+                problems.append(f"{one.name}: {why}")
+        else:
+            unknown = f"no {one.signal!r} is recorded{hint(one.signal, names, lead='there are')}"
+            problems.append(f"{one.name}: {unknown}")
+    if problems:
+        raise ScenarioError(problems)
 
 
 def unit_in(results: Results, chosen: Metric) -> str | None:

@@ -20,9 +20,21 @@ class Strict(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
 
+KINDS: dict[str, tuple[str, type, str]] = {
+    "axes": ("a sweep file", dict, "; it is for `yawbench sweep`"),
+    "units": ("a scenario", dict, "; it is for `yawbench run`"),
+    "runs": ("a study file", list, "; it is for `yawbench study` and `report`"),
+    "parameters": ("a vehicle file", dict, ""),
+}
+"""Key that tells a kind of file from the others -> the kind, what stands at the key, where it belongs."""
+
+
 def validate(model: type[Model], document: Document) -> Model | None:
     """Return the validated content, or None with the problems noted in the document."""
     if document.data is None:
+        return None
+    if another := _another_kind(model, document.data):
+        document.report((), another)
         return None
     try:
         return model.model_validate(document.data)
@@ -30,6 +42,15 @@ def validate(model: type[Model], document: Document) -> Model | None:
         for error in errors.errors(include_url=False):
             _report(model, document, _place(document.data, error["loc"]), error)
     return None
+
+
+def _another_kind(model: type[BaseModel], data: Any) -> str | None:
+    """Return a sentence if a file is plainly of another kind than its place asks for."""
+    own = next((key for key in KINDS if key in model.model_fields), None)
+    if own is None or not isinstance(data, dict) or own in data:
+        return None
+    found = next((key for key, (_, form, _) in KINDS.items() if isinstance(data.get(key), form)), None)
+    return f"{KINDS[found][0]}, not {KINDS[own][0]}{KINDS[found][2]}" if found else None
 
 
 def _place(data: Any, location: Key) -> Key:

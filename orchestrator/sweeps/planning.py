@@ -18,13 +18,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..errors import ScenarioError, YawbenchError
 from ..fmu.archive import open_fmu
-from ..metrics.run_metrics import metric, unit_in
+from ..metrics.run_metrics import metric, results_to_be, unit_in
 from ..plan import Fmu, Plan
-from ..results.read import Results
 from ..scenario import quantities, yaml_lines
 from ..scenario.yaml_lines import Document
 from ..sources import OF_METRICS, sources_hash
@@ -173,7 +170,7 @@ def _metric_units(sweep: Sweep, runs: list[PlannedRun]) -> dict[str, str]:
     Raises:
         ScenarioError: no run records a metric's signals, or a bound is in a unit that it does not have.
     """
-    made_up = {tuple(run.plan.record): _recorded(run.plan) for run in runs}.values()
+    made_up = {tuple(run.plan.record): results_to_be(run.plan) for run in runs}.values()
     units: dict[str, str] = {}
     problems = []
     for key, spec in sweep.spec.metrics.items():
@@ -207,17 +204,6 @@ def _bounds(sweep: Sweep) -> list[tuple[str, str, float | str]]:
         if figure.metric and (given := getattr(figure, name)) is not None
     ]
     return limits + figures
-
-
-def _recorded(plan: Plan) -> Results:
-    """Return results without rows: the columns that a plan will record."""
-    units = {unit.name: unit for unit in plan.units}
-    variables = {f"{u}.{name}": units[u].fmu.variables[name] for u, name in plan.record}
-    columns = {name: np.empty(0, float if v.type != "String" else str) for name, v in variables.items()}
-    names = {name: {"name": unit.fmu.name} for name, unit in units.items()}
-    return Results(
-        Path(), np.empty(0), columns, {n: v.unit or "" for n, v in variables.items()}, {"fmus": names}
-    )
 
 
 def _units(sweep: Sweep, runs: list[PlannedRun]) -> dict[str, str]:

@@ -272,6 +272,14 @@ def test_run_and_compare_write_the_format_they_are_told_and_print_metrics(driver
             ["--metric", "peek(sideslip)"],
             "'peek(sideslip)': there is no measure 'peek'; did you mean 'peak'?",
         ),
+        (
+            ["--metric", "peak(steer_angel)", "--metric", "standard"],
+            "peak(steer_angel): no 'steer_angel' is recorded; did you mean 'steer_angle'?",
+        ),
+        (
+            ["--metric", "rms_error(steer_angle)"],
+            "rms_error(steer_angle): steer_angle has no reference or not the right unit",
+        ),
     ],
 )
 def test_a_format_or_a_metric_that_there_is_not_is_said_before_the_run(

@@ -370,3 +370,25 @@ def test_times_can_be_overridden_exactly(file: Path) -> None:
     scenario = load_scenario(file, step_size=Fraction(1, 3000), stop_time="2 s", algorithm="jacobi")
     assert (scenario.step_size, scenario.stop_time) == (Fraction(1, 3000), Fraction(2))
     assert scenario.algorithm == "jacobi"
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (
+            "runs: [{scenario: b.yaml}]",
+            "a study file, not a scenario; it is for `yawbench study` and `report`",
+        ),
+        ("axes: {}\nruns: 3", "a sweep file, not a scenario; it is for `yawbench sweep`"),
+        ("parameters: {mass: 3}", "a vehicle file, not a scenario"),
+    ],
+)
+def test_a_file_of_another_kind_is_one_sentence(tmp_path: Path, text: str, sentence: str) -> None:
+    path = tmp_path / "other.yaml"
+    path.write_text(text, encoding="utf-8")
+    assert problems(path) == [f"{path}:1: {sentence}"]
+    scenario = tmp_path / "a.yaml"
+    scenario.write_text(GOOD.replace("stop_time", "vehicle: other.yaml\nstop_time"), encoding="utf-8")
+    if "vehicle" not in sentence:
+        swapped = sentence.replace("not a scenario", "not a vehicle file")
+        assert f"{path}:1: {swapped}" in problems(scenario)
