@@ -47,6 +47,7 @@ def run(
     there are replaced.
     """
     from ..master.isolation import opener_of
+    from ..master.log import STATUS, WARNING
     from ..master.simulate import simulate
     from ..results.formats import check_format
     from ..results.size import size_note
@@ -69,7 +70,9 @@ def run(
     with _bar(plan.title or scenario.stem) as progress, opener_of(plan, limit) as opener:
         info = simulate(plan, folder, progress=progress, opener=opener, format=format_)
     for message in info.warnings[:SHOWN]:
-        _say(f"warning: {message.unit} at t = {message.time:.9g} s: {message.text}")
+        grade = "" if message.status == WARNING else f"{STATUS[message.status]}: "
+        text = " ".join(message.text.split())
+        _say(f"warning: {message.unit} at t = {message.time:.9g} s: {grade}{text}")
     if len(info.warnings) > SHOWN:
         _say(f"warning: {len(info.warnings) - SHOWN} more, see {folder / 'run.json'}")
     _say(f"{folder}: {info.rows} rows of {info.columns} variables in {info.wall_time:.2f} s")

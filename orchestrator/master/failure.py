@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from .log import PENDING, PROCESS, STATUS, Log
+from .log import OK, PENDING, PROCESS, STATUS, Log, Message
 from .unit import Status
 
 _TELLS_WHEN = re.compile(r"^[^:]* failed at t = [^:]* s: ")
@@ -17,7 +17,9 @@ def describe(unit: str, what: str, time: float, status: Status, log: Log) -> str
         what: "step", "initialization", "setting inputs", ...
         time: beginning of the step [s].
     """
-    errors = log.errors(unit)
+    errors = _latest(unit, log)
+    if status != OK and errors and errors[0].time < log.time.value:
+        errors = []  # the unit has gone on since
     if status == PENDING and not errors:
         reason = "the FMU wants to compute asynchronously, which is not supported"
     elif not errors:
@@ -28,3 +30,9 @@ def describe(unit: str, what: str, time: float, status: Status, log: Log) -> str
         if _TELLS_WHEN.match(reason):  # a component of this project: it knows where and when
             return f"{unit}: {reason.partition('; inputs: ')[0]}"
     return f"{unit}: {what} failed at t = {time:.9g} s: {reason}"
+
+
+def _latest(unit: str, log: Log) -> list[Message]:
+    """Return the errors that a unit has logged at the last instant at which it logged any."""
+    errors = log.errors(unit)
+    return [m for m in errors if m.time == errors[-1].time]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import itertools
+import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -22,8 +23,8 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
 )
 
-OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
-STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
+OK, WARNING, DISCARD, ERROR, FATAL, PENDING, UNKNOWN = range(7)
+STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending", "a status that FMI 2.0 does not have")
 
 WRITTEN = 100
 """Warnings written into run.json; more are only counted."""
@@ -31,6 +32,14 @@ KEPT = 1000
 """Messages kept per unit; a unit that goes on is only counted."""
 PROCESS = "yawbench process"
 """Category of the message that says how the process of an isolated unit ended; always kept."""
+
+
+_CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+
+
+def known(status: int) -> int:
+    """Return a status, UNKNOWN for a number that is none."""
+    return status if OK <= status <= PENDING else UNKNOWN
 
 
 @dataclass(frozen=True)
@@ -55,6 +64,7 @@ class Log:
 
     def add(self, unit: str, status: int, category: str, text: str) -> None:
         """Keep a message; those with the status OK are of no interest."""
+        status = known(status)
         if status == OK:
             return
         self._counts[unit] += 1
@@ -73,13 +83,23 @@ class Log:
         """Return the full Python tracebacks that the unit has logged."""
         return [m.text for m in self.messages if m.unit == unit and m.category == "traceback"]
 
-    def warnings(self) -> Iterable[Message]:
-        """Return the warnings of all units."""
-        return [m for m in self.messages if m.status == WARNING]
+    def warnings(self, ended_by: str | None = None) -> Iterable[Message]:
+        """Return what the units said while the run went on.
 
-    def record(self) -> dict[str, Any]:
-        """Return what run.json says of the warnings."""
-        warnings = list(self.warnings())
+        That is warnings, and errors after which a unit went on as if there had been none.
+
+        Args:
+            ended_by: the unit whose errors ended the run, if one did: they are told elsewhere.
+        """
+        return [
+            m
+            for m in self.messages
+            if m.status == WARNING or (m.unit != ended_by and m.category != "traceback")
+        ]
+
+    def record(self, ended_by: str | None = None) -> dict[str, Any]:
+        """Return what run.json says of the warnings (see `warnings`)."""
+        warnings = list(self.warnings(ended_by))
         return {
             "warnings": [
                 {"unit": m.unit, "time": m.time, "status": STATUS[m.status], "text": m.text}
@@ -102,7 +122,8 @@ def _receive(environment, instance, status, category, text):
 
 
 def _decoded(text: bytes | None) -> str:
-    return (text or b"").decode("utf-8", errors="replace")
+    """Return a text of an FMU, without what would steer a terminal."""
+    return _CONTROLS.sub("", (text or b"").decode("utf-8", errors="replace"))
 
 
 def _receive_unformatted(environment, instance, status, category, text):

@@ -126,9 +126,11 @@ class Master:
 
     def _check_initialization(self, unit: str, what: str, status: Status) -> None:
         """Judge a call during initialization, where a logged error counts whatever the status is."""
-        self.memory.of[unit].slave.note(status)
+        status = self.memory.of[unit].slave.note(status)
         if status > WARNING or self.log.errors(unit):
             raise SimulationError(describe(unit, what, 0.0, status, self.log), unit=unit, time=0.0)
+        if status == WARNING:
+            self._note_warning(unit, what)
         if self.stop.requested:
             raise Interrupted("the run was interrupted during initialization", unit=None, time=0.0)
 
@@ -137,16 +139,20 @@ class Master:
         operations = self._operations[k % self.programs.cycle]
         operation = next(op for op in operations if op.call is call)
         station = self.memory.of[operation.unit]
-        station.slave.note(status)
+        status = station.slave.note(status)
         kind = station.slave.part(operation.kind)
         if status == WARNING:
-            if not any(m.unit == operation.unit for m in self.log.warnings()):
-                self.log.add(operation.unit, WARNING, "", f"the {kind} returned Warning")
+            self._note_warning(operation.unit, _WORDS[kind])
             return
         self._check_finite(k)  # a value that went wrong upstream explains this failure
         time = self.plan.time(k - station.unit.period)
         sentence = describe(operation.unit, _WORDS[kind], time, status, self.log)
         raise SimulationError(sentence, unit=operation.unit, time=time)
+
+    def _note_warning(self, unit: str, what: str) -> None:
+        """Keep a Warning of a unit that has said nothing so far."""
+        if not any(m.unit == unit for m in self.log.warnings()):
+            self.log.add(unit, WARNING, "", f"{what}: the FMU returned Warning and gave no reason")
 
     def _check_finite(self, k: int) -> None:
         """Raise SimulationError for the first wire, in evaluation order, that is not finite."""

@@ -84,9 +84,8 @@ class UnitProcess:
         return self._answer(self._limit)
 
     def _answer(self, limit: float) -> Any:
-        began = time.monotonic()
-        left = limit
-        while self._poll.poll(min(1000 * left, LONGEST)):
+        end = time.monotonic() + limit
+        while (left := end - time.monotonic()) > 0 and self._poll.poll(min(1000 * left, LONGEST)):
             try:
                 kind = self._channel.hear()
                 if kind is not None and kind < REQUEST:
@@ -97,7 +96,6 @@ class UnitProcess:
             if kind == REPLY:
                 return content
             self.log(*content)
-            left = max(0.0, limit - (time.monotonic() - began))
         self.end()
         raise Lost(f"{{function}} did not come back within {limit:g} s, the limit of a call")
 

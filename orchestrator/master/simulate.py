@@ -217,7 +217,9 @@ class _Run:
     def save(self, status: str, error: BaseException | None = None) -> None:
         """Write the record of the run and put the results in place."""
         self._writing = True
-        record = run_record(self.plan, status=status, started=self._started) | self.log.record()
+        record = run_record(self.plan, status=status, started=self._started) | self.log.record(
+            getattr(error, "unit", None)
+        )
         record |= {"wall_time": self.wall_time, "error": self._explained(error)}
         self.recorder.finish(record)
 

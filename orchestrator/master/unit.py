@@ -21,7 +21,7 @@ from fmpy.fmi2 import FMU2Slave, fmi2CoSimulation
 
 from ..errors import ModelDescriptionError, SimulationError
 from ..plan import Unit, Value
-from .log import ERROR, FATAL, OK, Log, listen, unlisten
+from .log import ERROR, FATAL, OK, STATUS, WARNING, Log, known, listen, unlisten
 
 Status = int
 
@@ -69,7 +69,10 @@ class Slave(Protocol):
         """Leave initialization mode."""
 
     def note(self, status: Status) -> Status:
-        """Remember a status, which decides how the instance may be ended, and return it."""
+        """Remember a status, which decides how the instance may be ended, and return it.
+
+        A number that is no status comes back as UNKNOWN.
+        """
 
     def free(self) -> None:
         """End the instance as its state allows. Once; further calls do nothing."""
@@ -109,6 +112,7 @@ class FmuSlave:
         finally:
             os.chdir(here)  # fmpy goes to the library's folder and, if loading fails, stays there
         self._library = self._fmu.dll
+        self._log = log
         self._callbacks = listen(log, unit.name)
         self._component = self._library.fmi2Instantiate(
             unit.name.encode(),
@@ -196,6 +200,7 @@ class FmuSlave:
         return self.note(self._library.fmi2ExitInitializationMode(self._component))
 
     def note(self, status: Status) -> Status:
+        status = known(status)
         self._worst = max(self._worst, status)
         if status >= FATAL:
             self._corrupted.add(self._directory)
@@ -208,7 +213,11 @@ class FmuSlave:
         self._freed = True
         if component is not None:
             if self._may_terminate and self._worst < ERROR:
-                self._library.fmi2Terminate(component)
+                status = self.note(self._library.fmi2Terminate(component))
+                if status != OK:
+                    self._log.add(self.name, WARNING, "", f"fmi2Terminate returned {STATUS[status]}")
+                if status >= FATAL:
+                    return
             self._library.fmi2FreeInstance(component)
         unlisten(self._callbacks)
         self._fmu.freeLibrary()

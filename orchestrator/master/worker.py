@@ -67,7 +67,7 @@ class Worker:
             self._part.value = part
             status = call()
             if status != OK:
-                self._slave.note(status)
+                status = self._slave.note(status)
                 if status > answer % 16:
                     answer = 16 * part + status
                 if status > WARNING:

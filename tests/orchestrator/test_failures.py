@@ -129,6 +129,33 @@ def test_the_first_error_that_was_logged_is_the_reason(tmp_path):
     assert sentence == "target: step failed at t = 0.2 s: pressure too high"
 
 
+def test_an_error_after_which_a_unit_went_on_is_reported_and_not_taken_for_the_reason(tmp_path):
+    class Slave(answering(ERROR, at=4)):
+        def connect(self, *args):
+            calls = super().connect(*args)
+
+            def step():
+                if self.time < 0.05:
+                    self.log.add(self.name, ERROR, "", "a glitch, never mind")
+                return calls.step()
+
+            return calls._replace(step=step)
+
+    sentence, results, _ = answer(tmp_path, Slave)
+    assert sentence == "target: step failed at t = 0.3 s: the FMU returned Error and gave no reason"
+
+    units = {"source": Clock(x=lambda t: 10.0 * t), "target": Passing()}
+    opener = Opener(units, "target", answering(OK, (ERROR, "a glitch, never mind")))
+    info = simulate(make_plan(units, ["source.x -> target.x"]), tmp_path, opener=opener)
+    assert [(m.unit, m.time, m.text) for m in info.warnings] == [("target", 0.2, "a glitch, never mind")]
+    assert [w["status"] for w in load_results(tmp_path).run["warnings"]] == ["Error"]
+
+
+def test_an_error_that_ended_the_run_is_no_warning_of_it(tmp_path):
+    _, results, _ = answer(tmp_path, answering(ERROR, (WARNING, "getting warm"), (ERROR, "too hot")))
+    assert [w["text"] for w in results.run["warnings"]] == ["getting warm"]
+
+
 def test_a_component_s_own_sentence_is_not_wrapped_in_another(tmp_path):
     text = (
         "step failed at t = 0.2 s: ValueError: 100 % too much: no (plants/a.py:7); inputs: x = 1.0, y = 2.0"
@@ -168,7 +195,9 @@ def test_a_warning_without_a_message_is_reported_too(tmp_path):
         make_plan(units, ["source.x -> target.x"]), tmp_path,
         opener=Opener(units, "target", answering(WARNING)),
     )  # fmt: skip
-    assert [(m.unit, m.text) for m in info.warnings] == [("target", "the step returned Warning")]
+    assert [(m.unit, m.text) for m in info.warnings] == [
+        ("target", "step: the FMU returned Warning and gave no reason")
+    ]
 
 
 def test_an_error_logged_during_initialization_ends_the_run_although_the_status_is_ok(tmp_path):

@@ -13,13 +13,16 @@ import fmpy
 import pytest
 
 from orchestrator.errors import ModelDescriptionError, SimulationError
+from orchestrator.master.isolation import Isolation
 from orchestrator.master.simulate import simulate
+from orchestrator.master.unit import FmuSlave
 from orchestrator.plan import Fmu, Plan, Unit, Variable, Wire
 from orchestrator.results.read import load_results
 
 HERE = Path(__file__).parent
 TYPES = ("Real", "Integer", "Boolean", "String")
 DISCARD, ERROR, FATAL = 2, 3, 4
+AT_THE_END = 100
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux")
 
@@ -117,6 +120,26 @@ def test_a_warning_with_printf_arguments_is_readable(fmu, held, tmp_path):
         ("b", 0.25, "valve 3 of b is 99.5% open, größer als gedacht")
     ]
     assert counters(fmu) == [2, 2, 2]
+
+
+@pytest.mark.parametrize("isolated", [False, True], ids=["together", "apart"])
+@pytest.mark.parametrize("answer", [-1, 42])
+def test_a_number_that_is_no_status_ends_the_run(fmu, answer, isolated, tmp_path):
+    plan = chain(fmu, answer)
+    with Isolation(plan.units) as isolation, pytest.raises(SimulationError) as caught:
+        simulate(plan, tmp_path / "out", opener=isolation if isolated else FmuSlave)
+    assert "b: step failed at t = 0.25 s: " in str(caught.value)
+    assert load_results(tmp_path / "out").time[-1] == 0.25
+
+
+@pytest.mark.parametrize(
+    ("answer", "word", "ended"), [(ERROR, "Error", [2, 2, 2]), (FATAL, "Fatal", [2, 1, 0])]
+)
+def test_an_instance_that_cannot_be_ended_is_reported(fmu, held, answer, word, ended, tmp_path):
+    info = simulate(chain(fmu, AT_THE_END + answer), tmp_path / "out")
+    assert [(m.unit, m.text) for m in info.warnings] == [("b", f"fmi2Terminate returned {word}")]
+    assert counters(fmu) == ended  # after Fatal no function of any instance may be called
+    assert load_results(tmp_path / "out").run["status"] == "completed"
 
 
 def test_an_fmu_that_refuses_to_be_instantiated_says_why(fmu, held, tmp_path):
