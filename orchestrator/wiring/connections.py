@@ -221,6 +221,13 @@ class Connector:
             of, to, what = source.type, target.type, "types"
         elif source.unit and target.unit and not same_unit(source.unit, target.unit):
             of, to, what = source.unit, target.unit, "units"
+        elif (
+            source.type == "Enumeration" and not (source.items or {}).items() <= (target.items or {}).items()
+        ):
+            of, to = (
+                listed(f"{name} {value}" for name, value in (v.items or {}).items()) for v in (source, target)
+            )
+            what = "enumerations"
         else:
             return
         self._report(key, ends.format(wire.source, wire.output, of, wire.target, wire.input, to, what))

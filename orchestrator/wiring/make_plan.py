@@ -6,7 +6,8 @@ before one given by a pattern. Whatever then has no source, or more than one, is
 value that an FMU carries for an input is never used in silence.
 
 Two units of measurement fit if they mean the same (N.m and Nm, m/s2 and m/s^2); where an FMU
-declares none, nothing can be checked and a note says so. Types must be equal.
+declares none, nothing can be checked and a note says so. Types must be equal, and an enumeration's
+items must all be among those of the input it feeds, with the same numbers.
 """
 
 from __future__ import annotations

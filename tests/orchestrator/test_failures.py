@@ -141,7 +141,7 @@ def test_an_error_after_which_a_unit_went_on_is_reported_and_not_taken_for_the_r
 
             return calls._replace(step=step)
 
-    sentence, results, _ = answer(tmp_path, Slave)
+    sentence, _, _ = answer(tmp_path, Slave)
     assert sentence == "target: step failed at t = 0.3 s: the FMU returned Error and gave no reason"
 
     units = {"source": Clock(x=lambda t: 10.0 * t), "target": Passing()}

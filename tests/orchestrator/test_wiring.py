@@ -521,6 +521,22 @@ def test_types_that_differ_over_equal_names_are_said(folder: Path) -> None:
     )
 
 
+def test_enumerations_fit_if_the_input_knows_every_item_by_the_same_number(folder: Path) -> None:
+    def feed(*items: str) -> Path:
+        mode = {"type": "Enumeration", "start": 1, "variability": "discrete"}
+        make_fmu(folder / "sensor.fmu", outputs=[out("road", items=items, **mode)])
+        make_fmu(
+            folder / "taker.fmu", inputs=[Var("road", items=("dry", "wet", "ice"), **mode)], outputs=["y"]
+        )
+        return scenario("  sensor: {fmu: sensor}\n  taker: {fmu: taker}\n", "")
+
+    assert len(plan(feed("dry", "wet")).wires) == 1
+    assert problems(feed("dry", "ice")) == [
+        "a.yaml:5: units.taker: cannot connect sensor.road [dry 1 and ice 2] to taker.road "
+        "[dry 1, wet 2 and ice 3]: the enumerations differ"
+    ]
+
+
 def test_a_real_algebraic_loop_is_said_with_its_path(folder: Path) -> None:
     make_fmu(
         folder / "plant_loop.fmu",
