@@ -71,7 +71,7 @@ def show(opinions: list[Opinion]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    console = Console(highlight=False, width=None if sys.stdout.isatty() else 140)
+    console = Console(highlight=False, markup=False, emoji=False, width=None if sys.stdout.isatty() else 140)
     found = [one for one in opinions if not one.problem]
     if found:
         table = Table("largest difference / range", box=None, pad_edge=False, header_style="bold")
@@ -92,7 +92,7 @@ def show(opinions: list[Opinion]) -> None:
         console.print()
     for one in opinions:
         if one.problem:
-            console.print(f"{one.master.title}: {one.problem}", markup=False)
+            console.print(f"{one.master.title}: {one.problem}")
         elif one.one_step or one.master.note:
             step = "compared with one step for all units: " if one.one_step else ""
-            console.print(f"{one.master.title}: {step}{one.master.note}", markup=False)
+            console.print(f"{one.master.title}: {step}{one.master.note}")

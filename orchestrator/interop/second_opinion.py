@@ -23,6 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..errors import WiringError
 from ..plan import Plan
 from .masters.request import Recording, Request
 from .ssp_write import write_ssp
@@ -111,9 +112,14 @@ def second_opinion(
         said: told what is being run.
 
     Raises:
+        WiringError: there is nothing to compare.
         ResultsError: the archive cannot be written.
         RuntimeError: our own run failed.
     """
+    if not _columns(plan):
+        raise WiringError(
+            f"{plan.title or 'this system'}: nothing to compare: no output of type Real is recorded"
+        )
     ours: dict[bool, tuple[Request, dict[str, Recording]]] = {}
     opinions = []
     for master in masters:
@@ -128,7 +134,7 @@ def second_opinion(
             found = {key: _run("own", at, folder) for key, at in _variants(request, pinned)}
             for one in found.values():
                 if isinstance(one, str):
-                    raise RuntimeError(one)
+                    raise RuntimeError(f"our own run of the archive has failed: {one}")
             ours[one_step] = request, {k: r for k, r in found.items() if isinstance(r, Recording)}
         request, own = ours[one_step]
         said(master.title)
@@ -143,9 +149,13 @@ def _request(plan: Plan, one_step: bool, folder: Path) -> Request:
         plan = replace(plan, units=tuple(replace(unit, period=1) for unit in plan.units))
     path = folder / ("one_step.ssp" if one_step else "system.ssp")
     write_ssp(plan, path)
+    return Request(str(path), float(plan.step), plan.n_steps, _columns(plan))
+
+
+def _columns(plan: Plan) -> list[tuple[str, str]]:
+    """Return what is compared: every recorded output of type Real."""
     units = {unit.name: unit.fmu for unit in plan.units}
-    columns = [(u, name) for u, name in plan.record if units[u].variables[name].type == "Real"]
-    return Request(str(path), float(plan.step), plan.n_steps, columns)
+    return [(u, name) for u, name in plan.record if units[u].variables[name].type == "Real"]
 
 
 def _variants(request: Request, pinned: bool) -> list[tuple[str, Request]]:
@@ -172,10 +182,11 @@ def _run(module: str, request: Request, folder: Path) -> Recording | str:
         return f"it did not end within {LIMIT:g} s"
     if done.returncode == 0 and answered.exists():
         return Recording.read(answered)
+    lines = done.stderr.decode(errors="replace").strip().splitlines()
     if done.returncode < 0:
         with suppress(ValueError):
-            return f"it died of {signal.Signals(-done.returncode).name}"
-    lines = done.stderr.decode(errors="replace").strip().splitlines()
+            name = signal.Signals(-done.returncode).name
+            return f"it died of {name}{'; before that it said: ' if lines else ''}{' '.join(lines[-2:])}"
     return lines[-1] if lines else f"it ended without a word, exit status {done.returncode}"
 
 
@@ -200,11 +211,11 @@ def differences(request: Request, own: np.ndarray, other: np.ndarray) -> dict[st
     """Return each signal's largest difference over its range in our run.
 
     One that stays constant but for rounding (`ROUNDING`) has no range: over its magnitude, over 1 if
-    that is 0. A row that the other master has no value for at all, such as the first, does not count;
-    a single value that is not finite counts as infinite.
+    that is 0. The first row does not count where the other master has no value for it at all; any
+    other value that is not finite counts as infinite.
     """
-    there = ~np.all(np.isnan(other), axis=1)
-    gap = np.abs(other[there] - own[there])
+    first = int(np.all(np.isnan(other[0])))
+    gap = np.abs(other[first:] - own[first:])
     gap = np.where(np.isfinite(gap), gap, np.inf)
     span, magnitude = np.ptp(own, axis=0), np.max(np.abs(own), axis=0)
     scale = np.where(span > ROUNDING * magnitude, span, np.where(magnitude > 0, magnitude, 1.0))

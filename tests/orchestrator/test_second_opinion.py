@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,18 @@ import pytest
 
 from fmus.build import build_all
 from orchestrator.cli import main
+from orchestrator.commands.second_opinion import show
+from orchestrator.errors import WiringError
 from orchestrator.interop import second_opinion as module
 from orchestrator.interop.masters.request import Recording, Request
-from orchestrator.interop.second_opinion import AGREEMENT, MASTERS, OtherMaster, differences, second_opinion
+from orchestrator.interop.second_opinion import (
+    AGREEMENT,
+    MASTERS,
+    Opinion,
+    OtherMaster,
+    differences,
+    second_opinion,
+)
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 
@@ -83,6 +93,25 @@ def test_differences_are_relative_to_the_range_and_infinite_where_a_value_is_mis
     other = own + np.array([[0.0, 0.0], [0.0, np.nan], [0.4, 0.0]])
     other[0] = np.nan  # this master has no value before its first step
     assert differences(request, own, other) == {"a.x": pytest.approx(0.1), "a.lost": np.inf}
+
+
+def test_a_master_that_gives_up_its_values_half_way_does_not_agree():
+    request = Request("x.ssp", 0.1, 2, [("a", "x")])
+    own = np.array([[0.0], [1.0], [2.0]])
+    assert differences(request, own, np.array([[np.nan], [1.0], [2.0]])) == {"a.x": 0.0}
+    assert differences(request, own, np.array([[0.0], [1.0], [np.nan]])) == {"a.x": np.inf}
+    assert differences(request, own, np.full((3, 1), np.nan)) == {"a.x": np.inf}
+
+
+def test_names_with_brackets_are_printed_whole(capsys):
+    show([Opinion(MASTERS[0], False, "", {"a.force[front]": 0.0}, {"theirs": 1e-6, "ours": 1e-6})])
+    assert "a.force[front]" in capsys.readouterr().out
+
+
+def test_a_system_without_recorded_reals_has_nothing_to_compare(fmus, tmp_path):
+    plan = replace(plan_of(fmus), record=())
+    with pytest.raises(WiringError, match="nothing to compare: no output of type Real is recorded"):
+        second_opinion(plan, tmp_path)
 
 
 def test_differences_of_a_signal_constant_but_for_rounding_are_relative_to_its_magnitude():
