@@ -48,16 +48,27 @@ def shadowed_modules(fmus: Mapping[str, Fmu], *, isolated: bool = False) -> list
 
 def _loaded_from_elsewhere(module: str, content: str, directory: Path) -> bool:
     """Return whether `module` is loaded, from other content than this unit's."""
-    loaded = getattr(sys.modules.get(module), "__file__", None)
-    if loaded is None or Path(loaded).is_relative_to(directory):
-        return False
-    file = Path(loaded)
-    home = file.parent.parent if file.name == "__init__.py" else file.parent
-    files = sorted(file.parent.rglob("*.py")) if file.name == "__init__.py" else [file]
+    homes = [home for home in _homes(module) if not home.is_relative_to(directory)]
+    return any(_content(home, module) != content for home in homes)
+
+
+def _homes(module: str) -> list[Path]:
+    """Return the folders that a loaded module comes from: several if it is a folder without __init__.py."""
+    loaded = sys.modules.get(module)
+    file = getattr(loaded, "__file__", None)
+    if file is not None:
+        return [Path(file).parents[1 if Path(file).name == "__init__.py" else 0]]
+    return [Path(folder).parent for folder in getattr(loaded, "__path__", ())]
+
+
+def _content(home: Path, module: str) -> str | None:
+    """Return the hash of a module's files as `description` makes it; None if they cannot be read."""
+    package = home / module
+    files = package.rglob("*.py") if package.is_dir() else [home / f"{module}.py"]
     digest = hashlib.sha256()
     try:
-        for path in files:
-            digest.update(path.relative_to(home).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+        for name, path in sorted((path.relative_to(home).as_posix(), path) for path in files):
+            digest.update(name.encode() + b"\0" + path.read_bytes() + b"\0")
     except OSError:
-        return True
-    return digest.hexdigest() != content
+        return None
+    return digest.hexdigest()

@@ -245,6 +245,26 @@ def test_a_unit_whose_module_is_loaded_already_is_refused(
     ]
 
 
+def test_a_unit_whose_folder_of_modules_is_loaded_from_another_archive_is_refused(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = {
+        "resources/slavemodule.txt": b"a_b",
+        "resources/a_b.py": b"",
+        "resources/fakes_ns/m.py": b"x = 1",
+    }
+    make_fmu(folder / "one.fmu", files=files)
+    (folder / "fakes_ns").mkdir()
+    loaded = folder / "fakes_ns" / "m.py"  # beside no __init__.py
+    loaded.write_text("x = 1")
+    monkeypatch.syspath_prepend(str(folder))
+    __import__("fakes_ns.m")
+    path = scenario(UNITS + "  a: {fmu: one}\n")
+    assert len(plan(path).units) == 5
+    loaded.write_text("x = 2")
+    assert "another Python module 'fakes_ns' is loaded in this process already" in problems(path)[0]
+
+
 # Parameters
 
 
