@@ -42,7 +42,7 @@ Isolate = Annotated[
     typer.Option(
         "--isolate",
         help="Give each unit a process of its own: if its FMU crashes or hangs, the run ends with "
-        "an error and the results so far. Same numbers; about 15 µs more per unit and step.",
+        "an error and the results so far. Same numbers; 30 to 70 µs more per unit and step.",
     ),
 ]
 CallLimit = Annotated[
