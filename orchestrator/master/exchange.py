@@ -3,8 +3,8 @@
 The Real values of a step, its time and its size lie in shared memory; two pipes carry single bytes:
 which of set, step and get are to be done, and how that ended. Such an exchange costs 7 us on one core
 and 50 us from core to core, most of it the two changes from one process to the other; a pair of pipes
-was the quickest of what tells the master at once that the other side has died. All else, and the messages that the
-FMU logs meanwhile, is a marked record of a few hundred bytes.
+was the quickest of what tells the master at once that the other side has died. All else, and the
+messages that the FMU logs meanwhile, is a marked record of a few hundred bytes.
 """
 
 from __future__ import annotations
