@@ -10,7 +10,7 @@ option, so that later messages name the option in place of a line.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from ..wording import hint, listed
@@ -21,8 +21,6 @@ RESERVED = ("vehicle", "inputs")
 """Words that `--set` understands in place of a unit."""
 OF_RUN = ("stop_time", "step_size", "algorithm")
 """What `--set` gives without a unit."""
-SET = f"write --set UNIT.PARAMETER=VALUE, or {listed(OF_RUN, last='or')}=VALUE"
-"""How to write it."""
 
 
 def is_path(fmu: str) -> bool:
@@ -30,16 +28,44 @@ def is_path(fmu: str) -> bool:
     return fmu.lower().endswith(".fmu") or "/" in fmu or "\\" in fmu
 
 
-def apply_swaps(document: Document, swaps: Iterable[str]) -> dict[str, str]:
-    """Replace FMUs; return the replaced one of each unit. Paths are relative to the working directory."""
-    replaced: dict[str, str] = {}
-    units = _mapping(document.data, "units")
+def _swaps(document: Document, swaps: Iterable[str]) -> Iterator[tuple[str, str, str]]:
+    """Yield option, unit and FMU of every --swap; report those that are none.
+
+    Paths are relative to the working directory.
+    """
     for text in swaps:
         option = f"--swap {text}"
         unit, equals, fmu = (part.strip() for part in text.partition("="))
-        if not (unit and equals and fmu):
+        if unit and equals and fmu:
+            yield option, unit, os.path.abspath(fmu) if is_path(fmu) else fmu
+        else:
             document.problems.append((0, f"{option}: write --swap UNIT=FMU"))
-            continue
+
+
+def _settings(document: Document, settings: Iterable[str]) -> Iterator[tuple[str, str, str, Any]]:
+    """Yield option, holder, name and value of every --set of a parameter; give the run what is meant for it.
+
+    Those that are none are reported.
+    """
+    for text in settings:
+        option = f"--set {text}"
+        target, equals, raw = (part.strip() for part in text.partition("="))
+        holder, dot, name = target.partition(".")
+        value = yaml_lines.scalar(raw)
+        if target in OF_RUN and equals:
+            _give(document, target, value, option)
+        elif holder and dot and name and equals:
+            yield option, holder, name, value
+        else:
+            sentence = f"write --set UNIT.PARAMETER=VALUE, or {listed(OF_RUN, last='or')}=VALUE"
+            document.problems.append((0, f"{option}: {sentence}"))
+
+
+def apply_swaps(document: Document, swaps: Iterable[str]) -> dict[str, str]:
+    """Replace FMUs; return the replaced one of each unit."""
+    replaced: dict[str, str] = {}
+    units = _mapping(document.data, "units")
+    for option, unit, fmu in _swaps(document, swaps):
         spec = units.get(unit)
         if not isinstance(spec, dict):
             sentence = f"{option}: the scenario has no unit {unit!r}"
@@ -47,7 +73,7 @@ def apply_swaps(document: Document, swaps: Iterable[str]) -> dict[str, str]:
             continue
         if isinstance(spec.get("fmu"), str):
             replaced.setdefault(unit, spec["fmu"])
-        spec["fmu"] = os.path.abspath(fmu) if is_path(fmu) else fmu
+        spec["fmu"] = fmu
         document.overrides[("units", unit, "fmu")] = option
     return replaced
 
@@ -55,17 +81,7 @@ def apply_swaps(document: Document, swaps: Iterable[str]) -> dict[str, str]:
 def apply_settings(document: Document, vehicle: Document, settings: Iterable[str]) -> None:
     """Set parameters of units, of the vehicle, and constants of inputs."""
     units = _mapping(document.data, "units")
-    for text in settings:
-        option = f"--set {text}"
-        target, equals, raw = (part.strip() for part in text.partition("="))
-        unit, dot, name = target.partition(".")
-        value = yaml_lines.scalar(raw)
-        if target in OF_RUN and equals:
-            _give(document, target, value, option)
-            continue
-        if not (unit and dot and name and equals):
-            document.problems.append((0, f"{option}: {SET}"))
-            continue
+    for option, unit, name, value in _settings(document, settings):
         if unit == "vehicle":
             _put(vehicle, (), "parameters", name, value, option)
         elif unit == "inputs":
@@ -82,22 +98,10 @@ def apply_settings(document: Document, vehicle: Document, settings: Iterable[str
 
 def apply_to_all_runs(document: Document, swaps: Iterable[str], settings: Iterable[str]) -> None:
     """Enter options into the `swap` and `set` of a file that has many runs of a scenario."""
-    for text in swaps:
-        option = f"--swap {text}"
-        unit, equals, fmu = (part.strip() for part in text.partition("="))
-        if unit and equals and fmu:
-            _put(document, (), "swap", unit, os.path.abspath(fmu) if is_path(fmu) else fmu, option)
-        else:
-            document.problems.append((0, f"{option}: write --swap UNIT=FMU"))
-    for text in settings:
-        option = f"--set {text}"
-        target, equals, raw = (part.strip() for part in text.partition("="))
-        if target in OF_RUN and equals:
-            _give(document, target, yaml_lines.scalar(raw), option)
-        elif "." in target and equals:
-            _put(document, (), "set", target, yaml_lines.scalar(raw), option)
-        else:
-            document.problems.append((0, f"{option}: {SET}"))
+    for option, unit, fmu in _swaps(document, swaps):
+        _put(document, (), "swap", unit, fmu, option)
+    for option, holder, name, value in _settings(document, settings):
+        _put(document, (), "set", f"{holder}.{name}", value, option)
 
 
 def apply_values(document: Document, values: Mapping[str, Any]) -> None:
