@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import shlex
+import subprocess
 from pathlib import Path
 
 import pytest
+
+HERE = Path(__file__).parent
 
 
 @pytest.fixture
@@ -13,3 +18,14 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "cache"
     monkeypatch.setenv("YAWBENCH_CACHE", str(folder))
     return folder
+
+
+@pytest.fixture(scope="session")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A compiled FMU library from elsewhere: it doubles its inputs, and answers a step as it is told."""
+    file = tmp_path_factory.mktemp("foreign") / "foreign.so"
+    compiler = shlex.split(os.environ.get("CC", "cc"))
+    include = HERE.parents[1] / "fmus"
+    source = HERE / "foreign.c"
+    subprocess.run([*compiler, "-shared", "-fPIC", "-w", f"-I{include}", source, "-o", file], check=True)
+    return file

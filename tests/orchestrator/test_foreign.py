@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shlex
-import subprocess
 import sys
 import zipfile
 from pathlib import Path
@@ -38,17 +35,6 @@ connections:
 KINDS = {"Real": 0.75, "Integer": -21, "Boolean": "true", "String": "größer"}
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux")
-
-
-@pytest.fixture(scope="module")
-def library(tmp_path_factory):
-    """The compiled library: it doubles what it is given, and answers a step as its parameter says."""
-    file = tmp_path_factory.mktemp("foreign") / "foreign.so"
-    compiler = shlex.split(os.environ.get("CC", "cc"))
-    include = HERE.parents[1] / "fmus"
-    source = HERE / "foreign.c"
-    subprocess.run([*compiler, "-shared", "-fPIC", "-w", f"-I{include}", source, "-o", file], check=True)
-    return file
 
 
 def description(*kinds):

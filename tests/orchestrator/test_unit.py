@@ -1,9 +1,6 @@
 """An FMU written in C behind the master: what does not come from PythonFMU."""
 
 import ctypes
-import os
-import shlex
-import subprocess
 import sys
 from dataclasses import replace
 from fractions import Fraction
@@ -25,17 +22,6 @@ DISCARD, ERROR, FATAL = 2, 3, 4
 AT_THE_END = 100
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux")
-
-
-@pytest.fixture(scope="session")
-def library(tmp_path_factory):
-    """The compiled library."""
-    file = tmp_path_factory.mktemp("foreign") / "foreign.so"
-    compiler = shlex.split(os.environ.get("CC", "cc"))
-    include = HERE.parents[1] / "fmus"
-    source = HERE / "foreign.c"
-    subprocess.run([*compiler, "-shared", "-fPIC", "-w", f"-I{include}", source, "-o", file], check=True)
-    return file
 
 
 @pytest.fixture
