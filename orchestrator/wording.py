@@ -44,6 +44,11 @@ def hint(name: str, valid: Iterable[str], *, lead: str) -> str:
     return f"; {lead}: {listed(names) or 'none'}"
 
 
+def counted(number: int, noun: str) -> str:
+    """Return "1 run", "2 runs"."""
+    return f"{number} {noun}{'s' * (number != 1)}"
+
+
 def fold(names: Sequence[str]) -> list[str]:
     """Return the names with every complete group of four wheels folded to one with `*`."""
     present = set(names)

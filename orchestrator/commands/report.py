@@ -46,6 +46,7 @@ def report(
     from ..studies.jobs import Outcome, pool
     from ..studies.study import all_tables, judge_study
     from ..studies.study_report import write_study
+    from ..wording import counted
     from .batch import print_tables, run_all, say, stoppable
     from .run import default_folder
 
@@ -67,8 +68,7 @@ def report(
         outcomes: list[Outcome] = []
         if not no_run:
             good = len(one.jobs) - len(work)
-            count = "1 run" if len(work) == 1 else f"{len(work)} runs"
-            say(f"{one.study.spec.title}: {count} to make, {good} with good results")
+            say(f"{one.study.spec.title}: {counted(len(work), 'run')} to make, {good} with good results")
             outcomes = run_all(work, one.folder, workers=jobs) if work else []
         with stoppable(one.folder), pool(jobs) as workers:
             findings = judge_study(one.study, one.folder, outcomes, each=workers.map)

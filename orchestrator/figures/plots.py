@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from ..errors import ResultsError
 from .display import digits_of
 from .panels import Panel, Run, shown_by
-from .style import RC, REFERENCE, ROW, frame, line_style
+from .style import RC, REFERENCE, ROW, frame, line_style, reference_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -103,10 +103,7 @@ def _legend(figure: Figure, runs: Sequence[Run]) -> list[Line2D]:
 
     several = len(runs) > 1
     handles = [Line2D([], [], label=run.label, **line_style(k)) for k, run in enumerate(runs) if several]
-    pale = [line for axes in figure.axes for line in axes.get_lines() if line.get_label() == "reference"]
-    if pale:
-        own = any(line.get_color() != REFERENCE["color"] for line in pale)
-        says = "wide and pale: the run's own reference" if own else "reference"
+    if says := reference_words(line for axes in figure.axes for line in axes.get_lines()):
         handles.append(Line2D([], [], label=says, **REFERENCE))
     return handles
 

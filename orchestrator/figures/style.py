@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 LINES: tuple[dict[str, Any], ...] = (
     {"color": "#0072B2", "linestyle": "-", "linewidth": 1.6},
@@ -89,6 +90,13 @@ def save(figure: Figure, stem: Path) -> list[Path]:
             reason = error.strerror or error
             raise ResultsError(f"{stem}: the figure cannot be written: {reason}.") from None
     return paths
+
+
+def reference_words(lines: Iterable[Line2D]) -> str | None:
+    """Return what the legend says of the pale lines among those drawn; None if there are none."""
+    pale = [line for line in lines if line.get_label() == "reference"]
+    own = any(line.get_color() != REFERENCE["color"] for line in pale)
+    return ("wide and pale: the run's own reference" if own else "reference") if pale else None
 
 
 def note_above(axes: Axes, note: str) -> None:

@@ -27,6 +27,7 @@ from ..studies.study import (
 )
 from ..studies.study_file import FIGURES
 from ..studies.tables import Cell, Table
+from ..wording import counted
 from .diagram import diagrams
 from .facts import anchor, animation_of, figure_of, fmus_of, programs_of
 from .provenance import count_kinds, groups_of
@@ -169,11 +170,10 @@ def definitions(findings: Findings) -> list[dict[str, str]]:
     found = []
     for spec in findings.study.spec.metrics.values():
         chosen = metric(spec.metric)
-        window = f", from {spec.window[0]:g} to {spec.window[1]:g} s" if spec.window else ""
         found.append(
             {
                 "heading": heading(spec),
-                "definition": f"{chosen.definition}{window}",
+                "definition": f"{chosen.definition}{spec.during('from ')}",
                 "formula": chosen.formula,
             }
         )
@@ -206,7 +206,7 @@ def grid_of_times(recorded: Any) -> list[str]:
             f"{run.get('algorithm')}, {1000 * run.get('step_size', 0):g} ms, until {run.get('stop_time'):g} s"
         )
         found[text] = found.get(text, 0) + 1
-    return [f"{text} ({count} {'run' if count == 1 else 'runs'})" for text, count in found.items()]
+    return [f"{text} ({counted(count, 'run')})" for text, count in found.items()]
 
 
 def _beside(path: Path, folder: Path) -> str:

@@ -16,7 +16,7 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from ..figures.panels import Panel, Run, draw_path, shown_by, thinned
-from ..figures.style import RC, REFERENCE, line_style
+from ..figures.style import RC, REFERENCE, line_style, reference_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -119,12 +119,8 @@ def _align(drawn: Sequence[Figure]) -> None:
 
 def _legend(runs: Sequence[Run], drawn: Sequence[Figure]) -> list[LegendEntry]:
     entries = [_entry(run.label, line_style(k)) for k, run in enumerate(runs) if len(runs) > 1]
-    pale = [
-        line for figure in drawn for line in figure.axes[0].get_lines() if line.get_label() == "reference"
-    ]
-    if pale:
-        own = any(line.get_color() != REFERENCE["color"] for line in pale)
-        entries.append(_entry("wide and pale: the run's own reference" if own else "reference", REFERENCE))
+    if says := reference_words(line for figure in drawn for line in figure.axes[0].get_lines()):
+        entries.append(_entry(says, REFERENCE))
     return entries
 
 

@@ -112,8 +112,7 @@ def heading(spec: MetricSpec) -> str:
     """Return the heading of a metric's column."""
     if spec.heading:
         return spec.heading
-    window = f", {spec.window[0]:g} to {spec.window[1]:g} s" if spec.window else ""
-    return f"{_metric(spec).formula}{window}"
+    return f"{_metric(spec).formula}{spec.during()}"
 
 
 def _metric(spec: MetricSpec) -> Metric:

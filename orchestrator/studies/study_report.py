@@ -98,8 +98,7 @@ def _markdown(findings: Findings, drawn: dict[str, Path]) -> str:
 def _definition(key: str, findings: Findings) -> str:
     spec = findings.study.spec.metrics[key]
     chosen = metric(spec.metric)
-    window = f", from {spec.window[0]:g} to {spec.window[1]:g} s" if spec.window else ""
-    return f"- {key}: {chosen.definition}{window}: `{chosen.formula}`"
+    return f"- {key}: {chosen.definition}{spec.during('from ')}: `{chosen.formula}`"
 
 
 def _record(findings: Findings, drawn: dict[str, Path]) -> dict[str, Any]:

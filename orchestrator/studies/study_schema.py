@@ -117,6 +117,10 @@ class MetricSpec(Strict):
     window: Window | None = Field(None, description="[from, to] in s; left out: the whole run")
     heading: str = Field("", description="Heading of its column; default: the formula")
 
+    def during(self, lead: str = "") -> str:
+        """Return the window as the end of a phrase: ", 1 to 6 s", after a `lead` such as "from "."""
+        return f", {lead}{self.window[0]:g} to {self.window[1]:g} s" if self.window else ""
+
 
 class TableSpec(Strict):
     """A table of metrics, one row per run."""

@@ -9,6 +9,7 @@ from ..figures.style import save
 from ..metrics.run_metrics import metric
 from ..studies.study import Each
 from ..studies.tables import Cell, Table, for_markdown
+from ..wording import counted
 from .figures import draw
 from .limits import limit_table
 from .schema import FigureSpec
@@ -59,10 +60,9 @@ def limit_tables(swept: Swept) -> list[Table]:
 def _page(swept: Swept, drawn: dict[str, str]) -> str:
     spec = swept.planned.sweep.spec
     runs, failed = swept.planned.runs, swept.failed
-    count = "1 run" if len(runs) == 1 else f"{len(runs)} runs"
     ended = f"; {len(failed)} failed" if failed else ""
     head = [f"# {spec.title}", "", *([spec.source, ""] if spec.source else [])]
-    head += [f"{count} of `{spec.scenario}`, one row each in `{TABLE}`{ended}.", ""]
+    head += [f"{counted(len(runs), 'run')} of `{spec.scenario}`, one row each in `{TABLE}`{ended}.", ""]
     parts = ["\n".join(head), for_markdown(_metrics(swept))]
     parts += [for_markdown(table) for table in limit_tables(swept)]
     parts += [f"![{title}]({path})\n" for title, path in drawn.items()]
@@ -78,7 +78,8 @@ def _metrics(swept: Swept) -> Table:
     table = Table("Metrics", ["column", "what it is", "", "unit"])
     for key, spec in swept.planned.sweep.spec.metrics.items():
         chosen = metric(spec.metric)
-        window = f", {spec.window[0]:g} to {spec.window[1]:g} s" if spec.window else ""
         unit = swept.unit(key)
-        table.rows.append([key, f"{chosen.definition}{window}", chosen.formula, "" if unit == "1" else unit])
+        table.rows.append(
+            [key, f"{chosen.definition}{spec.during()}", chosen.formula, "" if unit == "1" else unit]
+        )
     return table
