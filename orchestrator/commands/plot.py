@@ -57,12 +57,11 @@ def plot(
     from ..figures.style import save
     from ..results.read import load_results
     from ..studies.compare import FIGURES
+    from ..wording import counted
     from .batch import say
 
     if label and len(label) != len(sources):
-        given = (
-            f"{len(label)} label{'s' * (len(label) != 1)}, {len(sources)} folder{'s' * (len(sources) != 1)}"
-        )
+        given = f"{counted(len(label), 'label')}, {counted(len(sources), 'folder')}"
         raise ScenarioError(f"--label: needs one for each folder of results ({given})")
     folders = _recorded(sources, swap or [], set_ or [], fmus)
     labels = label or distinct(folders)
@@ -88,7 +87,7 @@ def _recorded(
     """
     from ..errors import ScenarioError
     from ..pages.freshness import staleness
-    from ..studies.jobs import Job, plan_of
+    from ..studies.jobs import Job, Once, plan_of
     from .batch import run_all
     from .run import default_folder
 
@@ -99,7 +98,8 @@ def _recorded(
         source: Job(source.stem, source, default_folder(source), tuple(swaps), tuple(settings), fmus=fmus)
         for source in scenarios
     }
-    stale = [job for job in jobs.values() if staleness(plan_of(job), job.out)]
+    once = Once()
+    stale = [job for job in jobs.values() if staleness(plan_of(job, once), job.out)]
     outcomes = run_all(stale, Path("results"), workers=None) if stale else []
     for outcome in outcomes:
         if not outcome.ok:

@@ -12,12 +12,13 @@ from ..figures.panels import shown_by
 from ..metrics.run_metrics import STANDARD, Value, metric
 from ..results.read import Results
 from ..studies.compare import FIGURES, Comparison
-from ..studies.jobs import Job
+from ..studies.jobs import Job, Once, planned
 from ..studies.tables import Cell, Table
+from ..wording import counted
 from .animation import MOST, assets
 from .diagram import diagrams
 from .divergence import SAME, SEEN, Divergence, Parting, divergence
-from .facts import animation_of, figure_of, fmus_of, made_by, planned, programs_of
+from .facts import animation_of, figure_of, fmus_of, made_by, programs_of
 from .provenance import count_kinds, groups_of
 from .rendering import render, style
 from .system import system_of
@@ -68,7 +69,8 @@ def compare_page(comparison: Comparison, jobs: Sequence[Job], *, title: str, com
     """Return the page of a comparison as HTML."""
     runs = comparison.runs
     recorded = [run.results for run in runs]
-    plans = [planned(job) for job in jobs]
+    once = Once()
+    plans = [planned(job, once) for job in jobs]
     groups = groups_of(plans)
     figures = [
         figure_of((name, name.replace("_", " ").capitalize(), runs, panels, (f"{name}.svg", f"{name}.png")))
@@ -104,7 +106,7 @@ def compare_page(comparison: Comparison, jobs: Sequence[Job], *, title: str, com
 def _summary(comparison: Comparison) -> str:
     count = len(comparison.runs)
     labels = ", ".join(run.label for run in comparison.runs)
-    return f"{count} {'run' if count == 1 else 'runs'}: {labels}." if count else "No run reached its end."
+    return f"{counted(count, 'run')}: {labels}." if count else "No run reached its end."
 
 
 def metric_facts(comparison: Comparison) -> dict[str, Any]:

@@ -11,11 +11,8 @@ from markupsafe import Markup
 
 from ..errors import ResultsError
 from ..figures.panels import Run
-from ..plan import Plan
 from ..results.read import Results
 from ..results.run_record import versions
-from ..scenario.load import Scenario, load_scenario
-from ..studies.jobs import Job, plan_of
 from .animation import fragment
 from .panel_images import LegendEntry, PanelImage, panel_images
 
@@ -53,24 +50,6 @@ def animation_of(runs: Sequence[tuple[str, Results]], title: str) -> Markup | No
         return fragment(runs, title=title)
     except ResultsError:
         return None
-
-
-def planned(job: Job) -> tuple[Scenario, Plan]:
-    """Return a job's scenario with all that is changed in it, and its plan.
-
-    Raises:
-        YawbenchError: the scenario or an FMU is wrong.
-    """
-    scenario = load_scenario(
-        job.scenario,
-        swaps=job.swaps,
-        settings=job.settings,
-        stop_time=job.stop_time,
-        step_size=job.step_size,
-        algorithm=job.algorithm,
-        vehicle=job.vehicle,
-    )
-    return scenario, plan_of(job)
 
 
 def fmus_of(recorded: Iterable[Results]) -> list[FmuFact]:

@@ -12,10 +12,10 @@ from ..plan import Plan
 from ..results.formats import RUN_FILE
 from ..scenario import yaml_lines
 from ..scenario.load import Scenario
-from ..studies.jobs import Job
+from ..studies.jobs import Job, Once, planned
 from ..studies.study_file import Study, load_study
 from .animation import assets
-from .facts import made_by, planned
+from .facts import made_by
 from .freshness import staleness
 from .rendering import render, style
 
@@ -66,7 +66,8 @@ def wanted(path: Path, folder: Path, *, fmus: Path | None, format: str) -> Wante
 
     study = load_study(path)
     jobs = {name: replace(run.job(folder, fmus), format=format) for name, run in study.runs.items()}
-    plans = {name: planned(job) for name, job in jobs.items()}
+    once = Once()
+    plans = {name: planned(job, once) for name, job in jobs.items()}
     found = {name: staleness(plans[name][1], job.out) for name, job in jobs.items()}
     return Wanted(study, folder, jobs, plans, {name: why for name, why in found.items() if why})
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from datetime import datetime
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -60,13 +61,15 @@ def versions() -> dict[str, str]:
     packages = ("yawbench", "fmpy", "pythonfmu", "numpy")
     return {
         "python": platform.python_version(),
-        **{package: _version(package) for package in packages},
+        **{package: version_of(package) for package in packages},
         "orchestrator": f"sources {sources_hash(OF_RESULTS)}",
         "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
     }
 
 
-def _version(package: str) -> str:
+@cache
+def version_of(package: str) -> str:
+    """Return the version of an installed package, "unknown" if it is none; the answer costs a millisecond."""
     try:
         return version(package)
     except PackageNotFoundError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import multiprocessing
 import os
 import signal
@@ -14,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import ResultsError, ScenarioError, YawbenchError
 from ..master.interrupts import StopFlag, interrupts
@@ -24,6 +25,9 @@ from ..results.read import Results, load_results
 from ..scenario import yaml_lines
 from ..scenario.yaml_lines import Document
 from ..wording import hint
+
+if TYPE_CHECKING:
+    from ..scenario.schema import Scenario
 
 GRACE = 5.0
 """Time that a process has to end, and a run to write what it has recorded [s]."""
@@ -75,25 +79,43 @@ NEEDED = ("orchestrator.wiring.make_plan", "orchestrator.master.simulate", "matp
 """Modules that take long to import."""
 
 
-def plan_of(
-    job: Job,
-    *,
-    read: Callable[..., Document] = yaml_lines.read,
-    open_: Callable[[Path], Fmu] | None = None,
-) -> Plan:
-    """Return the plan of a job's run.
+class Once:
+    """Files read and FMUs opened once for many plans."""
 
-    Args:
-        job: the job.
-        read, open_: how to read a YAML file and to open an FMU, for many plans of the same ones.
+    def __init__(self) -> None:
+        self._documents: dict[Path, Document] = {}
+        self._fmus: dict[Path, Fmu] = {}
+
+    def read(self, path: Path, *, what: str) -> Document:
+        """Return what `yaml_lines.read` does, a copy each time."""
+        if path not in self._documents:
+            self._documents[path] = yaml_lines.read(path, what=what)
+        return copy.deepcopy(self._documents[path])
+
+    def open(self, path: Path) -> Fmu:
+        """Return what `open_fmu` does."""
+        if path not in self._fmus:
+            from ..fmu.archive import open_fmu
+
+            self._fmus[path] = open_fmu(path)
+        return self._fmus[path]
+
+
+def plan_of(job: Job, once: Once | None = None) -> Plan:
+    """Return the plan of a job's run; `once` for many plans of the same files.
 
     Raises:
         YawbenchError: the scenario, an option or an FMU is wrong.
     """
-    from ..fmu.archive import open_fmu
+    return planned(job, once)[1]
+
+
+def planned(job: Job, once: Once | None = None) -> tuple[Scenario, Plan]:
+    """Return a job's scenario with all that is changed in it, and its plan (see `plan_of`)."""
     from ..scenario.load import load_scenario
     from ..wiring.make_plan import make_plan
 
+    once = once or Once()
     scenario = load_scenario(
         job.scenario,
         swaps=job.swaps,
@@ -102,18 +124,18 @@ def plan_of(
         step_size=job.step_size,
         algorithm=job.algorithm,
         vehicle=job.vehicle,
-        read=read,
+        read=once.read,
     )
     isolated = job.call_limit is not None
-    plan = make_plan(scenario, fmus=job.fmus, open_=open_ or open_fmu, isolated=isolated)
+    plan = make_plan(scenario, fmus=job.fmus, open_=once.open, isolated=isolated)
     if not job.record:
-        return plan
+        return scenario, plan
     recorded = {f"{unit}.{variable}": (unit, variable) for unit, variable in plan.record}
     unknown = [name for name in job.record if name not in recorded]
     if unknown:
         guess = hint(unknown[0], recorded, lead="recorded are")
         raise ScenarioError(f"{job.scenario}: {unknown[0]!r} is not recorded{guess}")
-    return replace(plan, record=tuple(recorded[name] for name in job.record))
+    return scenario, replace(plan, record=tuple(recorded[name] for name in job.record))
 
 
 def check(jobs: Sequence[Job]) -> None:
@@ -122,14 +144,15 @@ def check(jobs: Sequence[Job]) -> None:
     Raises:
         ScenarioError: with everything that is wrong with any of them, each problem once.
     """
-    problems = dict.fromkeys(problem for job in jobs for problem in _problems(job))
+    once = Once()
+    problems = dict.fromkeys(problem for job in jobs for problem in _problems(job, once))
     if problems:
         raise ScenarioError(problems)
 
 
-def _problems(job: Job) -> list[str]:
+def _problems(job: Job, once: Once) -> list[str]:
     try:
-        plan_of(job)
+        plan_of(job, once)
     except YawbenchError as error:
         return error.problems
     return []

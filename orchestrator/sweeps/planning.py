@@ -7,25 +7,21 @@ one key are one run, whatever file, folder or axis they come from.
 
 from __future__ import annotations
 
-import copy
 import hashlib
 import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from ..errors import ScenarioError, YawbenchError
-from ..fmu.archive import open_fmu
 from ..metrics.run_metrics import metric, results_to_be, unit_in
 from ..plan import Fmu, Plan
-from ..scenario import quantities, yaml_lines
-from ..scenario.yaml_lines import Document
+from ..results.run_record import version_of
+from ..scenario import quantities
 from ..sources import OF_METRICS, sources_hash
-from ..studies.jobs import Job, plan_of
+from ..studies.jobs import Job, Once, plan_of
 from ..studies.study_schema import si_number
 from .design import Level, Point
 from .schema import AxisSpec
@@ -84,7 +80,7 @@ def plan_sweep(
     Raises:
         ScenarioError: with everything that is wrong with any run, each problem once.
     """
-    once = _Once()
+    once = Once()
     metrics = [
         (key, spec.metric, list(spec.window) if spec.window else None)
         for key, spec in sweep.spec.metrics.items()
@@ -94,7 +90,7 @@ def plan_sweep(
     for number, point in enumerate(sweep.points):
         job = replace(sweep.job(number, out, fmus), call_limit=call_limit)
         try:
-            plan = plan_of(job, read=once.read, open_=once.open)
+            plan = plan_of(job, once)
             key = run_key(plan, metrics)
             runs.append(PlannedRun(number, point, replace(job, out=out / key[:12]), plan, key))
         except YawbenchError as error:
@@ -105,26 +101,6 @@ def plan_sweep(
         raise ScenarioError(_first(problems.values()))
     used = {unit.fmu.sha256: unit.fmu for run in runs for unit in run.plan.units}
     return Planned(sweep, runs, _units(sweep, runs), _metric_units(sweep, runs), used)
-
-
-class _Once:
-    """Files read and FMUs opened once for many plans."""
-
-    def __init__(self) -> None:
-        self._documents: dict[Path, Document] = {}
-        self._fmus: dict[Path, Fmu] = {}
-
-    def read(self, path: Path, *, what: str) -> Document:
-        """Return what `yaml_lines.read` does, a copy each time."""
-        if path not in self._documents:
-            self._documents[path] = yaml_lines.read(path, what=what)
-        return copy.deepcopy(self._documents[path])
-
-    def open(self, path: Path) -> Fmu:
-        """Return what `open_fmu` does."""
-        if path not in self._fmus:
-            self._fmus[path] = open_fmu(path)
-        return self._fmus[path]
 
 
 def _of_axis(sweep: Sweep, problem: str) -> tuple[str, str]:
@@ -144,15 +120,10 @@ def _first(problems: Iterable[str]) -> list[str]:
     return listed[:MANY] + more
 
 
-@cache
-def _version() -> str:
-    return version("yawbench")
-
-
 def run_key(plan: Plan, metrics: Any) -> str:
     """Return the hash of everything that a run's metrics follow from."""
     content = {
-        "yawbench": [_version(), sources_hash(OF_METRICS)],
+        "yawbench": [version_of("yawbench"), sources_hash(OF_METRICS)],
         "units": [[u.name, u.fmu.sha256, u.period, u.parameters, u.constants] for u in plan.units],
         "wires": [[w.source, w.output, w.target, w.input] for w in plan.wires],
         "record": plan.record,
