@@ -33,7 +33,7 @@ from pathlib import Path, PurePosixPath
 
 from ..errors import ModelDescriptionError
 from ..plan import Fmu
-from ..wording import closest, listed
+from ..wording import closest, listed, short
 from . import description as fmu_description
 
 FORMAT = 2
@@ -43,6 +43,7 @@ KEEP_DAYS = 60
 """An entry unused for so long is deleted when another is made."""
 
 _PLAIN_PATH = re.compile(r"[A-Za-z0-9_.~/\\: -]+")
+_FILE_NAME = re.compile(r"[^/\\:\x00-\x1f\x7f]{1,200}")
 _FILE_TIME = 946_684_800  # 2000-01-01, in s
 _DAMAGE = (
     zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, OSError, ValueError,
@@ -249,8 +250,14 @@ def _prune(folder: Path) -> None:
 
 
 def _check_binary(fmu: Fmu) -> None:
-    """Refuse an FMU that has no binary for this platform."""
+    """Refuse an FMU that has no binary for this platform, or names one outside the archive."""
     name, suffix = platform()
+    identifier = fmu.model_identifier
+    if not _FILE_NAME.fullmatch(identifier) or identifier in (".", ".."):
+        raise ModelDescriptionError(
+            f"{fmu.path}: modelIdentifier {short(identifier)} cannot name the library of an FMU: "
+            "allowed are letters, digits and _, at most 200"
+        )
     if (fmu.directory / "binaries" / name / (fmu.model_identifier + suffix)).is_file():
         return
     present = sorted(p.name for p in fmu.directory.glob("binaries/*") if any(p.iterdir()))

@@ -30,6 +30,8 @@ WRITTEN = 100
 """Warnings written into run.json; more are only counted."""
 KEPT = 1000
 """Messages kept per unit; a unit that goes on is only counted."""
+MASTER = "yawbench"
+"""Category of what the master has to say of a unit; always kept."""
 PROCESS = "yawbench process"
 """Category of the message that says how the process of an isolated unit ended; always kept."""
 
@@ -44,7 +46,7 @@ def known(status: int) -> int:
 
 @dataclass(frozen=True)
 class Message:
-    """One message of a unit; `time` [s] is the communication point before it."""
+    """One message of a unit; `time` [s] is the communication point before it, if none is said."""
 
     unit: str
     time: float
@@ -62,16 +64,21 @@ class Log:
         self._counts: Counter[str] = Counter()
         self.time = ctypes.c_double(0.0)  # [s], moved on by the master
 
-    def add(self, unit: str, status: int, category: str, text: str) -> None:
-        """Keep a message; those with the status OK are of no interest."""
+    def add(self, unit: str, status: int, category: str, text: str, time: float | None = None) -> None:
+        """Keep a message; those with the status OK are of no interest.
+
+        Args:
+            time: that it tells of [s]; default: the communication point before it.
+        """
         status = known(status)
         if status == OK:
             return
         self._counts[unit] += 1
-        if self._counts[unit] > KEPT and category != PROCESS:
+        if self._counts[unit] > KEPT and category not in (MASTER, PROCESS):
             self.dropped += 1
             return
-        self.messages.append(Message(unit, self.time.value, status, category, text.rstrip()))
+        at = self.time.value if time is None else time
+        self.messages.append(Message(unit, at, status, category, text.rstrip()))
 
     def errors(self, unit: str) -> list[Message]:
         """Return the unit's messages with a status worse than Warning, without tracebacks."""
@@ -84,18 +91,19 @@ class Log:
         return [m.text for m in self.messages if m.unit == unit and m.category == "traceback"]
 
     def warnings(self, ended_by: str | None = None) -> Iterable[Message]:
-        """Return what the units said while the run went on.
+        """Return what the units said while the run went on, after what the master had to say.
 
         That is warnings, and errors after which a unit went on as if there had been none.
 
         Args:
             ended_by: the unit whose errors ended the run, if one did: they are told elsewhere.
         """
-        return [
+        chosen = (
             m
             for m in self.messages
             if m.status == WARNING or (m.unit != ended_by and m.category != "traceback")
-        ]
+        )
+        return sorted(chosen, key=lambda m: m.category != MASTER)
 
     def record(self, ended_by: str | None = None) -> dict[str, Any]:
         """Return what run.json says of the warnings (see `warnings`)."""

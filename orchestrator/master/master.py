@@ -4,6 +4,10 @@ Per communication step it walks a flat program of calls (see `program`), looks o
 for values that are not finite, and copies what is recorded into a row: a few microseconds beside
 the units' own work. Time is k p / q with whole numbers, correctly rounded, so it neither drifts nor
 misses the end.
+
+A value on a wire that is not finite ends the run, for every unit behind it computes with it. One
+that is only recorded is a warning: FMUs put out NaN for "not available", and infinity for a time
+that never comes.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ from ..plan import Plan, Value
 from .failure import describe
 from .initialization import initialize
 from .interrupts import StopFlag
-from .log import OK, WARNING, Log
+from .log import MASTER, OK, WARNING, Log
 from .memory import Memory
 from .program import Operation, Programs
 from .unit import Slave, Status
@@ -57,6 +61,10 @@ class Master:
         self._recorded = np.array([memory.time_at, *real], np.intp)
         self._recorded_others = [key for key in plan.record if key not in memory.index]
         self._wires = [w for w in plan.wires if (w.source, w.output) in memory.index]
+        wired = {(w.source, w.output) for w in self._wires}
+        self._spare = {key: at for key, at in memory.index.items() if key not in wired}
+        """Outputs that are recorded and on no wire, all of whose values have been finite so far."""
+        self._expected = np.arange(memory.n_outputs)  # to be finite
         self._ones = np.ones(memory.n_outputs)
 
     def initialize(self, row: np.ndarray, others: list[list[Value]]) -> None:
@@ -151,18 +159,24 @@ class Master:
 
     def _note_warning(self, unit: str, what: str) -> None:
         """Keep a Warning of a unit that has said nothing so far."""
-        if not any(m.unit == unit for m in self.log.warnings()):
+        if not any(m.unit == unit and m.category != MASTER for m in self.log.warnings()):
             self.log.add(unit, WARNING, "", f"{what}: the FMU returned Warning and gave no reason")
 
     def _check_finite(self, k: int) -> None:
-        """Raise SimulationError for the first wire, in evaluation order, that is not finite."""
+        """Look for values that are not finite, which the sum of all outputs tells of.
+
+        Raises:
+            SimulationError: for the first wire, in evaluation order, that has such a value.
+        """
         memory = self.memory
+        if np.isfinite(memory.now[self._expected]).all():
+            return
+        time = self.plan.time(k)
         wires = sorted(self._wires, key=lambda w: memory.of[w.source].position)
         for wire in wires:
             value = memory.pool[memory.index[wire.source, wire.output]]
             if math.isfinite(value):
                 continue
-            time = self.plan.time(k)
             if self.log.errors(wire.source):
                 problem = describe(wire.source, "reading outputs", time, OK, self.log)
             else:
@@ -171,6 +185,11 @@ class Master:
                     f"on the wire {wire.source}.{wire.output} -> {wire.target}.{wire.input}"
                 )
             raise SimulationError(problem, unit=wire.source, time=time)
+        for (unit, name), at in list(self._spare.items()):
+            if not math.isfinite(value := memory.pool[at]):
+                del self._spare[unit, name]
+                self.log.add(unit, WARNING, MASTER, f"{name} is {_spelled(value)}; it is on no wire", time)
+                self._expected = self._expected[self._expected != at]
 
 
 _WORDS = {"set": "setting inputs", "step": "step", "get": "reading outputs"}

@@ -31,8 +31,8 @@ class _Relay(Log):
         super().__init__()
         self._channel = channel
 
-    def add(self, unit: str, status: int, category: str, text: str) -> None:
-        super().add(unit, status, category, text)
+    def add(self, unit: str, status: int, category: str, text: str, time: float | None = None) -> None:
+        super().add(unit, status, category, text, time)
         if status != OK:
             self._channel.send(LOG, (status, category, text))
 

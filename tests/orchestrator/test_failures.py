@@ -271,12 +271,53 @@ def test_a_nan_from_a_unit_that_has_logged_an_error_is_explained_by_it(tmp_path)
     assert sentence == "source: reading Real [17] failed at t = 0.5 s: KeyError: 17"
 
 
-def test_a_nan_that_is_only_recorded_does_not_stop_the_run(tmp_path):
-    units = {"source": Clock(x=lambda t: t, spare=lambda t: math.nan), "target": Passing()}
-    simulate(make_plan(units, ["source.x -> target.x"]), tmp_path, opener=Stage(units))
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
+@pytest.mark.parametrize(("begins", "time"), [(-1.0, 0.0), (0.45, 0.5)])
+def test_a_value_on_no_wire_that_is_not_finite_is_a_warning_with_its_first_time(
+    begins, time, algorithm, tmp_path
+):
+    units = {
+        "source": Clock(x=lambda t: t, spare=lambda t: math.nan if t > begins else t, more=lambda t: t),
+        "target": Passing(),
+    }
+    plan = make_plan(units, ["source.x -> target.x"], algorithm=algorithm)
+    info = simulate(plan, tmp_path, opener=Stage(units))
+    said = [(m.unit, m.time, m.text) for m in info.warnings]
+    assert said == [("source", time, "spare is not a number; it is on no wire")]
     results = load_results(tmp_path)
+    assert results.run["status"] == "completed"
+    assert [(w["unit"], w["time"]) for w in results.run["warnings"]] == [("source", time)]
     assert len(results.time) == 11
-    assert all(math.isnan(value) for value in results["source.spare"])
+    assert math.isnan(results["source.spare"][-1])
+
+
+def test_after_a_warning_of_one_value_all_others_are_still_looked_at(tmp_path):
+    units = {
+        "source": Clock(
+            x=lambda t: math.inf if t > 0.75 else t,
+            spare=lambda t: math.inf if t > 0.25 else t,
+            more=lambda t: -math.inf if t > 0.45 else t,
+        ),
+        "target": Passing(),
+    }
+    sentence, results, _ = fail(tmp_path, units, ["source.x -> target.x"])
+    assert sentence == "source: x is infinite at t = 0.8 s, on the wire source.x -> target.x"
+    assert [w["text"].split()[0] for w in results.run["warnings"]] == ["spare", "more"]
+    assert [w["time"] for w in results.run["warnings"]] == [0.3, 0.5]
+
+
+def test_a_value_on_no_wire_is_named_also_of_a_unit_that_floods_the_log(tmp_path):
+    def act(t):
+        for _ in range(2000):
+            stage.slaves["target"].log.add("target", WARNING, "", "hot")
+
+    units = {"source": Clock(x=lambda t: t), "target": Passing(act)}
+    units["target"].outputs = {"y": ("x",)}
+    units["target"].output = lambda t, u: {"y": math.nan if t > 0.5 else u["x"]}
+    stage = Stage(units)
+    info = simulate(make_plan(units, ["source.x -> target.x"]), tmp_path, opener=stage)
+    first = info.warnings[0]
+    assert (first.time, first.text) == (0.6, "y is not a number; it is on no wire")
 
 
 def test_a_nan_at_the_start_that_the_loop_heals_is_no_error(tmp_path):

@@ -351,3 +351,23 @@ def test_modules_of_a_pythonfmu_unit_are_listed_with_their_content(tmp_path: Pat
     assert set(first.python_modules) == {"entry", "helpers"}
     assert first.python_modules["entry"] == second.python_modules["entry"]
     assert first.python_modules["helpers"] != second.python_modules["helpers"]
+
+
+@pytest.mark.parametrize(
+    "identifier", ["../../../../outside/thief", "/tmp/thief", "a\\b", "a/b", "..", "C:thief", "x" * 300, ""]
+)
+def test_an_identifier_that_leads_out_of_the_archive_is_refused(
+    identifier: str, tmp_path: Path, cache: Path
+) -> None:
+    path = make_fmu(tmp_path / "a.fmu", outputs=[out("force", unit="N")])
+    with zipfile.ZipFile(path) as archive:
+        content = {name: archive.read(name) for name in archive.namelist()}
+    xml = content["modelDescription.xml"].decode()
+    assert 'modelIdentifier="a"' in xml
+    content["modelDescription.xml"] = xml.replace(
+        'modelIdentifier="a"', f'modelIdentifier="{identifier}"'
+    ).encode()
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, data in content.items():
+            archive.writestr(name, data)
+    assert "modelIdentifier" in problem(path)
