@@ -21,7 +21,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from components.core.roles import ROLES
+from components.fmi.roles import ROLES
 from orchestrator.errors import BuildError
 
 from .archive import pack, read_mark, to_bytes
@@ -134,7 +134,7 @@ def build_component(
 
     Args:
         file: inside `root`, or anywhere: then it imports the project's modules as
-            `components.core.<...>` and its own neighbours as `.<neighbour>`.
+            `components.<...>` and its own neighbours as `.<neighbour>`.
         role: folder of a role, such as "controllers"; if left out, the file's folder says it, or
             the file's name ("controller_idea.py").
         name: of the FMU; default `<role>_<file>`.

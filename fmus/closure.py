@@ -1,6 +1,6 @@
 """Which source files one FMU needs: the transitive closure of its imports, and nothing more.
 
-Only the closure is packed and only the closure is hashed, so touching `core/fuzzy.py` changes the
+Only the closure is packed and only the closure is hashed, so touching `mathematics/fuzzy.py` changes the
 FMUs that use it and no other. Imports are read from the syntax tree; nothing is executed. Every
 absolute import must be of the standard library, because the host's Python may have nothing else.
 Two are allowed and made relative: `components.<...>`, as a file outside this project writes it, and
@@ -62,12 +62,19 @@ class Sources:
             seen.add(parts)
             found = self._module(parts)
             if found is None:
-                raise BuildError(f"{where}there is no module {'.'.join(parts)} in {self.root}")
+                raise BuildError(
+                    f"{where}there is no module {'.'.join(parts)} in {self.root}{self._namesake(parts)}"
+                )
             waiting += [(parts[:i], where) for i in range(len(parts))]  # the packages above it
             is_package = self._file(parts).name == "__init__.py"
             files["/".join((*parts, "__init__") if is_package else parts) + ".py"] = found.text
             waiting += found.imports
         return dict(sorted(files.items()))
+
+    def _namesake(self, parts: Parts) -> str:
+        """Return where a module of this name stands, as the end of a sentence; names are used once."""
+        found = [file.relative_to(self.root).with_suffix("") for file in self.root.glob(f"*/{parts[-1]}.py")]
+        return "".join(f"; did you mean components.{'.'.join(file.parts)}?" for file in found[:1])
 
     def _file(self, parts: Parts) -> Path:
         """Return the file of a module or package, whether or not it exists."""
@@ -167,7 +174,7 @@ def _check_standard(name: str, where: str) -> None:
 
 
 def _make_relative(lines: list[str], node: ast.ImportFrom, *, levels: int) -> None:
-    """Rewrite `from components.core.x` or `from pythonfmu.x` in place, keeping the line."""
+    """Rewrite `from components.fmi.x` or `from pythonfmu.x` in place, keeping the line."""
     line = lines[node.lineno - 1].encode()
     head, tail = line[: node.col_offset].decode(), line[node.col_offset :].decode()
     dots = "." * levels

@@ -20,7 +20,7 @@ import pythonfmu
 import pythonfmu.fmi2slave
 from pythonfmu import FmuBuilder
 
-from components.core.roles import Role, wheels
+from components.fmi.roles import Role, wheels
 from orchestrator.errors import BuildError
 
 from .closure import Parts
@@ -49,7 +49,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.variables import changed
+from ..fmi.variables import changed
 from .{module} import {component} as Base
 
 
@@ -107,7 +107,7 @@ class Stage:
         """
         name = f"{self.package}.{'.'.join(module)}"
         try:
-            base = importlib.import_module(f"{self.package}.core.component").Component
+            base = importlib.import_module(f"{self.package}.fmi.component").Component
             loaded = importlib.import_module(name)
         except (Exception, SystemExit) as error:
             raise BuildError(self.explain(error)) from None
@@ -149,7 +149,7 @@ class Stage:
         return f"{type(error).__name__}: {error}{where}"
 
 
-_MACHINERY = ("core/component.py", "core/variables.py")
+_MACHINERY = ("fmi/component.py", "fmi/variables.py")
 """What finds a wrong declaration, but is not where it stands."""
 
 
@@ -182,7 +182,7 @@ def variant(component: type[Any], name: str, defaults: Mapping[str, Any]) -> str
     parameters = {v.name: v for v in component.variables if v.causality == "parameter"}
     annotation = {"Real": "float", "Integer": "int", "Boolean": "bool", "String": "str"}
     package = component.__module__.partition(".")[0]
-    check = importlib.import_module(f"{package}.core.variables").check_parameter
+    check = importlib.import_module(f"{package}.fmi.variables").check_parameter
     fields = []
     for key, value in defaults.items():
         if key not in parameters:

@@ -7,7 +7,7 @@
 
 so braking is regenerative up to the motor's limit, and friction does the rest.
 
-How delay and lag are solved exactly, whatever the step: `core.lag`.
+How delay and lag are solved exactly, whatever the step: `mathematics.first_order_lag`.
 
 Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, equations
 (14), (15). Erratum: printed with exp(+k s), which would be an advance. The paper names no values.
@@ -17,9 +17,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.component import Component
-from ..core.lag import Stage
-from ..core.variables import output, parameter
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter
+from ..mathematics.first_order_lag import Stage
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
     F_i = s_i M_z / arm_i      s_fl = s_l n_l    s_rl = s_l (1 - n_l)       n front shares per side
                                s_fr = s_r n_r    s_rr = s_r (1 - n_r)       s_l + s_r = 1
 
-so sum(F_i arm_i) = M_z; see `core.moment_sharing` for arms near zero. The driver's force comes on
+so sum(F_i arm_i) = M_z; see `control_laws.moment_sharing` for arms near zero. The driver's force comes on
 top, equal left and right as from one pedal, in fixed parts front and rear.
 
 Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
@@ -14,10 +14,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.component import Component
-from ..core.moment_sharing import add_drive_force, share_moment
-from ..core.variables import output, parameter, signal
-from ..core.wheel_kinematics import lever_arms
+from ..cars.wheel_kinematics import lever_arms
+from ..control_laws.moment_sharing import add_drive_force, share_moment
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter, signal
 
 
 @dataclass(frozen=True)

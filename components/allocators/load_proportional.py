@@ -3,12 +3,12 @@
     F_i = F_zi / sum(F_z) M_z / arm_i      arm_fl = a sin(delta) - d/2 cos(delta)    arm_rl = -d/2
                                            arm_fr = a sin(delta) + d/2 cos(delta)    arm_rr =  d/2
 
-so sum(F_i arm_i) = M_z; see `core.moment_sharing` for arms near zero. The driver's force comes on
+so sum(F_i arm_i) = M_z; see `control_laws.moment_sharing` for arms near zero. The driver's force comes on
 top, equal left and right as from one pedal, shared between the axles like their loads. A car
 without any load on its wheels asks for no force.
 
 `side_forces` offers paper B's two other ways to the same moment: one force per side of the car, split
-between its front and rear wheel in proportion to their loads (`core.side_forces`; paper B, equation
+between its front and rear wheel in proportion to their loads (`control_laws.side_forces`; paper B, equation
 (29) without the factor 1/2 that contradicts (25), (26)).
 
 Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
@@ -21,12 +21,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..core.component import Component
-from ..core.moment_sharing import NO_FORCE, Four, add_drive_force, share_moment
-from ..core.roles import wheels
-from ..core.side_forces import SIDE_FORCES, load_share, share_sides
-from ..core.variables import output, parameter, signal
-from ..core.wheel_kinematics import lever_arms
+from ..cars.wheel_kinematics import lever_arms
+from ..control_laws.moment_sharing import NO_FORCE, Four, add_drive_force, share_moment
+from ..control_laws.side_forces import SIDE_FORCES, load_share, share_sides
+from ..fmi.component import Component
+from ..fmi.roles import wheels
+from ..fmi.variables import output, parameter, signal
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Turn the yaw moment into one force per side, split between front and rear in fixed parts.
 
-The law stands in `core.side_forces`. The driver's force comes on top, equal left and right, and is
+The law stands in `control_laws.side_forces`. The driver's force comes on top, equal left and right, and is
 no part of the moment asked for: with steered front wheels it turns the car by itself, as it does
 without any control.
 
@@ -12,11 +12,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.component import Component
-from ..core.moment_sharing import add_drive_force
-from ..core.side_forces import SIDE_FORCES, share_sides
-from ..core.variables import output, parameter, signal
-from ..core.wheel_kinematics import lever_arms
+from ..cars.wheel_kinematics import lever_arms
+from ..control_laws.moment_sharing import add_drive_force
+from ..control_laws.side_forces import SIDE_FORCES, share_sides
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter, signal
 
 
 @dataclass(frozen=True)

@@ -32,10 +32,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.component import Component
-from ..core.moment_sharing import NO_FORCE, Four, add_drive_force, share_moment
-from ..core.variables import output, parameter, signal
-from ..core.wheel_kinematics import lever_arms
+from ..cars.wheel_kinematics import lever_arms
+from ..control_laws.moment_sharing import NO_FORCE, Four, add_drive_force, share_moment
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter, signal
 
 FL, FR, RL, RR = range(4)
 LEFT = (FL, RL)

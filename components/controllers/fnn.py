@@ -40,9 +40,9 @@ from dataclasses import dataclass
 from math import dist, tanh
 from operator import mul
 
-from ..core.component import Component
-from ..core.fuzzy import gaussian_grades
-from ..core.variables import output, parameter
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter
+from ..mathematics.fuzzy import gaussian_grades
 
 N_SETS = 7
 CENTRES = tuple((j - 3) / 3.0 for j in range(N_SETS))

@@ -14,19 +14,19 @@ well below one, or the moment chatters from sample to sample; with the defaults 
 
 Source: Xie, Li, Zheng, Pei, Synthesized feedback control of the ESP system based on fuzzy
 technology, section 3. Its tables 1, 2 and all factors were lost or not given: see
-`core.rule_tables`, and chosen values below.
+`control_laws.rule_tables`, and chosen values below.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.component import Component
-from ..core.fuzzy import FIVE, Mamdani, Partition
-from ..core.pid import Pid
-from ..core.rule_tables import FIVE_BY_FIVE
-from ..core.sliding_mode import limit
-from ..core.variables import output, parameter
+from ..control_laws.rule_tables import FIVE_BY_FIVE
+from ..control_laws.sliding_surface import limit
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter
+from ..mathematics.fuzzy import FIVE, Mamdani, Partition
+from ..mathematics.pid_loop import Pid
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
     M = PID(r_ref - r) + PID(beta - beta_ref)         K_x = max(K_x0 + range_x f_x(e, de/dt), 0)
 
 for x = p, i, d of each loop, e = r_ref - r and beta_ref - beta with their filtered rates. f is a Mamdani
-system of seven triangular sets per variable (`core.rule_tables.PID_GAINS`), one for both loops; the
+system of seven triangular sets per variable (`control_laws.rule_tables.PID_GAINS`), one for both loops; the
 centroid reaches +-8/9 of a range.
 
 The table read. Its dK_p is antisymmetric: as printed, gains rise for e < 0 and fall for e > 0, so left and
@@ -18,12 +18,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.component import Component
-from ..core.fuzzy import SEVEN, Mamdani, Partition
-from ..core.pid import Gains, Pid, YawLoops
-from ..core.rule_tables import PID_GAINS
-from ..core.sliding_mode import limit
-from ..core.variables import output, parameter
+from ..control_laws.rule_tables import PID_GAINS
+from ..control_laws.sliding_surface import limit
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter
+from ..mathematics.fuzzy import SEVEN, Mamdani, Partition
+from ..mathematics.pid_loop import Gains, Pid, YawLoops
 from .pid import SEEN, PidParameters, base_gains
 
 

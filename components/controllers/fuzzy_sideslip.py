@@ -22,9 +22,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.component import Component
-from ..core.fuzzy import SEVEN, Mamdani, Partition
-from ..core.variables import output, parameter
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter
+from ..mathematics.fuzzy import SEVEN, Mamdani, Partition
 
 RULES = """
     NB NB NB NB NM NS ZO

@@ -1,6 +1,6 @@
 """Fuzzy sliding-mode yaw-moment control: the gains of the reaching law follow steering and friction.
 
-The law stands in `core.sliding_mode`, here always with the saturation of equation (24). A Mamdani
+The law stands in `control_laws.sliding_surface`, here always with the saturation of equation (24). A Mamdani
 system with five sets per variable sets eps and k_d from |delta| and mu by one table for both: small
 gains on a slippery road and going straight, where a strong law only shakes the car, large ones in a
 sharp turn on a good road. The centroid spans about 0.08 to 0.92 of each gain's range.
@@ -13,10 +13,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core import sliding_mode
-from ..core.component import Component
-from ..core.fuzzy import Mamdani, Partition
-from ..core.variables import output, parameter
+from ..control_laws import sliding_surface
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter
+from ..mathematics.fuzzy import Mamdani, Partition
 
 LABELS = "SS S M B BB"
 
@@ -50,7 +50,7 @@ class FuzzySlidingModeParameters:
         0.1, "rad/s", "Half width Delta of the boundary layer; chosen: about 6 deg/s", minimum=0.0
     )
     sideslip_weight: float = parameter(
-        -0.25, "1/s", "Weight w of the sideslip error; negative, see core.sliding_mode; chosen"
+        -0.25, "1/s", "Weight w of the sideslip error; negative, see control_laws.sliding_surface; chosen"
     )
     yaw_inertia: float = parameter(1343.1, "kg.m2", "Yaw inertia I_z; paper B, table 1", minimum=1.0)
     moment_limit: float = parameter(
@@ -79,10 +79,10 @@ class FuzzySlidingMode(Component):
 
     Parameters = FuzzySlidingModeParameters
     sampled = True
-    inputs = (*sliding_mode.ERRORS, "velocity_x", "steer_angle", "friction")
+    inputs = (*sliding_surface.ERRORS, "velocity_x", "steer_angle", "friction")
     outputs = (
-        output("yaw_moment", *sliding_mode.ERRORS, "velocity_x", "steer_angle", "friction"),
-        output("sliding_surface", *sliding_mode.SURFACE, unit="rad/s", text="Sliding surface s"),
+        output("yaw_moment", *sliding_surface.ERRORS, "velocity_x", "steer_angle", "friction"),
+        output("sliding_surface", *sliding_surface.SURFACE, unit="rad/s", text="Sliding surface s"),
         output("reaching_rate", "steer_angle", "friction", unit="rad/s2", text="Gain eps as set on line"),
         output("reaching_gain", "steer_angle", "friction", unit="1/s", text="Gain k_d as set on line"),
     )
@@ -92,8 +92,8 @@ class FuzzySlidingMode(Component):
 
     def output(self, t, u):
         p = self.p
-        s, equivalent = sliding_mode.surface(u[:7], p.sideslip_weight)
+        s, equivalent = sliding_surface.surface(u[:7], p.sideslip_weight)
         eps, k_d = self.gains(u[9], abs(u[8]))
-        switched = sliding_mode.saturation(s, p.boundary_layer)
-        moment = sliding_mode.demand(s, equivalent, switched, eps=eps, k_d=k_d, i_z=p.yaw_inertia)
-        return sliding_mode.limit(moment, p.moment_limit, u[7], p.fade_speed), s, eps, k_d
+        switched = sliding_surface.saturation(s, p.boundary_layer)
+        moment = sliding_surface.demand(s, equivalent, switched, eps=eps, k_d=k_d, i_z=p.yaw_inertia)
+        return sliding_surface.limit(moment, p.moment_limit, u[7], p.fade_speed), s, eps, k_d

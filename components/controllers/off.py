@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..core.component import Component
+from ..fmi.component import Component
 
 
 class Off(Component):

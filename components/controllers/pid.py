@@ -3,7 +3,8 @@
     M = PID(r_ref - r) + PID(beta - beta_ref)
 
 A positive moment raises the yaw rate and lowers the sideslip. How the loops integrate, differentiate
-and share their limit: `core.pid`. The moment fades out below walking pace, where sideslip means nothing.
+and share their limit: `mathematics.pid_loop`. The moment fades out below walking pace, where sideslip
+means nothing.
 
 Source: Nie, Xiong, Pan, Multi-condition co-simulations of vehicle stability control via fuzzy PID
 algorithm, Journal of Dynamics and Control 19(3), 2021, section 2.1, which names no gains.
@@ -13,10 +14,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.component import Component
-from ..core.pid import Gains, YawLoops
-from ..core.sliding_mode import limit
-from ..core.variables import output, parameter
+from ..control_laws.sliding_surface import limit
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter
+from ..mathematics.pid_loop import Gains, YawLoops
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Sliding-mode yaw-moment control with constant gains, the baseline of paper B.
 
-The law stands in `core.sliding_mode`. Its switching function is the sign, as in the paper's
+The law stands in `control_laws.sliding_surface`. Its switching function is the sign, as in the paper's
 baseline, or the saturation of equation (24) with the same constant gains: the second shows how
 much of the fuzzy controller's calm the boundary layer alone achieves.
 
@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core import sliding_mode
-from ..core.component import Component
-from ..core.variables import output, parameter
+from ..control_laws import sliding_surface
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class SlidingModeParameters:
         0.1, "rad/s", "Half width Delta of the boundary layer; chosen: about 6 deg/s", minimum=0.0
     )
     sideslip_weight: float = parameter(
-        -0.25, "1/s", "Weight w of the sideslip error; negative, see core.sliding_mode; chosen"
+        -0.25, "1/s", "Weight w of the sideslip error; negative, see control_laws.sliding_surface; chosen"
     )
     yaw_inertia: float = parameter(1343.1, "kg.m2", "Yaw inertia I_z; paper B, table 1", minimum=1.0)
     moment_limit: float = parameter(
@@ -49,20 +49,20 @@ class SlidingMode(Component):
 
     Parameters = SlidingModeParameters
     sampled = True
-    inputs = (*sliding_mode.ERRORS, "velocity_x")
+    inputs = (*sliding_surface.ERRORS, "velocity_x")
     outputs = (
-        output("yaw_moment", *sliding_mode.ERRORS, "velocity_x"),
-        output("sliding_surface", *sliding_mode.SURFACE, unit="rad/s", text="Sliding surface s"),
+        output("yaw_moment", *sliding_surface.ERRORS, "velocity_x"),
+        output("sliding_surface", *sliding_surface.SURFACE, unit="rad/s", text="Sliding surface s"),
     )
 
     def output(self, t, u):
         p = self.p
-        s, equivalent = sliding_mode.surface(u[:7], p.sideslip_weight)
+        s, equivalent = sliding_surface.surface(u[:7], p.sideslip_weight)
         if p.switching == "sign":
-            switched = sliding_mode.sign(s)
+            switched = sliding_surface.sign(s)
         else:
-            switched = sliding_mode.saturation(s, p.boundary_layer)
-        moment = sliding_mode.demand(
+            switched = sliding_surface.saturation(s, p.boundary_layer)
+        moment = sliding_surface.demand(
             s, equivalent, switched, eps=p.reaching_rate, k_d=p.reaching_gain, i_z=p.yaw_inertia
         )
-        return sliding_mode.limit(moment, p.moment_limit, u[7], p.fade_speed), s
+        return sliding_surface.limit(moment, p.moment_limit, u[7], p.fade_speed), s

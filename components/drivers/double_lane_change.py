@@ -8,8 +8,8 @@
 
 l wheelbase, K stability factor: the driver knows how the car steers while its tyres are linear. With a
 car that followed at once, the path would be approached as by an oscillator of
-sqrt(2) / T_p and damping ratio 0.7. The path and the cones: `core.lane_change`. The speed:
-`core.speed_holding`.
+sqrt(2) / T_p and damping ratio 0.7. The path and the cones: `driving.lane_change`. The speed:
+`driving.speed_holding`.
 
 `path_offset` is the car's own distance from the path, `cone_overrun` how far the body is beyond the cones.
 
@@ -22,12 +22,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, sin
 
-from ..core.component import Component
-from ..core.lag import Stage
-from ..core.lane_change import LaneChangeParameters, Track
-from ..core.single_track import SingleTrackCar
-from ..core.speed_holding import HeldSpeedParameters, SpeedHold
-from ..core.variables import output, parameter
+from ..cars.single_track_car import SingleTrackCar
+from ..driving.lane_change import LaneChangeParameters, Track
+from ..driving.speed_holding import HeldSpeedParameters, SpeedHold
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter
+from ..mathematics.first_order_lag import Stage
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.component import Component
-from ..core.variables import parameter
+from ..fmi.component import Component
+from ..fmi.variables import parameter
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
     delta_h(t) = amplitude (t - start_time) / ramp_time,   held at 0 before and at the amplitude after
     delta(t) = delta_h(t) / steering_ratio
 
-A ramp time of zero makes it a step. The speed is held by default (`core.speed_holding`).
+A ramp time of zero makes it a step. The speed is held by default (`driving.speed_holding`).
 
 Source: Nie, Xiong, Pan, Multi-condition co-simulations of vehicle stability control via fuzzy PID
 algorithm, Journal of Dynamics and Control 19(3), 2021, section 3.3: 1.5 rad, reached in 2 s.
@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.component import Component
-from ..core.speed_holding import HeldSpeedParameters, SpeedHold
-from ..core.variables import parameter, signal
+from ..driving.speed_holding import HeldSpeedParameters, SpeedHold
+from ..fmi.component import Component
+from ..fmi.variables import parameter, signal
 
 
 @dataclass(frozen=True)

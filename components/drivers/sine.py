@@ -4,7 +4,7 @@
     delta(t) = delta_h(t) / steering_ratio
 
 With the default steering ratio of one the amplitude is that of the road wheels. The speed is held if
-`speed_gain` says so (`core.speed_holding`).
+`speed_gain` says so (`driving.speed_holding`).
 
 Stimuli live in a unit, not in the master, so that they are exact at every instant and not
 quantised to whole communication steps.
@@ -15,9 +15,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..core.component import Component
-from ..core.speed_holding import SpeedHold, SpeedHoldingParameters
-from ..core.variables import parameter, signal
+from ..driving.speed_holding import SpeedHold, SpeedHoldingParameters
+from ..fmi.component import Component
+from ..fmi.variables import parameter, signal
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@
     F_zr = (m g a + h X) / 2L -/+ (K_r phi + C_r dphi + h_r Y_r) / d
 
 with a_x = dv_x - v_y r, a_y = dv_y + v_x r, dotted quantities written with a d, phi positive with the
-left side up, X, Y_f, Y_r, M the resultants of the tyre forces (`core.plane_body`). phi belongs to the
+left side up, X, Y_f, Y_r, M the resultants of the tyre forces (`cars.plane_body`). phi belongs to the
 sprung mass; v_x, v_y, a_x, a_y to the point of the roll axis below the centre of mass, which is what the
 paper calls the centre of mass. The pair (1), (4) is solved for a_y and ddphi exactly. A wheel that
 lifts has no load; the other wheel of its axle then carries the axle.
@@ -24,21 +24,21 @@ is for km/h; the printed roll stiffness 5600 lies barely above m_s g h_s. The pa
 fl, fr, rr, rl.
 
 How it couples, and why nothing but the front wheels' slip depends directly on an input: as in
-`plants.seven_dof`. The equations stand in `core.rolling_body`. How they are solved over a step with
-held forces: roll exactly (`core.oscillator`), so any roll stiffness goes with any step, plane motion by
-`core.plane_body`, wheels by `core.wheel_spin`.
+`plants.seven_dof`. The equations stand in `cars.rolling_body`. How they are solved over a step with
+held forces: roll exactly (`mathematics.oscillator`), so any roll stiffness goes with any step, plane
+motion by `cars.plane_body`, wheels by `cars.wheel_spin`.
 """
 
 from __future__ import annotations
 
-from ..core import carry
-from ..core.car_signals import INPUTS, MOTION, WHEELS, initial_motion, motion_outputs, wheel_outputs
-from ..core.component import Component
-from ..core.oscillator import transition
-from ..core.plane_body import move, resultants
-from ..core.rolling_body import RollingCarParameters, RollModel, accelerations, longitudinal, vertical_loads
-from ..core.wheel_kinematics import wheel_velocities
-from ..core.wheel_spin import spin_wheels
+from ..cars.car_signals import INPUTS, MOTION, WHEELS, initial_motion, motion_outputs, wheel_outputs
+from ..cars.plane_body import move, resultants
+from ..cars.rolling_body import RollingCarParameters, RollModel, accelerations, longitudinal, vertical_loads
+from ..cars.wheel_kinematics import wheel_velocities
+from ..cars.wheel_spin import spin_wheels
+from ..fmi.component import Component
+from ..mathematics import carry
+from ..mathematics.oscillator import transition
 
 
 class EightDof(Component):

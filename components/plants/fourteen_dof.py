@@ -5,9 +5,9 @@
     J dw_i/dt = T_i - F_xi R                                                           (c)
 
 with X, Y the sums of the tyre forces in vehicle axes, v_x, v_y the velocity of the car's centre of mass.
-Yaw, roll, pitch, heave and the vertical motion of the wheels are those of `core.ride`, equations
+Yaw, roll, pitch, heave and the vertical motion of the wheels are those of `cars.ride`, equations
 (1)-(11): springs, dampers, anti-roll bars, roll centres, tyre springs that cannot pull. Slips are those
-of the contact points, which move with body and wheels (`core.contact_points`).
+of the contact points, which move with body and wheels (`cars.contact_points`).
 
 Stands in for a multi-body model. Degrees of freedom and assumptions as in T. Shim, C. Ghike,
 Understanding the limitations of different vehicle models for roll dynamics studies, Vehicle System
@@ -21,8 +21,8 @@ Drag acts at the centre of mass, rolling resistance as in `plants.eight_dof`.
 How it couples. Vertical loads follow from the tyre springs, that is from the state: there is no loop of
 loads and forces here. Nothing but the front wheels' slip and longitudinal velocity follows an input
 directly; tyre forces and torques belong to the middle of the step, accelerations are carried to
-its end (`core.carry`), as in `plants.seven_dof`. Solved over a step with held forces: plane motion by
-`core.plane_body`, wheels by `core.wheel_spin`, the rest by Runge-Kutta, in substeps where the
+its end (`mathematics.carry`), as in `plants.seven_dof`. Solved over a step with held forces: plane motion by
+`cars.plane_body`, wheels by `cars.wheel_spin`, the rest by Runge-Kutta, in substeps where the
 springs are stiff or the step is long.
 """
 
@@ -30,16 +30,16 @@ from __future__ import annotations
 
 from math import degrees, pi
 
-from ..core import carry
-from ..core.car_signals import INPUTS, MOTION, WHEELS, initial_motion, motion_outputs, wheel_outputs
-from ..core.component import Component
-from ..core.contact_points import contact, contact_velocities
-from ..core.plane_body import move
-from ..core.resistance import resistance
-from ..core.ride import AT_REST, RESOLVED, loads, move_ride
-from ..core.sprung_car import FourteenDofParameters, G, ride_of
-from ..core.variables import output
-from ..core.wheel_spin import spin_wheels
+from ..cars.car_signals import INPUTS, MOTION, WHEELS, initial_motion, motion_outputs, wheel_outputs
+from ..cars.contact_points import contact, contact_velocities
+from ..cars.plane_body import move
+from ..cars.resistance import resistance
+from ..cars.ride import AT_REST, RESOLVED, loads, move_ride
+from ..cars.sprung_car import FourteenDofParameters, G, ride_of
+from ..cars.wheel_spin import spin_wheels
+from ..fmi.component import Component
+from ..fmi.variables import output
+from ..mathematics import carry
 
 ROLLED_OVER = 0.25 * pi
 """Roll or pitch [rad] from which on these equations are wrong; chosen: half way on to its side."""

@@ -14,7 +14,7 @@ carries the axle, so the loads always add up to m g. Roll, pitch and suspension 
 
 Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
 FNN, equations (5)-(8), (13)-(20). Ours differs: the lifted wheel; slips at rest, see
-`core.wheel_kinematics`. Errata: (7) prints the rear-track term with the opposite sign;
+`cars.wheel_kinematics`. Errata: (7) prints the rear-track term with the opposite sign;
 (13)-(16) print sideslip for yaw rate; (17), (18) print b where a is meant.
 
 How it couples. Tyre forces and wheel torques enter the integration only: they are held over the
@@ -22,9 +22,10 @@ step, and a master that knows this hands over their values at its middle. The st
 the slip angles directly, so its value belongs to the end of the step; the forces are turned
 by the mean of it and the last one. The loads follow from the accelerations, these from the
 forces and these from the loads: to leave that loop open, the accelerations, known at the middle
-of each step, are carried on to its end along the straight line nearest to the last three (`core.carry`).
+of each step, are carried on to its end along the straight line nearest to the last three
+(`mathematics.carry`).
 All of this is exact to second order in the step, which may vary. The body's motion is solved by
-`core.plane_body`, the wheels' by `core.wheel_spin`, which also says what becomes of slow, braked wheels.
+`cars.plane_body`, the wheels' by `cars.wheel_spin`, which also says what becomes of slow, braked wheels.
 """
 
 from __future__ import annotations
@@ -32,14 +33,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..core import carry
-from ..core.car_signals import INPUTS, MOTION, WHEELS, initial_motion, motion_outputs, wheel_outputs
-from ..core.component import Component
-from ..core.load_transfer import quasi_static_loads
-from ..core.plane_body import Four, move, resultants
-from ..core.variables import parameter
-from ..core.wheel_kinematics import wheel_velocities
-from ..core.wheel_spin import spin_wheels
+from ..cars.car_signals import INPUTS, MOTION, WHEELS, initial_motion, motion_outputs, wheel_outputs
+from ..cars.load_transfer import quasi_static_loads
+from ..cars.plane_body import Four, move, resultants
+from ..cars.wheel_kinematics import wheel_velocities
+from ..cars.wheel_spin import spin_wheels
+from ..fmi.component import Component
+from ..fmi.variables import parameter
+from ..mathematics import carry
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class SevenDofParameters:
     slip_stiffness_per_load: float = parameter(
         15.0,
         "1",
-        "Slip stiffness over load for slow wheels, see core.wheel_spin; chosen: paper A's tyre at rest",
+        "Slip stiffness over load for slow wheels, see cars.wheel_spin; chosen: paper A's tyre at rest",
         minimum=0.0,
     )
 

@@ -5,7 +5,7 @@
                 + d/2 (F_yfl - F_yfr) sin(delta) + M                                      (2)
 
 Each wheel has its own slip angle and its own load, quasi-static from a_y = Y / m
-(`core.load_transfer`, a_x = 0: whatever holds the speed loads no axle). The wheels roll freely:
+(`cars.load_transfer`, a_x = 0: whatever holds the speed loads no axle). The wheels roll freely:
 longitudinal slip is 0, and longitudinal tyre forces, which the role has as inputs, are left out as in
 the paper. The controller's yaw moment M acts on the body from outside.
 
@@ -17,7 +17,7 @@ Source: Xie, Li, Zheng, Pei, Synthesized feedback control of the ESP system base
 
 How it couples. Tyre forces and the yaw moment enter the integration only, at the middle of the step; the
 steer angle feeds the front slip angles directly. The lateral acceleration, known at the middle of each
-step, is carried to its end (`core.carry`), which leaves the loop of loads and forces open, as in
+step, is carried to its end (`mathematics.carry`), which leaves the loop of loads and forces open, as in
 `plants.seven_dof`. With held forces r is linear and v_y a parabola, both exact; the path is taken by
 Gauss's rule with two points.
 """
@@ -27,13 +27,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, sin
 
-from ..core import carry
-from ..core.car_signals import MOTION, initial_motion, motion_outputs
-from ..core.component import Component
-from ..core.load_transfer import quasi_static_loads
-from ..core.plane_body import Motion
-from ..core.variables import output, parameter
-from ..core.wheel_kinematics import earth_velocity, slip_angle, wheel_velocities
+from ..cars.car_signals import MOTION, initial_motion, motion_outputs
+from ..cars.load_transfer import quasi_static_loads
+from ..cars.plane_body import Motion
+from ..cars.wheel_kinematics import earth_velocity, slip_angle, wheel_velocities
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter
+from ..mathematics import carry
 
 _GAUSS = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
 

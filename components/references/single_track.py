@@ -1,6 +1,6 @@
 """Reference from the linear single-track model, dynamic or in its steady state, limited by friction.
 
-    the model of core.single_track,        |delta| <= share mu g / (v r/delta)     `limit_steer_angle`
+    the model of cars.single_track_car,        |delta| <= share mu g / (v r/delta)     `limit_steer_angle`
     r_ref    = r limited to                +-share mu g / v                        `limit_yaw_rate`, (17)
     beta_ref = beta limited to             +-atan(c mu), c = 0.02 g                `limit_sideslip`, (18)
 
@@ -27,10 +27,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import atan, exp
 
-from ..core.component import Component
-from ..core.integrators import rk4
-from ..core.single_track import SingleTrackCar
-from ..core.variables import output, parameter, signal
+from ..cars.single_track_car import SingleTrackCar
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter, signal
+from ..mathematics.integrators import rk4
 
 G = 9.81  # m/s2
 

@@ -22,8 +22,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.component import Component
-from ..core.variables import output, parameter, signal
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter, signal
 
 G = 9.81  # m/s2
 SMALLEST = 1e-3

@@ -1,15 +1,15 @@
 """Magic Formula tyre, 2002 form: load dependence, combined slip, aligning moment, friction per wheel.
 
-The formulae, their source and what stands for friction are described in `core/magic_formula.py`,
-the default set, of a 205/60R15, in `core/magic_formula_parameters.py`.
+The formulae, their source and what stands for friction are described in `tyre_models/pacejka_2002.py`,
+the default set, of a 205/60R15, in `tyre_models/pacejka_2002_set.py`.
 """
 
 from __future__ import annotations
 
-from ..core.component import Component
-from ..core.magic_formula import forces_moment_stiffness
-from ..core.magic_formula_parameters import MagicFormulaParameters, coefficients
-from ..core.variables import output
+from ..fmi.component import Component
+from ..fmi.variables import output
+from ..tyre_models.pacejka_2002 import forces_moment_stiffness
+from ..tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
 
 _INPUTS = ("slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*")
 

@@ -1,19 +1,19 @@
 """Magic Formula tyre, original form of 1987: the set many papers use, combined slip by similarity.
 
-The formulae and their sources are described in `core/magic_formula_1987.py`. There is no aligning
+The formulae and their sources are described in `tyre_models/bakker_1987.py`. There is no aligning
 moment: the set has none.
 """
 
 from __future__ import annotations
 
-from ..core.component import Component
-from ..core.magic_formula_1987 import (
+from ..fmi.component import Component
+from ..fmi.variables import output
+from ..tyre_models.bakker_1987 import (
     MagicFormula1987Parameters,
     coefficients_1987,
     forces_stiffness_1987,
     loaded_tyre,
 )
-from ..core.variables import output
 
 _INPUTS = ("slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*")
 

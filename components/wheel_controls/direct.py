@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.component import Component
-from ..core.variables import output, parameter
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.component import Component
-from ..core.lag import Stage
-from ..core.variables import output, parameter
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter
+from ..mathematics.first_order_lag import Stage
 
 
 @dataclass(frozen=True)

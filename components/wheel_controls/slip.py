@@ -1,7 +1,7 @@
 """Wheel torque by sliding-mode slip control, with the curve of the tyre it is told of.
 
-The law is described in `core/slip_control.py`. It needs the tyre's F_x(kappa) at the present slip angle,
-load and friction; this unit evaluates the very functions that the tyre units evaluate, so no table is
+The law is described in `control_laws.slip_control`. It needs the tyre's F_x(kappa) at the present slip
+angle, load and friction; this unit evaluates the very functions that the tyre units evaluate, so no table is
 typed in. Give it the same parameters as the tyre, as a scenario's vehicle file does by itself.
 
 Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, equations (31)-(38).
@@ -13,12 +13,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from ..core.component import Component
-from ..core.magic_formula import lateral_slip, longitudinal_curve, longitudinal_force
-from ..core.magic_formula_1987 import MagicFormula1987Parameters, coefficients_1987, forces_1987, loaded_tyre
-from ..core.magic_formula_parameters import MagicFormulaParameters, coefficients
-from ..core.slip_control import Curve, SlipControlParameters, wheel_torque
-from ..core.variables import output, parameter
+from ..control_laws.slip_control import Curve, SlipControlParameters, wheel_torque
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter
+from ..tyre_models.bakker_1987 import MagicFormula1987Parameters, coefficients_1987, forces_1987, loaded_tyre
+from ..tyre_models.pacejka_2002 import lateral_slip, longitudinal_curve, longitudinal_force
+from ..tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
 from ..tyres.dugoff import DugoffParameters, dugoff
 from ..tyres.linear import LinearTyreParameters, limit_to_friction, linear_tyre
 

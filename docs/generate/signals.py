@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from components.core import roles, signals
-from components.core.roles import ROLES
-from components.core.signals import SIGNALS
+from components.fmi import roles, signals
+from components.fmi.roles import ROLES
+from components.fmi.signals import SIGNALS
 
 from .text import NOTE, cell, code, docstring, table
 

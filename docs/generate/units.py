@@ -7,7 +7,7 @@ import io
 import zipfile
 from typing import Any
 
-from components.core.roles import ROLES
+from components.fmi.roles import ROLES
 from fmus.build import HERE, find_components
 from orchestrator.wording import fold
 

@@ -24,7 +24,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from xml.etree import ElementTree
 
-from components.core.roles import ROLES
+from components.fmi.roles import ROLES
 from orchestrator.errors import BuildError
 from orchestrator.fmu.archive import platform
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
-from components.core.roles import Role
+from components.fmi.roles import Role
 from orchestrator.errors import BuildError
 
 from ..staging import missing_signals

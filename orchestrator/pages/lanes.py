@@ -6,7 +6,7 @@
 
 The right borders of lanes 1 and 5 lie on one line, that of lane 3 by the lane offset to its left; y = 0 is
 the middle of lane 1. Source: ISO 3888-1. The same track as the driver's own
-(`components/core/lane_change.py`), to which the tests hold it.
+(`components/driving/lane_change.py`), to which the tests hold it.
 """
 
 from __future__ import annotations

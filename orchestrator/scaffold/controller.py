@@ -49,7 +49,7 @@ def controller_files(name: str, language: Language, places: Layout) -> dict[Pure
         "fmu": f"controller_{name}",
         "title": title(name),
         "class_name": class_name(name),
-        "core": "." if places.in_checkout else "components",
+        "components": "." if places.in_checkout else "components",
         "source": places.source,
         "levels": len(places.test.parts) - 1,
         "vehicle": "../vehicles/in_wheel_motor_car.yaml" if places.in_checkout else "",

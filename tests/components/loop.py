@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from components.core.component import Component
+from components.fmi.component import Component
 
 
 class Unit:

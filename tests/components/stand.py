@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from components.core.component import Component
+from components.fmi.component import Component
 
 
 class Stand:

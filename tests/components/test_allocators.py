@@ -9,9 +9,9 @@ import pytest
 
 from components.allocators.fixed_share import FixedShare
 from components.allocators.load_proportional import LoadProportional
-from components.core.moment_sharing import share_moment
-from components.core.roles import WHEELS
-from components.core.wheel_kinematics import lever_arms
+from components.cars.wheel_kinematics import lever_arms
+from components.control_laws.moment_sharing import share_moment
+from components.fmi.roles import WHEELS
 
 from .stand import Stand
 

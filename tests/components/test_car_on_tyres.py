@@ -10,10 +10,10 @@ from math import isfinite, log2, pi, sin
 import numpy as np
 import pytest
 
-from components.core.component import Component
-from components.core.roles import WHEELS
-from components.core.variables import parameter
 from components.drivers.sine import Sine
+from components.fmi.component import Component
+from components.fmi.roles import WHEELS
+from components.fmi.variables import parameter
 from components.plants.seven_dof import SevenDof, SevenDofParameters
 from components.tyres.dugoff import Dugoff
 from components.tyres.linear import LinearTyre

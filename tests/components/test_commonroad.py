@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from components.core.component import Component
-from components.core.roles import WHEELS
-from components.core.variables import output, parameter
+from components.fmi.component import Component
+from components.fmi.roles import WHEELS
+from components.fmi.variables import output, parameter
 from components.plants.fourteen_dof import FourteenDof
 
 from .loop import Loop

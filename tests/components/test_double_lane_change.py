@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from components.core.lane_change import LaneChangeParameters, Track
 from components.drivers.double_lane_change import DoubleLaneChange
+from components.driving.lane_change import LaneChangeParameters, Track
 
 from .stand import Stand
 

@@ -7,13 +7,13 @@ from math import atan, cos, exp, hypot, pi, sin, sqrt, tan
 import numpy as np
 import pytest
 
-from components.core.magic_formula import forces_and_moment
-from components.core.magic_formula_parameters import MagicFormulaParameters, coefficients
-from components.core.rolling_body import G, RollingCarParameters
-from components.core.wheel_spin import spin
+from components.cars.rolling_body import G, RollingCarParameters
+from components.cars.wheel_spin import spin
 from components.drivers.sine import Sine
 from components.plants.eight_dof import EightDof
 from components.plants.seven_dof import SevenDof
+from components.tyre_models.pacejka_2002 import forces_and_moment
+from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
 from components.tyres.dugoff import Dugoff
 from components.tyres.magic_formula import MagicFormula
 

@@ -11,10 +11,10 @@ from components.actuators.lag import Lag
 from components.allocators.side_share import SideShare
 from components.controllers.fuzzy_sliding_mode import FuzzySlidingMode
 from components.controllers.sliding_mode import SlidingMode
-from components.core.magic_formula import forces_and_moment
-from components.core.magic_formula_parameters import MagicFormulaParameters, coefficients
 from components.plants.eight_dof import EightDof
 from components.references.single_track import SingleTrack
+from components.tyre_models.pacejka_2002 import forces_and_moment
+from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
 
 CAR = Path(__file__).parents[2] / "scenarios" / "vehicles" / "four_wheel_drive_car.yaml"
 UNITS = (SingleTrack, SlidingMode, FuzzySlidingMode, SideShare, Lag, EightDof)

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from skfuzzy import control, trimf
 
-from components.core import fuzzy
-from components.core.fuzzy import FIVE, SEVEN, Mamdani, Partition, clipped_pair, gaussian_grades
+from components.mathematics import fuzzy
+from components.mathematics.fuzzy import FIVE, SEVEN, Mamdani, Partition, clipped_pair, gaussian_grades
 
 STANDARD_7X7 = """
     NB NB NB NB NM NS ZO

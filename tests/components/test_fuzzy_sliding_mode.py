@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from components.control_laws.sliding_surface import ERRORS
 from components.controllers.fuzzy_sliding_mode import FuzzySlidingMode
 from components.controllers.sliding_mode import SlidingMode
-from components.core.sliding_mode import ERRORS
 
 from .stand import Stand
 

@@ -7,7 +7,7 @@ from math import exp
 import pytest
 
 from components.actuators.lag import Lag, blend
-from components.core.lag import relax
+from components.mathematics.first_order_lag import relax
 
 from .stand import Stand
 

@@ -10,15 +10,15 @@ from math import atan, cos, degrees, exp, hypot, isfinite, pi, radians, sin, sqr
 import pytest
 from scipy.optimize import minimize_scalar
 
-from components.core.magic_formula import (
+from components.tyre_models.pacejka_2002 import (
     forces_and_moment,
     lateral_slip,
     longitudinal_curve,
     longitudinal_force,
     practical_slip,
 )
-from components.core.magic_formula_parameters import MagicFormulaParameters, coefficients
-from components.core.slip_curve import slip_stiffness
+from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
+from components.tyre_models.slip_curve import slip_stiffness
 from components.tyres.magic_formula import MagicFormula
 
 from .stand import Stand

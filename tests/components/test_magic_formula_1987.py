@@ -7,13 +7,13 @@ from math import atan, atan2, cos, exp, hypot, isfinite, pi, radians, sin, tan
 
 import pytest
 
-from components.core.magic_formula_1987 import (
+from components.tyre_models.bakker_1987 import (
     MagicFormula1987Parameters,
     coefficients_1987,
     forces_1987,
     loaded_tyre,
 )
-from components.core.slip_curve import slip_stiffness
+from components.tyre_models.slip_curve import slip_stiffness
 from components.tyres.magic_formula_1987 import MagicFormula1987
 
 from .stand import Stand

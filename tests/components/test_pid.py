@@ -9,7 +9,7 @@ import pytest
 from components.controllers.fuzzy_feedback import FuzzyFeedback
 from components.controllers.fuzzy_pid import FuzzyPid, GainSchedule
 from components.controllers.pid import PidController
-from components.core.pid import Gains, Pid
+from components.mathematics.pid_loop import Gains, Pid
 
 from .stand import Stand
 

@@ -8,9 +8,9 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 import pytest
 
-from components.core.contact_points import contact, contact_velocities
-from components.core.ride import AT_REST, RESOLVED, loads, move_ride, rates
-from components.core.sprung_car import FourteenDofParameters, G, ride_of
+from components.cars.contact_points import contact, contact_velocities
+from components.cars.ride import AT_REST, RESOLVED, loads, move_ride, rates
+from components.cars.sprung_car import FourteenDofParameters, G, ride_of
 
 from . import monolith_c
 

@@ -7,7 +7,7 @@ from math import atan2, cos, isfinite, sin
 import numpy as np
 import pytest
 
-from components.core.roles import WHEELS
+from components.fmi.roles import WHEELS
 from components.plants.seven_dof import SevenDof, SevenDofParameters, vertical_loads
 
 from .stand import Stand

@@ -8,8 +8,8 @@ import pytest
 
 from components.allocators.load_proportional import LoadProportional
 from components.allocators.side_share import SideShare
-from components.core.side_forces import SIDE_FORCES
-from components.core.wheel_kinematics import lever_arms
+from components.cars.wheel_kinematics import lever_arms
+from components.control_laws.side_forces import SIDE_FORCES
 
 from .stand import Stand
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from components.core.single_track import SingleTrackCar
+from components.cars.single_track_car import SingleTrackCar
 from components.references.single_track import G, SingleTrack, SingleTrackParameters
 from components.references.steady_state import SteadyState
 

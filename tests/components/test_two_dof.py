@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from components.core.component import Component
-from components.core.load_transfer import quasi_static_loads
-from components.core.magic_formula_1987 import (
+from components.cars.load_transfer import quasi_static_loads
+from components.drivers.sine import Sine
+from components.fmi.component import Component
+from components.fmi.roles import ROLES, WHEELS, wheels
+from components.fmi.variables import parameter
+from components.plants.two_dof import TwoDof, TwoDofParameters
+from components.tyre_models.bakker_1987 import (
     MagicFormula1987Parameters,
     coefficients_1987,
     forces_1987,
     loaded_tyre,
 )
-from components.core.roles import ROLES, WHEELS, wheels
-from components.core.variables import parameter
-from components.drivers.sine import Sine
-from components.plants.two_dof import TwoDof, TwoDofParameters
 from components.tyres.linear import LinearTyre
 from components.tyres.magic_formula_1987 import MagicFormula1987
 

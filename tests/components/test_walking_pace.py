@@ -7,13 +7,13 @@ from math import log2
 import numpy as np
 import pytest
 
-from components.core.magic_formula import forces_and_moment
-from components.core.magic_formula_parameters import MagicFormulaParameters, coefficients
-from components.core.roles import WHEELS
 from components.drivers.sine import Sine
+from components.fmi.roles import WHEELS
 from components.plants.eight_dof import EightDof
 from components.plants.fourteen_dof import FourteenDof
 from components.plants.seven_dof import SevenDof
+from components.tyre_models.pacejka_2002 import forces_and_moment
+from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
 from components.tyres.dugoff import Dugoff
 from components.tyres.linear import LinearTyre
 from components.tyres.magic_formula import MagicFormula

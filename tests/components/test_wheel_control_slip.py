@@ -8,11 +8,11 @@ from math import isfinite, pi, sin
 import pytest
 from scipy.optimize import brentq
 
-from components.core.component import Component
-from components.core.slip_control import SlipControlParameters, slip_torque, wheel_torque
-from components.core.slip_curve import slip_for_force, slip_stiffness
-from components.core.variables import output
+from components.control_laws.slip_control import SlipControlParameters, slip_torque, wheel_torque
+from components.fmi.component import Component
+from components.fmi.variables import output
 from components.plants.eight_dof import EightDof
+from components.tyre_models.slip_curve import slip_for_force, slip_stiffness
 from components.tyres.dugoff import Dugoff
 from components.tyres.linear import LinearTyre
 from components.tyres.magic_formula import MagicFormula

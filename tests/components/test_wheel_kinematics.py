@@ -7,7 +7,7 @@ from math import atan2, cos, hypot, isfinite, pi, radians, sin
 import numpy as np
 import pytest
 
-from components.core.wheel_kinematics import (
+from components.cars.wheel_kinematics import (
     earth_velocity,
     lever_arms,
     slip_angle,

@@ -10,7 +10,7 @@ from urllib.parse import unquote
 import pytest
 import typer
 
-from components.core.signals import SIGNALS
+from components.fmi.signals import SIGNALS
 from docs.generate import schemas
 from docs.generate.formulas import to_mathml
 from docs.generate.text import docstring, table

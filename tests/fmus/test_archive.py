@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import pytest
 from fmpy.validation import validate_fmu
 
-from components.core.roles import ROLES
+from components.fmi.roles import ROLES
 from fmus.build import COMPONENTS, build_all, build_component, find_components
 from fmus.build import HERE as FMUS
 from fmus.compiler import compile_launcher
@@ -25,7 +25,8 @@ SOME = ["controller_off", "driver_sine", "tyre_linear"]
 def checkout(tmp_path):
     """A copy of three components and of what they need, in a folder of another name."""
     root = tmp_path / "another checkout" / "components"
-    shutil.copytree(COMPONENTS / "core", root / "core", ignore=shutil.ignore_patterns("__pycache__"))
+    for room in ("fmi", "mathematics", "driving"):
+        shutil.copytree(COMPONENTS / room, root / room, ignore=shutil.ignore_patterns("__pycache__"))
     (root / "__init__.py").write_bytes((COMPONENTS / "__init__.py").read_bytes())
     for path in ("controllers/off.py", "drivers/sine.py", "tyres/linear.py"):
         target = root / path
@@ -79,8 +80,8 @@ def test_an_archive_holds_what_the_fmu_needs_and_nothing_else(archive):
         "resources/slavemodule.txt",
     ]
     inside = {name.removeprefix(f"resources/{package}/") for name in names if f"/{package}/" in name}
-    assert {"controllers/off.py", "core/component.py", "pythonfmu/fmi2slave.py"} <= inside
-    assert not {"core/fuzzy.py", "pythonfmu/builder.py", "pythonfmu/deploy.py"} & inside
+    assert {"controllers/off.py", "fmi/component.py", "pythonfmu/fmi2slave.py"} <= inside
+    assert not {"mathematics/fuzzy.py", "pythonfmu/builder.py", "pythonfmu/deploy.py"} & inside
 
 
 def test_the_same_sources_give_the_same_bytes_from_another_folder(checkout, tmp_path):
@@ -129,9 +130,9 @@ def test_only_what_has_changed_is_built(checkout, tmp_path):
     assert build_all(out, root=checkout).current == SOME
     touch(checkout, "drivers/sine.py")
     assert build_all(out, root=checkout).built == ["driver_sine"]
-    touch(checkout, "core/fuzzy.py")  # nobody of these uses it
+    touch(checkout, "mathematics/fuzzy.py")  # nobody of these uses it
     assert build_all(out, root=checkout).built == []
-    touch(checkout, "core/component.py")
+    touch(checkout, "fmi/component.py")
     assert build_all(out, root=checkout).built == SOME
     assert build_all(out, root=checkout, components=["tyre_linear"], force=True).built == ["tyre_linear"]
 
@@ -139,9 +140,13 @@ def test_only_what_has_changed_is_built(checkout, tmp_path):
 def test_a_module_that_is_imported_anew_counts_from_then_on(checkout, tmp_path):
     out = tmp_path / "out"
     build_all(out, root=checkout)
-    touch(checkout, "drivers/sine.py", "\n\ndef late():\n    from ..core import fuzzy\n\n    return fuzzy\n")
+    touch(
+        checkout,
+        "drivers/sine.py",
+        "\n\ndef late():\n    from ..mathematics import fuzzy\n\n    return fuzzy\n",
+    )
     build_all(out, root=checkout)
-    touch(checkout, "core/fuzzy.py")
+    touch(checkout, "mathematics/fuzzy.py")
     assert build_all(out, root=checkout).built == ["driver_sine"]
 
 

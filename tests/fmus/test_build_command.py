@@ -50,7 +50,7 @@ def test_a_name_that_is_no_component_is_wrong_input(tmp_path):
 def test_a_python_file_from_anywhere_can_be_named(tmp_path):
     file = tmp_path / "controller_zero.py"
     file.write_text(
-        "from components.core.component import Component\n\n\n"
+        "from components.fmi.component import Component\n\n\n"
         'class Zero(Component):\n    """Nothing."""\n\n    outputs = ("yaw_moment",)\n\n'
         "    def output(self, t, u):\n        return (0.0,)\n"
     )

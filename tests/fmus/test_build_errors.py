@@ -17,8 +17,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from components.core.component import Component
-from components.core.variables import parameter
+from components.fmi.component import Component
+from components.fmi.variables import parameter
 
 
 @dataclass(frozen=True)
@@ -114,18 +114,23 @@ def test_an_import_that_only_type_checkers_see_is_allowed(tmp_path):
 
 def test_an_import_of_the_whole_package_says_how_to_write_it(attempt):
     (problem,) = attempt(
-        ("from components.core.component import Component", "import components.core.component")
+        ("from components.fmi.component import Component", "import components.fmi.component")
     )
-    assert problem.endswith("idea.py:7: write 'from components.core.component import ...'")
+    assert problem.endswith("idea.py:7: write 'from components.fmi.component import ...'")
 
 
 def test_a_module_that_does_not_exist_is_named_with_the_line(attempt):
-    (problem,) = attempt(("components.core.variables", "components.core.variable"))
-    assert problem.startswith("controller_idea: controllers/idea.py:8: there is no module core.variable in ")
+    (problem,) = attempt(("components.fmi.variables", "components.fmi.variable"))
+    assert problem.startswith("controller_idea: controllers/idea.py:8: there is no module fmi.variable in ")
+
+
+def test_a_module_that_stands_in_another_room_is_pointed_to(attempt):
+    (problem,) = attempt(("components.fmi.variables", "components.core.variables"))
+    assert problem.endswith("; did you mean components.fmi.variables?")
 
 
 def test_an_import_beyond_the_package_is_refused(attempt):
-    (problem,) = attempt(("from components.core.component", "from ....core.component"))
+    (problem,) = attempt(("from components.fmi.component", "from ....fmi.component"))
     assert problem.endswith("idea.py:7: the relative import goes beyond the package of the components")
 
 
@@ -223,11 +228,9 @@ def test_a_file_without_a_role_or_that_does_not_exist_is_an_error(tmp_path):
 def test_a_file_from_anywhere_becomes_an_fmu_with_its_neighbours(tmp_path, unpack, place):
     file = tmp_path / "my own work" / place
     file.parent.mkdir(parents=True)
-    text = GOOD.replace("from components.core.c", "from .gains import FACTOR\nfrom components.core.c")
+    text = GOOD.replace("from components.fmi.c", "from .gains import FACTOR\nfrom components.fmi.c")
     file.write_text(text.replace("-self.p.gain", "-FACTOR * self.p.gain"))
-    (file.parent / "gains.py").write_text(
-        "from components.core.roles import WHEELS\n\nFACTOR = len(WHEELS)\n"
-    )
+    (file.parent / "gains.py").write_text("from components.fmi.roles import WHEELS\n\nFACTOR = len(WHEELS)\n")
     fmu = build_component(file, tmp_path / "out", defaults={"gain": 10, "mode": "b", "fast": True})
     assert fmu == tmp_path / "out" / "controller_idea.fmu"
     unit = Unit(Fmu(unpack(fmu)), yaw_rate=0.5)

@@ -14,8 +14,8 @@ import struct
 
 import pytest
 
-from components.core.component import Component
-from components.core.roles import WHEELS
+from components.fmi.component import Component
+from components.fmi.roles import WHEELS
 from fmus.build import find_components
 from tests.components.stand import Stand
 from tests.fmus.plausible import plausible

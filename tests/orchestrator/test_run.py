@@ -54,7 +54,7 @@ FAULTY = '''
 import os
 import signal
 
-from components.core.component import Component
+from components.fmi.component import Component
 
 
 class {name}(Component):

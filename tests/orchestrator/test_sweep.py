@@ -24,8 +24,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from components.core.component import Component
-from components.core.variables import parameter
+from components.fmi.component import Component
+from components.fmi.variables import parameter
 
 HERE = Path({folder!r})
 

@@ -22,7 +22,7 @@ UNITS = (
 def test_the_controller_of_the_readme_runs_and_follows_the_yaw_rate(tmp_path, capsys):
     (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
     file = tmp_path / "yaw_rate.py"
-    file.write_text(code.replace("from ..core", "from components.core"), encoding="utf-8")
+    file.write_text(code.replace("from ..fmi", "from components.fmi"), encoding="utf-8")
     build_all(tmp_path, components=UNITS)
     build_component(file, tmp_path, role="controllers")
     with pytest.raises(SystemExit) as exit_:

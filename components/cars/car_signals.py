@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from math import atan2, cos, sin
 from typing import Any
 
+from ..fmi.variables import output, signal
 from .plane_body import Motion
-from .variables import output, signal
 from .wheel_kinematics import slip_angle, slip_ratio
 
 INPUTS = (

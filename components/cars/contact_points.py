@@ -5,7 +5,7 @@ Contact points follow the body's roll and pitch and, along the sloping path of t
     X_i = x_i - h theta          Y_i = y_i + h phi + p_i c_i          from the centre of mass
     v_xi = v_x - r Y_i - h dtheta          v_yi = v_y + r X_i + h dphi + p_i dc_i
 
-Symbols are those of `core.ride`. The same X_i, Y_i and p_i are the arms of the forces there, so the
+Symbols are those of `cars.ride`. The same X_i, Y_i and p_i are the arms of the forces there, so the
 power of the forces at the contact points is the power that body and wheels receive.
 """
 

@@ -224,9 +224,9 @@ class Component(Fmi2Slave):
         self._failed = True
         try:
             kind, error, trace = sys.exc_info()
-            core = os.path.dirname(os.path.abspath(__file__))
-            home = os.path.dirname(core)
-            machinery = [os.path.join(core, name) for name in ("component.py", "variables.py")]
+            room = os.path.dirname(os.path.abspath(__file__))
+            home = os.path.dirname(room)
+            machinery = [os.path.join(room, name) for name in ("component.py", "variables.py")]
             lines = [(frame.filename, frame.lineno, frame.name) for frame in traceback.extract_tb(trace)]
             if lines and lines[-1][2] == "_checked_output":  # what `output` returned is wrong
                 code = type(self).output.__code__

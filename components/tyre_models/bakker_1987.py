@@ -29,8 +29,8 @@ from dataclasses import dataclass
 from math import atan, copysign, cos, exp, pi, sin, sqrt
 from typing import Any, NamedTuple
 
-from .magic_formula import SMALLEST_FRICTION, SMALLEST_LOAD, lateral_slip, practical_slip
-from .variables import parameter
+from ..fmi.variables import parameter
+from .pacejka_2002 import SMALLEST_FRICTION, SMALLEST_LOAD, lateral_slip, practical_slip
 
 SMALLEST_SLIP = 1e-150
 """Slip below which there is no force: its square would vanish."""

@@ -1,4 +1,4 @@
-"""The rule tables of papers C and D as data, in the form that `core.fuzzy` reads.
+"""The rule tables of papers C and D as data, in the form that `mathematics.fuzzy` reads.
 
 Rows stand for the error, columns for its rate, both from NB to PB.
 """

@@ -41,8 +41,8 @@ from collections.abc import Sequence
 from math import ceil, cos, sin, sqrt
 from typing import NamedTuple
 
+from ..mathematics.integrators import rk4
 from .contact_points import Contact
-from .integrators import rk4
 
 RESOLVED = 0.5
 """Largest substep times the fastest rate: an error of 3e-4 of the wheels' hop in each of its radians."""

@@ -2,7 +2,7 @@
 
 The slip target is the requested force on the stable branch of the tyre's own curve F_x(kappa) at the
 present load, slip angle and friction, limited to a share of the optimum and to an absolute cap
-(`core.slip_curve`). With s = kappa_target - kappa and the slip rate asked for
+(`tyre_models.slip_curve`). With s = kappa_target - kappa and the slip rate asked for
 
     dkappa = eps sat(s / Delta) + k_d s
 
@@ -31,8 +31,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from .slip_curve import slip_for_force
-from .variables import parameter
+from ..fmi.variables import parameter
+from ..tyre_models.slip_curve import slip_for_force
 
 Curve = tuple[Callable[[float], float], float]
 """F_x [N] of kappa, and a slip that is surely on its stable branch, of the order of the optimum."""

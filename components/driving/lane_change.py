@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from math import copysign, cos, hypot, pi, sin
 from typing import NamedTuple
 
-from .variables import parameter
+from ..fmi.variables import parameter
 
 LENGTHS = (15.0, 30.0, 25.0, 25.0, 30.0)
 """Of lane 1, transition 2, lane 3, transition 4 and lanes 5 and 6 together [m]."""

@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import sin
 
+from ..fmi.variables import parameter
 from .plane_body import Four
 from .resistance import resistance
-from .variables import parameter
 
 G = 9.81  # m/s2
 
@@ -75,7 +75,7 @@ class RollingCarParameters:
     slip_stiffness_per_load: float = parameter(
         22.0,
         "1",
-        "Slip stiffness over load for slow wheels, see core.wheel_spin; chosen: tyre set 1",
+        "Slip stiffness over load for slow wheels, see cars.wheel_spin; chosen: tyre set 1",
         minimum=0.0,
     )
 

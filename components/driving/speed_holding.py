@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .lag import Stage
-from .pid import Gains, Pid
-from .variables import parameter
+from ..fmi.variables import parameter
+from ..mathematics.first_order_lag import Stage
+from ..mathematics.pid_loop import Gains, Pid
 
 
 @dataclass(frozen=True)

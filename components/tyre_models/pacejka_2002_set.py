@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from math import atan, pi
 from typing import Any, NamedTuple
 
-from .variables import parameter
+from ..fmi.variables import parameter
 
 _BOOK = "Pacejka 2006, table A3.1"
 

@@ -1,11 +1,11 @@
-"""The parameters of a car with a sprung body, and what `core.ride` needs of them."""
+"""The parameters of a car with a sprung body, and what `cars.ride` needs of them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..fmi.variables import parameter
 from .ride import Ride
-from .variables import parameter
 
 G = 9.81  # m/s2
 
@@ -117,7 +117,7 @@ class FourteenDofParameters:
     slip_stiffness_per_load: float = parameter(
         22.0,
         "1",
-        "Slip stiffness over load for slow wheels, see core.wheel_spin; chosen: tyre set 1",
+        "Slip stiffness over load for slow wheels, see cars.wheel_spin; chosen: tyre set 1",
         minimum=0.0,
     )
 

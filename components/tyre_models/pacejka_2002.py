@@ -30,7 +30,7 @@ from __future__ import annotations
 from math import atan, cos, exp, pi, sin, sqrt, tan
 from typing import NamedTuple
 
-from .magic_formula_parameters import Coefficients
+from .pacejka_2002_set import Coefficients
 
 SMALLEST_LOAD = 1e-6
 """Vertical load [N] at and below which a tyre gives nothing."""

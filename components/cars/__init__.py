@@ -1,0 +1,1 @@
+"""Parts of cars: bodies, wheels, loads, resistance."""

@@ -1,0 +1,1 @@
+"""Laws that controllers, allocators and wheel controls share."""

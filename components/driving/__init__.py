@@ -1,0 +1,1 @@
+"""What drivers share: the pedal, the steering wheel, the track."""

@@ -1,0 +1,1 @@
+"""What declares a unit and speaks FMI for it."""

@@ -1,0 +1,1 @@
+"""Laws of one tyre, where more than one unit asks for them."""
