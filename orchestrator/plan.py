@@ -72,6 +72,9 @@ class Unit:
     period: int  # in communication steps
     parameters: dict[str, Value]
     constants: dict[str, Value]  # inputs that no unit drives
+    origins: dict[str, str] = field(default_factory=dict)
+    """Parameter or constant -> where its value comes from: "default" (the FMU), "vehicle", "scenario", or the
+    origin of the change that gave it."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +85,19 @@ class Wire:
     output: str  # variable
     target: str  # unit
     input: str  # variable
+
+
+@dataclass(frozen=True)
+class Change:
+    """One thing that is other than in the scenario file."""
+
+    place: str  # as in --set: "plant.mass", "inputs.friction*", "stop_time"; a unit or "vehicle" for its file
+    value: Value
+    origin: str  # "--set", "--swap", "study", "sweep", ...
+
+    def __str__(self) -> str:
+        value = str(self.value).lower() if isinstance(self.value, bool) else self.value
+        return f"{self.origin} {self.place}={value}"
 
 
 @dataclass(frozen=True)
@@ -97,6 +113,7 @@ class Plan:
     title: str = ""
     scenario: dict = field(default_factory=dict)  # as run, for run.json
     notes: tuple[str, ...] = ()  # worth telling the user, but no error
+    changes: tuple[Change, ...] = ()  # against the scenario file
 
     def time(self, k: int) -> float:
         """Return the time [s] of communication point `k`, correctly rounded."""

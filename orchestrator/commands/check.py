@@ -21,9 +21,10 @@ PIPE_WIDTH = 140
 def check(scenario: ScenarioFile, swap: Swap = None, set_: Set = None, fmus: Fmus = None) -> None:
     """Validate a scenario; show units, wires and their order."""
     from ..scenario.load import load_scenario
+    from ..scenario.overrides import read_changes
     from ..wiring.make_plan import make_plan
 
-    plan = make_plan(load_scenario(scenario, swaps=swap or (), settings=set_ or ()), fmus=fmus)
+    plan = make_plan(load_scenario(scenario, changes=read_changes(swap or (), set_ or ())), fmus=fmus)
     show(plan, scenario)
     for note in plan.notes:
         print(f"note: {note}", file=sys.stderr)

@@ -45,6 +45,7 @@ def compare(
 
     from ..pages.compare_page import write_page
     from ..results.formats import check_format
+    from ..scenario.overrides import read_changes
     from ..studies.compare import judge_comparison, metric_table, variants, write_comparison
     from .batch import print_tables, run_all, say
     from .run import default_folder
@@ -53,7 +54,7 @@ def compare(
     folder = out or default.with_name(f"{default.name}-compare")
     check_format(format_)
     limit = isolation(isolate, call_limit)
-    made = variants(scenario, swap, set_ or (), folder, fmus)
+    made = variants(scenario, swap, read_changes(settings=set_ or ()), folder, fmus)
     work = [replace(job, format=format_, call_limit=limit) for job in made]
     outcomes = run_all(work, folder, workers=jobs)
     comparison = judge_comparison(outcomes)

@@ -44,6 +44,7 @@ def converge(
 
     from ..errors import ScenarioError
     from ..figures.style import save
+    from ..scenario.overrides import read_changes
     from ..studies.converge import convergence_figure, convergence_table, measure, refinements, write_rows
     from ..studies.tables import for_markdown
     from ..wording import hint
@@ -62,8 +63,7 @@ def converge(
         signal=signal,
         algorithms=algorithm or (),  # type: ignore[arg-type]
         out=folder,
-        swaps=swap or (),
-        settings=set_ or (),
+        changes=read_changes(swap or (), set_ or ()),
         fmus=fmus,
     )
     outcomes = run_all(work, folder, workers=1)

@@ -24,9 +24,10 @@ def export_ssp(
     """
     from ..interop.ssp_write import write_ssp
     from ..scenario.load import load_scenario
+    from ..scenario.overrides import read_changes
     from ..wiring.make_plan import make_plan
 
-    plan = make_plan(load_scenario(scenario, swaps=swap or (), settings=set_ or ()), fmus=fmus)
+    plan = make_plan(load_scenario(scenario, changes=read_changes(swap or (), set_ or ())), fmus=fmus)
     for note in plan.notes:
         print(f"note: {note}", file=sys.stderr)
     path = out or Path(f"{scenario.stem}.ssp")

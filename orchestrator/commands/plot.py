@@ -5,11 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .options import Fmus, Out, Set, Swap
+
+if TYPE_CHECKING:
+    from ..plan import Change
 
 Sources = Annotated[
     list[Path],
@@ -56,6 +59,7 @@ def plot(
     from ..figures.plots import OVERVIEW, draw
     from ..figures.style import save
     from ..results.read import load_results
+    from ..scenario.overrides import read_changes
     from ..studies.compare import FIGURES
     from ..wording import counted
     from .batch import say
@@ -63,7 +67,7 @@ def plot(
     if label and len(label) != len(sources):
         given = f"{counted(len(label), 'label')}, {counted(len(sources), 'folder')}"
         raise ScenarioError(f"--label: needs one for each folder of results ({given})")
-    folders = _recorded(sources, swap or [], set_ or [], fmus)
+    folders = _recorded(sources, read_changes(swap or (), set_ or ()), fmus)
     labels = label or distinct(folders)
     runs = [Run(name, load_results(folder)) for name, folder in zip(labels, folders, strict=True)]
     figures: dict[str, Sequence[str]] = {"overview": panel or OVERVIEW}
@@ -77,9 +81,7 @@ def plot(
         say(f"{paths[0]}, {paths[1].name}")
 
 
-def _recorded(
-    sources: Sequence[Path], swaps: list[str], settings: list[str], fmus: Path | None
-) -> list[Path]:
+def _recorded(sources: Sequence[Path], changes: tuple[Change, ...], fmus: Path | None) -> list[Path]:
     """Return the folders of all results, after making the runs of scenarios that have none.
 
     Raises:
@@ -92,12 +94,9 @@ def _recorded(
     from .run import default_folder
 
     scenarios = [source for source in sources if source.suffix in SCENARIOS and not source.is_dir()]
-    if (swaps or settings) and not scenarios:
+    if changes and not scenarios:
         raise ScenarioError("--swap and --set change a scenario; only folders of results are given")
-    jobs = {
-        source: Job(source.stem, source, default_folder(source), tuple(swaps), tuple(settings), fmus=fmus)
-        for source in scenarios
-    }
+    jobs = {source: Job(source.stem, source, default_folder(source), changes, fmus) for source in scenarios}
     once = Once()
     stale = [job for job in jobs.values() if staleness(plan_of(job, once), job.out)]
     outcomes = run_all(stale, Path("results"), workers=None) if stale else []

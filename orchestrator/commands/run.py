@@ -52,12 +52,13 @@ def run(
     from ..results.formats import check_format
     from ..results.size import size_note
     from ..scenario.load import load_scenario
+    from ..scenario.overrides import read_changes
     from ..wiring.make_plan import make_plan
 
     check_format(format_)
     metrics = _metric_names(metric or ())
     limit = isolation(isolate, call_limit)
-    loaded = load_scenario(scenario, swaps=swap or (), settings=set_ or ())
+    loaded = load_scenario(scenario, changes=read_changes(swap or (), set_ or ()))
     plan = make_plan(loaded, fmus=fmus, isolated=isolate)
     if named := [name for name in metric or () if name != "standard"]:
         from ..metrics import run_metrics

@@ -39,6 +39,7 @@ def second_opinion(
     from ..errors import ScenarioError, SimulationError
     from ..interop.second_opinion import MASTERS, second_opinion
     from ..scenario.load import load_scenario
+    from ..scenario.overrides import read_changes
     from ..wiring.make_plan import make_plan
     from ..wording import hint
 
@@ -47,7 +48,7 @@ def second_opinion(
         if name.lower() not in known:
             raise ScenarioError(f"--master {name}: there is no such master{hint(name, known, lead='known')}")
     chosen = [known[name.lower()] for name in master or known]
-    plan = make_plan(load_scenario(scenario, swaps=swap or (), settings=set_ or ()), fmus=fmus)
+    plan = make_plan(load_scenario(scenario, changes=read_changes(swap or (), set_ or ())), fmus=fmus)
     with tempfile.TemporaryDirectory(prefix="yawbench-") as folder:
         try:
             opinions = second_opinion(

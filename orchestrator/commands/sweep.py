@@ -55,6 +55,7 @@ def sweep(
     that is finished is run again.
     """
     from ..results.formats import check_format
+    from ..scenario.overrides import read_changes
     from ..studies.jobs import pool
     from ..sweeps.journal import Journal
     from ..sweeps.planning import plan_sweep
@@ -67,7 +68,7 @@ def sweep(
 
     check_format(format_)
     limit = isolation(isolate, call_limit)
-    loaded = load_sweep(file, swaps=swap or [], settings=set_ or [])
+    loaded = load_sweep(file, changes=read_changes(swap or (), set_ or ()))
     folder = out or default_folder(file)
     with stoppable(folder):
         with _bar("planning", len(loaded.points), quiet=True) as planning:

@@ -186,14 +186,12 @@ def settings(findings: Findings) -> Table:
         [
             run.name,
             run.scenario.name,
-            ", ".join(run.swaps) or None,
-            ", ".join(run.settings) or None,
-            f"{float(run.stop_time):g} s" if run.stop_time else None,
+            ", ".join(f"{change.place}={change.value}" for change in run.changes) or None,
         ]
         for run in findings.study.runs.values()
     ]
-    kept = [k for k in range(5) if any(row[k] is not None for row in rows)]
-    headings = ["run", "scenario", "swap", "set", "until"]
+    kept = [k for k in range(3) if any(row[k] is not None for row in rows)]
+    headings = ["run", "scenario", "changed"]
     return Table("", [headings[k] for k in kept], [[row[k] for k in kept] for row in rows])
 
 

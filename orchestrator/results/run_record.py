@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+from dataclasses import asdict
 from datetime import datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -34,6 +35,7 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
         "evaluation_order": list(units),
         "units": {"time": "s", **columns},
         "fmus": {name: _fmu(unit, plan) for name, unit in units.items()},
+        "changes": [asdict(change) for change in plan.changes],
         "connections": [f"{w.source}.{w.output} -> {w.target}.{w.input}" for w in plan.wires],
         "scenario": plan.scenario,
         "versions": versions(),
@@ -50,6 +52,7 @@ def _fmu(unit: Unit, plan: Plan) -> dict[str, Any]:
         "generation_tool": fmu.generation_tool,
         "step_size": float(unit.period * plan.step),
         "parameters": dict(unit.parameters),
+        "origins": {name: origin for name, origin in unit.origins.items() if origin != "default"},
         # what the FMU has for the others
         "defaults": {v.name: v.start for v in fmu.of("parameter") if v.name not in unit.parameters},
         "constants": dict(unit.constants),

@@ -1,4 +1,4 @@
-"""Reading a scenario file: options applied, validated, every problem reported in one go."""
+"""Reading a scenario file: changes applied, validated, every problem reported in one go."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from ..errors import ScenarioError
-from ..plan import Algorithm
+from ..plan import Change
 from ..wording import hint, listed
 from . import overrides, quantities, strict, yaml_lines
 from .schema import Connection, Endpoint, Scenario, UnitSpec, Vehicle, endpoint
@@ -20,38 +20,25 @@ __all__ = ["Connection", "Endpoint", "Scenario", "UnitSpec", "Vehicle", "load_sc
 def load_scenario(
     path: Path | str,
     *,
-    swaps: Sequence[str] = (),
-    settings: Sequence[str] = (),
-    stop_time: Fraction | float | str | None = None,
-    step_size: Fraction | float | str | None = None,
-    algorithm: Algorithm | None = None,
-    vehicle: Path | None = None,
+    changes: Sequence[Change] = (),
     read: Callable[..., Document] = yaml_lines.read,
 ) -> Scenario:
     """Read a scenario file, or an SSP archive.
 
     Args:
         path: the YAML file, or the archive.
-        swaps: `unit=fmu`, as given to --swap.
-        settings: `unit.parameter=value`, as given to --set.
-        stop_time, step_size: in place of the file's [s].
-        algorithm: in place of the file's.
-        vehicle: vehicle file in place of the scenario's, relative to the working directory.
+        changes: what is other than in the file; see `overrides`.
         read: how to read a file, called as `yaml_lines.read`; what it returns is changed.
 
     Raises:
-        ScenarioError: with everything that is wrong with the file, its vehicle file, the options.
+        ScenarioError: with everything that is wrong with the file, its vehicle file, the changes.
     """
     archive = Path(path).suffix.lower() == ".ssp"
     document = _read_archive(Path(path)) if archive else read(Path(path), what="scenario file")
-    if vehicle is not None:
-        overrides.apply_values(document, {"vehicle": str(vehicle.absolute())})
+    wanted = changes if isinstance(document.data, dict) else ()
+    overrides.apply_vehicle(document, wanted)
     vehicle_document = _read_vehicle(document, read)
-    replaced = overrides.apply_swaps(document, swaps) if document.data is not None else {}
-    if document.data is not None:
-        overrides.apply_settings(document, vehicle_document, settings)
-    values = {"stop_time": stop_time, "step_size": step_size, "algorithm": algorithm}
-    overrides.apply_values(document, values)
+    replaced, effective = overrides.apply_changes(document, vehicle_document, wanted)
     if archive and isinstance(document.data, dict):
         _ask_for_times(document)
 
@@ -64,7 +51,7 @@ def load_scenario(
     if problems or scenario is None or parameters is None:
         raise ScenarioError(problems)
     scenario._document, scenario._vehicle_document = document, vehicle_document
-    scenario._vehicle, scenario._replaced = parameters, replaced
+    scenario._vehicle, scenario._replaced, scenario._changes = parameters, replaced, effective
     scenario._explicit = archive
     return scenario
 
@@ -112,8 +99,8 @@ def _check_time_grid(document: Document) -> None:
         if time is None or time % step == 0:
             continue
         below = time // step * step
-        option = document.override(("step_size",))
-        origin = f" ({option})" if option else ""
+        change = document.override(("step_size",))
+        origin = f" ({change})" if change else ""
         nearest = listed([f"{float(t):.12g} s" for t in (below, below + step) if t > 0], last="or")
         document.report(
             key,

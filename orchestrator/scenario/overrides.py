@@ -1,21 +1,28 @@
-"""What the command line changes in a scenario before it is validated.
+"""What is changed in a scenario before it is validated.
 
 `--swap unit=fmu` replaces a unit's FMU; `--set unit.parameter=value` gives a parameter. Two names
 that no unit may have stand for more: `--set vehicle.mass=1200` changes the parameter set that all
 units share, `--set inputs.friction*=0.3` a constant. `--set stop_time=2`, `step_size` and `algorithm`
-change the run, `--set unit.step_size=0.01` the step of a unit. Whatever is changed this way remembers its
-option, so that later messages name the option in place of a line.
+change the run, `--set unit.step_size=0.01` the step of a unit. Studies and sweeps change the same places, and
+`vehicle` is the vehicle file itself. A value that was changed remembers by what, so that later messages name
+that in place of a line.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
+from ..errors import ScenarioError
+from ..plan import Change, Value
 from ..wording import hint, listed
 from . import yaml_lines
-from .yaml_lines import Document
+from .yaml_lines import Document, Key
 
 RESERVED = ("vehicle", "inputs")
 """Words that `--set` understands in place of a unit."""
@@ -28,105 +35,150 @@ def is_path(fmu: str) -> bool:
     return fmu.lower().endswith(".fmu") or "/" in fmu or "\\" in fmu
 
 
-def _swaps(document: Document, swaps: Iterable[str]) -> Iterator[tuple[str, str, str]]:
-    """Yield option, unit and FMU of every --swap; report those that are none.
+def read_changes(swaps: Iterable[str] = (), settings: Iterable[str] = ()) -> tuple[Change, ...]:
+    """Return what the options of a command line change.
 
-    Paths are relative to the working directory.
+    Args:
+        swaps: `unit=fmu`, as given to --swap; a path is relative to the working directory. An FMU may bring
+            parameters along, `unit=fmu:parameter=value`.
+        settings: `unit.parameter=value`, as given to --set.
+
+    Raises:
+        ScenarioError: with every option that is none.
     """
+    changes, problems = [], []
     for text in swaps:
-        option = f"--swap {text}"
         unit, equals, fmu = (part.strip() for part in text.partition("="))
         if unit and equals and fmu:
-            yield option, unit, os.path.abspath(fmu) if is_path(fmu) else fmu
+            changes += swap_of(unit, fmu, "--swap")
         else:
-            document.problems.append((0, f"{option}: write --swap UNIT=FMU"))
-
-
-def _settings(document: Document, settings: Iterable[str]) -> Iterator[tuple[str, str, str, Any]]:
-    """Yield option, holder, name and value of every --set of a parameter; give the run what is meant for it.
-
-    Those that are none are reported.
-    """
+            problems.append(f"--swap {text}: write --swap UNIT=FMU")
     for text in settings:
-        option = f"--set {text}"
-        target, equals, raw = (part.strip() for part in text.partition("="))
-        holder, dot, name = target.partition(".")
-        value = yaml_lines.scalar(raw)
-        if target in OF_RUN and equals:
-            _give(document, target, value, option)
-        elif holder and dot and name and equals:
-            yield option, holder, name, value
+        place, equals, raw = (part.strip() for part in text.partition("="))
+        holder, dot, name = place.partition(".")
+        if equals and ((holder and dot and name) or place in OF_RUN):
+            changes.append(Change(place, yaml_lines.scalar(raw), "--set"))
         else:
             sentence = f"write --set UNIT.PARAMETER=VALUE, or {listed(OF_RUN, last='or')}=VALUE"
-            document.problems.append((0, f"{option}: {sentence}"))
+            problems.append(f"--set {text}: {sentence}")
+    if problems:
+        raise ScenarioError(problems)
+    return tuple(changes)
 
 
-def apply_swaps(document: Document, swaps: Iterable[str]) -> dict[str, str]:
-    """Replace FMUs; return the replaced one of each unit."""
+def changes_of(
+    swaps: Mapping[str, str], settings: Mapping[str, Value], folder: Path, origin: str
+) -> list[Change]:
+    """Return the changes that a file in a folder gives as unit -> FMU (see `swap_of`) and place -> value."""
+    changes = [Change(place, value, origin) for place, value in settings.items()]
+    for unit, text in swaps.items():
+        fmu, *brought = swap_of(unit, text, origin)
+        path = str(folder / str(fmu.value)) if is_path(str(fmu.value)) else fmu.value
+        changes += [replace(fmu, value=path), *brought]
+    return changes
+
+
+def changes_of_run(spec: Any, origin: str) -> list[Change]:
+    """Return the changes that the fields `stop_time`, `step_size` and `algorithm` of a file's part give."""
+    given = [(place, getattr(spec, place)) for place in OF_RUN]
+    return [
+        Change(place, float(value) if isinstance(value, Fraction) else value, origin)
+        for place, value in given
+        if value is not None
+    ]
+
+
+def swap_of(unit: str, text: str, origin: str) -> list[Change]:
+    """Return the changes of `fmu:parameter=value:parameter=value` for a unit, first its FMU."""
+    match = re.fullmatch(r"(.*?)((?::\w+=[^:]*)*)", text)
+    assert match is not None
+    given = (one.partition("=") for one in match[2].split(":")[1:])
+    brought = [Change(f"{unit}.{name}", yaml_lines.scalar(value), origin) for name, _, value in given]
+    return [Change(unit, match[1], origin), *brought]
+
+
+def apply_changes(
+    document: Document, vehicle: Document, changes: Iterable[Change]
+) -> tuple[dict[str, str], tuple[Change, ...]]:
+    """Enter changes into a scenario and its vehicle file; report those that do not fit.
+
+    Of several changes of a place the last one counts.
+
+    Returns:
+        unit -> the FMU that the file names, of all that are swapped; the changes that make a difference.
+    """
     replaced: dict[str, str] = {}
+    effective: list[Change] = []
     units = _mapping(document.data, "units")
-    for option, unit, fmu in _swaps(document, swaps):
-        spec = units.get(unit)
-        if not isinstance(spec, dict):
-            sentence = f"{option}: the scenario has no unit {unit!r}"
-            document.problems.append((0, sentence + hint(unit, units, lead="it has")))
+    for change in {change.place: change for change in changes}.values():
+        holder, _, name = change.place.partition(".")
+        spec = units.get(holder)
+        if change.place in OF_RUN:
+            differs = _put(document, (change.place,), change)
+        elif change.place == "vehicle":
+            differs = True  # see `apply_vehicle`
+        elif holder == "vehicle":
+            differs = _put(vehicle, ("parameters", name), change)
+        elif holder == "inputs":
+            differs = _put(document, ("inputs", name), change)
+        elif not isinstance(spec, dict):
+            known = (*units, *RESERVED) if name else units
+            sentence = f"{change}: the scenario has no unit {holder!r}"
+            document.problems.append((0, sentence + hint(holder, known, lead="it has")))
             continue
-        if isinstance(spec.get("fmu"), str):
-            replaced.setdefault(unit, spec["fmu"])
-        spec["fmu"] = fmu
-        document.overrides[("units", unit, "fmu")] = option
-    return replaced
-
-
-def apply_settings(document: Document, vehicle: Document, settings: Iterable[str]) -> None:
-    """Set parameters of units, of the vehicle, and constants of inputs."""
-    units = _mapping(document.data, "units")
-    for option, unit, name, value in _settings(document, settings):
-        if unit == "vehicle":
-            _put(vehicle, (), "parameters", name, value, option)
-        elif unit == "inputs":
-            _put(document, (), "inputs", name, value, option)
-        elif isinstance(units.get(unit), dict) and name == "step_size":
-            units[unit][name] = value
-            document.overrides[("units", unit, name)] = option
-        elif isinstance(units.get(unit), dict):
-            _put(document, ("units", unit), "parameters", name, value, option)
+        elif not name:
+            if isinstance(spec.get("fmu"), str):
+                replaced[holder] = spec["fmu"]
+            differs = _swap(document, holder, change)
+        elif name == "step_size":
+            differs = _put(document, ("units", holder, name), change)
         else:
-            sentence = f"{option}: the scenario has no unit {unit!r}"
-            document.problems.append((0, sentence + hint(unit, (*units, *RESERVED), lead="it has")))
+            differs = _put(document, ("units", holder, "parameters", name), change)
+        effective += [change] if differs else []
+    return replaced, tuple(effective)
 
 
-def apply_to_all_runs(document: Document, swaps: Iterable[str], settings: Iterable[str]) -> None:
-    """Enter options into the `swap` and `set` of a file that has many runs of a scenario."""
-    for option, unit, fmu in _swaps(document, swaps):
-        _put(document, (), "swap", unit, fmu, option)
-    for option, holder, name, value in _settings(document, settings):
-        _put(document, (), "set", f"{holder}.{name}", value, option)
+def apply_vehicle(document: Document, changes: Iterable[Change]) -> None:
+    """Name another vehicle file, relative to the working directory, where a change asks for it."""
+    for change in changes:
+        if change.place == "vehicle":
+            _put(document, ("vehicle",), change, os.path.abspath(str(change.value)))
 
 
-def apply_values(document: Document, values: Mapping[str, Any]) -> None:
-    """Set top-level keys, such as step_size, where the value is not None."""
-    for name, value in values.items():
-        if value is not None:
-            _give(document, name, value, f"{name} = {value}")
+def apply_to_all_runs(document: Document, changes: Iterable[Change]) -> None:
+    """Enter changes into the `swap` and `set` of a file that has many runs of a scenario."""
+    for change in changes:
+        if change.place in OF_RUN:
+            _put(document, (change.place,), change)
+        else:
+            _put(document, ("set" if "." in change.place else "swap", change.place), change)
 
 
-def _give(document: Document, name: str, value: Any, option: str) -> None:
-    if isinstance(document.data, dict):
-        document.data[name] = value
-        document.overrides[(name,)] = option
+def _swap(document: Document, unit: str, change: Change) -> bool:
+    """Replace the FMU of a unit; return whether it is another one."""
+    fmu = str(change.value)
+    key: Key = ("units", unit, "fmu")
+    before = document.data["units"][unit].get("fmu")
+    if is_path(fmu):
+        fmu = os.path.abspath(fmu)
+        own = isinstance(before, str) and os.path.abspath(document.path.parent / before)
+        return _put(document, key, change, fmu) and fmu != own
+    return _put(document, key, change, fmu)
 
 
-def _put(document: Document, above: tuple[str, ...], group: str, name: str, value: Any, option: str) -> None:
+def _put(document: Document, key: Key, change: Change, value: Any = None) -> bool:
+    """Give the value at a key, a change's own if no other is given; return whether it was another before."""
     holder = document.data
-    for part in above:
-        holder = _mapping(holder, part)
-    if isinstance(holder, dict) and holder.get(group) is None:
-        holder[group] = {}
-    members = _mapping(holder, group)
-    members[name] = value
-    key = (*above, group, name)
-    document.overrides[key] = option
+    for part in key[:-1]:
+        if isinstance(holder, dict) and holder.get(part) is None:
+            holder[part] = {}
+        holder = _mapping(holder, str(part))
+    value = change.value if value is None else value
+    before = holder.get(key[-1])
+    if isinstance(document.data, dict):
+        holder[key[-1]] = value
+        document.overrides[key] = change
+    return before != value or isinstance(before, bool) != isinstance(value, bool)
 
 
 def _mapping(data: Any, name: str) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import AfterValidator, Field, PlainSerializer, PlainValidator, PrivateAttr, WithJsonSchema
 
-from ..plan import Algorithm, Value
+from ..plan import Algorithm, Change, Value
 from ..wording import short
 from . import overrides, quantities
 from .strict import Strict
@@ -94,7 +94,7 @@ class Vehicle(Strict):
 
 
 class Scenario(Strict):
-    """A scenario file with all overrides applied."""
+    """A scenario file with all changes applied."""
 
     title: str = ""
     source: str = Field("", description="Where the scenario comes from: paper, section, figure")
@@ -111,6 +111,7 @@ class Scenario(Strict):
     _vehicle_document: Document = PrivateAttr()
     _vehicle: Vehicle = PrivateAttr()
     _replaced: dict[str, str] = PrivateAttr()
+    _changes: tuple[Change, ...] = PrivateAttr(default=())
     _explicit: bool = PrivateAttr(default=False)
 
     @property
@@ -135,19 +136,24 @@ class Scenario(Strict):
 
     @property
     def replaced(self) -> dict[str, str]:
-        """Unit -> the FMU that the file names, for units swapped by an option."""
+        """Unit -> the FMU that the file names, for units that are swapped."""
         return self._replaced
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """What is other than in the file."""
+        return self._changes
 
     @property
     def explicit(self) -> bool:
         """Whether only what `connections` names is connected, and start values stand for the rest.
 
-        So it is in SSP archives, but for units swapped by an option.
+        So it is in SSP archives, but for units that are swapped.
         """
         return self._explicit
 
     def as_run(self) -> dict[str, Any]:
-        """Return everything that the file, the vehicle file and the options say, as JSON-ready data."""
+        """Return everything that the file, the vehicle file and the changes say, as JSON-ready data."""
         data = dict(self._document.data)
         times = {"stop_time": float(self.stop_time), "step_size": float(self.step_size)}
         return {"file": str(self.path), **data, **times, "vehicle_parameters": self.vehicle_parameters}

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..plan import Change
 from ..wording import closest, listed
 
 ALIASED = 100_000
@@ -24,8 +25,8 @@ class Document:
     path: Path
     data: Any = None
     lines: dict[Key, int] = field(default_factory=dict)
-    overrides: dict[Key, str] = field(default_factory=dict)
-    """Values that came from an option of the command line -> that option."""
+    overrides: dict[Key, Change] = field(default_factory=dict)
+    """Values that do not come from the file -> what gave them."""
     problems: list[tuple[int, str]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     """Remarks on what is no mistake, for the plan."""
@@ -38,26 +39,26 @@ class Document:
             self.problems.append(problem)
 
     def place(self, key: Key) -> str:
-        """Return 'file:line: dotted.key', or the option that the value came from."""
+        """Return 'file:line: dotted.key', or the change that the value came from."""
         return self._place(key)[1]
 
-    def override(self, key: Key) -> str | None:
-        """Return the option that gave the value at `key`, None if the file did."""
+    def override(self, key: Key) -> Change | None:
+        """Return the change that gave the value at `key`, None if the file did."""
         for n in range(len(key), 0, -1):
             if key[:n] in self.overrides:
                 return self.overrides[key[:n]]
         return None
 
     def _place(self, key: Key) -> tuple[int, str]:
-        option = self.override(key)
-        if option is not None:
-            return 0, option
+        change = self.override(key)
+        if change is not None:
+            return 0, str(change)
         line = next((self.lines[key[:n]] for n in range(len(key), -1, -1) if key[:n] in self.lines), 1)
         name = dotted(key)
         return line, f"{self.path}:{line}: {name}" if name else f"{self.path}:{line}"
 
     def sentences(self) -> list[str]:
-        """Return all problems, first those of options, then the file's from top to bottom."""
+        """Return all problems, first those of changes, then the file's from top to bottom."""
         return [sentence for _, sentence in sorted(self.problems, key=lambda p: p[0])]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +12,11 @@ from ..figures.panels import Run, shown_by
 from ..figures.plots import draw
 from ..figures.style import save
 from ..metrics.run_metrics import STANDARD, Value, evaluate_all, metric
+from ..plan import Change
 from ..scenario.load import load_scenario
-from ..scenario.overrides import is_path
+from ..scenario.overrides import is_path, swap_of
 from .jobs import Job, Outcome, read_back
+from .study_schema import text_of
 from .tables import Cell, Table, for_markdown, si, write_csv
 
 PANELS = (
@@ -33,7 +34,7 @@ METRICS, REPORT = "metrics.csv", "compare.md"
 
 
 def variants(
-    scenario: Path, swaps: Sequence[str], settings: Sequence[str], out: Path, fmus: Path | None
+    scenario: Path, swaps: Sequence[str], changes: Sequence[Change], out: Path, fmus: Path | None
 ) -> list[Job]:
     """Return one job for every combination of the FMUs that `swaps` names.
 
@@ -42,7 +43,7 @@ def variants(
         swaps: `unit=fmu,fmu,...`; a unit may be named more than once. An FMU may bring parameters,
             `fmu:parameter=value:parameter=value`, so that one FMU can be compared with itself. If only
             one FMU is named in all, the scenario as it stands is the other variant.
-        settings: `unit.parameter=value`, for all.
+        changes: for all.
         out: folder of all results; each variant has a folder below, named like it.
         fmus: folder of FMUs given by name.
 
@@ -51,8 +52,8 @@ def variants(
     """
     choices = _choices(swaps)
     if all(len(names) == 1 for names in choices.values()):
-        swapped = [f"{unit}={fmu_and_settings(names[0])[0]}" for unit, names in choices.items()]
-        own = load_scenario(scenario, swaps=swapped, settings=settings).replaced
+        swapped = [swap_of(unit, names[0], "--swap")[0] for unit, names in choices.items()]
+        own = load_scenario(scenario, changes=[*swapped, *changes]).replaced
         for unit, names in choices.items():
             fmu = str(scenario.absolute().parent / own[unit]) if is_path(own[unit]) else own[unit]
             names[:0] = [fmu] if fmu not in names else []
@@ -65,10 +66,9 @@ def variants(
         label = " + ".join(_label(chosen[unit]) for unit in named)
         repeated = sum(job.label.partition(" (")[0] == label for job in jobs)
         label += f" ({repeated + 1})" if repeated else ""
-        options = tuple(f"{unit}={fmu_and_settings(text)[0]}" for unit, text in chosen.items())
-        brought = tuple(f"{unit}.{one}" for unit, text in chosen.items() for one in fmu_and_settings(text)[1])
         folder = out / label.replace(" ", "")
-        jobs.append(Job(label, scenario, folder, options, (*settings, *brought), fmus=fmus))
+        own_changes = [one for unit, text in chosen.items() for one in swap_of(unit, text, "--swap")]
+        jobs.append(Job(label, scenario, folder, (*changes, *own_changes), fmus))
     return jobs
 
 
@@ -85,16 +85,11 @@ def _choices(swaps: Sequence[str]) -> dict[str, list[str]]:
     return choices
 
 
-def fmu_and_settings(text: str) -> tuple[str, list[str]]:
-    """Return the FMU and the settings of `fmu:parameter=value:parameter=value`."""
-    match = re.fullmatch(r"(.*?)((?::\w+=[^:]*)*)", text)
-    assert match is not None
-    return match[1], match[2].split(":")[1:]
-
-
 def _label(text: str) -> str:
-    fmu, settings = fmu_and_settings(text)
-    return " ".join([Path(fmu).stem if is_path(fmu) else fmu, *settings])
+    fmu, *brought = swap_of("", text, "--swap")
+    name = str(fmu.value)
+    settings = [f"{change.place[1:]}={text_of(change.value)}" for change in brought]
+    return " ".join([Path(name).stem if is_path(name) else name, *settings])
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,8 @@ from ..errors import ResultsError, ScenarioError
 from ..figures.style import QUIET, RC, frame, line_style
 from ..metrics.run_metrics import Value
 from ..metrics.signals import words
-from ..plan import Algorithm
+from ..plan import Algorithm, Change
+from ..plan import Value as Plain
 from ..scenario.load import load_scenario
 from .jobs import Job, Outcome, read_back
 from .tables import Cell, Table, write_csv
@@ -56,8 +57,7 @@ def refinements(
     signal: str,
     algorithms: Sequence[Algorithm],
     out: Path,
-    swaps: Sequence[str] = (),
-    settings: Sequence[str] = (),
+    changes: Sequence[Change] = (),
     fmus: Path | None = None,
 ) -> list[Job]:
     """Return the runs of a convergence study: all steps of the first algorithm, then the next.
@@ -65,7 +65,7 @@ def refinements(
     Raises:
         ScenarioError: the scenario or an option is wrong.
     """
-    loaded = load_scenario(scenario, swaps=swaps, settings=settings)
+    loaded = load_scenario(scenario, changes=changes)
     if signal.count(".") != 1:
         raise ScenarioError(f"--signal {signal}: write UNIT.VARIABLE, for example plant.yaw_rate")
     jobs = []
@@ -74,12 +74,12 @@ def refinements(
             step: Fraction = loaded.step_size / 2**k
             label = f"{algorithm}, {_milliseconds(float(step))}"
             folder = out / algorithm / _milliseconds(float(step)).replace(" ", "")
-            jobs.append(
-                Job(
-                    label, scenario, folder, tuple(swaps), tuple(settings), step_size=step,
-                    algorithm=algorithm, fmus=fmus, record=(signal,),
-                )
-            )  # fmt: skip
+            refined = (
+                *changes,
+                Change("algorithm", algorithm, "converge"),
+                Change("step_size", float(step), "converge"),
+            )
+            jobs.append(Job(label, scenario, folder, refined, fmus, record=(signal,)))
     return jobs
 
 
@@ -95,7 +95,7 @@ def measure(outcomes: Sequence[Outcome], signal: str) -> list[Row]:
     """
     by_algorithm: dict[str, list[Outcome]] = {}
     for outcome in outcomes:
-        by_algorithm.setdefault(str(outcome.job.algorithm), []).append(outcome)
+        by_algorithm.setdefault(str(_given(outcome, "algorithm")), []).append(outcome)
     finest = next(iter(by_algorithm.values()))[-1]
     samples = {id(outcome): _samples(outcome, signal) for outcome in outcomes}
     reference = samples[id(finest)][0]
@@ -113,9 +113,14 @@ def measure(outcomes: Sequence[Outcome], signal: str) -> list[Row]:
             distance = None if run is finest else _distance(coarse[k], target)
             _, wall_time, failed = samples[id(run)]
             error = None if distance is None else distance / peak
-            step = float(run.job.step_size or 0)
+            step = float(_given(run, "step_size"))
             rows.append(Row(algorithm, step, error, order, wall_time, failed, run is finest))
     return rows
+
+
+def _given(outcome: Outcome, place: str) -> Plain:
+    """Return what a run's job gives at a place."""
+    return next(change.value for change in reversed(outcome.job.changes) if change.place == place)
 
 
 def _samples(outcome: Outcome, signal: str) -> tuple[np.ndarray | None, float | None, str]:

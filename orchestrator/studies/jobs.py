@@ -12,14 +12,13 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ResultsError, ScenarioError, YawbenchError
 from ..master.interrupts import StopFlag, interrupts
-from ..plan import Algorithm, Fmu, Plan
+from ..plan import Change, Fmu, Plan
 from ..results.formats import FILES, RUN_FILE
 from ..results.read import Results, load_results
 from ..scenario import yaml_lines
@@ -42,15 +41,10 @@ class Job:
     label: str
     scenario: Path
     out: Path
-    swaps: tuple[str, ...] = ()  # unit=fmu
-    settings: tuple[str, ...] = ()  # unit.parameter=value
-    stop_time: Fraction | float | str | None = None  # in place of the scenario's [s]
-    step_size: Fraction | float | str | None = None
-    algorithm: Algorithm | None = None
+    changes: tuple[Change, ...] = ()
     fmus: Path | None = None
     record: tuple[str, ...] = ()  # unit.variable; default: what the scenario records
     format: str = "csv"  # of the results
-    vehicle: Path | None = None  # vehicle file in place of the scenario's
     call_limit: float | None = None  # of a call of an FMU [s], in a process per unit; None: units share one
 
 
@@ -116,16 +110,7 @@ def planned(job: Job, once: Once | None = None) -> tuple[Scenario, Plan]:
     from ..wiring.make_plan import make_plan
 
     once = once or Once()
-    scenario = load_scenario(
-        job.scenario,
-        swaps=job.swaps,
-        settings=job.settings,
-        stop_time=job.stop_time,
-        step_size=job.step_size,
-        algorithm=job.algorithm,
-        vehicle=job.vehicle,
-        read=once.read,
-    )
+    scenario = load_scenario(job.scenario, changes=job.changes, read=once.read)
     isolated = job.call_limit is not None
     plan = make_plan(scenario, fmus=job.fmus, open_=once.open, isolated=isolated)
     if not job.record:

@@ -7,18 +7,17 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from fractions import Fraction
 from pathlib import Path
 
 from ..errors import ScenarioError
-from ..plan import Algorithm
+from ..plan import Change
 from ..scenario import overrides, yaml_lines
 from ..scenario.strict import validate
 from ..scenario.yaml_lines import Document, Key
 from ..wording import hint, listed
 from .grids import cells
 from .jobs import Job
-from .study_schema import OPERATORS, Claim, Reference, RunSpec, StudySpec, text_of
+from .study_schema import OPERATORS, Claim, Reference, RunSpec, StudySpec
 
 FIGURES = "figures"
 """Folder of the figures, beside those of the runs."""
@@ -32,18 +31,11 @@ class StudyRun:
     label: str
     row: str
     scenario: Path
-    swaps: tuple[str, ...]
-    settings: tuple[str, ...]
-    stop_time: Fraction | None
-    step_size: Fraction | None
-    algorithm: Algorithm | None
+    changes: tuple[Change, ...]
 
     def job(self, out: Path, fmus: Path | None) -> Job:
         """Return the job that makes this run with its results below `out`."""
-        return Job(
-            self.name, self.scenario, out / self.name, self.swaps, self.settings,
-            self.stop_time, self.step_size, self.algorithm, fmus,
-        )  # fmt: skip
+        return Job(self.name, self.scenario, out / self.name, self.changes, fmus)
 
 
 @dataclass(frozen=True)
@@ -104,20 +96,19 @@ def _expanded(document: Document, key: Key, entry: RunSpec) -> Iterator[StudyRun
             sentence = f"{name!r} cannot name a run: use letters, digits, . _ + - and / between folders"
             document.report((*key, "name"), sentence)
         folder = document.path.parent
-        swaps = []
-        for unit, fmu in entry.swap.items():
-            filled = fill(fmu, "swap", unit)
-            swaps.append(f"{unit}={folder / filled if overrides.is_path(filled) else filled}")
-        settings = [f"{k}={fill(text_of(v), 'set', k)}" for k, v in entry.set.items()]
+        swaps = {unit: fill(fmu, "swap", unit) for unit, fmu in entry.swap.items()}
+        settings = {
+            place: yaml_lines.scalar(fill(value, "set", place)) if isinstance(value, str) else value
+            for place, value in entry.set.items()
+        }
+        changes = overrides.changes_of_run(entry, "study")
+        changes += overrides.changes_of(swaps, settings, folder, "study")
         label = fill(entry.label, "label", use=wording) or name
         row = fill(entry.row, "row", use=wording) or label
         scenario = folder / fill(entry.scenario, "scenario")
         if len(document.problems) > known:
             return
-        yield StudyRun(
-            name, label, row, scenario, tuple(swaps), tuple(settings),
-            entry.stop_time, entry.step_size, entry.algorithm,
-        )  # fmt: skip
+        yield StudyRun(name, label, row, scenario, tuple(changes))
 
 
 def _check_names(study: Study, document: Document) -> None:

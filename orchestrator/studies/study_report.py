@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -111,8 +112,7 @@ def _record(findings: Findings, drawn: dict[str, Path]) -> dict[str, Any]:
             run.name: {
                 "label": run.label,
                 "scenario": str(run.scenario),
-                "swap": list(run.swaps),
-                "set": list(run.settings),
+                "changes": [asdict(change) for change in run.changes],
                 "failed": findings.failed.get(run.name),
                 "fmus": _hashes(findings.results.get(run.name)),
                 "metrics": {

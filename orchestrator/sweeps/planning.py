@@ -95,7 +95,7 @@ def plan_sweep(
             runs.append(PlannedRun(number, point, replace(job, out=out / key[:12]), plan, key))
         except YawbenchError as error:
             for problem in error.problems:
-                problems.setdefault(*_of_axis(sweep, problem))
+                problems.setdefault(*_of_axis(sweep, job, problem))
         progress(number + 1)
     if problems:
         raise ScenarioError(_first(problems.values()))
@@ -103,14 +103,13 @@ def plan_sweep(
     return Planned(sweep, runs, _units(sweep, runs), _metric_units(sweep, runs), used)
 
 
-def _of_axis(sweep: Sweep, problem: str) -> tuple[str, str]:
+def _of_axis(sweep: Sweep, job: Job, problem: str) -> tuple[str, str]:
     """Return a problem without the value of its axis, and the same with its place in the sweep file."""
     for name, axis in sweep.spec.axes.items():
-        for place in axis.places:
-            if problem.startswith((f"--set {place}=", f"--swap {place}=")):
-                option, _, sentence = problem.partition(": ")
-                value = option.partition("=")[2]
-                return f"{name}{sentence.replace(value, '')}", f"{sweep.path}: axes.{name}: {problem}"
+        for change in job.changes:
+            if change.place in axis.places and problem.startswith(f"{change}: "):
+                sentence = problem.removeprefix(f"{change}: ").replace(str(change.value), "")
+                return f"{name}{sentence}", f"{sweep.path}: axes.{name}: {problem}"
     return problem, problem
 
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from ..errors import ScenarioError
-from ..plan import Value
-from ..scenario import overrides, yaml_lines
+from ..plan import Change, Value
+from ..scenario import yaml_lines
+from ..scenario.overrides import apply_to_all_runs, changes_of, changes_of_run
 from ..scenario.strict import validate
 from ..scenario.yaml_lines import Document
-from ..studies.compare import fmu_and_settings
 from ..studies.jobs import Job
 from ..studies.study_schema import text_of
 from ..wording import hint
@@ -31,6 +31,7 @@ class Sweep:
 
     path: Path
     spec: SweepSpec
+    for_all: tuple[Change, ...] = ()  # in all runs
 
     @property
     def identity(self) -> str:
@@ -45,61 +46,49 @@ class Sweep:
     def job(self, number: int, out: Path, fmus: Path | None) -> Job:
         """Return the job of a point's run; if it keeps its results, they go below `out`."""
         spec, folder = self.spec, self.path.parent
-        swaps, settings = _changes(spec.swap, spec.set, folder)
-        vehicle = None
+        changes = [*self.for_all]
         for axis, level in zip(spec.axes.values(), self.points[number], strict=True):
             if axis.kind == "vehicle":
-                vehicle = folder / str(level.value)
+                changes.append(Change("vehicle", str(folder / str(level.value)), "sweep"))
             elif axis.kind == "variant":
                 variant = axis.variants[str(level.value)]
-                vehicle = folder / variant.vehicle if variant.vehicle else vehicle
-                more = _changes(variant.swap, variant.set, folder)
-                swaps, settings = swaps + more[0], settings + more[1]
+                if variant.vehicle:
+                    changes.append(Change("vehicle", str(folder / variant.vehicle), "sweep"))
+                changes += changes_of(variant.swap, variant.set, folder, "sweep")
             elif axis.kind == "fmu":
-                more = _changes({axis.vary[0]: str(level.value)}, {}, folder)
-                swaps, settings = swaps + more[0], settings + more[1]
+                changes += changes_of({axis.vary[0]: str(level.value)}, {}, folder, "sweep")
             else:
-                settings += [f"{place}={_given(axis, level)}" for place in axis.vary]
+                changes += [Change(place, _given(axis, level), "sweep") for place in axis.vary]
         width = len(str(len(self.points)))
         name = f"{number + 1:0{width}}"
-        return Job(
-            name, folder / spec.scenario, out / name, tuple(swaps), tuple(settings), spec.stop_time,
-            spec.step_size, spec.algorithm, fmus, vehicle=vehicle,
-        )  # fmt: skip
+        return Job(name, folder / spec.scenario, out / name, tuple(changes), fmus)
 
 
-def _changes(swap: Mapping[str, str], set_: Mapping[str, Value], folder: Path) -> tuple[list[str], list[str]]:
-    """Return swaps and settings as the command line takes them; an FMU may bring settings along."""
-    swaps, settings = [], [f"{place}={text_of(value)}" for place, value in set_.items()]
-    for unit, text in swap.items():
-        fmu, brought = fmu_and_settings(text)
-        swaps.append(f"{unit}={folder / fmu if overrides.is_path(fmu) else fmu}")
-        settings += [f"{unit}.{one}" for one in brought]
-    return swaps, settings
+def _given(axis: AxisSpec, level: Level) -> Value:
+    """Return a level with the unit that the axis counts in."""
+    if axis.unit:
+        return f"{text_of(level.value)} {axis.unit}"
+    return yaml_lines.scalar(level.value) if isinstance(level.value, str) else level.value
 
 
-def _given(axis: AxisSpec, level: Level) -> str:
-    """Return a level as `--set` takes it."""
-    return f"{text_of(level.value)} {axis.unit}" if axis.unit else text_of(level.value)
-
-
-def load_sweep(path: Path | str, *, swaps: Iterable[str] = (), settings: Iterable[str] = ()) -> Sweep:
+def load_sweep(path: Path | str, *, changes: Sequence[Change] = ()) -> Sweep:
     """Read a sweep file.
 
     Args:
         path: of the file.
-        swaps: `unit=fmu` for all runs, as given to --swap; a path is relative to the working directory.
-        settings: `unit.parameter=value` for all runs, as given to --set.
+        changes: for all runs; the path of an FMU is relative to the working directory.
 
     Raises:
         ScenarioError: with everything that is wrong with it.
     """
     document = yaml_lines.read(Path(path), what="sweep file")
-    overrides.apply_to_all_runs(document, swaps, settings)
+    apply_to_all_runs(document, changes)
     spec = validate(SweepSpec, document)
     if spec is None or document.problems:
         raise ScenarioError(document.sentences())
-    sweep = Sweep(Path(path), spec)
+    own = changes_of_run(spec, "sweep") + changes_of(spec.swap, spec.set, Path(path).parent, "sweep")
+    given = {change.place: change for change in changes}
+    sweep = Sweep(Path(path), spec, (*(one for one in own if one.place not in given), *given.values()))
     _check_axes(spec, document)
     _check_names(spec, document)
     if not document.problems and len(sweep.points) > MOST:

@@ -14,7 +14,7 @@ from ..scenario.load import Connection, Scenario
 from ..scenario.quantities import same_unit
 from ..scenario.yaml_lines import Key, dotted
 from ..wording import fold, fold_sentences, hint, listed
-from .parameters import value_for
+from .parameters import origin, value_for
 
 Input = tuple[str, str]  # unit, variable
 
@@ -29,7 +29,10 @@ def match(pattern: str, name: str) -> str | None:
 
 
 class Connector:
-    """Finds every input's source; problems go to the scenario's document, remarks to `notes`."""
+    """Finds every input's source.
+
+    Problems go to the scenario's document, remarks to `notes`, where constants come from to `origins`.
+    """
 
     def __init__(
         self,
@@ -37,11 +40,13 @@ class Connector:
         fmus: Mapping[str, Fmu],
         replaced: Callable[[str], Fmu | None],
         notes: list[str],
+        origins: Mapping[str, dict[str, str]],
     ) -> None:
         self._scenario = scenario
         self._fmus = fmus
         self._replaced = replaced
         self._notes = notes
+        self._origins = origins
         self._found: list[tuple[Key, str]] = []
         self._outputs = {unit: {v.name: v for v in fmu.of("output")} for unit, fmu in fmus.items()}
         self._inputs = {unit: {v.name: v for v in fmu.of("input")} for unit, fmu in fmus.items()}
@@ -58,6 +63,7 @@ class Connector:
                     continue
                 if (variable.optional or self._explicit(unit)) and variable.start is not None:
                     constants[(unit, name)] = variable.start
+                    self._origins[unit][name] = "default"
                 else:
                     self._report(("units", unit), self._undriven(unit, variable))
         for wire, key in wires.values():
@@ -186,6 +192,7 @@ class Connector:
                 try:
                     values[target] = value_for(self._inputs[unit][name], raw)
                     givers[target] = (rank, pattern)
+                    self._origins[unit][name] = origin(self._scenario.document, key)
                 except ValueError as error:
                     self._report(key, f"{error}, for {unit}.{name}")
                     values[target] = raw

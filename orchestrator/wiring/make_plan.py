@@ -50,8 +50,9 @@ def make_plan(
     """
     opened, replaced = _open_all(scenario, fmus, open_)
     notes: list[str] = list(scenario.document.notes)
-    parameters = Parameters(scenario, opened, replaced, notes).of_units()
-    connector = Connector(scenario, opened, replaced, notes)
+    origins: dict[str, dict[str, str]] = {name: {} for name in opened}
+    parameters = Parameters(scenario, opened, replaced, notes, origins).of_units()
+    connector = Connector(scenario, opened, replaced, notes, origins)
     wires, constants = connector.connect()
     record = connector.recorded()
     if not isolated:
@@ -74,7 +75,7 @@ def make_plan(
         for loop in evaluation.possible_loops[:1]
     ]
     units = {
-        name: Unit(name, fmu, _period(scenario, name), parameters[name], constants[name])
+        name: Unit(name, fmu, _period(scenario, name), parameters[name], constants[name], origins[name])
         for name, fmu in opened.items()
     }
     return Plan(
@@ -87,6 +88,7 @@ def make_plan(
         title=scenario.title,
         scenario=scenario.as_run(),
         notes=tuple(notes),
+        changes=scenario.changes,
     )
 
 

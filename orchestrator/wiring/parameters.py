@@ -69,11 +69,18 @@ def _other(variable: Variable, given: Value) -> Value:
     return given
 
 
+def origin(document: Document, key: Key) -> str:
+    """Return where the value at a key comes from: the file's kind, or what changed it."""
+    change = document.override(key)
+    return change.origin if change else "vehicle" if key[0] == "parameters" else "scenario"
+
+
 class Parameters:
     """The parameters of all units: their own, then the vehicle's for those that declare them.
 
-    Problems go to the documents of the scenario, what was left out after a swap to `notes`: a
-    value meant for the FMU that an option has replaced is no mistake if that FMU declares it.
+    Problems go to the documents of the scenario, where values come from to `origins`, what was left out
+    after a swap to `notes`: a value meant for the FMU that was replaced is no mistake if that FMU
+    declares it.
     """
 
     def __init__(
@@ -82,21 +89,25 @@ class Parameters:
         fmus: Mapping[str, Fmu],
         replaced: Callable[[str], Fmu | None],
         notes: list[str],
+        origins: Mapping[str, dict[str, str]],
     ) -> None:
         self._scenario = scenario
         self._fmus = fmus
         self._replaced = replaced
         self._notes = notes
+        self._origins = origins
 
     def of_units(self) -> dict[str, dict[str, Value]]:
         """Return each unit's values."""
         given: dict[str, dict[str, Value]] = {unit: {} for unit in self._fmus}
+        for unit, fmu in self._fmus.items():
+            self._origins[unit].update((variable.name, "default") for variable in fmu.of("parameter"))
         self._from_vehicle(given)
         for unit, fmu in self._fmus.items():
             for name, raw in self._scenario.units[unit].parameters.items():
                 key = ("units", unit, "parameters", name)
                 if _is_parameter(fmu, name):
-                    self._put(given[unit], fmu.variables[name], raw, self._scenario.document, key)
+                    self._put(given, unit, name, raw, self._scenario.document, key)
                 elif self._left_out(unit, name, key):
                     self._notes.append(f"{unit}.{name} is left out: {fmu.name} has no such parameter")
                 else:
@@ -110,7 +121,7 @@ class Parameters:
             key = ("parameters", name)
             takers = [unit for unit, fmu in self._fmus.items() if _is_parameter(fmu, name)]
             for unit in takers:
-                self._put(given[unit], self._fmus[unit].variables[name], raw, document, key)
+                self._put(given, unit, name, raw, document, key)
             if takers:
                 continue
             before = (self._replaced(unit) for unit in self._scenario.replaced)
@@ -129,12 +140,20 @@ class Parameters:
         before = self._replaced(unit)
         return before is None or _is_parameter(before, name)
 
-    @staticmethod
-    def _put(values: dict[str, Value], variable: Variable, raw: Value, document: Document, key: Key) -> None:
+    def _put(
+        self,
+        given: dict[str, dict[str, Value]],
+        unit: str,
+        name: str,
+        raw: Value,
+        document: Document,
+        key: Key,
+    ) -> None:
         try:
-            values[variable.name] = value_for(variable, raw)
+            given[unit][name] = value_for(self._fmus[unit].variables[name], raw)
         except ValueError as error:
             document.report(key, str(error))
+        self._origins[unit][name] = origin(document, key)
 
 
 def _is_parameter(fmu: Fmu, name: str) -> bool:

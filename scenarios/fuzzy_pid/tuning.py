@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.metrics.measures import peak, total_variation_rate
+from orchestrator.plan import Change
 from orchestrator.results.read import load_results
 from orchestrator.studies.jobs import Job, execute
 
@@ -69,9 +70,11 @@ def drive(controller: str, gains: dict[str, float], out: Path) -> Found:
             run,
             FOLDER / f"{run}.yaml",
             out / run,
-            swaps=(f"controller=controller_{controller}",),
-            settings=tuple(f"controller.{name}={value!r}" for name, value in gains.items()),
-            step_size=STEP_SIZE,
+            (
+                Change("controller", f"controller_{controller}", "tuning"),
+                *(Change(f"controller.{name}", value, "tuning") for name, value in gains.items()),
+                Change("step_size", STEP_SIZE, "tuning"),
+            ),
             record=(*(f"plant.{name}" for name in PEAKS), "controller.yaw_moment"),
         )
         for run in RUNS

@@ -11,6 +11,7 @@ from orchestrator.commands.plot import distinct
 from orchestrator.errors import ScenarioError
 from orchestrator.studies.compare import judge_comparison, metric_table, variants, write_comparison
 from orchestrator.studies.jobs import Job, Outcome
+from tests.changed import changed
 
 from .recorded import car, write
 
@@ -30,16 +31,20 @@ def scenario(tmp_path) -> Path:
     return path
 
 
+def given(job):
+    """Return what a job changes, by its place."""
+    return {change.place: change.value for change in job.changes}
+
+
 def labels(scenario, *swaps):
     return [job.label for job in variants(scenario, swaps, (), Path("out"), None)]
 
 
 def test_one_run_per_fmu_of_a_list(scenario):
-    jobs = variants(scenario, ["controller=a,b, c"], ["plant.mass=2"], Path("out"), None)
+    jobs = variants(scenario, ["controller=a,b, c"], changed(settings=["plant.mass=2"]), Path("out"), None)
     assert [job.label for job in jobs] == ["a", "b", "c"]
-    assert [job.swaps for job in jobs] == [("controller=a",), ("controller=b",), ("controller=c",)]
+    assert [given(job) for job in jobs] == [{"plant.mass": 2, "controller": fmu} for fmu in ("a", "b", "c")]
     assert [job.out for job in jobs] == [Path("out/a"), Path("out/b"), Path("out/c")]
-    assert all(job.settings == ("plant.mass=2",) for job in jobs)
 
 
 def test_a_repeated_option_adds_to_the_list(scenario):
@@ -57,7 +62,7 @@ def test_one_fmu_alone_is_compared_with_the_scenarios_own(scenario):
     assert labels(scenario, "controller=controller_off") == ["controller_fnn", "controller_off"]
     jobs = variants(scenario, ["tyre=tyre_linear"], (), Path("out"), None)
     assert [job.label for job in jobs] == ["tyre_own", "tyre_linear"]
-    assert jobs[0].swaps == (f"tyre={scenario.parent / 'parts/tyre_own.fmu'}",)
+    assert given(jobs[0]) == {"tyre": str(scenario.parent / "parts/tyre_own.fmu")}
 
 
 def test_lists_for_two_units_are_combined(scenario):
@@ -78,17 +83,21 @@ def test_a_file_whose_name_holds_a_comma_is_one_fmu(scenario, tmp_path):
 
 
 def test_an_fmu_may_bring_parameters_and_so_be_compared_with_itself(scenario):
-    jobs = variants(scenario, ["controller=a,a:law=sign:gain=2,b"], ["plant.mass=2"], Path("out"), None)
+    heavier = changed(settings=["plant.mass=2"])
+    jobs = variants(scenario, ["controller=a,a:law=sign:gain=2,b"], heavier, Path("out"), None)
     assert [job.label for job in jobs] == ["a", "a law=sign gain=2", "b"]
-    assert [job.swaps for job in jobs] == [("controller=a",), ("controller=a",), ("controller=b",)]
-    assert jobs[1].settings == ("plant.mass=2", "controller.law=sign", "controller.gain=2")
-    assert jobs[0].settings == jobs[2].settings == ("plant.mass=2",)
+    assert [given(job) for job in jobs] == [
+        {"plant.mass": 2, "controller": "a"},
+        {"plant.mass": 2, "controller": "a", "controller.law": "sign", "controller.gain": 2},
+        {"plant.mass": 2, "controller": "b"},
+    ]
     assert len({job.out for job in jobs}) == 3
 
 
 def test_parameters_alone_set_the_scenarios_own_fmu_against_itself(scenario):
     jobs = variants(scenario, ["controller=controller_fnn:learning=false"], (), Path("out"), None)
-    assert [job.settings for job in jobs] == [(), ("controller.learning=false",)]
+    own = {"controller": "controller_fnn"}
+    assert [given(job) for job in jobs] == [own, {**own, "controller.learning": False}]
 
 
 def test_a_comparison_with_itself_is_an_error(scenario):

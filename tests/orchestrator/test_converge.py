@@ -17,6 +17,7 @@ from orchestrator.studies.converge import (
     write_rows,
 )
 from orchestrator.studies.jobs import Job, Outcome
+from tests.changed import changed
 
 from .recorded import results, write
 
@@ -33,7 +34,8 @@ def outcomes(folder: Path, orders: dict[str, int], halvings: int = 3, scale: flo
             t = np.linspace(0, 2, round(2 / step) + 1)
             recorded = results({SIGNAL: np.sin(t) + scale * step**order * np.sin(2 * t)}, t)
             write(recorded, folder / name / str(k), wall_time=float(2**k))
-            job = Job(f"{name} {k}", Path("x.yaml"), folder / name / str(k), step_size=step, algorithm=name)
+            given = changed(step_size=step, algorithm=name)
+            job = Job(f"{name} {k}", Path("x.yaml"), folder / name / str(k), given)
             made.append(Outcome(job))
     return made
 
@@ -140,8 +142,8 @@ def test_steps_are_halved_exactly_and_units_keep_their_own(tmp_path):
     jobs = refinements(
         tmp_path / "s.yaml", halvings=3, signal=SIGNAL, algorithms=["extrapolated", "jacobi"], out=tmp_path
     )
-    assert [float(job.step_size) for job in jobs] == [0.004, 0.002, 0.001, 0.0005] * 2
-    assert [job.algorithm for job in jobs] == ["extrapolated"] * 4 + ["jacobi"] * 4
+    assert [job.changes[-1].value for job in jobs] == [0.004, 0.002, 0.001, 0.0005] * 2
+    assert [job.changes[-2].value for job in jobs] == ["extrapolated"] * 4 + ["jacobi"] * 4
     assert len({job.out for job in jobs}) == 8
     assert all(job.record == (SIGNAL,) for job in jobs)
 
@@ -149,7 +151,7 @@ def test_steps_are_halved_exactly_and_units_keep_their_own(tmp_path):
 def test_the_scenarios_own_algorithm_is_the_default(tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO)
     jobs = refinements(tmp_path / "s.yaml", halvings=2, signal=SIGNAL, algorithms=[], out=tmp_path)
-    assert [job.algorithm for job in jobs] == ["jacobi"] * 3
+    assert [job.changes[-2].value for job in jobs] == ["jacobi"] * 3
 
 
 def test_a_signal_without_its_unit_is_an_error(tmp_path):

@@ -20,6 +20,7 @@ from orchestrator.results.read import load_results
 from orchestrator.scaffold.controller import controller_files, layout
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
+from tests.changed import changed
 
 ROOT = Path(__file__).parents[2]
 CAR = ROOT / "scenarios" / "fnn_sideslip" / "25mps.yaml"
@@ -75,7 +76,8 @@ def run(fmus, tmp_path, capsys):
 
 
 def plan_of(fmus, **options):
-    return make_plan(load_scenario(CAR, settings=["driver.start_time=0"], **options), fmus=fmus)
+    changes = changed(settings=["driver.start_time=0"], **options)
+    return make_plan(load_scenario(CAR, changes=changes), fmus=fmus)
 
 
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
@@ -100,11 +102,13 @@ def test_no_process_outlives_a_run(fmus, tmp_path):
 def test_units_end_when_the_master_is_killed(fmus, tmp_path):
     code = (
         "import sys, os, signal; from pathlib import Path\n"
+        "from orchestrator.plan import Change\n"
         "from orchestrator.scenario.load import load_scenario\n"
         "from orchestrator.wiring.make_plan import make_plan\n"
         "from orchestrator.master.isolation import Isolation\n"
         "from orchestrator.master.simulate import simulate\n"
-        f"plan = make_plan(load_scenario({str(CAR)!r}, stop_time=0.01), fmus=Path({str(fmus)!r}))\n"
+        f"short = [Change('stop_time', 0.01, 'test')]\n"
+        f"plan = make_plan(load_scenario({str(CAR)!r}, changes=short), fmus=Path({str(fmus)!r}))\n"
         "isolation = Isolation(plan.units)\n"
         f"simulate(plan, {str(tmp_path)!r}, opener=isolation)\n"
         "again = Isolation(plan.units)\n"

@@ -11,6 +11,7 @@ import pytest
 
 from orchestrator.errors import ScenarioError
 from orchestrator.scenario.load import Endpoint, Scenario, load_scenario
+from tests.changed import changed
 
 GOOD = """\
 title: Single sine
@@ -53,7 +54,7 @@ def edited(*replacements: tuple[str, str]) -> Path:
 
 def problems(path: Path, **options: Any) -> list[str]:
     with pytest.raises(ScenarioError) as caught:
-        load_scenario(path, **options)
+        load_scenario(path, changes=changed(**options))
     assert caught.value.exit_status == 2
     return caught.value.problems
 
@@ -76,9 +77,7 @@ def test_everything_in_the_file_is_read(file: Path) -> None:
 def test_a_scenario_as_run_is_plain_data_with_the_options_in_it(file: Path) -> None:
     scenario = load_scenario(
         file,
-        swaps=["controller=controller_fnn"],
-        settings=["driver.amplitude=0.1"],
-        step_size=Fraction(1, 2000),
+        changes=changed(["controller=controller_fnn"], ["driver.amplitude=0.1"], step_size=0.0005),
     )
     as_run = json.loads(json.dumps(scenario.as_run()))
     assert as_run["units"]["controller"]["fmu"] == "controller_fnn"
@@ -279,7 +278,7 @@ def test_a_vehicle_path_that_cannot_be_one_is_said(file: Path) -> None:
 
 
 def test_swap_replaces_the_fmu_and_remembers_the_old_one(file: Path) -> None:
-    scenario = load_scenario(file, swaps=["controller=controller_fnn"])
+    scenario = load_scenario(file, changes=changed(["controller=controller_fnn"]))
     assert scenario.units["controller"].fmu == "controller_fnn"
     assert scenario.replaced == {"controller": "controller_off"}
 
@@ -287,21 +286,23 @@ def test_swap_replaces_the_fmu_and_remembers_the_old_one(file: Path) -> None:
 def test_swapped_paths_are_relative_to_the_working_directory(file: Path) -> None:
     Path("deep").mkdir()
     Path("deep/b.yaml").write_text(GOOD)
-    scenario = load_scenario(Path("deep/b.yaml"), swaps=["controller=my.fmu"])
+    scenario = load_scenario(Path("deep/b.yaml"), changes=changed(["controller=my.fmu"]))
     assert scenario.units["controller"].fmu == str(Path("my.fmu").absolute())
 
 
 def test_settings_change_parameters_constants_and_the_vehicle(file: Path) -> None:
     scenario = load_scenario(
         file,
-        settings=[
-            "driver.amplitude=2 deg",
-            "driver.mode=lane change",
-            "plant.initial_speed=25",
-            "plant.locked=true",
-            "inputs.friction_fl=0.3",
-            "vehicle.mass=1200 kg",
-        ],
+        changes=changed(
+            settings=[
+                "driver.amplitude=2 deg",
+                "driver.mode=lane change",
+                "plant.initial_speed=25",
+                "plant.locked=true",
+                "inputs.friction_fl=0.3",
+                "vehicle.mass=1200 kg",
+            ]
+        ),
     )
     assert scenario.units["driver"].parameters == {"amplitude": "2 deg", "mode": "lane change"}
     assert scenario.units["plant"].parameters == {"initial_speed": 25, "locked": True}
@@ -312,7 +313,9 @@ def test_settings_change_parameters_constants_and_the_vehicle(file: Path) -> Non
 def test_settings_change_times_and_algorithm_of_the_run_and_steps_of_units(file: Path) -> None:
     scenario = load_scenario(
         file,
-        settings=["stop_time=2 s", "step_size=5 ms", "algorithm=jacobi", "controller.step_size=0.01"],
+        changes=changed(
+            settings=["stop_time=2 s", "step_size=5 ms", "algorithm=jacobi", "controller.step_size=0.01"]
+        ),
     )
     assert (scenario.stop_time, scenario.step_size) == (2, Fraction(1, 200))
     assert scenario.algorithm == "jacobi"
@@ -345,30 +348,30 @@ def test_settings_change_times_and_algorithm_of_the_run_and_steps_of_units(file:
         ({"settings": ["driver.amplitude="]}, None),
         (
             {"settings": ["driver.amplitude=.inf"]},
-            "--set driver.amplitude=.inf: must be a finite number (got inf)",
+            "--set driver.amplitude=inf: must be a finite number (got inf)",
         ),
         (
             {"step_size": 0.0015},
             "a.yaml:2: stop_time: 8 s is no integer multiple of the communication step 0.0015 s "
-            "(step_size = 0.0015); nearest allowed: 7.9995 s or 8.001 s",
+            "(test step_size=0.0015); nearest allowed: 7.9995 s or 8.001 s",
         ),
-        ({"step_size": -1.0}, "step_size = -1.0: must be a time above 0 s (got -1.0)"),
+        ({"step_size": -1.0}, "test step_size=-1.0: must be a time above 0 s (got -1.0)"),
         (
             {"algorithm": "euler"},
-            "algorithm = euler: must be 'jacobi', 'gauss_seidel' or 'extrapolated' (got 'euler')",
+            "test algorithm=euler: must be 'jacobi', 'gauss_seidel' or 'extrapolated' (got 'euler')",
         ),
     ],
 )
 def test_a_wrong_option_is_named(file: Path, options: dict[str, Any], expected: str | None) -> None:
     if expected is None:
-        assert load_scenario(file, **options).units["driver"].parameters["amplitude"] == ""
+        assert load_scenario(file, changes=changed(**options)).units["driver"].parameters["amplitude"] == ""
     else:
         assert expected in problems(file, **options)
 
 
 def test_times_can_be_overridden_exactly(file: Path) -> None:
-    scenario = load_scenario(file, step_size=Fraction(1, 3000), stop_time="2 s", algorithm="jacobi")
-    assert (scenario.step_size, scenario.stop_time) == (Fraction(1, 3000), Fraction(2))
+    scenario = load_scenario(file, changes=changed(step_size=0.00025, stop_time="2 s", algorithm="jacobi"))
+    assert (scenario.step_size, scenario.stop_time) == (Fraction(1, 4000), Fraction(2))
     assert scenario.algorithm == "jacobi"
 
 

@@ -26,6 +26,7 @@ from orchestrator.interop.second_opinion import (
 )
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
+from tests.changed import changed
 
 from . import fmpy_exchanging
 
@@ -46,7 +47,8 @@ def fmus(tmp_path_factory):
 
 
 def plan_of(fmus, scenario="fuzzy_feedback/single_sine.yaml", stop_time=0.1, settings=()):
-    return make_plan(load_scenario(SCENARIOS / scenario, stop_time=stop_time, settings=settings), fmus=fmus)
+    changes = changed(settings=settings, stop_time=stop_time)
+    return make_plan(load_scenario(SCENARIOS / scenario, changes=changes), fmus=fmus)
 
 
 @pytest.mark.parametrize("scenario", PAPERS)

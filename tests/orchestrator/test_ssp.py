@@ -20,6 +20,7 @@ from orchestrator.master.simulate import simulate
 from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.ssp_names import DESCRIPTION_FILE, OMS, SSC, SSD, SSM, SSV
 from orchestrator.wiring.make_plan import make_plan
+from tests.changed import changed
 
 from .fake_fmus import make_fmu
 
@@ -49,7 +50,7 @@ def feedback(fmus, tmp_path_factory):
 
 
 def plan_of(path, fmus, **options):
-    return make_plan(load_scenario(path, stop_time=0.6, **options), fmus=fmus)
+    return make_plan(load_scenario(path, changes=changed(stop_time=0.6, **options)), fmus=fmus)
 
 
 def results_of(plan, folder):
@@ -110,7 +111,7 @@ def unit_of(plan, name):
 
 def problem(archive, fmus, **options):
     with pytest.raises(YawbenchError) as error:
-        make_plan(load_scenario(archive, **options), fmus=fmus)
+        make_plan(load_scenario(archive, changes=changed(**options)), fmus=fmus)
     (sentence,) = error.value.problems
     return sentence
 
@@ -316,7 +317,7 @@ def test_values_of_a_file_reach_what_they_are_mapped_to_and_go_before_those_of_c
     with zipfile.ZipFile(path, "a") as archive:
         archive.writestr("values.ssv", parameter_set("speed", 72, "km/h"))
         archive.writestr("names.ssm", SPEED_MAPPED.format(transformation))
-    plan = make_plan(load_scenario(path, settings=["plant.mass=1500"]), fmus=fmus)
+    plan = make_plan(load_scenario(path, changes=changed(settings=["plant.mass=1500"])), fmus=fmus)
     assert unit_of(plan, "plant").parameters["initial_speed"] == speed
     assert unit_of(plan, "plant").parameters["mass"] == 1500.0
 
@@ -418,7 +419,7 @@ def test_an_archive_without_a_step_asks_for_one_and_takes_it(feedback, fmus, tmp
     )
     asks = f"{path}: the archive says no communication step: give one in s, such as --set step_size=0.001"
     assert problem(path, fmus) == asks
-    plan = make_plan(load_scenario(path, settings=["step_size=0.0025"]), fmus=fmus)
+    plan = make_plan(load_scenario(path, changes=changed(step_size=0.0025)), fmus=fmus)
     assert (plan.n_steps, plan.algorithm) == (240, "extrapolated")
 
 
@@ -435,7 +436,7 @@ def test_the_step_of_an_archive_of_omsimulator_is_taken(feedback, fmus, tmp_path
 def test_an_archive_without_a_stop_time_asks_for_one(feedback, fmus, tmp_path):
     path = rewritten(feedback, tmp_path / "endless.ssp", ('stopTime="0.6"', ""))
     assert "the archive says no stop time" in problem(path, fmus)
-    assert make_plan(load_scenario(path, stop_time=0.2), fmus=fmus).n_steps == 200
+    assert make_plan(load_scenario(path, changes=changed(stop_time=0.2)), fmus=fmus).n_steps == 200
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from rich.console import Console
 
 from orchestrator.errors import ScenarioError
 from orchestrator.metrics.run_metrics import Value
+from orchestrator.plan import Change
 from orchestrator.studies.claims import condition_text, judge
 from orchestrator.studies.derived import calculate, rank_correlation
 from orchestrator.studies.jobs import Job, Outcome
@@ -106,20 +107,23 @@ def test_for_stands_for_one_run_per_combination(study, tmp_path):
     run = runs["25mps/fnn"]
     assert (run.label, run.row) == ("neural network", "25 m/s, neural network")
     assert run.scenario == tmp_path / "25mps.yaml"
-    assert run.swaps == ("controller=controller_fnn",)
-    assert run.settings == ("driver.amplitude=0.03", "controller.learning=true")
+    assert run.changes == (
+        Change("driver.amplitude", 0.03, "study"),
+        Change("controller.learning", True, "study"),
+        Change("controller", "controller_fnn", "study"),
+    )
     assert (runs["slow"].label, runs["slow"].row) == ("slow", "slow")
 
 
 def test_a_run_becomes_a_job_with_a_folder_of_its_own(study, tmp_path):
     job = study().runs["slow"].job(tmp_path / "out", None)
     assert job.out == tmp_path / "out" / "slow"
-    assert (float(job.stop_time), job.algorithm) == (2.0, "jacobi")
+    assert job.changes == (Change("stop_time", 2.0, "study"), Change("algorithm", "jacobi", "study"))
 
 
 def test_an_fmu_given_by_its_path_is_relative_to_the_study_file(study, tmp_path):
     run = study(('"controller_{controller}"', '"mine/{controller}.fmu"')).runs["15mps/fnn"]
-    assert run.swaps == (f"controller={tmp_path / 'mine/fnn.fmu'}",)
+    assert run.changes[-1] == Change("controller", str(tmp_path / "mine/fnn.fmu"), "study")
 
 
 def test_all_problems_of_a_study_are_reported_at_once(study):

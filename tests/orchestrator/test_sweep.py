@@ -362,5 +362,5 @@ def test_a_sweep_file_that_is_wrong_makes_no_run(moods, yawbench, tmp_path):
     status, _, err = yawbench(file, "out")
     assert status == 2
     assert len(err.splitlines()) == 1
-    assert "axes.level: --set controller.levle=10: " in err
+    assert "axes.level: sweep controller.levle=10: " in err
     assert not (tmp_path / "out").exists()

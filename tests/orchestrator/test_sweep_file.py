@@ -10,6 +10,7 @@ from fmus.build import build_all
 from orchestrator.errors import ScenarioError
 from orchestrator.sweeps.planning import plan_sweep
 from orchestrator.sweeps.sweep_file import load_sweep
+from tests.changed import changed
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
 
@@ -271,7 +272,7 @@ def test_figures_and_limits_must_name_what_there_is(old, new, sentence, sweep, t
 
 
 PLANS_REFUSED = [
-    ("driver.amplitude", "driver.amplitud", "axes.amplitude: --set driver.amplitud=0.01: "),
+    ("driver.amplitude", "driver.amplitud", "axes.amplitude: sweep driver.amplitud=0.01: "),
     ("vary: driver.amplitude", "vary: drivr.amplitude", "the scenario has no unit 'drivr'; did you mean"),
     ("vary: controller,", "vary: contrller,", "the scenario has no unit 'contrller'; did you mean"),
     ("controller_off:", "controller_of:", "no FMU 'controller_of'"),
@@ -306,7 +307,7 @@ def test_a_bound_in_a_unit_that_its_metric_does_not_have_is_refused_before_any_r
 def test_options_change_all_runs_as_the_file_would(sweep, tmp_path, fmus):
     path = sweep(("axes:\n", "set: {driver.frequency: 1}\naxes:\n")).path
     settings = ["driver.frequency=3 Hz", "stop_time=0.2", "vehicle.mass=1300", "driver.start_time=0.1"]
-    planned = plan_sweep(load_sweep(path, settings=settings), tmp_path / "runs", fmus)
+    planned = plan_sweep(load_sweep(path, changes=changed(settings=settings)), tmp_path / "runs", fmus)
     written = sweep(
         ("axes:\n", "set: {driver.frequency: 3 Hz, vehicle.mass: 1300, driver.start_time: 0.1}\naxes:\n"),
         ("axes:\n", "stop_time: 0.2\naxes:\n"),
@@ -317,7 +318,7 @@ def test_options_change_all_runs_as_the_file_would(sweep, tmp_path, fmus):
     swapped = load_sweep(
         sweep(("  control: {vary: controller, values: {controller_off: no control, "
                "controller_fuzzy_sideslip: fuzzy}}\n", "")).path,
-        swaps=[f"controller={fmus / 'controller_off.fmu'}"],
+        changes=changed([f"controller={fmus / 'controller_off.fmu'}"]),
     )  # fmt: skip
     for run in plan_sweep(swapped, tmp_path / "runs", fmus).runs:
         assert {unit.name: unit.fmu.name for unit in run.plan.units}["controller"] == "controller_off"
@@ -336,5 +337,5 @@ def test_options_change_all_runs_as_the_file_would(sweep, tmp_path, fmus):
 def test_options_that_are_wrong_are_said(options, sentence, sweep):
     path = sweep().path
     with pytest.raises(ScenarioError) as error:
-        load_sweep(path, **options)
+        load_sweep(path, changes=changed(**options))
     assert sentence in str(error.value)

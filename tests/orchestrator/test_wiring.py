@@ -10,9 +10,10 @@ from typing import Any
 import pytest
 
 from orchestrator.errors import ModelDescriptionError, WiringError, YawbenchError
-from orchestrator.plan import Plan, Unit, Wire
+from orchestrator.plan import Change, Plan, Unit, Wire
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
+from tests.changed import changed
 
 from .fake_fmus import WHEELS, Var, make_fmu, out
 
@@ -95,7 +96,7 @@ def scenario(units: str = UNITS, rest: str = CONSTANTS + TORQUES, *, head: str =
 
 
 def plan(path: Path | None = None, *, fmus: Path | None = None, **options: Any) -> Plan:
-    return make_plan(load_scenario(path or scenario(), **options), fmus=fmus)
+    return make_plan(load_scenario(path or scenario(), changes=changed(**options)), fmus=fmus)
 
 
 def problems(path: Path, kind: type[YawbenchError] = WiringError, **options: Any) -> list[str]:
@@ -650,3 +651,29 @@ def test_a_record_of_nothing_is_said() -> None:
         "torque_request_*, yaw_rate, acceleration_y, slip_angle_*, slip_ratio_*, tyre_force_x_* and "
         "tyre_force_y_*",
     ]
+
+
+def test_every_value_says_where_it_comes_from(folder: Path) -> None:
+    Path("car.yaml").write_text("parameters: {mass: 1200}\n", encoding="utf-8")
+    units = UNITS.replace("driver_sine}", "driver_sine, parameters: {amplitude: 0.05}}")
+    path = scenario(units, head="vehicle: car.yaml\n")
+    made = plan(path, settings=["inputs.friction_fl=0.3"])
+    assert unit(made, "plant").origins["mass"] == "vehicle"
+    assert unit(made, "driver").origins["amplitude"] == "scenario"
+    assert unit(made, "driver").origins["road"] == "default"
+    assert unit(made, "tyre").origins["friction_fl"] == "--set"
+    assert unit(made, "tyre").origins["friction_rr"] == "scenario"
+
+
+def test_a_plan_names_what_is_other_than_in_the_scenario_file() -> None:
+    made = plan(settings=["inputs.friction*=0.3", "driver.amplitude=0.05", "driver.amplitude=0.1"])
+    assert made.changes == (
+        Change("inputs.friction*", 0.3, "--set"),
+        Change("driver.amplitude", 0.1, "--set"),
+    )
+
+
+def test_a_change_that_changes_nothing_is_none() -> None:
+    made = plan(swaps=["controller=controller_fnn"], settings=["inputs.friction*=0.65", "stop_time=8.0"])
+    assert made.changes == ()
+    assert unit(made, "tyre").origins["friction_fl"] == "--set"

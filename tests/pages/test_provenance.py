@@ -23,6 +23,7 @@ from orchestrator.pages.provenance import (
 from orchestrator.results.run_record import run_record
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
+from tests.changed import changed
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_fnn")
 SCENARIO = """
@@ -86,7 +87,7 @@ def folder(tmp_path_factory) -> Path:
 
 
 def planned(folder, *settings, **values):
-    scenario = load_scenario(folder / "half.yaml", settings=settings, **values)
+    scenario = load_scenario(folder / "half.yaml", changes=changed(settings=settings, **values))
     return scenario, make_plan(scenario, fmus=folder / "fmus")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from fractions import Fraction
 from functools import cache
 
 import numpy as np
@@ -14,6 +13,7 @@ from orchestrator.master.simulate import simulate
 from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
+from tests.changed import changed
 from tests.components import monolith
 
 OPEN_LOOP = """
@@ -57,7 +57,7 @@ def error(tmp_path_factory):
     @cache
     def of(algorithm, milliseconds):
         scenario = load_scenario(
-            file, stop_time=STOP, step_size=Fraction(milliseconds, 1000), algorithm=algorithm
+            file, changes=changed(stop_time=STOP, step_size=milliseconds / 1000, algorithm=algorithm)
         )
         folder = tmp_path_factory.mktemp("run")
         simulate(make_plan(scenario, fmus=fmus), folder)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import json
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from orchestrator.cli import main
 from orchestrator.figures.display import shown
 from orchestrator.results.read import load_results
 from orchestrator.studies.jobs import Job, execute
+from tests.changed import changed
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "fuzzy_pid"
 SCENARIOS = ("double_lane_change", "sine", "ramp")
@@ -158,8 +158,8 @@ def test_the_coupling_error_of_the_sine_at_1_ms_is_small(fmus, tmp_path):
     jobs = [
         Job(
             f"{controller}, {divisor}", FOLDER / "sine.yaml", tmp_path / controller / str(divisor),
-            (f"controller=controller_{controller}",), stop_time=Fraction(6),
-            step_size=Fraction(1, 1000 * divisor), fmus=fmus, record=("plant.yaw_rate",),
+            changed([f"controller=controller_{controller}"], stop_time=6, step_size=0.001 / divisor),
+            fmus, record=("plant.yaw_rate",),
         )
         for controller in ("off", "fuzzy_pid")
         for divisor in (1, 4)
@@ -176,7 +176,7 @@ def test_the_coupling_error_of_the_sine_at_1_ms_is_small(fmus, tmp_path):
 )
 def test_the_mirrored_manoeuvre_gives_the_mirrored_motion(study, fmus, tmp_path, run, setting):
     out = tmp_path / run
-    (outcome,) = execute([Job(run, FOLDER / f"{run}.yaml", out, settings=(setting,), fmus=fmus)])
+    (outcome,) = execute([Job(run, FOLDER / f"{run}.yaml", out, changed(settings=[setting]), fmus)])
     assert outcome.ok
     there, mirrored = load_results(study["folder"] / run / "fuzzy_pid"), load_results(out)
     for name in ("yaw_rate", "sideslip", "roll_angle", "position_y"):
@@ -191,8 +191,9 @@ def test_the_mirrored_manoeuvre_gives_the_mirrored_motion(study, fmus, tmp_path,
 def test_with_combined_slip_by_similarity_the_sine_loses_the_car_without_control_alone(fmus, tmp_path):
     jobs = [
         Job(
-            controller, FOLDER / "sine.yaml", tmp_path / controller, (f"controller=controller_{controller}",),
-            ("tyre.low_friction=similarity",), fmus=fmus, record=("plant.sideslip",),
+            controller, FOLDER / "sine.yaml", tmp_path / controller,
+            changed([f"controller=controller_{controller}"], ["tyre.low_friction=similarity"]),
+            fmus, record=("plant.sideslip",),
         )
         for controller in ("off", *CONTROLLERS)
     ]  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ from orchestrator.cli import main
 from orchestrator.figures.display import shown
 from orchestrator.results.read import load_results
 from orchestrator.studies.jobs import Job, execute
+from tests.changed import changed
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "fuzzy_sliding_mode"
 SCENARIOS = ("high_friction", "low_friction", "beyond_paper", "beyond_grip", "side_share")
@@ -65,8 +65,7 @@ def short_runs(tmp_path_factory, fmus):
     """Scenario -> results of its first second."""
     folder = tmp_path_factory.mktemp("short")
     jobs = [
-        Job(name, FOLDER / f"{name}.yaml", folder / name, stop_time=Fraction(1), fmus=fmus)
-        for name in SCENARIOS
+        Job(name, FOLDER / f"{name}.yaml", folder / name, changed(stop_time=1), fmus) for name in SCENARIOS
     ]
     assert [outcome.problems for outcome in execute(jobs)] == [()] * len(jobs)
     return {name: load_results(folder / name) for name in SCENARIOS}

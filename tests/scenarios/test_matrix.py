@@ -13,6 +13,7 @@ from orchestrator.master.simulate import simulate
 from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
+from tests.changed import changed
 
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "fuzzy_sliding_mode" / "high_friction.yaml"
 CONTROLLERS = (
@@ -44,7 +45,7 @@ def fmus(tmp_path_factory):
 def test_every_controller_runs_on_this_car_and_tyre(fmus, tmp_path, plant, tyre):
     for controller in CONTROLLERS:
         swaps = (f"controller=controller_{controller}", f"plant=plant_{plant}", f"tyre=tyre_{tyre}")
-        plan = make_plan(load_scenario(SCENARIO, swaps=swaps, stop_time=2.0), fmus=fmus)
+        plan = make_plan(load_scenario(SCENARIO, changes=changed(swaps, stop_time=2.0)), fmus=fmus)
         simulate(plan, tmp_path / controller)
         results = load_results(tmp_path / controller)
         assert results.run["status"] == "completed", (controller, results.run["error"])

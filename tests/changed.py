@@ -1,0 +1,12 @@
+"""Changes of a scenario, as tests write them."""
+
+from collections.abc import Iterable
+
+from orchestrator.plan import Change, Value
+from orchestrator.scenario.overrides import read_changes
+
+
+def changed(swaps: Iterable[str] = (), settings: Iterable[str] = (), **of_run: Value) -> tuple[Change, ...]:
+    """Return what --swap and --set with these texts change, and times and the algorithm by name."""
+    named = [Change(place, value, "test") for place, value in of_run.items()]
+    return (*read_changes(swaps, settings), *named)
