@@ -5,10 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 Value = float | int | bool | str
 Algorithm = Literal["jacobi", "gauss_seidel", "extrapolated"]
+
+
+class Place(NamedTuple):
+    """Where an FMU keeps a scalar value."""
+
+    type: str  # in the names of the functions that set and get it: "Real", "Float64", ...
+    reference: int
+    element: int = 0  # of an array, counted row by row
+    elements: int = 1  # of the whole array
 
 
 @dataclass(frozen=True)
@@ -29,6 +38,15 @@ class Variable:
     choices: tuple[str, ...] | None = None  # of a String: allowed values, if the description lists them
     items: dict[str, int] | None = None  # of an Enumeration: name -> value
     optional: bool = False  # of an input: its start value is meant for when nothing drives it
+    encoding: str | None = None  # FMI 3.0: the type that the FMU keeps it in, such as "Float32"
+    element: int = 0  # of an array, counted row by row
+    elements: int = 1  # of the whole array
+
+    @property
+    def place(self) -> Place:
+        """Where the FMU keeps it. To the functions of FMI 2.0 an enumeration is an Integer."""
+        kind = self.encoding or {"Enumeration": "Integer"}.get(self.type, self.type)
+        return Place(kind, self.reference, self.element, self.elements)
 
     @property
     def discrete(self) -> bool:
@@ -55,6 +73,7 @@ class Fmu:
     variables: dict[str, Variable]
     description: str = ""
     once_per_process: bool = False
+    fmi: int = 2  # major version of the standard
     python_modules: dict[str, str] = field(default_factory=dict)
     """Of a PythonFMU unit: top-level module in resources/ -> hash of its content."""
 

@@ -23,8 +23,8 @@ from orchestrator.interop.second_opinion import MASTERS, installed, second_opini
 from orchestrator.master.interrupts import StopFlag
 from orchestrator.master.log import Log
 from orchestrator.master.master import Master
+from orchestrator.master.opening import open_unit
 from orchestrator.master.program import Operation
-from orchestrator.master.unit import FmuSlave
 from orchestrator.plan import Plan
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
@@ -71,7 +71,7 @@ def measure(plan: Plan, change: Change = lambda operation: [operation]) -> dict[
     begin = perf_counter()
     try:
         for unit in plan.units:
-            slaves[unit.name] = FmuSlave(unit, log, corrupted)
+            slaves[unit.name] = open_unit(unit, log, corrupted)
         opened = perf_counter()
         master = Master(plan, slaves, log, StopFlag())
         row = np.zeros(1 + len(plan.record))

@@ -64,7 +64,8 @@ def open_fmu(path: Path | str) -> Fmu:
     fmu = _load(entry, path)
     if fmu is None:
         fmu = _unpack(raw, entry, path)
-    _check_binary(fmu)
+    if problem := binary_problem(fmu):
+        raise ModelDescriptionError(f"{fmu.path}: {problem}")
     return fmu
 
 
@@ -249,18 +250,24 @@ def _prune(folder: Path) -> None:
             continue
 
 
-def _check_binary(fmu: Fmu) -> None:
-    """Refuse an FMU that has no binary for this platform, or names one outside the archive."""
+def binary_problem(fmu: Fmu) -> str | None:
+    """Return why an FMU cannot be loaded on this platform, None if it has a binary for it."""
     name, suffix = platform()
     identifier = fmu.model_identifier
     if not _FILE_NAME.fullmatch(identifier) or identifier in (".", ".."):
-        raise ModelDescriptionError(
-            f"{fmu.path}: modelIdentifier {short(identifier)} cannot name the library of an FMU: "
+        return (
+            f"modelIdentifier {short(identifier)} cannot name the library of an FMU: "
             "allowed are letters, digits and _, at most 200"
         )
-    if (fmu.directory / "binaries" / name / (fmu.model_identifier + suffix)).is_file():
-        return
-    present = sorted(p.name for p in fmu.directory.glob("binaries/*") if any(p.iterdir()))
+    if (fmu.directory / "binaries" / name / (identifier + suffix)).is_file():
+        return None
+    present = sorted(p.name for p in fmu.directory.glob("binaries/*") if p.is_dir() and any(p.iterdir()))
+    missing = f"binaries/{name}/{identifier}{suffix}"
+    if name in present:
+        files = sorted(p.name for p in (fmu.directory / "binaries" / name).iterdir())
+        return (
+            f"no binary of the name that the model identifier asks for ({missing}); binaries/{name} holds "
+            f"{listed(files)}"
+        )
     others = f"it has binaries for {listed(present)}" if present else "it has no binaries"
-    missing = f"binaries/{name}/{fmu.model_identifier}{suffix}"
-    raise ModelDescriptionError(f"{fmu.path}: no binary for this platform ({missing}); {others}")
+    return f"no binary for this platform ({missing}); {others}"

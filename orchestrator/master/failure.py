@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from .log import OK, PENDING, PROCESS, STATUS, Log, Message
-from .unit import Status
+from .slave import Status
 
 _TELLS_WHEN = re.compile(r"^[^:]* failed at t = [^:]* s: ")
 

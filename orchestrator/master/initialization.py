@@ -1,25 +1,35 @@
 """Bringing all units to a common start.
 
-Units enter initialization mode in evaluation order, each with the outputs of those before it. Then
-values go round until no input changes by a single bit: closed loops (tyre forces, accelerations)
-settle that way. A loop that keeps flickering in its last digits is accepted after `PASSES` passes
-if nothing moves by more than `TOLERANCE` of its value; one that moves more is an error.
+Parameters are set once the experiment is set up, because some tools' FMUs reset the model there, and
+read back in initialization mode: one that did not take is an error. Units enter initialization mode
+in evaluation order, each with the outputs of those before it. Then values go round until no input
+changes by a single bit: closed loops (tyre forces, accelerations) settle that way. A loop that keeps
+flickering in its last digits is accepted after `PASSES` passes if nothing moves by more than
+`TOLERANCE` of its value; one that moves more is an error.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import SimulationError
-from ..plan import Value, Wire
+from ..plan import Value, Variable, Wire
+from ..wording import listed
+from .log import FATAL, STATUS, WARNING, Log
 from .memory import Memory, Station
-from .unit import Status
+from .slave import Experiment, Status
 
 PASSES = 100
 TOLERANCE = 1e-9
+SINGLE = 1e-7
+"""Relative difference up to which a value that was read back is the one that was set; chosen: what an
+FMU that computes in single precision makes of it."""
+NAMED = 4
+"""Variables named in a sentence."""
 
 Check = Callable[[str, str, Status], None]
 """Called with a unit, what was done and the status after every call; raises if that is the end."""
@@ -45,55 +55,131 @@ class Movement:
         return f"{self.wire} ({self.old!r}, then {self.new!r})"
 
 
-def initialize(memory: Memory, check: Check) -> int:
+def initialize(memory: Memory, check: Check, log: Log) -> int:
     """Initialize all units and return the number of passes it took.
 
     Raises:
-        SimulationError: the loop of a wire does not settle; and whatever `check` raises.
+        SimulationError: a parameter does not take, the loop of a wire does not settle; and whatever
+            `check` raises.
     """
+    plan = memory.plan
     for station in memory.stations:
-        _set_parameters(station, check)
-        _set_known_inputs(memory, station, check)
-        check(station.name, "initialization", station.slave.enter(memory.plan.time(memory.plan.n_steps)))
+        experiment = Experiment(plan.time(0), plan.time(plan.n_steps))
+        check(station.name, "initialization", station.slave.setup(experiment))
+        _put(station, station.unit.parameters, "setting parameters", check)
+        _put(station, _known_inputs(memory, station), "setting inputs", check)
+        check(station.name, "initialization", station.slave.enter())
+        _check_parameters(station, check, log)
         _get(memory, station, check)
     for number in range(1, PASSES + 1):  # noqa: B007  the number is the result
         moving = [movement for s in memory.stations for movement in _renew(memory, s, check)]
         if not moving:
             break
     if any(movement.large for movement in moving):
-        raise SimulationError(_unsettled(moving), unit=None, time=0.0)
+        raise SimulationError(_unsettled(moving), unit=None, time=plan.time(0))
     for station in memory.stations:
         check(station.name, "initialization", station.slave.exit())
         _get(memory, station, check)
+        _check_constants(station, check, log)
     memory.start_history()
     return number
 
 
-def _set_parameters(station: Station, check: Check) -> None:
-    variables = [station.unit.fmu.variables[name] for name in station.unit.parameters]
-    for kind in {v.type: None for v in variables}:
-        chosen = [v for v in variables if v.type == kind]
-        values = [station.unit.parameters[v.name] for v in chosen]
-        check(
-            station.name, "setting parameters", station.slave.put(kind, [v.reference for v in chosen], values)
-        )
+def _put(station: Station, given: Mapping[str, Value], what: str, check: Check) -> None:
+    """Set variables; elements of an array that are not given keep their start values."""
+    variables = station.unit.fmu.variables
+    arrays = {variables[name].reference for name in given if variables[name].elements > 1}
+    others = (v for v in variables.values() if v.reference in arrays) if arrays else ()
+    values = {v.name: v.start for v in others if v.start is not None} | dict(given)
+    for chosen in _by_type(variables[name] for name in values):
+        status = station.slave.put([v.place for v in chosen], [values[v.name] for v in chosen])
+        check(station.name, what, status)
 
 
-def _set_known_inputs(memory: Memory, station: Station, check: Check) -> None:
-    """Set constants and the outputs of earlier units; others keep the start value of the FMU."""
-    known: dict[str, dict[int, Value]] = {}
+def _by_type(variables: Iterable[Variable]) -> Iterable[list[Variable]]:
+    groups: dict[str, list[Variable]] = {}
+    for variable in variables:
+        groups.setdefault(variable.place.type, []).append(variable)
+    return groups.values()
+
+
+def _known_inputs(memory: Memory, station: Station) -> dict[str, Value]:
+    """Return constants and the outputs of earlier units; others keep the start value of the FMU."""
+    known: dict[str, Value] = {}
     for variable, wire, source in zip(station.inputs, station.wires, station.sources, strict=True):
         value = float(memory.pool[source])
         if _comes_before(memory, wire, station) and np.isfinite(value):
-            known.setdefault("Real", {})[variable.reference] = value
+            known[variable.name] = value
     for variable, key in station.other_inputs:
         if key is None:
-            known.setdefault(variable.type, {})[variable.reference] = station.unit.constants[variable.name]
+            known[variable.name] = station.unit.constants[variable.name]
         elif key in memory.others:
-            known.setdefault(variable.type, {})[variable.reference] = memory.others[key]
-    for kind, values in known.items():
-        status = station.slave.put(kind, list(values), list(values.values()))
-        check(station.name, "setting inputs", status)
+            known[variable.name] = memory.others[key]
+    return known
+
+
+def _check_parameters(station: Station, check: Check, log: Log) -> None:
+    """Read all parameters back; raise SimulationError if one does not have the value that was set.
+
+    It is a warning if the FMU does not tell: so it may be that all is well.
+    """
+    lost = []
+    for chosen, status, found in _read_back(station, station.unit.parameters, check, log):
+        if status > WARNING:
+            names = listed([v.name for v in chosen][:NAMED]) + (" and others" if len(chosen) > NAMED else "")
+            text = f"whether {names} took the value that was set is not known: reading returned"
+            log.add(station.name, WARNING, "", f"{text} {STATUS[status]}")
+            continue
+        lost += [(v, value) for v, value in zip(chosen, found, strict=True) if not _took(station, v, value)]
+    if lost:
+        told = [
+            f"{v.name} is {_shown(v, value)}, not {_shown(v, station.unit.parameters[v.name])}"
+            for v, value in lost
+        ]
+        more = f" and {len(lost) - NAMED} more" if len(lost) > NAMED else ""
+        what = "a parameter" if len(lost) == 1 else "parameters"
+        raise SimulationError(
+            f"{station.name}: {what} did not take the value that was set: {listed(told[:NAMED])}{more}",
+            unit=station.name, time=log.time.value,
+        )  # fmt: skip
+
+
+def _check_constants(station: Station, check: Check, log: Log) -> None:
+    """Read constant inputs back; warn of others, for an FMU may rightly take inputs only when it steps."""
+    for chosen, status, found in _read_back(station, station.unit.constants, check, log):
+        for variable, value in zip(chosen, found, strict=True):
+            if status <= WARNING and not _took(station, variable, value):
+                asked = _shown(variable, station.unit.constants[variable.name])
+                text = f"the constant {variable.name} reads back as {_shown(variable, value)}, not {asked}"
+                log.add(station.name, WARNING, "", text)
+
+
+def _read_back(
+    station: Station, names: Iterable[str], check: Check, log: Log
+) -> Iterator[tuple[list[Variable], Status, list[Value]]]:
+    """Yield variables of one type, the status of reading them, and their values."""
+    for chosen in _by_type(station.unit.fmu.variables[name] for name in names):
+        with log.deaf():
+            status, values = station.slave.look([v.place for v in chosen])
+        if status >= FATAL:
+            check(station.name, "reading back what was set", status)
+        yield chosen, status, values
+
+
+def _took(station: Station, variable: Variable, found: Value) -> bool:
+    asked = (station.unit.parameters | station.unit.constants)[variable.name]
+    if variable.type == "Real":
+        return math.isclose(asked, found, rel_tol=SINGLE)  # type: ignore[arg-type]
+    return asked == found
+
+
+def _shown(variable: Variable, value: Value) -> str:
+    if isinstance(value, float):
+        return f"{value:.9g}" + (f" {variable.unit}" if variable.unit not in (None, "1") else "")
+    if isinstance(value, bool):
+        return str(value).lower()
+    names: dict[Value, str] = {number: name for name, number in (variable.items or {}).items()}
+    return names.get(value, repr(value))
 
 
 def _comes_before(memory: Memory, wire: Wire | None, station: Station) -> bool:
@@ -116,24 +202,37 @@ def _renew(memory: Memory, s: Station, check: Check) -> list[Movement]:
     if changed.size:
         s.u[:] = new
         check(s.name, "setting inputs", s.calls.set())
-    for variable, key in s.other_inputs:
-        if key is not None and memory.others[key] != memory.others.get((s.name, variable.name)):
-            value = memory.others[key]
-            old = memory.others.get((s.name, variable.name), "")
-            memory.others[s.name, variable.name] = value
-            moving.append(Movement(f"{key[0]}.{key[1]} -> {s.name}.{variable.name}", old, value))
-            check(s.name, "setting inputs", s.slave.put(variable.type, [variable.reference], [value]))
-    if moving or changed.size:
+    renewed = _renew_others(memory, s, check, moving)
+    if moving or changed.size or renewed:
         _get(memory, s, check)
     return moving
+
+
+def _renew_others(memory: Memory, s: Station, check: Check, moving: list[Movement]) -> bool:
+    """Do the same for what is not Real; add to `moving` and return whether anything has changed."""
+    changed = set()
+    for variable, key in s.other_inputs:
+        value = s.unit.constants[variable.name] if key is None else memory.others[key]
+        old = memory.others.get((s.name, variable.name))
+        if value == old:
+            continue
+        memory.others[s.name, variable.name] = value
+        changed.add(variable.place[:2])
+        if key is not None:
+            wire = f"{key[0]}.{key[1]} -> {s.name}.{variable.name}"
+            moving.append(Movement(wire, "" if old is None else old, value))
+    if changed:  # of an array all elements
+        given = [v.name for v, _ in s.other_inputs if v.place[:2] in changed]
+        _put(s, {name: memory.others[s.name, name] for name in given}, "setting inputs", check)
+    return bool(changed)
 
 
 def _get(memory: Memory, s: Station, check: Check) -> None:
     if s.outputs:
         check(s.name, "reading outputs", s.calls.get())
-    for variable in s.other_outputs:
-        status, (value,) = s.slave.fetch(variable.type, [variable.reference])
-        memory.others[s.name, variable.name] = value
+    for chosen in _by_type(s.other_outputs):
+        status, values = s.slave.fetch([v.place for v in chosen])
+        memory.others.update(((s.name, v.name), value) for v, value in zip(chosen, values, strict=True))
         check(s.name, "reading outputs", status)
 
 

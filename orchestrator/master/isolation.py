@@ -1,7 +1,7 @@
 """Units in processes of their own: a crash or a call that never comes back ends a run, not the master.
 
 To the master an isolated unit is a `Slave` like any other. Its numbers are those of the same unit in
-this process, for the process at the other end runs the same `FmuSlave` on the same values. Setting
+this process, for the process at the other end runs the same `unit.FmuSlave` on the same values. Setting
 inputs waits for the step and outputs come back with it, so a unit costs one exchange per step.
 """
 
@@ -19,17 +19,18 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelDescriptionError, SimulationError
-from ..plan import Plan, Unit, Value
+from ..plan import Place, Plan, Unit, Value
 from .exchange import GET, SET, STEP, Board
 from .log import FATAL, OK, PROCESS, WARNING, Log
+from .opening import SLAVES, open_unit
 from .process import Lost, UnitProcess
-from .unit import Calls, FmuSlave, Slave, Status
+from .slave import Calls, Experiment, Slave, Status
 
 CALL_LIMIT = 10.0
 """Time that a call of an FMU may take [s]; chosen: ten thousand times what a step takes, and still
 within the patience of somebody who waits."""
 
-_PARTS = {SET: ("set", "fmi2SetReal"), STEP: ("step", "fmi2DoStep"), GET: ("get", "fmi2GetReal")}
+_PARTS = {SET: ("set", "SetReal"), STEP: ("step", "DoStep"), GET: ("get", "GetReal")}
 """Part of an exchange -> kind of the master's operation, and function of the FMU."""
 
 
@@ -40,13 +41,14 @@ class IsolatedSlave:
         """Let the process load the library and instantiate.
 
         Raises:
-            ModelDescriptionError, SimulationError: as `FmuSlave`; also if the process dies of it.
+            ModelDescriptionError, SimulationError: as `unit.FmuSlave`; also if the process dies of it.
         """
         self.name = unit.name
         self._log = log
         self._process: UnitProcess | None = process
         self._stepping = False
         self._part = ""
+        self._prefix = SLAVES[unit.fmu.fmi].prefix
         process.log = functools.partial(log.add, unit.name)
         try:
             process.wait_until_ready()
@@ -56,7 +58,7 @@ class IsolatedSlave:
             # what the process needs of the FMU, which leaves out some hundred variables
             failed = process.ask("open", replace(unit, fmu=replace(unit.fmu, variables={})))
         except Lost as lost:
-            reason = lost.in_("fmi2Instantiate or before")
+            reason = lost.in_(f"{self._prefix}Instantiate or before")
             raise self._refused(f"{unit.name}: {unit.fmu.path} cannot be instantiated: {reason}") from None
         if failed is not None:
             process.end()
@@ -71,16 +73,16 @@ class IsolatedSlave:
     def connect(
         self,
         inputs: np.ndarray,
-        input_references: Sequence[int],
+        input_places: Sequence[Place],
         outputs: np.ndarray,
-        output_references: Sequence[int],
+        output_places: Sequence[Place],
         time: ctypes.c_double,
         step: ctypes.c_double,
     ) -> Calls:
         assert self._process is not None
-        board = Board(self._process.memory, len(input_references), len(output_references))
+        board = Board(self._process.memory, len(input_places), len(output_places))
         self._board = board
-        self._ask("", None, "connect", list(input_references), list(output_references))
+        self._ask("", None, "connect", list(input_places), list(output_places))
         board.step.value = step.value
         give = _copy(inputs, board.inputs)
         take = _copy(board.outputs, outputs)
@@ -124,7 +126,7 @@ class IsolatedSlave:
             answer = self._process.exchange(_BYTES[parts])
         except Lost as lost:
             self._part, function = _PARTS.get(self._board.part.value, ("", ""))
-            return self._lose(lost, function)
+            return self._lose(lost, function and self._prefix + function)
         if answer == OK:
             return OK
         self._part = _PARTS[answer >> 4][0]
@@ -133,21 +135,31 @@ class IsolatedSlave:
     def part(self, kind: str) -> str:
         return self._part or kind
 
-    def put(self, kind: str, references: Sequence[int], values: Sequence[Value]) -> Status:
+    def put(self, places: Sequence[Place], values: Sequence[Value]) -> Status:
         status = self._flush() if self._stepping else OK  # inputs are set in the order of the calls
         if status > WARNING:
             return status
-        return max(status, self._ask(f"fmi2Set{kind}", FATAL, "put", kind, list(references), list(values)))
+        function = f"{self._prefix}Set{places[0].type}"
+        return max(status, self._ask(function, FATAL, "put", list(places), list(values)))
 
-    def fetch(self, kind: str, references: Sequence[int]) -> tuple[Status, list[Value]]:
-        failed: tuple[Status, list[Value]] = (FATAL, [0] * len(references))
-        return self._ask(f"fmi2Get{kind}", failed, "fetch", kind, list(references))
+    def fetch(self, places: Sequence[Place]) -> tuple[Status, list[Value]]:
+        return self._get("fetch", places)
 
-    def enter(self, stop_time: float) -> Status:
-        return self._ask("fmi2SetupExperiment or fmi2EnterInitializationMode", FATAL, "enter", stop_time)
+    def look(self, places: Sequence[Place]) -> tuple[Status, list[Value]]:
+        return self._get("look", places)
+
+    def _get(self, request: str, places: Sequence[Place]) -> tuple[Status, list[Value]]:
+        failed: tuple[Status, list[Value]] = (FATAL, [0] * len(places))
+        return self._ask(f"{self._prefix}Get{places[0].type}", failed, request, list(places))
+
+    def setup(self, experiment: Experiment) -> Status:
+        return self._ask(f"{self._prefix}SetupExperiment", FATAL, "setup", experiment)
+
+    def enter(self) -> Status:
+        return self._ask(f"{self._prefix}EnterInitializationMode", FATAL, "enter")
 
     def exit(self) -> Status:
-        status = self._ask("fmi2ExitInitializationMode", FATAL, "exit")
+        status = self._ask(f"{self._prefix}ExitInitializationMode", FATAL, "exit")
         self._stepping = True
         return status
 
@@ -180,7 +192,12 @@ class IsolatedSlave:
         try:
             process.ask("free")
         except Lost as lost:  # the results are not the worse for it
-            self._log.add(self.name, WARNING, PROCESS, lost.in_("fmi2Terminate or fmi2FreeInstance"))
+            self._log.add(
+                self.name,
+                WARNING,
+                PROCESS,
+                lost.in_(f"{self._prefix}Terminate or {self._prefix}FreeInstance"),
+            )
         else:
             process.leave()
 
@@ -228,7 +245,7 @@ def opener_of(plan: Plan, call_limit: float | None) -> Iterator[Callable[[Unit, 
         SimulationError: this operating system has not what isolation needs.
     """
     if call_limit is None:
-        yield FmuSlave
+        yield open_unit
         return
     if sys.platform == "win32":
         raise SimulationError("--isolate needs Linux or macOS.", unit=None, time=0.0)

@@ -1,30 +1,22 @@
 """What the units say through the FMI logger.
 
-FMI log texts are printf formats with arguments that Python cannot read; fmpy's native proxy
-formats them (at most 2047 bytes). That proxy knows one receiver per process, so there is one
-callback here, and the component environment of an instance says whose message it is.
+There is one receiver for all instances of a process; the environment that an instance was given, a
+number, says whose message it is.
 """
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import itertools
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from fmpy import calloc, free
-from fmpy.fmi2 import (
-    fmi2CallbackAllocateMemoryTYPE,
-    fmi2CallbackFreeMemoryTYPE,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
-)
-
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING, UNKNOWN = range(7)
-STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending", "a status that FMI 2.0 does not have")
+STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending", "a status that FMI does not have")
 
 WRITTEN = 100
 """Warnings written into run.json; more are only counted."""
@@ -62,7 +54,17 @@ class Log:
         self.messages: list[Message] = []
         self.dropped = 0
         self._counts: Counter[str] = Counter()
+        self._deaf = False
         self.time = ctypes.c_double(0.0)  # [s], moved on by the master
+
+    @contextlib.contextmanager
+    def deaf(self) -> Iterator[None]:
+        """Hear nothing while the block runs: an FMU may be asked for what it need not tell."""
+        self._deaf = True
+        try:
+            yield
+        finally:
+            self._deaf = False
 
     def add(self, unit: str, status: int, category: str, text: str, time: float | None = None) -> None:
         """Keep a message; those with the status OK are of no interest.
@@ -71,7 +73,7 @@ class Log:
             time: that it tells of [s]; default: the communication point before it.
         """
         status = known(status)
-        if status == OK:
+        if status == OK or (self._deaf and category not in (MASTER, PROCESS)):
             return
         self._counts[unit] += 1
         if self._counts[unit] > KEPT and category not in (MASTER, PROCESS):
@@ -117,13 +119,30 @@ class Log:
         }
 
 
-_listeners: dict[int, tuple[Log, str, fmi2CallbackFunctions]] = {}
+_listeners: dict[int, tuple[Log, str, Any]] = {}
 _numbers = itertools.count(1)
 
 
-def _receive(environment, instance, status, category, text):
+def listen(log: Log, unit: str, kept: Any = None) -> int:
+    """Return the number under which `receive` passes messages on to `log`.
+
+    Args:
+        kept: what has to stay in memory until the number is given to `unlisten`.
+    """
+    number = next(_numbers)
+    _listeners[number] = (log, unit, kept)
+    return number
+
+
+def unlisten(number: int) -> None:
+    """Forget an instance that has been freed."""
+    _listeners.pop(number, None)
+
+
+def receive(number: int, status: int, category: bytes | None, text: bytes | None) -> None:
+    """Take a message of the instance that was given this number."""
     try:
-        log, unit, _ = _listeners[environment]
+        log, unit, _ = _listeners[number]
         log.add(unit, status, _decoded(category), _decoded(text))
     except Exception as error:  # must not reach the C code that called
         print(f"yawbench: a log message was lost: {error}")
@@ -132,40 +151,3 @@ def _receive(environment, instance, status, category, text):
 def _decoded(text: bytes | None) -> str:
     """Return a text of an FMU, without what would steer a terminal."""
     return _CONTROLS.sub("", (text or b"").decode("utf-8", errors="replace"))
-
-
-def _receive_unformatted(environment, instance, status, category, text):
-    _receive(environment, instance, status, category, (text or b"").replace(b"%%", b"%"))
-
-
-try:
-    from fmpy.logging import addLoggerProxy
-
-    _receiver = fmi2CallbackLoggerTYPE(_receive)
-except (ImportError, OSError):  # no native proxy for this platform: arguments stay unformatted
-    addLoggerProxy = None
-    _receiver = fmi2CallbackLoggerTYPE(_receive_unformatted)
-
-_allocate = fmi2CallbackAllocateMemoryTYPE(calloc)
-_free = fmi2CallbackFreeMemoryTYPE(free)
-
-
-def listen(log: Log, unit: str) -> fmi2CallbackFunctions:
-    """Return callback functions for one instance, whose messages go to `log`.
-
-    The structure is kept until it is given to `unlisten`, when the instance is gone.
-    """
-    callbacks = fmi2CallbackFunctions()
-    callbacks.logger = _receiver
-    callbacks.allocateMemory = _allocate
-    callbacks.freeMemory = _free
-    if addLoggerProxy is not None:
-        addLoggerProxy(ctypes.byref(callbacks))
-    callbacks.componentEnvironment = number = next(_numbers)
-    _listeners[number] = (log, unit, callbacks)
-    return callbacks
-
-
-def unlisten(callbacks: fmi2CallbackFunctions) -> None:
-    """Forget an instance that has been freed."""
-    _listeners.pop(callbacks.componentEnvironment, None)

@@ -26,7 +26,7 @@ from .interrupts import StopFlag
 from .log import MASTER, OK, WARNING, Log
 from .memory import Memory
 from .program import Operation, Programs
-from .unit import Slave, Status
+from .slave import Slave, Status
 
 
 class Interrupted(SimulationError):
@@ -49,9 +49,9 @@ class Master:
             period = s.unit.period
             s.calls = s.slave.connect(
                 s.u,
-                [v.reference for v in s.inputs],
+                [v.place for v in s.inputs],
                 s.y,
-                [v.reference for v in s.outputs],
+                [v.place for v in s.outputs],
                 self._clocks[period],
                 ctypes.c_double(float(period * plan.step)),
             )
@@ -73,7 +73,7 @@ class Master:
         Raises:
             SimulationError: a unit fails or logs an error, a wire does not settle or is not finite.
         """
-        self.passes = initialize(self.memory, self._check_initialization)
+        self.passes = initialize(self.memory, self._check_initialization, self.log)
         self._check_finite(0)
         self.memory.pool.take(self._recorded, None, row, "clip")
         if self._recorded_others:

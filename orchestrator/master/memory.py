@@ -17,7 +17,7 @@ import numpy as np
 
 from ..plan import Plan, Unit, Value, Variable, Wire
 from .coupling import Relation
-from .unit import Calls, Slave
+from .slave import Calls, Slave
 
 
 @dataclass

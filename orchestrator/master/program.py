@@ -14,9 +14,11 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from ..plan import Place
 from .coupling import Weights, weights
+from .log import OK
 from .memory import Memory, Station
-from .unit import OK, Status
+from .slave import Status
 
 KEPT = 1024
 """Programs kept. Periods without a common factor have cycles longer than any run; then every program is
@@ -159,12 +161,14 @@ def _setting(m: Memory, s: Station) -> list[Operation]:
     operations = []
     if any(s.wires):
         operations.append(Operation(s.name, "set", s.calls.set))
-    for kind in {v.type: None for v, source in s.other_inputs if source is not None}:
-        chosen = [(v.reference, src) for v, src in s.other_inputs if v.type == kind and src is not None]
-        references, sources = [r for r, _ in chosen], [src for _, src in chosen]
+    driven = {v.place[:2] for v, source in s.other_inputs if source is not None}  # of an array all elements
+    others = [(v, source) for v, source in s.other_inputs if v.place[:2] in driven]
+    for kind in dict.fromkeys(v.place.type for v, _ in others):
+        chosen = [(v, source or (s.name, v.name)) for v, source in others if v.place.type == kind]
+        places, sources = [v.place for v, _ in chosen], [source for _, source in chosen]
 
-        def put(kind: str = kind, references: list = references, sources: list = sources) -> Status:
-            return s.slave.put(kind, references, [m.others[source] for source in sources])
+        def put(places: list[Place] = places, sources: list = sources) -> Status:
+            return s.slave.put(places, [m.others[source] for source in sources])
 
         operations.append(Operation(s.name, "set", put))
     return operations
@@ -174,12 +178,12 @@ def _getting(m: Memory, s: Station) -> list[Operation]:
     operations = []
     if s.outputs:
         operations.append(Operation(s.name, "get", s.calls.get))
-    for kind in {v.type: None for v in s.other_outputs}:
-        chosen = [v for v in s.other_outputs if v.type == kind]
-        references, keys = [v.reference for v in chosen], [(s.name, v.name) for v in chosen]
+    for kind in dict.fromkeys(v.place.type for v in s.other_outputs):
+        chosen = [v for v in s.other_outputs if v.place.type == kind]
+        places, keys = [v.place for v in chosen], [(s.name, v.name) for v in chosen]
 
-        def fetch(kind: str = kind, references: list = references, keys: list = keys) -> Status:
-            status, values = s.slave.fetch(kind, references)
+        def fetch(places: list[Place] = places, keys: list = keys) -> Status:
+            status, values = s.slave.fetch(places)
             m.others.update(zip(keys, values, strict=True))
             return status
 

@@ -24,13 +24,14 @@ from ..results.run_record import run_record
 from .interrupts import StopFlag, interrupts
 from .log import Log, Message
 from .master import Interrupted, Master
-from .unit import FmuSlave, Slave
+from .opening import open_unit
+from .slave import Slave
 
 Progress = Callable[[int, int], None]
 """Called a few times a second with the communication points done and those in all."""
 
 Opener = Callable[[Unit, Log, set[Path]], Slave]
-"""Makes the instance of a unit (see `unit.FmuSlave`)."""
+"""Makes the instance of a unit (see `opening.open_unit`)."""
 
 KEPT = "What was recorded until then"
 """How the sentence begins that names the results of a run that failed."""
@@ -55,7 +56,7 @@ def simulate(
     out: Path | str,
     *,
     progress: Progress | None = None,
-    opener: Opener = FmuSlave,
+    opener: Opener = open_unit,
     format: str = "csv",
 ) -> RunInfo:
     """Run a plan and write its results (`results.csv`) and `run.json` into the folder `out`.
@@ -84,7 +85,7 @@ def simulate(
     return RunInfo(Path(out), recorder.written, len(plan.record), run.wall_time, passes, warnings)
 
 
-def simulate_in_memory(plan: Plan, *, opener: Opener = FmuSlave) -> Results:
+def simulate_in_memory(plan: Plan, *, opener: Opener = open_unit) -> Results:
     """Run a plan and return its results; nothing is written.
 
     Raises:

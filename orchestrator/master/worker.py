@@ -16,9 +16,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..errors import ModelDescriptionError, SimulationError
-from ..plan import Unit
+from ..plan import Place, Unit
 from .exchange import GET, LOG, REPLY, SET, STEP, Board, Channel
 from .log import OK, WARNING, Log
+from .opening import open_unit
+from .slave import Experiment
 from .unit import FmuSlave
 
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
@@ -78,15 +80,15 @@ class Worker:
     def open(self, unit: Unit) -> tuple[str, list[str]] | None:
         """Instantiate the FMU; return the name of an error and its sentences if that fails."""
         try:
-            self._slave = FmuSlave(unit, _Relay(self._channel), set())
+            self._slave = open_unit(unit, _Relay(self._channel), set())
         except (ModelDescriptionError, SimulationError) as error:
             return type(error).__name__, error.problems
         return None
 
-    def connect(self, input_references: Sequence[int], output_references: Sequence[int]) -> None:
-        board = Board(self._memory, len(input_references), len(output_references))
+    def connect(self, input_places: Sequence[Place], output_places: Sequence[Place]) -> None:
+        board = Board(self._memory, len(input_places), len(output_places))
         calls = self._slave.connect(
-            board.inputs, input_references, board.outputs, output_references, board.time, board.step
+            board.inputs, input_places, board.outputs, output_places, board.time, board.step
         )
         self._part = board.part
         self._calls = ((SET, calls.set), (STEP, calls.step), (GET, calls.get))
@@ -97,8 +99,14 @@ class Worker:
     def fetch(self, *arguments: Any) -> Any:
         return self._slave.fetch(*arguments)
 
-    def enter(self, stop_time: float) -> int:
-        return self._slave.enter(stop_time)
+    def look(self, *arguments: Any) -> Any:
+        return self._slave.look(*arguments)
+
+    def setup(self, experiment: Experiment) -> int:
+        return self._slave.setup(experiment)
+
+    def enter(self) -> int:
+        return self._slave.enter()
 
     def exit(self) -> int:
         return self._slave.exit()

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.master.log import ERROR, OK, Log
-from orchestrator.master.unit import Calls, Slave
-from orchestrator.plan import Algorithm, Fmu, Plan, Unit, Variable, Wire
+from orchestrator.master.slave import Calls, Experiment, Slave
+from orchestrator.plan import Algorithm, Fmu, Place, Plan, Unit, Variable, Wire
 
 
 class Behaviour:
@@ -48,9 +48,9 @@ class FakeSlave:
         self.time = 0.0
         self.started = False
 
-    def connect(self, inputs, input_references, outputs, output_references, time, step) -> Calls:
-        input_names = [self.names[r] for r in input_references]
-        output_names = [self.names[r] for r in output_references]
+    def connect(self, inputs, input_places, outputs, output_places, time, step) -> Calls:
+        input_names = self._named(input_places)
+        output_names = self._named(output_places)
 
         def set_inputs() -> int:
             self.calls.append(("set", *inputs.tolist()))
@@ -82,17 +82,28 @@ class FakeSlave:
     def part(self, kind: str) -> str:
         return kind
 
-    def put(self, kind: str, references: Sequence[int], values: Sequence[Any]) -> int:
-        self.calls.append(("put", kind, tuple(self.names[r] for r in references), tuple(values)))
-        self.values.update(zip((self.names[r] for r in references), values, strict=True))
+    def _named(self, places: Sequence[Place]) -> list[str]:
+        return [self.names[place.reference] for place in places]
+
+    def put(self, places: Sequence[Place], values: Sequence[Any]) -> int:
+        names = self._named(places)
+        self.calls.append(("put", places[0].type, tuple(names), tuple(values)))
+        self.values.update(zip(names, values, strict=True))
         return OK
 
-    def fetch(self, kind: str, references: Sequence[int]) -> tuple[int, list[Any]]:
+    def fetch(self, places: Sequence[Place]) -> tuple[int, list[Any]]:
         self._refresh()
-        return OK, [self.values[self.names[r]] for r in references]
+        return self.look(places)
 
-    def enter(self, stop_time: float) -> int:
-        self.calls.append(("enter", stop_time))
+    def look(self, places: Sequence[Place]) -> tuple[int, list[Any]]:
+        return OK, [self.values[name] for name in self._named(places)]
+
+    def setup(self, experiment: Experiment) -> int:
+        self.calls.append(("setup", experiment.start, experiment.stop))
+        return OK
+
+    def enter(self) -> int:
+        self.calls.append(("enter",))
         return OK
 
     def exit(self) -> int:

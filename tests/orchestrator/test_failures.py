@@ -202,7 +202,7 @@ def test_a_warning_without_a_message_is_reported_too(tmp_path):
 
 def test_an_error_logged_during_initialization_ends_the_run_although_the_status_is_ok(tmp_path):
     class Slave(FakeSlave):
-        def enter(self, stop_time):
+        def enter(self):
             self.log.add(self.name, ERROR, "", "initialization failed at t = 0 s: ValueError: mass is -1")
             return OK
 
@@ -357,7 +357,7 @@ def test_an_interrupted_run_ends_between_two_steps_and_keeps_its_results(number,
 
 def test_a_run_interrupted_during_initialization_has_no_rows(tmp_path):
     class Slave(FakeSlave):
-        def enter(self, stop_time):
+        def enter(self):
             os.kill(os.getpid(), signal.SIGINT)
             return OK
 
@@ -370,7 +370,7 @@ def test_a_run_interrupted_during_initialization_has_no_rows(tmp_path):
 
 def test_a_failure_before_all_inputs_are_known_records_those_that_are(tmp_path):
     class Slave(FakeSlave):
-        def enter(self, stop_time):
+        def enter(self):
             return ERROR
 
     units = {"b": Echo(), "a": Mixed()}

@@ -300,6 +300,15 @@ def test_a_missing_binary_is_said_with_those_there_are(tmp_path: Path, cache: Pa
     assert problem(path) == f"{path}: {missing}; it has no binaries"
 
 
+def test_a_binary_of_another_name_is_said_with_the_name_that_is_expected(tmp_path: Path, cache: Path) -> None:
+    path = tmp_path / "a.fmu"
+    make_fmu(path, binaries=[], files={f"binaries/{HERE}/b{SUFFIX}": b"", f"binaries/{HERE}/c.txt": b""})
+    assert problem(path) == (
+        f"{path}: no binary of the name that the model identifier asks for (binaries/{HERE}/a{SUFFIX}); "
+        f"binaries/{HERE} holds b{SUFFIX} and c.txt"
+    )
+
+
 def test_a_full_disk_is_said_and_leaves_nothing_half_done(
     fmu: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -37,7 +37,7 @@ KINDS = {"Real": 0.75, "Integer": -21, "Boolean": "true", "String": "größer"}
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux")
 
 
-def description(*kinds):
+def description(*kinds, guid):
     """Return a model description without optional capabilities, with large and sparse references."""
     variables = [
         f'<ScalarVariable name="answer" valueReference="{ANSWER}" causality="parameter"'
@@ -55,7 +55,7 @@ def description(*kinds):
     outputs = "".join(f'<Unknown index="{3 + 2 * i}" dependencies="{2 + 2 * i}"/>' for i in range(len(kinds)))
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n'
-        '<fmiModelDescription fmiVersion="2.0" modelName="foreign" guid="{good}">'
+        f'<fmiModelDescription fmiVersion="2.0" modelName="foreign" guid="{guid}">'
         f'<CoSimulation modelIdentifier="foreign"/>{MODES if "Enumeration" in kinds else ""}'
         f"<ModelVariables>{''.join(variables)}</ModelVariables>"
         f"<ModelStructure><Outputs>{outputs}</Outputs><InitialUnknowns>{outputs}</InitialUnknowns>"
@@ -67,9 +67,9 @@ def description(*kinds):
 def run(library, tmp_path, capsys):
     """Run two units of an FMU, the second fed by the first; return status, words and results."""
 
-    def go(*arguments, answer=0, given=KINDS):
+    def go(*arguments, answer=0, given=KINDS, guid="{good}"):
         with zipfile.ZipFile(tmp_path / "foreign.fmu", "w") as archive:
-            archive.writestr("modelDescription.xml", description(*given))
+            archive.writestr("modelDescription.xml", description(*given, guid=guid))
             archive.write(library, f"binaries/{fmpy.platform}/foreign.so")
         constants = ", ".join(f"a.{kind}_in: {value}" for kind, value in given.items())
         (tmp_path / "two.yaml").write_text(
@@ -147,3 +147,29 @@ def test_a_tunable_parameter_is_given_as_any_other(run):
     assert status == 2
     assert "--set b.answer=5" in said
     assert "4" in said
+
+
+@together_and_apart
+def test_a_parameter_reaches_an_fmu_that_resets_when_the_experiment_is_set_up(run, isolate):
+    assert run(*isolate, answer=3, guid="{reset}")[0] == 1  # as told, it fails
+    status, said, results = run(*isolate, answer=1, guid="{reset}")
+    assert status == 0
+    assert "valve 3 of b" in said
+    assert results.run["fmus"]["b"]["parameters"] == {"answer": 1}
+
+
+@together_and_apart
+def test_a_parameter_that_does_not_take_ends_the_run(run, isolate):
+    status, said, results = run(*isolate, answer=2, guid="{deaf}")
+    assert status == 1
+    assert "b: a parameter did not take the value that was set: answer is 0, not 2" in said
+    assert results.run["status"] == "failed"
+    assert results.run["error"]["unit"] == "b"
+
+
+@together_and_apart
+def test_a_parameter_that_cannot_be_read_back_is_a_warning(run, isolate):
+    status, said, results = run(*isolate, answer=1, guid="{mute}")
+    assert status == 0
+    assert "b at t = 0 s: whether answer took the value that was set is not known" in said
+    assert results.time[-1] == 0.5

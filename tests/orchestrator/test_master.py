@@ -222,7 +222,7 @@ def test_constants_are_set_once_and_never_again(tmp_path):
     unit = Function(lambda t, u: {"y": 2 * u["mu"]}, ["mu"], ["y"])
     slaves, results = run({"a": unit}, [], tmp_path, constants={"a": {"mu": 0.65}})
     calls = slaves["a"].calls
-    assert ("put", "Real", ("mu",), (0.65,)) in calls[: calls.index(("enter", 1.0))]
+    assert ("put", "Real", ("mu",), (0.65,)) in calls[: calls.index(("enter",))]
     assert "set" not in [call[0] for call in calls[calls.index(("exit",)) :]]
     assert results["a.y"].tolist() == [1.3] * 11
 
@@ -250,7 +250,7 @@ def test_what_nobody_needs_is_not_read(tmp_path):
     assert read == [0.0]  # the fake's own, when it leaves initialization
 
 
-def test_parameters_are_set_before_initialization_mode(tmp_path):
+def test_parameters_are_set_between_the_experiments_setup_and_initialization_mode(tmp_path):
     class Gain(Behaviour):
         parameters = {"gain": 1.0}
         outputs = {"y": ()}
@@ -259,7 +259,7 @@ def test_parameters_are_set_before_initialization_mode(tmp_path):
             return {"y": u["gain"]}
 
     slaves, results = run({"a": Gain()}, [], tmp_path, parameters={"a": {"gain": 5.0}})
-    assert slaves["a"].calls[0] == ("put", "Real", ("gain",), (5.0,))
+    assert slaves["a"].calls[:3] == [("setup", 0.0, 1.0), ("put", "Real", ("gain",), (5.0,)), ("enter",)]
     assert results["a.y"].tolist() == [5.0] * 11
 
 
@@ -277,7 +277,7 @@ def test_units_enter_initialization_with_the_outputs_of_those_before_them(tmp_pa
     units = {"a": Clock(x=lambda t: 25.0), "b": Function(lambda t, u: {"y": 1.0 / u["x"]}, ["x"], ["y"])}
     slaves, _ = run(units, ["a.x -> b.x"], tmp_path)
     calls = slaves["b"].calls
-    assert calls[: calls.index(("enter", 1.0))] == [("put", "Real", ("x",), (25.0,))]
+    assert calls[: calls.index(("enter",))] == [("setup", 0.0, 1.0), ("put", "Real", ("x",), (25.0,))]
 
 
 def test_a_loop_that_does_not_settle_is_an_error_that_names_its_wires(tmp_path):

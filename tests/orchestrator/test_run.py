@@ -14,8 +14,8 @@ import pytest
 from fmus.build import build_all, build_component
 from orchestrator.cli import main
 from orchestrator.master import log
+from orchestrator.master.opening import open_unit
 from orchestrator.master.simulate import simulate
-from orchestrator.master.unit import FmuSlave
 from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
@@ -411,7 +411,7 @@ def repeat_runs(scenario, fmus, out):
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 def test_300_runs_in_one_process_neither_leak_nor_take_more_work(fmus, tmp_path):
     scenario = car(tmp_path, stop=0.004)
-    slave = FmuSlave(make_plan(load_scenario(scenario), fmus=fmus).units[0], log.Log(), set())
+    slave = open_unit(make_plan(load_scenario(scenario), fmus=fmus).units[0], log.Log(), set())
     alive = live_components()
     slave.free()
     assert live_components() == alive - 1  # so instances are counted

@@ -11,7 +11,8 @@ import numpy as np
 from ...master.interrupts import StopFlag
 from ...master.log import Log
 from ...master.master import Master
-from ...master.unit import FmuSlave, Slave
+from ...master.opening import open_unit
+from ...master.slave import Slave
 from ...plan import Change
 from ...scenario.load import load_scenario
 from ...wiring.make_plan import make_plan
@@ -31,7 +32,7 @@ def drive(request: Request) -> Recording:
     rows = np.zeros((request.n_steps + 1, 1 + len(request.columns)))
     try:
         for unit in plan.units:
-            slaves[unit.name] = FmuSlave(unit, log, set())
+            slaves[unit.name] = open_unit(unit, log, set())
         master = Master(plan, slaves, log, StopFlag())
         master.initialize(rows[0], [])
         begin = time.perf_counter()

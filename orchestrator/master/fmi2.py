@@ -1,0 +1,134 @@
+"""Instances of FMI 2.0 co-simulation."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy import calloc, free
+from fmpy.fmi2 import (
+    FMU2Slave,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+    fmi2CoSimulation,
+)
+
+from ..plan import Place, Unit
+from .log import ERROR, listen, receive
+from .slave import Calls, Experiment, Status
+from .unit import FmuSlave, nothing_to_do
+
+
+class Fmi2Slave(FmuSlave):
+    """An instance of an FMI 2.0 co-simulation FMU."""
+
+    prefix = "fmi2"
+    library = FMU2Slave
+    c_types = {
+        "Real": ctypes.c_double,
+        "Integer": ctypes.c_int,
+        "Boolean": ctypes.c_int,
+        "String": ctypes.c_char_p,
+    }
+
+    def _instantiate(self, unit: Unit) -> int | None:
+        callbacks = _callbacks()
+        callbacks.componentEnvironment = self._listener = listen(self._log, unit.name, callbacks)
+        return self._function("Instantiate")(
+            unit.name.encode(),
+            fmi2CoSimulation,
+            unit.fmu.guid.encode(),
+            Path(unit.fmu.directory, "resources").absolute().as_uri().encode(),
+            ctypes.byref(callbacks),
+            False,
+            True,  # PythonFMU passes on no message at all without
+        )
+
+    def connect(
+        self,
+        inputs: np.ndarray,
+        input_places: Sequence[Place],
+        outputs: np.ndarray,
+        output_places: Sequence[Place],
+        time: ctypes.c_double,
+        step: ctypes.c_double,
+    ) -> Calls:
+        component = ctypes.c_void_p(self._component)
+        return Calls(
+            self._exchange("SetReal", component, input_places, inputs),
+            functools.partial(self._raw("DoStep"), component, time, step, ctypes.c_int(1)),
+            self._exchange("GetReal", component, output_places, outputs),
+        )
+
+    def _exchange(
+        self, function: str, component: ctypes.c_void_p, places: Sequence[Place], values: np.ndarray
+    ) -> Callable[[], Status]:
+        if not places:
+            return nothing_to_do
+        buffer = (ctypes.c_double * len(places)).from_buffer(values.data)
+        count = ctypes.c_size_t(len(places))
+        return functools.partial(self._raw(function), component, _references(places), count, buffer)
+
+    def _access(self, verb: str, places: Sequence[Place], values: Sequence[Any]) -> tuple[Status, list[Any]]:
+        kind = places[0].type
+        buffer = (self.c_types[kind] * len(places))(*values)
+        function = self._function(verb + kind)
+        return function(self._component, _references(places), len(places), buffer), list(buffer)
+
+    def setup(self, experiment: Experiment) -> Status:
+        start, stop, tolerance = experiment
+        status = self.note(
+            self._function("SetupExperiment")(
+                self._component, tolerance is not None, tolerance or 0.0, start, True, stop
+            )
+        )
+        self._may_terminate = status < ERROR
+        return status
+
+    def enter(self) -> Status:
+        return self.note(self._function("EnterInitializationMode")(self._component))
+
+
+def _references(places: Sequence[Place]) -> Any:
+    return (ctypes.c_uint * len(places))(*(place.reference for place in places))
+
+
+def _log(environment, instance, status, category, text):
+    receive(environment, status, category, text)
+
+
+def _log_unformatted(environment, instance, status, category, text):
+    receive(environment, status, category, (text or b"").replace(b"%%", b"%"))
+
+
+try:
+    from fmpy.logging import addLoggerProxy
+
+    _logger = fmi2CallbackLoggerTYPE(_log)
+except (ImportError, OSError):  # no native proxy for this platform: arguments stay unformatted
+    addLoggerProxy = None
+    _logger = fmi2CallbackLoggerTYPE(_log_unformatted)
+
+_allocate = fmi2CallbackAllocateMemoryTYPE(calloc)
+_free = fmi2CallbackFreeMemoryTYPE(free)
+
+
+def _callbacks() -> fmi2CallbackFunctions:
+    """Return callback functions for one instance.
+
+    FMI 2.0's log texts are printf formats with arguments that Python cannot read; fmpy's native proxy
+    formats them (at most 2047 bytes).
+    """
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = _logger
+    callbacks.allocateMemory = _allocate
+    callbacks.freeMemory = _free
+    if addLoggerProxy is not None:
+        addLoggerProxy(ctypes.byref(callbacks))
+    return callbacks

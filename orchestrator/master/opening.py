@@ -1,0 +1,18 @@
+"""The instance of a unit in this process, of the version of FMI that its FMU follows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..plan import Unit
+from .fmi2 import Fmi2Slave
+from .log import Log
+from .unit import FmuSlave
+
+SLAVES: dict[int, type[FmuSlave]] = {2: Fmi2Slave}
+"""Major version of FMI -> its instances."""
+
+
+def open_unit(unit: Unit, log: Log, corrupted: set[Path]) -> FmuSlave:
+    """Return the instance of a unit; arguments and errors are those of `FmuSlave`."""
+    return SLAVES[unit.fmu.fmi](unit, log, corrupted)

@@ -1,0 +1,79 @@
+"""What the master needs of an FMU's instance, whichever version of FMI it follows."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from ..plan import Place, Value
+
+Status = int
+
+
+class Calls(NamedTuple):
+    """The calls of a communication step, each without arguments, returning an FMI status."""
+
+    set: Callable[[], Status]
+    step: Callable[[], Status]
+    get: Callable[[], Status]
+
+
+class Experiment(NamedTuple):
+    """What an instance is told of the run before it is initialized."""
+
+    start: float  # [s]
+    stop: float  # [s]
+    tolerance: float | None = None  # relative, of its own solver; None: its default
+
+
+class Slave(Protocol):
+    """An instance of an FMU. Statuses are FMI's, never exceptions."""
+
+    name: str
+
+    def connect(
+        self,
+        inputs: np.ndarray,
+        input_places: Sequence[Place],
+        outputs: np.ndarray,
+        output_places: Sequence[Place],
+        time: ctypes.c_double,
+        step: ctypes.c_double,
+    ) -> Calls:
+        """Return the calls that exchange floating-point values through the two arrays.
+
+        `step` takes the instance from `time` [s] to `time` + `step` [s], both read at the call.
+        """
+
+    def part(self, kind: str) -> str:
+        """Return which kind of call (set, step, get) has failed when one of `kind` did not return OK."""
+
+    def put(self, places: Sequence[Place], values: Sequence[Value]) -> Status:
+        """Set variables of one type; of an array all elements."""
+
+    def fetch(self, places: Sequence[Place]) -> tuple[Status, list[Value]]:
+        """Return variables of one type."""
+
+    def look(self, places: Sequence[Place]) -> tuple[Status, list[Value]]:
+        """Return variables of one type; that the FMU refuses to tell them is not held against it."""
+
+    def setup(self, experiment: Experiment) -> Status:
+        """Tell the instance of the run."""
+
+    def enter(self) -> Status:
+        """Enter initialization mode."""
+
+    def exit(self) -> Status:
+        """Leave initialization mode."""
+
+    def note(self, status: Status) -> Status:
+        """Remember a status, which decides how the instance may be ended, and return it.
+
+        A number that is no status comes back as UNKNOWN.
+        """
+
+    def free(self) -> None:
+        """End the instance as its state allows. Once; further calls do nothing."""
