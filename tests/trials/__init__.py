@@ -1,0 +1,1 @@
+"""Trials run on demand: what is too long for the tests, of which a sample runs there."""
