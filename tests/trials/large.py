@@ -15,7 +15,7 @@ def write_ring(folder: Path, *, units: int, variables: int, follows: str) -> Pat
         units: how many.
         variables: of all units together, half of them inputs.
         follows: what each output follows at once: "nothing", "one" input, "all" of them, or "unsaid".
-            The last unit of the ring closes it without direct dependence unless it is "unsaid".
+            The last unit of the ring follows nothing unless it is "unsaid", or "closed": one input each.
     """
     each = variables // units // 2
     for i in range(units):
@@ -25,7 +25,7 @@ def write_ring(folder: Path, *, units: int, variables: int, follows: str) -> Pat
             name, last = f"u{i}_y{k}", i == units - 1
             if follows == "unsaid":
                 outputs.append(Var(name, follows=None))
-            elif follows == "nothing" or last:
+            elif follows == "nothing" or (last and follows != "closed"):
                 outputs.append(out(name))
             else:
                 outputs.append(out(name, *(names if follows == "all" else names[k : k + 1])))
