@@ -14,17 +14,9 @@ _WHEEL_SUFFIX = re.compile(r"_(fl|fr|rl|rr)\b")
 K = TypeVar("K")
 
 
-LISTED = 100
-"""Names in one sentence. Chosen: more than any of our FMUs has parameters."""
-ALIKE = 500
-"""Names compared with a wrong one; of more, those that begin like it. Chosen: 20 ms."""
-
-
 def listed(items: Iterable[object], *, last: str = "and") -> str:
-    """Return 'a, b and c'; of very many the first ones, 'a, b, c and 900 more'."""
+    """Return 'a, b and c'."""
     words = [str(item) for item in items]
-    if len(words) > LISTED:
-        words[LISTED - 1 :] = [f"{len(words) - LISTED + 1} more"]
     if len(words) < 2:
         return "".join(words)
     return f"{', '.join(words[:-1])} {last} {words[-1]}"
@@ -39,10 +31,6 @@ def short(value: object) -> str:
 def closest(name: str, valid: Iterable[str]) -> str | None:
     """Return the valid name most like `name`, or None if none is like it."""
     by_lower = {v.lower(): v for v in valid}
-    if len(by_lower) > ALIKE:
-        begins = name[:3].lower()
-        alike = [lower for lower in by_lower if lower.startswith(begins)]
-        by_lower = {lower: by_lower[lower] for lower in alike[:ALIKE]}
     found = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.65)
     return by_lower[found[0]] if found else None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import io
 import re
@@ -146,8 +147,11 @@ def _python_modules(files: Mapping[str, bytes]) -> dict[str, str]:
 
 def to_record(fmu: Fmu) -> dict[str, Any]:
     """Return the description as JSON-ready data, without where archive and folder are."""
-    record = {key: value for key, value in vars(fmu).items() if key not in ("name", "path", "directory")}
-    return {**record, "variables": [vars(variable) for variable in fmu.variables.values()]}
+    record = dataclasses.asdict(fmu)
+    for key in ("name", "path", "directory"):
+        del record[key]
+    record["variables"] = list(record["variables"].values())
+    return record
 
 
 def from_record(record: dict[str, Any], *, path: Path, directory: Path) -> Fmu:

@@ -5,32 +5,46 @@ which of set, step and get are to be done, and how that ended. Such an exchange 
 and 50 us from core to core, most of it the two changes from one process to the other; a pair of pipes
 was the quickest of what tells the master at once that the other side has died. All else, and the
 messages that the FMU logs meanwhile, is a marked record of a few hundred bytes.
+
+An FMU can write into every file that its process has open, the pipe to the master among them. So what
+comes from there is JSON and checked, never unpickled; a byte that is no answer is told by the last answer and
+its number, which stand in the shared memory; and no record is waited for longer than a call may take.
 """
 
 from __future__ import annotations
 
 import contextlib
 import ctypes
+import json
 import mmap
 import os
 import pickle
 import tempfile
 import threading
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 SET, STEP, GET = 1, 2, 4
 """Parts of an exchange, in this order; a sum of them asks for several."""
-REQUEST, LOG, REPLY = 0x80, 0x81, 0x82
-"""First bytes of records: what the master wants, what the FMU says, what the master gets."""
+ANSWER = 0x7F
+"""The largest byte that tells how an exchange ended (see `worker.Worker.exchange`)."""
+REQUEST, LOG, REPLY, FAILED = 0x80, 0x81, 0x82, 0x83
+"""First bytes of records: what the master wants, what the FMU says, what the master gets, why it does not."""
+LONGEST = 1 << 26
+"""Bytes of a record at most; chosen: no text that an FMU hands out is nearly as long."""
 
-_HEAD = 3  # numbers before the inputs: time, step size, part being done
+_HEAD = 4  # numbers before the inputs: time, step size, part being done, last answer
 _LENGTH = 4  # bytes
 
 
+class Garbled(Exception):
+    """What came out of a pipe is no record."""
+
+
 class Board:
-    """The shared memory of a unit: time and step size [s], the part being done, inputs, outputs."""
+    """The shared memory of a unit: time and step size [s], part being done, last answer, inputs, outputs."""
 
     def __init__(self, descriptor: int, inputs: int, outputs: int) -> None:
         """Map the memory that `shared_memory` made, for so many values."""
@@ -38,6 +52,8 @@ class Board:
         self.time = ctypes.c_double.from_buffer(self._map, 0)
         self.step = ctypes.c_double.from_buffer(self._map, 8)
         self.part = ctypes.c_int64.from_buffer(self._map, 16)
+        self.answer = ctypes.c_int64.from_buffer(self._map, 24)
+        """Number of the exchange times 256, and how it ended."""
         self.inputs = np.frombuffer(self._map, float, inputs, 8 * _HEAD)
         self.outputs = np.frombuffer(self._map, float, outputs, 8 * (_HEAD + inputs))
 
@@ -59,11 +75,16 @@ def shared_memory(values: int) -> int:
 
 
 class Channel:
-    """One side's ends of the two pipes."""
+    """One side's ends of the two pipes.
 
-    def __init__(self, reading: int, writing: int) -> None:
+    Args:
+        wait: called before every read; returns when there is something, or raises.
+    """
+
+    def __init__(self, reading: int, writing: int, wait: Callable[[], None] = lambda: None) -> None:
         self.reading = reading
         self.writing = writing
+        self._wait = wait
         self._alone = threading.Lock()  # an FMU may log from a thread of its own
 
     def say(self, byte: bytes) -> None:
@@ -76,30 +97,65 @@ class Channel:
         byte = os.read(self.reading, 1)
         return byte[0] if byte else None
 
+    def order(self, content: Any) -> None:
+        """Write a record to somebody who trusts this side."""
+        self._send(REQUEST, pickle.dumps(content))
+
+    def ordered(self) -> Any:
+        """Return the record of `order` whose first byte has just been heard.
+
+        Raises:
+            EOFError: the other side is gone.
+        """
+        return pickle.loads(self._content())
+
     def send(self, kind: int, content: Any) -> None:
-        """Write a record."""
-        data = pickle.dumps(content)
+        """Write a record of what JSON can hold.
+
+        Raises:
+            Garbled: there is too much of it, or JSON cannot hold it.
+        """
+        try:
+            data = json.dumps(content).encode()
+        except (TypeError, ValueError) as error:
+            raise Garbled(str(error)) from None
+        if len(data) > LONGEST:
+            raise Garbled(f"{len(data)} bytes cannot be passed on at once, {LONGEST} can")
+        self._send(kind, data)
+
+    def receive(self) -> Any:
+        """Return the record of `send` whose first byte has just been heard.
+
+        Raises:
+            EOFError: the other side is gone.
+            Garbled: it is no record; and whatever `wait` raises.
+        """
+        try:
+            return json.loads(self._content())
+        except (ValueError, RecursionError):
+            raise Garbled("what it holds is no record") from None
+
+    def _send(self, kind: int, data: bytes) -> None:
         rest = memoryview(bytes([kind]) + len(data).to_bytes(_LENGTH, "little") + data)
         with self._alone:
             while rest:
                 rest = rest[os.write(self.writing, rest) :]
 
-    def receive(self) -> Any:
-        """Return the record whose first byte has just been heard.
-
-        Raises:
-            EOFError: the other side is gone.
-        """
-        return pickle.loads(self._read(int.from_bytes(self._read(_LENGTH), "little")))
+    def _content(self) -> bytes:
+        length = int.from_bytes(self._read(_LENGTH), "little")
+        if length > LONGEST:
+            raise Garbled(f"it announces {length} bytes")
+        return self._read(length)
 
     def _read(self, count: int) -> bytes:
-        data = b""
+        data = bytearray()
         while len(data) < count:
-            more = os.read(self.reading, count - len(data))
+            self._wait()
+            more = os.read(self.reading, min(count - len(data), 1 << 20))
             if not more:
                 raise EOFError
             data += more
-        return data
+        return bytes(data)
 
     def close(self) -> None:
         for descriptor in (self.reading, self.writing):

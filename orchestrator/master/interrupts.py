@@ -9,8 +9,11 @@ from __future__ import annotations
 import contextlib
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from types import FrameType
+
+_requested_at: float | None = None
 
 
 class StopFlag:
@@ -18,6 +21,11 @@ class StopFlag:
 
     def __init__(self) -> None:
         self.requested = False
+
+
+def stop_requested_at() -> float | None:
+    """Return when this process was asked to stop, by `time.monotonic` [s]; None if it was not."""
+    return _requested_at
 
 
 @contextlib.contextmanager
@@ -28,17 +36,22 @@ def interrupts(flag: StopFlag, again: Callable[[], None]) -> Iterator[None]:
     """
 
     def handle(number: int, frame: FrameType | None) -> None:
+        global _requested_at
         if flag.requested:
             again()
         flag.requested = True
+        _requested_at = _requested_at or time.monotonic()
 
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+    global _requested_at
+    _requested_at = None
     numbers = (signal.SIGINT, signal.SIGTERM)
     earlier = [signal.signal(number, handle) for number in numbers]
     try:
         yield
     finally:
+        _requested_at = None
         for number, handler in zip(numbers, earlier, strict=True):
             signal.signal(number, signal.SIG_DFL if handler is None else handler)

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..errors import ModelDescriptionError, SimulationError
 from ..plan import Place, Plan, Unit, Value
-from .exchange import GET, SET, STEP, Board
+from .exchange import GET, SET, STEP, Board, Garbled
 from .log import FATAL, OK, PROCESS, WARNING, Log
 from .opening import SLAVES, open_unit
 from .process import Lost, UnitProcess
@@ -48,8 +48,9 @@ class IsolatedSlave:
         self._process: UnitProcess | None = process
         self._stepping = False
         self._part = ""
+        self._answered = 0
         self._prefix = SLAVES[unit.fmu.fmi].prefix
-        process.log = functools.partial(log.add, unit.name)
+        process.log = self._note_log
         try:
             process.wait_until_ready()
         except Lost as lost:
@@ -66,6 +67,20 @@ class IsolatedSlave:
             if kind == ModelDescriptionError.__name__:
                 raise ModelDescriptionError(problems)
             raise self._refused(problems[0])
+
+    def _note_log(self, content: Any) -> None:
+        """Keep what the FMU logs: a message, or how many more there were.
+
+        Raises:
+            Garbled: it is neither.
+        """
+        match content:
+            case int():
+                self._log.dropped += content
+            case [int() as status, str() as category, str() as text]:
+                self._log.add(self.name, status, category, text)
+            case _:
+                raise Garbled("a message that is none")
 
     def _refused(self, sentence: str) -> SimulationError:
         return SimulationError(sentence, unit=self.name, time=0.0)
@@ -124,6 +139,9 @@ class IsolatedSlave:
             return FATAL
         try:
             answer = self._process.exchange(_BYTES[parts])
+            self._answered += 256
+            if self._board.answer.value != self._answered + answer:
+                raise self._process.garbled(f"byte {answer}")
         except Lost as lost:
             self._part, function = _PARTS.get(self._board.part.value, ("", ""))
             return self._lose(lost, function and self._prefix + function)

@@ -22,6 +22,8 @@ WRITTEN = 100
 """Warnings written into run.json; more are only counted."""
 KEPT = 1000
 """Messages kept per unit; a unit that goes on is only counted."""
+LONGEST = 10_000
+"""Characters kept of a message; chosen: a traceback has fewer."""
 MASTER = "yawbench"
 """Category of what the master has to say of a unit; always kept."""
 PROCESS = "yawbench process"
@@ -80,7 +82,7 @@ class Log:
             self.dropped += 1
             return
         at = self.time.value if time is None else time
-        self.messages.append(Message(unit, at, status, category, text.rstrip()))
+        self.messages.append(Message(unit, at, status, category, text[:LONGEST].rstrip()))
 
     def errors(self, unit: str) -> list[Message]:
         """Return the unit's messages with a status worse than Warning, without tracebacks."""
@@ -142,6 +144,8 @@ def unlisten(number: int) -> None:
 def receive(number: int, status: int, category: bytes | None, text: bytes | None) -> None:
     """Take a message of the instance that was given this number."""
     try:
+        if number not in _listeners:
+            return  # a thread of an instance that is gone
         log, unit, _ = _listeners[number]
         log.add(unit, status, _decoded(category), _decoded(text))
     except Exception as error:  # must not reach the C code that called

@@ -136,7 +136,7 @@ class Master:
         """Judge a call during initialization, where a logged error counts whatever the status is."""
         status = self.memory.of[unit].slave.note(status)
         if status > WARNING or self.log.errors(unit):
-            raise SimulationError(describe(unit, what, 0.0, status, self.log), unit=unit, time=0.0)
+            raise self._failure(describe(unit, what, 0.0, status, self.log), unit, 0.0)
         if status == WARNING:
             self._note_warning(unit, what)
         if self.stop.requested:
@@ -155,7 +155,13 @@ class Master:
         self._check_finite(k)  # a value that went wrong upstream explains this failure
         time = self.plan.time(k - station.unit.period)
         sentence = describe(operation.unit, _WORDS[kind], time, status, self.log)
-        raise SimulationError(sentence, unit=operation.unit, time=time)
+        raise self._failure(sentence, operation.unit, time)
+
+    def _failure(self, sentence: str, unit: str, time: float) -> SimulationError:
+        """Return what ends the run because of a unit."""
+        if self.stop.requested:
+            return Interrupted(f"the run was interrupted: {sentence}", unit=unit, time=time)
+        return SimulationError(sentence, unit=unit, time=time)
 
     def _note_warning(self, unit: str, what: str) -> None:
         """Keep a Warning of a unit that has said nothing so far."""

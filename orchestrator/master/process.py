@@ -12,12 +12,17 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from .exchange import REPLY, REQUEST, Channel, shared_memory
+from .exchange import ANSWER, FAILED, LOG, REPLY, Channel, Garbled, shared_memory
+from .interrupts import stop_requested_at
 
 START_LIMIT = 60.0
 """Time that a process may take to start [s]; chosen: Python is read from a slow disk in less."""
-LONGEST = 2e9
-"""The longest time that poll takes [ms]: 23 days."""
+LOOK_EVERY = 200
+"""Time between two looks at the clock while an answer is waited for [ms]."""
+STOP_GRACE = 2.0
+"""Time that a call may still take when the run is to stop [s]; chosen: as long as one likes to wait."""
+CLOSING = 1.0
+"""Time in which a process that has closed its pipe is seen to end [s]."""
 GRACE = 5.0
 """Time that it may take to end once the FMU has been freed [s]; it has nothing left to do."""
 
@@ -48,7 +53,7 @@ class UnitProcess:
         """
         self._limit = limit
         self.memory = shared_memory(values)
-        self.log: Callable[[int, str, str], None] = lambda status, category, text: None
+        self.log: Callable[[Any], None] = lambda content: None
         commands, writing = os.pipe()
         reading, answers = os.pipe()
         theirs = (commands, answers, self.memory)
@@ -62,76 +67,112 @@ class UnitProcess:
         finally:
             os.close(commands)
             os.close(answers)
-        self._channel = Channel(reading, writing)
+        self._channel = Channel(reading, writing, self._wait_for_more)
         self._poll = select.poll()
         self._poll.register(reading, select.POLLIN)
+        self._deadline = 0.0
         self._ended = False
 
     def wait_until_ready(self) -> None:
         """Wait until it can be asked."""
-        self._answer(START_LIMIT)
+        self._answer(START_LIMIT, REPLY)
 
     def ask(self, request: str, *arguments: Any) -> Any:
         """Return the answer to a request (a method of `worker.Worker`)."""
         with contextlib.suppress(BrokenPipeError):  # why is found where the answer should be
-            self._channel.send(REQUEST, (request, arguments))
-        return self._answer(self._limit)
+            self._channel.order((request, arguments))
+        return self._answer(self._limit, REPLY)
 
     def exchange(self, parts: bytes) -> int:
         """Let it do parts of a step; return how that ended (see `worker.Worker.exchange`)."""
         with contextlib.suppress(BrokenPipeError):
             self._channel.say(parts)
-        return self._answer(self._limit)
+        return self._answer(self._limit, ANSWER)
 
-    def _answer(self, limit: float) -> Any:
-        end = time.monotonic() + limit
-        while (left := end - time.monotonic()) > 0 and self._poll.poll(min(1000 * left, LONGEST)):
-            try:
+    def _answer(self, limit: float, wanted: int) -> Any:
+        self._deadline = time.monotonic() + limit
+        try:
+            while True:
+                self._wait_for_more()
                 kind = self._channel.hear()
-                if kind is not None and kind < REQUEST:
+                if kind is None:
+                    raise EOFError
+                if kind <= ANSWER and wanted == ANSWER:
                     return kind
+                if kind not in (LOG, FAILED, wanted):
+                    raise Garbled(f"byte {kind}")
                 content = self._channel.receive()
-            except EOFError:
-                raise Lost(self._death()) from None
-            if kind == REPLY:
-                return content
-            self.log(*content)
+                if kind == wanted:
+                    return content
+                if kind == FAILED:
+                    raise self.lost(f"{content}{{where}}")
+                self.log(content)
+                self._check_time()
+        except EOFError:
+            raise Lost(self._death()) from None
+        except Garbled as error:
+            raise self.garbled(str(error)) from None
+
+    def _wait_for_more(self) -> None:
+        """Wait for the pipe to hold something, until the deadline or, a while, after a wish to stop."""
+        while not self._poll.poll(LOOK_EVERY):
+            self._check_time()
+
+    def _check_time(self) -> None:
+        now, asked = time.monotonic(), stop_requested_at()
+        if asked is not None and now - asked > STOP_GRACE:
+            raise self.lost("{function} did not come back when the run was to stop")
+        if now > self._deadline:
+            limit = f"{self._limit:g} s, the limit of a call (--call-limit)"
+            raise self.lost(f"{{function}} did not come back within {limit}")
+
+    def garbled(self, what: str) -> Lost:
+        """End it, for its answers can no longer be told from what else came; return what to raise."""
+        return self.lost(f"its process wrote into the pipe to the master what is no answer{{where}} ({what})")
+
+    def lost(self, sentence: str) -> Lost:
+        """End it; return what to raise."""
         self.end()
-        raise Lost(f"{{function}} did not come back within {limit:g} s, the limit of a call")
+        return Lost(sentence)
 
     def _death(self) -> str:
         """Return a sentence on how the process has ended; it has closed its end of the pipe."""
-        code = self._wait()
+        code = self._wait(CLOSING)
         self.end()
         if code is None:
             return "its process closed the pipe to the master{where}"
         if code >= 0:
             return f"its process ended itself with exit status {code}{{where}}"
-        try:
-            name = signal.Signals(-code).name
-        except ValueError:
-            name = f"signal {-code}"
         cause = ", sent from outside or for want of memory," if -code == signal.SIGKILL else ""
-        return f"its process died of {name}{cause}{{where}}"
+        return f"its process died of {signal_name(-code)}{cause}{{where}}"
 
-    def _wait(self) -> int | None:
+    def _wait(self, limit: float) -> int | None:
         try:
-            return self._popen.wait(GRACE)
+            return self._popen.wait(limit)
         except subprocess.TimeoutExpired:
             return None
 
     def leave(self) -> None:
         """Let it end by itself, which it does when nobody is left to ask it."""
         self._channel.close()
-        self._wait()
+        self._wait(GRACE)
         self.end()
 
     def end(self) -> None:
-        """End it, whatever it is doing. Further calls do nothing."""
+        """End it and all that it has started, whatever they are doing. Further calls do nothing."""
         if self._ended:
             return
         self._ended = True
-        self._channel.close()
+        self._channel.close()  # its guardian wakes up
         os.close(self.memory)
-        self._popen.kill()
-        self._popen.wait()
+        if self._wait(GRACE) is None:
+            self._popen.kill()
+            self._popen.wait()
+
+
+def signal_name(number: int) -> str:
+    """Return "SIGSEGV" or, of a signal without a name, "signal 42"."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"

@@ -1,42 +1,45 @@
 """The process of an isolated unit: it does with the FMU what the master asks for, and nothing else.
 
-It ends when the master does: the kernel kills it (Linux), and where a call of the FMU lets other
-threads run, one of them sees that the pipe from the master has no writer any more.
+It ends when the master does, and with it all that the FMU has started (see `guardian`).
 """
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import os
-import select
-import signal
-import sys
-import threading
 from collections.abc import Sequence
 from typing import Any
 
 from ..errors import ModelDescriptionError, SimulationError
 from ..plan import Place, Unit
-from .exchange import GET, LOG, REPLY, SET, STEP, Board, Channel
-from .log import OK, WARNING, Log
+from .exchange import FAILED, GET, LOG, REPLY, SET, STEP, Board, Channel
+from .guardian import stand_guard
+from .log import KEPT, OK, WARNING, Log
 from .opening import open_unit
 from .slave import Experiment
 from .unit import FmuSlave
 
-_PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
-
-class _Relay(Log):
-    """Passes on to the master what the FMU logs, at once: the FMU may be about to crash."""
+class Relay(Log):
+    """Passes on what FMUs log at once, for one may be about to crash; a flood it only counts."""
 
     def __init__(self, channel: Channel) -> None:
         super().__init__()
         self._channel = channel
 
     def add(self, unit: str, status: int, category: str, text: str, time: float | None = None) -> None:
+        kept, dropped = len(self.messages), self.dropped
         super().add(unit, status, category, text, time)
-        if status != OK:
-            self._channel.send(LOG, (status, category, text))
+        if len(self.messages) > kept:
+            self._channel.send(LOG, (status, category, self.messages[-1].text))
+        elif self.dropped > dropped and self.dropped % KEPT == 0:
+            self._channel.send(LOG, KEPT)
+
+    def finish(self) -> None:
+        """Pass on how many messages have been counted since the last thousand."""
+        if self.dropped % KEPT:
+            self._channel.send(LOG, self.dropped % KEPT)
 
 
 class Worker:
@@ -45,17 +48,27 @@ class Worker:
     def __init__(self, channel: Channel, memory: int) -> None:
         self._channel = channel
         self._memory = memory
+        self._log = Relay(channel)
         self._slave: FmuSlave
 
     def serve(self) -> None:
-        """Answer until there is no master any more."""
+        """Answer until there is no master any more, or in a copy that the FMU has made of this process."""
         hear, say, answers = self._channel.hear, self._channel.say, [bytes([i]) for i in range(256)]
+        process, count = os.getpid(), 0
         while (asked := hear()) is not None:
-            if asked <= SET | STEP | GET:
-                say(answers[self.exchange(asked)])
-                continue
-            name, arguments = self._channel.receive()
-            self._channel.send(REPLY, getattr(self, name)(*arguments))
+            parts = asked if asked <= SET | STEP | GET else 0
+            if parts:
+                answer, count = self.exchange(parts), count + 256
+            else:
+                name, arguments = self._channel.ordered()
+                reply = getattr(self, name)(*arguments)
+            if os.getpid() != process:
+                return
+            if parts:
+                self._answer.value = count + answer
+                say(answers[answer])
+            else:
+                self._channel.send(REPLY, reply)
 
     def exchange(self, parts: int) -> int:
         """Do parts of a step in order; return the worst status, and 16 times the part it belongs to.
@@ -80,7 +93,7 @@ class Worker:
     def open(self, unit: Unit) -> tuple[str, list[str]] | None:
         """Instantiate the FMU; return the name of an error and its sentences if that fails."""
         try:
-            self._slave = open_unit(unit, _Relay(self._channel), set())
+            self._slave = open_unit(unit, self._log, set())
         except (ModelDescriptionError, SimulationError) as error:
             return type(error).__name__, error.problems
         return None
@@ -91,6 +104,7 @@ class Worker:
             board.inputs, input_places, board.outputs, output_places, board.time, board.step
         )
         self._part = board.part
+        self._answer = board.answer
         self._calls = ((SET, calls.set), (STEP, calls.step), (GET, calls.get))
 
     def put(self, *arguments: Any) -> int:
@@ -117,27 +131,19 @@ class Worker:
     def free(self) -> None:
         """End the instance, and what its library has still to print."""
         self._slave.free()
+        self._log.finish()
         ctypes.CDLL(None).fflush(None)
-
-
-def _die_with_master(reading: int) -> None:
-    """See to it that this process ends when the master does, also in the middle of a call."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-
-    def watch() -> None:
-        gone = select.poll()
-        gone.register(reading, 0)  # nothing is asked for, so what comes is the end of the pipe
-        gone.poll()
-        os._exit(0)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 def main(reading: int, writing: int, memory: int) -> None:
     """Serve the master at the other ends of two pipes."""
-    _die_with_master(reading)
+    stand_guard(reading, (writing, memory))
     channel = Channel(reading, writing)
     channel.send(REPLY, "ready")
-    Worker(channel, memory).serve()
+    try:
+        Worker(channel, memory).serve()
+    except Exception as error:
+        with contextlib.suppress(OSError):
+            channel.send(FAILED, f"its process failed: {type(error).__name__}: {error}")
+        os._exit(1)
     os._exit(0)

@@ -14,7 +14,6 @@ import math
 import re
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
 
 from ..wording import listed
 
@@ -105,7 +104,6 @@ _NUMBER = re.compile(
 )
 
 
-@lru_cache(maxsize=1000)
 def parse_unit(text: str) -> Measure:
     """Return what the unit `text` means.
 

@@ -8,7 +8,6 @@ nothing is connected by equal names.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache
 
 from ..plan import Fmu, Value, Variable, Wire
 from ..scenario.load import Connection, Scenario
@@ -27,13 +26,6 @@ def match(pattern: str, name: str) -> str | None:
         return "" if name == pattern else None
     fits = len(name) >= len(head) + len(tail) and name.startswith(head) and name.endswith(tail)
     return name[len(head) : len(name) - len(tail)] if fits else None
-
-
-def matching(pattern: str, names: Iterable[str]) -> dict[str, str]:
-    """Return the names that fit a pattern, each under what the `*` stands for in it."""
-    if "*" not in pattern:
-        return {"": pattern} if pattern in names else {}
-    return {part: name for name in names if (part := match(pattern, name)) is not None}
 
 
 class Connector:
@@ -58,7 +50,6 @@ class Connector:
         self._found: list[tuple[Key, str]] = []
         self._outputs = {unit: {v.name: v for v in fmu.of("output")} for unit, fmu in fmus.items()}
         self._inputs = {unit: {v.name: v for v in fmu.of("input")} for unit, fmu in fmus.items()}
-        self._fitting = cache(self._fitting_uncached)
 
     def connect(self) -> tuple[list[Wire], dict[str, dict[str, Value]]]:
         """Return all wires, and each unit's constants."""
@@ -112,8 +103,8 @@ class Connector:
         if source == target:
             self._report(key, f"connects {source} to itself")
             return []
-        outputs = matching(from_pattern, self._outputs[source])
-        inputs = matching(to_pattern, self._inputs[target])
+        outputs = {part: n for n in self._outputs[source] if (part := match(from_pattern, n)) is not None}
+        inputs = {part: n for n in self._inputs[target] if (part := match(to_pattern, n)) is not None}
         if not outputs:
             self._no_such((*key, "from"), source, from_pattern, "output")
         if not inputs:
@@ -147,20 +138,16 @@ class Connector:
     def _had(self, units: Iterable[str], causality: str, pattern: str) -> bool:
         """Return whether an FMU that an option has replaced in one of the units has such a variable."""
         replaced = [self._replaced(unit) for unit in units if unit in self._scenario.replaced]
-        return any(matching(pattern, [v.name for v in fmu.of(causality)]) for fmu in replaced if fmu)
+        return any(match(pattern, v.name) is not None for fmu in replaced if fmu for v in fmu.of(causality))
 
     def _by_names(self, wires: dict[Input, tuple[Wire, Key]]) -> set[Input]:
         """Add the wires of equal names; return the inputs that have more than one candidate."""
         ambiguous = set()
-        having: dict[str, list[str]] = {}  # output -> units
-        for unit, outputs in self._outputs.items():
-            for name in outputs:
-                having.setdefault(name, []).append(unit)
         for unit, inputs in self._inputs.items():
             for name in inputs:
                 if self._explicit(unit):
                     break
-                sources = [source for source in having.get(name, ()) if source != unit]
+                sources = [s for s, outputs in self._outputs.items() if name in outputs and s != unit]
                 if (unit, name) in wires or not sources:
                     continue
                 if len(sources) == 1:
@@ -182,7 +169,7 @@ class Connector:
             key = ("inputs", pattern)
             prefix, _, rest = pattern.partition(".")
             units, name_pattern = ([prefix], rest) if prefix in self._fmus else (list(self._fmus), pattern)
-            found = [(u, n) for u in units for n in matching(name_pattern, self._inputs[u]).values()]
+            found = [(u, n) for u in units for n in self._inputs[u] if match(name_pattern, n) is not None]
             if not found:
                 self._no_such_input(key, pattern, name_pattern, units)
             rank = ("*" not in pattern, prefix in self._fmus)
@@ -222,9 +209,9 @@ class Connector:
         """Return the sentence for an input without a source."""
         choices = [
             f"{source}.{name}"
-            for source, names in self._fitting(variable.type, variable.unit).items()
+            for source, outputs in self._outputs.items()
             if source != unit
-            for name in names
+            for name in fold([n for n, v in outputs.items() if _fits(v, variable)])
         ]
         connect = f"connect {listed(choices, last='or')}, or give" if 0 < len(choices) <= 8 else "give"
         measure = f" [{variable.unit}]" if variable.unit else ""
@@ -232,14 +219,6 @@ class Connector:
             f"{unit}.{variable.name}{measure} has no source: no unit has an output of this name; "
             f"{connect} a constant under 'inputs'"
         )
-
-    def _fitting_uncached(self, type_: str, measure: str | None) -> dict[str, list[str]]:
-        """Return the outputs of a type and unit, those of four wheels as one with `*`, by unit."""
-        found = {
-            source: fold([n for n, v in outputs.items() if v.type == type_ and same_unit(v.unit, measure)])
-            for source, outputs in self._outputs.items()
-        }
-        return {source: names for source, names in found.items() if names}
 
     def _check(self, wire: Wire, key: Key) -> None:
         source = self._outputs[wire.source][wire.output]
@@ -278,7 +257,7 @@ class Connector:
         Text is not: a table of results holds numbers.
         """
         numbers = {
-            unit: {name: v for name, v in outputs.items() if v.type != "String"}
+            unit: [name for name, v in outputs.items() if v.type != "String"]
             for unit, outputs in self._outputs.items()
         }
         if self._scenario.record is None:
@@ -286,7 +265,7 @@ class Connector:
         chosen: dict[tuple[str, str], None] = {}
         for i, (unit, pattern) in enumerate(self._scenario.record):
             units = list(numbers) if unit == "*" else [unit]
-            found = [(u, n) for u in units for n in matching(pattern, numbers[u]).values()]
+            found = [(u, n) for u in units for n in numbers[u] if match(pattern, n) is not None]
             chosen.update(dict.fromkeys(found))
             if found:
                 continue
@@ -298,3 +277,7 @@ class Connector:
             sentence = f"{who} output {pattern!r} to record{hint(pattern, names, lead='there are')}"
             self._scenario.document.report(("record", i), sentence)
         return tuple(chosen)
+
+
+def _fits(source: Variable, target: Variable) -> bool:
+    return source.type == target.type and same_unit(source.unit, target.unit)

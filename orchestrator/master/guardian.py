@@ -1,0 +1,130 @@
+"""The process that stands between master and unit, so that nothing a unit has started outlives it.
+
+Every isolated unit has one, forked before the FMU is loaded, and costs an exchange nothing: it
+sleeps until the unit's process has ended or the master has (even by SIGKILL), then kills what is left.
+On Linux that is all descendants, daemons too: they become its children when their parents die.
+Elsewhere it is the unit's process group.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import resource
+import select
+import signal
+import sys
+import time
+from collections.abc import Iterable
+from pathlib import Path
+
+_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36  # linux/prctl.h
+PATIENCE = 2.0
+"""Time for which what is left is killed [s]: something may start processes faster than they end."""
+
+
+def stand_guard(reading: int, others: Iterable[int]) -> None:
+    """Fork; return in the child, which is to be the unit's process, and never in the guardian.
+
+    Args:
+        reading: pipe from the master; when it has no writer any more, the master is gone.
+        others: descriptors that only the unit's process needs.
+    """
+    _prctl(_PR_SET_CHILD_SUBREAPER, 1)
+    waking, woken = os.pipe()
+    os.set_blocking(woken, False)
+    signal.signal(signal.SIGCHLD, lambda number, frame: None)
+    signal.set_wakeup_fd(woken, warn_on_full_buffer=False)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    guardian = os.getpid()
+    unit = os.fork()
+    if unit:
+        try:
+            _watch(unit, reading, waking, others)
+        finally:
+            os._exit(1)
+    signal.set_wakeup_fd(-1)
+    for number in (signal.SIGCHLD, signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+    for descriptor in (waking, woken):
+        os.close(descriptor)
+    for descriptor in (reading, *others):
+        os.set_inheritable(descriptor, False)  # by programs that the FMU starts
+    os.setsid()  # what it sends to its group is not for the guardian
+    _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != guardian:
+        os._exit(1)
+
+
+def _watch(unit: int, reading: int, waking: int, others: Iterable[int]) -> None:
+    """Wait for the unit's process or the master to end; kill what is left; end as the unit's did."""
+    for descriptor in others:
+        os.close(descriptor)
+    events = select.poll()
+    events.register(reading, 0)  # nothing is asked for, so what comes is the end of the pipe
+    events.register(waking, select.POLLIN)
+    status: int | None = None
+    while status is None:
+        ready = [descriptor for descriptor, _ in events.poll()]
+        status = _reaped(unit)
+        if reading in ready:
+            break
+        os.read(waking, 512)
+    status = _kill_all(unit, status)
+    if status is None or not os.WIFSIGNALED(status):
+        os._exit(0 if status is None else os.WEXITSTATUS(status))
+    number = os.WTERMSIG(status)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    with contextlib.suppress(OSError, ValueError):
+        signal.signal(number, signal.SIG_DFL)
+    os.kill(os.getpid(), number)
+    os._exit(128 + number)
+
+
+def _kill_all(unit: int, status: int | None) -> int | None:
+    """Kill the unit's process and all that it has started; return how it ended."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        with contextlib.suppress(OSError):
+            os.killpg(unit, signal.SIGKILL)
+        for child in _children():
+            with contextlib.suppress(OSError):
+                os.kill(child, signal.SIGKILL)
+        found = _reaped(unit)
+        status = found if status is None else status
+        if not _has_children():
+            break
+        time.sleep(0.001)
+    return status
+
+
+def _children() -> list[int]:
+    try:
+        return [int(word) for word in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()]
+    except OSError:  # not Linux
+        return []
+
+
+def _reaped(unit: int) -> int | None:
+    """Take note of all children that have ended; return how the unit's process did if it is among them."""
+    status = None
+    with contextlib.suppress(ChildProcessError):
+        while (ended := os.waitpid(-1, os.WNOHANG))[0]:
+            if ended[0] == unit:
+                status = ended[1]
+    return status
+
+
+def _has_children() -> bool:
+    try:
+        os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)
+    except ChildProcessError:
+        return False
+    return True
+
+
+def _prctl(option: int, value: int) -> None:
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(option, value, 0, 0, 0)

@@ -1,0 +1,125 @@
+"""FMUs that do harm: a sample of `tests.trials.hostile_fmus`, and what comes through the pipe of one."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import random
+import shutil
+import sys
+
+import pytest
+
+from orchestrator.master import process
+from orchestrator.master.exchange import FAILED, LOG, REPLY, Channel, Garbled
+from orchestrator.master.process import Lost, UnitProcess
+
+from ..trials.hostile_fmus import Case, attack
+
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux"),
+    pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler"),
+]
+APART = (
+    "load:exit", "enter:segfault", "step:_exit", "step:hang", "step:daemon", "step:child_crash", "step:fork",
+    "step:garbage", "step:zeros", "step:endless", "step:pickle", "step:close", "get:stop", "set:flood",
+    "terminate:kill", "free:hang", "value:nan", "value:huge_text", "step:status_minus", "leave:long",
+)  # fmt: skip
+
+
+def test_an_isolated_unit_that_does_harm_ends_its_run_with_a_sentence_and_leaves_nothing(tmp_path):
+    cases = [Case(does, isolated=True) for does in APART]
+    assert attack(cases, tmp_path) == {case: [] for case in cases}
+
+
+class _Pretender:
+    """In place of a unit's process: has written `said` into the pipe, and waits or is gone."""
+
+    said = b""
+    stays = False
+
+    def __init__(self, command, pass_fds, **options):
+        self.descriptor = os.dup(pass_fds[1])
+        os.write(self.descriptor, self.said)
+        self.returncode = None
+        if not self.stays:
+            self.kill()
+
+    def wait(self, limit=None):
+        self.kill()
+        return 0
+
+    def kill(self):
+        if self.returncode is None:
+            os.close(self.descriptor)
+            self.returncode = 0
+
+
+@pytest.fixture
+def pretend(monkeypatch):
+    """Ask a process that has said something else; return the sentence on how it was lost."""
+    monkeypatch.setattr(process.subprocess, "Popen", _Pretender)
+
+    def ask(said, *, stays=False, ask="ready"):
+        monkeypatch.setattr(_Pretender, "said", said)
+        monkeypatch.setattr(_Pretender, "stays", stays)
+        monkeypatch.setattr(process, "LOOK_EVERY", 1)
+        unit = UnitProcess(3, limit=0.01)
+        unit.log = lambda content: None
+        with pytest.raises(Lost) as lost:
+            unit._answer(0.01, REPLY)
+        return lost.value.in_("fmi2DoStep")
+
+    return ask
+
+
+class _Malicious:
+    def __reduce__(self):
+        return os._exit, (3,)
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        bytes([REPLY]) + b"\xff\xff\xff\x7f{",
+        bytes([REPLY]) + (26).to_bytes(4, "little") + b"\x80\x04garbage that is no record",
+        bytes([REPLY]) + (2_000_000).to_bytes(4, "little") + b"[" * 60_000,
+        bytes([REPLY]) + (3).to_bytes(4, "little") + b"\xff\xfe\xfd",
+        bytes([FAILED]) + b"\x05\x00",
+        bytes([LOG]) + b"\x02\x00\x00\x00{}" + b"\x00",
+        b"\x00",
+        b"hello",
+        b"",
+    ],
+)
+@pytest.mark.parametrize("stays", [True, False])
+def test_what_comes_through_the_pipe_and_is_no_answer_is_a_sentence(said, stays, pretend):
+    sentence = pretend(said, stays=stays)
+    assert any(
+        words in sentence
+        for words in ("wrote into the pipe", "did not come back", "exit status 0", "pipe to the")
+    )
+
+
+def test_nothing_that_comes_from_a_unit_is_unpickled(pretend):
+    data = pickle.dumps(_Malicious())
+    for kind in (REPLY, LOG, FAILED):
+        assert "wrote into the pipe" in pretend(bytes([kind]) + len(data).to_bytes(4, "little") + data)
+
+
+def test_random_bytes_in_the_pipe_never_pass_for_an_answer(pretend):
+    chance = random.Random(7)
+    for _ in range(300):
+        kind = chance.choice([REPLY, LOG, FAILED, chance.randrange(256)])
+        length = chance.choice([chance.randrange(1 << 32), chance.randrange(40)])
+        said = bytes([kind]) + length.to_bytes(4, "little") + chance.randbytes(chance.randrange(40))
+        assert pretend(said[: chance.randrange(1, 50)])
+
+
+def test_a_record_that_is_too_long_or_cannot_be_written_is_refused():
+    reading, writing = os.pipe()
+    channel = Channel(reading, writing)
+    for content in ("x" * (1 << 26), {1, 2}):
+        with pytest.raises(Garbled):
+            channel.send(REPLY, content)
+    channel.close()
