@@ -21,6 +21,15 @@ class Place(NamedTuple):
 
 
 @dataclass(frozen=True)
+class UnitDefinition:
+    """What an FMU says that a unit of measurement is: `factor * value + offset` in base units."""
+
+    powers: tuple[int, ...]  # of kg, m, s, A, K, mol, cd, rad
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
 class Variable:
     """A scalar variable of an FMU, from its model description."""
 
@@ -38,6 +47,7 @@ class Variable:
     choices: tuple[str, ...] | None = None  # of a String: allowed values, if the description lists them
     items: dict[str, int] | None = None  # of an Enumeration: name -> value
     optional: bool = False  # of an input: its start value is meant for when nothing drives it
+    definition: UnitDefinition | None = None  # of `unit`, if the description gives one
     encoding: str | None = None  # FMI 3.0: the type that the FMU keeps it in, such as "Float32"
     element: int = 0  # of an array, counted row by row
     elements: int = 1  # of the whole array
@@ -104,6 +114,13 @@ class Wire:
     output: str  # variable
     target: str  # unit
     input: str  # variable
+    gain: float = 1.0  # the input is gain * output + offset
+    offset: float = 0.0
+
+    @property
+    def converts(self) -> bool:
+        """True if the input's number is not that of the output."""
+        return (self.gain, self.offset) != (1.0, 0.0)
 
 
 @dataclass(frozen=True)

@@ -101,10 +101,18 @@ def _wire_rows(plan: Plan) -> Iterable[Sequence[str]]:
         shown = []
         for output, name in fold_wires([(w.output, w.input) for w in wires]):
             example = next(w for w in wires if _is_of(w.input, name))
-            measure = units[target][example.input].unit
+            of, measure = units[source][example.output].unit, units[target][example.input].unit
             ends = output if output == name else f"{output} → {name}"
+            if example.converts:
+                measure = f"{of or '?'} → {measure or '?'}: {_scaled(example)}"
             shown.append(f"{ends} [{measure}]" if measure else ends)
         yield source, target, ", ".join(shown)
+
+
+def _scaled(wire: Wire) -> str:
+    """Return what a wire does to numbers."""
+    offset = f" {'-' if wire.offset < 0 else '+'} {abs(wire.offset):.6g}" if wire.offset else ""
+    return f"x {wire.gain:.6g}{offset}"
 
 
 def _grouped(wires: Iterable[Wire]) -> dict[tuple[str, str], list[Wire]]:

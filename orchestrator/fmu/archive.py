@@ -36,7 +36,7 @@ from ..plan import Fmu
 from ..wording import closest, listed, short
 from . import description as fmu_description
 
-FORMAT = 2
+FORMAT = 3
 """Of the cache's entries; part of their names, so versions of this program do not quarrel."""
 
 KEEP_DAYS = 60

@@ -12,7 +12,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from ..errors import ModelDescriptionError
-from ..plan import Fmu, Value, Variable
+from ..plan import Fmu, UnitDefinition, Value, Variable
 
 SUPPORTED = "supported is FMI 2.0 for co-simulation"
 _CHOICES = re.compile(r"\(one of: ([^()]*)\)$")
@@ -88,9 +88,11 @@ def _variables(description: Any, optional: Container[str]) -> dict[str, Variable
         known = unknown.dependencies
         names = None if known is None else tuple(v.name for v in known if v.causality == "input")
         sources[unknown.variable.name] = names
+    definitions = _definitions(description)
     variables: dict[str, Variable] = {}
     for v in description.modelVariables:
         declared = v.declaredType
+        unit = v.unit or (declared.unit if declared else None)
         text = v.description or ""
         listed = _CHOICES.search(text) if v.type == "String" else None
         items = (
@@ -102,7 +104,7 @@ def _variables(description: Any, optional: Container[str]) -> dict[str, Variable
             type=v.type,
             causality=v.causality,
             variability=v.variability,
-            unit=v.unit or (declared.unit if declared else None),
+            unit=unit,
             start=_value(v.type, v.start),
             minimum=_number(v.min or (declared.min if declared else None)),
             maximum=_number(v.max or (declared.max if declared else None)),
@@ -111,8 +113,20 @@ def _variables(description: Any, optional: Container[str]) -> dict[str, Variable
             choices=tuple(listed[1].split(", ")) if listed else None,
             items=items,
             optional=v.name in optional,
+            definition=definitions.get(unit),
         )
     return variables
+
+
+def _definitions(description: Any) -> dict[str | None, UnitDefinition]:
+    """Return what the description defines in base units, by the name of the unit."""
+    return {
+        unit.name: UnitDefinition(
+            (base.kg, base.m, base.s, base.A, base.K, base.mol, base.cd, base.rad), base.factor, base.offset
+        )
+        for unit in description.unitDefinitions
+        if (base := unit.baseUnit) is not None
+    }
 
 
 def _value(kind: str, text: str | None) -> Value | None:
@@ -160,6 +174,8 @@ def from_record(record: dict[str, Any], *, path: Path, directory: Path) -> Fmu:
     for v in record["variables"]:
         for key in ("depends_on", "choices"):
             v[key] = None if v[key] is None else tuple(v[key])
+        if (unit := v.get("definition")) is not None:
+            v["definition"] = UnitDefinition(tuple(unit["powers"]), unit["factor"], unit["offset"])
         variables[v["name"]] = Variable(**v)
     fields = {**record, "variables": variables}
     return Fmu(name=path.stem, path=path, directory=directory, **fields)

@@ -26,8 +26,8 @@ from lxml.etree import SubElement, _Element
 
 from ..errors import ResultsError
 from ..fmu.archive import read_archive
-from ..plan import Fmu, Plan, Unit, Value, Variable
-from ..scenario import quantities
+from ..plan import Fmu, Plan, Unit, Value, Variable, Wire
+from ..scenario.measurement_units import Measure, measure_of
 from ..scenario.ssp_names import (
     DESCRIPTION_FILE,
     NAMESPACES,
@@ -106,18 +106,27 @@ def system_structure(plan: Plan) -> _Element:
     if plan.wires:
         connections = SubElement(system, f"{{{SSD}}}Connections")
         for wire in plan.wires:
-            SubElement(
-                connections,
-                f"{{{SSD}}}Connection",
-                startElement=wire.source,
-                startConnector=wire.output,
-                endElement=wire.target,
-                endConnector=wire.input,
-            )
+            _add_connection(connections, wire)
     _add_enumerations(root, enumerations)
     _add_units(root, spelled)
     _add_experiment(root, plan)
     return root
+
+
+def _add_connection(above: _Element, wire: Wire) -> None:
+    """Write a wire; what it does to numbers is said in full, for programs that do not look at units too."""
+    connection = SubElement(
+        above,
+        f"{{{SSD}}}Connection",
+        startElement=wire.source,
+        startConnector=wire.output,
+        endElement=wire.target,
+        endConnector=wire.input,
+    )
+    if wire.converts:
+        connection.set("suppressUnitConversion", "true")
+        scale = {"factor": repr(wire.gain), "offset": repr(wire.offset)}
+        SubElement(connection, f"{{{SSC}}}LinearTransformation", scale)
 
 
 def _in_order_of_scenario(plan: Plan) -> list[Unit]:
@@ -143,7 +152,7 @@ def _add_component(
     unit: Unit,
     plan: Plan,
     source: str,
-    spelled: Mapping[str, quantities.Measure],
+    spelled: Mapping[str, Measure],
     enumerations: dict[str, Mapping[str, int]],
 ) -> None:
     component = SubElement(
@@ -182,7 +191,7 @@ def _add_component(
 
 
 def _add_values(
-    above: _Element, values: Mapping[str, Value], fmu: Fmu, spelled: Mapping[str, quantities.Measure]
+    above: _Element, values: Mapping[str, Value], fmu: Fmu, spelled: Mapping[str, Measure]
 ) -> None:
     parameter_set = SubElement(above, f"{{{SSV}}}ParameterSet", version="1.0", name=PARAMETER_SET)
     parameters = SubElement(parameter_set, f"{{{SSV}}}Parameters")
@@ -207,20 +216,16 @@ def _text(variable: Variable, value: Value) -> str:
     return str(value)
 
 
-def _spelled_units(plan: Plan) -> dict[str, quantities.Measure]:
-    """Return the units of measurement that appear in the plan and can be put in base units."""
-    names = sorted({v.unit for unit in plan.units for v in unit.fmu.variables.values() if v.unit})
-    return {name: measure for name in names if (measure := _measure(name)) is not None}
+def _spelled_units(plan: Plan) -> dict[str, Measure]:
+    """Return the units of measurement that appear in the plan, as far as all FMUs mean the same by them."""
+    meant: dict[str, set[Measure | None]] = {}
+    for variable in (v for unit in plan.units for v in unit.fmu.variables.values() if v.unit):
+        meant.setdefault(str(variable.unit), set()).add(measure_of(variable.unit, variable.definition))
+    only = {name: next(iter(measures)) for name, measures in sorted(meant.items()) if len(measures) == 1}
+    return {name: measure for name, measure in only.items() if measure is not None}
 
 
-def _measure(unit: str) -> quantities.Measure | None:
-    try:
-        return quantities.parse_unit(unit)
-    except ValueError:
-        return None
-
-
-def _add_units(above: _Element, spelled: Mapping[str, quantities.Measure]) -> None:
+def _add_units(above: _Element, spelled: Mapping[str, Measure]) -> None:
     if not spelled:
         return
     units = SubElement(above, f"{{{SSD if above.tag.startswith('{' + SSD) else SSV}}}Units")
@@ -233,6 +238,8 @@ def _add_units(above: _Element, spelled: Mapping[str, quantities.Measure]) -> No
         factor = float(measure.factor) * math.pi**measure.pi
         if factor != 1.0:
             base.set("factor", repr(factor))
+        if measure.offset:
+            base.set("offset", repr(float(measure.offset)))
 
 
 def _add_enumerations(root: _Element, enumerations: Mapping[str, Mapping[str, int]]) -> None:

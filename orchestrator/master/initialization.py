@@ -106,15 +106,15 @@ def _by_type(variables: Iterable[Variable]) -> Iterable[list[Variable]]:
 def _known_inputs(memory: Memory, station: Station) -> dict[str, Value]:
     """Return constants and the outputs of earlier units; others keep the start value of the FMU."""
     known: dict[str, Value] = {}
-    for variable, wire, source in zip(station.inputs, station.wires, station.sources, strict=True):
-        value = float(memory.pool[source])
+    values = memory.taken(station).tolist()
+    for variable, wire, value in zip(station.inputs, station.wires, values, strict=True):
         if _comes_before(memory, wire, station) and np.isfinite(value):
             known[variable.name] = value
-    for variable, key in station.other_inputs:
-        if key is None:
+    for variable, wire in station.other_inputs:
+        if wire is None:
             known[variable.name] = station.unit.constants[variable.name]
-        elif key in memory.others:
-            known[variable.name] = memory.others[key]
+        elif (wire.source, wire.output) in memory.others:
+            known[variable.name] = memory.other(wire)
     return known
 
 
@@ -191,7 +191,7 @@ def _renew(memory: Memory, s: Station, check: Check) -> list[Movement]:
 
     A value that is not finite yet is not passed on: the loop may still heal it.
     """
-    new = memory.pool[s.sources]
+    new = memory.taken(s)
     new = np.where(np.isfinite(new) | np.isnan(s.u), new, s.u)
     changed = np.flatnonzero(new.view(np.int64) != s.u.view(np.int64))
     moving = [
@@ -211,16 +211,16 @@ def _renew(memory: Memory, s: Station, check: Check) -> list[Movement]:
 def _renew_others(memory: Memory, s: Station, check: Check, moving: list[Movement]) -> bool:
     """Do the same for what is not Real; add to `moving` and return whether anything has changed."""
     changed = set()
-    for variable, key in s.other_inputs:
-        value = s.unit.constants[variable.name] if key is None else memory.others[key]
+    for variable, wire in s.other_inputs:
+        value = s.unit.constants[variable.name] if wire is None else memory.other(wire)
         old = memory.others.get((s.name, variable.name))
         if value == old:
             continue
         memory.others[s.name, variable.name] = value
         changed.add(variable.place[:2])
-        if key is not None:
-            wire = f"{key[0]}.{key[1]} -> {s.name}.{variable.name}"
-            moving.append(Movement(wire, "" if old is None else old, value))
+        if wire is not None:
+            text = f"{wire.source}.{wire.output} -> {s.name}.{variable.name}"
+            moving.append(Movement(text, "" if old is None else old, value))
     if changed:  # of an array all elements
         given = [v.name for v, _ in s.other_inputs if v.place[:2] in changed]
         _put(s, {name: memory.others[s.name, name] for name in given}, "setting inputs", check)

@@ -122,11 +122,11 @@ class Master:
         """Return the inputs with which a unit was last stepped."""
         s = self.memory.of[unit]
         values: dict[str, Value] = {v.name: float(u) for v, u in zip(s.inputs, s.u, strict=True)}
-        for variable, key in s.other_inputs:
-            if key is None:
+        for variable, wire in s.other_inputs:
+            if wire is None:
                 values[variable.name] = s.unit.constants[variable.name]
-            elif key in self.memory.others:  # else its source has not been read yet
-                values[variable.name] = self.memory.others[key]
+            elif (wire.source, wire.output) in self.memory.others:  # else its source has not been read yet
+                values[variable.name] = self.memory.other(wire)
         return values
 
     def _values_of_others(self) -> list[Value]:

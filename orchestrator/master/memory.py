@@ -10,11 +10,13 @@ Values that are no Reals live in a dictionary beside it; without such wires it c
 from __future__ import annotations
 
 import ctypes
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..errors import SimulationError
 from ..plan import Plan, Unit, Value, Variable, Wire
 from .coupling import Relation
 from .slave import Calls, Slave
@@ -30,7 +32,7 @@ class Station:
     inputs: list[Variable]  # Real and driven, in declared order
     wires: list[Wire | None]  # what drives them; None for a constant
     outputs: list[Variable]  # Real and needed, in declared order
-    other_inputs: list[tuple[Variable, tuple[str, str] | None]]  # not Real; None for a constant
+    other_inputs: list[tuple[Variable, Wire | None]]  # not Real; None for a constant
     other_outputs: list[Variable]
     sources: np.ndarray = field(default_factory=lambda: np.empty(0, np.intp))  # pool index per input
     kept: np.ndarray = field(default_factory=lambda: np.empty(0))  # pool view, one per input
@@ -39,6 +41,18 @@ class Station:
     y: np.ndarray = field(default_factory=lambda: np.empty(0))  # its outputs in the pool
     y_before: np.ndarray = field(default_factory=lambda: np.empty(0))
     calls: Calls = field(init=False)
+
+    @functools.cached_property
+    def scale(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Gain and offset of each input, None if no wire converts.
+
+        Others have 1 and -0.0, which leave every number as it is, to the sign of zero.
+        """
+        if not any(wire and wire.converts for wire in self.wires):
+            return None
+        pairs = [(w.gain, w.offset) if w and w.converts else (1.0, -0.0) for w in self.wires]
+        gains, offsets = np.array(pairs).T.copy()
+        return gains, offsets
 
     @property
     def name(self) -> str:
@@ -105,6 +119,26 @@ class Memory:
             s.sources = np.array(sources, np.intp)
             at = end
 
+    def taken(self, s: Station) -> np.ndarray:
+        """Return what a unit's Real inputs get of the present outputs."""
+        values = self.pool[s.sources]
+        return values if s.scale is None else values * s.scale[0] + s.scale[1]
+
+    def other(self, wire: Wire) -> Value:
+        """Return what a wire that is no Real gives its input.
+
+        Raises:
+            KeyError: its source has not been read yet.
+        """
+        value = self.others[wire.source, wire.output]
+        if not wire.converts:
+            return value
+        number = int(wire.gain * value + wire.offset)  # type: ignore[operator]
+        if not -(2**31) <= number < 2**31:
+            sentence = f"{wire.target}: {wire.input} would be {number}, more than an Integer holds"
+            raise SimulationError(sentence, unit=wire.target, time=self.time.value)
+        return number
+
     def relation(self, target: Station, variable: Variable, wire: Wire) -> Relation:
         """Return what the weights of a wire depend on."""
         source = self.of[wire.source]
@@ -142,7 +176,7 @@ def _stations(plan: Plan, slaves: Mapping[str, Slave]) -> list[Station]:
                 [v for v, _ in driven if v.type == "Real"],
                 [wire for v, wire in driven if v.type == "Real"],
                 [v for v in read if v.type == "Real"],
-                [(v, (w.source, w.output) if w else None) for v, w in driven if v.type != "Real"],
+                [(v, w) for v, w in driven if v.type != "Real"],
                 [v for v in read if v.type != "Real"],
             )
         )

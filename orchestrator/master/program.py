@@ -65,6 +65,7 @@ class Programs:
             operations.append(Operation("", "gather", _held(m, sources, m.inputs[: len(sources)])))
         slow = [s for s in beginning if s.unit.period > 1 and s.inputs]
         operations += [Operation(s.name, "gather", _held(m, s.sources, s.u)) for s in slow]
+        operations += [op for s in beginning for op in _converting(s)]
         operations += [op for s in beginning for op in _setting(m, s)]
         for s in ending:
             operations += [Operation(s.name, "step", s.calls.step), *_getting(m, s)]
@@ -98,7 +99,7 @@ class Programs:
         key = (s.name, *per_input)
         if key not in self._gathers:
             _make_room(self._gathers)
-            operations = [Operation(s.name, "gather", _gather(m, s, per_input))]
+            operations = [Operation(s.name, "gather", _gather(m, s, per_input)), *_converting(s)]
             if any(w.kept for w in per_input):
                 operations.append(Operation(s.name, "keep", _held(m, s.sources, s.kept)))
             self._gathers[key] = operations
@@ -153,6 +154,21 @@ def _blended(m: Memory, pairs: np.ndarray, factors: np.ndarray, target: np.ndarr
     return blended
 
 
+def _converting(s: Station) -> list[Operation]:
+    """Return what turns a unit's inputs, as they were gathered, into its units of measurement."""
+    if s.scale is None:
+        return []
+    (gains, offsets), values = s.scale, s.u
+    multiply, add = np.multiply, np.add
+
+    def converted() -> Status:
+        multiply(values, gains, values)
+        add(values, offsets, values)
+        return OK
+
+    return [Operation(s.name, "gather", converted)]
+
+
 def _copy(source: np.ndarray, target: np.ndarray) -> Callable[[], None]:
     return functools.partial(target.data.__setitem__, slice(None), source.data)
 
@@ -161,14 +177,15 @@ def _setting(m: Memory, s: Station) -> list[Operation]:
     operations = []
     if any(s.wires):
         operations.append(Operation(s.name, "set", s.calls.set))
-    driven = {v.place[:2] for v, source in s.other_inputs if source is not None}  # of an array all elements
-    others = [(v, source) for v, source in s.other_inputs if v.place[:2] in driven]
+    driven = {v.place[:2] for v, wire in s.other_inputs if wire is not None}  # of an array all elements
+    others = [(v, wire) for v, wire in s.other_inputs if v.place[:2] in driven]
     for kind in dict.fromkeys(v.place.type for v, _ in others):
-        chosen = [(v, source or (s.name, v.name)) for v, source in others if v.place.type == kind]
-        places, sources = [v.place for v, _ in chosen], [source for _, source in chosen]
+        chosen = [(v, wire) for v, wire in others if v.place.type == kind]
+        places = [v.place for v, _ in chosen]
 
-        def put(places: list[Place] = places, sources: list = sources) -> Status:
-            return s.slave.put(places, [m.others[source] for source in sources])
+        def put(places: list[Place] = places, chosen: list = chosen) -> Status:
+            values = [m.others[s.name, v.name] if wire is None else m.other(wire) for v, wire in chosen]
+            return s.slave.put(places, values)
 
         operations.append(Operation(s.name, "set", put))
     return operations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -116,7 +117,7 @@ def _together(one: Parting, other: Parting) -> Parting:
     )  # fmt: skip
 
 
-def targets_of(run: Mapping[str, object], signal: str) -> tuple[str, ...]:
+def targets_of(run: Mapping[str, Any], signal: str) -> tuple[str, ...]:
     """Return the units that take a recorded signal, as the run's record says."""
-    wires = [str(wire).split(" -> ") for wire in run.get("connections", [])]  # type: ignore[attr-defined]
-    return tuple(dict.fromkeys(ends[1].partition(".")[0] for ends in wires if ends[0] == signal))
+    wires = run.get("connections", [])
+    return tuple(dict.fromkeys(wire["to"].partition(".")[0] for wire in wires if wire["from"] == signal))

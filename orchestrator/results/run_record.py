@@ -9,7 +9,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from ..plan import Plan, Unit
+from ..plan import Plan, Unit, Wire
 from ..sources import OF_RESULTS, sources_hash
 
 
@@ -36,10 +36,15 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
         "units": {"time": "s", **columns},
         "fmus": {name: _fmu(unit, plan) for name, unit in units.items()},
         "changes": [asdict(change) for change in plan.changes],
-        "connections": [f"{w.source}.{w.output} -> {w.target}.{w.input}" for w in plan.wires],
+        "connections": [_connection(wire) for wire in plan.wires],
         "scenario": plan.scenario,
         "versions": versions(),
     }
+
+
+def _connection(wire: Wire) -> dict[str, Any]:
+    ends = {"from": f"{wire.source}.{wire.output}", "to": f"{wire.target}.{wire.input}"}
+    return ends | ({"gain": wire.gain, "offset": wire.offset} if wire.converts else {})
 
 
 def _fmu(unit: Unit, plan: Plan) -> dict[str, Any]:

@@ -60,9 +60,16 @@ def _plain(value: object) -> Value:
     raise ValueError("has no value" if value is None else f"must be one value (got {short(value)})")
 
 
+def _number(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ValueError(f"must be a number (got {short(value)})")
+    return float(value)
+
+
 _SCALAR_SCHEMA = {"type": ["number", "boolean", "string"]}
 _TIME_SCHEMA = {"type": ["number", "string"]}
 Scalar = Annotated[Value, PlainValidator(_plain), WithJsonSchema(_SCALAR_SCHEMA)]
+Number = Annotated[float, PlainValidator(_number), WithJsonSchema({"type": "number"})]
 Time = Annotated[
     Fraction, PlainValidator(quantities.seconds), PlainSerializer(float), WithJsonSchema(_TIME_SCHEMA)
 ]
@@ -79,10 +86,23 @@ class UnitSpec(Strict):
 
 
 class Connection(Strict):
-    """Connections beyond equal names; `*` in both ends connects everything that matches in pairs."""
+    """Connections beyond equal names; `*` in both ends connects everything that matches in pairs.
+
+    Numbers are converted from the output's unit into the input's. With `gain` or `offset` the units do
+    not count: the input is gain times the output plus offset, in plain numbers.
+    """
 
     source: Variables = Field(alias="from", description="unit.output")
     target: Variables = Field(alias="to", description="unit.input")
+    gain: Number | None = Field(None, description="Factor in place of the conversion of units")
+    offset: Number | None = Field(None, description="Added after the factor")
+
+    @property
+    def scale(self) -> tuple[float, float] | None:
+        """Gain and offset, None if the connection gives neither."""
+        if self.gain is None and self.offset is None:
+            return None
+        return (1.0 if self.gain is None else self.gain, 0.0 if self.offset is None else self.offset)
 
 
 class Vehicle(Strict):

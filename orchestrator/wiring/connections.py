@@ -8,10 +8,11 @@ nothing is connected by equal names.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 
 from ..plan import Fmu, Value, Variable, Wire
 from ..scenario.load import Connection, Scenario
-from ..scenario.quantities import same_unit
+from ..scenario.measurement_units import conversion, measure_of
 from ..scenario.yaml_lines import Key, dotted
 from ..wording import fold, fold_sentences, hint, listed
 from .parameters import origin, value_for
@@ -66,15 +67,14 @@ class Connector:
                     self._origins[unit][name] = "default"
                 else:
                     self._report(("units", unit), self._undriven(unit, variable))
-        for wire, key in wires.values():
-            self._check(wire, key)
-        self._note_missing_units(wire for wire, _ in wires.values())
+        fitted = [self._fitted(wire, key) for wire, key in wires.values()]
+        self._note_units(wire for wire, key in wires.values() if self._scale(key) is None)
         for key, sentence in fold_sentences(self._found):
             self._scenario.document.report(key, sentence)
         by_unit: dict[str, dict[str, Value]] = {unit: {} for unit in self._fmus}
         for (unit, name), value in constants.items():
             by_unit[unit][name] = value
-        return [wire for wire, _ in wires.values()], by_unit
+        return fitted, by_unit
 
     def _explicit(self, unit: str) -> bool:
         """Return whether only the scenario's connections count for the inputs of a unit."""
@@ -220,36 +220,54 @@ class Connector:
             f"{connect} a constant under 'inputs'"
         )
 
-    def _check(self, wire: Wire, key: Key) -> None:
-        source = self._outputs[wire.source][wire.output]
-        target = self._inputs[wire.target][wire.input]
-        ends = "cannot connect {}.{} [{}] to {}.{} [{}]: the {} differ"
-        if source.type != target.type:
-            of, to, what = source.type, target.type, "types"
-        elif source.unit and target.unit and not same_unit(source.unit, target.unit):
-            of, to, what = source.unit, target.unit, "units"
-        elif (
-            source.type == "Enumeration" and not (source.items or {}).items() <= (target.items or {}).items()
-        ):
-            of, to = (
-                listed(f"{name} {value}" for name, value in (v.items or {}).items()) for v in (source, target)
-            )
-            what = "enumerations"
-        else:
-            return
-        self._report(key, ends.format(wire.source, wire.output, of, wire.target, wire.input, to, what))
+    def _scale(self, key: Key) -> tuple[float, float] | None:
+        """Return the gain and offset that the connection at `key` gives, None if it gives none."""
+        return self._scenario.connections[key[1]].scale if key[0] == "connections" else None  # type: ignore[index]
 
-    def _note_missing_units(self, wires: Iterable[Wire]) -> None:
+    def _fitted(self, wire: Wire, key: Key) -> Wire:
+        """Return a wire with what it does to numbers; report ends that do not fit."""
+        source, target = self._outputs[wire.source][wire.output], self._inputs[wire.target][wire.input]
+        between, given = _conversion(source, target), self._scale(key)
+        scale = given or between
+        differing = _difference(source, target, scale)
+        if differing is not None:
+            what, of, to = differing
+            ends = f"{wire.source}.{wire.output} [{of}] to {wire.target}.{wire.input} [{to}]"
+            way_out = "; a connection with a gain takes plain numbers" if what == "units" else ""
+            self._report(key, f"cannot connect {ends}: the {what} differ{way_out}")
+            return wire
+        assert scale is not None
+        whole = source.type == "Integer" and all(x.is_integer() for x in scale)
+        if given and source.type != "Real" and not whole:
+            self._report(
+                key, f"gain and offset are for Real, and whole ones for Integer, not for {source.type}"
+            )
+        if given and between not in (None, (1.0, 0.0), given):
+            self._notes.append(
+                f"{dotted(key)}: its gain and offset stand in place of the conversion "
+                f"from {source.unit} to {target.unit}"
+            )
+        return replace(wire, gain=scale[0], offset=scale[1])
+
+    def _note_units(self, wires: Iterable[Wire]) -> None:
+        """Note ends without a unit, and units that an FMU defines otherwise than their name says."""
         missing: dict[str, list[str]] = {}
+        odd: dict[tuple[str, str], None] = {}
         for wire in wires:
-            source = self._outputs[wire.source][wire.output]
-            target = self._inputs[wire.target][wire.input]
-            if source.type == "Real" and (source.unit is None) != (target.unit is None):
-                unit, name = (wire.source, wire.output) if source.unit is None else (wire.target, wire.input)
-                missing.setdefault(unit, []).append(name)
+            ends = (
+                (wire.source, self._outputs[wire.source][wire.output]),
+                (wire.target, self._inputs[wire.target][wire.input]),
+            )
+            lacking = [(unit, v.name) for unit, v in ends if v.type == "Real" and v.unit is None]
+            if len(lacking) == 1:
+                missing.setdefault(lacking[0][0], []).append(lacking[0][1])
+            odd.update({(unit, v.unit): None for unit, v in ends if v.unit and _contradicts_its_name(v)})
         for unit, names in missing.items():
             text = listed(fold(list(dict.fromkeys(names))))
             self._notes.append(f"{unit} ({self._fmus[unit].name}) declares no unit for {text}: not checked")
+        for unit, measure in odd:
+            who = f"{unit} ({self._fmus[unit].name})"
+            self._notes.append(f"{who} defines {measure} otherwise than usual: taken as it defines it")
 
     def recorded(self) -> tuple[tuple[str, str], ...]:
         """Return what is recorded: (unit, output), in the order of the scenario's list or units.
@@ -279,5 +297,41 @@ class Connector:
         return tuple(chosen)
 
 
+def _conversion(source: Variable, target: Variable) -> tuple[float, float] | None:
+    """Return gain and offset from one end's unit to the other's, None if they do not fit.
+
+    A unit that an end does not declare is taken to be the other's.
+    """
+    if source.unit is None or target.unit is None:
+        return 1.0, 0.0
+    if (source.unit, source.definition) == (target.unit, target.definition):
+        return 1.0, 0.0
+    measures = measure_of(source.unit, source.definition), measure_of(target.unit, target.definition)
+    if measures[0] is None or measures[1] is None:
+        return (1.0, 0.0) if source.unit == target.unit else None
+    return conversion(measures[0], measures[1])
+
+
+def _contradicts_its_name(variable: Variable) -> bool:
+    usual, defined = measure_of(variable.unit), measure_of(variable.unit, variable.definition)
+    return usual is not None and usual != defined
+
+
+def _difference(
+    source: Variable, target: Variable, scale: tuple[float, float] | None
+) -> tuple[str, str | None, str | None] | None:
+    """Return in what two ends differ that cannot be connected, and what each has of it."""
+    if source.type != target.type:
+        return "types", source.type, target.type
+    if scale is None:
+        return "units", source.unit, target.unit
+    items = source.items or {}, target.items or {}
+    if source.type == "Enumeration" and not items[0].items() <= items[1].items():
+        of, to = (listed(f"{name} {value}" for name, value in each.items()) for each in items)
+        return "enumerations", of, to
+    return None
+
+
 def _fits(source: Variable, target: Variable) -> bool:
-    return source.type == target.type and same_unit(source.unit, target.unit)
+    alike = source.type == target.type and (source.unit is None) == (target.unit is None)
+    return alike and _conversion(source, target) is not None

@@ -38,7 +38,9 @@ def _real(variable: Variable, given: Value) -> float:
     if isinstance(given, bool):
         raise ValueError(f"must be a number{in_unit} (got {str(given).lower()})")
     try:
-        value = float(quantities.convert(given, variable.unit) if isinstance(given, str) else given)
+        value = float(
+            quantities.convert(given, variable.unit, variable.definition) if isinstance(given, str) else given
+        )
     except OverflowError:
         value = math.inf
     if not math.isfinite(value):

@@ -46,10 +46,16 @@ def make_fmu(
     binaries: Iterable[str] | None = None,
     xml: str | None = None,
     once: bool = False,
+    definitions: Mapping[str, str] | None = None,
 ) -> Path:
-    """Write an FMU; `binaries` are platform folders, by default this platform's; `xml` replaces all."""
+    """Write an FMU; `binaries` are platform folders, by default this platform's; `xml` replaces all.
+
+    `definitions` are units of measurement: name -> attributes of its BaseUnit.
+    """
     name = path.stem
-    text = xml or model_description(name, inputs, outputs, parameters, once=once)
+    text = xml or model_description(
+        name, inputs, outputs, parameters, once=once, definitions=definitions or {}
+    )
     here, suffix = platform()
     path.parent.mkdir(parents=True, exist_ok=True)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -69,6 +75,7 @@ def model_description(
     parameters: Iterable[Var] = (),
     *,
     once: bool = False,
+    definitions: Mapping[str, str] = {},
 ) -> str:
     """Return a valid FMI 2.0 model description."""
     rows: list[tuple[str, Var]] = []
@@ -87,7 +94,12 @@ def model_description(
         f' canBeInstantiatedOnlyOncePerProcess="{str(once).lower()}"/>',
     ]
     if units:
-        inner = "".join(f"<Unit name={quoteattr(unit)}/>" for unit in units)
+        inner = "".join(
+            f"<Unit name={quoteattr(unit)}><BaseUnit {definitions[unit]}/></Unit>"
+            if unit in definitions
+            else f"<Unit name={quoteattr(unit)}/>"
+            for unit in units
+        )
         lines.append(f"<UnitDefinitions>{inner}</UnitDefinitions>")
     if types:
         lines.append("<TypeDefinitions>")

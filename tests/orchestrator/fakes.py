@@ -153,7 +153,7 @@ def make_plan(
     parameters: Mapping[str, Mapping[str, Any]] | None = None,
     record: Iterable[str] | None = None,
 ) -> Plan:
-    """Return a plan of fake units in the order given; wires are written `a.x -> b.y`."""
+    """Return a plan of fake units in the order given; wires are written `a.x -> b.y [gain offset]`."""
     made = tuple(
         Unit(
             name, make_fmu(name, b), (periods or {}).get(name, 1),
@@ -161,11 +161,11 @@ def make_plan(
         )
         for name, b in units.items()
     )  # fmt: skip
-    pairs = [tuple(end.strip().split(".") for end in text.split("->")) for text in wires]
+    pairs = [_wire(text) for text in wires]
     recorded = record if record is not None else [f"{n}.{o}" for n, b in units.items() for o in b.outputs]
     return Plan(
         made,
-        tuple(Wire(*source, *target) for source, target in pairs),
+        tuple(pairs),
         tuple((name.split(".")[0], name.split(".")[1]) for name in recorded),
         Fraction(step),
         n_steps,
@@ -173,6 +173,11 @@ def make_plan(
         title="fake",
         scenario={"title": "fake"},
     )
+
+
+def _wire(text: str) -> Wire:
+    source, _, target, *scale = text.split()
+    return Wire(*source.split("."), *target.split("."), *(float(number) for number in scale))
 
 
 class Stage:

@@ -169,3 +169,10 @@ def test_checking_loads_no_simulation_and_no_figures() -> None:
     assert check("Läufe 2/a.yaml") == 0  # fills the cache
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+def test_a_wire_that_converts_says_from_what_into_what(capsys: pytest.CaptureFixture[str]) -> None:
+    outputs = [out("steer_angle", unit="deg"), out("torque_*", unit="N.m")]
+    make_fmu(Path("Läufe 2/driver_deg.fmu"), outputs=outputs)
+    assert check("Läufe 2/a.yaml", "--swap", "driver=Läufe 2/driver_deg.fmu") == 0
+    assert "steer_angle [deg → rad: x 0.0174533]" in capsys.readouterr().out

@@ -67,17 +67,20 @@ def description(*kinds, guid):
 def run(library, tmp_path, capsys):
     """Run two units of an FMU, the second fed by the first; return status, words and results."""
 
-    def go(*arguments, answer=0, given=KINDS, guid="{good}"):
+    def go(*arguments, answer=0, given=KINDS, guid="{good}", scale=""):
         with zipfile.ZipFile(tmp_path / "foreign.fmu", "w") as archive:
             archive.writestr("modelDescription.xml", description(*given, guid=guid))
             archive.write(library, f"binaries/{fmpy.platform}/foreign.so")
+        comma = ", " if scale else ""
         constants = ", ".join(f"a.{kind}_in: {value}" for kind, value in given.items())
         (tmp_path / "two.yaml").write_text(
             SCENARIO.format(
                 constants=f"{{{constants}}}",
                 fmu="foreign.fmu",
                 answer=answer,
-                connections="\n".join(f"  - {{from: a.{kind}_out, to: b.{kind}_in}}" for kind in given),
+                connections="\n".join(
+                    f"  - {{from: a.{kind}_out, to: b.{kind}_in{comma}{scale}}}" for kind in given
+                ),
             ),
             encoding="utf-8",
         )
@@ -173,3 +176,22 @@ def test_a_parameter_that_cannot_be_read_back_is_a_warning(run, isolate):
     assert status == 0
     assert "b at t = 0 s: whether answer took the value that was set is not known" in said
     assert results.time[-1] == 0.5
+
+
+@together_and_apart
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
+def test_gain_and_offset_reach_units_that_declare_no_units_of_measurement(run, isolate, algorithm):
+    """Both units double what they get."""
+    status, said, results = run(
+        *isolate,
+        "--set",
+        f"algorithm={algorithm}",
+        given={"Real": 0.75, "Integer": 5},
+        scale="gain: 10, offset: -3",
+    )
+    assert status == 0, said
+    assert set(results["b.Real_out"]) == {2 * (10 * 1.5 - 3)}
+    assert set(results["b.Integer_out"]) == {2 * (10 * 10 - 3)}
+    assert results.run["connections"][0] == {
+        "from": "a.Real_out", "to": "b.Real_in", "gain": 10.0, "offset": -3.0
+    }  # fmt: skip

@@ -317,3 +317,65 @@ def test_constants_of_any_type_reach_their_unit(tmp_path):
     constants = {"count_in": 3, "flag_in": True, "word_in": "dry", "mode_in": 2, "x_in": 0.5}
     _, results = run({"b": Echo()}, [], tmp_path, n_steps=1, constants={"b": constants})
     assert [results[f"b.{n}"][1] for n in Mixed.outputs] == [3, 1, "dry", 2, 0.5]
+
+
+class Twice(Behaviour):
+    """Writes down an input that is converted beside the same unconverted; integrates one of each."""
+
+    inputs = ("plain", "scaled", "plain_end", "scaled_end")
+    outputs = {"y": ("plain_end", "scaled_end")}
+
+    def __init__(self):
+        self.seen = []
+
+    def advance(self, t, h, u):
+        self.seen.append([u[name] for name in self.inputs])
+
+    def output(self, t, u):
+        return {"y": u["scaled_end"] - u["plain_end"]}
+
+
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
+@pytest.mark.parametrize("source_first", [True, False])
+@pytest.mark.parametrize(("n", "m"), [(1, 1), (2, 1), (1, 2), (2, 3)])
+def test_a_converting_wire_gives_gain_times_what_a_plain_one_gives_plus_offset(
+    algorithm, source_first, n, m, tmp_path
+):
+    target = Twice()
+    units = {"source": Clock(x=lambda t: math.sin(5.0 * t) - 0.3), "target": target}
+    if not source_first:
+        units = dict(reversed(units.items()))
+    _, results = run(
+        units,
+        [
+            "source.x -> target.plain", "source.x -> target.scaled 57.3 -0.7",
+            "source.x -> target.plain_end", "source.x -> target.scaled_end 57.3 -0.7",
+        ],
+        tmp_path, step="1/8", n_steps=30, algorithm=algorithm, periods={"source": n, "target": m},
+    )  # fmt: skip
+    seen = np.array(target.seen)
+    assert np.ptp(seen[:, 0]) > 0.5
+    assert np.array_equal(seen[:, 1], 57.3 * seen[:, 0] - 0.7)
+    assert np.array_equal(seen[:, 3], 57.3 * seen[:, 2] - 0.7)
+    assert results["target.y"][0] == 57.3 * -0.3 - 0.7 + 0.3  # from initialization on
+
+
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
+def test_beside_a_converting_wire_others_keep_every_bit(algorithm, tmp_path):
+    odd = [-0.0, 5e-324, 0.1, 1e300]
+    units = {f"s{i}": Clock(x=lambda t, value=value: value) for i, value in enumerate(odd)}
+    target = Function(lambda t, u: {"y": 0.0}, ["a", "b", "c", "d", "e"], ["y"])
+    wires = [f"s{i}.x -> target.{name}" for i, name in enumerate("abcd")] + ["s2.x -> target.e 2 1"]
+    slaves, _ = run(units | {"target": target}, wires, tmp_path, n_steps=3, algorithm=algorithm)
+    sets = [call[1:] for call in slaves["target"].calls if call[0] == "set"]
+    assert len(sets) >= 3
+    assert all(list(map(repr, values)) == [*map(repr, odd), "1.2"] for values in sets)
+
+
+def test_a_whole_number_is_converted_too_and_one_too_large_ends_the_run(tmp_path):
+    units = {"source": Mixed(), "target": Echo()}
+    wires = [f"source.{name} -> target.{name}_in" for name in Mixed.outputs if name != "count"]
+    _, results = run(units, [*wires, "source.count -> target.count_in 3 -1"], tmp_path, n_steps=4)
+    assert results["target.count"].tolist() == [-1, 2, 5, 8, 11]
+    with pytest.raises(SimulationError, match=r"target: count_in would be 3000000000, more than an Integer"):
+        run(units, [*wires, "source.count -> target.count_in 1e9 0"], tmp_path, n_steps=4)

@@ -7,8 +7,10 @@ from fractions import Fraction
 
 import pytest
 
+from orchestrator.plan import UnitDefinition
 from orchestrator.scenario import quantities
-from orchestrator.scenario.quantities import convert, parse_unit, same_unit, seconds
+from orchestrator.scenario.measurement_units import conversion, measure_of, parse_unit
+from orchestrator.scenario.quantities import convert, seconds
 
 
 @pytest.mark.parametrize(
@@ -86,17 +88,46 @@ def test_every_offered_spelling_is_a_unit() -> None:
         ("N.m", "Nm", True),
         ("m/s2", "m/s^2", True),
         ("kg.m2", "kg*m2", True),
-        ("widgets", "widgets", True),
         ("rad", "deg", False),
         ("rad/s", "1/s", False),
         ("N", "kN", False),
-        ("widgets", "m", False),
-        ("1", None, False),
     ],
 )
-def test_units_are_the_same_if_they_mean_the_same(a: str, b: str | None, same: bool) -> None:
-    assert same_unit(a, b) is same
-    assert same_unit(b, a) is same
+def test_units_are_the_same_if_they_mean_the_same(a: str, b: str, same: bool) -> None:
+    assert (conversion(parse_unit(a), parse_unit(b)) == (1.0, 0.0)) is same
+    assert (conversion(parse_unit(b), parse_unit(a)) == (1.0, 0.0)) is same
+
+
+RAD, KELVIN = (0, 0, 0, 0, 0, 0, 0, 1), (0, 0, 0, 0, 1, 0, 0, 0)
+
+
+def test_what_an_fmu_defines_goes_before_the_table_but_for_rounding() -> None:
+    rounded = measure_of("deg", UnitDefinition(RAD, 0.0174533))
+    assert rounded == parse_unit("deg")  # the same, with fewer digits
+    assert conversion(rounded, parse_unit("rad")) == (math.radians(1), 0.0)
+    grad = measure_of("deg", UnitDefinition(RAD, 0.015707963267948967))
+    assert conversion(grad, parse_unit("rad")) == (pytest.approx(math.pi / 200, rel=1e-15), 0.0)
+    assert measure_of("widget") is None
+    assert conversion(measure_of("widget", UnitDefinition(RAD)), parse_unit("rad")) == (1.0, 0.0)
+    assert measure_of("deg", UnitDefinition(RAD, 0.0)) == parse_unit("deg")  # 0 is no factor
+
+
+def test_offsets_are_converted_and_differences_have_none() -> None:
+    celsius, fahrenheit = parse_unit("degC"), measure_of("F", UnitDefinition(KELVIN, 5 / 9, 459.67 * 5 / 9))
+    assert conversion(celsius, parse_unit("K")) == (1.0, 273.15)
+    gain, offset = conversion(celsius, fahrenheit)
+    assert (100 * gain + offset, -40 * gain + offset) == (pytest.approx(212), pytest.approx(-40))
+    assert convert("20 degC", "K") == Fraction("293.15")
+    assert convert("300 K", "degC") == Fraction("26.85")
+    assert conversion(parse_unit("W/degC"), parse_unit("W/K")) == (1.0, 0.0)
+
+
+def test_a_quantity_is_converted_into_a_unit_that_only_the_fmu_defines() -> None:
+    assert convert("180 deg", "radian", UnitDefinition(RAD)) == math.pi
+    with pytest.raises(ValueError, match="cannot be converted to radian"):
+        convert("180 deg", "radian")
+    with pytest.raises(ValueError, match=r"'5 m' is not a value in radian: use radian, rad, deg or mrad"):
+        convert("5 m", "radian", UnitDefinition(RAD))
 
 
 @pytest.mark.parametrize(

@@ -115,7 +115,8 @@ def test_the_schema_can_be_printed() -> None:
             "{from: controller.torque_request_*, too:",
             [
                 "a.yaml:11: connections[0]: 'to' is missing",
-                "a.yaml:11: connections[0].too: unknown key; did you mean 'to'? allowed here: from and to",
+                "a.yaml:11: connections[0].too: unknown key; did you mean 'to'? allowed here: from, to, "
+                "gain and offset",
             ],
         ),
         (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -479,8 +480,9 @@ def test_more_than_one_output_of_a_name_is_said_and_a_connection_settles_it() ->
         (
             "{from: driver.steer_angle, to: plant.wheel_torque_*}",
             "connections[0]: cannot connect driver.steer_angle [rad] to plant.wheel_torque_* [N.m]: "
-            "the units differ",
+            "the units differ; a connection with a gain takes plain numbers",
         ),
+        ("{from: plant.yaw_rate, to: controller.yaw_rate, gain: much}", None),
         (
             "{from: plant.status, to: controller.yaw_rate}",
             "connections[0]: cannot connect plant.status [String] to controller.yaw_rate [Real]: "
@@ -512,14 +514,110 @@ def test_one_output_can_feed_four_wheels() -> None:
     assert fed == {f"wheel_torque_{w}": "torque_request_fl" for w in WHEELS}
 
 
+def wire_to(made: Plan, target: str, name: str) -> Wire:
+    return next(w for w in made.wires if (w.target, w.input) == (target, name))
+
+
 def test_units_that_differ_over_equal_names_are_said_with_the_target(folder: Path) -> None:
-    make_fmu(folder / "driver_deg.fmu", outputs=[out("steer_angle", unit="deg")])
-    assert problems(scenario(), swaps=["driver=driver_deg"]) == [
-        "a.yaml:5: units.controller: cannot connect driver.steer_angle [deg] to controller.steer_angle "
-        "[rad]: the units differ",
-        "a.yaml:6: units.plant: cannot connect driver.steer_angle [deg] to plant.steer_angle [rad]: "
-        "the units differ",
+    make_fmu(folder / "driver_m.fmu", outputs=[out("steer_angle", unit="m")])
+    ends = "driver.steer_angle [m] to {}.steer_angle [rad]"
+    more = ": the units differ; a connection with a gain takes plain numbers"
+    assert problems(scenario(), swaps=["driver=driver_m"]) == [
+        f"a.yaml:5: units.controller: cannot connect {ends.format('controller')}{more}",
+        f"a.yaml:6: units.plant: cannot connect {ends.format('plant')}{more}",
     ]
+
+
+def test_a_wire_converts_between_units_of_one_dimension(folder: Path) -> None:
+    make_fmu(folder / "driver_deg.fmu", outputs=[out("steer_angle", unit="deg")])
+    made = plan(swaps=["driver=driver_deg"])
+    assert wire_to(made, "plant", "steer_angle") == Wire(
+        "driver", "steer_angle", "plant", "steer_angle", math.pi / 180
+    )
+    assert [w for w in made.wires if w.converts and w.source != "driver"] == []
+    assert made.notes == ()
+
+
+@pytest.mark.parametrize(
+    ("unit", "base", "gain", "offset"),
+    [
+        ("radian", 'rad="1"', 1.0, 0.0),
+        ("turn", 'rad="1" factor="6.283185307179586"', 2 * math.pi, 0.0),
+        ("deg", 'rad="1" factor="0.01745329"', math.pi / 180, 0.0),  # with few digits
+        ("from_north", 'rad="1" factor="-1" offset="1.5"', -1.0, 1.5),
+    ],
+)
+def test_units_are_known_by_what_the_fmu_defines(folder, unit, base, gain, offset) -> None:
+    make_fmu(folder / "other.fmu", outputs=[out("steer_angle", unit=unit)], definitions={unit: base})
+    wire = wire_to(plan(swaps=["driver=other"]), "plant", "steer_angle")
+    assert (wire.gain, wire.offset) == (gain, offset)
+
+
+def test_units_that_are_neither_known_nor_defined_fit_by_name_alone(folder: Path) -> None:
+    make_fmu(folder / "other.fmu", outputs=[out("steer_angle", unit="radian")])
+    assert (
+        "[radian] to plant.steer_angle [rad]: the units differ"
+        in problems(scenario(), swaps=["driver=other"])[1]
+    )
+    make_fmu(folder / "taker.fmu", inputs=[Var("steer_angle", "radian")], outputs=["y"])
+    path = scenario("  other: {fmu: other}\n  taker: {fmu: taker}\n", "")
+    assert not wire_to(plan(path), "taker", "steer_angle").converts
+
+
+def test_a_unit_that_contradicts_its_name_counts_as_defined_and_is_noted(folder: Path) -> None:
+    make_fmu(folder / "other.fmu", outputs=[out("steer_angle", unit="deg")], definitions={"deg": 'rad="1"'})
+    made = plan(swaps=["driver=other"])
+    assert not wire_to(made, "plant", "steer_angle").converts
+    assert made.notes == ("driver (other) defines deg otherwise than usual: taken as it defines it",)
+
+
+def test_a_parameter_is_converted_into_a_unit_that_only_the_fmu_defines(folder: Path) -> None:
+    make_fmu(
+        folder / "other.fmu",
+        outputs=[out("steer_angle", unit="rad")],
+        parameters=[Var("amplitude", "radian")],
+        definitions={"radian": 'rad="1"'},
+    )
+    made = plan(swaps=["driver=other"], settings=["driver.amplitude=180 deg"])
+    assert unit(made, "driver").parameters == {"amplitude": math.pi}
+
+
+@pytest.mark.parametrize(
+    ("given", "scale"),
+    [("gain: 0.5, offset: 2", (0.5, 2.0)), ("gain: 3", (3.0, 0.0)), ("offset: -1", (1.0, -1.0))],
+)
+def test_gain_and_offset_take_plain_numbers_whatever_the_units_are(folder, given, scale) -> None:
+    make_fmu(folder / "driver_m.fmu", outputs=[out("steer_angle", unit="m")])
+    rest = CONSTANTS + TORQUES
+    rest += "".join(
+        f"  - {{from: driver.steer_angle, to: {end}.steer_angle, {given}}}\n"
+        for end in ("plant", "controller")
+    )
+    made = plan(scenario(rest=rest), swaps=["driver=driver_m"])
+    wire = wire_to(made, "plant", "steer_angle")
+    assert (wire.gain, wire.offset) == scale
+    make_fmu(folder / "driver_m.fmu", outputs=[out("steer_angle", unit=None)])
+    assert plan(scenario(rest=rest), swaps=["driver=driver_m"]).notes == ()
+
+
+def test_a_gain_in_place_of_a_conversion_is_noted(folder: Path) -> None:
+    make_fmu(folder / "driver_deg.fmu", outputs=[out("steer_angle", unit="deg")])
+    rest = CONSTANTS + TORQUES + "  - {from: driver.steer_angle, to: plant.steer_angle, gain: 0.0625}\n"
+    assert plan(scenario(rest=rest), swaps=["driver=driver_deg"]).notes == (
+        "connections[1]: its gain and offset stand in place of the conversion from deg to rad",
+    )
+
+
+def test_text_has_no_gain_and_a_whole_number_a_whole_one(folder: Path) -> None:
+    make_fmu(folder / "count.fmu", outputs=[Var("n", type="Integer"), Var("word", type="String", start="")])
+    make_fmu(folder / "taker.fmu", inputs=[Var("n", type="Integer", start=0)], outputs=["y"])
+    make_fmu(folder / "reader.fmu", inputs=[Var("word", type="String", start="")], outputs=["y"])
+    units = "  a: {fmu: count}\n  b: {fmu: taker}\n  c: {fmu: reader}\n"
+    rest = "connections:\n  - {from: a.n, to: b.n, gain: 2}\n  - {from: a.word, to: c.word, gain: 2}\n"
+    says = "gain and offset are for Real, and whole ones for Integer, not for"
+    assert problems(scenario(units, rest)) == [f"a.yaml:9: connections[1]: {says} String"]
+    rest = "connections:\n  - {from: a.n, to: b.n, gain: 0.5}\n"
+    assert problems(scenario(units, rest)) == [f"a.yaml:8: connections[0]: {says} Integer"]
 
 
 def test_units_that_mean_the_same_fit(folder: Path) -> None:

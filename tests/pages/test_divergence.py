@@ -23,7 +23,7 @@ def two(**changed):
         full = next(column for column in columns if column.endswith(name))
         other[full] += np.where(start - 1e-12 <= T, amount, 0.0)
     order = {"evaluation_order": ["controller", "plant"]}
-    wires = {"connections": ["controller.yaw_moment -> plant.yaw_moment"]}
+    wires = {"connections": [{"from": "controller.yaw_moment", "to": "plant.yaw_moment"}]}
     made = [results(one, T) for one in (columns, other)]
     return [replace(one, run={**one.run, **order, **wires}) for one in made]
 
