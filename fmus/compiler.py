@@ -12,19 +12,21 @@ import sys
 import tempfile
 from pathlib import Path
 
-import platformdirs
+from orchestrator.cache import keep, recall
 
 HERE = Path(__file__).resolve().parent
 SOURCES = ("launcher.c", "fmi2.h", "find_python.h", "text.h")
 FLAGS = ("-std=c11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-Wl,--build-id=none", "-s")
 LIBRARIES = ("-ldl", "-pthread")
+STORE = "launcher"
+"""Of compiled launchers in the cache."""
 
 
-def compile_launcher(cache: Path | None = None) -> tuple[bytes | None, str]:
+def compile_launcher() -> tuple[bytes | None, str]:
     """Return the launcher for this machine, or None with the reason why there is none.
 
     The same sources and the same compiler give the same bytes; another compiler may give others.
-    `CC` names a compiler other than `cc`. `cache` is a folder; default: the user's cache.
+    `CC` names a compiler other than `cc`.
     """
     if sys.platform != "linux" or platform.machine() != "x86_64":
         return None, f"it is for Linux on x86-64, this is {platform.system()} on {platform.machine()}"
@@ -36,10 +38,10 @@ def compile_launcher(cache: Path | None = None) -> tuple[bytes | None, str]:
     content = hashlib.sha256("\0".join([*command, version, *FLAGS, *LIBRARIES]).encode())
     for name in SOURCES:
         content.update((HERE / name).read_bytes())
-    folder = cache or platformdirs.user_cache_path("yawbench") / "launcher"
-    kept = folder / f"{content.hexdigest()[:16]}.so"
-    if kept.exists():
-        return kept.read_bytes(), ""
+    key = content.hexdigest()[:16]
+    kept = recall(STORE, key)
+    if kept is not None:
+        return kept, ""
     with tempfile.TemporaryDirectory() as temporary:
         made = Path(temporary) / "launcher.so"
         # Relative names: what the compiler writes must not depend on where the sources stand.
@@ -54,16 +56,5 @@ def compile_launcher(cache: Path | None = None) -> tuple[bytes | None, str]:
             lines = [line for line in done.stderr.splitlines() if "error" in line]
             return None, f"the C compiler failed: {(lines or [f'exit status {done.returncode}'])[0]}"
         binary = made.read_bytes()
-    _keep(kept, binary)
+    keep(STORE, key, binary)
     return binary, ""
-
-
-def _keep(file: Path, content: bytes) -> None:
-    """Write a file that others may be writing too; without the right to write there, do nothing."""
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=file.parent, delete=False) as draft:
-            draft.write(content)
-        os.replace(draft.name, file)
-    except OSError:
-        pass

@@ -1,13 +1,10 @@
-"""FMU archives, each unpacked once into a cache named by its content.
+"""FMU archives, each unpacked once into the cache under a name that its content gives.
 
-The cache holds, per archive, its files in `fmu/` and beside them `description.json`: the model
-description as this program needs it (parsing it anew costs 15 to 50 ms) and every file's size. An
-entry appears under its name in one rename, complete, so processes that unpack the same archive at
-the same time cannot meet a half one. Every file's time is set to one fixed instant: a file that was
-changed, cut off or deleted since is found by its size and time, and put back.
-
-The cache's path is plain ASCII, because stock PythonFMU decodes nothing but `%20` in the address of
-its resources: where the user's cache folder is called something else, a temporary folder serves.
+An entry holds, per archive, its files in `fmu/` and beside them `description.json`: the model
+description as this program needs it (parsing it anew costs 15 to 50 ms) and every file's hash. It
+appears under its name in one rename, complete, so processes that unpack the same archive at the
+same time cannot meet a half one. A file that was changed, cut off or deleted since is found by its
+hash, which costs a millisecond per FMU, and put back.
 """
 
 from __future__ import annotations
@@ -31,6 +28,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
+from ..cache import cache_folders
 from ..errors import ModelDescriptionError
 from ..plan import Fmu
 from ..wording import closest, listed, short
@@ -42,9 +40,9 @@ FORMAT = 3
 KEEP_DAYS = 60
 """An entry unused for so long is deleted when another is made."""
 
-_PLAIN_PATH = re.compile(r"[A-Za-z0-9_.~/\\: -]+")
 _FILE_NAME = re.compile(r"[^/\\:\x00-\x1f\x7f]{1,200}")
-_FILE_TIME = 946_684_800  # 2000-01-01, in s
+_FILE_TIME = 946_684_800
+"""Of every unpacked file, 2000-01-01 [s]: what Python compiles of a module stays good when it is put back."""
 _DAMAGE = (
     zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, OSError, ValueError,
     RuntimeError,  # encrypted, or packed by a method that is not known
@@ -59,50 +57,26 @@ def open_fmu(path: Path | str) -> Fmu:
     """
     path = Path(path).absolute()
     raw = read_archive(path)
-    folder = cache_folder()
-    entry = folder / f"{hashlib.sha256(raw).hexdigest()[:32]}-{FORMAT}"
-    fmu = _load(entry, path)
-    if fmu is None:
-        fmu = _unpack(raw, entry, path)
-    if problem := binary_problem(fmu):
-        raise ModelDescriptionError(f"{fmu.path}: {problem}")
-    return fmu
+    name = f"{hashlib.sha256(raw).hexdigest()[:32]}-{FORMAT}"
+    problem: ModelDescriptionError | None = None
+    for folder in cache_folders():
+        try:
+            fmu = _load(folder / name, path) or _unpack(raw, folder / name, path)
+        except OSError as error:
+            problem = problem or ModelDescriptionError(_no_room(path, folder, error))
+            continue
+        if wrong := binary_problem(fmu):
+            raise ModelDescriptionError(f"{fmu.path}: {wrong}")
+        return fmu
+    assert problem is not None
+    raise problem
 
 
-def cache_folder() -> Path:
-    """Return the folder of unpacked FMUs: YAWBENCH_CACHE, the user's cache, or a temporary folder.
-
-    Raises:
-        ModelDescriptionError: none has a plain ASCII path.
-    """
-    chosen = os.environ.get("YAWBENCH_CACHE")
-    if chosen:
-        wanted = Path(chosen).absolute()
-    else:
-        from platformdirs import user_cache_path
-
-        wanted = user_cache_path("yawbench")
-    if _PLAIN_PATH.fullmatch(str(wanted)):
-        return wanted
-    user = os.getuid() if hasattr(os, "getuid") else os.environ.get("USERNAME", "user").encode().hex()
-    for base in (tempfile.gettempdir(), os.environ.get("PUBLIC", "/tmp")):
-        if _PLAIN_PATH.fullmatch(base):
-            return _private(Path(base) / f"yawbench-{user}")
-    raise ModelDescriptionError(
-        f"{wanted}: FMUs cannot be unpacked here: the path holds more than ASCII letters, digits, "
-        "spaces and ._~-; name another folder in YAWBENCH_CACHE"
-    )
-
-
-def _private(folder: Path) -> Path:
-    """Make a folder that others could have made first; refuse it if they have."""
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    if hasattr(os, "getuid") and folder.stat().st_uid != os.getuid():
-        raise ModelDescriptionError(
-            f"{folder}: FMUs cannot be unpacked here: the folder belongs to another user; "
-            "name another one in YAWBENCH_CACHE"
-        )
-    return folder
+def _no_room(path: Path, folder: Path, error: OSError) -> str:
+    where = f"{path}: cannot unpack this FMU into {folder}"
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return f"{where}: no space left; free some there or name another folder in YAWBENCH_CACHE"
+    return f"{where}: {error.strerror}; another folder can be named in YAWBENCH_CACHE"
 
 
 def platform() -> tuple[str, str]:
@@ -151,16 +125,27 @@ def _read_member(path: Path) -> bytes:
 
 def _load(entry: Path, path: Path) -> Fmu | None:
     """Return the FMU of a cache entry, None if there is none or it is damaged."""
+    record = whole_entry(entry)
+    if record is None:
+        return None
+    try:
+        fmu = fmu_description.from_record(record["fmu"], path=path, directory=entry / "fmu")
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return None
+    with contextlib.suppress(OSError):  # a cache that others keep up is none to be tidied from here
+        os.utime(entry)
+    return fmu
+
+
+def whole_entry(entry: Path) -> dict | None:
+    """Return the record of a cache entry all of whose files are as they were unpacked, else None."""
     try:
         record = json.loads((entry / "description.json").read_bytes())
-        for name, size in record["files"].items():
-            status = os.stat(entry / "fmu" / name)
-            if status.st_size != size or int(status.st_mtime) != _FILE_TIME:
-                return None
-        fmu = fmu_description.from_record(record["fmu"], path=path, directory=entry / "fmu")
-        with contextlib.suppress(OSError):  # a cache that others keep up is none to be tidied from here
-            os.utime(entry)
-        return fmu
+        for name, digest in record["files"].items():
+            with open(f"{entry}/fmu/{name}", "rb", buffering=0) as file:
+                if hashlib.sha256(file.read()).hexdigest() != digest:
+                    return None
+        return record
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
 
@@ -168,15 +153,7 @@ def _load(entry: Path, path: Path) -> Fmu | None:
 def _unpack(raw: bytes, entry: Path, path: Path) -> Fmu:
     files = _files(raw, path)
     fmu = fmu_description.describe(files, raw, path)
-    try:
-        _make_entry(files, fmu, entry)
-    except OSError as error:
-        where = f"{path}: cannot unpack this FMU into {entry.parent}"
-        if error.errno in (errno.ENOSPC, errno.EDQUOT):
-            reason = "no space left; free some there or name another folder in YAWBENCH_CACHE"
-        else:
-            reason = f"{error.strerror}; another folder can be named in YAWBENCH_CACHE"
-        raise ModelDescriptionError(f"{where}: {reason}") from None
+    _make_entry(files, fmu, entry)
     return replace(fmu, directory=entry / "fmu")
 
 
@@ -213,8 +190,8 @@ def _make_entry(files: dict[str, bytes], fmu: Fmu, entry: Path) -> None:
             target.write_bytes(content)
             target.chmod(0o755 if name.startswith("binaries/") else 0o644)
             os.utime(target, (_FILE_TIME, _FILE_TIME))
-        sizes = {name: len(content) for name, content in files.items()}
-        record = {"fmu": fmu_description.to_record(fmu), "files": sizes}
+        hashes = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
+        record = {"fmu": fmu_description.to_record(fmu), "files": hashes}
         (scratch / "description.json").write_text(json.dumps(record), encoding="utf-8")
         try:
             os.rename(scratch, entry)
@@ -236,6 +213,8 @@ def _repair(entry: Path, scratch: Path, files: Iterable[str]) -> None:
             shutil.rmtree(target)
         target.parent.mkdir(parents=True, exist_ok=True)
         os.replace(scratch / name, target)
+    for compiled in entry.rglob("__pycache__"):  # perhaps of a module as it was in between
+        shutil.rmtree(compiled, ignore_errors=True)
 
 
 def _prune(folder: Path) -> None:

@@ -14,9 +14,10 @@ from typing import Any
 
 import pytest
 
+from orchestrator.cache import cache_folder
 from orchestrator.errors import ModelDescriptionError
 from orchestrator.fmu import archive as fmu_archive
-from orchestrator.fmu.archive import cache_folder, open_fmu, platform
+from orchestrator.fmu.archive import open_fmu, platform
 
 from .fake_fmus import Var, make_fmu, model_description, out
 
@@ -95,7 +96,7 @@ def test_equal_content_shares_one_entry_under_its_own_name(fmu: Path, cache: Pat
     assert len(list(cache.iterdir())) == 1
 
 
-@pytest.mark.parametrize("harm", ["delete", "cut", "edit", "folder", "description"])
+@pytest.mark.parametrize("harm", ["delete", "cut", "edit", "edit in place", "folder", "description"])
 def test_a_damaged_cache_entry_is_put_right(fmu: Path, harm: str) -> None:
     opened = open_fmu(fmu)
     file = opened.directory / "resources/table.txt"
@@ -105,6 +106,10 @@ def test_a_damaged_cache_entry_is_put_right(fmu: Path, harm: str) -> None:
         file.write_bytes(b"1")
     elif harm == "edit":
         file.write_bytes(b"9 9 9")
+    elif harm == "edit in place":  # nothing but the content has changed
+        times = file.stat()
+        file.write_bytes(b"1 9 3")
+        os.utime(file, ns=(times.st_atime_ns, times.st_mtime_ns))
     elif harm == "folder":
         file.unlink()
         file.mkdir()
@@ -175,6 +180,7 @@ def test_a_temporary_cache_of_another_user_is_refused(
 ) -> None:
     monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "ä"))
     monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
+    monkeypatch.setenv("PUBLIC", str(tmp_path))
     owner = os.getuid()
     (tmp_path / f"yawbench-{owner + 1}").mkdir()
     monkeypatch.setattr("os.getuid", lambda: owner + 1)
@@ -310,11 +316,12 @@ def test_a_binary_of_another_name_is_said_with_the_name_that_is_expected(tmp_pat
 
 
 def test_a_full_disk_is_said_and_leaves_nothing_half_done(
-    fmu: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+    fmu: Path, cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def write_bytes(self: Path, content: bytes) -> int:
         raise OSError(errno.ENOSPC, "No space left on device")
 
+    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
     with monkeypatch.context() as patch:
         patch.setattr(Path, "write_bytes", write_bytes)
         assert problem(fmu) == (
@@ -325,8 +332,12 @@ def test_a_full_disk_is_said_and_leaves_nothing_half_done(
     assert open_fmu(fmu).name == "tyre_a"
 
 
-def test_a_cache_that_cannot_be_written_is_said(fmu: Path, tmp_path: Path, cache: Path) -> None:
+def test_a_cache_that_cannot_be_written_is_said_if_there_is_no_other(
+    fmu: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     cache.write_text("a file in its place")
+    monkeypatch.setattr("tempfile.gettempdir", lambda: "/ü")
+    monkeypatch.setenv("PUBLIC", "/ö")
     assert problem(fmu) == (
         f"{fmu}: cannot unpack this FMU into {cache}: File exists; "
         "another folder can be named in YAWBENCH_CACHE"

@@ -1,0 +1,149 @@
+"""What this program keeps because it is costly to make again: in the user's cache, or a temporary folder.
+
+    <32 digits>-<n>/    FMUs, unpacked (see `fmu.archive`)
+    <store>/            small files that say themselves whether they are whole: <key>-<hash>
+
+Nobody has to look after it. Nothing in it is believed unseen: a file that was cut off or changed is
+made anew. Where the user's folder cannot be written (a container, another user's home), or its path
+is not plain ASCII, a temporary folder serves. The path must be plain because stock PythonFMU decodes
+nothing but `%20` in the address of its resources.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import re
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from .errors import ModelDescriptionError
+
+_PLAIN_PATH = re.compile(r"[A-Za-z0-9_.~/\\: -]+")
+_DIGITS = 32
+"""Of a hash in the name of a kept file."""
+
+
+def cache_folders() -> Iterator[Path]:
+    """Yield the folders to keep things in, best first: YAWBENCH_CACHE or the user's cache, a temporary one.
+
+    Raises:
+        ModelDescriptionError: there is none.
+    """
+    from platformdirs import user_cache_path
+
+    chosen = os.environ.get("YAWBENCH_CACHE")
+    wanted = Path(chosen).absolute() if chosen else user_cache_path("yawbench")
+    problems = []
+    not_plain = (
+        f"{wanted}: FMUs cannot be unpacked here: the path holds more than ASCII letters, digits, "
+        "spaces and ._~-; name another folder in YAWBENCH_CACHE"
+    )
+    found = wanted.is_absolute() and bool(_PLAIN_PATH.fullmatch(str(wanted)))  # "~" if there is no home
+    if found:
+        yield wanted
+    user = os.getuid() if hasattr(os, "getuid") else os.environ.get("USERNAME", "user").encode().hex()
+    for base in dict.fromkeys((_temporary(), os.environ.get("PUBLIC", "/tmp"))):
+        if _PLAIN_PATH.fullmatch(base):
+            try:
+                yield _private(Path(base) / f"yawbench-{user}")
+                found = True
+            except OSError as error:
+                problems.append(f"{base}: FMUs cannot be unpacked here: {error.strerror}")
+            except ModelDescriptionError as error:
+                problems += error.problems
+    if not found:
+        raise ModelDescriptionError([*problems, not_plain][0])
+
+
+def cache_folder() -> Path:
+    """Return the best of `cache_folders`."""
+    return next(cache_folders())
+
+
+def _temporary() -> str:
+    try:
+        return tempfile.gettempdir()
+    except FileNotFoundError:  # no folder that can be written
+        return ""
+
+
+def _private(folder: Path) -> Path:
+    """Make a folder that others could have made first; refuse it if they have."""
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    if hasattr(os, "getuid") and folder.lstat().st_uid != os.getuid():
+        raise ModelDescriptionError(
+            f"{folder}: FMUs cannot be unpacked here: the folder belongs to another user; "
+            "name another one in YAWBENCH_CACHE"
+        )
+    return folder
+
+
+def recall(store: str, key: str) -> bytes | None:
+    """Return what was kept under `key`, None if nothing was or it is not whole."""
+    with contextlib.suppress(ModelDescriptionError):
+        for folder in cache_folders():
+            for file in folder.glob(f"{store}/{key}-*"):
+                with contextlib.suppress(OSError):
+                    content = file.read_bytes()
+                    if is_whole(file, content):
+                        return content
+    return None
+
+
+def keep(store: str, key: str, content: bytes) -> None:
+    """Keep `content` under `key` in place of what was kept there, in the first folder that takes it.
+
+    Where none does, nothing is kept: whatever it is will be made again.
+    """
+    with contextlib.suppress(ModelDescriptionError):
+        for folder in cache_folders():
+            file = folder / store / f"{key}-{_hash(content)}"
+            try:
+                file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+                write_durably(file, content)
+            except OSError:
+                continue
+            for other in file.parent.glob(f"{key}-*"):
+                if other != file:
+                    other.unlink(missing_ok=True)
+            return
+
+
+def is_whole(file: Path, content: bytes) -> bool:
+    """Return whether a kept file's content is that which its name speaks of."""
+    return file.name.rpartition("-")[2] == _hash(content)
+
+
+def _hash(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:_DIGITS]
+
+
+def write_durably(file: Path, content: bytes) -> None:
+    """Write a file that appears under its name complete, or not at all, also if the computer stops.
+
+    Raises:
+        OSError: it cannot be written; what stood there stands.
+    """
+    with draft_of(file, content) as draft:
+        os.replace(draft, file)
+
+
+@contextlib.contextmanager
+def draft_of(file: Path, content: bytes) -> Iterator[Path]:
+    """Write `content` beside `file`, for whoever looks at it before it is put in its place."""
+    with tempfile.NamedTemporaryFile(dir=file.parent, prefix=".", suffix=".draft", delete=False) as draft:
+        path = Path(draft.name)
+        try:
+            draft.write(content)
+            draft.flush()
+            os.fsync(draft.fileno())
+        except OSError:
+            path.unlink(missing_ok=True)
+            raise
+    try:
+        yield path
+    finally:
+        path.unlink(missing_ok=True)
