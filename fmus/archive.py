@@ -15,8 +15,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from xml.etree import ElementTree
 
+from .mark import Mark
+
 _DATE = (1980, 1, 1, 0, 0, 0)
-_MARK = b"yawbench "
 PYTHONFMU_LIBRARY = "libpythonfmu-export.so"
 """Name of PythonFMU's library beside the launcher; the launcher opens it by this name."""
 
@@ -55,8 +56,8 @@ def _description(files: Mapping[str, bytes], version: str) -> bytes:
     return ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
 
 
-def to_bytes(files: Mapping[str, bytes], mark: str) -> bytes:
-    """Return the archive of `files`; `mark` says in its comment what it was built from."""
+def to_bytes(files: Mapping[str, bytes], mark: Mark) -> bytes:
+    """Return the archive of `files`; its comment is the mark."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
         for path, data in sorted(files.items()):
@@ -64,15 +65,5 @@ def to_bytes(files: Mapping[str, bytes], mark: str) -> bytes:
             info.create_system = 3  # Unix, also when built elsewhere
             info.external_attr = 0o100644 << 16
             archive.writestr(info, data)
-        archive.comment = _MARK + mark.encode()
+        archive.comment = mark.to_comment()
     return buffer.getvalue()
-
-
-def read_mark(fmu: Path) -> str | None:
-    """Return what `to_bytes` noted in an FMU, None for any other file."""
-    try:
-        with zipfile.ZipFile(fmu) as archive:
-            comment = archive.comment
-    except (OSError, zipfile.BadZipFile):
-        return None
-    return comment[len(_MARK) :].decode(errors="replace") if comment.startswith(_MARK) else None

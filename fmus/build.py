@@ -1,33 +1,33 @@
 """Make components into FMUs: find what has changed, build it, check it, put it in place.
 
-    build_all(out)                       every component of the project
-    build_component(file, out, ...)      one file from anywhere, or one with other default values
+    build_all(out)                       every component of the project, in Python or in C
+    build_component(source, out, ...)    one from anywhere, or one with other default values
 
 An FMU is current if it was built from the same sources, by the same builder, with the same
-launcher; a key of all these stands in its archive's comment. An FMU whose component can no longer
-be built, or no longer exists, is removed, so that nobody runs yesterday's model by mistake.
+launcher; a key of all these stands in its archive's mark. What cannot be built keeps the FMU that
+it has; who runs scenarios does not use it (see `upkeep`).
 """
 
 from __future__ import annotations
 
-import contextlib
-import hashlib
-import json
 import os
-import tempfile
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
-from functools import cache
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from components.fmi.roles import ROLES
+from orchestrator.cache import draft_of
 from orchestrator.errors import BuildError
 
-from .archive import pack, read_mark, to_bytes
+from .archive import to_bytes
+from .c.recipe import CRecipe, find_c_components
+from .check import defects
 from .closure import Parts, Sources
 from .compiler import compile_launcher
-from .staging import PYTHONFMU, missing_signals, staged, variant
+from .mark import Mark, read_mark
+from .recipe import PythonRecipe, Recipe, natural_name
+from .staging import PYTHONFMU
 
 HERE = Path(__file__).resolve().parent
 COMPONENTS = HERE.parent / "components"
@@ -43,26 +43,11 @@ class Report:
     built: list[str] = field(default_factory=list)
     current: list[str] = field(default_factory=list)
     removed: list[str] = field(default_factory=list)
-    warning: str = ""  # why the FMUs have no launcher, if they have none
-
-
-@dataclass(frozen=True)
-class _Recipe:
-    """One FMU to be built."""
-
-    name: str
-    module: Parts
-    sources: Sources
-    defaults: Mapping[str, Any]
-    kind: str  # "component", or "file": one that is not removed with the others
-
-    @property
-    def is_variant(self) -> bool:
-        return bool(self.defaults) or self.name != natural_name(self.module)
+    warning: str = ""  # why FMUs that were built have no launcher, if they have none
 
 
 def find_components(root: Path = COMPONENTS) -> dict[str, Parts]:
-    """Return name of FMU -> module of every component below `root`."""
+    """Return name of FMU -> module of every component in Python below `root`."""
     found: dict[str, Parts] = {}
     for folder in sorted(root.iterdir()):
         if folder.is_dir() and folder.name in ROLES:
@@ -71,6 +56,13 @@ def find_components(root: Path = COMPONENTS) -> dict[str, Parts]:
                     module = (folder.name, file.stem)
                     found[natural_name(module)] = module
     return found
+
+
+def find_recipes(root: Path = COMPONENTS) -> dict[str, Recipe]:
+    """Return name of FMU -> recipe of every component below `root`."""
+    sources = Sources(root, pythonfmu=PYTHONFMU)
+    in_python = {name: PythonRecipe(name, module, sources) for name, module in find_components(root).items()}
+    return in_python | {name: CRecipe(folder) for name, folder in find_c_components(root).items()}
 
 
 def build_all(
@@ -83,45 +75,50 @@ def build_all(
 ) -> Report:
     """Build the components that have changed into `out`, all or those named (names of FMUs).
 
+    If all could be built, FMUs of components that are gone are removed.
+
     Raises:
         BuildError: with one sentence or more per component that cannot be built; all others are.
     """
-    known = find_components(root)
+    known = find_recipes(root)
     chosen = list(known) if components is None else list(dict.fromkeys(components))
     unknown = [name for name in chosen if name not in known]
     if unknown:
         raise BuildError(f"there is no component {name!r}; there are: {', '.join(known)}" for name in unknown)
     problems: list[str] = []
-    sources = Sources(root, pythonfmu=PYTHONFMU)
-    launcher, warning = compile_launcher()
-    report = Report(warning=warning)
+    report = Report()
     tell = progress or (lambda name, what: None)
     for name in chosen:
-        recipe = _Recipe(name, known[name], sources, {}, "component")
         try:
-            made = _bring_up_to_date(recipe, out / f"{name}.fmu", launcher, force)
-        except BuildError as error:
+            mark = component_mark(known[name], root)
+            made = bring_up_to_date(known[name], out / f"{name}.fmu", mark, force)
+        except BuildError as error:  # noqa: PERF203 - all problems are collected
             problems += error.problems
-            if (read_mark(out / f"{name}.fmu") or "").startswith("component "):
-                with contextlib.suppress(OSError):  # a folder that cannot be written is the problem told
-                    (out / f"{name}.fmu").unlink()
             tell(name, "failed")
         else:
             (report.built if made else report.current).append(name)
             tell(name, "built" if made else "current")
+    if problems:
+        raise BuildError(problems)
+    if any(isinstance(known[name], PythonRecipe) for name in report.built):
+        report.warning = compile_launcher()[1]
     if components is None and out.is_dir():
         for fmu in sorted(out.glob("*.fmu")):
-            if fmu.stem not in known and (read_mark(fmu) or "").startswith("component "):
+            found = read_mark(fmu)
+            if fmu.stem not in known and found is not None and found.is_component:
                 fmu.unlink()
                 report.removed.append(fmu.stem)
                 tell(fmu.stem, "removed")
-    if problems:
-        raise BuildError(problems)
     return report
 
 
+def component_mark(recipe: Recipe, root: Path = COMPONENTS) -> Mark:
+    """Return the mark of a component of the project, still without its key."""
+    return Mark(recipe.name, "", f"components/{recipe.source.relative_to(root).as_posix()}")
+
+
 def build_component(
-    file: Path,
+    source: Path,
     out: Path,
     *,
     role: str | None = None,
@@ -130,109 +127,86 @@ def build_component(
     force: bool = False,
     root: Path = COMPONENTS,
 ) -> Path:
-    """Build the component in `file` into `out` and return the FMU.
+    """Build one component into `out` and return the FMU.
 
     Args:
-        file: inside `root`, or anywhere: then it imports the project's modules as
-            `components.<...>` and its own neighbours as `.<neighbour>`.
-        role: folder of a role, such as "controllers"; if left out, the file's folder says it, or
+        source: a Python file, inside `root` or anywhere: then it imports the project's modules as
+            `components.<...>` and its own neighbours as `.<neighbour>`; or the folder of a unit
+            in C.
+        role: folder of a role, such as "controllers"; if left out, the source's folder says it, or
             the file's name ("controller_idea.py").
         name: of the FMU; default `<role>_<file>`.
         defaults: other default values of parameters.
+        root: the folder `components`.
     """
-    file = file.resolve()
-    if not file.is_file():
-        raise BuildError(f"{file}: there is no such file")
-    stem = file.stem
-    if role is None and file.parent.name in ROLES:
-        role = file.parent.name
+    source = source.resolve()
+    recipe = recipe_of(source, role=role, name=name, defaults=defaults, root=root)
+    target = out.absolute() / f"{recipe.name}.fmu"
+    mark = Mark(
+        recipe.name,
+        key="",
+        source=Path(os.path.relpath(source, target.parent.resolve())).as_posix(),
+        home=target.parent.name,
+        role=recipe.module[0] if isinstance(recipe, PythonRecipe) else "",
+        defaults=dict(defaults or {}),
+    )
+    bring_up_to_date(recipe, target, mark, force)
+    return target
+
+
+def recipe_of(
+    source: Path,
+    *,
+    role: str | None = None,
+    name: str | None = None,
+    defaults: Mapping[str, Any] | None = None,
+    root: Path = COMPONENTS,
+) -> Recipe:
+    """Return the recipe of one source (see `build_component`).
+
+    Raises:
+        BuildError: no such file, no role, or a name that is none.
+    """
+    if source.is_dir():
+        return CRecipe(source)
+    if not source.is_file():
+        raise BuildError(f"{source}: there is no such file")
+    stem = source.stem
+    if role is None and source.parent.name in ROLES:
+        role = source.parent.name
     for folder, other in ROLES.items():
         if role in (None, folder) and stem.startswith(other.name + "_"):
             role, stem = folder, stem[len(other.name) + 1 :]
             break
     if role not in ROLES:
-        raise BuildError(f"{file}: which role? Put it into a folder called one of: {', '.join(ROLES)}")
-    elsewhere = {} if file.is_relative_to(root) else {role: file.parent}
+        raise BuildError(f"{source}: which role? Put it into a folder called one of: {', '.join(ROLES)}")
+    elsewhere = {} if source.is_relative_to(root) else {role: source.parent}
     sources = Sources(root, pythonfmu=PYTHONFMU, elsewhere=elsewhere)
-    natural = natural_name((role, stem))
-    recipe = _Recipe(name or natural, (role, file.stem), sources, dict(defaults or {}), "file")
+    recipe = PythonRecipe(
+        name or natural_name((role, stem)), (role, source.stem), sources, dict(defaults or {})
+    )
     if not recipe.name.isidentifier() or not recipe.name.isascii():
         raise BuildError(f"{recipe.name}: the name of an FMU is made of letters, digits and _")
-    target = out / f"{recipe.name}.fmu"
-    launcher, _ = compile_launcher()
-    _bring_up_to_date(recipe, target, launcher, force)
-    return target
+    return recipe
 
 
-def natural_name(module: Parts) -> str:
-    """Return the name of the FMU that a module becomes: `<role>_<file>`."""
-    return f"{ROLES[module[0]].name}_{module[-1]}"
-
-
-def _bring_up_to_date(recipe: _Recipe, target: Path, launcher: bytes | None, force: bool) -> bool:
-    """Build an FMU unless it is current; return whether it was built.
+def bring_up_to_date(recipe: Recipe, target: Path, mark: Mark, force: bool = False) -> bool:
+    """Build an FMU unless it is current; return whether it was built. `mark` is still without its key.
 
     Raises:
         BuildError: each problem begins with the FMU's name.
     """
     try:
-        files = recipe.sources.closure(recipe.module)
-        mark = f"{recipe.kind} {_key(recipe, files, launcher)}"
+        mark = replace(mark, key=recipe.key())
         if not force and read_mark(target) == mark:
             return False
-        content, modules = _make(recipe, files, launcher, mark)
-        put(target, content, *modules)
+        files, modules = recipe.make()
+        put(target, to_bytes(files, mark), *modules)
     except BuildError as error:
         raise BuildError([f"{recipe.name}: {problem}" for problem in error.problems]) from None
     except OSError as error:
-        raise BuildError(f"{recipe.name}: cannot be written: {error}") from None
+        raise BuildError(f"{recipe.name}: cannot be read or written: {error}") from None
     return True
-
-
-def _key(recipe: _Recipe, files: Mapping[str, str], launcher: bytes | None) -> str:
-    """Return a hash of all that decides what the FMU's bytes are."""
-    parts = [recipe.name, ".".join(recipe.module), json.dumps(dict(recipe.defaults)), _builder()]
-    parts += [hashlib.sha256(launcher or b"").hexdigest(), _hash(files)]
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
-
-
-@cache
-def _builder() -> str:
-    """Return a hash of this builder and of what it takes from PythonFMU."""
-    content = hashlib.sha256()
-    theirs = [*sorted(PYTHONFMU.glob("resources/binaries/*/*")), PYTHONFMU / "builder.py"]
-    for file in [*sorted(HERE.glob("*.py")), *theirs]:
-        content.update(file.read_bytes())
-    return content.hexdigest()
-
-
-def _hash(files: Mapping[str, str]) -> str:
-    content = hashlib.sha256()
-    for path, text in sorted(files.items()):
-        content.update(f"{path}\0{len(text)}\0{text}".encode())
-    return content.hexdigest()
-
-
-def _make(
-    recipe: _Recipe, files: dict[str, str], launcher: bytes | None, mark: str
-) -> tuple[bytes, tuple[str, str]]:
-    """Return the archive of an FMU and the names of its package and its entry module."""
-    module = recipe.module
-    if recipe.is_variant:
-        with staged(files, "yawbench_variant", "yawbench_variant_entry") as stage:
-            text = variant(stage.component(module), recipe.name, recipe.defaults)
-        module = (*module[:-1], f"{module[-1]}_variant")
-        files = files | {"/".join(module) + ".py": text}
-    version = _hash(files)[:12]
-    package, entry = f"yawbench_{version}", f"{recipe.name}_{version}"
-    with staged(files, package, entry) as stage:
-        component = stage.component(module)
-        problems = missing_signals(ROLES[module[0]], component.variables)
-        if problems:
-            raise BuildError(problems)
-        built = stage.build(recipe.name, component)
-        packed = pack(built, name=recipe.name, version=version, launcher=launcher)
-    return to_bytes(packed, mark), (package, entry)
 
 
 def put(target: Path, content: bytes, *modules: str) -> None:
@@ -241,16 +215,10 @@ def put(target: Path, content: bytes, *modules: str) -> None:
     Raises:
         BuildError: what is wrong with it; the place is left as it was.
     """
-    from .check import defects  # fmpy takes its time; nobody waits for it if everything is current
-
     target.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile(dir=target.parent, prefix=".", suffix=".draft", delete=False) as draft:
-        draft.write(content)
-    try:
-        problems = defects(Path(draft.name), *modules)
+    with draft_of(target, content) as draft:
+        problems = defects(draft, *modules)
         if problems:
             raise BuildError(problems)
-        os.chmod(draft.name, 0o644)
-        os.replace(draft.name, target)
-    finally:
-        Path(draft.name).unlink(missing_ok=True)
+        draft.chmod(0o644)
+        os.replace(draft, target)

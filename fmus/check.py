@@ -1,18 +1,24 @@
-"""Is an FMU that has just been built right: its model description, and does it load?"""
+"""Is an FMU that has just been built right: its model description, and does it load?
+
+It is loaded in a process of its own, one for all FMUs of a build: an FMU may end its process, and
+what it leaves behind in one is nobody's concern.
+"""
 
 from __future__ import annotations
 
+import atexit
+import json
+import os
+import signal
+import subprocess
+import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
-import fmpy
-from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
-from fmpy.model_description import ModelDescription
-from fmpy.validation import validate_fmu
-
-from .staging import apart
+_PROGRAM = "import sys; sys.path[:] = sys.argv[1].split('\\n'); from fmus.check import serve; serve()"
+_checker: subprocess.Popen | None = None
 
 
 def defects(fmu: Path, *modules: str) -> list[str]:
@@ -21,16 +27,59 @@ def defects(fmu: Path, *modules: str) -> list[str]:
     It is validated, loaded once, and its parameters must have the values that its model
     description says.
     """
-    found = [f"model description: {problem}" for problem in validate_fmu(str(fmu))]
-    if found or fmpy.platform not in fmpy.supported_platforms(str(fmu)):
+    global _checker
+    if _checker is None or _checker.poll() is not None:
+        command = [sys.executable, "-c", _PROGRAM, "\n".join(sys.path)]
+        _checker = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        atexit.register(_end, _checker)
+    try:
+        print(json.dumps([str(fmu), *modules]), file=_checker.stdin, flush=True)
+        answer = _checker.stdout.readline()  # type: ignore[union-attr]
+    except BrokenPipeError:
+        answer = ""
+    return json.loads(answer) if answer else [f"does not load: {_death(_checker.wait())}"]
+
+
+def _end(checker: subprocess.Popen) -> None:
+    checker.kill()
+    checker.communicate()
+
+
+def _death(code: int) -> str:
+    if code >= 0:
+        return f"it ended its process with exit status {code}"
+    try:
+        return f"its process died of {signal.Signals(-code).name}"
+    except ValueError:
+        return f"its process died of signal {-code}"
+
+
+def serve() -> None:
+    """Answer requests until there is nobody to ask; what FMUs print goes to stderr."""
+    answers: IO[str] = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    for line in sys.stdin:
+        print(json.dumps(_defects(*json.loads(line))), file=answers, flush=True)
+
+
+def _defects(fmu: str, *modules: str) -> list[str]:
+    import fmpy
+    from fmpy.validation import validate_fmu
+
+    from .staging import apart
+
+    found = [f"model description: {problem}" for problem in validate_fmu(fmu)]
+    if found or fmpy.platform not in fmpy.supported_platforms(fmu):
         return found
-    description = fmpy.read_model_description(str(fmu))
+    description = fmpy.read_model_description(fmu)
     with tempfile.TemporaryDirectory(prefix="yawbench_") as folder, apart(*modules):
-        fmpy.extract(str(fmu), folder)
+        fmpy.extract(fmu, folder)
         return _load(description, folder)
 
 
-def _load(description: ModelDescription, folder: str) -> list[str]:
+def _load(description: Any, folder: str) -> list[str]:
+    from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+
     messages: list[str] = []
 
     def log(environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:

@@ -19,6 +19,8 @@ from pathlib import Path
 
 from orchestrator.errors import BuildError
 
+from .evidence import Looks, content_digest
+
 Parts = tuple[str, ...]
 """A module's dotted name inside the package, split: ("controllers", "fnn")."""
 
@@ -29,6 +31,8 @@ class _Module:
 
     text: str
     imports: tuple[tuple[Parts, str], ...]  # and where: file:line
+    file: Path | None = None
+    digest: str = ""  # of the file's content
 
 
 class Sources:
@@ -44,6 +48,7 @@ class Sources:
         self.root = root
         self.pythonfmu = pythonfmu
         self.elsewhere = dict(elsewhere or {})
+        self.evidence: dict[Parts, dict[str, str]] = {}  # of a closure that has been found: see `evidence`
         self._modules: dict[Parts, _Module | None] = {}
 
     def closure(self, module: Parts) -> dict[str, str]:
@@ -53,6 +58,8 @@ class Sources:
             BuildError: a file that is missing, cannot be parsed or imports what no FMU may.
         """
         files: dict[str, str] = {}
+        evidence: dict[str, str] = {}
+        folders: set[Path] = set()
         waiting = [(module, "")]
         seen: set[Parts] = set()
         while waiting:
@@ -66,9 +73,13 @@ class Sources:
                     f"{where}there is no module {'.'.join(parts)} in {self.root}{self._namesake(parts)}"
                 )
             waiting += [(parts[:i], where) for i in range(len(parts))]  # the packages above it
-            is_package = self._file(parts).name == "__init__.py"
+            is_package = self.file(parts).name == "__init__.py"
             files["/".join((*parts, "__init__") if is_package else parts) + ".py"] = found.text
             waiting += found.imports
+            if found.file is not None:
+                evidence[str(found.file)] = found.digest
+                folders.add(found.file.parent)  # a new file in it can come before one that is known
+        self.evidence[module] = evidence | Looks().evidence(sorted(folders))
         return dict(sorted(files.items()))
 
     def _namesake(self, parts: Parts) -> str:
@@ -76,7 +87,7 @@ class Sources:
         found = [file.relative_to(self.root).with_suffix("") for file in self.root.glob(f"*/{parts[-1]}.py")]
         return "".join(f"; did you mean components.{'.'.join(file.parts)}?" for file in found[:1])
 
-    def _file(self, parts: Parts) -> Path:
+    def file(self, parts: Parts) -> Path:
         """Return the file of a module or package, whether or not it exists."""
         if parts[:1] == ("pythonfmu",):
             return _module_file(self.pythonfmu, parts[1:])
@@ -89,7 +100,7 @@ class Sources:
     def _module(self, parts: Parts) -> _Module | None:
         """Return a module of the package, None if there is none."""
         if parts not in self._modules:
-            file = self._file(parts)
+            file = self.file(parts)
             found = None
             if parts == ("pythonfmu",):
                 found = _Module(_PYTHONFMU, ())
@@ -103,7 +114,8 @@ class Sources:
     def _parse(self, file: Path, parts: Parts) -> _Module:
         name = _shown(file)
         try:
-            text = file.read_text("utf-8").replace("\r\n", "\n")
+            content = file.read_bytes()
+            text = content.decode("utf-8").replace("\r\n", "\n")
             tree = ast.parse(text)
         except SyntaxError as error:
             raise BuildError(f"{name}:{error.lineno}: {type(error).__name__}: {error.msg}") from None
@@ -123,9 +135,9 @@ class Sources:
                 continue
             if node.level == 0:
                 _make_relative(lines, node, levels=len(package) + 1)
-            modules = [base] + [(*base, a.name) for a in node.names if self._file((*base, a.name)).exists()]
+            modules = [base] + [(*base, a.name) for a in node.names if self.file((*base, a.name)).exists()]
             imports += [(module, f"{where}: ") for module in modules]
-        return _Module("\n".join(lines), tuple(imports))
+        return _Module("\n".join(lines), tuple(imports), file, content_digest(content))
 
     def _base(self, node: ast.ImportFrom, package: Parts, where: str) -> Parts | None:
         """Return the module of the package that a `from` imports from, None for the standard library."""

@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from functools import cache
 from pathlib import Path
 
 from orchestrator.cache import keep, recall
@@ -22,15 +23,28 @@ STORE = "launcher"
 """Of compiled launchers in the cache."""
 
 
+def compiler_command() -> list[str]:
+    """Return how the C compiler is called: `cc`, or what `CC` names."""
+    return shlex.split(os.environ.get("CC", "")) or ["cc"]
+
+
+def compiler_tools() -> tuple[str, str]:
+    """Return what decides which compiler that is and what it does (see `evidence`)."""
+    return "env:CC", f"tool:{compiler_command()[0]}"
+
+
 def compile_launcher() -> tuple[bytes | None, str]:
     """Return the launcher for this machine, or None with the reason why there is none.
 
     The same sources and the same compiler give the same bytes; another compiler may give others.
-    `CC` names a compiler other than `cc`.
     """
+    return _launcher(tuple(compiler_command()))
+
+
+@cache
+def _launcher(command: tuple[str, ...]) -> tuple[bytes | None, str]:
     if sys.platform != "linux" or platform.machine() != "x86_64":
         return None, f"it is for Linux on x86-64, this is {platform.system()} on {platform.machine()}"
-    command = shlex.split(os.environ.get("CC", "")) or ["cc"]
     compiler = shutil.which(command[0])
     if compiler is None:
         return None, f"there is no C compiler ({command[0]})"

@@ -8,8 +8,6 @@ from typing import Annotated
 
 import typer
 
-from ..errors import BuildError
-
 Components = Annotated[
     list[str] | None,
     typer.Argument(
@@ -27,42 +25,28 @@ Force = Annotated[bool, typer.Option("--force", help="Build also what has not ch
 
 def build(components: Components = None, out: Target = None, force: Force = False) -> None:
     """Build the FMUs whose sources have changed."""
-    from fmus.build import HERE, build_all, build_component, find_components
-    from fmus.c.build import build_all_c, build_c, find_c_components
+    from fmus.build import HERE, build_all, build_component, find_recipes
 
     target = out or HERE
-    in_python, in_c = find_components(), find_c_components()
+    known = find_recipes()
     named = list(components or ())
-    names = [name for name in named if name in in_python or name in in_c]
     for name in named:
-        if name in names:
+        if name in known:
             continue
         if not name.endswith(".py") and not Path(name).is_dir():
-            known = ", ".join(sorted([*in_python, *in_c]))
-            raise typer.BadParameter(f"there is no component {name!r}; there are: {known}")
-        fmu = (build_component if name.endswith(".py") else build_c)(Path(name), target, force=force)
+            raise typer.BadParameter(f"there is no component {name!r}; there are: {', '.join(sorted(known))}")
+        fmu = build_component(Path(name), target, force=force)
         print(f"{fmu.stem}: built from {name}", file=sys.stderr)
+    names = [name for name in named if name in known]
     if named and not names:
         return
-    problems: list[str] = []
-    built = current = 0
-    for every, known_to_it in ((build_all, in_python), (build_all_c, in_c)):
-        chosen = [name for name in names if name in known_to_it] if names else None
-        if chosen == []:
-            continue
-        try:
-            report = every(target, components=chosen, force=force, progress=_show)
-        except BuildError as error:
-            problems += error.problems
-            continue
-        built, current = built + len(report.built), current + len(report.current)
-        if report.warning and report.built:
-            why = f"these FMUs load in Python only, they have no launcher: {report.warning}"
-            print(f"warning: {why}", file=sys.stderr)
-    if problems:
-        raise BuildError(problems)
-    if current:
-        print(f"{current} of {built + current} FMUs up to date", file=sys.stderr)
+    report = build_all(target, components=names or None, force=force, progress=_show)
+    if report.warning:
+        why = f"these FMUs load in Python only, they have no launcher: {report.warning}"
+        print(f"warning: {why}", file=sys.stderr)
+    if report.current:
+        total = len(report.built) + len(report.current)
+        print(f"{len(report.current)} of {total} FMUs up to date", file=sys.stderr)
 
 
 def _show(name: str, what: str) -> None:

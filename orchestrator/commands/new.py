@@ -50,14 +50,13 @@ def new(kind: What, name: Name, language: Written = Language.python, out: Projec
     `yawbench build` finds them; elsewhere in folders controllers, tests and scenarios. Nothing is
     ever overwritten.
     """
-    from fmus.build import COMPONENTS, find_components
-    from fmus.c.build import find_c_components
+    from fmus.build import COMPONENTS, find_recipes
 
     from ..scaffold.controller import controller_files, layout, write_new
     from ..scaffold.names import check_name
     from .batch import say
 
-    check_name(name, role=kind.value, taken={*find_components(), *find_c_components()})
+    check_name(name, role=kind.value, taken=set(find_recipes()))
     root = COMPONENTS.parent
     checkout = root if (root / "scenarios").is_dir() else None  # None: installed without them
     here = checkout is not None and Path.cwd().resolve().is_relative_to(checkout)

@@ -12,9 +12,12 @@ import pytest
 from fmpy.validation import validate_fmu
 
 from components.fmi.roles import ROLES
-from fmus.build import COMPONENTS, build_all, build_component, find_components
+from fmus import compiler
+from fmus.archive import to_bytes
+from fmus.build import COMPONENTS, build_all, build_component, find_components, put
 from fmus.build import HERE as FMUS
 from fmus.compiler import compile_launcher
+from fmus.mark import read_mark
 from orchestrator.errors import BuildError
 
 NAMES = list(find_components())
@@ -104,11 +107,44 @@ def test_the_same_sources_give_the_same_bytes_in_another_process(tmp_path):
         assert (tmp_path / "1" / f"{name}.fmu").read_bytes() == (tmp_path / "2" / f"{name}.fmu").read_bytes()
 
 
-def test_the_launcher_compiles_to_the_same_bytes_again(tmp_path):
-    first, second = compile_launcher(tmp_path / "a")[0], compile_launcher(tmp_path / "b")[0]
-    assert first is not None
-    assert first == second
-    assert len(list(tmp_path.glob("a/*.so"))) == 1
+def test_the_launcher_compiles_to_the_same_bytes_again(tmp_path, monkeypatch):
+    made = []
+    for cache in ("a", "b"):
+        monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / cache))
+        compiler._launcher.cache_clear()
+        made.append(compile_launcher()[0])
+        assert len(list(tmp_path.glob(f"{cache}/launcher/*"))) == 1
+    assert made[0] is not None
+    assert made[0] == made[1]
+
+
+@pytest.mark.parametrize("harm", [lambda c: c[: len(c) // 2], lambda c: b"", lambda c: c[:-1] + b"x"])
+def test_a_damaged_launcher_in_the_cache_is_compiled_anew(harm, tmp_path, monkeypatch):
+    """Believed, it would end the build with SIGBUS, or have every FMU fail."""
+    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path))
+    compiler._launcher.cache_clear()
+    good = compile_launcher()[0]
+    (kept,) = tmp_path.glob("launcher/*")
+    kept.write_bytes(harm(good))
+    compiler._launcher.cache_clear()
+    assert compile_launcher()[0] == good
+    assert kept.read_bytes() == good
+
+
+def test_an_fmu_whose_binary_ends_the_process_is_refused_in_one_sentence(checkout, tmp_path):
+    build_all(tmp_path, components=["controller_off"], root=checkout)
+    target = tmp_path / "controller_off.fmu"
+    good = target.read_bytes()
+    with zipfile.ZipFile(target) as fmu:
+        files = {name: fmu.read(name) for name in fmu.namelist()}
+    binary = "binaries/linux64/controller_off.so"
+    spoilt = files | {binary: files[binary][: len(files[binary]) // 2]}
+    for _ in range(2):  # what looks at FMUs is there again for the next
+        with pytest.raises(BuildError, match="does not load: its process died of SIGBUS"):
+            put(target, to_bytes(spoilt, read_mark(target)))
+    assert target.read_bytes() == good
+    put(target, to_bytes(files, read_mark(target)))
+    assert [file.name for file in tmp_path.iterdir() if file.suffix != ".fmu"] == ["another checkout"]
 
 
 def test_the_launcher_compiles_without_a_warning():
@@ -177,9 +213,10 @@ def test_fmus_of_components_that_are_gone_are_removed_and_no_others(checkout, tm
     }  # fmt: skip
 
 
-def test_a_component_that_no_longer_builds_loses_its_fmu_and_the_others_are_built(checkout, tmp_path):
+def test_a_component_that_no_longer_builds_keeps_its_fmu_and_the_others_are_built(checkout, tmp_path):
     out = tmp_path / "out"
     build_all(out, root=checkout)
+    good = (out / "driver_sine.fmu").read_bytes()
     touch(checkout, "drivers/sine.py", "\n1 +\n")
     touch(checkout, "tyres/linear.py")
     seen = []
@@ -188,7 +225,11 @@ def test_a_component_that_no_longer_builds_loses_its_fmu_and_the_others_are_buil
     lines = len((checkout / "drivers" / "sine.py").read_text("utf-8").splitlines())
     assert caught.value.problems == [f"driver_sine: drivers/sine.py:{lines}: SyntaxError: invalid syntax"]
     assert seen == [("controller_off", "current"), ("driver_sine", "failed"), ("tyre_linear", "built")]
-    assert not (out / "driver_sine.fmu").exists()
+    assert (out / "driver_sine.fmu").read_bytes() == good
+    (checkout / "controllers" / "off.py").unlink()
+    with pytest.raises(BuildError):
+        build_all(out, root=checkout)
+    assert (out / "controller_off.fmu").exists()
 
 
 def test_an_unknown_component_is_an_error_that_lists_the_known_ones(checkout, tmp_path):
@@ -198,7 +239,7 @@ def test_an_unknown_component_is_an_error_that_lists_the_known_ones(checkout, tm
 
 def test_a_folder_that_cannot_be_written_is_an_error(checkout, tmp_path):
     (tmp_path / "out").write_text("a file in the way")
-    with pytest.raises(BuildError, match="controller_off: cannot be written"):
+    with pytest.raises(BuildError, match="controller_off: cannot be read or written"):
         build_all(tmp_path / "out", root=checkout)
 
 
@@ -218,7 +259,7 @@ def test_without_a_compiler_the_stock_library_is_used_and_the_reason_given(check
         assert "binaries/linux64/libpythonfmu-export.so" not in fmu.namelist()
         assert b"fmi2Instantiate" in fmu.read("binaries/linux64/controller_off.so")
     monkeypatch.setenv("CC", "false")
-    assert compile_launcher(tmp_path)[1] == "the C compiler failed: exit status 1"
+    assert compile_launcher()[1] == "the C compiler failed: exit status 1"
 
 
 def test_every_file_in_a_role_folder_becomes_an_fmu():

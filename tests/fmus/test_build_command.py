@@ -9,8 +9,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from fmus.build import find_components
-from fmus.c.build import find_c_components
+from fmus.build import find_recipes
 from orchestrator.commands.build import build
 from orchestrator.errors import BuildError
 
@@ -38,7 +37,7 @@ def test_it_builds_nothing_twice_unless_forced(tmp_path):
 def test_it_builds_everything_by_default(tmp_path):
     done = run("--out", tmp_path)
     assert done.exit_code == 0
-    assert {file.stem for file in tmp_path.iterdir()} == set(find_components()) | set(find_c_components())
+    assert {file.stem for file in tmp_path.iterdir()} == set(find_recipes())
 
 
 def test_a_name_that_is_no_component_is_wrong_input(tmp_path):

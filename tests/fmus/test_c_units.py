@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from fmus.archive import read_mark
 from fmus.build import HERE as FMUS
-from fmus.c.build import build_all_c, build_c
+from fmus.build import build_all, build_component
+from fmus.mark import read_mark
 from orchestrator.errors import BuildError
 from orchestrator.scaffold.controller import controller_files, layout
 from tests.fmus.bare import ERROR, OK, Fmu, Refused, Unit
@@ -36,7 +36,7 @@ def folder(root):
 @pytest.fixture
 def unit(folder, tmp_path, unpack):
     """An instance of it, and its library loaded."""
-    return Unit(Fmu(unpack(build_c(folder, tmp_path / "out"))), logging_on=True)
+    return Unit(Fmu(unpack(build_component(folder, tmp_path / "out"))), logging_on=True)
 
 
 def edited(file: Path, old: str, new: str) -> None:
@@ -47,37 +47,39 @@ def edited(file: Path, old: str, new: str) -> None:
 
 def problems(folder: Path) -> str:
     with pytest.raises(BuildError) as error:
-        build_c(folder, folder.parents[2] / "out")
+        build_component(folder, folder.parents[2] / "out")
     assert not (folder.parents[2] / "out" / "controller_idea.fmu").exists()
     return str(error.value)
 
 
 def test_the_same_sources_give_the_same_bytes_wherever_they_stand(folder, tmp_path):
-    first = build_c(folder, tmp_path / "a").read_bytes()
-    elsewhere = tmp_path / "other" / "controllers" / "idea"
+    first = build_component(folder, tmp_path / "a").read_bytes()
+    elsewhere = tmp_path / "other" / "components" / "controllers" / "idea"
     shutil.copytree(folder, elsewhere)
-    assert build_c(elsewhere, tmp_path / "b").read_bytes() == first
+    assert build_component(elsewhere, tmp_path / "other" / "a").read_bytes() == first
 
 
 def test_only_what_has_changed_is_built_again(root, folder, tmp_path):
-    assert build_all_c(tmp_path / "out", root=root).built == ["controller_idea"]
-    assert build_all_c(tmp_path / "out", root=root).current == ["controller_idea"]
+    assert build_all(tmp_path / "out", root=root).built == ["controller_idea"]
+    assert build_all(tmp_path / "out", root=root).current == ["controller_idea"]
     edited(folder / "idea.c", "s->x = 0.0", "s->x = 0.5")
-    assert build_all_c(tmp_path / "out", root=root).built == ["controller_idea"]
+    assert build_all(tmp_path / "out", root=root).built == ["controller_idea"]
 
 
-def test_an_fmu_whose_sources_are_gone_or_broken_is_removed(root, folder, tmp_path):
+def test_an_fmu_whose_sources_are_broken_stays_and_one_whose_sources_are_gone_is_removed(
+    root, folder, tmp_path
+):
     target = tmp_path / "out" / "controller_idea.fmu"
-    build_all_c(tmp_path / "out", root=root)
+    build_all(tmp_path / "out", root=root)
     edited(folder / "idea.c", "s->x = 0.0;", "s->x = nothing;")
     with pytest.raises(BuildError, match=r"controller_idea: idea\.c:.*nothing"):
-        build_all_c(tmp_path / "out", root=root)
-    assert not target.exists()
+        build_all(tmp_path / "out", root=root)
+    assert target.exists()
     edited(folder / "idea.c", "nothing", "0.0")
-    build_all_c(tmp_path / "out", root=root)
-    assert (read_mark(target) or "").startswith("c-component ")
+    build_all(tmp_path / "out", root=root)
+    assert read_mark(target).source == "components/controllers/idea"
     shutil.rmtree(folder)
-    assert build_all_c(tmp_path / "out", root=root).removed == ["controller_idea"]
+    assert build_all(tmp_path / "out", root=root).removed == ["controller_idea"]
     assert not target.exists()
 
 
@@ -114,10 +116,10 @@ def test_what_is_missing_is_named(folder, root, monkeypatch):
 
 def test_a_folder_without_a_role_or_a_model_description_is_refused(folder, tmp_path):
     with pytest.raises(BuildError, match=r"holds no modelDescription\.xml"):
-        build_c(tmp_path, tmp_path / "out")
+        build_component(tmp_path, tmp_path / "out")
     moved = shutil.copytree(folder, tmp_path / "idea")
     with pytest.raises(BuildError, match="which role"):
-        build_c(moved, tmp_path / "out")
+        build_component(moved, tmp_path / "out")
 
 
 def test_outputs_follow_inputs_and_parameters_until_initialization_ends(unit):
@@ -165,7 +167,7 @@ def test_what_it_cannot_do_is_an_error_with_a_message_not_a_crash(unit):
 
 
 def test_it_runs_in_a_c_host_without_python(folder, tmp_path, unpack, host):
-    unpacked = Fmu(unpack(build_c(folder, tmp_path / "out")))
+    unpacked = Fmu(unpack(build_component(folder, tmp_path / "out")))
     program = [str(host), str(unpacked.binary), (unpacked.folder / "resources").as_uri(), unpacked.guid]
     done = run([*program, "0", "6", "0=0.1"], tmp_path)
     assert done.returncode == 0, done.stderr
@@ -177,6 +179,6 @@ def test_it_runs_in_a_c_host_without_python(folder, tmp_path, unpack, host):
 
 
 def test_the_shared_part_compiles_without_warnings(folder, tmp_path, capfd):
-    build_c(folder, tmp_path / "out")
+    build_component(folder, tmp_path / "out")
     assert capfd.readouterr().err == ""
     assert (FMUS / "c" / "unit.h").is_file()

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.build import build_all
-from fmus.c.build import build_c
+from fmus.build import build_all, build_component
 from orchestrator.cli import main
 from orchestrator.errors import SimulationError
 from orchestrator.master.isolation import Isolation
@@ -55,7 +54,7 @@ def foreign(tmp_path):
                 text = text.replace(STEP, f"if (t > 0.0495) {{ {act} }}\n    {STEP}")
                 text = f"#include <signal.h>\n#include <stdlib.h>\n{text}"
             file.write_text(text)
-        return build_c(tmp_path / "components" / "controllers" / "idea", tmp_path / "built")
+        return build_component(tmp_path / "components" / "controllers" / "idea", tmp_path / "built")
 
     return build
 

@@ -1,0 +1,142 @@
+"""Units written in C: a folder with modelDescription.xml and C files becomes the files of an FMU.
+
+The model description is the one place where variables are declared; `variables.h` is made from it
+at every build, the GUID follows from it and the sources. As with components in Python, the same
+sources and the same compiler give the same bytes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import uuid
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+from components.fmi.roles import ROLES
+from orchestrator.errors import BuildError
+from orchestrator.fmu.archive import platform
+
+from ..compiler import compiler_command, compiler_tools
+from ..evidence import Looks
+from .declaration import DESCRIPTION, header, read_declaration
+
+HERE = Path(__file__).resolve().parent
+SHARED = (
+    HERE / "recipe.py",
+    HERE / "declaration.py",
+    HERE / "unit.h",
+    HERE.parent / "fmi2.h",
+    HERE.parent / "archive.py",
+)
+"""What has a say in the FMU of every unit in C."""
+FLAGS = ("-std=c11", "-O2", "-Wall", "-Wextra", "-Wno-unused-parameter", "-fPIC", "-shared")
+EXACT = ("-fvisibility=hidden", "-ffp-contract=off")  # no fused multiply-add: the same numbers everywhere
+LINUX = ("-Wl,--build-id=none", "-Wl,-z,defs", "-s")
+
+
+def find_c_components(root: Path) -> dict[str, Path]:
+    """Return name of FMU -> folder of every unit in C below `root`."""
+    found = {}
+    for role in ROLES:
+        for file in sorted((root / role).glob(f"*/{DESCRIPTION}")):
+            found[f"{ROLES[role].name}_{file.parent.name}"] = file.parent
+    return found
+
+
+@dataclass(frozen=True)
+class CRecipe:
+    """A unit in C; the folder that holds its own says the role, as in `controllers/idea/idea.c`.
+
+    Raises:
+        BuildError: no model description, or no role.
+    """
+
+    source: Path
+
+    def __post_init__(self) -> None:
+        if not (self.source / DESCRIPTION).is_file():
+            raise BuildError(f"{self.source}: no unit in C: it holds no {DESCRIPTION}")
+        if self.source.parent.name not in ROLES:
+            folders = ", ".join(ROLES)
+            raise BuildError(f"{self.source}: which role? Put it into a folder called one of: {folders}")
+
+    @property
+    def name(self) -> str:
+        return f"{ROLES[self.source.parent.name].name}_{self.source.name}"
+
+    def key(self) -> str:
+        compiler = _compiler()
+        version = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False).stdout
+        content = hashlib.sha256("\0".join([self.name, *compiler, version, *FLAGS, *EXACT]).encode())
+        for file in [*SHARED, *self._files()]:
+            data = file.read_bytes()
+            content.update(f"{file.name}\0{len(data)}\0".encode() + data)
+        return content.hexdigest()[:32]
+
+    def evidence(self) -> dict[str, str]:
+        return Looks().evidence([self.source, self._twin, *SHARED, *self._files(), *compiler_tools()])
+
+    @property
+    def _twin(self) -> Path:
+        return self.source.with_suffix(".py")
+
+    def _files(self) -> list[Path]:
+        return [self.source / DESCRIPTION, *sorted(self.source.glob("*.[ch]"))]
+
+    def make(self) -> tuple[dict[str, bytes], tuple[str, ...]]:
+        if self._twin.exists():
+            folder = self.source
+            raise BuildError(f"there are both {folder.name}.py and {folder.name}/ in {folder.parent}")
+        compiler = _compiler()
+        description, *code = self._files()
+        sources = {file.name: file.read_bytes() for file in code}
+        if not any(source.endswith(".c") for source in sources):
+            raise BuildError(f"{self.source} holds no C file")
+        role = ROLES[self.source.parent.name]
+        root, variables = read_declaration(description.read_bytes(), self.name, role)
+        root.set("guid", _guid(root, sources))
+        binary = _compile(compiler, sources, header(variables, root.get("guid", "")))
+        system, suffix = platform()
+        return {
+            DESCRIPTION: ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n",
+            f"binaries/{system}/{self.name}{suffix}": binary,
+        }, ()
+
+
+def _compiler() -> list[str]:
+    command = compiler_command()
+    if shutil.which(command[0]) is None:
+        raise BuildError(f"there is no C compiler ({command[0]}); CC can name one")
+    return command
+
+
+def _guid(root: ElementTree.Element, sources: dict[str, bytes]) -> str:
+    root.set("guid", "")
+    content = hashlib.sha256(ElementTree.tostring(root))
+    for name, data in sources.items():
+        content.update(name.encode() + b"\0" + hashlib.sha256(data).digest())
+    return f"{{{uuid.UUID(bytes=content.digest()[:16])}}}"
+
+
+def _compile(compiler: list[str], sources: dict[str, bytes], header: str) -> bytes:
+    """Return the shared library; what the compiler warns of goes to stderr."""
+    flags = [*FLAGS, *EXACT, *(LINUX if sys.platform == "linux" else ())]
+    with tempfile.TemporaryDirectory(prefix="yawbench_") as temporary:
+        for name, data in sources.items():  # relative names: bytes must not depend on where they stand
+            Path(temporary, name).write_bytes(data)
+        Path(temporary, "variables.h").write_text(header, encoding="utf-8")
+        files = [name for name in sources if name.endswith(".c")]
+        includes = ["-I.", f"-I{HERE}", f"-I{HERE.parent}"]
+        command = [*compiler, *flags, *includes, *files, "-o", "unit.so", "-lm"]
+        done = subprocess.run(command, cwd=temporary, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            lines = [line for line in done.stderr.splitlines() if "error" in line or "undefined" in line]
+            raise BuildError(lines or [f"the C compiler failed with exit status {done.returncode}"])
+        if done.stderr:
+            print(done.stderr.rstrip(), file=sys.stderr)
+        return Path(temporary, "unit.so").read_bytes()

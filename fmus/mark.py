@@ -1,0 +1,49 @@
+"""What an FMU's archive says, in its comment, about what it was built from."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+_SIGN = b"yawbench "
+
+
+@dataclass(frozen=True)
+class Mark:
+    """Where an FMU comes from, and a key of all that decided what its bytes are."""
+
+    name: str
+    key: str
+    source: str  # of a component: from the folder above components/; of a file: from the FMU's folder
+    home: str = ""  # of a file: name of the FMU's folder; a copy in another folder is the user's own affair
+    role: str = ""  # of a file: the folder of its role
+    defaults: Mapping[str, Any] = field(default_factory=dict)  # default values other than the source's
+
+    @property
+    def is_component(self) -> bool:
+        """True for one that the project builds by itself, and removes when its source is gone."""
+        return not self.home
+
+    def to_comment(self) -> bytes:
+        """Return the comment of the archive."""
+        said = {key: value for key, value in asdict(self).items() if value}
+        return _SIGN + json.dumps(said, sort_keys=True).encode()
+
+
+def read_mark(fmu: Path) -> Mark | None:
+    """Return the mark of an FMU that was built here, None for any other file, and for none."""
+    try:
+        with zipfile.ZipFile(fmu) as archive:
+            comment = archive.comment
+    except (OSError, ValueError, zipfile.BadZipFile):
+        return None
+    if not comment.startswith(_SIGN):
+        return None
+    try:
+        return Mark(**json.loads(comment[len(_SIGN) :]))
+    except (ValueError, TypeError):  # as other versions of this program wrote it
+        return Mark(fmu.stem, "", "")

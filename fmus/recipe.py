@@ -1,0 +1,116 @@
+"""Recipes: how one unit, in Python or in C, becomes the files of an FMU."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any, Protocol
+
+from components.fmi.roles import ROLES
+from orchestrator.errors import BuildError
+
+from .archive import pack
+from .closure import Parts, Sources
+from .compiler import compile_launcher, compiler_tools
+from .evidence import Looks
+from .staging import PYTHONFMU, missing_signals, staged, variant
+
+HERE = Path(__file__).resolve().parent
+
+
+class Recipe(Protocol):
+    """One FMU that can be built. All raise BuildError with what is wrong with the sources."""
+
+    @property
+    def name(self) -> str:
+        """Name of the FMU."""
+
+    @property
+    def source(self) -> Path:
+        """The file, or the folder of a unit in C."""
+
+    def key(self) -> str:
+        """Return a hash of all that decides what the FMU's bytes are."""
+
+    def evidence(self) -> dict[str, str]:
+        """Return what the key follows from, cheap to look at (see `evidence`)."""
+
+    def make(self) -> tuple[dict[str, bytes], tuple[str, ...]]:
+        """Return the files of the archive, and the names of the Python modules among them."""
+
+
+@dataclass(frozen=True)
+class PythonRecipe:
+    """A component."""
+
+    name: str
+    module: Parts
+    sources: Sources
+    defaults: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def source(self) -> Path:
+        return self.sources.file(self.module)
+
+    @cached_property
+    def _files(self) -> dict[str, str]:
+        return self.sources.closure(self.module)
+
+    def key(self) -> str:
+        parts = [self.name, ".".join(self.module), json.dumps(dict(self.defaults)), _builder()]
+        parts += [hashlib.sha256(compile_launcher()[0] or b"").hexdigest(), _hash(self._files)]
+        return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
+
+    def evidence(self) -> dict[str, str]:
+        self._files  # noqa: B018 - found once, with its evidence
+        tools = [f"tool:{file}" for file in _from_pythonfmu()]
+        return self.sources.evidence[self.module] | Looks().evidence(
+            [*sorted(HERE.glob("*.[pch]*")), *tools, *compiler_tools()]
+        )
+
+    def make(self) -> tuple[dict[str, bytes], tuple[str, ...]]:
+        module, files = self.module, self._files
+        if self.defaults or self.name != natural_name(module):
+            with staged(files, "yawbench_variant", "yawbench_variant_entry") as stage:
+                text = variant(stage.component(module), self.name, self.defaults)
+            module = (*module[:-1], f"{module[-1]}_variant")
+            files = files | {"/".join(module) + ".py": text}
+        version = _hash(files)[:12]
+        package, entry = f"yawbench_{version}", f"{self.name}_{version}"
+        with staged(files, package, entry) as stage:
+            component = stage.component(module)
+            problems = missing_signals(ROLES[module[0]], component.variables)
+            if problems:
+                raise BuildError(problems)
+            built = stage.build(self.name, component)
+            launcher, _ = compile_launcher()
+            return pack(built, name=self.name, version=version, launcher=launcher), (package, entry)
+
+
+def natural_name(module: Parts) -> str:
+    """Return the name of the FMU that a module becomes: `<role>_<file>`."""
+    return f"{ROLES[module[0]].name}_{module[-1]}"
+
+
+@cache
+def _builder() -> str:
+    """Return a hash of this builder and of what it takes from PythonFMU."""
+    content = hashlib.sha256()
+    for file in [*sorted(HERE.glob("*.py")), *_from_pythonfmu()]:
+        content.update(file.read_bytes())
+    return content.hexdigest()
+
+
+def _from_pythonfmu() -> list[Path]:
+    return [*sorted(PYTHONFMU.glob("resources/binaries/*/*")), PYTHONFMU / "builder.py"]
+
+
+def _hash(files: Mapping[str, str]) -> str:
+    content = hashlib.sha256()
+    for path, text in sorted(files.items()):
+        content.update(f"{path}\0{len(text)}\0{text}".encode())
+    return content.hexdigest()
