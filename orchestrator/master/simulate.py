@@ -85,14 +85,16 @@ def simulate(
     return RunInfo(Path(out), recorder.written, len(plan.record), run.wall_time, passes, warnings)
 
 
-def simulate_in_memory(plan: Plan, *, opener: Opener = open_unit) -> Results:
+def simulate_in_memory(
+    plan: Plan, *, progress: Progress | None = None, opener: Opener = open_unit
+) -> Results:
     """Run a plan and return its results; nothing is written.
 
     Raises:
         ModelDescriptionError, SimulationError: as `simulate`.
     """
     recorder = MemoryRecorder(*_columns(plan))
-    _go(plan, recorder, None, opener)
+    _go(plan, recorder, progress, opener)
     assert recorder.results is not None
     return recorder.results
 

@@ -38,6 +38,7 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
         "changes": [asdict(change) for change in plan.changes],
         "connections": [_connection(wire) for wire in plan.wires],
         "scenario": plan.scenario,
+        "notes": list(plan.notes),
         "versions": versions(),
     }
 

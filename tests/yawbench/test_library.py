@@ -1,0 +1,188 @@
+"""The Python library: scenarios as values, runs in memory, units in plain Python."""
+
+import json
+
+import numpy as np
+import pytest
+
+import yawbench as yb
+from components.controllers.fnn import Fnn
+from orchestrator.cli import main
+
+SCENARIO = "fnn_sideslip/25mps"
+
+
+@pytest.fixture(scope="module")
+def base():
+    return yb.load(SCENARIO).set({"stop_time": 1.6})
+
+
+@pytest.fixture(scope="module")
+def run(base):
+    return base.run()
+
+
+def proportional(yaw_rate_ref, yaw_rate):
+    return 20000 * (yaw_rate_ref - yaw_rate)
+
+
+class Proportional:
+    """The same law as an object."""
+
+    inputs = ("yaw_rate_ref", "yaw_rate")
+    outputs = ("yaw_moment",)
+
+    def output(self, t, u):
+        return 20000 * (u.yaw_rate_ref - u.yaw_rate)
+
+
+class Counting(Proportional):
+    """A law with a memory."""
+
+    step_size = 0.1
+    calls = 0
+
+    def advance(self, t, h, u):
+        self.calls += 1
+
+    def output(self, t, u):
+        return float(self.calls)
+
+
+def equal(one, other):
+    return list(one) == list(other) and all(np.array_equal(one[name], other[name]) for name in one)
+
+
+def test_every_public_name_has_a_docstring_and_is_exported():
+    for name in yb.__all__:
+        assert getattr(yb, name).__doc__, name
+
+
+def test_a_run_has_the_numbers_that_the_command_line_writes(base, run, tmp_path):
+    main_path = str(base.path)
+    with pytest.raises(SystemExit) as end:
+        main(["run", main_path, "--set", "stop_time=1.6", "--out", str(tmp_path / "cli")])
+    assert end.value.code == 0
+    assert equal(run, yb.open(tmp_path / "cli"))
+
+
+def test_swap_and_set_leave_the_scenario_as_it_was(base):
+    other = base.swap(controller="controller_off").set(
+        {"vehicle.mass": 1200, "plant.initial_speed": "80 km/h"}
+    )
+    assert base.changes[0].place == "stop_time"
+    assert len(base.changes) == 1
+    assert [change.place for change in other.changes] == [
+        "stop_time", "controller", "vehicle.mass", "plant.initial_speed",
+    ]  # fmt: skip
+    plant = next(unit for unit in other.plan().units if unit.name == "plant")
+    assert plant.parameters["mass"] == 1200
+    assert plant.parameters["initial_speed"] == pytest.approx(80 / 3.6)
+
+
+def test_names_of_signals_and_columns_give_the_same_arrays(run):
+    assert np.array_equal(run["plant.sideslip"], run["sideslip"])
+    assert run.time.shape == run["sideslip"].shape == (len(run),)
+    assert run.unit_of("sideslip") == "rad"
+    assert "plant.sideslip" in run
+
+
+def test_pandas_has_all_columns_and_their_units(run):
+    frame = run.to_pandas()
+    assert list(frame.columns) == list(run)
+    assert frame.index.name == "time"
+    assert frame.attrs["units"]["plant.yaw_rate"] == "rad/s"
+    assert np.array_equal(frame["plant.yaw_rate"], run["yaw_rate"])
+
+
+def test_metrics_are_those_of_the_command_line(run):
+    assert run.metric("peak(sideslip)") == np.max(np.abs(run["sideslip"]))
+    late = run.time >= 1.2
+    assert run.metric("peak(sideslip)", window=(1.2, 1.6)) == np.max(np.abs(run["sideslip"][late]))
+    with pytest.raises(yb.ResultsError, match="no number"):
+        run.metric("peak(sideslip)", window=(1, 60))
+    with pytest.raises(yb.ScenarioError, match=r"did you mean 'peak'"):
+        run.metric("peek(sideslip)")
+
+
+def test_saved_results_are_read_back_to_the_bit(run, tmp_path):
+    for name in ("csv", "parquet"):
+        run.save(tmp_path / name, format=name)
+        again = yb.open(tmp_path / name)
+        assert equal(run, again)
+        assert again.changes == run.changes
+        assert json.loads((tmp_path / name / "run.json").read_text())["status"] == "completed"
+
+
+def test_a_figure_shows_itself_in_a_notebook(run):
+    figure = run.plot("sideslip", "yaw_rate")
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    assert [axes.get_label() for axes in figure.axes] == ["sideslip", "yaw_rate"]
+
+
+def test_function_object_and_component_of_one_law_give_the_same_bits(base):
+    by_function = base.swap(controller=proportional).run()
+    by_object = base.swap(controller=Proportional()).run()
+    assert equal(
+        by_function.to_pandas().rename(columns=str).to_dict("series"),
+        by_object.to_pandas().to_dict("series"),
+    )
+
+
+def test_a_component_class_gives_the_bits_of_its_fmu(base, run):
+    assert equal(run, base.swap(controller=Fnn).run())
+
+
+def test_a_run_without_an_fmu_says_so(base):
+    run = base.swap(controller=proportional).run()
+    assert run.record["fmus"]["controller"]["generation_tool"] == "Python, no FMU"
+    assert any("no FMU" in note and "controller" in note for note in run.record["notes"])
+
+
+def test_every_run_begins_with_a_copy_of_the_object(base):
+    law = Counting()
+    scenario = base.swap(controller=law)
+    first, second = scenario.run(), scenario.run()
+    assert law.calls == 0
+    assert equal(first, second)
+    assert first["controller.yaw_moment"][-1] == 16
+
+
+def test_what_python_code_raises_is_the_cause(base):
+    def broken(t, yaw_rate):
+        return 1 / (t < 1)
+
+    with pytest.raises(yb.SimulationError, match=r"controller: .*ZeroDivisionError") as caught:
+        base.swap(controller=broken).run()
+    assert isinstance(caught.value.__cause__, ZeroDivisionError)
+    assert caught.value.unit == "controller"
+    assert caught.value.time == pytest.approx(1.0, abs=0.003)
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        (3, "int is no controller"),
+        (Proportional, r"Proportional is a class; give an object of it, Proportional\(\)"),
+        (lambda x: x, "signal 'x' is not in the signal dictionary"),
+        (type("Mute", (), {"output": lambda self, t, u: 0.0, "inputs": ()})(), "Mute has no outputs"),
+        (type("Text", (), {"output": None, "inputs": "yaw_rate", "outputs": ()})(), "are tuples of names"),
+    ],
+)
+def test_what_cannot_stand_for_a_controller_is_refused_in_a_sentence(base, given, sentence):
+    with pytest.raises(yb.ScenarioError, match=sentence):
+        base.swap(controller=given)
+
+
+def test_unknown_units_places_and_scenarios_are_refused_with_a_guess(base):
+    with pytest.raises(yb.ScenarioError, match="did you mean 'controller'"):
+        base.swap(controler="controller_off")
+    with pytest.raises(yb.YawbenchError, match="did you mean 'mass'"):
+        base.set({"plant.mas": 3}).plan()
+    with pytest.raises(yb.ScenarioError, match="did you mean 'fnn_sideslip/25mps'"):
+        yb.load("fnn_sideslip/25mp")
+
+
+def test_an_output_of_the_wrong_length_ends_the_run_with_a_sentence(base):
+    with pytest.raises(yb.SimulationError, match="gave 2 values for 1 output"):
+        base.swap(controller=lambda yaw_rate: (yaw_rate, 1.0)).run()

@@ -1,0 +1,59 @@
+"""Vehicle yaw-stability control on a test bench of FMI units.
+
+    import yawbench as yb
+
+    run = yb.load("fnn_sideslip/25mps").swap(controller="controller_off").run()
+    run["plant.sideslip"], run.time      # numpy arrays, in SI units
+    run.metric("peak(sideslip)")         # 0.0526...
+    run.plot("sideslip", "yaw_rate")     # a matplotlib figure
+
+A controller may be plain Python, run in this process; `yawbench build` makes an FMU of one that has
+proved itself:
+
+    def proportional(yaw_rate_ref, yaw_rate):
+        return 20000 * (yaw_rate_ref - yaw_rate)
+
+    yb.load("fnn_sideslip/25mps").swap(controller=proportional).run().metric("peak(sideslip)")
+
+Scenarios never change: `swap` and `set` give new ones. Nothing is written, and nothing is printed,
+unless asked for. Errors are of one tree:
+
+    YawbenchError
+    ├── ScenarioError             the scenario or a change of it is wrong
+    ├── ModelDescriptionError     an FMU is missing, corrupt or not supported
+    ├── WiringError               units cannot be connected as asked
+    ├── ResultsError              recorded results are missing or unreadable
+    ├── BuildError                a component cannot be made into an FMU
+    └── SimulationError           a run failed; knows `unit` and `time`
+"""
+
+from orchestrator.errors import (
+    BuildError,
+    ModelDescriptionError,
+    ResultsError,
+    ScenarioError,
+    SimulationError,
+    WiringError,
+    YawbenchError,
+)
+
+from .program import output, parameter, signal
+from .run import Run, open
+from .scenario import Scenario, load
+
+__all__ = [
+    "BuildError",
+    "ModelDescriptionError",
+    "ResultsError",
+    "Run",
+    "Scenario",
+    "ScenarioError",
+    "SimulationError",
+    "WiringError",
+    "YawbenchError",
+    "load",
+    "open",
+    "output",
+    "parameter",
+    "signal",
+]

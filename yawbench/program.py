@@ -1,0 +1,282 @@
+"""Units in plain Python, run in the process of the run without an FMU.
+
+A function, an object or a component class becomes a component, whose model description is the one
+that its FMU would have: wiring, master and results treat it as they treat an FMU.
+"""
+
+from __future__ import annotations
+
+import copy
+import ctypes
+import functools
+import hashlib
+import inspect
+import io
+import sys
+import zipfile
+from collections import namedtuple
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from components.fmi.component import Component
+from components.fmi.roles import ROLES, wheels
+from components.fmi.variables import output, parameter, signal
+from orchestrator.errors import ScenarioError
+from orchestrator.fmu.description import describe
+from orchestrator.master.log import ERROR, OK, Log
+from orchestrator.master.slave import Calls, Experiment, Status
+from orchestrator.master.unit import nothing_to_do
+from orchestrator.plan import Fmu, Place, Unit, Value
+
+__all__ = ["Program", "output", "parameter", "signal"]
+
+HOME = Path("/python")
+"""Where the archive of a program would lie: a name for messages and records, nothing is there."""
+
+
+class Program:
+    """What stands in for an FMU: a component class, and where in a plan it belongs.
+
+    Args:
+        given: a function, an object with `output`, or a component class.
+        unit: the unit whose FMU it replaces, for messages.
+        role: of that unit (controller, driver, ...); its signals are the outputs of a function.
+
+    Raises:
+        ScenarioError: it is none of these, or declares what cannot be.
+    """
+
+    def __init__(self, given: Any, *, unit: str, role: str) -> None:
+        self.given = given
+        try:
+            self.component = _component(given, role)
+            xml = ElementTree.tostring(self._made(unit).to_xml())
+        except ScenarioError as error:
+            raise ScenarioError(f"{unit}: {error}") from None
+        except (TypeError, ValueError) as error:
+            raise ScenarioError(f"{unit}: {_name(given)}: {error}") from error
+        name = self.component.fmu_name
+        self.path = HOME / f"{name}.fmu"
+        digest = hashlib.sha256(xml + _source(given)).hexdigest()
+        described = describe({"modelDescription.xml": xml}, _archived(xml), self.path)
+        self.fmu: Fmu = replace(described, sha256=digest, generation_tool="Python, no FMU")
+
+    @property
+    def step_size(self) -> float | None:
+        """Time between two samples [s], where the program says so."""
+        return getattr(self.given, "step_size", None)
+
+    def open(self, unit: Unit, log: Log) -> ProgramSlave:
+        """Return an instance for a unit of a run."""
+        return ProgramSlave(unit, self._made(unit.name), log)
+
+    def _made(self, unit: str) -> Component:
+        return self.component(instance_name=unit, resources="")
+
+
+class ProgramSlave:
+    """An instance of a program, as the master sees it (see `orchestrator.master.slave.Slave`)."""
+
+    def __init__(self, unit: Unit, component: Component, log: Log) -> None:
+        self.name = unit.name
+        self._component = component
+        self._log = log
+
+    @property
+    def error(self) -> BaseException | None:
+        """What the program has raised, None if nothing."""
+        return getattr(self._component, "error", None)
+
+    def connect(
+        self,
+        inputs: np.ndarray,
+        input_places: Sequence[Place],
+        outputs: np.ndarray,
+        output_places: Sequence[Place],
+        time: ctypes.c_double,
+        step: ctypes.c_double,
+    ) -> Calls:
+        component, status = self._component, self._status
+        into, of = ([place.reference for place in places] for places in (input_places, output_places))
+
+        def set_inputs() -> Status:
+            component.set_real(into, inputs.tolist())
+            return status()
+
+        def do_step() -> Status:
+            return status(component.do_step(time.value, step.value))
+
+        def get_outputs() -> Status:
+            outputs[:] = component.get_real(of)
+            return status()
+
+        return Calls(set_inputs if into else nothing_to_do, do_step, get_outputs if of else nothing_to_do)
+
+    def part(self, kind: str) -> str:
+        return kind
+
+    def put(self, places: Sequence[Place], values: Sequence[Value]) -> Status:
+        set_values = getattr(self._component, f"set_{places[0].type.lower()}")
+        set_values([place.reference for place in places], list(values))
+        return self._status()
+
+    def fetch(self, places: Sequence[Place]) -> tuple[Status, list[Value]]:
+        get_values = getattr(self._component, f"get_{places[0].type.lower()}")
+        values = get_values([place.reference for place in places])
+        return self._status(), values
+
+    look = fetch
+
+    def setup(self, experiment: Experiment) -> Status:
+        self._component.setup_experiment(experiment.start, experiment.stop, experiment.tolerance)
+        return self._status()
+
+    def enter(self) -> Status:
+        self._component.enter_initialization_mode()
+        return self._status()
+
+    def exit(self) -> Status:
+        self._component.exit_initialization_mode()
+        return self._status()
+
+    def note(self, status: Status) -> Status:
+        return status
+
+    def free(self) -> None:
+        pass
+
+    def _status(self, stepped: bool = True) -> Status:
+        """Hand over what the component has said; return how it is."""
+        queue = self._component.log_queue
+        if queue:
+            for message in queue:
+                self._log.add(
+                    self.name, int(message.status), message.category, message.msg.replace("%%", "%")
+                )
+            queue.clear()
+        return OK if stepped and not self._component._failed else ERROR
+
+
+def _archived(xml: bytes) -> bytes:
+    """Return an archive of a model description alone."""
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w") as members:
+        members.writestr("modelDescription.xml", xml)
+    return archive.getvalue()
+
+
+def _component(given: Any, role: str) -> type[Component]:
+    """Return the component class that a function, an object or a class stands for."""
+    if isinstance(given, type):
+        if issubclass(given, Component):
+            return given
+        raise ScenarioError(f"{_name(given)} is a class; give an object of it, {_name(given)}()")
+    if hasattr(given, "output"):
+        return _of_object(given)
+    if callable(given):
+        return _of_function(given, role)
+    raise ScenarioError(
+        f"{_name(given)} is no controller: give the name or path of an FMU, a function of signals, "
+        "an object with inputs, outputs and a method output(t, u), or a component class"
+    )
+
+
+def _of_function(function: Callable[..., Any], role: str) -> type[Component]:
+    """Return a component that calls a function of signals; its outputs are those that the role must show."""
+    known = {one.name: one.outputs for one in ROLES.values()}
+    if role not in known:
+        raise ScenarioError(
+            f"{_name(function)}: what it returns is not known for a unit that is none of {', '.join(known)}; "
+            "give an object with outputs"
+        )
+    parameters = inspect.signature(function).parameters.values()
+    plain = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+    names = [p.name for p in parameters if p.kind in plain and (p.default is p.empty)]
+    inputs = [name for name in names if name != "t"]
+    outputs = [one for pattern in known[role] for one in wheels(pattern)]
+
+    def compute(self: Component, t: float, u: Sequence[float]) -> Any:
+        given = dict(zip(inputs, u, strict=True))
+        result = function(**given, t=t) if "t" in names else function(**given)
+        return (result,) if len(outputs) == 1 and np.ndim(result) == 0 else result
+
+    return _class(function, inputs, known[role], {"output": compute})
+
+
+def _of_object(given: Any) -> type[Component]:
+    """Return a component whose instances each work with a copy of an object."""
+    for wanted in ("inputs", "outputs"):
+        if not hasattr(given, wanted):
+            raise ScenarioError(f"{_name(given)} has no {wanted}: name its signals, as in ('yaw_rate',)")
+
+    def __init__(self: Any, **kwargs: Any) -> None:
+        super(component, self).__init__(**kwargs)
+        try:
+            self._given = copy.deepcopy(given)  # a run leaves nothing behind for the next
+        except Exception as error:
+            raise ScenarioError(f"{_name(given)} cannot be copied for a run: {error}") from error
+
+    members = {"__init__": __init__}
+    for method in ("output", "advance", "start"):
+        if hasattr(given, method):
+            members[method] = _passing_on(method)
+    component = _class(given, given.inputs, given.outputs, members)
+    return component
+
+
+def _passing_on(method: str) -> Callable[..., Any]:
+    def call(self: Any, t: float, *rest: Any) -> Any:
+        *step, u = rest
+        result = getattr(self._given, method)(t, *step, self._named(*u))
+        single = method == "output" and self._n_io - self._n_in == 1 and np.ndim(result) == 0
+        return (result,) if single and result is not None else result
+
+    return call
+
+
+def _class(given: Any, inputs: Sequence[Any], outputs: Sequence[Any], members: dict[str, Any]) -> Any:
+    """Return a component class; outputs that do not say what they follow follow all inputs."""
+    if isinstance(inputs, str) or isinstance(outputs, str):
+        raise ScenarioError(f"{_name(given)}: inputs and outputs are tuples of names, ('yaw_rate',)")
+    names = [one if isinstance(one, str) else one.name for one in inputs]
+    declared = tuple(output(one, *names) if isinstance(one, str) else one for one in outputs)
+    scalars = [name for pattern in names for name in wheels(pattern)]
+    members |= {
+        "inputs": tuple(inputs),
+        "outputs": declared,
+        "sampled": getattr(given, "sampled", True),
+        "fmu_name": _name(given),
+        "__doc__": inspect.getdoc(given) or f"{_name(given)}, plain Python.",
+        "_named": staticmethod(namedtuple("Inputs", scalars)),
+        "_fail": _fail,
+    }
+    return type(_name(given), (Component,), members)
+
+
+def _fail(self: Any, what: str, t: float) -> None:
+    """Remember the exception for whoever started the run, then do what every component does."""
+    self.error = self.__dict__.get("error") or sys.exc_info()[1]
+    Component._fail(self, what, t)
+
+
+def _name(given: Any) -> str:
+    """Return what a program is called."""
+    if isinstance(given, functools.partial):
+        return _name(given.func)
+    name = getattr(given, "__name__", None) or type(given).__name__
+    return "function" if name == "<lambda>" else name
+
+
+def _source(given: Any) -> bytes:
+    """Return the program's text where Python knows it: another text is another program."""
+    try:
+        return inspect.getsource(
+            given if callable(given) and not hasattr(given, "output") else type(given)
+        ).encode()
+    except (OSError, TypeError):
+        return repr(given).encode()

@@ -1,0 +1,165 @@
+"""The results of a run: arrays, metrics, figures, files."""
+
+from __future__ import annotations
+
+import functools
+import io
+from collections.abc import Iterator
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from orchestrator.errors import ResultsError
+from orchestrator.metrics.run_metrics import STANDARD, Value, evaluate, evaluate_all, metric
+from orchestrator.results.read import Results, load_results
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+def open(folder: str | Path) -> Run:
+    """Return the run whose results lie in a folder.
+
+        >>> yb.open("results/fnn_sideslip/25mps").metric("peak(sideslip)")
+
+    Raises:
+        ResultsError: they are missing or unreadable.
+    """
+    return Run(load_results(folder))
+
+
+class Run:
+    """What one run has recorded.
+
+    >>> run["plant.yaw_rate"], run["yaw_rate"], run.time
+    >>> list(run)                       # names of all columns
+    >>> run.unit_of("plant.yaw_rate")   # "rad/s"
+    """
+
+    def __init__(self, results: Results) -> None:
+        self.results = results
+
+    @property
+    def time(self) -> np.ndarray:
+        """Communication points [s], shape (rows,)."""
+        return self.results.time
+
+    @property
+    def title(self) -> str:
+        """The scenario's title."""
+        return str(self.results.run.get("title") or "")
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """Everything needed to repeat the run: run.json."""
+        return self.results.run
+
+    @property
+    def changes(self) -> list[dict[str, Any]]:
+        """What was other than in the scenario file, each with place, value and origin."""
+        return list(self.record.get("changes", ()))
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Return a column, shape (rows,): `unit.variable`, or the only variable of that name."""
+        return self.results.columns[self.results.column(name)]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.results.columns
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.results.columns)
+
+    def __len__(self) -> int:
+        return self.time.size
+
+    def unit_of(self, name: str) -> str:
+        """Return the measurement unit of a column, "" if it has none."""
+        return self.results.units[self.results.column(name)]
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return all columns over time; `attrs["units"]` holds their units."""
+        import pandas as pd
+
+        frame = pd.DataFrame(self.results.columns, index=pd.Index(self.time, name="time"))
+        frame.attrs = {"title": self.title, "units": dict(self.results.units)}
+        return frame
+
+    def metric(self, name: str, window: tuple[float, float] | None = None) -> float:
+        """Return a metric in SI units; ratios are plain numbers.
+
+            >>> run.metric("peak(sideslip)")
+            >>> run.metric("mean_error(yaw_rate)", window=(1, 6))
+
+        Args:
+            name: `measure(signal)`; the documentation lists all measures.
+            window: from when to when [s]; default: the whole run.
+
+        Raises:
+            ScenarioError: there is no such measure.
+            ResultsError: the run has not recorded what it needs, or does not last for the window.
+        """
+        value = evaluate(self.results, metric(name), window)
+        if value is None:
+            raise ResultsError(f"{name}: this run gives no number; it has recorded {', '.join(self)}.")
+        return value.number
+
+    def metrics(self) -> dict[str, Value]:
+        """Return the usual metrics that the run has the signals for: name -> number and unit."""
+        return evaluate_all(self.results, STANDARD)
+
+    def plot(self, *panels: str, title: str | None = None) -> Figure:
+        """Return a figure, drawn as `yawbench plot` draws it.
+
+            >>> run.plot("sideslip", "yaw_rate(sideslip)", "path").savefig("run.svg")
+
+        Args:
+            panels: a signal, its error (`sideslip_error`), one over another (`yaw_rate(sideslip)`) or `path`;
+                default: all that the papers draw.
+            title: default: the run's.
+
+        Raises:
+            ResultsError: the run has recorded none of them.
+        """
+        from orchestrator.figures import panels as drawing
+        from orchestrator.figures.plots import OVERVIEW, draw
+
+        return shown_in_notebooks(
+            draw([drawing.Run(self.title, self.results)], panels or OVERVIEW, title=title)
+        )
+
+    def save(self, folder: str | Path, *, format: str = "csv") -> Path:
+        """Write results and run.json, as `yawbench run` does, and return the folder.
+
+        Raises:
+            ResultsError: they cannot be written.
+        """
+        from orchestrator.results.write import write_results
+
+        write_results(self.results, Path(folder), format=format)
+        return Path(folder)
+
+    def __repr__(self) -> str:
+        return f"<Run {self.title!r}: {len(self)} rows of {len(self.results.columns)} variables>"
+
+    def _repr_html_(self) -> str:
+        from orchestrator.figures.display import shown
+
+        changed = "".join(f"<br>{escape(str(c['place']))} = {escape(str(c['value']))}" for c in self.changes)
+        cells = [(metric(name).title, shown(x.number, x.unit)) for name, x in self.metrics().items()]
+        rows = "".join(f"<tr><td>{escape(title)}</td><td>{escape(value)}</td></tr>" for title, value in cells)
+        return f"<b>{escape(self.title)}</b>{changed}<table>{rows}</table>"
+
+
+def shown_in_notebooks(figure: Figure) -> Figure:
+    """Return the figure, which a notebook now shows as a picture, with or without pyplot."""
+    figure._repr_png_ = functools.partial(_png, figure)  # type: ignore[attr-defined]
+    return figure
+
+
+def _png(figure: Figure) -> bytes:
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png", dpi=110)
+    return picture.getvalue()

@@ -1,0 +1,199 @@
+"""A scenario as a value: loaded, changed, run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from orchestrator.errors import ScenarioError, SimulationError
+from orchestrator.master.opening import open_unit
+from orchestrator.master.simulate import simulate_in_memory
+from orchestrator.plan import Change, Fmu, Plan, Value
+from orchestrator.scenario.load import load_scenario
+from orchestrator.wiring.make_plan import make_plan
+from orchestrator.wording import hint
+
+from .program import Program
+from .run import Run
+
+SHIPPED = Path(__file__).resolve().parent.parent / "scenarios"
+"""Where the scenarios lie that are loaded by name."""
+ENDINGS = (".yaml", ".yml", ".ssp")
+
+
+def load(source: str | Path) -> Scenario:
+    """Return the scenario of a name or a file.
+
+        >>> yb.load("fnn_sideslip/25mps")
+        >>> yb.load("my_scenarios/lane_change.yaml")
+        >>> yb.load("from_another_tool.ssp")
+
+    Args:
+        source: a name in the folder of scenarios, or the path of a YAML file or an SSP archive.
+
+    Raises:
+        ScenarioError: there is no such scenario, or something is wrong with it.
+    """
+    path = Path(source)
+    if path.suffix not in ENDINGS and not path.exists():
+        path = SHIPPED / f"{source}.yaml"
+        if not path.is_file():
+            raise ScenarioError(
+                f"there is no scenario {str(source)!r}{hint(str(source), names(), lead='there are')}"
+            )
+    scenario = Scenario(path)
+    scenario.loaded  # noqa: B018 - what is wrong is said now
+    return scenario
+
+
+def names() -> list[str]:
+    """Return the names of all scenarios that `load` takes by name."""
+    files = sorted(SHIPPED.glob("*/*.yaml"))
+    found = [file for file in files if "\nunits:" in file.read_text(encoding="utf-8")]
+    return [file.relative_to(SHIPPED).with_suffix("").as_posix() for file in found]
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A scenario and what is changed in it; made by `load`, never changed itself.
+
+        >>> base = yb.load("fnn_sideslip/25mps")
+        >>> run = base.swap(controller="controller_off").set({"plant.initial_speed": "80 km/h"}).run()
+
+    Attributes:
+        path: the file.
+        changes: what is other than in the file.
+    """
+
+    path: Path
+    changes: tuple[Change, ...] = ()
+    programs: Mapping[Path, Program] = field(default_factory=dict, repr=False)
+    """Units in plain Python, by the path that stands for each."""
+
+    def swap(self, **units: Any) -> Scenario:
+        """Return the scenario with other units.
+
+            >>> base.swap(controller="controller_fnn", tyre="tyre_linear")
+            >>> base.swap(controller="my_controller.fmu")
+            >>> base.swap(controller=lambda yaw_rate_ref, yaw_rate: 2e4 * (yaw_rate_ref - yaw_rate))
+
+        Args:
+            units: unit of the scenario -> the name of an FMU, the path of one, or plain Python: a
+                function whose parameters are named as signals are (`t` is the time in s); an object with
+                `inputs`, `outputs` and `output(t, u)`, perhaps `advance(t, h, u)`, `start(t, u)` and
+                `step_size`; or a component class. Every run works with a copy of an object.
+
+        Raises:
+            ScenarioError: there is no such unit, or what is given cannot stand for one.
+        """
+        given = self.loaded.units
+        changes, programs = [*self.changes], dict(self.programs)
+        for unit, wanted in units.items():
+            if unit not in given:
+                raise ScenarioError(
+                    f"{self.path}: there is no unit {unit!r}{hint(unit, given, lead='units')}"
+                )
+            if isinstance(wanted, (str, Path)):
+                path = Path(wanted).absolute() if Path(wanted).suffix == ".fmu" else wanted
+                changes.append(Change(unit, str(path), "swap"))
+                continue
+            role = _role(self.loaded.replaced.get(unit, given[unit].fmu), unit)
+            program = Program(wanted, unit=unit, role=role)
+            programs[program.path] = program
+            changes.append(Change(unit, str(program.path), "swap"))
+            if program.step_size is not None:
+                changes.append(Change(f"{unit}.step_size", program.step_size, "swap"))
+        return replace(self, changes=tuple(changes), programs=programs)
+
+    def set(self, values: Mapping[str, Value]) -> Scenario:
+        """Return the scenario with other values.
+
+            >>> base.set({"vehicle.mass": 1200, "plant.initial_speed": "80 km/h", "inputs.friction*": 0.3})
+
+        Args:
+            values: as `--set` takes them: `unit.parameter`, `vehicle.parameter`, `inputs.pattern`,
+                `unit.step_size`, `stop_time`, `step_size` or `algorithm` -> value, in SI or with its unit.
+
+        Raises:
+            ScenarioError: a place or value is wrong.
+        """
+        changed = [Change(place, value, "set") for place, value in values.items()]
+        scenario = replace(self, changes=(*self.changes, *changed))
+        scenario.loaded  # noqa: B018 - what is wrong is said now
+        return scenario
+
+    @cached_property
+    def loaded(self) -> Any:
+        """The scenario as its schema has it, all changes applied; the file is read once."""
+        return load_scenario(self.path, changes=self.changes)
+
+    def plan(self) -> Plan:
+        """Return what a run does: units in order, wires, constants, time grid.
+
+        Raises:
+            YawbenchError: an FMU is missing, or the units cannot be connected.
+        """
+        from orchestrator.fmu.archive import open_fmu
+
+        def opened(path: Path) -> Fmu:
+            program = self.programs.get(path)
+            return program.fmu if program else open_fmu(path)
+
+        plan = make_plan(self.loaded, open_=opened)
+        notes = tuple(
+            f"{unit.name}: {unit.fmu.name} is plain Python of this process, no FMU"
+            for unit in plan.units
+            if unit.fmu.path in self.programs
+        )
+        return replace(plan, notes=plan.notes + notes)
+
+    def run(self, *, progress: Callable[[int, int], None] | None = None) -> Run:
+        """Run the scenario in this process and return its results; nothing is written.
+
+        Args:
+            progress: called a few times a second with the steps done and those in all.
+
+        Raises:
+            SimulationError: a unit failed; what Python code raised is its `__cause__`.
+        """
+        plan = self.plan()
+        opened: list[Any] = []
+
+        def opener(unit: Any, log: Any, corrupted: set[Path]) -> Any:
+            program = self.programs.get(unit.fmu.path)
+            slave = program.open(unit, log) if program else open_unit(unit, log, corrupted)
+            opened.append(slave)
+            return slave
+
+        try:
+            return Run(simulate_in_memory(plan, opener=opener, progress=progress))
+        except SimulationError as error:
+            causes = [getattr(slave, "error", None) for slave in opened if slave.name == error.unit]
+            raise error from next(iter(causes), None)
+
+    @property
+    def title(self) -> str:
+        """The scenario's title."""
+        return self.loaded.title
+
+    def _repr_html_(self) -> str:
+        plan = self.plan()
+        rows = "".join(
+            f"<tr><td>{escape(unit.name)}</td><td>{escape(unit.fmu.name)}</td>"
+            f"<td>{escape(unit.fmu.description)}</td></tr>"
+            for unit in plan.units
+        )
+        changed = "".join(f"<br>{escape(str(change))}" for change in self.changes)
+        return f"<b>{escape(plan.title)}</b>{changed}<table>{rows}</table>"
+
+
+def _role(fmu: str, unit: str) -> str:
+    """Return the role of a unit: its FMU's name begins with it, else the unit is called so."""
+    from components.fmi.roles import ROLES
+
+    names = [role.name for role in ROLES.values()]
+    return next((name for name in names if Path(fmu).stem.startswith(f"{name}_")), unit)
