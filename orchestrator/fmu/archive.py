@@ -30,6 +30,7 @@ from pathlib import Path, PurePosixPath
 
 from ..cache import cache_folders
 from ..errors import ModelDescriptionError
+from ..files import PACKED, TooLargeError, check_archive, read_bytes, reason
 from ..plan import Fmu
 from ..wording import closest, listed, short
 from . import description as fmu_description
@@ -93,7 +94,7 @@ def read_archive(path: Path) -> bytes:
         ModelDescriptionError: it cannot be read.
     """
     try:
-        return path.read_bytes()
+        return read_bytes(path, largest=PACKED)
     except FileNotFoundError:
         names = sorted(p.name for p in path.parent.glob("*.fmu")) if path.parent.is_dir() else []
         likely = closest(path.name, names)
@@ -104,18 +105,17 @@ def read_archive(path: Path) -> bytes:
         raise ModelDescriptionError(f"{path}: no such FMU{more}") from None
     except NotADirectoryError:
         return _read_member(path)
-    except OSError as error:
-        raise ModelDescriptionError(f"{path}: cannot read this FMU: {error.strerror}") from None
-    except ValueError as error:  # a null character in the path
-        raise ModelDescriptionError(f"{str(path)!r}: cannot read this FMU: {error}") from None
+    except (OSError, ValueError) as error:
+        raise ModelDescriptionError(f"{path}: cannot read this FMU: {reason(error)}") from None
 
 
 def _read_member(path: Path) -> bytes:
     """Return an FMU that is a member of an archive."""
-    outer = next(above for above in path.parents if above.is_file())
+    outer = next(above for above in path.parents if os.path.isfile(above))
     member = path.relative_to(outer).as_posix()
     try:
         with zipfile.ZipFile(outer) as archive:
+            check_archive(archive)
             return archive.read(member)
     except KeyError:
         raise ModelDescriptionError(f"{path}: no such FMU: {outer} does not hold it") from None
@@ -151,17 +151,18 @@ def whole_entry(entry: Path) -> dict | None:
 
 
 def _unpack(raw: bytes, entry: Path, path: Path) -> Fmu:
-    files = _files(raw, path)
-    fmu = fmu_description.describe(files, raw, path)
-    _make_entry(files, fmu, entry)
+    contents = _files(raw, path)
+    fmu = fmu_description.describe(contents, raw, path)
+    _make_entry(contents, fmu, entry)
     return replace(fmu, directory=entry / "fmu")
 
 
 def _files(raw: bytes, path: Path) -> dict[str, bytes]:
     """Return the content of the archive's files by relative path, none of which leaves the folder."""
-    files = {}
+    contents = {}
     try:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+            check_archive(archive)
             for info in archive.infolist():
                 name = info.filename.replace("\\", "/")
                 parts = PurePosixPath(name).parts
@@ -170,13 +171,15 @@ def _files(raw: bytes, path: Path) -> dict[str, bytes]:
                         f"{path}: the archive is unsafe: it holds the path {info.filename!r}"
                     )
                 if not name.endswith("/"):
-                    files["/".join(parts)] = archive.read(info)
+                    contents["/".join(parts)] = archive.read(info)
+    except TooLargeError as error:
+        raise ModelDescriptionError(f"{path}: cannot read this FMU: {error}") from None
     except _DAMAGE as error:
         if raw[:2] != b"PK":
             raise ModelDescriptionError(f"{path}: no FMU: this is not a zip archive") from None
-        reason = str(error).rstrip(".") or type(error).__name__
-        raise ModelDescriptionError(f"{path}: the archive is damaged or cut off ({reason})") from None
-    return files
+        why = reason(error).rstrip(".")
+        raise ModelDescriptionError(f"{path}: the archive is damaged or cut off ({why})") from None
+    return contents
 
 
 def _make_entry(files: dict[str, bytes], fmu: Fmu, entry: Path) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+from orchestrator import files
 from orchestrator.cache import cache_folder
 from orchestrator.errors import ModelDescriptionError
 from orchestrator.fmu import archive as fmu_archive
@@ -391,3 +392,35 @@ def test_an_identifier_that_leads_out_of_the_archive_is_refused(
         for name, data in content.items():
             archive.writestr(name, data)
     assert "modelIdentifier" in problem(path)
+
+
+@pytest.mark.usefixtures("cache")
+def test_an_archive_that_unpacks_without_limit_is_refused_before_it_is_unpacked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = make_fmu(tmp_path / "bomb.fmu", files={"resources/zeros": bytes(3_000_000)})
+    assert path.stat().st_size < 10_000
+    monkeypatch.setattr(files, "UNPACKED", 2_000_000)
+    monkeypatch.setattr(zipfile.ZipFile, "read", lambda *_: pytest.fail("a member was unpacked"))
+    with pytest.raises(
+        ModelDescriptionError, match=r"bomb.fmu: cannot read this FMU: unpacked it has 3 MB, "
+    ):
+        open_fmu(path)
+
+
+@pytest.mark.usefixtures("cache")
+def test_an_archive_of_very_many_files_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "MEMBERS", 20)
+    path = make_fmu(tmp_path / "many.fmu", files={f"resources/{i}": b"" for i in range(20)})
+    with pytest.raises(ModelDescriptionError, match=r"it holds 22 files, more than 20$"):
+        open_fmu(path)
+
+
+@pytest.mark.usefixtures("cache")
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
+def test_a_pipe_in_place_of_an_fmu_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.fmu")
+    with pytest.raises(
+        ModelDescriptionError, match=r"pipe.fmu: cannot read this FMU: it is a pipe, a socket"
+    ):
+        open_fmu(tmp_path / "pipe.fmu")

@@ -1,0 +1,111 @@
+"""Users' files: opened without waiting, bounded in size, and every mistake in them a sentence.
+
+Every reader of a user's file (scenario, vehicle, study, sweep, SSP archive, FMU, results) gets its bytes
+from `read_bytes` and works inside `reading`. Mistakes that a reader foresees it reports itself, with the
+line; `reading` is for those that nobody foresaw.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from .errors import YawbenchError
+
+TEXT = 1_000_000
+"""Bytes of a YAML file. Chosen: fifty times the largest of ours; reading them takes five seconds."""
+PACKED = 1_000_000_000
+"""Bytes of an archive. Chosen: more than any FMU that we have met, and it is held in memory."""
+UNPACKED = 1_000_000_000
+"""Bytes of all members of an archive. Chosen: likewise."""
+MEMBERS = 50_000
+"""Members of an archive. Chosen: ten times what a whole Python with numpy has."""
+
+
+class TooLargeError(ValueError):
+    """What is in a file is more than is read, in a sentence that begins with "it" or a participle."""
+
+
+def check_regular(path: Path) -> None:
+    """Make sure that a path names a regular file, so that no reader waits for a pipe or a device.
+
+    Raises:
+        OSError: there is none, or a folder.
+        ValueError: it is something else, or no path can be called so.
+    """
+    mode = os.stat(path).st_mode
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(21, "it is a folder", str(path))
+    if not stat.S_ISREG(mode):
+        raise ValueError("it is a pipe, a socket or a device, not a file")
+
+
+def read_bytes(path: Path, *, largest: int) -> bytes:
+    """Return the content of a regular file.
+
+    Raises:
+        OSError: it cannot be opened or read.
+        ValueError: it is no regular file, or no path can be called so.
+        TooLargeError: it is larger than `largest`.
+    """
+    check_regular(path)
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    with open(os.open(path, flags), "rb") as stream:
+        if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):  # exchanged since
+            raise ValueError("it is a pipe, a socket or a device, not a file")
+        content = stream.read(largest + 1)
+    if len(content) > largest:
+        raise TooLargeError(f"it is larger than {_in_words(largest)}")
+    return content
+
+
+def check_archive(archive: zipfile.ZipFile) -> None:
+    """Make sure that an archive has room when unpacked, by what its directory says: no more is ever read.
+
+    Raises:
+        TooLargeError: a sentence.
+    """
+    members = archive.infolist()
+    if len(members) > MEMBERS:
+        raise TooLargeError(f"it holds {len(members)} files, more than {MEMBERS}")
+    size = sum(member.file_size for member in members)
+    if size > UNPACKED:
+        raise TooLargeError(f"unpacked it has {_in_words(size)}, more than {_in_words(UNPACKED)}")
+
+
+def _in_words(size: int) -> str:
+    return f"{size / 1e9:.3g} GB" if size >= 1e9 else f"{size / 1e6:.3g} MB"
+
+
+@contextlib.contextmanager
+def reading(what: str, path: Path | str, error: type[YawbenchError]) -> Iterator[None]:
+    """Turn what nobody foresaw while a user's file is read into one sentence; the cause stays chained.
+
+    Args:
+        what: the file is, or what else is read: "scenario file".
+        path: of the file, or what else says the place.
+        error: raised in place of the cause.
+    """
+    try:
+        yield
+    except YawbenchError:
+        raise
+    except RecursionError as cause:
+        raise error(f"{path}: cannot read this {what}: it is nested too deeply") from cause
+    except MemoryError as cause:
+        raise error(f"{path}: cannot read this {what}: it does not fit into the memory") from cause
+    except OSError as cause:
+        raise error(f"{cause.filename or path}: cannot read this {what}: {reason(cause)}") from cause
+    except Exception as cause:
+        text = f"{type(cause).__name__}: {reason(cause)}"
+        raise error(f"{path}: cannot read this {what}: something in it is not understood ({text})") from cause
+
+
+def reason(error: Exception) -> str:
+    """Return why a file cannot be read, in one line."""
+    text = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return " ".join(str(text).split())
