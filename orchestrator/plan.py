@@ -8,6 +8,10 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 Value = float | int | bool | str
+OF_RUN = ("stop_time", "step_size", "algorithm")
+"""What a change gives without naming a unit."""
+FACTS = ("friction", "speed")
+"""What one change tells all units that have to know it (see `wiring.facts`)."""
 Algorithm = Literal["jacobi", "gauss_seidel", "extrapolated"]
 
 
@@ -130,6 +134,11 @@ class Change:
     place: str  # as in --set: "plant.mass", "inputs.friction*", "stop_time"; a unit or "vehicle" for its file
     value: Value
     origin: str  # "--set", "--swap", "study", "sweep", ...
+
+    @property
+    def swaps(self) -> bool:
+        """Whether the FMU of a unit was replaced."""
+        return "." not in self.place and self.place not in (*OF_RUN, "vehicle", *FACTS)
 
     def __str__(self) -> str:
         value = str(self.value).lower() if isinstance(self.value, bool) else self.value

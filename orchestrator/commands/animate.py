@@ -29,6 +29,7 @@ def animate(folders: Folders, label: Labels = None, out: Page = None) -> None:
     from ..errors import ResultsError, ScenarioError
     from ..pages.animation import MOST, page
     from ..results.read import load_results
+    from ..titles import changed_each, changes_in
     from .batch import say
     from .plot import distinct
 
@@ -38,10 +39,11 @@ def animate(folders: Folders, label: Labels = None, out: Page = None) -> None:
         raise ScenarioError(f"--label: needs one for each run ({len(label)} for {len(folders)} given)")
     runs = list(zip(label or distinct(folders), map(load_results, folders), strict=True))
     titles = [str(results.run.get("title") or name) for name, results in runs]
+    changed = changed_each([(name, changes_in(results.run)) for name, results in runs])
     if len(runs) == 1:
-        text = page(runs, title=titles[0])
+        text = page(runs, title=titles[0], changed=changed)
     else:
-        text = page(runs, below="; ".join(dict.fromkeys(titles)))
+        text = page(runs, below="; ".join(dict.fromkeys(titles)), changed=changed)
     target = folders[0]
     if len(folders) > 1:
         target = Path(os.path.commonpath([folder.absolute().parent for folder in folders]))

@@ -43,7 +43,11 @@ def show(plan: Plan, scenario: Path) -> None:
 
 
 def _print(plan: Plan, scenario: Path, console: Console) -> None:
+    from ..titles import changed
+
     console.print(f"{scenario}: {plan.title}" if plan.title else f"{scenario}")
+    if plan.changes:
+        console.print(f"changed: {changed(plan.changes)}")
     console.print(
         f"{_number(plan.n_steps * plan.step)} s in {plan.n_steps} steps of {_number(1000 * plan.step)} ms, "
         f"{plan.algorithm}; {len(plan.wires)} wires, {len(plan.record)} outputs recorded"

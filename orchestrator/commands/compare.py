@@ -47,6 +47,7 @@ def compare(
     from ..results.formats import check_format
     from ..scenario.overrides import read_changes
     from ..studies.compare import judge_comparison, metric_table, variants, write_comparison
+    from ..titles import changed, changes_in, changes_of_all
     from .batch import print_tables, run_all, say
     from .run import default_folder
 
@@ -58,10 +59,12 @@ def compare(
     work = [replace(job, format=format_, call_limit=limit) for job in made]
     outcomes = run_all(work, folder, workers=jobs)
     comparison = judge_comparison(outcomes)
+    for_all = changes_of_all([changes_in(run.results.run) for run in comparison.runs])
     title = str(comparison.runs[0].results.run.get("title") or "") if comparison.runs else ""
     exchanged = " and ".join(dict.fromkeys(text.partition("=")[0].strip() for text in swap))
-    table = metric_table(comparison, f"{title or scenario.stem} ({exchanged} exchanged)")
-    files = write_comparison(comparison, table, folder)
+    said = changed(for_all)
+    table = metric_table(comparison, f"{title or scenario.stem} ({exchanged} exchanged)", said)
+    files = write_comparison(comparison, table, folder, said)
     print_tables([table])
     given = [
         part
@@ -70,7 +73,7 @@ def compare(
         for part in (option, v)
     ]
     command = shlex.join(["yawbench", "compare", str(scenario), *given])
-    page = write_page(comparison, work, folder, title=table.title, command=command)
+    page = write_page(comparison, work, folder, title=table.title, changed=said, command=command)
     say(f"{folder}: {', '.join(files)}")
     say(f"The page: {page}")
     if comparison.failed:

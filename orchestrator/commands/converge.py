@@ -47,6 +47,7 @@ def converge(
     from ..scenario.overrides import read_changes
     from ..studies.converge import convergence_figure, convergence_table, measure, refinements, write_rows
     from ..studies.tables import for_markdown
+    from ..titles import with_changes
     from ..wording import hint
     from .batch import print_tables, run_all, say
     from .run import default_folder
@@ -57,18 +58,19 @@ def converge(
             raise ScenarioError(f"--algorithm {name}: no such algorithm{guess}")
     default = default_folder(scenario)
     folder = out or default.with_name(f"{default.name}-converge")
+    given = read_changes(swap or (), set_ or ())
     work = refinements(
         scenario,
         halvings=halvings,
         signal=signal,
         algorithms=algorithm or (),  # type: ignore[arg-type]
         out=folder,
-        changes=read_changes(swap or (), set_ or ()),
+        changes=given,
         fmus=fmus,
     )
     outcomes = run_all(work, folder, workers=1)
     rows = measure(outcomes, signal)
-    title = f"Convergence of {signal}, {scenario.stem}"
+    title = with_changes(f"Convergence of {signal}, {scenario.stem}", given)
     table = convergence_table(rows, title)
     write_rows(rows, folder / "converge.csv")
     (folder / "converge.md").write_text(for_markdown(table), encoding="utf-8")

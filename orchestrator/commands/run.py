@@ -53,6 +53,7 @@ def run(
     from ..results.size import size_note
     from ..scenario.load import load_scenario
     from ..scenario.overrides import read_changes
+    from ..titles import changed, with_changes
     from ..wiring.make_plan import make_plan
 
     check_format(format_)
@@ -68,7 +69,10 @@ def run(
     for note in (*plan.notes, size_note(plan, folder, format_)):
         if note:
             _say(f"note: {note}")
-    with _bar(plan.title or scenario.stem) as progress, opener_of(plan, limit) as opener:
+    if plan.changes:
+        _say(f"changed: {changed(plan.changes)}")
+    title = with_changes(plan.title or scenario.stem, plan.changes)
+    with _bar(title) as progress, opener_of(plan, limit) as opener:
         info = simulate(plan, folder, progress=progress, opener=opener, format=format_)
     for message in info.warnings[:SHOWN]:
         grade = "" if message.status == WARNING else f"{STATUS[message.status]}: "

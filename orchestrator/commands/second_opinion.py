@@ -40,6 +40,7 @@ def second_opinion(
     from ..interop.second_opinion import MASTERS, second_opinion
     from ..scenario.load import load_scenario
     from ..scenario.overrides import read_changes
+    from ..titles import changed
     from ..wiring.make_plan import make_plan
     from ..wording import hint
 
@@ -49,6 +50,8 @@ def second_opinion(
             raise ScenarioError(f"--master {name}: there is no such master{hint(name, known, lead='known')}")
     chosen = [known[name.lower()] for name in master or known]
     plan = make_plan(load_scenario(scenario, changes=read_changes(swap or (), set_ or ())), fmus=fmus)
+    if plan.changes:
+        print(f"changed: {changed(plan.changes)}", file=sys.stderr)
     with tempfile.TemporaryDirectory(prefix="yawbench-") as folder:
         try:
             opinions = second_opinion(

@@ -63,6 +63,7 @@ def sweep(
     from ..sweeps.run_sweep import finish, left_to_do
     from ..sweeps.sweep_file import load_sweep
     from ..sweeps.table import Swept, point_text
+    from ..titles import changed
     from .batch import print_tables, say, stoppable
     from .run import default_folder
 
@@ -78,6 +79,8 @@ def sweep(
             left = left_to_do(planned, journal.records, keep=keep, format=format_)
             total = len({run.key for run in planned.runs})
             say(f"{len(planned.runs)} runs{_finished(total - len(left), total)}")
+            if loaded.by_options:
+                say(f"changed: {changed(loaded.by_options)}")
             with _bar(loaded.path.stem, total, total - len(left)) as progress:
                 finish(left, journal, runner=runner, told=_counted(progress, total - len(left)))
             swept = Swept(planned, dict(journal.records))

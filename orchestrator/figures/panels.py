@@ -20,7 +20,7 @@ from ..metrics.signals import words
 from ..results.read import Results
 from .display import digits_of, in_formula, shown_unit
 from .portrait import curves_of, draw_portrait, signals_of
-from .style import REFERENCE, ROW, WIDTH, line_style, note_above
+from .style import REFERENCE, ROW, WIDTH, line_style, literal, note_above
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -89,7 +89,7 @@ def panels_of(runs: Sequence[Run], name: str) -> list[Panel]:
         return [Panel(name, False, lambda axes: _draw_wheels(axes, runs[0], name))]
     four = []
     for k, wheel in enumerate(WHEEL_NAMES):
-        heading = f"{words(name)}, {WHEEL_NAMES[wheel]},"
+        heading = f"{literal(words(name))}, {WHEEL_NAMES[wheel]},"
         four.append(Panel(name.replace("*", wheel), False, _one_wheel(runs, name, k, heading), name))
     return four
 
@@ -133,7 +133,7 @@ def _draw_signal(axes: Axes, runs: Sequence[Run], name: str) -> None:
     for number, run, column, _ in lines:
         unit = run.results.units[column]
         _line(axes, run.results.time, run.results[column], unit, line_style(number))
-    _finish(axes, f"{words(name)} {in_formula(name)}", unit)
+    _finish(axes, f"{literal(words(name))} {in_formula(name)}", unit)
     if references:
         peaks = [(run.label, _peak(run.results[column])) for _, run, column, _ in lines]
         wanted = max(_peak(reference) for reference in references)
@@ -163,7 +163,7 @@ def _draw_error(axes: Axes, runs: Sequence[Run], signal: str) -> None:
         if error is not None:
             _line(axes, run.results.time, error, "%", line_style(number))
             peaks.append((run.label, _peak(error)))
-    _finish(axes, f"{words(signal)}, error in % of max|{in_formula(signal + '_ref')}|", "")
+    _finish(axes, f"{literal(words(signal))}, error in % of max|{in_formula(signal + '_ref')}|", "")
     _limit(axes, max(SEEN_ERROR, min(peak for _, peak in peaks)), peaks, "%")
 
 
@@ -181,7 +181,7 @@ def _draw_wheels(axes: Axes, run: Run, name: str) -> None:
     unit = run.results.units[columns[0]]
     for k, (column, wheel) in enumerate(zip(columns, WHEEL_NAMES, strict=True)):
         _line(axes, run.results.time, run.results[column], unit, {**line_style(k), "label": wheel})
-    _finish(axes, f"{words(name)} {in_formula(name)}", unit)
+    _finish(axes, f"{literal(words(name))} {in_formula(name)}", unit)
     axes.legend(
         loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, handlelength=2.4,
         columnspacing=1.2, borderpad=0.2,
@@ -247,7 +247,7 @@ def thinned(t: np.ndarray, x: np.ndarray, buckets: int = POINTS) -> tuple[np.nda
 
 def _finish(axes: Axes, heading: str, unit: str) -> None:
     text = shown_unit(unit)[0]
-    axes.set_title(f"{heading} in {text}" if text else heading.rstrip(","))
+    axes.set_title(f"{heading} in {literal(text)}" if text else heading.rstrip(","))
     axes.set_xlabel("$t$ in s")
     axes.locator_params(axis="x", nbins=9, steps=[1, 2, 5, 10])
     axes.margins(x=0.01)

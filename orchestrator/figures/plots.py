@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..errors import ResultsError
+from ..titles import changed_each, changes_in
 from .display import digits_of
 from .panels import Panel, Run, shown_by
 from .style import RC, REFERENCE, ROW, frame, line_style, reference_words
@@ -37,6 +38,7 @@ def draw(
     panels: Sequence[str] = OVERVIEW,
     *,
     title: str | None = None,
+    changed: str | None = None,
     note: str | None = None,
 ) -> Figure:
     """Return a figure of the panels with all runs laid over each other.
@@ -45,6 +47,8 @@ def draw(
         runs: the first is drawn first; the legend keeps the order.
         panels: names of panels, in order; those that no run has the signals for are left out.
         title: default: the scenario's title.
+        changed: what was changed, to stand below the title; default: what the runs' records say. With a
+            title that was made for these runs it stands in the note.
         note: the line of provenance at the bottom; default: made from the runs' records.
 
     Raises:
@@ -77,8 +81,11 @@ def draw(
                 below = rows[i + 1] if i + 1 < len(rows) else []
                 if panel.over_time and below and below[0].over_time:
                     axes.set_xlabel("")  # the same time axis stands below
+        said = changes_of(runs) if changed is None else changed
         foot = provenance(runs) if note is None else note
-        frame(figure, ROW * sum(heights), _legend(figure, runs), title or title_of(runs), foot)
+        if title is not None and changed is None and said:
+            foot, said = f"{foot} · changed: {said}", ""
+        frame(figure, ROW * sum(heights), _legend(figure, runs), title or title_of(runs), foot, said)
     return figure
 
 
@@ -112,6 +119,11 @@ def title_of(runs: Sequence[Run]) -> str:
     """Return the title of the runs' scenario, or a general one where they differ."""
     titles = {str(run.results.run.get("title") or "") for run in runs}
     return (titles.pop() if len(titles) == 1 else "") or "Comparison of runs"
+
+
+def changes_of(runs: Sequence[Run]) -> str:
+    """Return what was changed for the runs against their scenarios, in words."""
+    return changed_each([(run.label, changes_in(run.results.run)) for run in runs])
 
 
 def provenance(runs: Sequence[Run]) -> str:

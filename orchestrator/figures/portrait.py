@@ -17,7 +17,7 @@ from ..metrics.run_metrics import columns_of, reference_of
 from ..metrics.signals import words
 from ..results.read import Results
 from .display import digits_of, in_formula, shown_unit
-from .style import REFERENCE, line_style, note_above
+from .style import REFERENCE, line_style, literal, note_above
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -82,14 +82,14 @@ def draw_portrait(axes: Axes, runs: Sequence[tuple[str, Results]], x: str, y: st
         axes.plot(curve.x[-1:], curve.y[-1:], "o", ms=3.5, color=style["color"])
     results = next(results for _, results in runs if columns_of(results, x) and columns_of(results, y))
     units = [shown_unit(results.units[columns_of(results, name)[0]])[0] for name in (x, y)]
-    axes.set_title(f"{words(y)} over {words(x)[0].lower()}{words(x)[1:]}")
+    axes.set_title(literal(f"{words(y)} over {words(x)[0].lower()}{words(x)[1:]}"))
     axes.set_xlabel(_label(x, units[0]))
     axes.set_ylabel(_label(y, units[1]))
     _limit(axes, curves, drawn, units)
 
 
 def _label(signal: str, unit: str) -> str:
-    name = in_formula(signal) or words(signal)
+    name = in_formula(signal) or literal(words(signal))
     return f"{name} in {unit}" if unit else name
 
 

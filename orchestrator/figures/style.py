@@ -57,7 +57,8 @@ WIDTH, ROW = 10.0, 2.25
 """Width of a figure and height of a row of panels [inches]."""
 QUIET = "#666666"
 """The colour of what may be overlooked: provenance, guides."""
-
+CHANGED = "#A33B00"
+"""The colour of what was changed against the scenario that a title names."""
 
 NOTE_WIDTH = 72
 """Characters of a note above a panel of half the figure's width."""
@@ -101,7 +102,7 @@ def reference_words(lines: Iterable[Line2D]) -> str | None:
 
 def note_above(axes: Axes, note: str) -> None:
     """Write a note between a panel and its title."""
-    rows = textwrap.wrap(note, NOTE_WIDTH)
+    rows = textwrap.wrap(literal(note), NOTE_WIDTH)
     axes.set_title(axes.get_title(loc="left"), pad=6 + 10 * len(rows))
     axes.annotate(
         "\n".join(rows), (0, 1), (0, 4), xycoords="axes fraction",
@@ -109,7 +110,14 @@ def note_above(axes: Axes, note: str) -> None:
     )  # fmt: skip
 
 
-def frame(figure: Figure, height: float, handles: Sequence[Artist], title: str, note: str) -> None:
+def literal(text: str) -> str:
+    """Return a user's text so that no `$` in it begins a formula."""
+    return text.replace("$", r"\$")
+
+
+def frame(
+    figure: Figure, height: float, handles: Sequence[Artist], title: str, note: str, changed: str = ""
+) -> None:
     """Set title and legend above the panels and the note below, in room of their own.
 
     Args:
@@ -117,19 +125,27 @@ def frame(figure: Figure, height: float, handles: Sequence[Artist], title: str, 
         height: of all its panels [inches].
         handles: what the legend shows.
         title, note: broken into lines as needed.
+        changed: what was changed against the scenario that the title names; it stands below the title.
     """
     titles, notes = textwrap.wrap(title, 95), textwrap.wrap(note, 165)
+    changes = textwrap.wrap(f"changed: {changed}", 110) if changed else []
+    for handle in handles:
+        handle.set_label(literal(str(handle.get_label())))
     widths = [len(str(handle.get_label())) + 9 for handle in handles]  # characters
     columns = len(handles) if sum(widths) <= 135 else max(1, 135 // max(widths))
-    above = 0.12 + 0.22 * len(titles)
+    above = 0.12 + 0.22 * len(titles) + 0.18 * len(changes) + 0.06 * bool(changes)
     lines = math.ceil(len(handles) / max(columns, 1))
     head, foot = above + 0.2 * lines + 0.08, 0.12 + 0.13 * len(notes)  # inches
     total = height + head + foot
     figure.set_size_inches(WIDTH, total)
     figure.get_layout_engine().set(rect=(0, foot / total, 1, height / total), h_pad=0.07)  # type: ignore[union-attr, call-arg]
     left = 0.1 / WIDTH
-    figure.text(left, 1 - 0.1 / total, "\n".join(titles), va="top", fontsize=12, fontweight="bold")
-    figure.text(left, 0.08 / total, "\n".join(notes), va="bottom", fontsize=7, color=QUIET)
+    below = 1 - (0.12 + 0.22 * len(titles)) / total
+    heading: dict[str, Any] = {"va": "top", "fontweight": "bold"}
+    figure.text(left, 1 - 0.1 / total, literal("\n".join(titles)), fontsize=12, **heading)
+    if changes:
+        figure.text(left, below, literal("\n".join(changes)), fontsize=10, color=CHANGED, **heading)
+    figure.text(left, 0.08 / total, literal("\n".join(notes)), va="bottom", fontsize=7, color=QUIET)
     if handles:
         figure.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(left, 1 - above / total),

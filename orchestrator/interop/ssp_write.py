@@ -41,6 +41,7 @@ from ..scenario.ssp_names import (
     SSD,
     SSV,
 )
+from ..titles import with_changes
 
 _FILE_TIME = (1980, 1, 1, 0, 0, 0)
 _BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
@@ -91,7 +92,7 @@ def system_structure(plan: Plan) -> _Element:
     """
     root = etree.Element(f"{{{SSD}}}SystemStructureDescription", nsmap=NAMESPACES)
     root.set("version", "1.0")
-    root.set("name", plan.title or "scenario")
+    root.set("name", with_changes(plan.title, plan.changes) or "scenario")
     if plan.scenario.get("source"):
         root.set("description", str(plan.scenario["source"]))
     root.set("generationTool", f"yawbench {version('yawbench')}")

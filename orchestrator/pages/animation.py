@@ -61,18 +61,20 @@ def assets() -> Markup:
     return Markup(f"<style>\n{style}</style>\n<script>\n(() => {{\n'use strict';\n{script}}})();\n</script>")
 
 
-def page(runs: Runs, *, title: str = "", below: str = "") -> str:
+def page(runs: Runs, *, title: str = "", below: str = "", changed: str = "") -> str:
     """Return a page of its own; it plays by itself unless the reader has asked for less motion.
 
     Args:
         runs: one or two (label, results).
         title: of the page; default: the labels.
         below: a line under the title.
+        changed: what was changed against the scenario that the title names.
 
     Raises:
         ResultsError: a run's position or yaw angle was not recorded.
     """
-    return render("animation_page.html.j2", assets=assets(), below=below, **_facts(runs, title, alone=True))
+    facts = _facts(runs, title, alone=True)
+    return render("animation_page.html.j2", assets=assets(), below=below, changed=changed, **facts)
 
 
 def _facts(runs: Runs, title: str, *, alone: bool = False) -> dict[str, Any]:

@@ -27,6 +27,7 @@ from ..studies.study import (
 )
 from ..studies.study_file import FIGURES
 from ..studies.tables import Cell, Table
+from ..titles import changed
 from ..wording import counted
 from .diagram import diagrams
 from .facts import anchor, animation_of, figure_of, fmus_of, programs_of
@@ -186,7 +187,7 @@ def settings(findings: Findings) -> Table:
         [
             run.name,
             run.scenario.name,
-            ", ".join(f"{change.place}={change.value}" for change in run.changes) or None,
+            changed(run.changes) or None,
         ]
         for run in findings.study.runs.values()
     ]

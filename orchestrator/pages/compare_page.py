@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from .. import titles
 from ..figures.display import digits_of, shown, shown_unit
 from ..figures.panels import shown_by
 from ..metrics.run_metrics import STANDARD, Value, metric
@@ -50,7 +51,9 @@ class MetricRow:
     cells: list[MetricCell]
 
 
-def write_page(comparison: Comparison, jobs: Sequence[Job], out: Path, *, title: str, command: str) -> Path:
+def write_page(
+    comparison: Comparison, jobs: Sequence[Job], out: Path, *, title: str, changed: str, command: str
+) -> Path:
     """Write the page of a comparison into its folder.
 
     Args:
@@ -58,14 +61,18 @@ def write_page(comparison: Comparison, jobs: Sequence[Job], out: Path, *, title:
         jobs: of all runs; every one can start.
         out: the folder of the comparison.
         title: of the page.
+        changed: what was changed for all runs.
         command: the command line that made the comparison.
     """
     file = out / PAGE
-    file.write_text(compare_page(comparison, jobs, title=title, command=command), encoding="utf-8")
+    text = compare_page(comparison, jobs, title=title, changed=changed, command=command)
+    file.write_text(text, encoding="utf-8")
     return file
 
 
-def compare_page(comparison: Comparison, jobs: Sequence[Job], *, title: str, command: str) -> str:
+def compare_page(
+    comparison: Comparison, jobs: Sequence[Job], *, title: str, changed: str, command: str
+) -> str:
     """Return the page of a comparison as HTML."""
     runs = comparison.runs
     recorded = [run.results for run in runs]
@@ -82,6 +89,7 @@ def compare_page(comparison: Comparison, jobs: Sequence[Job], *, title: str, com
     return render(
         "compare.html.j2",
         title=title,
+        changed=changed,
         style=style(),
         assets=assets(),
         source=str(recorded[0].run.get("scenario", {}).get("source") or "") if recorded else "",
@@ -197,6 +205,7 @@ def settings_table(runs: Sequence[tuple[str, Results]]) -> Table:
         rows.append(
             [
                 label,
+                titles.changed(titles.changes_in(run)) or None,
                 str(run.get("scenario", {}).get("file", "")),
                 str(run.get("algorithm", "")),
                 f"{1000 * run['step_size']:g} ms" if "step_size" in run else None,
@@ -204,4 +213,4 @@ def settings_table(runs: Sequence[tuple[str, Results]]) -> Table:
                 str(results.folder),
             ]
         )
-    return Table("", ["run", "scenario", "algorithm", "step", "until", "results"], rows)
+    return Table("", ["run", "changed", "scenario", "algorithm", "step", "until", "results"], rows)

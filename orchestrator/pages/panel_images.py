@@ -162,4 +162,5 @@ def in_html(title: str) -> Markup:
         return re.sub(r"_(\w+)", r"<sub>\1</sub>", f"<i>{plain}</i>")
 
     escaped = str(Markup.escape(title.replace("'", "’")))
-    return Markup(re.sub(r"\$(.*?)\$", formula, " ".join(escaped.split())))
+    found = re.sub(r"(?<!\\)\$(.*?)(?<!\\)\$", formula, " ".join(escaped.split()))
+    return Markup(found.replace(r"\$", "$"))

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ResultsError
+from ..titles import changes_in, with_changes
 from .columnar import ColumnRecorder, plain
 from .formats import FILES, Table
 
@@ -47,7 +48,11 @@ class MdfRecorder(ColumnRecorder):
         with package.MDF(version="4.10") as mdf:
             if run.get("started"):
                 mdf.header.start_time = datetime.fromisoformat(run["started"])
-            mdf.append(signals, comment=str(run.get("title") or ""), common_timebase=True)
+            mdf.append(
+                signals,
+                comment=with_changes(str(run.get("title") or ""), changes_in(run)),
+                common_timebase=True,
+            )
             data = io.BytesIO()
             mdf.save(data, compression=2)  # transposed before it is deflated: columns change slowly
         self._append(data.getvalue())

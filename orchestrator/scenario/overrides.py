@@ -19,15 +19,13 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ScenarioError
-from ..plan import Change, Value
+from ..plan import OF_RUN, Change, Value
 from ..wording import hint, listed
 from . import yaml_lines
 from .yaml_lines import Document, Key
 
 RESERVED = ("vehicle", "inputs")
 """Words that `--set` understands in place of a unit."""
-OF_RUN = ("stop_time", "step_size", "algorithm")
-"""What `--set` gives without a unit."""
 
 
 def is_path(fmu: str) -> bool:

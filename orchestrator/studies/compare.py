@@ -109,10 +109,10 @@ def judge_comparison(outcomes: Sequence[Outcome]) -> Comparison:
     return Comparison(runs, failed, {run.label: evaluate_all(run.results) for run in runs})
 
 
-def metric_table(comparison: Comparison, title: str) -> Table:
-    """Return a table with one row per metric and one column per run."""
+def metric_table(comparison: Comparison, title: str, changed: str = "") -> Table:
+    """Return a table with one row per metric and one column per run; `changed` for all stands below."""
     labels = [*comparison.values, *comparison.failed]
-    table = Table(title, ["metric", "", *labels])
+    table = Table(title, ["metric", "", *labels], notes=[f"changed: {changed}"] if changed else [])
     for name in STANDARD:
         cells: list[Cell] = [values.get(name) for values in comparison.values.values()]
         if any(cell is not None for cell in cells):
@@ -121,10 +121,12 @@ def metric_table(comparison: Comparison, title: str) -> Table:
     return table
 
 
-def write_comparison(comparison: Comparison, table: Table, out: Path) -> list[str]:
+def write_comparison(comparison: Comparison, table: Table, out: Path, changed: str = "") -> list[str]:
     """Write figures and tables into `out`, under the table's title; return the names of the files."""
     drawable = [name for name, panels in FIGURES.items() if shown_by(comparison.runs, panels)]
-    figures = {name: draw(comparison.runs, FIGURES[name], title=table.title) for name in drawable}
+    figures = {
+        name: draw(comparison.runs, FIGURES[name], title=table.title, changed=changed) for name in drawable
+    }
     written = [path.name for name, figure in figures.items() for path in save(figure, out / name)]
     names = [name for name in STANDARD if any(name in v for v in comparison.values.values())]
     units = {name: value.unit for values in comparison.values.values() for name, value in values.items()}

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from ..figures.display import shown
 from ..metrics.run_metrics import Value, evaluate_all, metric
+from ..titles import changes_in, with_changes
 
 if TYPE_CHECKING:
     import rich.console
@@ -89,7 +90,7 @@ def metrics_of_run(results: Results, names: Sequence[str]) -> Table:
     rows: list[Sequence[Cell]] = [
         [metric(name).title, metric(name).formula, value] for name, value in values.items()
     ]
-    title = str(results.run.get("title") or results.folder)
+    title = with_changes(str(results.run.get("title") or results.folder), changes_in(results.run))
     missing = [name for name in names if name not in values]
     notes = [f"No number for {', '.join(missing)}."] if missing else []
     return Table(title, ["metric", "", "value"], rows, notes)

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ..figures.style import QUIET
+from ..figures.style import QUIET, literal
 from ..metrics.signals import variable_of, words
 from ..studies.study_schema import text_of
 from .design import Level
@@ -105,13 +105,13 @@ class Drawing:
     def name_y(self, left: Sequence[Axes], text: str) -> None:
         """Write what stands upwards beside the panels on the left, broken to their height."""
         for axes in left:
-            axes.set_ylabel("\n".join(textwrap.wrap(text, 34)))
+            axes.set_ylabel(literal("\n".join(textwrap.wrap(text, 34))))
 
     def scale_x(self, axes: Axes) -> None:
         """Set the scale and, for an axis of names, the ticks of x."""
         if not self.sweep.axes[self.spec.x].numeric:
             every = self.levels(self.spec.x)
-            axes.set_xticks(range(len(every)), [level.words for level in every])
+            axes.set_xticks(range(len(every)), [literal(level.words) for level in every])
             axes.set_xlim(-0.5, len(every) - 0.5)
         elif self.sweep.axes[self.spec.x].spacing == "log":
             axes.set_xscale("log")

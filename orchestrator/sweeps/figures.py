@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ..figures.style import RC, ROW, frame
+from ..figures.style import RC, ROW, frame, literal
+from ..titles import changed
 from .drawing import Drawing
 from .limit_drawing import Limits
 from .metric_drawing import Curves, Map
@@ -43,13 +44,14 @@ def draw(swept: Swept, spec: FigureSpec) -> Figure:
             axes.remove()
         for axes, (heading, runs) in zip(drawn, panels, strict=True):
             drawing.fill(axes, runs)
-            axes.set_title(heading)
+            axes.set_title(literal(heading))
         for k, axes in enumerate(drawn):
             if k + columns >= len(drawn):  # none stands below
-                axes.set_xlabel(drawing.label(spec.x))
+                axes.set_xlabel(literal(drawing.label(spec.x)))
                 axes.tick_params(labelbottom=True)
         drawing.finish(figure, drawn, drawn[::columns])
-        frame(figure, height, drawing.handles(), spec.title or drawing.what, _provenance(swept))
+        options = changed(swept.planned.sweep.by_options)
+        frame(figure, height, drawing.handles(), spec.title or drawing.what, _provenance(swept), options)
     return figure
 
 
@@ -57,4 +59,5 @@ def _provenance(swept: Swept) -> str:
     planned, spec = swept.planned, swept.planned.sweep.spec
     fmus = sorted(f"{fmu.name} {digest[:8]}" for digest, fmu in planned.fmus.items())
     parts = [f"{len(planned.runs)} runs of {spec.scenario}", f"FMUs: {', '.join(fmus)}"]
+    parts += [f"changed in all runs: {words}"] if (words := changed(planned.sweep.for_all)) else []
     return " · ".join([spec.source, *parts] if spec.source else parts)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import ResultsError
 from ..figures.display import shown, shown_unit
-from ..figures.style import line_style
+from ..figures.style import line_style, literal
 from ..metrics.run_metrics import metric
 from .drawing import FAILED, GUIDE, PLAIN, Drawing
 from .planning import PlannedRun
@@ -162,7 +162,7 @@ class Map(MetricDrawing):
         self.name_y(left, self.label(self.spec.y))
         beyond = "max" if self.spec.largest is not None else "neither"
         bar = figure.colorbar(drawn[0].collections[0], ax=list(drawn), pad=0.02, fraction=0.05, extend=beyond)
-        bar.set_label(self.measured)
+        bar.set_label(literal(self.measured))
 
     def handles(self) -> list[Artist]:
         from matplotlib.lines import Line2D

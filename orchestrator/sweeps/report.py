@@ -9,6 +9,7 @@ from ..figures.style import save
 from ..metrics.run_metrics import metric
 from ..studies.study import Each
 from ..studies.tables import Cell, Table, for_markdown
+from ..titles import changed
 from ..wording import counted
 from .figures import draw
 from .limits import limit_table
@@ -54,7 +55,11 @@ def _draw(wanted: tuple[Swept, FigureSpec, Path]) -> str | None:
 
 def limit_tables(swept: Swept) -> list[Table]:
     """Return the tables of all limits."""
-    return [limit_table(swept, name) for name in swept.planned.sweep.spec.limits]
+    tables = [limit_table(swept, name) for name in swept.planned.sweep.spec.limits]
+    if words := changed(swept.planned.sweep.by_options):
+        for table in tables:
+            table.notes.append(f"changed: {words}")
+    return tables
 
 
 def _page(swept: Swept, drawn: dict[str, str]) -> str:
@@ -63,6 +68,8 @@ def _page(swept: Swept, drawn: dict[str, str]) -> str:
     ended = f"; {len(failed)} failed" if failed else ""
     head = [f"# {spec.title}", "", *([spec.source, ""] if spec.source else [])]
     head += [f"{counted(len(runs), 'run')} of `{spec.scenario}`, one row each in `{TABLE}`{ended}.", ""]
+    if words := changed(swept.planned.sweep.for_all):
+        head += [f"Changed in all runs: {words}.", ""]
     parts = ["\n".join(head), for_markdown(_metrics(swept))]
     parts += [for_markdown(table) for table in limit_tables(swept)]
     parts += [f"![{title}]({path})\n" for title, path in drawn.items()]

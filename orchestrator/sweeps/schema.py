@@ -36,9 +36,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, model_validator
 
-from ..plan import Algorithm, Value
+from ..plan import OF_RUN, Algorithm, Value
 from ..scenario.measurement_units import parse_unit
-from ..scenario.overrides import OF_RUN
 from ..scenario.schema import Scalar, Time
 from ..scenario.strict import Strict
 from ..studies.study_schema import OPERATORS, MetricSpec, text_of

@@ -34,6 +34,11 @@ class Sweep:
     for_all: tuple[Change, ...] = ()  # in all runs
 
     @property
+    def by_options(self) -> list[Change]:
+        """What is changed in all runs against the file."""
+        return [change for change in self.for_all if change.origin != "sweep"]
+
+    @property
     def identity(self) -> str:
         """What tells sweeps apart: the name of the file and of its folder."""
         return f"{self.path.absolute().parent.name}/{self.path.name}"

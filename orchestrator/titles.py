@@ -1,0 +1,65 @@
+"""What a run is called wherever it is drawn, printed or listed: its title with all that was changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from .plan import Change
+
+
+def changed(changes: Iterable[Change]) -> str:
+    """Return changes in words, `controller_off for controller, inputs.friction* = 0.3`; "" for none."""
+    return ", ".join(map(in_words, changes))
+
+
+def in_words(change: Change) -> str:
+    """Return a change in words."""
+    value = change.value
+    if change.swaps:
+        name = str(value)
+        return f"{Path(name).stem if name.lower().endswith('.fmu') else name} for {change.place}"
+    if change.place == "vehicle":
+        return f"vehicle file {Path(str(value)).name}"
+    text = str(value).lower() if isinstance(value, bool) else str(value)
+    if isinstance(value, float):
+        text = f"{value:.10g}"
+    seconds = " s" if change.place.endswith(("stop_time", "step_size")) and not isinstance(value, str) else ""
+    return f"{change.place} = {text}{seconds}"
+
+
+def with_changes(title: str, changes: Iterable[Change]) -> str:
+    """Return a title in one line with what was changed behind it."""
+    words = changed(changes)
+    return f"{title} (changed: {words})" if words and title else f"changed: {words}" if words else title
+
+
+def changes_in(run: Mapping[str, Any]) -> tuple[Change, ...]:
+    """Return what was changed for a run, by its record."""
+    given = run.get("changes")
+    return tuple(
+        Change(str(one["place"]), one.get("value", ""), str(one.get("origin", "")))
+        for one in (given if isinstance(given, list) else ())
+        if isinstance(one, dict) and "place" in one
+    )
+
+
+def changes_of_all(every: Sequence[Sequence[Change]]) -> tuple[Change, ...]:
+    """Return what was changed alike for all runs."""
+    first, *others = every or [()]
+    return tuple(one for one in first if all(_among(one, changes) for changes in others))
+
+
+def changed_each(labelled: Sequence[tuple[str, Sequence[Change]]]) -> str:
+    """Return what was changed for several runs (label, changes): for all, then for each by its label."""
+    common = changes_of_all([changes for _, changes in labelled])
+    parts = [changed(common)]
+    for label, changes in labelled:
+        own = [one for one in changes if not _among(one, common)]
+        parts += [f"{label}: {changed(own)}"] if own else []
+    return "; ".join(filter(None, parts))
+
+
+def _among(change: Change, changes: Iterable[Change]) -> bool:
+    return any((one.place, one.value) == (change.place, change.value) for one in changes)

@@ -1,0 +1,196 @@
+"""What was changed stands beside the title of everything drawn or printed from a run."""
+
+from __future__ import annotations
+
+import json
+from html import unescape
+from pathlib import Path
+
+import pytest
+
+from fmus.build import build_all
+from orchestrator.cli import main
+from orchestrator.figures import plots
+from orchestrator.figures.panels import Run
+from orchestrator.figures.plots import draw
+from orchestrator.figures.style import save
+from orchestrator.plan import Change
+from orchestrator.results.read import load_results
+from orchestrator.sweeps import figures as sweep_figures
+from orchestrator.titles import changed, changed_each, changes_in, with_changes
+
+from .recorded import car
+
+UNITS = (
+    "driver_sine",
+    "reference_single_track",
+    "controller_off",
+    "controller_fuzzy_feedback",
+    "plant_two_dof",
+    "tyre_magic_formula_1987",
+)
+SCENARIO = Path(__file__).parents[2] / "scenarios" / "fuzzy_feedback" / "single_sine.yaml"
+SET = ("--set", "inputs.friction*=0.3", "--set", "vehicle.mass=1700", "--set", "stop_time=0.05")
+WORDS = ("inputs.friction* = 0.3", "vehicle.mass = 1700", "stop_time = 0.05 s")
+SWEEP = f"""
+title: Amplitudes
+scenario: {SCENARIO}
+axes: {{amplitude: {{vary: driver.amplitude, values: [0.1, 0.12]}}}}
+metrics: {{sideslip: {{metric: peak(sideslip)}}}}
+limits:
+  small: {{says: Largest amplitude, of: amplitude, holds_if: [{{metric: sideslip, at_most: 10 deg}}]}}
+figures: [{{name: peaks, kind: curve, x: amplitude, metric: sideslip}}]
+"""
+
+
+@pytest.fixture(scope="session")
+def fmus(tmp_path_factory):
+    """A folder with the FMUs of paper D."""
+    folder = tmp_path_factory.mktemp("fmus")
+    build_all(folder, components=UNITS)
+    return folder
+
+
+@pytest.fixture
+def yawbench(fmus, tmp_path, monkeypatch, capsys):
+    """Run the command line in an empty folder; return all it printed."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments, fmus=fmus):
+        with pytest.raises(SystemExit) as exit_:
+            main([*map(str, arguments), *(["--fmus", str(fmus)] if fmus else [])])
+        captured = capsys.readouterr()
+        assert not exit_.value.code, captured.err
+        return captured.out, captured.err
+
+    return run
+
+
+def flat(text):
+    """Return a text without the line breaks of a terminal."""
+    return " ".join(text.split())
+
+
+def texts(figure):
+    """Return all text that stands outside the panels of a figure."""
+    return flat(" ".join(text.get_text() for text in figure.texts))
+
+
+def test_everything_made_of_a_run_names_all_that_was_changed(yawbench, tmp_path, monkeypatch):
+    out, said = yawbench("run", SCENARIO, *SET, "--swap", "controller=controller_off", "--out", "r",
+                         "--metric", "peak(sideslip)")  # fmt: skip
+    wanted = ("controller_off for controller", *WORDS)
+    record = json.loads((tmp_path / "r/run.json").read_text())
+    assert [one["place"] for one in record["changes"]] == [
+        "controller", "inputs.friction*", "vehicle.mass", "stop_time",
+    ]  # fmt: skip
+    shown = {"metrics": flat(out), "messages": flat(said)}
+
+    drawn = {}
+    for module in (plots, sweep_figures):
+
+        def kept(figure, *arguments, name=module.__name__, frame=module.frame):
+            frame(figure, *arguments)
+            drawn[name] = texts(figure)
+
+        monkeypatch.setattr(module, "frame", kept)
+    yawbench("plot", "r")
+    shown["figure"] = drawn[plots.__name__]
+    yawbench("animate", "r", fmus=None)
+    shown["animation"] = unescape((tmp_path / "r/animation.html").read_text())
+    shown["check"] = flat(yawbench("check", SCENARIO, *SET, "--swap", "controller=controller_off")[0])
+    for name, text in shown.items():
+        assert [words for words in wanted if words not in text] == [], name
+
+    shown = {}
+    swaps = ("--swap", "controller=controller_off,controller_fuzzy_feedback", "--jobs", "1")
+    shown["comparison"] = flat(yawbench("compare", SCENARIO, *SET, *swaps, "--out", "c")[0])
+    shown["overlay"] = drawn[plots.__name__]
+    shown["page"] = unescape((tmp_path / "c/compare.html").read_text())
+    shown["table"] = (tmp_path / "c/compare.md").read_text()
+    (tmp_path / "sweep.yaml").write_text(SWEEP)
+    out, said = yawbench("sweep", "sweep.yaml", *SET, "--jobs", "1", "--out", "s")
+    shown |= {"limits": flat(out), "messages": flat(said), "sweep": (tmp_path / "s/sweep.md").read_text()}
+    steps = ("--halvings", "2", "--signal", "plant.velocity_x", "--out", "h")
+    shown["convergence"] = flat(yawbench("converge", SCENARIO, *SET, *steps)[0])
+    for name, text in shown.items():
+        assert [words for words in WORDS if words not in text] == [], name
+
+
+def test_the_figure_of_a_sweep_names_what_options_changed(yawbench, fmus, tmp_path):
+    from orchestrator.sweeps.journal import Record
+    from orchestrator.sweeps.planning import plan_sweep
+    from orchestrator.sweeps.sweep_file import load_sweep
+    from orchestrator.sweeps.table import Swept
+    from tests.changed import changed as given
+
+    (tmp_path / "sweep.yaml").write_text(SWEEP)
+    sweep = load_sweep(tmp_path / "sweep.yaml", changes=given(settings=["inputs.friction*=0.3"]))
+    planned = plan_sweep(sweep, tmp_path / "runs", fmus)
+    records = {run.key: Record({"sideslip": (0.1, "rad")}, ()) for run in planned.runs}
+    figure = sweep_figures.draw(Swept(planned, records), sweep.spec.figures[0])
+    assert "changed: inputs.friction* = 0.3" in texts(figure)
+
+
+def made(*changes):
+    """Return a made-up run whose record names changes."""
+    results = car()
+    results.run["changes"] = [vars(change) for change in changes]
+    return results
+
+
+ICE = Change("inputs.friction*", 0.3, "--set")
+OFF = Change("controller", "mine/controller_off.fmu", "--swap")
+SLOW = Change("plant.initial_speed", "50 km/h", "--set")
+
+
+def test_an_overlay_names_what_was_changed_for_all_and_for_each():
+    figure = draw([Run("a", made(ICE, OFF)), Run("b", made(ICE, SLOW))])
+    said = "inputs.friction* = 0.3; a: controller_off for controller; b: plant.initial_speed = 50 km/h"
+    assert f"changed: {said}" in texts(figure)
+
+
+def test_a_figure_with_a_title_of_its_own_names_changes_at_its_foot():
+    figure = draw([Run("a", made(ICE)), Run("b", made(OFF))], title="Figure 7")
+    foot = flat(figure.texts[-1].get_text())
+    assert "changed: a: inputs.friction* = 0.3; b: controller_off for controller" in foot
+
+
+def test_a_long_list_of_changes_is_wrapped_and_never_cut(tmp_path):
+    many = [Change(f"controller.gain_{k}", k / 7, "--set") for k in range(40)]
+    figure = draw([Run("a", made(*many))])
+    save(figure, tmp_path / "long")
+    assert all(f"controller.gain_{k} = " in texts(figure) for k in range(40))
+    assert max(len(line) for text in figure.texts for line in text.get_text().splitlines()) <= 165
+
+
+def test_dollars_in_titles_and_labels_are_no_formulas(tmp_path):
+    results = [made(Change("driver.name", "$x_{", "--set")), made()]
+    for one in results:
+        one.run["title"] = r"Costs $5_{ and $\frac"
+    figure = draw([Run("$a_{$", results[0]), Run(r"$\b$", results[1])])
+    save(figure, tmp_path / "dollars")
+    assert (tmp_path / "dollars.png").stat().st_size > 0
+
+
+def test_changes_are_told_in_words():
+    assert changed([OFF, ICE]) == "controller_off for controller, inputs.friction* = 0.3"
+    assert changed([Change("plant.locked", True, "--set")]) == "plant.locked = true"
+    assert changed([Change("step_size", 0.002, "study")]) == "step_size = 0.002 s"
+    assert changed([Change("vehicle", "/cars/saloon.yaml", "sweep")]) == "vehicle file saloon.yaml"
+    assert with_changes("Lane change", [ICE]) == "Lane change (changed: inputs.friction* = 0.3)"
+    assert with_changes("Lane change", []) == "Lane change"
+    assert changed_each([("a", [ICE]), ("b", [ICE])]) == "inputs.friction* = 0.3"
+    assert changed_each([("a", []), ("b", [ICE])]) == "b: inputs.friction* = 0.3"
+
+
+def test_a_record_of_another_shape_names_no_changes():
+    assert changes_in({}) == changes_in({"changes": 3}) == changes_in({"changes": ["x", {"value": 1}]}) == ()
+
+
+def test_the_record_of_a_swap_reads_back_as_it_was(yawbench, tmp_path):
+    yawbench("run", SCENARIO, "--swap", "controller=controller_off", "--set", "stop_time=0.01", "--out", "r")
+    assert changes_in(load_results(tmp_path / "r").run) == (
+        Change("controller", "controller_off", "--swap"),
+        Change("stop_time", 0.01, "--set"),
+    )
