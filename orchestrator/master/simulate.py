@@ -6,6 +6,7 @@ import contextlib
 import os
 import sys
 import time
+import uuid
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
@@ -17,6 +18,7 @@ import numpy as np
 from ..errors import ResultsError, SimulationError, YawbenchError
 from ..plan import Plan, Unit
 from ..results.columnar import MemoryRecorder
+from ..results.folder import COMPLETED, RUNNING
 from ..results.formats import recorder_of
 from ..results.read import Results
 from ..results.recorder import BLOCK, Recorder
@@ -46,6 +48,7 @@ class RunInfo:
     folder: Path
     rows: int
     columns: int
+    id: str  # in run.json too: which run the results in a folder are of
     wall_time: float  # of initialization and stepping [s]
     passes: int  # of initialization
     warnings: list[Message] = field(default_factory=list)
@@ -62,7 +65,9 @@ def simulate(
     """Run a plan and write its results (`results.csv`) and `run.json` into the folder `out`.
 
     A run that fails or is interrupted (Ctrl-C, SIGTERM) writes what it has recorded, and why it
-    ended, before it raises. Results of an earlier run in `out` are replaced as a whole.
+    ended, before it raises. Results of an earlier run in `out` are replaced as a whole; a run that fails
+    leaves those of one that reached its end, and puts its own into `failed` beside them. All is on the
+    disk before the units are terminated and freed.
 
     Args:
         plan: made by `wiring.make_plan`.
@@ -82,7 +87,7 @@ def simulate(
     run = _go(plan, recorder, progress, opener)
     passes = run.master.passes if run.master else 0
     warnings = list(run.log.warnings())
-    return RunInfo(Path(out), recorder.written, len(plan.record), run.wall_time, passes, warnings)
+    return RunInfo(Path(out), recorder.written, len(plan.record), run.id, run.wall_time, passes, warnings)
 
 
 def simulate_in_memory(
@@ -112,12 +117,16 @@ def _go(plan: Plan, recorder: Recorder | MemoryRecorder, progress: Progress | No
     run = _Run(plan, recorder, progress)
     with interrupts(run.stop, run.abandon):
         try:
-            with np.errstate(all="ignore"):  # what is not finite is found by looking, not by warning
-                run.go(opener)
-        except BaseException as error:
-            run.fail(error)
-            raise
-        run.save("completed")
+            run.announce()
+            try:
+                with np.errstate(all="ignore"):  # what is not finite is found by looking, not by warning
+                    run.go(opener)
+            except BaseException as error:
+                run.fail(error)
+                raise
+            run.save(COMPLETED)
+        finally:
+            run.end()
     return run
 
 
@@ -131,6 +140,10 @@ class _Run:
         self.log = Log()
         self.stop = StopFlag()
         self.master: Master | None = None
+        self.id = uuid.uuid4().hex[:12]
+        self._slaves: dict[str, Slave] = {}
+        self._record: dict[str, Any] = {}  # of the run that has ended
+        self._ended_by: str | None = None  # unit
         self._started = datetime.now(timezone.utc)
         self._began = time.perf_counter()
         self._handed_over = 0  # rows given to the recorder
@@ -140,19 +153,27 @@ class _Run:
     def wall_time(self) -> float:
         return time.perf_counter() - self._began
 
+    def announce(self) -> None:
+        """Write down that the run has begun."""
+        self.recorder.announce(self._recorded(RUNNING))
+
     def go(self, opener: Opener) -> None:
-        """Open, initialize, step, close."""
-        slaves: dict[str, Slave] = {}
+        """Open, initialize, step."""
         corrupted: set[Path] = set()
+        for unit in self.plan.units:
+            self._slaves[unit.name] = opener(unit, self.log, corrupted)
+        self.master = Master(self.plan, self._slaves, self.log, self.stop)
+        self.master.initialize(self.recorder.rows[0], self.recorder.others)
+        self._step(self.master)
+
+    def end(self) -> None:
+        """Terminate and free the units, and note in the record, once that is written, what they said to it."""
         try:
-            for unit in self.plan.units:
-                slaves[unit.name] = opener(unit, self.log, corrupted)
-            self.master = Master(self.plan, slaves, self.log, self.stop)
-            self.master.initialize(self.recorder.rows[0], self.recorder.others)
-            self._step(self.master)
-        finally:
-            for slave in reversed(slaves.values()):
+            for slave in reversed(self._slaves.values()):
                 slave.free()
+        finally:
+            freed = {**self._record, **self.log.record(self._ended_by), "units_freed": True}
+            self.recorder.close(freed if self._record else None)
 
     def _step(self, master: Master) -> None:
         """Step to the end, in stretches short enough to report progress between them."""
@@ -202,29 +223,34 @@ class _Run:
         except ResultsError as lost:
             problems += lost.problems
         else:
-            if self.recorder.folder is not None:
-                problems.append(f"{KEPT}: {self.recorder.folder}")
+            if self.recorder.place is not None:
+                problems.append(f"{KEPT}: {self.recorder.place}")
 
     def abandon(self) -> None:
         """Leave at once: somebody insists, perhaps because a unit never comes back."""
         if self._writing:
             return
-        error = Interrupted("the run was interrupted inside a unit", unit=None, time=self.log.time.value)
+        doing = "while its units were freed" if self._record else "inside a unit"
+        error = Interrupted(f"the run was interrupted {doing}", unit=None, time=self.log.time.value)
         try:
-            self.fail(error)
+            if not self._record:
+                self.fail(error)
         finally:
-            where = "" if self.recorder.folder is None else f"; results so far: {self.recorder.folder}"
+            where = "" if self.recorder.place is None else f"; results so far: {self.recorder.place}"
             print(f"yawbench: {error}{where}", file=sys.stderr, flush=True)
             os._exit(error.exit_status)
 
     def save(self, status: str, error: BaseException | None = None) -> None:
         """Write the record of the run and put the results in place."""
         self._writing = True
-        record = run_record(self.plan, status=status, started=self._started) | self.log.record(
-            getattr(error, "unit", None)
-        )
-        record |= {"wall_time": self.wall_time, "error": self._explained(error)}
+        self._ended_by = getattr(error, "unit", None)
+        ended = {"wall_time": self.wall_time, "error": self._explained(error), "units_freed": False}
+        record = self._recorded(status) | self.log.record(self._ended_by) | ended
         self.recorder.finish(record)
+        self._record, self._writing = record, False
+
+    def _recorded(self, status: str) -> dict[str, Any]:
+        return {"id": self.id, **run_record(self.plan, status=status, started=self._started)}
 
     def _explained(self, error: BaseException | None) -> dict[str, Any] | None:
         if error is None:

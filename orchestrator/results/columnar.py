@@ -66,6 +66,7 @@ class ColumnRecorder(Recorder):
     def write(self, count: int) -> None:
         if count <= 0:
             return
+        self._look_at(self._block[:count])
         self._columns.add(self._block[:count], self.others[:count])
         self.others.clear()
         self.written += count
@@ -83,7 +84,7 @@ class ColumnRecorder(Recorder):
 class MemoryRecorder(Block):
     """A run's results in memory alone, as if they had been written and read back."""
 
-    folder = None
+    folder = place = None
 
     def __init__(
         self, columns: Sequence[str], real: Sequence[bool], units: Mapping[str, str | None] | None = None
@@ -109,7 +110,10 @@ class MemoryRecorder(Block):
             Path(RUN_FILE).parent, time, dict(zip(self.columns, values, strict=True)), units, record
         )
 
-    def discard(self) -> None:
+    def announce(self, run: dict[str, Any]) -> None:
+        """Nothing: there are no files."""
+
+    def close(self, run: dict[str, Any] | None = None) -> None:
         """Nothing: there are no files."""
 
 

@@ -21,6 +21,9 @@ RUN_FILE = "run.json"
 FILES = {"csv": RESULTS_FILE, "parquet": "results.parquet", "mf4": "results.mf4"}
 """Format -> name of its file. CSV is the default: every program reads it, and it survives a kill."""
 
+PART = ".part"
+"""What the names of a run's files end in while it goes on."""
+
 Table = dict[str, np.ndarray]
 """Column, `time` first -> its values: float64, or text."""
 

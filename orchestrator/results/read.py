@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import ResultsError
 from ..wording import listed
+from .folder import settle
 from .formats import FILES, RESULTS_FILE, RUN_FILE, Table, reader_of
 
 __all__ = ["RESULTS_FILE", "RUN_FILE", "Results", "load_results"]
@@ -101,6 +102,7 @@ def load_results(folder: Path | str) -> Results:
         ResultsError: a file is missing, unreadable, cut off or not what `yawbench run` writes.
     """
     folder = Path(folder)
+    settle(folder)
     run_file = folder / RUN_FILE
     try:
         run = json.loads(run_file.read_text(encoding="utf-8"))

@@ -1,8 +1,8 @@
 """Writing results.csv (the other formats: `columnar`) and run.json.
 
-Both are written under temporary names and take their places together at the end, so a folder holds
-either the earlier results or the new ones; while a run writes there, no other may. Rows go out in
-blocks during the run: whatever ends it, what has been recorded stays. Numbers are written so that
+Both are written under temporary names and take their places together at the end (see `folder`), so a
+folder holds either the earlier results or the new ones; while a run writes there, no other may. Rows go
+out in blocks during the run: whatever ends it, what has been recorded stays. Numbers are written so that
 reading them gives the same bits.
 """
 
@@ -11,19 +11,23 @@ from __future__ import annotations
 import contextlib
 import csv
 import errno
+import hashlib
 import io
 import json
 import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from ..errors import ResultsError
 from ..plan import Value
-from .formats import FILES, RESULTS_FILE, RUN_FILE
+from ..writing import reason, write_whole
+from .folder import RUNNING, put_in_place, tidy
+from .formats import PART, RESULTS_FILE, RUN_FILE
+from .lock import Lock
 
 BLOCK = 512
 """Rows kept in memory before they are written."""
@@ -44,6 +48,18 @@ class Block:
         self._block = np.zeros((BLOCK, 1 + sum(real)))
         self.rows = list(self._block)
         self.others: list[list[Value]] = []
+        self._real = [name for name, is_real in zip(columns, real, strict=True) if is_real]
+        self._extremes = np.full((2, sum(real)), np.nan)
+
+    def extremes(self) -> dict[str, dict[str, float]]:
+        """Return the smallest and the largest value of every Real in what has been written."""
+        smallest, largest = (dict(zip(self._real, row.tolist(), strict=True)) for row in self._extremes)
+        return {"smallest": smallest, "largest": largest}
+
+    def _look_at(self, rows: np.ndarray) -> None:
+        """Take note of the extremes of a block, in which NaN are none."""
+        np.fmin(self._extremes[0], np.fmin.reduce(rows[:, 1:]), out=self._extremes[0])
+        np.fmax(self._extremes[1], np.fmax.reduce(rows[:, 1:]), out=self._extremes[1])
 
 
 class Recorder(Block):
@@ -53,6 +69,10 @@ class Recorder(Block):
         folder: made if it does not exist.
         columns, real: see `Block`.
         units: column -> measurement unit, for formats that carry it.
+
+    Attributes:
+        place: where the results are once the run has ended: `folder`, or a folder below it if the run
+            failed and those of one that did not stand there.
 
     Raises:
         ResultsError: another run is writing into the folder, or it or a file in it cannot be written;
@@ -71,27 +91,33 @@ class Recorder(Block):
         units: Mapping[str, str | None] | None = None,
     ) -> None:
         super().__init__(columns, real)
-        self.folder = folder
+        self.folder = self.place = folder
         self.units = dict(units or {})
         self._home = folder.absolute()  # an FMU may change the working directory
-        self._path = self._home / f"{self.file}.part"
-        self._run_path = self._home / f"{RUN_FILE}.part"
-        self._lock: int | None = None
+        self._path = self._home / f"{self.file}{PART}"
+        self._run_path = self._home / f"{RUN_FILE}{PART}"
+        self._lock = Lock(folder)
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            self._lock = _lock(folder)
+            tidy(self._home)
             self._file = self._path.open("wb", buffering=0)
-        except FileExistsError:
-            raise ResultsError(f"{folder}: results cannot be written here: it is no folder.") from None
         except OSError as error:
-            self._unlock()
+            self._lock.release()
             raise ResultsError(f"{folder}: results cannot be written here: {reason(error)}.") from None
         self._size = 0
+        self._digest: Any = hashlib.sha256()
         try:
             self._begin()
         except ResultsError:
             self.discard()
             raise
+
+    def announce(self, run: dict[str, Any]) -> None:
+        """Write down that a run has begun; should it die, its record is there."""
+        try:
+            self._write_record({**run, "status": RUNNING})
+        except OSError as error:
+            self.discard()
+            raise self._unwritable(error) from None
 
     def _begin(self) -> None:
         """Write what stands before the rows."""
@@ -103,6 +129,7 @@ class Recorder(Block):
         """Write the first `count` of `rows`; they are then free again."""
         if count <= 0:
             return
+        self._look_at(self._block[:count])
         values = self._block[:count].tolist()
         if len(self._order) == self._block.shape[1]:
             # the text of a list of lists is the fastest way to many shortest decimal numbers
@@ -130,54 +157,73 @@ class Recorder(Block):
             self._cut_back(data[: len(data) - len(view)])
             raise ResultsError(f"{self.folder / self.file}: cannot be written: {reason(error)}.") from None
         self._size += len(data)
+        if self._digest is not None:
+            self._digest.update(data)
 
     def _cut_back(self, arrived: bytes) -> None:
         """Keep the whole rows of a block that did not fit."""
         whole = arrived.rfind(b"\n") + 1
         self.written += arrived[:whole].count(b"\n") if self._size else 0
         self._size += whole
+        self._digest = None
         with contextlib.suppress(OSError):
             self._file.truncate(self._size)
 
     def finish(self, run: dict[str, Any]) -> None:
-        """Write the record of the run and put both files in their places.
+        """Write the record of the run, see that all is on the disk, and put both files in their places.
 
-        On a full disk the last rows give way to the record, without which the others are no use.
+        On a full disk the last rows give way to the record, without which the others are no use. The
+        folder is held until `close`.
         """
         try:
             self._complete(run)
+            os.fsync(self._file.fileno())
             try:
-                self._write_record(run)
+                self._write_record(self._whole(run))
             except OSError as error:
                 if error.errno != errno.ENOSPC or not self._make_room(len(json.dumps(_plain(run)))):
                     raise
-                self._write_record(run)
+                self._write_record(self._whole(run))
             self._file.close()
-            target = self._home / RUN_FILE
-            target.unlink(missing_ok=True)  # from here on the earlier results are gone as a whole
-            os.replace(self._path, self._home / self.file)
-            for other in FILES.values():
-                if other != self.file:
-                    (self._home / other).unlink(missing_ok=True)
-            os.replace(self._run_path, target)
-            self._unlock()
+            self.place = self.folder / put_in_place(self._home).relative_to(self._home)
         except ResultsError:
             self.discard()
             raise
         except OSError as error:
             self.discard()
-            raise ResultsError(f"{self.folder}: results cannot be written: {reason(error)}.") from None
+            raise self._unwritable(error) from None
+
+    def close(self, run: dict[str, Any] | None = None) -> None:
+        """Let go of the folder.
+
+        Args:
+            run: the record as it is now, if something has happened since `finish`.
+        """
+        if run is not None:
+            with contextlib.suppress(OSError):  # the results are there, and so is their record
+                self._write_record(self._whole(run), self._home / self.place.relative_to(self.folder) / RUN_FILE)
+        self._lock.release()
 
     def _complete(self, run: dict[str, Any]) -> None:
         """Write what stands behind the rows."""
 
-    def _write_record(self, run: dict[str, Any]) -> None:
-        run = {**run, "rows": self.written}
-        if self.file != RESULTS_FILE:
-            run["results"] = self.file
+    def _whole(self, run: dict[str, Any]) -> dict[str, Any]:
+        """Return a run's record with what only the recorder knows."""
+        file = {} if self.file == RESULTS_FILE else {"results": self.file}
+        return {**run, "rows": self.written, **file, "checksum": self._checksum(), **self.extremes()}
+
+    def _checksum(self) -> str:
+        if self._digest is None:  # rows were cut off
+            with self._path.open("rb") as stream:
+                self._digest = digest_of(stream)
+        return f"sha256:{self._digest.hexdigest()}"
+
+    def _write_record(self, run: dict[str, Any], path: Path | None = None) -> None:
         text = json.dumps(_plain(run), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-        # a path that is no UTF-8 comes as lone surrogates, which JSON writes as \\udcxx
-        self._run_path.write_text(text, encoding="utf-8", errors="backslashreplace")
+        write_whole(path or self._run_path, text)
+
+    def _unwritable(self, error: OSError) -> ResultsError:
+        return ResultsError(f"{self.folder}: results cannot be written: {reason(error)}.")
 
     def _make_room(self, needed: int) -> bool:
         """Cut rows off the end of the results; return whether that gave any room."""
@@ -190,6 +236,7 @@ class Recorder(Block):
         whole = lost.find(b"\n") + 1
         self.written -= lost[whole:].count(b"\n")
         self._size = size + whole
+        self._digest = None
         self._file.truncate(self._size)
         return True
 
@@ -199,32 +246,15 @@ class Recorder(Block):
         with contextlib.suppress(OSError):
             self._path.unlink(missing_ok=True)
             self._run_path.unlink(missing_ok=True)
-        self._unlock()
-
-    def _unlock(self) -> None:
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+        self._lock.release()
 
 
-def _lock(folder: Path) -> int | None:
-    """Claim a folder for this run until the descriptor is closed; None where that is not possible.
-
-    Two runs in one folder would write into each other's files.
-    """
-    try:
-        import fcntl
-    except ImportError:  # Windows, where a file that is being written cannot be replaced anyway
-        return None
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        os.close(descriptor)
-        if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
-            raise ResultsError(f"{folder}: another run is writing its results here.") from None
-        return None  # some network drives cannot lock folders
-    return descriptor
+def digest_of(stream: BinaryIO) -> Any:
+    """Return the SHA-256 of a file that is open for reading."""
+    digest = hashlib.sha256()
+    while block := stream.read(1 << 20):
+        digest.update(block)
+    return digest
 
 
 def _order(real: Sequence[bool]) -> list[int]:
@@ -235,13 +265,6 @@ def _order(real: Sequence[bool]) -> list[int]:
         order.append(reals if is_real else others)
         reals, others = reals + is_real, others + (not is_real)
     return order
-
-
-def reason(error: OSError) -> str:
-    """Return why something cannot be written, in words."""
-    if error.errno == errno.ENOSPC:
-        return "the disk is full"
-    return f"{error.strerror or error}"
 
 
 def _plain(value: Any) -> Any:

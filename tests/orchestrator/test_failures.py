@@ -388,9 +388,53 @@ def test_handlers_are_restored_after_a_run(tmp_path):
     assert signal.getsignal(signal.SIGINT) is before
 
 
-def test_a_failed_run_replaces_the_results_of_an_earlier_one_as_a_whole(tmp_path):
+def test_a_failed_run_stands_beside_the_results_of_one_that_reached_its_end(tmp_path):
     units = {"a": Clock(x=math.sin)}
     simulate(make_plan(units), tmp_path, opener=Stage(units))
-    _, results, _ = fail(tmp_path, ramp_into(raise_at(0.5, ValueError("no"))), ["source.x -> target.x"])
-    assert list(results) == ["source.x", "target.y"]
+    failing = ramp_into(raise_at(0.5, ValueError("no")))
+    with pytest.raises(SimulationError) as caught:
+        simulate(make_plan(failing, ["source.x -> target.x"]), tmp_path, opener=Stage(failing))
+    assert caught.value.problems[-1] == f"What was recorded until then: {tmp_path / 'failed'}"
+    results = load_results(tmp_path)
+    assert list(results) == ["a.x"]
+    assert results.run["status"] == "completed"
+    beside = load_results(tmp_path / "failed")
+    assert list(beside) == ["source.x", "target.y"]
+    assert beside.run["status"] == "failed"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["failed", "results.csv", "run.json"]
+
+
+def test_a_run_that_reaches_its_end_replaces_good_and_failed_results(tmp_path):
+    test_a_failed_run_stands_beside_the_results_of_one_that_reached_its_end(tmp_path)
+    units = {"b": Clock(y=math.sin)}
+    simulate(make_plan(units), tmp_path, opener=Stage(units))
+    assert list(load_results(tmp_path)) == ["b.y"]
     assert sorted(p.name for p in tmp_path.iterdir()) == ["results.csv", "run.json"]
+
+
+def test_a_failed_run_replaces_the_results_of_another_that_failed(tmp_path):
+    for connected in (["source.x -> target.x"], []):
+        _, results, _ = fail(tmp_path, ramp_into(raise_at(0.5, ValueError("no"))), connected)
+    assert results.run["connections"] == []
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["results.csv", "run.json"]
+
+
+def test_results_are_whole_on_the_disk_before_a_unit_is_freed(tmp_path):
+    units = {"a": Clock(x=math.sin)}
+    found = []
+
+    class Dying(Stage):
+        def __call__(self, *arguments):
+            slave = super().__call__(*arguments)
+            slave.free = lambda: found.append((load_results(tmp_path), slave.note_end()))
+            slave.note_end = lambda: slave.log.add("a", WARNING, "", "fmi2Terminate returned Error")
+            return slave
+
+    simulate(make_plan(units, n_steps=50), tmp_path, opener=Dying(units))
+    ((before, _),) = found
+    assert len(before.time) == 51
+    assert before.run["status"] == "completed"
+    assert not before.run["units_freed"]
+    after = load_results(tmp_path).run
+    assert after["units_freed"]
+    assert [w["text"] for w in after["warnings"]] == ["fmi2Terminate returned Error"]

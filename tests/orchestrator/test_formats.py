@@ -48,6 +48,7 @@ def record(folder, rows, name):
     units = {k: UNITS.get(k) for k in ("time", *COLUMNS)}
     started = "2024-01-02T03:04:05+00:00"
     writer.finish({"status": "completed", "title": "Sine", "started": started, "units": units})
+    writer.close()
     return load_results(folder)
 
 
@@ -74,6 +75,7 @@ def test_results_in_memory_are_those_on_disk(tmp_path):
     memory = MemoryRecorder(COLUMNS, REAL, UNITS)
     fill(memory, 700)
     memory.finish({"status": "completed"})
+    memory.close()
     alike(memory.results, expected)
     assert memory.results.run == {"status": "completed", "rows": 700}
 
@@ -221,6 +223,7 @@ def test_plot_draws_results_of_every_format(tmp_path):
                 row[:] = values
             writer.write(len(block))
         writer.finish({**recorded.run, "units": recorded.units})
+        writer.close()
     for name in FILES:
         main_ok(["plot", str(tmp_path / name)])
     pictures = [(tmp_path / name / "overview.png").read_bytes() for name in FILES]

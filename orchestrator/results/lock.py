@@ -1,0 +1,155 @@
+"""Who writes into a folder: one command at a time.
+
+A lock is a small file in the folder that says who holds it. The operating system ends the hold when
+the process ends, however it does; the file that a killed process leaves is taken over by the next.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shlex
+import socket
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from pathlib import Path
+
+from ..errors import ResultsError
+from ..writing import claim, fcntl, reason
+
+LOCK_FILE = ".yawbench-lock"
+LOOKS = 5
+"""Times that a lock is asked for again, 10 ms apart; chosen: a look at it takes microseconds."""
+
+
+@dataclass(frozen=True)
+class Holder:
+    """A command that writes into a folder."""
+
+    command: str
+    process: int
+    host: str
+    since: str  # ISO 8601
+
+    @classmethod
+    def here(cls) -> Holder:
+        """Return this process."""
+        name = Path(sys.argv[0]).stem if sys.argv else ""
+        command = shlex.join(["yawbench" if name in ("", "cli", "-c") else name, *sys.argv[1:]])
+        now = datetime.now().astimezone().isoformat(timespec="seconds")
+        return cls(command, os.getpid(), socket.gethostname(), now)
+
+    def __str__(self) -> str:
+        command = self.command if len(self.command) <= 100 else f"{self.command[:97]}..."
+        return f"{command!r} (process {self.process} on {self.host}, since {self.since[11:19]})"
+
+
+class Lock:
+    """The hold of a folder, until it is released. The folder is made if it does not exist.
+
+    Raises:
+        ResultsError: somebody else holds it, or nothing can be written there.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        home = folder.absolute()
+        self._path = home / LOCK_FILE
+        self._made = [place for place in (home, *home.parents) if not place.exists()]
+        self._descriptor: int | None = None
+        try:
+            home.mkdir(parents=True, exist_ok=True)
+            self._descriptor = _claimed(self._path)
+            os.ftruncate(self._descriptor, 0)
+            os.write(self._descriptor, json.dumps(asdict(Holder.here())).encode())
+        except FileExistsError:
+            raise ResultsError(f"{folder}: results cannot be written here: it is no folder.") from None
+        except BlockingIOError:
+            raise _held(folder, _said(self._path)) from None
+        except OSError as error:
+            self.release()
+            raise ResultsError(f"{folder}: results cannot be written here: {reason(error)}.") from None
+
+    def release(self) -> None:
+        """Let go of the folder; one that was made for nothing is removed. Further calls do nothing."""
+        descriptor, self._descriptor = self._descriptor, None
+        if descriptor is not None:
+            if fcntl is None:
+                os.close(descriptor)  # Windows removes no open file
+            with contextlib.suppress(OSError):
+                self._path.unlink()
+            if fcntl is not None:
+                os.close(descriptor)
+        with contextlib.suppress(OSError):
+            for place in self._made:
+                place.rmdir()
+
+
+def _claimed(path: Path) -> int:
+    """Claim a file; one who only looks whether it is held (`holder_of`) is no reason to give up."""
+    for _ in range(LOOKS):
+        with contextlib.suppress(BlockingIOError):
+            return claim(path)
+        time.sleep(0.01)
+    return claim(path)
+
+
+@contextlib.contextmanager
+def writing(*folders: Path) -> Iterator[None]:
+    """Hold folders, and all that is below them, while the block runs.
+
+    Runs of the same command lock their own folders below.
+
+    Raises:
+        ResultsError: another command holds one of them or a folder above, or nothing can be written there.
+    """
+    with contextlib.ExitStack() as stack:
+        for folder in {folder.resolve(): folder for folder in folders}.values():
+            refuse_below_others(folder)
+            stack.callback(Lock(folder).release)
+        yield
+
+
+def refuse_below_others(folder: Path) -> None:
+    """Make sure that no other process holds a folder above.
+
+    Raises:
+        ResultsError: one does.
+    """
+    for above in folder.absolute().parents:
+        holder = holder_of(above)
+        if holder is not None and (holder.process, holder.host) != (os.getpid(), socket.gethostname()):
+            raise _held(above, holder)
+
+
+def holder_of(folder: Path) -> Holder | None:
+    """Return who writes into a folder, None if nobody does."""
+    path = folder / LOCK_FILE
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except OSError:
+        return None
+    try:
+        if fcntl is not None:
+            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            return None
+    except OSError:  # held, or on a network drive that cannot tell
+        pass
+    finally:
+        os.close(descriptor)
+    return _said(path)
+
+
+def _said(path: Path) -> Holder:
+    """Return what a lock file says of its holder, who may not have come to say it."""
+    try:
+        return Holder(**json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return Holder("another run", 0, "this computer", "")
+
+
+def _held(folder: Path, holder: Holder) -> ResultsError:
+    return ResultsError(f"{folder}: {holder} is writing here; wait for it, or give another folder with --out.")
