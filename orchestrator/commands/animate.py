@@ -30,6 +30,7 @@ def animate(folders: Folders, label: Labels = None, out: Page = None) -> None:
     from ..pages.animation import MOST, page
     from ..results.read import load_results
     from ..titles import changed_each, changes_in
+    from ..writing import write_whole
     from .batch import say
     from .plot import distinct
 
@@ -49,8 +50,7 @@ def animate(folders: Folders, label: Labels = None, out: Page = None) -> None:
         target = Path(os.path.commonpath([folder.absolute().parent for folder in folders]))
     file = out or target / "animation.html"
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text, encoding="utf-8")
+        write_whole(file, text)
     except OSError as error:
         raise ResultsError(f"{file}: the page cannot be written: {error.strerror or error}.") from None
     say(f"{file}: {len(text.encode()) / 1000:.0f} kB")

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import click
 import typer
 
 if TYPE_CHECKING:
@@ -38,6 +39,17 @@ def run_all(jobs: Sequence[Job], folder: Path, *, workers: int | None) -> list[O
     check(jobs)
     with stoppable(folder):
         return execute(jobs, workers=workers, done=_progress(len(jobs)))
+
+
+def hold(*folders: Path) -> None:
+    """Claim folders for this command until it has ended.
+
+    Raises:
+        ResultsError: another command is writing there, or nothing can be written.
+    """
+    from ..results.lock import writing
+
+    click.get_current_context().with_resource(writing(*folders))
 
 
 @contextlib.contextmanager

@@ -48,12 +48,13 @@ def compare(
     from ..scenario.overrides import read_changes
     from ..studies.compare import judge_comparison, metric_table, variants, write_comparison
     from ..titles import changed, changes_in, changes_of_all
-    from .batch import print_tables, run_all, say
+    from .batch import hold, print_tables, run_all, say
     from .run import default_folder
 
     default: Path = default_folder(scenario)
     folder = out or default.with_name(f"{default.name}-compare")
     check_format(format_)
+    hold(folder)
     limit = isolation(isolate, call_limit)
     made = variants(scenario, swap, read_changes(settings=set_ or ()), folder, fmus)
     work = [replace(job, format=format_, call_limit=limit) for job in made]

@@ -49,7 +49,8 @@ def converge(
     from ..studies.tables import for_markdown
     from ..titles import with_changes
     from ..wording import hint
-    from .batch import print_tables, run_all, say
+    from ..writing import write_whole
+    from .batch import hold, print_tables, run_all, say
     from .run import default_folder
 
     for name in algorithm or ():
@@ -59,6 +60,7 @@ def converge(
     default = default_folder(scenario)
     folder = out or default.with_name(f"{default.name}-converge")
     given = read_changes(swap or (), set_ or ())
+    hold(folder)
     work = refinements(
         scenario,
         halvings=halvings,
@@ -73,7 +75,7 @@ def converge(
     title = with_changes(f"Convergence of {signal}, {scenario.stem}", given)
     table = convergence_table(rows, title)
     write_rows(rows, folder / "converge.csv")
-    (folder / "converge.md").write_text(for_markdown(table), encoding="utf-8")
+    write_whole(folder / "converge.md", for_markdown(table))
     print_tables([table])
     files = ["converge.csv", "converge.md"]
     if any(row.error for row in rows):

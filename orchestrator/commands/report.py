@@ -47,7 +47,8 @@ def report(
     from ..studies.study import all_tables, judge_study
     from ..studies.study_report import write_study
     from ..wording import counted
-    from .batch import print_tables, run_all, say, stoppable
+    from ..writing import write_whole
+    from .batch import hold, print_tables, run_all, say, stoppable
     from .run import default_folder
 
     if again and no_run:
@@ -59,6 +60,7 @@ def report(
     if out is not None:
         below = [out / path.absolute().parent.name / path.stem for path in paths]
         folders = [out] if len(paths) == 1 else below
+    hold(*folders)
     every = [
         wanted(path, folder, fmus=fmus, format=format_) for path, folder in zip(paths, folders, strict=True)
     ]
@@ -84,9 +86,8 @@ def report(
             print_tables(all_tables(findings))
         verdicts = ", ".join(f"{word}: {count}" for word, count in facts["counts"].items())
         say(f"{one.study.spec.title}: {verdicts or 'no claims of its own'}")
-    page_folder.mkdir(parents=True, exist_ok=True)
     page = page_folder / PAGE
-    page.write_text(report_page(chapters), encoding="utf-8")
+    write_whole(page, report_page(chapters))
     say(f"The report: {page} ({page.stat().st_size / 1e6:.1f} MB)")
     if failed:
         raise typer.Exit(1)

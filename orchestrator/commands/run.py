@@ -50,6 +50,7 @@ def run(
     from ..master.log import STATUS, WARNING
     from ..master.simulate import simulate
     from ..results.formats import check_format
+    from ..results.lock import refuse_below_others
     from ..results.size import size_note
     from ..scenario.load import load_scenario
     from ..scenario.overrides import read_changes
@@ -66,6 +67,7 @@ def run(
 
         run_metrics.check_metrics(plan, map(run_metrics.metric, named))
     folder = out or default_folder(scenario)
+    refuse_below_others(folder)
     for note in (*plan.notes, size_note(plan, folder, format_)):
         if note:
             _say(f"note: {note}")

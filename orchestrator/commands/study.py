@@ -38,13 +38,14 @@ def study(
     from ..studies.study import all_tables, judge_study
     from ..studies.study_file import load_study
     from ..studies.study_report import REPORT, write_study
-    from .batch import print_tables, run_all, say, stoppable
+    from .batch import hold, print_tables, run_all, say, stoppable
     from .run import default_folder
 
     check_format(format_)
     limit = isolation(isolate, call_limit)
     loaded = load_study(file)
     folder = out or default_folder(file)
+    hold(folder)
     outcomes: list[Outcome] = []
     if not no_run:
         made = [run.job(folder, fmus) for run in loaded.runs.values()]

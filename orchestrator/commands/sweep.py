@@ -64,13 +64,14 @@ def sweep(
     from ..sweeps.sweep_file import load_sweep
     from ..sweeps.table import Swept, point_text
     from ..titles import changed
-    from .batch import print_tables, say, stoppable
+    from .batch import hold, print_tables, say, stoppable
     from .run import default_folder
 
     check_format(format_)
     limit = isolation(isolate, call_limit)
     loaded = load_sweep(file, changes=read_changes(swap or (), set_ or ()))
     folder = out or default_folder(file)
+    hold(folder)
     with stoppable(folder):
         with _bar("planning", len(loaded.points), quiet=True) as planning:
             planned = plan_sweep(loaded, folder / "runs", fmus, call_limit=limit, progress=planning)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import textwrap
 import warnings
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ResultsError
+from ..writing import reason, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -84,12 +86,12 @@ def save(figure: Figure, stem: Path) -> list[Path]:
             layout.execute(figure)  # once, not once per file
             figure.set_layout_engine("none")
         try:
-            stem.parent.mkdir(parents=True, exist_ok=True)
-            figure.savefig(paths[0], metadata={"Date": None})
-            figure.savefig(paths[1], metadata={"Software": None})
+            for path, metadata in zip(paths, ({"Date": None}, {"Software": None}), strict=True):
+                content = io.BytesIO()
+                figure.savefig(content, format=path.suffix[1:], metadata=metadata)
+                write_whole(path, content.getvalue())
         except OSError as error:
-            reason = error.strerror or error
-            raise ResultsError(f"{stem}: the figure cannot be written: {reason}.") from None
+            raise ResultsError(f"{stem}: the figure cannot be written: {reason(error)}.") from None
     return paths
 
 

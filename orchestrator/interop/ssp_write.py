@@ -11,10 +11,9 @@ value of another one. Equal plans give equal bytes.
 
 from __future__ import annotations
 
+import io
 import math
-import os
 import re
-import tempfile
 import zipfile
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
@@ -42,6 +41,7 @@ from ..scenario.ssp_names import (
     SSV,
 )
 from ..titles import with_changes
+from ..writing import write_whole
 
 _FILE_TIME = (1980, 1, 1, 0, 0, 0)
 _BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
@@ -61,18 +61,13 @@ def write_ssp(plan: Plan, path: Path) -> None:
         raise ResultsError(f"{path}: cannot write this archive: {error}") from None
     description = etree.tostring(structure, xml_declaration=True, encoding="UTF-8", pretty_print=True)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, scratch = tempfile.mkstemp(prefix=path.name, suffix=".part", dir=path.parent)
-        try:
-            with os.fdopen(handle, "wb") as stream, zipfile.ZipFile(stream, "w") as archive:
-                _put(archive, DESCRIPTION_FILE, description)
-                for sha256, source in sorted(sources.items(), key=lambda item: item[1]):
-                    fmu = next(unit.fmu for unit in plan.units if unit.fmu.sha256 == sha256)
-                    _put(archive, source, read_archive(fmu.path))
-            os.chmod(scratch, 0o644)
-            os.replace(scratch, path)
-        finally:
-            Path(scratch).unlink(missing_ok=True)
+        content = io.BytesIO()
+        with zipfile.ZipFile(content, "w") as archive:
+            _put(archive, DESCRIPTION_FILE, description)
+            for sha256, source in sorted(sources.items(), key=lambda item: item[1]):
+                fmu = next(unit.fmu for unit in plan.units if unit.fmu.sha256 == sha256)
+                _put(archive, source, read_archive(fmu.path))
+        write_whole(path, content.getvalue())
     except OSError as error:
         raise ResultsError(f"{path}: cannot write this archive: {error.strerror or error}") from None
 

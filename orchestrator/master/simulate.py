@@ -167,7 +167,7 @@ class _Run:
         self._step(self.master)
 
     def end(self) -> None:
-        """Terminate and free the units, and note in the record, once that is written, what they said to it."""
+        """Terminate and free the units, and note in the record what they said to it."""
         try:
             for slave in reversed(self._slaves.values()):
                 slave.free()

@@ -16,6 +16,7 @@ from ..studies.compare import FIGURES, Comparison
 from ..studies.jobs import Job, Once, planned
 from ..studies.tables import Cell, Table
 from ..wording import counted
+from ..writing import write_whole
 from .animation import MOST, assets
 from .diagram import diagrams
 from .divergence import SAME, SEEN, Divergence, Parting, divergence
@@ -67,6 +68,7 @@ def write_page(
     file = out / PAGE
     text = compare_page(comparison, jobs, title=title, changed=changed, command=command)
     file.write_text(text, encoding="utf-8")
+    write_whole(file, compare_page(comparison, jobs, title=title, command=command))
     return file
 
 

@@ -106,9 +106,7 @@ def death(folder: Path) -> str:
     """Return a sentence on a run that has died in a folder."""
     begun = str(_record(folder / f"{RUN_FILE}{PART}").get("started") or "")
     when = f" begun at {begun}" if begun else ""
-    beside = (
-        "; the results of the run before it are read again then" if _status(folder / RUN_FILE) else ""
-    )
+    beside = "; the results of the run before it are read again then" if _status(folder / RUN_FILE) else ""
     return (
         f"{folder}: the run{when} ended without a word; run it again, or keep what it recorded with "
         f"'yawbench salvage {folder}'{beside}."

@@ -152,4 +152,6 @@ def _said(path: Path) -> Holder:
 
 
 def _held(folder: Path, holder: Holder) -> ResultsError:
-    return ResultsError(f"{folder}: {holder} is writing here; wait for it, or give another folder with --out.")
+    return ResultsError(
+        f"{folder}: {holder} is writing here; wait for it, or give another folder with --out."
+    )

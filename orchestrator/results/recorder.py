@@ -201,7 +201,9 @@ class Recorder(Block):
         """
         if run is not None:
             with contextlib.suppress(OSError):  # the results are there, and so is their record
-                self._write_record(self._whole(run), self._home / self.place.relative_to(self.folder) / RUN_FILE)
+                self._write_record(
+                    self._whole(run), self._home / self.place.relative_to(self.folder) / RUN_FILE
+                )
         self._lock.release()
 
     def _complete(self, run: dict[str, Any]) -> None:

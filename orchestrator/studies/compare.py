@@ -15,6 +15,7 @@ from ..metrics.run_metrics import STANDARD, Value, evaluate_all, metric
 from ..plan import Change
 from ..scenario.load import load_scenario
 from ..scenario.overrides import is_path, swap_of
+from ..writing import write_whole
 from .jobs import Job, Outcome, read_back
 from .study_schema import text_of
 from .tables import Cell, Table, for_markdown, si, write_csv
@@ -103,7 +104,7 @@ class Comparison:
 
 def judge_comparison(outcomes: Sequence[Outcome]) -> Comparison:
     """Read the results back from disk and compute the standard metrics."""
-    found = [(outcome.job.label, outcome.reason or read_back(outcome.job.out)) for outcome in outcomes]
+    found = [(one.job.label, one.reason or read_back(one.job.out, one.value)) for one in outcomes]
     runs = [Run(label, results) for label, results in found if not isinstance(results, str)]
     failed = {label: reason for label, reason in found if isinstance(reason, str)}
     return Comparison(runs, failed, {run.label: evaluate_all(run.results) for run in runs})
@@ -138,5 +139,5 @@ def write_comparison(comparison: Comparison, table: Table, out: Path, changed: s
     write_csv(out / METRICS, ["run", "status", *(f"{name} [{si(units[name])}]" for name in names)], rows)
     failed = "".join(f"\n{label} failed: {why}\n" for label, why in comparison.failed.items())
     pictures = "".join(f"\n![{name}]({name})\n" for name in written if name.endswith(".png"))
-    (out / REPORT).write_text(f"{for_markdown(table)}{failed}{pictures}", encoding="utf-8")
+    write_whole(out / REPORT, f"{for_markdown(table)}{failed}{pictures}")
     return [*written, METRICS, REPORT]

@@ -125,7 +125,7 @@ def _given(outcome: Outcome, place: str) -> Plain:
 
 def _samples(outcome: Outcome, signal: str) -> tuple[np.ndarray | None, float | None, str]:
     """Return the signal, the wall time [s] and why there is neither."""
-    found = outcome.reason or read_back(outcome.job.out)
+    found = outcome.reason or read_back(outcome.job.out, outcome.value)
     if isinstance(found, str):
         return None, None, found
     if not np.issubdtype(found[signal].dtype, np.number):

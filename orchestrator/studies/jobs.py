@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ResultsError, ScenarioError, YawbenchError
 from ..master.interrupts import StopFlag, interrupts
 from ..plan import Change, Fmu, Plan
-from ..results.formats import FILES, RUN_FILE
 from ..results.read import Results, load_results
 from ..scenario import yaml_lines
 from ..scenario.yaml_lines import Document
@@ -143,8 +142,8 @@ def _problems(job: Job, once: Once) -> list[str]:
     return []
 
 
-def run_job(job: Job) -> None:
-    """Make one run in this process; return nothing, for the results are on disk.
+def run_job(job: Job) -> str:
+    """Make one run in this process; return its id, for the results are on disk.
 
     Raises:
         YawbenchError: the scenario is wrong or the run failed.
@@ -154,7 +153,7 @@ def run_job(job: Job) -> None:
 
     plan = plan_of(job)
     with opener_of(plan, job.call_limit) as opener:
-        simulate(plan, job.out, opener=opener, format=job.format)
+        return simulate(plan, job.out, opener=opener, format=job.format).id
 
 
 def default_workers() -> int:
@@ -172,7 +171,6 @@ def execute(
 ) -> list[Outcome]:
     """Run all jobs, so many at a time, each in a fresh process; return their outcomes in order.
 
-    Results of an earlier run in a job's folder are deleted first, so that none can pass for new.
     Ctrl-C is looked at between two runs' ends, never while a process is being started, which would
     leave one that nobody knows.
 
@@ -243,9 +241,6 @@ class _Running:
 
     @classmethod
     def start(cls, number: int, job: Job, context: Any, run: Callable[[Job], Any]) -> _Running:
-        for name in (*FILES.values(), RUN_FILE):
-            with suppress(OSError):
-                (job.out / name).unlink()
         ours, theirs = context.Pipe(duplex=False)
         process = context.Process(target=_work, args=(job, run, theirs), daemon=True)
         process.start()
@@ -296,12 +291,19 @@ def _death(code: int | None) -> str:
     return f"the process of this run ended without a word, exit status {code}"
 
 
-def read_back(folder: Path) -> Results | str:
-    """Return the results of a run that reached its end, or a sentence that says why there are none."""
+def read_back(folder: Path, run: str | None = None) -> Results | str:
+    """Return the results of a run that reached its end, or a sentence that says why there are none.
+
+    Args:
+        folder: of the results.
+        run: the id of the run that they must be of; None: whichever was the last.
+    """
     try:
         results = load_results(folder)
     except ResultsError as error:
         return str(error)
+    if run is not None and results.run.get("id") != run:
+        return f"{folder}: holds the results of another run than the one just made"
     if results.run.get("status") == "completed":
         return results
     message = (results.run.get("error") or {}).get("message", "no reason recorded")

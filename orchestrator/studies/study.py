@@ -50,12 +50,13 @@ def judge_study(study: Study, out: Path, outcomes: Iterable[Outcome] = (), *, ea
     Raises:
         ScenarioError: a claim's bound is in a unit that its metric does not have.
     """
-    reasons = {outcome.job.label: outcome.reason for outcome in outcomes if not outcome.ok}
+    made = {outcome.job.label: outcome for outcome in outcomes}
     results: dict[str, Results] = {}
     failed: dict[str, str] = {}
-    recorded = each(read_back, [out / name for name in study.runs])
+    ids = [made[name].value if name in made else None for name in study.runs]
+    recorded = each(read_back, [out / name for name in study.runs], ids)
     for name, read in zip(study.runs, recorded, strict=True):
-        found = reasons.get(name) or read
+        found = (made[name].reason if name in made else "") or read
         if isinstance(found, str):
             failed[name] = found
         else:

@@ -14,6 +14,7 @@ from ..figures.plots import draw
 from ..figures.style import save
 from ..metrics.run_metrics import Value, metric
 from ..results.read import Results
+from ..writing import write_whole
 from .claims import Judgement, condition_text
 from .study import Each, Findings, all_tables, heading, verdict
 from .study_file import FIGURES
@@ -25,12 +26,11 @@ REPORT, METRICS, RECORD = "study.md", "metrics.csv", "study.json"
 
 def write_study(findings: Findings, out: Path, *, each: Each = map) -> list[str]:
     """Write everything that a study leaves on disk into `out`; return what could not be drawn."""
-    out.mkdir(parents=True, exist_ok=True)
     drawn, problems = draw_figures(findings, out, each)
     write_metrics(findings, out / METRICS)
-    (out / REPORT).write_text(_markdown(findings, drawn), encoding="utf-8")
+    write_whole(out / REPORT, _markdown(findings, drawn))
     record = json.dumps(_record(findings, drawn), indent=1, ensure_ascii=False, allow_nan=False)
-    (out / RECORD).write_text(record + "\n", encoding="utf-8")
+    write_whole(out / RECORD, record + "\n")
     return problems
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 import textwrap
 from collections.abc import Sequence
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 from ..figures.display import shown
 from ..metrics.run_metrics import Value, evaluate_all, metric
 from ..titles import changes_in, with_changes
+from ..writing import write_whole
 
 if TYPE_CHECKING:
     import rich.console
@@ -98,11 +100,11 @@ def metrics_of_run(results: Results, names: Sequence[str]) -> Table:
 
 def write_csv(path: Path, headings: Sequence[str], rows: Sequence[Sequence[Cell]]) -> None:
     """Write rows for programs: numbers in SI with all their digits, ratios as such, nothing for nothing."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(headings)
-        writer.writerows([_plain(cell) for cell in row] for row in rows)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(headings)
+    writer.writerows([_plain(cell) for cell in row] for row in rows)
+    write_whole(path, text.getvalue())
 
 
 def _plain(cell: Cell) -> str:

@@ -1,7 +1,7 @@
 """Which runs of a sweep are finished, and what they came to: one line per run, written as it ends.
 
 The file is only ever appended to, each line is on the disk before the next run is counted, and a
-line that a kill has cut off is dropped when the sweep goes on. One sweep at a time may write it.
+line that a kill has cut off is dropped when the sweep goes on. The folder is held by its writer.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ResultsError
-from ..results.recorder import reason
+from ..writing import reason
 from .measuring import Measured
 
 FILE = "runs.jsonl"
@@ -41,7 +41,7 @@ class Journal:
         fresh: forget all runs that are finished, whichever sweep they are of.
 
     Raises:
-        ResultsError: the folder holds another sweep, one is running there, or it cannot be written.
+        ResultsError: the folder holds another sweep, or it cannot be written.
     """
 
     def __init__(self, folder: Path, identity: str, *, fresh: bool = False) -> None:
@@ -54,7 +54,6 @@ class Journal:
         except OSError as error:
             raise ResultsError(f"{folder}: results cannot be written here: {reason(error)}.") from None
         try:
-            self._lock()
             if fresh:
                 os.ftruncate(self._file, 0)
             lines, whole = _whole_lines(path.read_bytes())
@@ -63,18 +62,6 @@ class Journal:
         except BaseException:
             self.close()
             raise
-
-    def _lock(self) -> None:
-        try:
-            import fcntl
-        except ImportError:  # Windows
-            return
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise ResultsError(f"{self.folder}: another sweep is running here.") from None
-        except OSError:  # some network drives cannot lock
-            return
 
     def _take_over(self, lines: list[bytes], identity: str) -> None:
         path = self.folder / FILE

@@ -11,6 +11,7 @@ from ..studies.study import Each
 from ..studies.tables import Cell, Table, for_markdown
 from ..titles import changed
 from ..wording import counted
+from ..writing import write_whole
 from .figures import draw
 from .limits import limit_table
 from .schema import FigureSpec
@@ -40,7 +41,7 @@ def write_sweep(swept: Swept, out: Path, *, each: Each = map) -> list[str]:
             problems.append(f"figure {figure.name}: {problem}")
         else:
             drawn[figure.title or figure.name] = f"{FIGURES}/{figure.name}.png"
-    (out / REPORT).write_text(_page(swept, drawn), encoding="utf-8")
+    write_whole(out / REPORT, _page(swept, drawn))
     return problems
 
 

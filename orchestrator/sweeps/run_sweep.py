@@ -6,9 +6,7 @@ from collections.abc import Callable, Mapping
 
 from ..errors import ResultsError
 from ..master.simulate import KEPT
-from ..results.formats import RUN_FILE
-from ..results.read import load_results
-from ..studies.jobs import Outcome
+from ..studies.jobs import Outcome, read_back
 from .journal import Journal, Record
 from .local import run_here
 from .measuring import Measurement, Metrics
@@ -46,9 +44,7 @@ def left_to_do(
 
 def _lost(run: PlannedRun, record: Record) -> bool:
     """Return whether a run that went well has left no results."""
-    if not record.ok or not (run.job.out / RUN_FILE).exists():
-        return record.ok
-    return load_results(run.job.out).run.get("status") != "completed"
+    return record.ok and isinstance(read_back(run.job.out), str)
 
 
 def finish(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,9 +10,9 @@ from typing import Any
 
 from ..errors import ResultsError
 from ..metrics.run_metrics import Value, metric
-from ..results.recorder import reason
 from ..studies.study_schema import si_number
 from ..studies.tables import si
+from ..writing import reason, write_whole
 from .journal import Record
 from .planning import Planned, PlannedRun
 
@@ -105,12 +104,11 @@ def write_table(swept: Swept, path: Path) -> None:
     columns.append((pa.field("key", pa.string()), [run.key for run in runs]))
     schema = pa.schema([field for field, _ in columns], metadata={"sweep": _description(swept)})
     arrays = [pa.array(values, type=field.type) for field, values in columns]
-    part = path.with_name(f"{path.name}.part")
+    content = pa.BufferOutputStream()
+    pq.write_table(pa.Table.from_arrays(arrays, schema=schema), content, compression="zstd")
     try:
-        pq.write_table(pa.Table.from_arrays(arrays, schema=schema), part, compression="zstd")
-        os.replace(part, path)
+        write_whole(path, content.getvalue().to_pybytes())
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise ResultsError(f"{path}: cannot be written: {reason(error)}.") from None
 
 

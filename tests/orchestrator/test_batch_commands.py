@@ -13,6 +13,7 @@ import pytest
 
 from fmus.build import build_all
 from orchestrator.cli import main
+from orchestrator.results.lock import LOCK_FILE, Holder, Lock
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
 
@@ -207,6 +208,38 @@ def test_study_finds_a_wrong_scenario_before_anything_runs(yawbench, folder):
     assert "has no parameter 'frequenzy'; did you mean 'frequency'?" in said
     assert said.count("\n") == 1  # once, though two runs have it
     assert not (folder / "o").exists()
+
+
+SWEEP = """
+title: Half a sweep
+scenario: half.yaml
+axes: {gain: {vary: driver.amplitude, values: [0.01, 0.02], unit: rad}}
+metrics: {moment: {metric: peak(yaw_moment)}}
+"""
+WRITERS = {
+    "run": ("half.yaml",),
+    "compare": ("half.yaml", "--swap", "controller=controller_off"),
+    "converge": ("half.yaml", "--signal", "controller.yaw_moment"),
+    "study": ("study.yaml",),
+    "report": ("study.yaml",),
+    "sweep": ("sweep.yaml",),
+}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="folders cannot be locked")
+@pytest.mark.parametrize("command", WRITERS)
+def test_a_command_leaves_a_folder_alone_that_another_is_writing(command, yawbench, folder):
+    (folder / "sweep.yaml").write_text(SWEEP)
+    lock = Lock(folder / "o")
+    before = sorted((folder / "o").iterdir())
+    status, out, said = yawbench(command, *WRITERS[command], "--out", "o")
+    assert (status, out) == (2, "")
+    assert f"o: {Holder.here().command!r} (process {os.getpid()}" in said
+    assert said.endswith("is writing here; wait for it, or give another folder with --out.\n")
+    assert sorted((folder / "o").iterdir()) == before
+    lock.release()
+    assert yawbench(command, *WRITERS[command], "--out", "o")[0] == 0
+    assert not list((folder / "o").rglob(LOCK_FILE))
 
 
 LONG = """

@@ -92,7 +92,9 @@ def test_a_run_that_dies_while_its_files_get_their_names_is_caught_up_with(
                 raise KeyboardInterrupt
         replace(source, target)
 
-    signals = {"x": math.cos} if status == "completed" else {"x": lambda t: math.cos(t) if t < 0.05 else 1 / 0}
+    signals = (
+        {"x": math.cos} if status == "completed" else {"x": lambda t: math.cos(t) if t < 0.05 else 1 / 0}
+    )
     monkeypatch.setattr(module.os, "replace", replace_until_death)
     try:
         run(tmp_path, **signals)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 ORCHESTRATOR = Path(__file__).parents[2] / "orchestrator"
 STAGES = (
-    {"errors", "files", "wording", "plan", "sources", "cache", "titles"},  # what all share
+    {"errors", "wording", "plan", "sources", "cache", "files", "titles", "writing"},  # what all share
     {"scenario"},
     {"fmu"},
     {"wiring"},

@@ -322,14 +322,6 @@ def test_a_folder_of_another_sweep_is_refused(moods, yawbench, tmp_path):
     assert yawbench(other, "out", "--fresh")[0] == 0
 
 
-def test_two_sweeps_cannot_write_into_one_folder(tmp_path):
-    first = Journal(tmp_path, "a/b.yaml")
-    with pytest.raises(ResultsError, match="another sweep is running here"):
-        Journal(tmp_path, "a/b.yaml")
-    first.close()
-    Journal(tmp_path, "a/b.yaml").close()
-
-
 def test_a_line_that_a_kill_has_cut_off_is_dropped(tmp_path):
     first = Journal(tmp_path, "a/b.yaml")
     first.add("one", Record({"x": (float("inf"), "s"), "y": None, "z": (0.1, "m")}))

@@ -1,0 +1,91 @@
+"""Reading results.csv in blocks of rows, so that a long run needs no more memory than is kept of it."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from .formats import Table
+
+BLOCK = 8_000_000
+"""Bytes read at a time; chosen: some thousand rows of a hundred variables."""
+
+
+class CsvFile:
+    """A CSV file: the `names` of its columns, and its rows in blocks.
+
+    Args:
+        path: of the file.
+        texts: columns of text; None: those whose first value is no number.
+
+    Raises:
+        OSError, ValueError: it cannot be read; so does `blocks`.
+    """
+
+    def __init__(self, path: Path, texts: Sequence[str] | None = None) -> None:
+        self._path = path
+        try:
+            with path.open("rb") as stream:
+                lines = (line.decode() for line in iter(stream.readline, b""))
+                self.names = [name.lstrip("\ufeff") for name in next(csv.reader(lines), [])]
+                self._begin = stream.tell()  # a name may go over lines
+                first = next(csv.reader(lines), [])
+        except csv.Error as error:
+            raise ValueError(str(error)) from None
+        if texts is None:
+            texts = [name for name, cell in zip(self.names, first, strict=False) if not _is_number(cell)]
+        self._texts = set(texts)
+
+    def blocks(self, columns: Sequence[str]) -> Iterator[Table]:
+        """Yield some rows after the other of chosen columns."""
+        import pyarrow as pa
+        from pyarrow import csv as arrow
+
+        with self._path.open("rb") as stream:
+            stream.seek(self._begin)
+            if not stream.read(1):
+                return
+            stream.seek(self._begin)
+            try:
+                yield from (
+                    {name: column.to_numpy(zero_copy_only=False) for name, column in zip(columns, batch)}
+                    for batch in arrow.open_csv(
+                        stream,
+                        arrow.ReadOptions(column_names=self.names, block_size=BLOCK),
+                        arrow.ParseOptions(newlines_in_values=bool(self._texts), ignore_empty_lines=False),
+                        arrow.ConvertOptions(
+                            include_columns=columns,
+                            column_types={
+                                n: pa.string() if n in self._texts else pa.float64() for n in columns
+                            },
+                            null_values=[],
+                        ),
+                    )
+                )
+            except pa.ArrowInvalid as error:
+                raise ValueError(self._fault() or " ".join(str(error).split())) from None
+
+    def _fault(self) -> str | None:
+        """Return a sentence on the first row that is none, None if all are."""
+        with self._path.open(encoding="utf-8", errors="replace", newline="") as stream:
+            reader = csv.reader(stream)
+            try:
+                next(reader)
+                for row in reader:
+                    if len(row) != len(self.names):
+                        return f"line {reader.line_num} has {len(row)} values for {len(self.names)} columns"
+                    for name, cell in zip(self.names, row, strict=True):
+                        if name not in self._texts and not _is_number(cell):
+                            return f"line {reader.line_num}: {short(cell)} in column {name!r} is no number"
+            except csv.Error as error:
+                return f"line {reader.line_num}: {error}"
+        return None
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
