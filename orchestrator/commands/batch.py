@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import click
 import typer
 
 if TYPE_CHECKING:
@@ -41,7 +40,7 @@ def run_all(jobs: Sequence[Job], folder: Path, *, workers: int | None) -> list[O
         return execute(jobs, workers=workers, done=_progress(len(jobs)))
 
 
-def hold(*folders: Path) -> None:
+def hold(context: typer.Context, *folders: Path) -> None:
     """Claim folders for this command until it has ended.
 
     Raises:
@@ -49,7 +48,7 @@ def hold(*folders: Path) -> None:
     """
     from ..results.lock import writing
 
-    click.get_current_context().with_resource(writing(*folders))
+    context.with_resource(writing(*folders))
 
 
 @contextlib.contextmanager

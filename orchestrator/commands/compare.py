@@ -22,6 +22,7 @@ Swaps = Annotated[
 
 
 def compare(
+    context: typer.Context,
     scenario: ScenarioFile,
     swap: Swaps,
     set_: Set = None,
@@ -54,7 +55,7 @@ def compare(
     default: Path = default_folder(scenario)
     folder = out or default.with_name(f"{default.name}-compare")
     check_format(format_)
-    hold(folder)
+    hold(context, folder)
     limit = isolation(isolate, call_limit)
     made = variants(scenario, swap, read_changes(settings=set_ or ()), folder, fmus)
     work = [replace(job, format=format_, call_limit=limit) for job in made]

@@ -25,6 +25,7 @@ Algorithms = Annotated[
 
 
 def converge(
+    context: typer.Context,
     scenario: ScenarioFile,
     halvings: Halvings = 3,
     signal: Signal = "plant.yaw_rate",
@@ -59,8 +60,8 @@ def converge(
             raise ScenarioError(f"--algorithm {name}: no such algorithm{guess}")
     default = default_folder(scenario)
     folder = out or default.with_name(f"{default.name}-converge")
+    hold(context, folder)
     given = read_changes(swap or (), set_ or ())
-    hold(folder)
     work = refinements(
         scenario,
         halvings=halvings,

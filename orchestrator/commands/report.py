@@ -24,6 +24,7 @@ NoRun = Annotated[bool, typer.Option("--no-run", help="Run nothing: report what 
 
 
 def report(
+    context: typer.Context,
     studies: Studies = None,
     out: Out = None,
     fmus: Fmus = None,
@@ -60,7 +61,7 @@ def report(
     if out is not None:
         below = [out / path.absolute().parent.name / path.stem for path in paths]
         folders = [out] if len(paths) == 1 else below
-    hold(*folders)
+    hold(context, *folders)
     every = [
         wanted(path, folder, fmus=fmus, format=format_) for path, folder in zip(paths, folders, strict=True)
     ]

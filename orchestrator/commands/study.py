@@ -17,6 +17,7 @@ NoRun = Annotated[
 
 
 def study(
+    context: typer.Context,
     file: StudyFile,
     out: Out = None,
     fmus: Fmus = None,
@@ -45,7 +46,7 @@ def study(
     limit = isolation(isolate, call_limit)
     loaded = load_study(file)
     folder = out or default_folder(file)
-    hold(folder)
+    hold(context, folder)
     outcomes: list[Outcome] = []
     if not no_run:
         made = [run.job(folder, fmus) for run in loaded.runs.values()]

@@ -34,6 +34,7 @@ SHOWN = 10
 
 
 def sweep(
+    context: typer.Context,
     file: SweepFile,
     swap: Swap = None,
     set_: Set = None,
@@ -71,7 +72,7 @@ def sweep(
     limit = isolation(isolate, call_limit)
     loaded = load_sweep(file, changes=read_changes(swap or (), set_ or ()))
     folder = out or default_folder(file)
-    hold(folder)
+    hold(context, folder)
     with stoppable(folder):
         with _bar("planning", len(loaded.points), quiet=True) as planning:
             planned = plan_sweep(loaded, folder / "runs", fmus, call_limit=limit, progress=planning)

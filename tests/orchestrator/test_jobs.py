@@ -81,8 +81,12 @@ def test_each_outcome_is_told_as_it_comes(tmp_path):
 
 def test_results_of_an_earlier_run_cannot_pass_for_new(tmp_path):
     write(car(n=5), tmp_path / "fails")
-    execute(jobs(tmp_path, "fails"), run=obey)
-    assert isinstance(read_back(tmp_path / "fails"), str)
+    (failed,) = execute(jobs(tmp_path, "fails"), run=obey)
+    assert not failed.ok
+    assert load_results(tmp_path / "fails").run["status"] == "completed"  # nothing is lost
+    assert read_back(tmp_path / "fails", "of the new run") == (
+        f"{tmp_path / 'fails'}: holds the results of another run than the one just made"
+    )
 
 
 @pytest.mark.parametrize("why", [KeyboardInterrupt, ValueError])
