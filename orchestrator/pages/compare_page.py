@@ -67,8 +67,7 @@ def write_page(
     """
     file = out / PAGE
     text = compare_page(comparison, jobs, title=title, changed=changed, command=command)
-    file.write_text(text, encoding="utf-8")
-    write_whole(file, compare_page(comparison, jobs, title=title, command=command))
+    write_whole(file, text)
     return file
 
 

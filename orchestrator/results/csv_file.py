@@ -6,7 +6,9 @@ import csv
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from .formats import Table
+import numpy as np
+
+from ..wording import short
 
 BLOCK = 8_000_000
 """Bytes read at a time; chosen: some thousand rows of a hundred variables."""
@@ -37,32 +39,25 @@ class CsvFile:
             texts = [name for name, cell in zip(self.names, first, strict=False) if not _is_number(cell)]
         self._texts = set(texts)
 
-    def blocks(self, columns: Sequence[str]) -> Iterator[Table]:
+    def blocks(self, columns: Sequence[str]) -> Iterator[list[np.ndarray]]:
         """Yield some rows after the other of chosen columns."""
         import pyarrow as pa
         from pyarrow import csv as arrow
 
+        types = {name: pa.string() if name in self._texts else pa.float64() for name in columns}
         with self._path.open("rb") as stream:
             stream.seek(self._begin)
             if not stream.read(1):
                 return
             stream.seek(self._begin)
             try:
-                yield from (
-                    {name: column.to_numpy(zero_copy_only=False) for name, column in zip(columns, batch)}
-                    for batch in arrow.open_csv(
-                        stream,
-                        arrow.ReadOptions(column_names=self.names, block_size=BLOCK),
-                        arrow.ParseOptions(newlines_in_values=bool(self._texts), ignore_empty_lines=False),
-                        arrow.ConvertOptions(
-                            include_columns=columns,
-                            column_types={
-                                n: pa.string() if n in self._texts else pa.float64() for n in columns
-                            },
-                            null_values=[],
-                        ),
-                    )
-                )
+                for batch in arrow.open_csv(
+                    stream,
+                    arrow.ReadOptions(column_names=self.names, block_size=BLOCK),
+                    arrow.ParseOptions(newlines_in_values=bool(self._texts), ignore_empty_lines=False),
+                    arrow.ConvertOptions(include_columns=columns, column_types=types, null_values=[]),
+                ):
+                    yield [column.to_numpy(zero_copy_only=False) for column in batch]
             except pa.ArrowInvalid as error:
                 raise ValueError(self._fault() or " ".join(str(error).split())) from None
 
