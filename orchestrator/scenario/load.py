@@ -129,9 +129,16 @@ def _check_unit_names(document: Document) -> None:
             named += [(("connections", i, end), connection.get(end)) for end in ("from", "to")]
     named += [(("record", i), item) for i, item in enumerate(record if isinstance(record, list) else ())]
     for key, value in named:
-        try:
-            unit = endpoint(value).unit
-        except ValueError:
-            continue
-        if unit not in units and not (unit == "*" and key[0] == "record"):
-            document.report(key, f"there is no unit {unit!r}{hint(unit, units, lead='units')}")
+        for unit in _units_in(value):
+            if unit not in units and not (unit == "*" and key[0] == "record"):
+                document.report(key, f"there is no unit {unit!r}{hint(unit, units, lead='units')}")
+
+
+def _units_in(value: object) -> list[str]:
+    """Return the units that an end of a connection names; none if it is malformed."""
+    if isinstance(value, list):
+        return [name for name in value if isinstance(name, str)]
+    try:
+        return [endpoint(value).unit]
+    except ValueError:
+        return []

@@ -13,7 +13,15 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import AfterValidator, Field, PlainSerializer, PlainValidator, PrivateAttr, WithJsonSchema
+from pydantic import (
+    AfterValidator,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    PrivateAttr,
+    WithJsonSchema,
+    model_validator,
+)
 
 from ..plan import Algorithm, Change, Value
 from ..wording import short
@@ -66,6 +74,18 @@ def _number(value: object) -> float:
     return float(value)
 
 
+def _end(value: object) -> Endpoint | list[str]:
+    if not isinstance(value, list):
+        return endpoint(value)
+    if not value or not all(isinstance(name, str) and name and "." not in name for name in value):
+        raise ValueError(f"must be names of units (got {short(value)})")
+    return value
+
+
+def _source(value: object) -> Endpoint | list[str] | None:
+    return None if value is None else _end(value)
+
+
 _SCALAR_SCHEMA = {"type": ["number", "boolean", "string"]}
 _TIME_SCHEMA = {"type": ["number", "string"]}
 Scalar = Annotated[Value, PlainValidator(_plain), WithJsonSchema(_SCALAR_SCHEMA)]
@@ -85,17 +105,37 @@ class UnitSpec(Strict):
     parameters: dict[str, Scalar] = Field({}, description="Values of this unit's parameters")
 
 
+_END_SCHEMA = {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}
+_SOURCE_SCHEMA = {"anyOf": [*_END_SCHEMA["anyOf"], {"type": "null"}]}
+Source = Annotated[Endpoint | list[str] | None, PlainValidator(_source), WithJsonSchema(_SOURCE_SCHEMA)]
+Target = Annotated[Endpoint | list[str], PlainValidator(_end), WithJsonSchema(_END_SCHEMA)]
+
+
 class Connection(Strict):
     """Connections beyond equal names; `*` in both ends connects everything that matches in pairs.
 
     Numbers are converted from the output's unit into the input's. With `gain` or `offset` the units do
     not count: the input is gain times the output plus offset, in plain numbers.
+
+    Lists of units choose among equal names: `{from: [estimator, sensor], to: [controller, reference]}`
+    lets each input of the latter take the output of its name from the first of the former that has it,
+    before any other unit. `from: null` leaves inputs without a source, whatever outputs there are.
     """
 
-    source: Variables = Field(alias="from", description="unit.output")
-    target: Variables = Field(alias="to", description="unit.input")
+    source: Source = Field(alias="from", description="unit.output, or units in order, or null")
+    target: Target = Field(alias="to", description="unit.input, or units")
     gain: Number | None = Field(None, description="Factor in place of the conversion of units")
     offset: Number | None = Field(None, description="Added after the factor")
+
+    @model_validator(mode="after")
+    def _check_ends(self) -> Connection:
+        if self.source is not None and isinstance(self.source, list) != isinstance(self.target, list):
+            raise ValueError("'from' and 'to' must both be lists of units, or both unit.variable")
+        if self.source is None and isinstance(self.target, list):
+            raise ValueError("with 'from: null', 'to' must be unit.variable")
+        if self.scale is not None and not isinstance(self.source, Endpoint):
+            raise ValueError("gain and offset are for a connection of unit.variable to unit.variable")
+        return self
 
     @property
     def scale(self) -> tuple[float, float] | None:
@@ -114,7 +154,16 @@ class Vehicle(Strict):
 
 
 class Scenario(Strict):
-    """A scenario file with all changes applied."""
+    """A scenario file with all changes applied.
+
+    Every input has one source: what `connections` names; else a constant whose key names the unit
+    (`tyre.friction_*`); else the output of the same name; else a constant by name or pattern alone
+    (`friction*`), which is refused where an output drives the input; else, if its unit declares it as
+    optional, its start value.
+
+    A pattern under `record` means outputs. Where it matches none that is a number, it means any variable:
+    inputs, parameters, internal ones, text.
+    """
 
     title: str = ""
     source: str = Field("", description="Where the scenario comes from: paper, section, figure")
@@ -122,10 +171,12 @@ class Scenario(Strict):
     stop_time: Time = Field(description="s, an integer multiple of the communication step")
     step_size: Time = Field(description="s, communication step")
     algorithm: Algorithm = Field("extrapolated", description="How units are coupled")
-    inputs: dict[str, Scalar] = Field({}, description="[unit.]pattern -> constant of undriven inputs")
+    inputs: dict[str, Scalar] = Field({}, description="[unit.]pattern -> constant; see below")
     units: dict[UnitName, UnitSpec] = Field(description="Name -> unit", min_length=1)
     connections: list[Connection] = Field([], description="Connections beyond equal names")
-    record: list[Variables] | None = Field(None, description="unit.pattern; left out: all outputs")
+    record: list[Variables] | None = Field(
+        None, description="unit.pattern, *.pattern for all units; left out: all outputs but text"
+    )
 
     _document: Document = PrivateAttr()
     _vehicle_document: Document = PrivateAttr()

@@ -1,4 +1,4 @@
-"""One source for every input: wires by connections, by equal names, constants for what is left.
+"""One source for every input: connections, constants of its own, equal names, constants for what is left.
 
 An input that its unit declares as optional, and that nothing drives, keeps its start value: it counts
 among the constants, so it is shown and recorded like them. So does any input in an SSP archive, where
@@ -7,26 +7,16 @@ nothing is connected by equal names.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import replace
 
 from ..plan import Fmu, Value, Variable, Wire
 from ..scenario.load import Connection, Scenario
-from ..scenario.measurement_units import conversion, measure_of
 from ..scenario.yaml_lines import Key, dotted
 from ..wording import fold, fold_sentences, hint, listed
-from .parameters import origin, value_for
-
-Input = tuple[str, str]  # unit, variable
-
-
-def match(pattern: str, name: str) -> str | None:
-    """Return what the `*` of a pattern stands for in a name, '' without `*`, None if they differ."""
-    head, star, tail = pattern.partition("*")
-    if not star:
-        return "" if name == pattern else None
-    fits = len(name) >= len(head) + len(tail) and name.startswith(head) and name.endswith(tail)
-    return name[len(head) : len(name) - len(tail)] if fits else None
+from .constants import Constant, Input, constants
+from .fitting import contradicts_its_name, conversion_between, difference, fits
+from .patterns import Replaced, had, match
 
 
 class Connector:
@@ -39,7 +29,7 @@ class Connector:
         self,
         scenario: Scenario,
         fmus: Mapping[str, Fmu],
-        replaced: Callable[[str], Fmu | None],
+        replaced: Replaced,
         notes: list[str],
         origins: Mapping[str, dict[str, str]],
     ) -> None:
@@ -51,19 +41,31 @@ class Connector:
         self._found: list[tuple[Key, str]] = []
         self._outputs = {unit: {v.name: v for v in fmu.of("output")} for unit, fmu in fmus.items()}
         self._inputs = {unit: {v.name: v for v in fmu.of("input")} for unit, fmu in fmus.items()}
+        self._having: dict[str, list[str]] = {}  # name of an output -> units that have it
+        for unit, outputs in self._outputs.items():
+            for name in outputs:
+                self._having.setdefault(name, []).append(unit)
+        self._preferred: dict[str, list[tuple[str, Key]]] = {}  # unit -> sources of equal names, in order
+        self._refused: set[Input] = set()  # by equal names
 
     def connect(self) -> tuple[list[Wire], dict[str, dict[str, Value]]]:
         """Return all wires, and each unit's constants."""
         wires = self._by_connections()
-        ambiguous = self._by_names(wires)
-        constants = self._constants(wires)
-        fed = wires.keys() | constants.keys() | ambiguous
+        given = constants(self._scenario, self._fmus, self._replaced, self._notes, self._found)
+        own = {target for target, constant in given.items() if constant.of_unit}
+        self._note_overruled(own - wires.keys())
+        ambiguous = self._by_names(wires, own | self._refused)
+        values = {}
+        for target, constant in self._given(given, wires).items():
+            values[target] = constant.value
+            self._origins[target[0]][target[1]] = constant.origin
+        fed = wires.keys() | given.keys() | ambiguous
         for unit, inputs in self._inputs.items():
             for name, variable in inputs.items():
                 if (unit, name) in fed:
                     continue
                 if (variable.optional or self._explicit(unit)) and variable.start is not None:
-                    constants[(unit, name)] = variable.start
+                    values[(unit, name)] = variable.start
                     self._origins[unit][name] = "default"
                 else:
                     self._report(("units", unit), self._undriven(unit, variable))
@@ -72,9 +74,20 @@ class Connector:
         for key, sentence in fold_sentences(self._found):
             self._scenario.document.report(key, sentence)
         by_unit: dict[str, dict[str, Value]] = {unit: {} for unit in self._fmus}
-        for (unit, name), value in constants.items():
+        for (unit, name), value in values.items():
             by_unit[unit][name] = value
         return fitted, by_unit
+
+    def _note_overruled(self, inputs: Set[Input]) -> None:
+        """Note the inputs that have a constant of their own though an output has their name."""
+        overruled: dict[Input, list[str]] = {}  # unit and source -> names
+        for unit, name in inputs:
+            sources = [] if self._explicit(unit) else self._sources(unit, name)[0]
+            for source in sources[:1]:
+                overruled.setdefault((unit, source), []).append(name)
+        for (unit, source), names in sorted(overruled.items()):
+            for name in fold([v for v in self._inputs[unit] if v in names]):
+                self._notes.append(f"{unit}.{name} is constant: {source}.{name} does not drive it")
 
     def _explicit(self, unit: str) -> bool:
         """Return whether only the scenario's connections count for the inputs of a unit."""
@@ -99,16 +112,26 @@ class Connector:
         return wires
 
     def _expand(self, connection: Connection, key: Key) -> list[Wire]:
-        (source, from_pattern), (target, to_pattern) = connection.source, connection.target
+        """Return the wires of a connection; lists of units and null are kept for equal names."""
+        ends = connection.source, connection.target
+        if isinstance(ends[0], list) and isinstance(ends[1], list):
+            for unit in ends[1]:
+                self._preferred.setdefault(unit, []).extend((source, key) for source in ends[0])
+            return []
+        (target, to_pattern) = ends[1]
+        inputs = {part: n for n in self._inputs[target] if (part := match(to_pattern, n)) is not None}
+        if not inputs:
+            self._no_such((*key, "to"), target, to_pattern, "input")
+        if ends[0] is None:
+            self._refused.update((target, name) for name in inputs.values())
+            return []
+        (source, from_pattern) = ends[0]
         if source == target:
             self._report(key, f"connects {source} to itself")
             return []
         outputs = {part: n for n in self._outputs[source] if (part := match(from_pattern, n)) is not None}
-        inputs = {part: n for n in self._inputs[target] if (part := match(to_pattern, n)) is not None}
         if not outputs:
             self._no_such((*key, "from"), source, from_pattern, "output")
-        if not inputs:
-            self._no_such((*key, "to"), target, to_pattern, "input")
         if not (outputs and inputs):
             return []
         if "*" in from_pattern and "*" not in to_pattern:
@@ -125,7 +148,7 @@ class Connector:
 
     def _no_such(self, key: Key, unit: str, pattern: str, kind: str) -> None:
         """Report a pattern without a match, or note it if the FMU that was replaced has one."""
-        if self._had([unit], kind, pattern):
+        if had(self._scenario, self._replaced, [unit], pattern, kind):
             self._notes.append(f"{dotted(key[:2])} is left out: {unit} has no {kind} {pattern!r} any more")
             return
         variable = self._fmus[unit].variables.get(pattern)
@@ -135,75 +158,45 @@ class Connector:
         names = fold([v.name for v in self._fmus[unit].of(kind)])
         self._report(key, f"{unit} has no {kind} {pattern!r}{hint(pattern, names, lead='it has')}")
 
-    def _had(self, units: Iterable[str], causality: str, pattern: str) -> bool:
-        """Return whether an FMU that an option has replaced in one of the units has such a variable."""
-        replaced = [self._replaced(unit) for unit in units if unit in self._scenario.replaced]
-        return any(match(pattern, v.name) is not None for fmu in replaced if fmu for v in fmu.of(causality))
-
-    def _by_names(self, wires: dict[Input, tuple[Wire, Key]]) -> set[Input]:
-        """Add the wires of equal names; return the inputs that have more than one candidate."""
+    def _by_names(self, wires: dict[Input, tuple[Wire, Key]], taken: Set[Input]) -> set[Input]:
+        """Add the wires of equal names but to inputs `taken`; return those with more than one candidate."""
         ambiguous = set()
         for unit, inputs in self._inputs.items():
+            if self._explicit(unit):
+                continue
             for name in inputs:
-                if self._explicit(unit):
-                    break
-                sources = [s for s, outputs in self._outputs.items() if name in outputs and s != unit]
-                if (unit, name) in wires or not sources:
+                if (unit, name) in wires or (unit, name) in taken:
                     continue
+                sources, key = self._sources(unit, name)
                 if len(sources) == 1:
-                    wires[(unit, name)] = (Wire(sources[0], name, unit, name), ("units", unit))
-                    continue
-                ambiguous.add((unit, name))
-                choices = listed(f"{source}.{name}" for source in sources)
-                self._report(
-                    ("units", unit),
-                    f"{unit}.{name} has more than one source: {choices}; name one under 'connections'",
-                )
-        return ambiguous
-
-    def _constants(self, wires: Mapping[Input, tuple[Wire, Key]]) -> dict[Input, Value]:
-        """Return the constants, each of the most specific pattern: by name before by `*`."""
-        values: dict[Input, Value] = {}
-        givers: dict[Input, tuple[tuple[bool, bool], str]] = {}
-        for pattern, raw in self._scenario.inputs.items():
-            key = ("inputs", pattern)
-            prefix, _, rest = pattern.partition(".")
-            units, name_pattern = ([prefix], rest) if prefix in self._fmus else (list(self._fmus), pattern)
-            found = [(u, n) for u in units for n in self._inputs[u] if match(name_pattern, n) is not None]
-            if not found:
-                self._no_such_input(key, pattern, name_pattern, units)
-            rank = ("*" not in pattern, prefix in self._fmus)
-            for target in found:
-                unit, name = target
-                if target in wires:
-                    wire = wires[target][0]
-                    driver = f"{wire.source}.{wire.output}"
+                    wires[(unit, name)] = (Wire(sources[0], name, unit, name), key)
+                elif sources:
+                    ambiguous.add((unit, name))
+                    choices = listed(f"{source}.{name}" for source in sources)
                     self._report(
                         key,
-                        f"{unit}.{name} is driven by {driver}: a constant is for inputs that no unit drives",
+                        f"{unit}.{name} has more than one source: {choices}; name one under 'connections'",
                     )
-                    continue
-                other_rank, other = givers.get(target, (rank, pattern))
-                if other_rank > rank:
-                    continue
-                if other_rank == rank and other != pattern:
-                    self._report(key, f"{unit}.{name} has another constant already, by inputs.{other}")
-                    continue
-                try:
-                    values[target] = value_for(self._inputs[unit][name], raw)
-                    givers[target] = (rank, pattern)
-                    self._origins[unit][name] = origin(self._scenario.document, key)
-                except ValueError as error:
-                    self._report(key, f"{error}, for {unit}.{name}")
-                    values[target] = raw
-        return values
+        return ambiguous
 
-    def _no_such_input(self, key: Key, pattern: str, name_pattern: str, units: Iterable[str]) -> None:
-        if self._had(units, "input", name_pattern):
-            self._notes.append(f"inputs.{pattern} is left out: no unit has such an input after the swap")
-            return
-        names = fold(list(dict.fromkeys(n for unit in units for n in self._inputs[unit])))
-        self._report(key, f"no input matches{hint(name_pattern, names, lead='there are')}")
+    def _sources(self, unit: str, name: str) -> tuple[list[str], Key]:
+        """Return the units that an input takes the output of its name from, and the key that says so."""
+        having = [source for source in self._having.get(name, ()) if source != unit]
+        for preferred, key in self._preferred.get(unit, ()):
+            if preferred in having:
+                return [preferred], key
+        return having, ("units", unit)
+
+    def _given(
+        self, given: Mapping[Input, Constant], wires: Mapping[Input, tuple[Wire, Key]]
+    ) -> dict[Input, Constant]:
+        """Return the constants without those for inputs that a wire drives, which are reported."""
+        for target in given.keys() & wires.keys():
+            wire, constant = wires[target][0], given[target]
+            unless = "" if constant.of_unit else f", unless its key names {wire.target}"
+            driven = f"{wire.target}.{wire.input} is driven by {wire.source}.{wire.output}"
+            self._report(constant.key, f"{driven}: a constant is for inputs that no unit drives{unless}")
+        return {target: constant for target, constant in given.items() if target not in wires}
 
     def _undriven(self, unit: str, variable: Variable) -> str:
         """Return the sentence for an input without a source."""
@@ -211,7 +204,7 @@ class Connector:
             f"{source}.{name}"
             for source, outputs in self._outputs.items()
             if source != unit
-            for name in fold([n for n, v in outputs.items() if _fits(v, variable)])
+            for name in fold([n for n, v in outputs.items() if fits(v, variable)])
         ]
         connect = f"connect {listed(choices, last='or')}, or give" if 0 < len(choices) <= 8 else "give"
         measure = f" [{variable.unit}]" if variable.unit else ""
@@ -227,9 +220,9 @@ class Connector:
     def _fitted(self, wire: Wire, key: Key) -> Wire:
         """Return a wire with what it does to numbers; report ends that do not fit."""
         source, target = self._outputs[wire.source][wire.output], self._inputs[wire.target][wire.input]
-        between, given = _conversion(source, target), self._scale(key)
+        between, given = conversion_between(source, target), self._scale(key)
         scale = given or between
-        differing = _difference(source, target, scale)
+        differing = difference(source, target, scale)
         if differing is not None:
             what, of, to = differing
             ends = f"{wire.source}.{wire.output} [{of}] to {wire.target}.{wire.input} [{to}]"
@@ -261,77 +254,10 @@ class Connector:
             lacking = [(unit, v.name) for unit, v in ends if v.type == "Real" and v.unit is None]
             if len(lacking) == 1:
                 missing.setdefault(lacking[0][0], []).append(lacking[0][1])
-            odd.update({(unit, v.unit): None for unit, v in ends if v.unit and _contradicts_its_name(v)})
+            odd.update({(unit, v.unit): None for unit, v in ends if v.unit and contradicts_its_name(v)})
         for unit, names in missing.items():
             text = listed(fold(list(dict.fromkeys(names))))
             self._notes.append(f"{unit} ({self._fmus[unit].name}) declares no unit for {text}: not checked")
         for unit, measure in odd:
             who = f"{unit} ({self._fmus[unit].name})"
             self._notes.append(f"{who} defines {measure} otherwise than usual: taken as it defines it")
-
-    def recorded(self) -> tuple[tuple[str, str], ...]:
-        """Return what is recorded: (unit, output), in the order of the scenario's list or units.
-
-        Text is not: a table of results holds numbers.
-        """
-        numbers = {
-            unit: [name for name, v in outputs.items() if v.type != "String"]
-            for unit, outputs in self._outputs.items()
-        }
-        if self._scenario.record is None:
-            return tuple((unit, name) for unit, names in numbers.items() for name in names)
-        chosen: dict[tuple[str, str], None] = {}
-        for i, (unit, pattern) in enumerate(self._scenario.record):
-            units = list(numbers) if unit == "*" else [unit]
-            found = [(u, n) for u in units for n in numbers[u] if match(pattern, n) is not None]
-            chosen.update(dict.fromkeys(found))
-            if found:
-                continue
-            if self._had(units, "output", pattern):
-                self._notes.append(f"record[{i}] is left out: {unit} has no output {pattern!r} any more")
-                continue
-            names = fold(list(dict.fromkeys(n for u in units for n in numbers[u])))
-            who = "no unit has an" if unit == "*" else f"{unit} has no"
-            sentence = f"{who} output {pattern!r} to record{hint(pattern, names, lead='there are')}"
-            self._scenario.document.report(("record", i), sentence)
-        return tuple(chosen)
-
-
-def _conversion(source: Variable, target: Variable) -> tuple[float, float] | None:
-    """Return gain and offset from one end's unit to the other's, None if they do not fit.
-
-    A unit that an end does not declare is taken to be the other's.
-    """
-    if source.unit is None or target.unit is None:
-        return 1.0, 0.0
-    if (source.unit, source.definition) == (target.unit, target.definition):
-        return 1.0, 0.0
-    measures = measure_of(source.unit, source.definition), measure_of(target.unit, target.definition)
-    if measures[0] is None or measures[1] is None:
-        return (1.0, 0.0) if source.unit == target.unit else None
-    return conversion(measures[0], measures[1])
-
-
-def _contradicts_its_name(variable: Variable) -> bool:
-    usual, defined = measure_of(variable.unit), measure_of(variable.unit, variable.definition)
-    return usual is not None and usual != defined
-
-
-def _difference(
-    source: Variable, target: Variable, scale: tuple[float, float] | None
-) -> tuple[str, str | None, str | None] | None:
-    """Return in what two ends differ that cannot be connected, and what each has of it."""
-    if source.type != target.type:
-        return "types", source.type, target.type
-    if scale is None:
-        return "units", source.unit, target.unit
-    items = source.items or {}, target.items or {}
-    if source.type == "Enumeration" and not items[0].items() <= items[1].items():
-        of, to = (listed(f"{name} {value}" for name, value in each.items()) for each in items)
-        return "enumerations", of, to
-    return None
-
-
-def _fits(source: Variable, target: Variable) -> bool:
-    alike = source.type == target.type and (source.unit is None) == (target.unit is None)
-    return alike and _conversion(source, target) is not None

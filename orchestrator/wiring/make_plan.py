@@ -1,13 +1,14 @@
 """From a scenario to a plan: FMUs opened, parameters distributed, every input given its one source.
 
-An output feeds every input of the same name in other units. A connection of the scenario goes
-before equal names; a constant is for an input that neither feeds, and a constant given by name goes
+An output feeds every input of the same name in other units. Before equal names go, in this order, a
+connection of the scenario and a constant whose key names the unit; a list of units under `connections`
+chooses among equal names. Any other constant is for inputs that nothing drives, one given by name
 before one given by a pattern. Whatever then has no source, or more than one, is an error: the start
 value that an FMU carries for an input is never used in silence.
 
-Two units of measurement fit if they mean the same (N.m and Nm, m/s2 and m/s^2); where an FMU
-declares none, nothing can be checked and a note says so. Types must be equal, and an enumeration's
-items must all be among those of the input it feeds, with the same numbers.
+Units of measurement fit if they have one dimension, and the wire converts; where an FMU declares none,
+nothing can be checked and a note says so. Types must be equal, and an enumeration's items must all be
+among those of the input it feeds, with the same numbers.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from ..scenario.overrides import is_path
 from .connections import Connector
 from .order import evaluate
 from .parameters import Parameters
+from .recording import recorded
 
 
 def make_plan(
@@ -54,7 +56,7 @@ def make_plan(
     parameters = Parameters(scenario, opened, replaced, notes, origins).of_units()
     connector = Connector(scenario, opened, replaced, notes, origins)
     wires, constants = connector.connect()
-    record = connector.recorded()
+    record = recorded(scenario, opened, replaced, notes)
     if not isolated:
         _check_instances(scenario, opened)
     evaluation = evaluate(opened, wires)

@@ -69,7 +69,7 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolea
     return in->answer;
 }
 
-#define EXCHANGE(Type, set, get)                                                                            \
+#define EXCHANGE(Type, set, get, given)                                                                            \
     EXPORT fmi2Status fmi2Set##Type(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2##Type v[]) \
     {                                                                                                       \
         Instance *in = c;                                                                                   \
@@ -92,6 +92,8 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolea
                 v[i] = (fmi2##Type)(size_t)in->answer;                                                      \
             } else if (r[i] == OUTPUT) {                                                                    \
                 get;                                                                                        \
+            } else if (r[i] == INPUT) {                                                                     \
+                given;                                                                                      \
             } else {                                                                                        \
                 in->host.logger(in->host.componentEnvironment, in->name, fmi2Error, "", "no such output");  \
                 return fmi2Error;                                                                           \
@@ -100,10 +102,11 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolea
         return fmi2OK;                                                                                      \
     }
 
-EXCHANGE(Integer, in->integer = v[i], v[i] = 2 * in->integer)
-EXCHANGE(Boolean, in->boolean = v[i], v[i] = !in->boolean)
+EXCHANGE(Integer, in->integer = v[i], v[i] = 2 * in->integer, v[i] = in->integer)
+EXCHANGE(Boolean, in->boolean = v[i], v[i] = !in->boolean, v[i] = in->boolean)
 EXCHANGE(String, snprintf(in->given, sizeof in->given, "%s", v[i]),
-         (snprintf(in->made, sizeof in->made, "<%s>", in->given), v[i] = in->made))
+         (snprintf(in->made, sizeof in->made, "<%s>", in->given), v[i] = in->made),
+         v[i] = in->given)
 
 EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Real v[])
 {
@@ -116,10 +119,12 @@ EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[], siz
 
 EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2Real v[])
 {
-    if (n != 1 || r[0] != OUTPUT) {
-        return fmi2Error;
+    for (size_t i = 0; i < n; i++) {
+        if (r[i] != OUTPUT && r[i] != INPUT) {
+            return fmi2Error;
+        }
+        v[i] = (r[i] == OUTPUT ? 2 : 1) * ((Instance *)c)->real;
     }
-    v[0] = 2 * ((Instance *)c)->real;
     return fmi2OK;
 }
 

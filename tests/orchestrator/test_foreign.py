@@ -29,6 +29,7 @@ inputs: {constants}
 units:
   a: {{fmu: ./{fmu}}}
   b: {{fmu: ./{fmu}, parameters: {{answer: {answer}}}}}
+{record}
 connections:
 {connections}
 """
@@ -67,7 +68,7 @@ def description(*kinds, guid):
 def run(library, tmp_path, capsys):
     """Run two units of an FMU, the second fed by the first; return status, words and results."""
 
-    def go(*arguments, answer=0, given=KINDS, guid="{good}", scale=""):
+    def go(*arguments, answer=0, given=KINDS, guid="{good}", scale="", record=""):
         with zipfile.ZipFile(tmp_path / "foreign.fmu", "w") as archive:
             archive.writestr("modelDescription.xml", description(*given, guid=guid))
             archive.write(library, f"binaries/{fmpy.platform}/foreign.so")
@@ -78,6 +79,7 @@ def run(library, tmp_path, capsys):
                 constants=f"{{{constants}}}",
                 fmu="foreign.fmu",
                 answer=answer,
+                record=record,
                 connections="\n".join(
                     f"  - {{from: a.{kind}_out, to: b.{kind}_in{comma}{scale}}}" for kind in given
                 ),
@@ -195,3 +197,28 @@ def test_gain_and_offset_reach_units_that_declare_no_units_of_measurement(run, i
     assert results.run["connections"][0] == {
         "from": "a.Real_out", "to": "b.Real_in", "gain": 10.0, "offset": -3.0
     }  # fmt: skip
+
+
+@together_and_apart
+@pytest.mark.parametrize("form", ["csv", "parquet", "mf4"])
+def test_text_parameters_and_inputs_are_recorded_by_name(run, isolate, form):
+    status, said, results = run(
+        *isolate,
+        "--format",
+        form,
+        record="record: [b.String_out, b.answer, b.Integer_in, b.Real_in, '*.Real_out']",
+    )
+    assert status == 0, said
+    assert list(results) == [
+        "b.String_out",
+        "b.answer",
+        "b.Integer_in",
+        "b.Real_in",
+        "a.Real_out",
+        "b.Real_out",
+    ]
+    assert set(results["b.String_out"]) == {"<<größer>>"}
+    assert set(results["b.answer"]) == {0}
+    assert set(results["b.Integer_in"]) == {-42}
+    assert set(results["b.Real_in"]) == {1.5}
+    assert results.run["rows"] == 11

@@ -332,7 +332,8 @@ def test_every_type_of_parameter_is_taken() -> None:
         ("inputs.friction_fl=5 m", "'5 m' is not a value in 1: use 1 or %, for tyre.friction_fl"),
         (
             "inputs.steer_angle=0",
-            "plant.steer_angle is driven by driver.steer_angle: a constant is for inputs that no unit drives",
+            "plant.steer_angle is driven by driver.steer_angle: a constant is for inputs that no unit "
+            "drives, unless its key names plant",
         ),
     ],
 )
@@ -389,7 +390,7 @@ def test_a_constant_and_a_connection_of_the_replaced_fmu_are_left_out_with_a_not
     assert made.notes == (
         "connections[0] is left out: plant has no input 'wheel_torque_*' any more",
         "inputs.tyre_force* is left out: no unit has such an input after the swap",
-        "record[0] is left out: plant has no output 'acceleration_y' any more",
+        "record[0] is left out: plant has no variable 'acceleration_y' any more",
     )
     assert made.record == ()
 
@@ -717,8 +718,109 @@ def test_a_constant_for_driven_inputs_is_said_once_for_four_wheels() -> None:
     rest = 'inputs: {"friction*": 1, "slip_ratio*": 0}\n' + TORQUES
     assert problems(scenario(rest=rest)) == [
         "a.yaml:8: inputs.slip_ratio*: tyre.slip_ratio_* is driven by plant.slip_ratio_*: "
-        "a constant is for inputs that no unit drives"
+        "a constant is for inputs that no unit drives, unless its key names tyre"
     ]
+
+
+def test_a_constant_that_names_the_unit_goes_before_equal_names_with_a_note() -> None:
+    rest = 'inputs: {"friction*": 1, tyre.slip_ratio_*: 0.1, plant.steer_angle: 1 deg}\n' + TORQUES
+    made = plan(scenario(rest=rest))
+    assert [unit(made, "tyre").constants[f"slip_ratio_{w}"] for w in WHEELS] == [0.1] * 4
+    assert unit(made, "plant").constants == {"steer_angle": math.pi / 180}
+    assert [w.target for w in made.wires if w.output == "steer_angle"] == ["controller"]
+    assert not [w for w in made.wires if w.input.startswith("slip_ratio")]
+    assert made.notes == (
+        "plant.steer_angle is constant: driver.steer_angle does not drive it",
+        "tyre.slip_ratio_* is constant: plant.slip_ratio_* does not drive it",
+    )
+
+
+def test_a_constant_never_goes_before_a_connection() -> None:
+    rest = 'inputs: {"friction*": 1, "plant.wheel_torque_*": 0}\n' + TORQUES
+    assert problems(scenario(rest=rest)) == [
+        "a.yaml:8: inputs.plant.wheel_torque_*: plant.wheel_torque_* is driven by "
+        "controller.torque_request_*: a constant is for inputs that no unit drives"
+    ]
+
+
+# Which of several sources
+
+
+def estimators(folder: Path) -> str:
+    """Write an estimator and a road that both offer friction, and return all units."""
+    for name, more in (("estimator", ["yaw_rate"]), ("road", [])):
+        units = {"yaw_rate": "rad/s"}
+        outputs = ["friction_*", "friction", *more]
+        make_fmu(folder / f"{name}.fmu", outputs=[out(n, unit=units.get(n, "1")) for n in outputs])
+    return UNITS + "  estimator: {fmu: estimator}\n  road: {fmu: road}\n"
+
+
+def sources(made: Plan, name: str) -> dict[str, str]:
+    return {w.target: w.source for w in made.wires if w.input == name}
+
+
+def test_a_list_of_units_chooses_among_equal_names_in_its_order(folder: Path) -> None:
+    rest = "connections:\n  - {from: controller.torque_request_*, to: plant.wheel_torque_*}\n"
+    rest += "  - {from: [driver, road], to: [tyre]}\n  - {from: [estimator, road], to: [controller]}\n"
+    made = plan(scenario(estimators(folder), rest))
+    assert sources(made, "friction_fl") == {"tyre": "road"}
+    assert sources(made, "friction") == {"controller": "estimator"}
+    assert sources(made, "yaw_rate") == {"controller": "estimator"}
+    assert sources(made, "steer_angle") == {"plant": "driver", "controller": "driver"}
+
+
+def test_a_list_of_units_goes_after_connections_and_constants_that_name_the_input(folder: Path) -> None:
+    rest = "inputs: {controller.friction: 0.5}\n" + TORQUES
+    rest += (
+        "  - {from: [estimator], to: [tyre, controller]}\n  - {from: road.friction_*, to: tyre.friction_*}\n"
+    )
+    made = plan(scenario(estimators(folder), rest))
+    assert sources(made, "friction_rr") == {"tyre": "road"}
+    assert unit(made, "controller").constants == {"friction": 0.5}
+    assert sources(made, "yaw_rate") == {"controller": "estimator"}
+
+
+def test_null_leaves_an_input_without_a_source(folder: Path) -> None:
+    units = estimators(folder).replace("  road: {fmu: road}\n", "")
+    refused = TORQUES + "  - {from: null, to: tyre.friction_*}\n"
+    refused += "  - {from: [plant], to: [controller]}\n"
+    assert [p.partition(" has no source")[0] for p in problems(scenario(units, refused))] == [
+        "a.yaml:7: units.tyre: tyre.friction_* [1]"
+    ]
+    made = plan(scenario(units, 'inputs: {"friction_*": 0.3}\n' + refused))
+    assert [unit(made, "tyre").constants[f"friction_{w}"] for w in WHEELS] == [0.3] * 4
+    assert sources(made, "friction_fl") == {}
+
+
+@pytest.mark.parametrize(
+    ("connection", "expected"),
+    [
+        (
+            "{from: [plant], to: tyre.friction_*}",
+            ": 'from' and 'to' must both be lists of units, or both unit.variable",
+        ),
+        (
+            "{from: plant.yaw_rate, to: [tyre]}",
+            ": 'from' and 'to' must both be lists of units, or both unit.variable",
+        ),
+        ("{from: null, to: [tyre]}", ": with 'from: null', 'to' must be unit.variable"),
+        (
+            "{from: [plant], to: [tyre], gain: 2}",
+            ": gain and offset are for a connection of unit.variable to unit.variable",
+        ),
+        ("{from: [plant.x], to: [tyre]}", ".from: must be names of units (got ['plant.x'])"),
+        ("{from: [plnt], to: [tyre]}", ".from: there is no unit 'plnt'; did you mean 'plant'?"),
+        (
+            "{from: null, to: tyre.fricton_*}",
+            ".to: tyre has no input 'fricton_*'; did you mean 'friction_*'?",
+        ),
+    ],
+)
+def test_a_wrong_choice_of_sources_is_said(connection: str, expected: str) -> None:
+    path = scenario(rest=CONSTANTS + TORQUES + f"  - {connection}\n")
+    with pytest.raises(YawbenchError) as caught:
+        plan(path)
+    assert f"a.yaml:11: connections[1]{expected}" in caught.value.problems
 
 
 # Records
@@ -744,8 +846,8 @@ def test_recorded_outputs_are_in_the_order_of_the_list_each_once() -> None:
 def test_a_record_of_nothing_is_said() -> None:
     rest = CONSTANTS + TORQUES + 'record: [plant.yawrate, "*.beta"]\n'
     assert problems(scenario(rest=rest)) == [
-        "a.yaml:11: record[0]: plant has no output 'yawrate' to record; did you mean 'yaw_rate'?",
-        "a.yaml:11: record[1]: no unit has an output 'beta' to record; there are: steer_angle, "
+        "a.yaml:11: record[0]: plant has no variable 'yawrate' to record; did you mean 'yaw_rate'?",
+        "a.yaml:11: record[1]: no unit has a variable 'beta' to record; its outputs are: steer_angle, "
         "torque_request_*, yaw_rate, acceleration_y, slip_angle_*, slip_ratio_*, tyre_force_x_* and "
         "tyre_force_y_*",
     ]
@@ -775,3 +877,26 @@ def test_a_change_that_changes_nothing_is_none() -> None:
     made = plan(swaps=["controller=controller_fnn"], settings=["inputs.friction*=0.65", "stop_time=8.0"])
     assert made.changes == ()
     assert unit(made, "tyre").origins["friction_fl"] == "--set"
+
+
+def test_any_variable_is_recorded_by_its_name_and_patterns_mean_outputs_first() -> None:
+    rest = CONSTANTS + TORQUES
+    rest += (
+        'record: [plant.mass, plant.status, tyre.friction_*, "*.wheel_radius", "*.yaw_rate", driver.shape]\n'
+    )
+    assert plan(scenario(rest=rest)).record == (
+        ("plant", "mass"),
+        ("plant", "status"),
+        *(("tyre", f"friction_{w}") for w in WHEELS),
+        ("controller", "wheel_radius"),
+        ("plant", "wheel_radius"),
+        ("plant", "yaw_rate"),  # and not the controller's input
+        ("driver", "shape"),
+    )
+
+
+def test_a_record_that_is_like_no_output_is_guessed_among_all_variables() -> None:
+    rest = CONSTANTS + TORQUES + "record: [plant.whel_radius]\n"
+    assert problems(scenario(rest=rest)) == [
+        "a.yaml:11: record[0]: plant has no variable 'whel_radius' to record; did you mean 'wheel_radius'?"
+    ]
