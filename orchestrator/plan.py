@@ -90,6 +90,16 @@ class Fmu:
     fmi: int = 2  # major version of the standard
     python_modules: dict[str, str] = field(default_factory=dict)
     """Of a PythonFMU unit: top-level module in resources/ -> hash of its content."""
+    refused: dict[str, str] = field(default_factory=dict)
+    """Variable that cannot be used -> why."""
+    flaws: tuple[str, ...] = ()
+    """What is formally wrong with the model description."""
+    lacking: tuple[str, ...] = ()
+    """Functions of the standard that the library does not have."""
+    tolerance: float | None = None
+    """Relative tolerance of the default experiment."""
+    needs_tool: bool = False
+    """Whether it needs the tool that made it."""
 
     def of(self, causality: str) -> list[Variable]:
         """Return the variables of one causality, in the order of the model description."""

@@ -19,7 +19,7 @@ from xml.etree import ElementTree
 
 from components.fmi.roles import ROLES
 from orchestrator.errors import BuildError
-from orchestrator.fmu.archive import platform
+from orchestrator.fmu.binary import platform
 
 from ..compiler import compiler_command, compiler_tools
 from ..evidence import Looks

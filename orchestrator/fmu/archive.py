@@ -19,7 +19,6 @@ import os
 import re
 import shutil
 import struct
-import sys
 import tempfile
 import time
 import zipfile
@@ -32,16 +31,16 @@ from ..cache import cache_folders
 from ..errors import ModelDescriptionError
 from ..files import PACKED, TooLargeError, check_archive, read_bytes, reason
 from ..plan import Fmu
-from ..wording import closest, listed, short
+from ..wording import closest, listed
 from . import description as fmu_description
+from .binary import binary_problem
 
-FORMAT = 3
+FORMAT = 4
 """Of the cache's entries; part of their names, so versions of this program do not quarrel."""
 
 KEEP_DAYS = 60
 """An entry unused for so long is deleted when another is made."""
 
-_FILE_NAME = re.compile(r"[^/\\:\x00-\x1f\x7f]{1,200}")
 _FILE_TIME = 946_684_800
 """Of every unpacked file, 2000-01-01 [s]: what Python compiles of a module stays good when it is put back."""
 _DAMAGE = (
@@ -50,8 +49,11 @@ _DAMAGE = (
 )  # fmt: skip
 
 
-def open_fmu(path: Path | str) -> Fmu:
+def open_fmu(path: Path | str, *, validate: bool = True) -> Fmu:
     """Return the FMU `path`, unpacked in the cache.
+
+    Args:
+        validate: refuse a model description that is formally wrong, though it could be used.
 
     Raises:
         ModelDescriptionError: missing, damaged, not supported, or no room to unpack it.
@@ -66,6 +68,8 @@ def open_fmu(path: Path | str) -> Fmu:
         except OSError as error:
             problem = problem or ModelDescriptionError(_no_room(path, folder, error))
             continue
+        if validate and fmu.flaws:
+            raise ModelDescriptionError(f"{fmu.path}: {fmu_description.invalid(fmu.fmi, fmu.flaws)}")
         if wrong := binary_problem(fmu):
             raise ModelDescriptionError(f"{fmu.path}: {wrong}")
         return fmu
@@ -78,13 +82,6 @@ def _no_room(path: Path, folder: Path, error: OSError) -> str:
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return f"{where}: no space left; free some there or name another folder in YAWBENCH_CACHE"
     return f"{where}: {error.strerror}; another folder can be named in YAWBENCH_CACHE"
-
-
-def platform() -> tuple[str, str]:
-    """Return FMI 2.0's name of this platform and the suffix of its binaries."""
-    names = {"win32": ("win", ".dll"), "cygwin": ("win", ".dll"), "darwin": ("darwin", ".dylib")}
-    system, suffix = names.get(sys.platform, ("linux", ".so"))
-    return f"{system}{64 if sys.maxsize > 2**32 else 32}", suffix
 
 
 def read_archive(path: Path) -> bytes:
@@ -230,26 +227,3 @@ def _prune(folder: Path) -> None:
                 shutil.rmtree(entry, ignore_errors=True)
         except OSError:
             continue
-
-
-def binary_problem(fmu: Fmu) -> str | None:
-    """Return why an FMU cannot be loaded on this platform, None if it has a binary for it."""
-    name, suffix = platform()
-    identifier = fmu.model_identifier
-    if not _FILE_NAME.fullmatch(identifier) or identifier in (".", ".."):
-        return (
-            f"modelIdentifier {short(identifier)} cannot name the library of an FMU: "
-            "allowed are letters, digits and _, at most 200"
-        )
-    if (fmu.directory / "binaries" / name / (identifier + suffix)).is_file():
-        return None
-    present = sorted(p.name for p in fmu.directory.glob("binaries/*") if p.is_dir() and any(p.iterdir()))
-    missing = f"binaries/{name}/{identifier}{suffix}"
-    if name in present:
-        files = sorted(p.name for p in (fmu.directory / "binaries" / name).iterdir())
-        return (
-            f"no binary of the name that the model identifier asks for ({missing}); binaries/{name} holds "
-            f"{listed(files)}"
-        )
-    others = f"it has binaries for {listed(present)}" if present else "it has no binaries"
-    return f"no binary for this platform ({missing}); {others}"

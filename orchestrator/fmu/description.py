@@ -5,56 +5,88 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import io
-import re
-from collections.abc import Container, Mapping
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 from xml.etree import ElementTree
 
 from ..errors import ModelDescriptionError
-from ..plan import Fmu, UnitDefinition, Value, Variable
+from ..plan import Fmu, UnitDefinition, Variable
+from .binary import binary_of, lacking
+from .variables import scalars
 
-SUPPORTED = "supported is FMI 2.0 for co-simulation"
-_CHOICES = re.compile(r"\(one of: ([^()]*)\)$")
+SUPPORTED = "supported are FMI 2.0 and 3.0 for co-simulation"
 
 
 def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
     """Read the model description of the archive `raw` that holds `files`; `directory` is still to be set.
 
+    One that is formally wrong is read all the same, if it can be; what is wrong stands in `flaws`.
+
     Raises:
-        ModelDescriptionError: none, malformed, invalid, or of a kind that is not supported.
+        ModelDescriptionError: none, malformed, unusable, or of a kind that is not supported.
     """
     if "modelDescription.xml" not in files:
         raise ModelDescriptionError(f"{path}: no FMU: the archive holds no modelDescription.xml")
     root = _parsed(files["modelDescription.xml"], path)
+    fmi = int(root.get("fmiVersion", "")[0])
 
     from fmpy.model_description import ValidationError, read_model_description
 
+    flaws: list[str] = []
     try:
-        description = read_model_description(io.BytesIO(raw))
-        variables = _variables(description, _optional(root))
-    except ValidationError as error:
-        raise ModelDescriptionError(
-            f"{path}: the model description is not valid FMI 2.0: {error.problems[0]}"
-        ) from None
+        try:
+            description = read_model_description(io.BytesIO(raw))
+        except ValidationError as error:
+            flaws = [_one_line(problem) for problem in error.problems]
+            description = read_model_description(io.BytesIO(raw), validate=False)
+        variables, refused = scalars(description, root)
     except Exception as error:  # fmpy raises whatever its parsing meets
-        reason = " ".join(str(error).split()) or type(error).__name__
+        if flaws:
+            raise ModelDescriptionError(f"{path}: {invalid(fmi, flaws)}") from None
+        reason = _one_line(error) or type(error).__name__
         raise ModelDescriptionError(f"{path}: the model description cannot be used: {reason}") from None
     kind = description.coSimulation
+    experiment = description.defaultExperiment
+    identifier = kind.modelIdentifier or ""
     return Fmu(
         name=path.stem,
         path=path,
         directory=path,
         sha256=hashlib.sha256(raw).hexdigest(),
         guid=description.guid or "",
-        model_identifier=kind.modelIdentifier,
+        model_identifier=identifier,
         generation_tool=description.generationTool or "",
         can_save_state=kind.canGetAndSetFMUstate,
         variables=variables,
         description=description.description or "",
         once_per_process=kind.canBeInstantiatedOnlyOncePerProcess,
         python_modules=_python_modules(files),
+        fmi=fmi,
+        refused=refused,
+        flaws=tuple(flaws),
+        lacking=lacking(files.get(binary_of(fmi, identifier)), fmi),
+        tolerance=_tolerance(experiment),
+        needs_tool=kind.needsExecutionTool,
     )
+
+
+def invalid(fmi: int, flaws: Sequence[str]) -> str:
+    """Return the sentence that says what is formally wrong with a model description."""
+    more = f" (and {len(flaws) - 1} more)" if len(flaws) > 1 else ""
+    return f"the model description is not valid FMI {fmi}.0: {flaws[0]}{more}"
+
+
+def _one_line(problem: object) -> str:
+    return " ".join(str(problem).split())
+
+
+def _tolerance(experiment: Any) -> float | None:
+    """Return the tolerance of a default experiment, None if it has none that makes sense."""
+    text = experiment.tolerance if experiment else None
+    value = None if text is None else float(text)
+    return value if value is not None and 0.0 < value < math.inf else None
 
 
 def _parsed(xml: bytes, path: Path) -> ElementTree.Element:
@@ -66,79 +98,13 @@ def _parsed(xml: bytes, path: Path) -> ElementTree.Element:
     version = root.get("fmiVersion")
     if root.tag != "fmiModelDescription" or version is None:
         raise ModelDescriptionError(f"{path}: modelDescription.xml is no FMI model description; {SUPPORTED}")
-    if version != "2.0":
+    if version != "2.0" and not version.startswith("3.0"):
         raise ModelDescriptionError(f"{path}: an FMU of FMI {version}; {SUPPORTED}")
     if root.find("CoSimulation") is None:
-        raise ModelDescriptionError(f"{path}: an FMU for model exchange only; {SUPPORTED}")
+        scheduled = root.find("ScheduledExecution") is not None and root.find("ModelExchange") is None
+        kind = "scheduled execution" if scheduled else "model exchange"
+        raise ModelDescriptionError(f"{path}: an FMU for {kind} only; {SUPPORTED}")
     return root
-
-
-def _optional(root: ElementTree.Element) -> set[str]:
-    """Return the inputs that need no source: `<Annotations><Tool name="yawbench"><optional/>`."""
-    mark = "Annotations/Tool[@name='yawbench']/optional"
-    variables = root.iterfind("ModelVariables/ScalarVariable")
-    return {
-        v.get("name", "") for v in variables if v.get("causality") == "input" and v.find(mark) is not None
-    }
-
-
-def _variables(description: Any, optional: Container[str]) -> dict[str, Variable]:
-    sources: dict[str, tuple[str, ...] | None] = {}
-    for unknown in description.outputs:
-        known = unknown.dependencies
-        names = None if known is None else tuple(v.name for v in known if v.causality == "input")
-        sources[unknown.variable.name] = names
-    definitions = _definitions(description)
-    variables: dict[str, Variable] = {}
-    for v in description.modelVariables:
-        declared = v.declaredType
-        unit = v.unit or (declared.unit if declared else None)
-        text = v.description or ""
-        listed = _CHOICES.search(text) if v.type == "String" else None
-        items = (
-            {i.name: int(i.value) for i in declared.items} if v.type == "Enumeration" and declared else None
-        )
-        variables[v.name] = Variable(
-            name=v.name,
-            reference=v.valueReference,
-            type=v.type,
-            causality=v.causality,
-            variability=v.variability,
-            unit=unit,
-            start=_value(v.type, v.start),
-            minimum=_number(v.min or (declared.min if declared else None)),
-            maximum=_number(v.max or (declared.max if declared else None)),
-            description=text,
-            depends_on=sources.get(v.name) if v.causality == "output" else None,
-            choices=tuple(listed[1].split(", ")) if listed else None,
-            items=items,
-            optional=v.name in optional,
-            definition=definitions.get(unit),
-        )
-    return variables
-
-
-def _definitions(description: Any) -> dict[str | None, UnitDefinition]:
-    """Return what the description defines in base units, by the name of the unit."""
-    return {
-        unit.name: UnitDefinition(
-            (base.kg, base.m, base.s, base.A, base.K, base.mol, base.cd, base.rad), base.factor, base.offset
-        )
-        for unit in description.unitDefinitions
-        if (base := unit.baseUnit) is not None
-    }
-
-
-def _value(kind: str, text: str | None) -> Value | None:
-    if text is None or kind == "String":
-        return text
-    if kind == "Boolean":
-        return text in ("true", "1")
-    return float(text) if kind == "Real" else int(text)
-
-
-def _number(text: str | None) -> float | None:
-    return None if text is None else float(text)
 
 
 def _python_modules(files: Mapping[str, bytes]) -> dict[str, str]:
@@ -177,5 +143,6 @@ def from_record(record: dict[str, Any], *, path: Path, directory: Path) -> Fmu:
         if (unit := v.get("definition")) is not None:
             v["definition"] = UnitDefinition(tuple(unit["powers"]), unit["factor"], unit["offset"])
         variables[v["name"]] = Variable(**v)
-    fields = {**record, "variables": variables}
+    tuples = {key: tuple(record[key]) for key in ("flaws", "lacking")}
+    fields = {**record, **tuples, "variables": variables}
     return Fmu(name=path.stem, path=path, directory=directory, **fields)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,10 +18,12 @@ from fmpy.fmi2 import (
     fmi2CallbackFunctions,
     fmi2CallbackLoggerTYPE,
     fmi2CoSimulation,
+    fmi2LastSuccessfulTime,
+    fmi2Terminated,
 )
 
 from ..plan import Place, Unit
-from .log import ERROR, listen, receive
+from .log import ERROR, OK, listen, receive
 from .slave import Calls, Experiment, Status
 from .unit import FmuSlave, nothing_to_do
 
@@ -30,6 +33,8 @@ class Fmi2Slave(FmuSlave):
 
     prefix = "fmi2"
     library = FMU2Slave
+    version = 2
+    real = "Real"
     c_types = {
         "Real": ctypes.c_double,
         "Integer": ctypes.c_int,
@@ -61,12 +66,12 @@ class Fmi2Slave(FmuSlave):
     ) -> Calls:
         component = ctypes.c_void_p(self._component)
         return Calls(
-            self._exchange("SetReal", component, input_places, inputs),
+            self._fast("SetReal", component, input_places, inputs),
             functools.partial(self._raw("DoStep"), component, time, step, ctypes.c_int(1)),
-            self._exchange("GetReal", component, output_places, outputs),
+            self._fast("GetReal", component, output_places, outputs),
         )
 
-    def _exchange(
+    def _fast(
         self, function: str, component: ctypes.c_void_p, places: Sequence[Place], values: np.ndarray
     ) -> Callable[[], Status]:
         if not places:
@@ -75,9 +80,9 @@ class Fmi2Slave(FmuSlave):
         count = ctypes.c_size_t(len(places))
         return functools.partial(self._raw(function), component, _references(places), count, buffer)
 
-    def _access(self, verb: str, places: Sequence[Place], values: Sequence[Any]) -> tuple[Status, list[Any]]:
+    def _exchange(self, verb: str, places: Sequence[Place], given: Sequence[Any]) -> tuple[Status, list[Any]]:
         kind = places[0].type
-        buffer = (self.c_types[kind] * len(places))(*values)
+        buffer = (self.c_types[kind] * len(places))(*given)
         function = self._function(verb + kind)
         return function(self._component, _references(places), len(places), buffer), list(buffer)
 
@@ -93,6 +98,18 @@ class Fmi2Slave(FmuSlave):
 
     def enter(self) -> Status:
         return self.note(self._function("EnterInitializationMode")(self._component))
+
+    def ended(self) -> float | None:
+        """Return how far the FMU has gone if it has answered Discard because it wants to end."""
+        if not self._has("GetBooleanStatus"):
+            return None
+        wants, last = ctypes.c_int(0), ctypes.c_double(math.nan)
+        ask = self._function("GetBooleanStatus")
+        if ask(self._component, fmi2Terminated, ctypes.byref(wants)) != OK or not wants.value:
+            return None
+        if self._has("GetRealStatus"):
+            self._function("GetRealStatus")(self._component, fmi2LastSuccessfulTime, ctypes.byref(last))
+        return last.value
 
 
 def _references(places: Sequence[Place]) -> Any:

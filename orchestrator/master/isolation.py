@@ -30,7 +30,7 @@ CALL_LIMIT = 10.0
 """Time that a call of an FMU may take [s]; chosen: ten thousand times what a step takes, and still
 within the patience of somebody who waits."""
 
-_PARTS = {SET: ("set", "SetReal"), STEP: ("step", "DoStep"), GET: ("get", "GetReal")}
+_PARTS = {SET: ("set", "Set{}"), STEP: ("step", "DoStep"), GET: ("get", "Get{}")}
 """Part of an exchange -> kind of the master's operation, and function of the FMU."""
 
 
@@ -49,7 +49,7 @@ class IsolatedSlave:
         self._stepping = False
         self._part = ""
         self._answered = 0
-        self._prefix = SLAVES[unit.fmu.fmi].prefix
+        self._prefix, self._real = SLAVES[unit.fmu.fmi].prefix, SLAVES[unit.fmu.fmi].real
         process.log = self._note_log
         try:
             process.wait_until_ready()
@@ -144,7 +144,7 @@ class IsolatedSlave:
                 raise self._process.garbled(f"byte {answer}")
         except Lost as lost:
             self._part, function = _PARTS.get(self._board.part.value, ("", ""))
-            return self._lose(lost, function and self._prefix + function)
+            return self._lose(lost, function and self._prefix + function.format(self._real))
         if answer == OK:
             return OK
         self._part = _PARTS[answer >> 4][0]
@@ -180,6 +180,9 @@ class IsolatedSlave:
         status = self._ask(f"{self._prefix}ExitInitializationMode", FATAL, "exit")
         self._stepping = True
         return status
+
+    def ended(self) -> float | None:
+        return self._ask(f"{self._prefix}GetBooleanStatus", None, "ended")
 
     def note(self, status: Status) -> Status:
         return status  # the process has noted it

@@ -6,10 +6,11 @@ from pathlib import Path
 
 from ..plan import Unit
 from .fmi2 import Fmi2Slave
+from .fmi3 import Fmi3Slave
 from .log import Log
 from .unit import FmuSlave
 
-SLAVES: dict[int, type[FmuSlave]] = {2: Fmi2Slave}
+SLAVES: dict[int, type[FmuSlave]] = {2: Fmi2Slave, 3: Fmi3Slave}
 """Major version of FMI -> its instances."""
 
 

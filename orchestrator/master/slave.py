@@ -69,6 +69,12 @@ class Slave(Protocol):
     def exit(self) -> Status:
         """Leave initialization mode."""
 
+    def ended(self) -> float | None:
+        """Return the time [s] that an instance which wants to end has reached, None if it does not.
+
+        Asked after a step that was answered with Discard. Not a number: it does not say how far it is.
+        """
+
     def note(self, status: Status) -> Status:
         """Remember a status, which decides how the instance may be ended, and return it.
 

@@ -19,8 +19,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..errors import ModelDescriptionError, SimulationError
-from ..fmu.archive import binary_problem
+from ..fmu.binary import CORE, binary_problem
 from ..plan import Place, Unit, Value
+from ..wording import listed
 from .log import ERROR, FATAL, OK, STATUS, WARNING, Log, known, unlisten
 from .slave import Calls, Experiment, Status
 
@@ -32,6 +33,10 @@ class FmuSlave(ABC):
     """Of the names of the functions."""
     library: ClassVar[type]
     """fmpy's class that loads the library."""
+    version: ClassVar[int]
+    """Of FMI, the major one."""
+    real: ClassVar[str]
+    """The type in the names of the functions that exchange most values of a step."""
     c_types: ClassVar[dict[str, Any]]
     """Type in the names of the functions that set and get values -> C type."""
 
@@ -56,11 +61,17 @@ class FmuSlave(ABC):
         self._listener = 0
         self._fmu = self._load(unit)
         self._library = self._fmu.dll
+        if missing := [name for name in CORE[self.version] if not self._has(name)]:
+            functions = listed(f"{self.prefix}{name}" for name in missing)
+            self._fmu.freeLibrary()
+            raise ModelDescriptionError(f"{unit.name}: {unit.fmu.path}: its library lacks {functions}")
         self._component = self._instantiate(unit)
         if self._component is None:
             self.free()
             said = log.errors(unit.name)
             reason = said[0].text if said else "it gave no reason"
+            if unit.fmu.needs_tool:
+                reason += f" (it says that it needs its tool: {unit.fmu.generation_tool or 'not named'})"
             raise SimulationError(
                 f"{unit.name}: {unit.fmu.path} cannot be instantiated: {reason}", unit=unit.name, time=0.0
             )
@@ -86,8 +97,21 @@ class FmuSlave(ABC):
         """Return the instance; None if the FMU refuses."""
 
     @abstractmethod
-    def _access(self, verb: str, places: Sequence[Place], values: Sequence[Any]) -> tuple[Status, list[Any]]:
+    def _exchange(
+        self, verb: str, places: Sequence[Place], values: Sequence[Any]
+    ) -> tuple[Status, list[Any]]:
         """Set ("Set") or get ("Get") variables of one type; return status and values."""
+
+    def _access(self, verb: str, places: Sequence[Place], values: Sequence[Any]) -> tuple[Status, list[Any]]:
+        """Do the same if the library has the function for it."""
+        name = verb + places[0].type
+        if self._has(name):
+            return self._exchange(verb, places, values)
+        self._log.add(self.name, ERROR, "", f"the library lacks {self.prefix}{name}")
+        return ERROR, [0] * len(places)
+
+    def _has(self, name: str) -> bool:
+        return hasattr(self._library, self.prefix + name)
 
     @abstractmethod
     def connect(
@@ -105,6 +129,9 @@ class FmuSlave(ABC):
 
     @abstractmethod
     def enter(self) -> Status: ...
+
+    @abstractmethod
+    def ended(self) -> float | None: ...
 
     def _function(self, name: str) -> Callable[..., Any]:
         """Return a C function with declared argument types.
@@ -124,7 +151,7 @@ class FmuSlave(ABC):
         return kind
 
     def put(self, places: Sequence[Place], values: Sequence[Value]) -> Status:
-        given = [v.encode() if isinstance(v, str) else v for v in values]
+        given = [v.encode() if isinstance(v, str) else v for v in values]  # C text is in bytes
         return self.note(self._access("Set", places, given)[0])
 
     def fetch(self, places: Sequence[Place]) -> tuple[Status, list[Value]]:
@@ -156,7 +183,7 @@ class FmuSlave(ABC):
             return  # after Fatal no function of any instance may be called (FMI 2.0.4, 2.1.3)
         self._freed = True
         if component is not None:
-            if self._may_terminate and self._worst < ERROR:
+            if self._may_terminate and self._worst < ERROR and self._has("Terminate"):
                 status = self.note(self._function("Terminate")(component))
                 if status != OK:
                     self._log.add(self.name, WARNING, "", f"{self.prefix}Terminate returned {STATUS[status]}")

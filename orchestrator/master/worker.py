@@ -125,6 +125,9 @@ class Worker:
     def exit(self) -> int:
         return self._slave.exit()
 
+    def ended(self) -> float | None:
+        return self._slave.ended()
+
     def note(self, status: int) -> int:
         return self._slave.note(status)
 

@@ -56,6 +56,7 @@ def _fmu(unit: Unit, plan: Plan) -> dict[str, Any]:
         "sha256": fmu.sha256,
         "guid": fmu.guid,
         "generation_tool": fmu.generation_tool,
+        "fmi_version": f"{fmu.fmi}.0",
         "step_size": float(unit.period * plan.step),
         "parameters": dict(unit.parameters),
         "origins": {name: origin for name, origin in unit.origins.items() if origin != "default"},

@@ -155,6 +155,9 @@ class Connector:
         if variable is not None:
             self._report(key, f"{unit}.{pattern} is no {kind}: its causality is {variable.causality}")
             return
+        if pattern in self._fmus[unit].refused:
+            self._report(key, f"{unit}.{pattern} {self._fmus[unit].refused[pattern]}")
+            return
         names = fold([v.name for v in self._fmus[unit].of(kind)])
         self._report(key, f"{unit} has no {kind} {pattern!r}{hint(pattern, names, lead='it has')}")
 

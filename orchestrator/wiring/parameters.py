@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Mapping
 
+from ..fmu.binary import integer_limits
 from ..plan import Fmu, Value, Variable
 from ..scenario import quantities
 from ..scenario.load import Scenario
 from ..scenario.yaml_lines import Document, Key
 from ..wording import closest, fold, hint, listed
+
+LARGEST, LARGEST_SINGLE = sys.float_info.max, (2 - 2**-23) * 2.0**127
+"""Numbers of double and single precision."""
 
 
 def value_for(variable: Variable, given: Value) -> Value:
@@ -43,14 +48,17 @@ def _real(variable: Variable, given: Value) -> float:
         )
     except OverflowError:
         value = math.inf
-    if not math.isfinite(value):
+    if not abs(value) <= (LARGEST_SINGLE if variable.encoding == "Float32" else LARGEST):
         raise ValueError(f"must be a finite number{in_unit} (got {given!r})")
     return value
 
 
 def _integer(variable: Variable, given: Value) -> int:
-    if isinstance(given, bool) or not isinstance(given, int) or not -(2**31) <= given < 2**31:
+    if isinstance(given, bool) or not isinstance(given, int):
         raise ValueError(f"must be a whole number (got {given!r})")
+    lowest, highest = integer_limits(variable.encoding or "Int32")
+    if not lowest <= given <= highest:
+        raise ValueError(f"must be a whole number from {lowest} to {highest} (got {given!r})")
     return given
 
 
@@ -165,5 +173,10 @@ def _is_parameter(fmu: Fmu, name: str) -> bool:
 def _unknown(unit: str, fmu: Fmu, name: str) -> str:
     if name in fmu.variables and fmu.variables[name].causality == "input":
         return f"{name!r} is an input of {unit}, not a parameter: give constants under 'inputs'"
+    if name in fmu.variables and fmu.variables[name].causality == "structuralParameter":
+        start = fmu.variables[name].start
+        return f"{name!r} of {unit} is a structural parameter, which can only keep its start value, {start}"
+    if name in fmu.refused:
+        return f"{unit}.{name} {fmu.refused[name]}"
     names = fold([v.name for v in fmu.of("parameter")])
     return f"{unit} ({fmu.name}) has no parameter {name!r}" + hint(name, names, lead="it has")

@@ -112,6 +112,9 @@ class FakeSlave:
         self.started = True
         return OK
 
+    def ended(self) -> float | None:
+        return None
+
     def note(self, status: int) -> int:
         self.worst = max(self.worst, status)
         return status

@@ -18,7 +18,8 @@ from orchestrator import files
 from orchestrator.cache import cache_folder
 from orchestrator.errors import ModelDescriptionError
 from orchestrator.fmu import archive as fmu_archive
-from orchestrator.fmu.archive import open_fmu, platform
+from orchestrator.fmu.archive import open_fmu
+from orchestrator.fmu.binary import platform
 
 from .fake_fmus import Var, make_fmu, model_description, out
 
@@ -263,19 +264,20 @@ def test_an_archive_that_reaches_out_of_its_folder_is_refused(name: str, tmp_pat
         ),
         (
             '<html fmiVersion="2.0"/>',
-            "modelDescription.xml is no FMI model description; supported is FMI 2.0 for co-simulation",
+            "modelDescription.xml is no FMI model description; "
+            "supported are FMI 2.0 and 3.0 for co-simulation",
         ),
         (
             '<fmiModelDescription fmiVersion="1.0"/>',
-            "an FMU of FMI 1.0; supported is FMI 2.0 for co-simulation",
+            "an FMU of FMI 1.0; supported are FMI 2.0 and 3.0 for co-simulation",
         ),
         (
-            '<fmiModelDescription fmiVersion="3.0"><CoSimulation/></fmiModelDescription>',
-            "an FMU of FMI 3.0; supported is FMI 2.0 for co-simulation",
+            '<fmiModelDescription fmiVersion="4.0"><CoSimulation/></fmiModelDescription>',
+            "an FMU of FMI 4.0; supported are FMI 2.0 and 3.0 for co-simulation",
         ),
         (
             '<fmiModelDescription fmiVersion="2.0"><ModelExchange/></fmiModelDescription>',
-            "an FMU for model exchange only; supported is FMI 2.0 for co-simulation",
+            "an FMU for model exchange only; supported are FMI 2.0 and 3.0 for co-simulation",
         ),
         (
             model_description("a").replace('guid="a"', ""),

@@ -1,0 +1,83 @@
+"""The library in an FMU: where it has to be for this platform, which functions it has."""
+
+from __future__ import annotations
+
+import platform as machine
+import re
+import sys
+
+from ..plan import Fmu
+from ..wording import listed, short
+
+_ALWAYS = ("EnterInitializationMode", "ExitInitializationMode", "DoStep", "FreeInstance")
+CORE = {
+    2: ("Instantiate", "SetupExperiment", *_ALWAYS),
+    3: ("InstantiateCoSimulation", *_ALWAYS),
+}
+"""Major version of FMI -> functions without which nothing runs."""
+INTEGERS = tuple(f"{sign}Int{bits}" for bits in (8, 16, 32, 64) for sign in ("", "U"))
+TYPES = {
+    2: ("Real", "Integer", "Boolean", "String"),
+    3: ("Float32", "Float64", *INTEGERS, "Boolean", "String"),
+}
+"""Major version of FMI -> types in the names of the functions that set and get values."""
+_FILE_NAME = re.compile(r"[^/\\:\x00-\x1f\x7f]{1,200}")
+_ARCHITECTURES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
+
+
+def integer_limits(kind: str) -> tuple[int, int]:
+    """Return the smallest and the largest number of an integer type of FMI 3.0, such as "UInt8"."""
+    bits = int(kind.partition("Int")[2])
+    return (0, 2**bits - 1) if kind.startswith("U") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+
+
+def platform(fmi: int = 2) -> tuple[str, str]:
+    """Return a version of FMI's name of this platform and the suffix of its binaries."""
+    names = {"win32": ("win", ".dll"), "cygwin": ("win", ".dll"), "darwin": ("darwin", ".dylib")}
+    system, suffix = names.get(sys.platform, ("linux", ".so"))
+    wide = sys.maxsize > 2**32
+    if fmi == 2:
+        return f"{system}{64 if wide else 32}", suffix
+    architecture = _ARCHITECTURES.get(machine.machine().lower(), "x86_64") if wide else "x86"
+    return f"{architecture}-{'windows' if system == 'win' else system}", suffix
+
+
+def binary_of(fmi: int, identifier: str) -> str:
+    """Return the path in an archive of the library for this platform."""
+    name, suffix = platform(fmi)
+    return f"binaries/{name}/{identifier}{suffix}"
+
+
+def binary_problem(fmu: Fmu) -> str | None:
+    """Return why an FMU cannot be loaded on this platform, None if it has a binary for it."""
+    identifier = fmu.model_identifier
+    if not _FILE_NAME.fullmatch(identifier) or identifier in (".", ".."):
+        return (
+            f"modelIdentifier {short(identifier)} cannot name the library of an FMU: "
+            "allowed are letters, digits and _, at most 200"
+        )
+    missing = binary_of(fmu.fmi, identifier)
+    if (fmu.directory / missing).is_file():
+        return None
+    name, _ = platform(fmu.fmi)
+    present = sorted(p.name for p in fmu.directory.glob("binaries/*") if p.is_dir() and any(p.iterdir()))
+    if name in present:
+        files = sorted(p.name for p in (fmu.directory / "binaries" / name).iterdir())
+        return (
+            f"no binary of the name that the model identifier asks for ({missing}); binaries/{name} holds "
+            f"{listed(files)}"
+        )
+    others = f"it has binaries for {listed(present)}" if present else "it has no binaries"
+    return f"no binary for this platform ({missing}); {others}"
+
+
+def lacking(library: bytes | None, fmi: int) -> tuple[str, ...]:
+    """Return the functions that a library does not have, of those that this program may call.
+
+    Nothing of it is run: a function that has no name in the file cannot be found when it is loaded. A file
+    without any of the names gets its functions from another, so it has all or will be refused then.
+    """
+    access = [f"{verb}{kind}" for verb in ("Set", "Get") for kind in TYPES[fmi]]
+    named = {name: f"fmi{fmi}{name}" for name in (*CORE[fmi], *access)}
+    missing = [name for name, full in named.items() if f"{full}\0".encode() not in (library or b"")]
+    return () if len(missing) == len(named) else tuple(named[name] for name in missing)
