@@ -6,12 +6,14 @@ import importlib
 import io
 import os
 import sys
+import traceback
 from importlib.metadata import version
 from typing import Annotated
 
 import typer
 
 from .errors import YawbenchError
+from .wording import cut, printable
 
 COMMANDS = (
     "new",
@@ -68,13 +70,44 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         _application()(arguments)
     except YawbenchError as error:
+        _print_traceback(error)
         for problem in error.problems:
-            print(problem, file=sys.stderr)
+            print(cut(printable(problem), SAID), file=sys.stderr)
         sys.exit(error.exit_status)
     except OSError as error:  # a figure or table that cannot be written, most likely
+        _print_traceback(error)
         where = f"{error.filename}: " if error.filename else ""
-        print(f"{where}{error.strerror or error}", file=sys.stderr)
+        print(printable(f"{where}{error.strerror or error}"), file=sys.stderr)
         sys.exit(1)
+    except Exception as error:
+        shown = _print_traceback(error)
+        print(_own_error(error, shown), file=sys.stderr)
+        sys.exit(1)
+
+
+SAID = 5000
+"""Characters of one sentence on the terminal. Chosen: twice the longest list of names."""
+TRACEBACK = "YAWBENCH_TRACEBACK"
+"""Environment variable; if it is set, errors are shown with where in the program they come from."""
+
+
+def _print_traceback(error: Exception) -> bool:
+    """Show where an error and what it was made of come from, if that is asked for; return whether."""
+    wanted = bool(os.environ.get(TRACEBACK))
+    if wanted:
+        traceback.print_exception(error)
+    return wanted
+
+
+def _own_error(error: Exception, shown: bool) -> str:
+    """Return the sentence for what should never happen: a mistake in this program, not in a file."""
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    what = printable(" ".join(f"{type(error).__name__}: {error}".split()))
+    hint = "" if shown else f"; {TRACEBACK}=1 shows more"
+    return (
+        f"this is an error in yawbench itself, please report it: {what} "
+        f"({os.path.basename(frame.filename)}:{frame.lineno}{hint})"
+    )
 
 
 def _make_printable() -> None:

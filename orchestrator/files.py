@@ -8,13 +8,19 @@ line; `reading` is for those that nobody foresaw.
 from __future__ import annotations
 
 import contextlib
+import errno
+import functools
 import os
 import stat
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Concatenate, ParamSpec, TypeVar
 
 from .errors import YawbenchError
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 TEXT = 1_000_000
 """Bytes of a YAML file. Chosen: fifty times the largest of ours; reading them takes five seconds."""
@@ -39,7 +45,7 @@ def check_regular(path: Path) -> None:
     """
     mode = os.stat(path).st_mode
     if stat.S_ISDIR(mode):
-        raise IsADirectoryError(21, "it is a folder", str(path))
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     if not stat.S_ISREG(mode):
         raise ValueError("it is a pipe, a socket or a device, not a file")
 
@@ -103,6 +109,24 @@ def reading(what: str, path: Path | str, error: type[YawbenchError]) -> Iterator
     except Exception as cause:
         text = f"{type(cause).__name__}: {reason(cause)}"
         raise error(f"{path}: cannot read this {what}: something in it is not understood ({text})") from cause
+
+
+def reads(
+    what: str, error: type[YawbenchError]
+) -> Callable[[Callable[Concatenate[Path | str, P], R]], Callable[Concatenate[Path | str, P], R]]:
+    """Return a decorator for a function that reads the file that is its first argument; see `reading`."""
+
+    def decorate(
+        function: Callable[Concatenate[Path | str, P], R],
+    ) -> Callable[Concatenate[Path | str, P], R]:
+        @functools.wraps(function)
+        def wrapper(path: Path | str, *args: P.args, **kwargs: P.kwargs) -> R:
+            with reading(what, path, error):
+                return function(path, *args, **kwargs)
+
+        return wrapper
+
+    return decorate
 
 
 def reason(error: Exception) -> str:

@@ -7,6 +7,8 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+from .wording import cut
+
 Value = float | int | bool | str
 OF_RUN = ("stop_time", "step_size", "algorithm")
 """What a change gives without naming a unit."""
@@ -151,8 +153,8 @@ class Change:
         return "." not in self.place and self.place not in (*OF_RUN, "vehicle", *FACTS)
 
     def __str__(self) -> str:
-        value = str(self.value).lower() if isinstance(self.value, bool) else self.value
-        return f"{self.origin} {self.place}={value}"
+        value = str(self.value).lower() if isinstance(self.value, bool) else str(self.value)
+        return f"{self.origin} {cut(self.place)}={cut(value)}"
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,17 @@ _WHEEL_SUFFIX = re.compile(r"_(fl|fr|rl|rr)\b")
 K = TypeVar("K")
 
 
+LISTED = 100
+"""Names in one sentence. Chosen: more than any of our FMUs has parameters."""
+ALIKE = 500
+"""Names compared with a wrong one; of more, those that begin like it. Chosen: 20 ms."""
+
+
 def listed(items: Iterable[object], *, last: str = "and") -> str:
-    """Return 'a, b and c'."""
+    """Return 'a, b and c'; of very many the first ones, 'a, b, c and 900 more'."""
     words = [str(item) for item in items]
+    if len(words) > LISTED:
+        words[LISTED - 1 :] = [f"{len(words) - LISTED + 1} more"]
     if len(words) < 2:
         return "".join(words)
     return f"{', '.join(words[:-1])} {last} {words[-1]}"
@@ -24,13 +32,39 @@ def listed(items: Iterable[object], *, last: str = "and") -> str:
 
 def short(value: object) -> str:
     """Return a value as it stands in a message, cut if long."""
-    text = "nothing" if value is None else repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return cut("nothing" if value is None else repr(value), 60)
+
+
+def cut(text: str, longest: int = 200) -> str:
+    """Return a text, cut if it is longer than a message may be."""
+    return text if len(text) <= longest else text[: longest - 3] + "..."
+
+
+_UNPRINTABLE = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f"  # control characters but tab and line feed
+    "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff"  # what turns the direction of text, or hides
+    "\ud800-\udfff]"  # halves of characters
+)
+
+
+def unprintable(text: str) -> str | None:
+    """Return the first character of a text that would do something to a terminal or a page, written out."""
+    found = _UNPRINTABLE.search(text)
+    return ascii(found[0])[1:-1] if found else None
+
+
+def printable(text: str) -> str:
+    """Return a text with such characters written out, as `\\x1b`."""
+    return _UNPRINTABLE.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
 def closest(name: str, valid: Iterable[str]) -> str | None:
     """Return the valid name most like `name`, or None if none is like it."""
     by_lower = {v.lower(): v for v in valid}
+    if len(by_lower) > ALIKE:
+        begins = name[:3].lower()
+        alike = [lower for lower in by_lower if lower.startswith(begins)]
+        by_lower = {lower: by_lower[lower] for lower in alike[:ALIKE]}
     found = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.65)
     return by_lower[found[0]] if found else None
 

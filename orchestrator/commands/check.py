@@ -44,6 +44,7 @@ def show(plan: Plan, scenario: Path) -> None:
 
 def _print(plan: Plan, scenario: Path, console: Console) -> None:
     from ..titles import changed
+    from ..wiring.order import evaluate
 
     console.print(f"{scenario}: {plan.title}" if plan.title else f"{scenario}")
     if plan.changes:
@@ -55,8 +56,12 @@ def _print(plan: Plan, scenario: Path, console: Console) -> None:
     _show(console, "Units in evaluation order", ("unit", "FMU", "step", "parameters"), _unit_rows(plan))
     _show(console, "Wires", ("from", "to", "variables"), _wire_rows(plan))
     _show(console, "Constants", ("input", "value"), _constant_rows(plan.units))
-    _show(console, "Why this order", ("unit", "after", "because its outputs follow"), _order_rows(plan))
-    _show(console, "Against the order", ("from", "to", "uses earlier values of"), _backward_rows(plan))
+    direct = evaluate({unit.name: unit.fmu for unit in plan.units}, plan.wires).direct
+    headings = ("unit", "after", "because its outputs follow")
+    _show(console, "Why this order", headings, _order_rows(plan, direct))
+    _show(
+        console, "Against the order", ("from", "to", "uses earlier values of"), _backward_rows(plan, direct)
+    )
     console.print("\nNothing is wrong.")
 
 
@@ -98,13 +103,14 @@ def _assignment(name: str, value: object, measure: str | None) -> str:
 
 
 def _wire_rows(plan: Plan) -> Iterable[Sequence[str]]:
-    from ..wording import fold_wires
+    from ..wording import fold_wires, star
 
     units = {unit.name: unit.fmu.variables for unit in plan.units}
     for (source, target), wires in _grouped(plan.wires).items():
         shown = []
+        examples = {name: w for w in reversed(wires) for name in (w.input, star(w.input))}
         for output, name in fold_wires([(w.output, w.input) for w in wires]):
-            example = next(w for w in wires if _is_of(w.input, name))
+            example = examples[name]
             of, measure = units[source][example.output].unit, units[target][example.input].unit
             ends = output if output == name else f"{output} → {name}"
             if example.converts:
@@ -126,10 +132,6 @@ def _grouped(wires: Iterable[Wire]) -> dict[tuple[str, str], list[Wire]]:
     return groups
 
 
-def _is_of(name: str, pattern: str) -> bool:
-    return name == pattern or (pattern.endswith("*") and name.startswith(pattern[:-1]))
-
-
 def _constant_rows(units: Iterable[Unit]) -> Iterable[Sequence[str]]:
     from ..wording import fold
 
@@ -143,29 +145,26 @@ def _constant_rows(units: Iterable[Unit]) -> Iterable[Sequence[str]]:
                 yield f"{unit.name}.{name}", shown
 
 
-def _order_rows(plan: Plan) -> Iterable[Sequence[str]]:
+def _order_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]]:
     from ..wording import fold
 
     position = {unit.name: i for i, unit in enumerate(plan.units)}
-    forward = [w for w in _direct(plan) if position[w.source] < position[w.target]]
+    forward: dict[str, list[Wire]] = {}
+    for wire in direct:
+        if position[wire.source] < position[wire.target]:
+            forward.setdefault(wire.target, []).append(wire)
     for unit in plan.units:
-        before = [w for w in forward if w.target == unit.name]
+        before = forward.get(unit.name, [])
         sources = list(dict.fromkeys(w.source for w in before))
         names = fold([w.input for w in before])
         if before:
             yield unit.name, ", ".join(sources), ", ".join(names)
 
 
-def _backward_rows(plan: Plan) -> Iterable[Sequence[str]]:
+def _backward_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]]:
     from ..wording import fold
 
     position = {unit.name: i for i, unit in enumerate(plan.units)}
-    backward = [w for w in _direct(plan) if position[w.source] >= position[w.target]]
+    backward = [w for w in direct if position[w.source] >= position[w.target]]
     for (source, target), wires in _grouped(backward).items():
         yield source, target, ", ".join(fold([w.output for w in wires]))
-
-
-def _direct(plan: Plan) -> Sequence[Wire]:
-    from ..wiring.order import evaluate
-
-    return evaluate({unit.name: unit.fmu for unit in plan.units}, plan.wires).direct

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import io
 import math
@@ -127,11 +126,13 @@ def _python_modules(files: Mapping[str, bytes]) -> dict[str, str]:
 
 def to_record(fmu: Fmu) -> dict[str, Any]:
     """Return the description as JSON-ready data, without where archive and folder are."""
-    record = dataclasses.asdict(fmu)
-    for key in ("name", "path", "directory"):
-        del record[key]
-    record["variables"] = list(record["variables"].values())
-    return record
+    record = {key: value for key, value in vars(fmu).items() if key not in ("name", "path", "directory")}
+    return {**record, "variables": [_record(variable) for variable in fmu.variables.values()]}
+
+
+def _record(variable: Variable) -> dict[str, Any]:
+    definition = variable.definition
+    return {**vars(variable), "definition": None if definition is None else vars(definition)}
 
 
 def from_record(record: dict[str, Any], *, path: Path, directory: Path) -> Fmu:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..errors import ModelDescriptionError
 from ..scenario.overrides import is_path
-from ..wording import closest, listed
+from ..wording import closest, listed, short
 
 
 def find_folder(scenario: Path) -> Path:
@@ -42,13 +42,13 @@ def find_fmu(fmu: str, *, scenario: Path, fmus: Path | None) -> Path:
         return Path(os.path.normpath(scenario.absolute().parent / fmu))
     folder = find_folder(scenario) if fmus is None else fmus
     archive = folder / f"{fmu}.fmu"
-    if archive.is_file():
+    if os.path.isfile(archive):
         return archive
     names = sorted(p.stem for p in folder.glob("*.fmu"))
     if not names:
-        raise ModelDescriptionError(f"no FMU {fmu!r}: the folder {folder} holds no FMUs")
+        raise ModelDescriptionError(f"no FMU {short(fmu)}: the folder {folder} holds no FMUs")
     role = fmu.partition("_")[0] + "_"
     related = [name for name in names if name.startswith(role)] or names
     likely = closest(fmu, names)
     guess = f"did you mean {likely!r}? " if likely else ""
-    raise ModelDescriptionError(f"no FMU {fmu!r} in {folder}; {guess}there are: {listed(related)}")
+    raise ModelDescriptionError(f"no FMU {short(fmu)} in {folder}; {guess}there are: {listed(related)}")

@@ -14,9 +14,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import ResultsError
+from ..files import read_bytes, reads
 from ..wording import listed
 from .folder import settle
 from .formats import FILES, RESULTS_FILE, RUN_FILE, Table, reader_of
+
+RECORD = 100_000_000
+"""Bytes of run.json. Chosen: a thousand times what one of ours has."""
 
 __all__ = ["RESULTS_FILE", "RUN_FILE", "Results", "load_results"]
 
@@ -95,6 +99,7 @@ class Results:
         return f"{self.file}: no column '{variable}'{of} was recorded{hint}"
 
 
+@reads("recorded run", ResultsError)
 def load_results(folder: Path | str) -> Results:
     """Read the results of one run; those of a failed run too, as far as they go.
 
@@ -105,7 +110,7 @@ def load_results(folder: Path | str) -> Results:
     settle(folder)
     run_file = folder / RUN_FILE
     try:
-        run = json.loads(run_file.read_text(encoding="utf-8"))
+        run = json.loads(read_bytes(run_file, largest=RECORD).decode())
     except FileNotFoundError:
         raise ResultsError(
             f"{folder}: no results here, {RUN_FILE} is missing; "

@@ -8,6 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from ..errors import ScenarioError
+from ..files import reads
 from ..plan import Change
 from ..wording import hint, listed
 from . import overrides, quantities, strict, yaml_lines
@@ -17,6 +18,7 @@ from .yaml_lines import Document, Key
 __all__ = ["Connection", "Endpoint", "Scenario", "UnitSpec", "Vehicle", "load_scenario"]
 
 
+@reads("scenario file", ScenarioError)
 def load_scenario(
     path: Path | str,
     *,
@@ -76,8 +78,8 @@ def _read_vehicle(document: Document, read: Callable[..., Document]) -> Document
     if not isinstance(name, str):
         return Document(document.path, data={})
     vehicle = Path(os.path.normpath(document.path.parent / name))
-    if not vehicle.exists():
-        missing = read(vehicle, what="vehicle file").problems[0][1]
+    if not os.path.exists(vehicle):
+        missing = next(iter(read(vehicle, what="vehicle file").problems))[1]
         document.report(("vehicle",), missing)
         return Document(vehicle, data={})
     return read(vehicle, what="vehicle file")

@@ -17,6 +17,7 @@ from fractions import Fraction
 from functools import cache
 
 from ..plan import UnitDefinition
+from ..wording import short
 
 Powers = tuple[int, int, int, int, int, int, int, int]  # kg m s A K mol cd rad
 
@@ -98,19 +99,32 @@ _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _TOKEN = re.compile(r"(?P<symbol>[A-Za-zµ°%]+|1)(?:\^?(?P<power>-?\d{1,2}))?|(?P<mark>[./()*·])|\s+")
 
 
+class UnknownUnitError(ValueError):
+    """A text is no unit."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(f"{short(text)} is not a unit")
+
+
+LONGEST = 60
+"""Characters of a unit; chosen: three times the longest that makes sense."""
+
+
 def parse_unit(text: str) -> Measure:
     """Return what the unit `text` means.
 
     Raises:
         ValueError: not a unit.
     """
+    if len(text) > LONGEST:
+        raise UnknownUnitError(text)
     plain = text.translate(_SUPERSCRIPTS).replace("μ", "µ")
     tokens: list[Measure | str] = []
     position = 0
     while position < len(plain):
         match = _TOKEN.match(plain, position)
         if match is None:
-            raise ValueError(f"{text!r} is not a unit")
+            raise UnknownUnitError(text)
         position = match.end()
         if match["symbol"]:
             tokens.append(_symbol(match["symbol"], text) ** int(match["power"] or 1))
@@ -118,7 +132,7 @@ def parse_unit(text: str) -> Measure:
             tokens.append("." if match["mark"] in "*·" else match["mark"])
     measure, rest = _product(tokens, text)
     if rest:
-        raise ValueError(f"{text!r} is not a unit")
+        raise UnknownUnitError(text)
     return measure
 
 
@@ -128,7 +142,7 @@ def _symbol(symbol: str, text: str) -> Measure:
         return known
     prefix, base = _PREFIXES.get(symbol[0]), _PREFIXED.get(symbol[1:])
     if prefix is None or base is None:
-        raise ValueError(f"{text!r} is not a unit")
+        raise UnknownUnitError(text)
     return Measure(prefix, 0, _NONE) * base
 
 
@@ -155,7 +169,7 @@ def _factor(tokens: list[Measure | str], text: str) -> tuple[Measure, list[Measu
         inner, rest = _product(tokens[1:], text)
         if rest and rest[0] == ")":
             return inner, rest[1:]
-    raise ValueError(f"{text!r} is not a unit")
+    raise UnknownUnitError(text)
 
 
 @cache
@@ -181,7 +195,10 @@ def conversion(source: Measure, target: Measure) -> tuple[float, float] | None:
     """
     if source.powers != target.powers:
         return None
-    gain = float(source.factor / target.factor) * math.pi ** (source.pi - target.pi)
-    offset = float((source.offset - target.offset) / target.factor) / math.pi**target.pi
+    try:
+        gain = float(source.factor / target.factor) * math.pi ** (source.pi - target.pi)
+        offset = float((source.offset - target.offset) / target.factor) / math.pi**target.pi
+    except OverflowError:  # by definitions of FMUs
+        return None
     same = math.isclose(gain, 1.0, rel_tol=ROUNDING) and abs(offset) <= ROUNDING
     return (1.0, 0.0) if same else (gain, offset)

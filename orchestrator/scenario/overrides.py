@@ -88,7 +88,7 @@ def changes_of_run(spec: Any, origin: str) -> list[Change]:
 
 def swap_of(unit: str, text: str, origin: str) -> list[Change]:
     """Return the changes of `fmu:parameter=value:parameter=value` for a unit, first its FMU."""
-    match = re.fullmatch(r"(.*?)((?::\w+=[^:]*)*)", text)
+    match = re.fullmatch(r"(.*?)((?::\w+=[^:]*)*)", text, re.DOTALL)
     assert match is not None
     given = (one.partition("=") for one in match[2].split(":")[1:])
     brought = [Change(f"{unit}.{name}", yaml_lines.scalar(value), origin) for name, _, value in given]
@@ -122,7 +122,7 @@ def apply_changes(
         elif not isinstance(spec, dict):
             known = (*units, *RESERVED) if name else units
             sentence = f"{change}: the scenario has no unit {holder!r}"
-            document.problems.append((0, sentence + hint(holder, known, lead="it has")))
+            document.problem(0, sentence + hint(holder, known, lead="it has"))
             continue
         elif not name:
             if isinstance(spec.get("fmu"), str):

@@ -7,15 +7,18 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from dataclasses import replace
 from fractions import Fraction
 
 from ..plan import UnitDefinition
-from ..wording import listed
-from .measurement_units import Measure, measure_of, parse_unit
+from ..wording import closest, listed, short
+from .measurement_units import Measure, UnknownUnitError, measure_of, parse_unit
 
 LONGEST = 1e9
 """The longest time that is taken for one [s]."""
+WRITTEN = 200
+"""Characters of a quantity. Chosen: ten times the longest that makes sense."""
 SHORTEST = Fraction(1, 10**9)
 """The shortest [s]; below, steps are lost in the rounding of time."""
 
@@ -28,8 +31,11 @@ _COMMON = (  # noqa: SIM905 - units read better as one line of text
 """Spellings to offer in a message."""
 
 _NUMBER = re.compile(
-    r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(?P<unit>[A-Za-zµμ°%1(].*?)?\s*"
+    r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(?P<unit>[A-Za-zµμ°%1(].*?)?\s*",
+    re.ASCII,
 )
+_LARGEST = Fraction(sys.float_info.max)
+_COMMA = re.compile(r"\s*([+-]?\d+),(\d+\s*[^,]*?)\s*", re.ASCII)
 
 
 def convert(text: str, unit: str | None, definition: UnitDefinition | None = None) -> Fraction | float:
@@ -40,19 +46,26 @@ def convert(text: str, unit: str | None, definition: UnitDefinition | None = Non
     Raises:
         ValueError: a sentence that says what `text` should have been.
     """
-    match = _NUMBER.fullmatch(text)
+    match = _NUMBER.fullmatch(text) if len(text) <= WRITTEN else None
     if match is None or not match["unit"]:
         wanted = f" in {unit}" if unit else ""
-        raise ValueError(f"{text!r} is neither a number{wanted} nor a number with its unit")
+        comma = _COMMA.fullmatch(text) if len(text) <= WRITTEN else None
+        point = f"; write a decimal point: {comma[1]}.{comma[2]}" if comma else ""
+        raise ValueError(f"{short(text)} is neither a number{wanted} nor a number with its unit{point}")
     number, given = Fraction(match["number"]), match["unit"]
+    if abs(number) > _LARGEST:
+        raise ValueError(f"must be a finite number{f' in {unit}' if unit else ''} (got {text!r})")
     if given == unit:
         return number
     if unit is None:
         raise ValueError(f"{text!r} names a unit, but the FMU declares none: give a plain number")
-    source = parse_unit(given)
     target = measure_of(unit, definition)
     if target is None:
         raise ValueError(f"{text!r} cannot be converted to {unit}: give a number in {unit}")
+    try:
+        source = parse_unit(given)
+    except UnknownUnitError as error:
+        raise ValueError(f"{error}{_guess(given, unit, target)}") from None
     if given == "g" and target.powers == _GRAVITY.powers:
         source = _GRAVITY
     if source.powers != target.powers:
@@ -61,7 +74,21 @@ def convert(text: str, unit: str | None, definition: UnitDefinition | None = Non
         )
     exact = (number * source.factor + source.offset - target.offset) / target.factor
     turns = source.pi - target.pi
-    return exact if turns == 0 else float(exact) * math.pi**turns
+    try:
+        value = float(exact) * math.pi**turns
+    except OverflowError:
+        value = math.inf
+    if not math.isfinite(value):
+        raise ValueError(f"must be a finite number in {unit} (got {text!r})")
+    return exact if turns == 0 else value
+
+
+def _guess(given: str, unit: str, target: Measure) -> str:
+    """Return "; did you mean ...?" for what is no unit, or the units that fit."""
+    fitting = _spellings(unit, target)
+    plain = {re.sub(r"[^a-z0-9]", "", name.lower()): name for name in reversed([*_COMMON, *fitting])}
+    likely = plain.get(re.sub(r"[^a-z0-9]", "", given.lower())) or closest(given, fitting)
+    return f"; did you mean {likely!r}?" if likely else f": use {listed(fitting, last='or')}"
 
 
 def _spellings(unit: str, target: Measure) -> list[str]:
@@ -82,10 +109,10 @@ def seconds(value: object) -> Fraction:
         time = convert(value, "s")
     elif isinstance(value, Fraction):
         time = value
-    elif isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+    elif isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < math.inf:
         time = Fraction(repr(value))
     else:
-        raise ValueError(f"must be a time in s (got {value!r})")
+        raise ValueError(f"must be a time in s (got {short(value)})")
     if not 0 < time <= LONGEST:
         limit = f" and at most {LONGEST:g} s" if time > 0 else ""
         raise ValueError(f"must be a time above 0 s{limit} (got {value!r})")

@@ -17,6 +17,9 @@ from urllib.parse import unquote, urlsplit
 from lxml import etree
 from lxml.etree import _Element
 
+from ..files import PACKED, TooLargeError, check_archive, read_bytes, reason
+from ..wording import short
+
 LARGEST = 100_000_000
 """Bytes that a description may take, unpacked. Chosen: a thousand times what one of ours takes."""
 
@@ -54,14 +57,16 @@ class Archive:
     def __init__(self, path: Path, *, what: str) -> None:
         self.path = path
         try:
-            raw = path.read_bytes()
+            raw = read_bytes(path, largest=PACKED)
         except FileNotFoundError:
             raise Refused(f"no such {what}") from None
         except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise Refused(f"cannot read this {what}: {reason}") from None
+            raise Refused(f"cannot read this {what}: {reason(error)}") from None
         try:
             self._archive = zipfile.ZipFile(io.BytesIO(raw))
+            check_archive(self._archive)
+        except TooLargeError as error:
+            raise Refused(f"cannot read this {what}: {error}") from None
         except _DAMAGE as error:
             raise Refused(f"no {what}, or damaged: {error}") from None
         self._variables: dict[str, dict[str, Declared]] = {}
@@ -73,7 +78,10 @@ class Archive:
             Refused: it is outside of the archive, or in an FMU.
         """
         source = element.get("source", "")
-        address = urlsplit(source)
+        try:
+            address = urlsplit(source)
+        except ValueError:
+            raise Refused(f"source {short(source)} is no address", element) from None
         member = posixpath.normpath(unquote(address.path))
         if address.scheme or address.netloc or not source or member.startswith(("/", "..")):
             raise Refused(f"source {source!r} is not in the archive", element)
@@ -112,6 +120,7 @@ class Archive:
         if member not in self._variables:
             try:
                 with zipfile.ZipFile(io.BytesIO(self._archive.read(member))) as fmu:
+                    check_archive(fmu)
                     description = etree.fromstring(fmu.read("modelDescription.xml"), _parser())
             except (KeyError, *_DAMAGE, etree.XMLSyntaxError):
                 if member not in self._archive.namelist():

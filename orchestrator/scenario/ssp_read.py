@@ -35,7 +35,7 @@ def read(path: Path, *, what: str = "SSP archive") -> Document:
     try:
         document.data = _scenario(Archive(path, what=what), document)
     except Refused as refused:
-        document.problems.append((refused.line, refused.sentence(path)))
+        document.problem(refused.line, refused.sentence(path))
     return document
 
 

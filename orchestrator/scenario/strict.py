@@ -17,7 +17,7 @@ Model = TypeVar("Model", bound=BaseModel)
 class Strict(BaseModel):
     """A part of a file: no unknown keys, no silent conversions."""
 
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 KINDS: dict[str, tuple[str, type, str]] = {
@@ -93,6 +93,7 @@ _MUST_BE = {
     "list_type": "a list",
     "too_short": "not empty",
     "float_type": "a number",
+    "finite_number": "a finite number",
 }
 
 

@@ -7,9 +7,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..errors import ScenarioError
+from ..files import TEXT, read_bytes, reason
 from ..plan import Change
-from ..wording import closest, listed
+from ..wording import closest, listed, short, unprintable
 
+PROBLEMS = 200
+"""Problems of one file that are told. Chosen: nobody mends more before looking again."""
+DEEPEST = 40
+"""Collections in collections. Chosen: four times what the schemas know."""
+LARGEST_WHOLE = 2**64
+"""Whole numbers are smaller; chosen: what every program takes."""
 ALIASED = 100_000
 """Values that the aliases of a file may repeat: aliases of aliases multiply, and a few lines could fill
 the memory. Chosen: a hundred times what a study of a hundred runs needs."""
@@ -27,16 +35,26 @@ class Document:
     lines: dict[Key, int] = field(default_factory=dict)
     overrides: dict[Key, Change] = field(default_factory=dict)
     """Values that do not come from the file -> what gave them."""
-    problems: list[tuple[int, str]] = field(default_factory=list)
+    problems: dict[tuple[int, str], None] = field(default_factory=dict)
+    """(line, sentence), each once; line 0: of no line."""
     notes: list[str] = field(default_factory=list)
     """Remarks on what is no mistake, for the plan."""
 
     def report(self, key: Key, sentence: str) -> None:
         """Note a problem with the value (or the missing value) at `key`."""
         line, place = self._place(key)
-        problem = (line, f"{place}: {sentence}")
-        if problem not in self.problems:
-            self.problems.append(problem)
+        self.problem(line, f"{place}: {sentence}")
+
+    def problem(self, line: int, sentence: str) -> None:
+        """Note a problem that says its place itself.
+
+        Raises:
+            ScenarioError: with all problems, if they have become very many.
+        """
+        self.problems[line, sentence] = None
+        if len(self.problems) >= PROBLEMS:
+            more = f"{self.path}: there may be more; these are the first {PROBLEMS} problems"
+            raise ScenarioError([*self.sentences(), more])
 
     def place(self, key: Key) -> str:
         """Return 'file:line: dotted.key', or the change that the value came from."""
@@ -80,45 +98,30 @@ def read(path: Path, *, what: str) -> Document:
     document = Document(path)
 
     def fail(line: int, sentence: str) -> Document:
-        document.problems.append((line, f"{path}:{line}: {sentence}" if line else f"{path}: {sentence}"))
+        document.problem(line, f"{path}:{line}: {sentence}" if line else f"{path}: {sentence}")
         return document
 
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        text = read_bytes(path, largest=TEXT).decode("utf-8-sig")
     except FileNotFoundError:
         return fail(0, f"no such {what}{_neighbours(path)}")
-    except OSError as error:
-        return fail(0, f"cannot read this {what}: {error.strerror}")
     except UnicodeDecodeError:
         return fail(0, f"this {what} is not UTF-8 text")
-    except ValueError as error:
-        return fail(0, f"cannot read this {what}: {error}")
-
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import MarkedYAMLError, YAMLError
-
-    yaml = YAML(typ="safe", pure=True)
+    except (OSError, ValueError) as error:
+        return fail(0, f"cannot read this {what}: {reason(error)}")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # an anchor that is given again is no mistake
-            node = yaml.compose(text)
-    except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        reason = " ".join(f"{error.context or ''} {error.problem or ''}".split())
-        return fail(mark.line + 1 if mark else 1, f"not valid YAML: {reason}")
-    except YAMLError as error:
-        return fail(0, f"not valid YAML: {' '.join(str(error).split())}")
+        node, constructor = _composed(text)
+    except _NotYamlError as error:
+        return fail(error.line, f"not valid YAML: {error}")
     except RecursionError:
         return fail(0, f"cannot read this {what}: it is nested too deeply")
     document.lines[()] = 1
     if node is not None:
         try:
-            document.data = _Reader(document, yaml.constructor).value(node, (), ())
-        except _TooManyAliasesError as error:
-            document.report(error.key[:1], f"aliases repeat more than {ALIASED} values")
+            document.data = _Reader(document, constructor).value(node, (), ())
+        except _TooMuchError as error:
+            document.report(error.key[:1], str(error))
             return document
-        except RecursionError:  # aliases of aliases are deeper than the text
-            return fail(0, f"cannot read this {what}: it is nested too deeply")
     if document.data is None and not document.problems:
         return fail(0, f"this {what} is empty")
     return document
@@ -126,22 +129,62 @@ def read(path: Path, *, what: str) -> Document:
 
 def scalar(text: str) -> Any:
     """Return the value that `text` would have as a scalar in a YAML file."""
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
-    yaml = YAML(typ="safe", pure=True)
     try:
-        node = yaml.compose(text)
-    except YAMLError:
+        node, constructor = _composed(text)
+    except (_NotYamlError, RecursionError):
         return text
     if node is None or not isinstance(node.value, str):
         return text
-    return _Reader(Document(Path(text)), yaml.constructor).value(node, (), ())
+    document = Document(Path())
+    value = _Reader(document, constructor).value(node, (), ())  # one scalar cannot be too much
+    return text if document.problems else value
 
 
-class _TooManyAliasesError(Exception):
-    def __init__(self, key: Key) -> None:
+class _NotYamlError(Exception):
+    def __init__(self, line: int, sentence: str) -> None:
+        super().__init__(" ".join(sentence.split()))
+        self.line = line
+
+
+def _composed(text: str) -> tuple[Any, Any]:
+    """Return the node of a text, None if it is empty, and what makes values of scalars.
+
+    Raises:
+        _NotYamlError: with the line, 0 if it is not known.
+        RecursionError: it is nested too deeply.
+    """
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+    yaml = YAML(typ="safe", pure=True)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # an anchor that is given again is no mistake
+            constructor, _ = yaml.get_constructor_parser(text)
+            return constructor.composer.get_single_node(), constructor
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        raise _NotYamlError(
+            mark.line + 1 if mark else 1, f"{error.context or ''} {error.problem or ''}"
+        ) from None
+    except YAMLError as error:
+        raise _NotYamlError(0, str(error)) from None
+    except (ValueError, OverflowError) as error:  # such as an escape beyond Unicode
+        raise _NotYamlError(yaml.reader.line + 1, str(error)) from None
+
+
+class _TooMuchError(Exception):
+    def __init__(self, key: Key, sentence: str) -> None:
+        super().__init__(sentence)
         self.key = key
+
+
+_TAGS = {
+    "scalar": {"str", "int", "float", "bool", "null", "timestamp", "merge", "value"},
+    "sequence": {"seq"},
+    "mapping": {"map"},
+}
+"""Kind of a node -> the tags that it may have; a timestamp is text here."""
 
 
 @dataclass
@@ -160,24 +203,36 @@ class _Reader:
         if id(node) in self.seen:
             self.repeated += 1
             if self.repeated > ALIASED:
-                raise _TooManyAliasesError(key)
+                raise _TooMuchError(key, f"aliases repeat more than {ALIASED} values")
         self.seen.add(id(node))
         above = (*above, id(node))
-        if isinstance(node.value, str):
-            return self._scalar(node, key)
-        if node.tag.endswith(":seq"):
-            return self._sequence(node, key, above)
-        return self._mapping(node, key, above)
+        if len(above) > DEEPEST:
+            raise _TooMuchError(key, f"is nested too deeply: at most {DEEPEST} collections in each other")
+        kind = node.tag.removeprefix("tag:yaml.org,2002:")
+        if kind not in _TAGS[node.id]:
+            self.document.report(key, f"the tag {short(node.tag)} means nothing here")
+            return None
+        if node.id == "scalar":
+            return self._scalar(node, kind, key)
+        return (self._sequence if node.id == "sequence" else self._mapping)(node, key, above)
 
-    def _scalar(self, node: Any, key: Key) -> Any:
-        kind = node.tag.rpartition(":")[2]
+    def _scalar(self, node: Any, kind: str, key: Key) -> Any:
         if kind not in ("int", "float", "bool", "null"):
+            self._check_text(node.value, key)
             return node.value
         try:
-            return self.constructor.construct_object(node)
+            value = self.constructor.construct_object(node)
         except (ValueError, LookupError, ArithmeticError):
-            self.document.report(key, f"{node.value!r} is not of type {kind}")
+            self.document.report(key, f"{short(node.value)} is not of type {kind}")
             return None
+        if isinstance(value, int) and abs(value) >= LARGEST_WHOLE:
+            self.document.report(key, f"{short(node.value)} is too large a whole number")
+            return None
+        return value
+
+    def _check_text(self, text: str, key: Key) -> None:
+        if (character := unprintable(text)) is not None:
+            self.document.report(key, f"holds the control character {character}")
 
     def _sequence(self, node: Any, key: Key, above: tuple[int, ...]) -> list[Any]:
         items = []
@@ -188,7 +243,7 @@ class _Reader:
         return items
 
     def _mapping(self, node: Any, key: Key, above: tuple[int, ...]) -> dict[str, Any]:
-        path, lines, problems = self.document.path, self.document.lines, self.document.problems
+        path, lines = self.document.path, self.document.lines
         mapping: dict[str, Any] = {}
         for name, item in node.value:
             if name.tag.endswith(":merge"):
@@ -198,37 +253,38 @@ class _Reader:
         for name, item in node.value:
             line = name.start_mark.line + 1
             if not isinstance(name.value, str):
-                problems.append((line, f"{path}:{line}: a key must be text, not a collection"))
+                self.document.problem(line, f"{path}:{line}: a key must be text, not a collection")
                 continue
             if name.tag.endswith(":merge"):
                 continue
             below = (*key, name.value)
             if name.value in own:
                 first = own[name.value]
-                problems.append(
-                    (line, f"{path}:{line}: {dotted(below)} is given twice, first in line {first}")
-                )
+                sentence = f"{path}:{line}: {dotted(below)} is given twice, first in line {first}"
+                self.document.problem(line, sentence)
                 continue
             own[name.value] = lines[below] = line
+            self._check_text(name.value, below)
             mapping[name.value] = self.value(item, below, above)
         return mapping
 
     def _merged(self, name: Any, item: Any) -> list[Any]:
         """Return the mappings that a merge key takes in: one, or several in a list."""
-        nodes = item.value if item.tag.endswith(":seq") else [item]
-        if all(one.tag.endswith(":map") for one in nodes):
+        nodes = item.value if item.id == "sequence" else [item]
+        if all(one.id == "mapping" for one in nodes):
             return list(nodes)
         line = name.start_mark.line + 1
         sentence = "<<: write an alias of a mapping, or a list of such aliases"
-        self.document.problems.append((line, f"{self.document.path}:{line}: {sentence}"))
+        self.document.problem(line, f"{self.document.path}:{line}: {sentence}")
         return []
 
 
 def _neighbours(path: Path) -> str:
     """Return what the folder of a missing file holds in its place."""
-    if not path.parent.is_dir():
+    try:
+        names = {p.stem: p.name for p in sorted(path.parent.iterdir()) if p.suffix in (".yaml", ".yml")}
+    except (OSError, ValueError):
         return ""
-    names = {p.stem: p.name for p in sorted(path.parent.iterdir()) if p.suffix in (".yaml", ".yml")}
     close = closest(path.stem, names)
     if close is not None:
         return f"; did you mean {str(path.parent / names[close])!r}?"

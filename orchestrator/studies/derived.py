@@ -13,6 +13,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
+from ..wording import short
+
+LONGEST = 400
+"""Characters of an expression. Chosen: eight times the longest of ours; deeper ones could not be computed."""
+
 _OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -27,10 +32,12 @@ def parse(text: str) -> ast.expr:
     Raises:
         ValueError: it is none, or holds more than arithmetic.
     """
+    if len(text) > LONGEST:
+        raise ValueError(f"{short(text)}: an expression has at most {LONGEST} characters")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
-    except SyntaxError:
-        raise ValueError(f"{text!r} is no expression, for example (a - b) / a") from None
+    except (SyntaxError, ValueError, RecursionError, MemoryError):  # by what is in it, by brackets
+        raise ValueError(f"{short(text)} is no expression, for example (a - b) / a") from None
     for node in _nodes(tree):
         plain = isinstance(node, ast.Constant) and type(node.value) in (int, float)
         if not (plain or isinstance(node, (ast.Name, ast.BinOp, ast.UnaryOp))):
@@ -71,7 +78,7 @@ def calculate(text: str, values: Mapping[str, float]) -> float | None:
 
     try:
         number = value_of(parse(text))
-    except ZeroDivisionError:
+    except (ZeroDivisionError, OverflowError):
         return None
     return number if math.isfinite(number) else None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -10,17 +11,23 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from ..errors import ScenarioError
+from ..files import reads
 from ..plan import Change
 from ..scenario import overrides, yaml_lines
 from ..scenario.strict import validate
 from ..scenario.yaml_lines import Document, Key
-from ..wording import hint, listed
+from ..wording import hint, listed, short
 from .grids import cells
 from .jobs import Job
 from .study_schema import OPERATORS, Claim, Reference, RunSpec, StudySpec
 
 FIGURES = "figures"
 """Folder of the figures, beside those of the runs."""
+MOST = 10_000
+"""Runs of a study. Chosen: a hundred times the largest of ours; all stand in one report."""
+LONGEST = 100
+"""Characters of a run's folder. Chosen: more do not fit into file names where a letter takes two bytes."""
+_FOLDER = re.compile(rf"[\w.+-]{{1,{LONGEST}}}")
 
 
 @dataclass(frozen=True)
@@ -52,6 +59,7 @@ class Study:
         return [self.runs[name] for name in dict.fromkeys(names)]
 
 
+@reads("study file", ScenarioError)
 def load_study(path: Path | str) -> Study:
     """Read a study file.
 
@@ -65,6 +73,9 @@ def load_study(path: Path | str) -> Study:
     runs: dict[str, StudyRun] = {}
     for i, entry in enumerate(spec.runs):
         for run in _expanded(document, ("runs", i), entry):
+            if len(runs) == MOST:
+                document.report(("runs",), f"more than {MOST} runs; no more are taken")
+                raise ScenarioError(document.sentences())
             if run.name in runs:
                 document.report(("runs", i, "name"), f"there is already a run {run.name!r}")
             runs[run.name] = run
@@ -79,12 +90,16 @@ def load_study(path: Path | str) -> Study:
 def _expanded(document: Document, key: Key, entry: RunSpec) -> Iterator[StudyRun]:
     """Return the runs that an entry stands for, none if it is wrong."""
     known = len(document.problems)
+    number = math.prod(map(len, entry.for_each.values()))
+    if number > MOST:
+        document.report((*key, "for"), f"stands for {number} runs; at most {MOST} are taken")
+        return
     for combination in itertools.product(*(choices.items() for choices in entry.for_each.values())):
         values = dict(zip(entry.for_each, (value for value, _ in combination), strict=True))
         wording = dict(zip(entry.for_each, (said for _, said in combination), strict=True))
 
         def fill(text: str, *where: str, use: dict[str, str] = values) -> str:
-            for word in re.findall(r"\{(.*?)\}", text):
+            for word in re.findall(r"\{([^{}]*)\}", text):
                 if word not in use:
                     sentence = f"{{{word}}} stands for nothing" + hint(word, use, lead="'for' has")
                     document.report((*key, *where), sentence)
@@ -92,8 +107,10 @@ def _expanded(document: Document, key: Key, entry: RunSpec) -> Iterator[StudyRun
 
         name = fill(entry.name, "name")
         parts = name.split("/")
-        if not all(re.fullmatch(r"[\w.+-]*[\w+-][\w.+-]*", part) for part in parts) or parts[0] == FIGURES:
-            sentence = f"{name!r} cannot name a run: use letters, digits, . _ + - and / between folders"
+        if not all(_FOLDER.fullmatch(part) and part.strip(".") for part in parts) or parts[0] == FIGURES:
+            sentence = f"{short(name)} cannot name a run: use letters, digits, . _ + - and / between folders"
+            if any(len(part) > LONGEST for part in parts):
+                sentence = f"{short(name)} is too long: at most {LONGEST} characters between two /"
             document.report((*key, "name"), sentence)
         folder = document.path.parent
         swaps = {unit: fill(fmu, "swap", unit) for unit, fmu in entry.swap.items()}

@@ -57,6 +57,9 @@ from ..scenario.strict import Strict
 from ..wording import listed, short
 from . import derived
 
+CELLS = 10_000
+"""Of a grid. Chosen: as many as a study has runs."""
+
 OPERATORS = ("above", "at_least", "below", "at_most")
 
 
@@ -74,8 +77,12 @@ def text_of(value: object) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
+def _is_finite(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
 def _window(value: object) -> tuple[float, float]:
-    numbers = isinstance(value, list) and len(value) == 2 and all(isinstance(v, (int, float)) for v in value)
+    numbers = isinstance(value, list) and len(value) == 2 and all(map(_is_finite, value))
     if not numbers or not value[0] < value[1]:  # type: ignore[index]
         raise ValueError(f"must be [from, to] in s, from before to (got {short(value)})")
     return float(value[0]), float(value[1])  # type: ignore[index]
@@ -166,6 +173,8 @@ class GridSpec(Strict):
         for name in (row, column):
             if f"{{{name}}}" not in self.run:
                 raise ValueError(f"run: {self.run!r} does not depend on {{{name}}}")
+        if len(rows) * len(columns) > CELLS:
+            raise ValueError(f"{len(rows) * len(columns)} runs; at most {CELLS} are taken")
         if row == column:
             raise ValueError(f"rows and columns are both called {row!r}")
         if self.published and [len(line) for line in self.published] != [len(columns)] * len(rows):
@@ -183,7 +192,7 @@ class Source(Strict):
 def _is_number(value: object) -> bool:
     if isinstance(value, str):
         return re.match(r"\s*[+-]?\.?\d", value) is not None
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    return _is_finite(value)
 
 
 def _number(value: object) -> float | str:

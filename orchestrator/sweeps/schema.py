@@ -43,6 +43,9 @@ from ..scenario.strict import Strict
 from ..studies.study_schema import OPERATORS, MetricSpec, text_of
 from ..wording import listed, short
 
+MOST = 100_000
+"""Runs of a sweep; chosen: more is a slip of the pen, and would be planned for an hour."""
+
 Kind = Literal["setting", "fmu", "vehicle", "variant"]
 
 
@@ -115,7 +118,7 @@ class AxisSpec(Strict):
     values: Levels | None = Field(None, description="A list, or a mapping of values to words")
     start: Number | None = Field(None, alias="from", description="The first of `count` values")
     end: Number | None = Field(None, alias="to", description="The last")
-    count: int | None = Field(None, ge=2, description="How many; a Latin hypercube needs none")
+    count: int | None = Field(None, ge=2, le=MOST, description="How many; a Latin hypercube needs none")
     spacing: Literal["linear", "log"] = Field("linear", description="Equal steps or equal factors")
     unit: str | None = Field(None, description="Of the numbers; left out: the parameter's own")
     says: str = Field("", description="What figures call it; default: the parameter in words")
@@ -132,6 +135,12 @@ class AxisSpec(Strict):
     def places(self) -> list[str]:
         """What the axis changes."""
         return self.vary or list(dict.fromkeys(p for one in self.variants.values() for p in one.places))
+
+    @property
+    def length(self) -> int | None:
+        """How many values there are, None if the axis does not say."""
+        levels = self.variants or self.values
+        return self.count if levels is None else len(levels)
 
     @property
     def numeric(self) -> bool:
@@ -290,14 +299,22 @@ class SweepSpec(Strict):
             raise ValueError(f"runs and seed belong to a latin_hypercube; the design is {self.design}")
         else:
             self._check_lengths()
+        number = self.number_of_runs()
+        if number > MOST:
+            raise ValueError(f"{number} runs; at most {MOST} are taken")
         return self
 
+    def number_of_runs(self) -> int:
+        """Return how many points the design has."""
+        if self.design == "latin_hypercube":
+            return self.runs or 0
+        lengths = [axis.length or 0 for axis in self.axes.values()]
+        return max(lengths) if self.design == "list" else math.prod(lengths)
+
     def _check_lengths(self) -> None:
-        lengths = {}
-        for name, axis in self.axes.items():
-            levels = axis.variants or axis.values
-            lengths[name] = axis.count if levels is None else len(levels)
-            if lengths[name] is None:
+        lengths = {name: axis.length for name, axis in self.axes.items()}
+        for name, length in lengths.items():
+            if length is None:
                 raise ValueError(f"axes.{name}: needs count")
         if self.design == "list" and len(set(lengths.values())) > 1:
             counted = ", ".join(f"{name} has {n}" for name, n in lengths.items())

@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from ..errors import ScenarioError
+from ..files import reads
 from ..plan import Change, Value
 from ..scenario import yaml_lines
 from ..scenario.overrides import apply_to_all_runs, changes_of, changes_of_run
@@ -21,8 +22,6 @@ from .schema import AxisSpec, FigureSpec, SweepSpec
 
 COLUMNS = ("run", "status", "reason", "key")
 """Columns of the table beside the axes and the metrics."""
-MOST = 100_000
-"""Runs of a sweep; chosen: more is a slip of the pen, and would be planned for an hour."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +75,7 @@ def _given(axis: AxisSpec, level: Level) -> Value:
     return yaml_lines.scalar(level.value) if isinstance(level.value, str) else level.value
 
 
+@reads("sweep file", ScenarioError)
 def load_sweep(path: Path | str, *, changes: Sequence[Change] = ()) -> Sweep:
     """Read a sweep file.
 
@@ -96,8 +96,6 @@ def load_sweep(path: Path | str, *, changes: Sequence[Change] = ()) -> Sweep:
     sweep = Sweep(Path(path), spec, (*(one for one in own if one.place not in given), *given.values()))
     _check_axes(spec, document)
     _check_names(spec, document)
-    if not document.problems and len(sweep.points) > MOST:
-        document.report(("axes",), f"{len(sweep.points)} runs; at most {MOST} are taken")
     if document.problems:
         raise ScenarioError(document.sentences())
     return sweep

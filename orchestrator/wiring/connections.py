@@ -12,11 +12,11 @@ from dataclasses import replace
 
 from ..plan import Fmu, Value, Variable, Wire
 from ..scenario.load import Connection, Scenario
-from ..scenario.yaml_lines import Key, dotted
-from ..wording import fold, fold_sentences, hint, listed
+from ..scenario.yaml_lines import PROBLEMS, Key, dotted
+from ..wording import WHEELS, fold, fold_sentences, hint, listed
 from .constants import Constant, Input, constants
 from .fitting import contradicts_its_name, conversion_between, difference, fits
-from .patterns import Replaced, had, match
+from .patterns import Replaced, had, matching
 
 
 class Connector:
@@ -47,6 +47,7 @@ class Connector:
                 self._having.setdefault(name, []).append(unit)
         self._preferred: dict[str, list[tuple[str, Key]]] = {}  # unit -> sources of equal names, in order
         self._refused: set[Input] = set()  # by equal names
+        self._fitting: dict[object, dict[str, list[str]]] = {}  # kind of an input -> see `_fitting_outputs`
 
     def connect(self) -> tuple[list[Wire], dict[str, dict[str, Value]]]:
         """Return all wires, and each unit's constants."""
@@ -71,8 +72,7 @@ class Connector:
                     self._report(("units", unit), self._undriven(unit, variable))
         fitted = [self._fitted(wire, key) for wire, key in wires.values()]
         self._note_units(wire for wire, key in wires.values() if self._scale(key) is None)
-        for key, sentence in fold_sentences(self._found):
-            self._scenario.document.report(key, sentence)
+        self._tell()
         by_unit: dict[str, dict[str, Value]] = {unit: {} for unit in self._fmus}
         for (unit, name), value in values.items():
             by_unit[unit][name] = value
@@ -95,6 +95,13 @@ class Connector:
 
     def _report(self, key: Key, sentence: str) -> None:
         self._found.append((key, sentence))
+        if len(self._found) >= len(WHEELS) * PROBLEMS:
+            self._tell()
+
+    def _tell(self) -> None:
+        for key, sentence in fold_sentences(self._found):
+            self._scenario.document.report(key, sentence)
+        self._found.clear()
 
     def _by_connections(self) -> dict[Input, tuple[Wire, Key]]:
         """Return the wires that the scenario names, each with the key it comes from."""
@@ -119,7 +126,7 @@ class Connector:
                 self._preferred.setdefault(unit, []).extend((source, key) for source in ends[0])
             return []
         (target, to_pattern) = ends[1]
-        inputs = {part: n for n in self._inputs[target] if (part := match(to_pattern, n)) is not None}
+        inputs = matching(to_pattern, self._inputs[target])
         if not inputs:
             self._no_such((*key, "to"), target, to_pattern, "input")
         if ends[0] is None:
@@ -129,7 +136,7 @@ class Connector:
         if source == target:
             self._report(key, f"connects {source} to itself")
             return []
-        outputs = {part: n for n in self._outputs[source] if (part := match(from_pattern, n)) is not None}
+        outputs = matching(from_pattern, self._outputs[source])
         if not outputs:
             self._no_such((*key, "from"), source, from_pattern, "output")
         if not (outputs and inputs):
@@ -205,9 +212,9 @@ class Connector:
         """Return the sentence for an input without a source."""
         choices = [
             f"{source}.{name}"
-            for source, outputs in self._outputs.items()
+            for source, names in self._fitting_outputs(variable).items()
             if source != unit
-            for name in fold([n for n, v in outputs.items() if fits(v, variable)])
+            for name in names
         ]
         connect = f"connect {listed(choices, last='or')}, or give" if 0 < len(choices) <= 8 else "give"
         measure = f" [{variable.unit}]" if variable.unit else ""
@@ -215,6 +222,16 @@ class Connector:
             f"{unit}.{variable.name}{measure} has no source: no unit has an output of this name; "
             f"{connect} a constant under 'inputs'"
         )
+
+    def _fitting_outputs(self, target: Variable) -> dict[str, list[str]]:
+        """Return the outputs that an input could take, those of four wheels as one with `*`, by unit."""
+        kind = target.type, target.unit, target.definition
+        if kind not in self._fitting:
+            self._fitting[kind] = {
+                source: fold([n for n, v in outputs.items() if fits(v, target)])
+                for source, outputs in self._outputs.items()
+            }
+        return self._fitting[kind]
 
     def _scale(self, key: Key) -> tuple[float, float] | None:
         """Return the gain and offset that the connection at `key` gives, None if it gives none."""

@@ -10,7 +10,7 @@ from ..scenario.load import Scenario
 from ..scenario.yaml_lines import Key
 from ..wording import fold, hint
 from .parameters import origin, value_for
-from .patterns import Replaced, had, match
+from .patterns import Replaced, had, matching
 
 Input = tuple[str, str]  # unit, variable
 
@@ -40,14 +40,13 @@ def constants(
 ) -> dict[Input, Constant]:
     """Return what `inputs` gives to each input; problems and remarks go to the two lists."""
     found: dict[Input, Constant] = {}
+    inputs = {unit: {v.name: v for v in fmu.of("input")} for unit, fmu in fmus.items()}
     for pattern, raw in scenario.inputs.items():
         key: Key = ("inputs", pattern)
         prefix, _, rest = pattern.partition(".")
         of_unit = prefix in fmus
         units, name_pattern = ([prefix], rest) if of_unit else (list(fmus), pattern)
-        targets = [
-            (u, v.name) for u in units for v in fmus[u].of("input") if match(name_pattern, v.name) is not None
-        ]
+        targets = [(u, name) for u in units for name in matching(name_pattern, inputs[u]).values()]
         if not targets and had(scenario, replaced, units, name_pattern, "input"):
             notes.append(f"inputs.{pattern} is left out: no unit has such an input after the swap")
         elif not targets:

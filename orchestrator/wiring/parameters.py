@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable, Mapping
 
@@ -11,7 +10,7 @@ from ..plan import Fmu, Value, Variable
 from ..scenario import quantities
 from ..scenario.load import Scenario
 from ..scenario.yaml_lines import Document, Key
-from ..wording import closest, fold, hint, listed
+from ..wording import closest, fold, hint, listed, short
 
 LARGEST, LARGEST_SINGLE = sys.float_info.max, (2 - 2**-23) * 2.0**127
 """Numbers of double and single precision."""
@@ -29,12 +28,12 @@ def value_for(variable: Variable, given: Value) -> Value:
     if variable.choices is not None and value not in variable.choices:
         likely = closest(str(value), variable.choices)
         guess = f"; did you mean {likely!r}?" if likely else ""
-        raise ValueError(f"must be one of {listed(variable.choices, last='or')} (got {given!r}){guess}")
+        raise ValueError(f"must be one of {listed(variable.choices, last='or')} (got {short(given)}){guess}")
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         if variable.minimum is not None and value < variable.minimum:
-            raise ValueError(f"must be at least {variable.minimum:g}{unit} (got {given!r})")
+            raise ValueError(f"must be at least {variable.minimum:g}{unit} (got {short(given)})")
         if variable.maximum is not None and value > variable.maximum:
-            raise ValueError(f"must be at most {variable.maximum:g}{unit} (got {given!r})")
+            raise ValueError(f"must be at most {variable.maximum:g}{unit} (got {short(given)})")
     return value
 
 
@@ -42,23 +41,20 @@ def _real(variable: Variable, given: Value) -> float:
     in_unit = f" in {variable.unit}" if variable.unit and variable.unit != "1" else ""
     if isinstance(given, bool):
         raise ValueError(f"must be a number{in_unit} (got {str(given).lower()})")
-    try:
-        value = float(
-            quantities.convert(given, variable.unit, variable.definition) if isinstance(given, str) else given
-        )
-    except OverflowError:
-        value = math.inf
+    value = float(
+        quantities.convert(given, variable.unit, variable.definition) if isinstance(given, str) else given
+    )
     if not abs(value) <= (LARGEST_SINGLE if variable.encoding == "Float32" else LARGEST):
-        raise ValueError(f"must be a finite number{in_unit} (got {given!r})")
+        raise ValueError(f"must be a finite number{in_unit} (got {short(given)})")
     return value
 
 
 def _integer(variable: Variable, given: Value) -> int:
     if isinstance(given, bool) or not isinstance(given, int):
-        raise ValueError(f"must be a whole number (got {given!r})")
+        raise ValueError(f"must be a whole number (got {short(given)})")
     lowest, highest = integer_limits(variable.encoding or "Int32")
     if not lowest <= given <= highest:
-        raise ValueError(f"must be a whole number from {lowest} to {highest} (got {given!r})")
+        raise ValueError(f"must be a whole number from {lowest} to {highest} (got {short(given)})")
     return given
 
 
@@ -68,14 +64,14 @@ def _enumeration(variable: Variable, given: Value) -> int:
         return items[given]
     if given in items.values() and not isinstance(given, (bool, float)):
         return int(given)
-    raise ValueError(f"must be one of {listed(items, last='or')} (got {given!r})")
+    raise ValueError(f"must be one of {listed(items, last='or')} (got {short(given)})")
 
 
 def _other(variable: Variable, given: Value) -> Value:
     if variable.type == "Boolean" and not isinstance(given, bool):
-        raise ValueError(f"must be true or false (got {given!r})")
+        raise ValueError(f"must be true or false (got {short(given)})")
     if variable.type == "String" and not isinstance(given, str):
-        raise ValueError(f"must be text (got {given!r}): put it in quotes")
+        raise ValueError(f"must be text (got {short(given)}): put it in quotes")
     return given
 
 

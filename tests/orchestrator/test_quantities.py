@@ -62,13 +62,23 @@ def test_quantity_with_pi_is_converted_to_rounding(text: str, unit: str, value: 
         ("5 kg", "rad", "'5 kg' is not a value in rad: use rad, deg or mrad"),
         ("5 rad", "kg", "'5 rad' is not a value in kg: use kg, g or t"),
         ("fast", "m/s", "'fast' is neither a number in m/s nor a number with its unit"),
-        ("0,5 m", "m", "'0,5 m' is neither a number in m nor a number with its unit"),
-        ("5 foo", "m", "'foo' is not a unit"),
-        ("5 m/", "m", "'m/' is not a unit"),
+        (
+            "0,5 m",
+            "m",
+            "'0,5 m' is neither a number in m nor a number with its unit; write a decimal point: 0.5 m",
+        ),
+        ("5 foo", "m", "'foo' is not a unit: use m, mm, cm or km"),
+        ("5 kmh", "m/s", "'kmh' is not a unit; did you mean 'km/h'?"),
+        (
+            "0,0325",
+            "rad",
+            "'0,0325' is neither a number in rad nor a number with its unit; write a decimal point: 0.0325",
+        ),
+        ("5 m/", "m", "'m/' is not a unit; did you mean 'm'?"),
         ("5 m/s.kg", "m", "'m/s.kg' is ambiguous: put the denominator in parentheses"),
         ("5 m", "widgets", "'5 m' cannot be converted to widgets: give a number in widgets"),
         ("5 m", None, "'5 m' names a unit, but the FMU declares none: give a plain number"),
-        ("5 mkg", "kg", "'mkg' is not a unit"),
+        ("5 mkg", "kg", "'mkg' is not a unit; did you mean 'kg'?"),
     ],
 )
 def test_what_is_no_such_quantity_is_said_in_a_sentence(text: str, unit: str | None, message: str) -> None:

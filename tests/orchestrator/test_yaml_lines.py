@@ -24,7 +24,7 @@ def document(tmp_path, monkeypatch):
 def test_a_merge_key_takes_in_what_the_mapping_does_not_give_itself(document):
     made = document("a: &a {x: 1, y: {z: 2}}\nb:\n  y: 3\n  <<: *a\n  w: 4\n")
     assert made.data["b"] == {"x": 1, "y": 3, "w": 4}
-    assert made.problems == []
+    assert not made.problems
 
 
 def test_of_several_merged_mappings_the_first_one_counts(document):
@@ -71,8 +71,8 @@ def test_merge_keys_that_would_fill_the_memory_are_refused(document):
 def test_a_chain_of_aliases_too_deep_to_follow_is_refused(document):
     opened, closed = "[" * 100, "]" * 100
     lines = [f"x0: &x0 {opened}{closed}", *(f"x{n}: &x{n} {opened}*x{n - 1}{closed}" for n in range(1, 20))]
-    sentence = "a.yaml: cannot read this scenario file: it is nested too deeply"
-    assert document("\n".join(lines)).sentences() == [sentence]
+    (sentence,) = document("\n".join(lines)).sentences()
+    assert sentence.startswith("a.yaml:1: x0: is nested too deeply: at most 40 collections in each other")
 
 
 def test_a_long_list_without_aliases_is_no_bomb(document, monkeypatch):

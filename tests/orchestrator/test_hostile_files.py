@@ -1,0 +1,227 @@
+"""Users' files that are wrong in unusual ways: each is answered by a sentence with its place."""
+
+from __future__ import annotations
+
+import os
+import re
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from orchestrator import files
+from orchestrator.errors import ScenarioError, YawbenchError
+from orchestrator.files import reading
+from orchestrator.scenario import yaml_lines
+from orchestrator.scenario.load import load_scenario
+from orchestrator.scenario.overrides import read_changes
+from orchestrator.studies.derived import parse
+from orchestrator.studies.study_file import load_study
+from orchestrator.sweeps.sweep_file import load_sweep
+from orchestrator.wiring.make_plan import make_plan
+
+from .fake_fmus import Var, make_fmu
+
+HEAD = "stop_time: 1\nstep_size: 0.01\n"
+STUDY = "title: t\nmetrics: {m: {metric: peak(sideslip)}}\nruns:\n"
+SWEEP = "title: t\nscenario: a.yaml\nmetrics: {m: {metric: peak(sideslip)}}\n"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cache: Path) -> Path:
+    """The working directory, with one FMU."""
+    monkeypatch.chdir(tmp_path)
+    make_fmu(tmp_path / "fmus" / "plant.fmu", outputs=["speed"], parameters=[Var("mass", "kg")])
+    return tmp_path
+
+
+def problems(text: str | bytes, **options: list[str]) -> list[str]:
+    """Return what is said of a scenario file with this text."""
+    Path("a.yaml").write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(YawbenchError) as caught:
+        make_plan(load_scenario(Path("a.yaml"), changes=read_changes(**options)))
+    assert caught.value.__cause__ is None, "caught by the net for what is not foreseen"
+    assert all(len(problem) < 12_000 for problem in caught.value.problems)
+    return caught.value.problems
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("units: !own {a: {fmu: plant}}", "a.yaml:3: units: the tag '!own' means nothing here"),
+        ("units: !!seq {a: b}", "a.yaml:3: units: the tag 'tag:yaml.org,2002:seq' means nothing here"),
+        ("units: !!map [a]", "a.yaml:3: units: the tag 'tag:yaml.org,2002:map' means nothing here"),
+        ("title: !!binary aGk=", "a.yaml:3: title: the tag 'tag:yaml.org,2002:binary' means nothing here"),
+        ('title: "\\U00FFFFFF"', "a.yaml:3: not valid YAML: chr() arg not in range(0x110000)"),
+        ("title: !<%ff> b", "a.yaml:3: not valid YAML: while scanning an tag 'utf-8' codec can't decode"),
+        ("title: !%zz b", "a.yaml:3: not valid YAML: while scanning an tag expected URI escape sequence"),
+        ('title: "\\e[31mred"', "a.yaml:3: title: holds the control character \\x1b"),
+        ('title: "a \\u202e b"', "a.yaml:3: title: holds the control character \\u202e"),
+        ('title: "\\ud800"', "a.yaml:3: title: holds the control character \\ud800"),
+        ('"\\e[2J": 1', "a.yaml:3: \x1b[2J: holds the control character \\x1b"),
+        ("title: " + "[" * 45 + "]" * 45, "a.yaml:3: title: is nested too deeply: at most 40 collections"),
+        ("title: " + "[" * 5000, "a.yaml: cannot read this scenario file: it is nested too deeply"),
+        ("inputs: {a: " + "1" * 400 + "}", "a.yaml:3: inputs.a: '" + "1" * 56 + "... is too large a whole"),
+        ("inputs: {a: " + "1" * 5000 + "}", "a.yaml:3: inputs.a: '" + "1" * 56 + "... is not of type int"),
+    ],
+)
+def test_yaml_beyond_what_scenarios_use_is_refused_in_a_sentence(text: str, expected: str) -> None:
+    assert any(said.startswith(expected) for said in problems(f"{HEAD}{text}\n")), problems(f"{HEAD}{text}\n")
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        ("1" * 400, "must be a number|neither a number"),
+        ("[" * 3000, "neither a number"),
+        ("5 " + "(" * 3000, "neither a number"),
+        ("5 " + "(" * 50 + "kg" + ")" * 40, "is not a unit"),
+        ("1e999 kg", "must be a finite number in kg"),
+        ("1e999", "must be a finite number"),
+        ("nan", "neither a number"),
+        (".nan", "must be a finite number"),
+        ("5,5", "write a decimal point: 5.5"),
+        ("5 kgg", "did you mean 'kg'"),
+    ],
+)
+def test_a_setting_that_is_no_quantity_is_refused_in_a_sentence(value: str, expected: str) -> None:
+    (said,) = problems(f"{HEAD}units: {{a: {{fmu: plant}}}}\n", settings=[f"a.mass={value}"])
+    assert said.startswith("--set a.mass=")
+    assert re.search(expected, said)
+
+
+@pytest.mark.parametrize("name", ["n" * 4000, "n" * 300 + ".yaml", "a\0b"])
+def test_names_that_cannot_be_those_of_files_are_refused(name: str) -> None:
+    assert problems(f"{HEAD}units: {{a: {{fmu: {name!r}}}}}\n".replace("\0", "\\0").replace("'", '"'))
+    assert problems(f'{HEAD}vehicle: "{name}"\nunits: {{a: {{fmu: plant}}}}\n'.replace("\0", "\\0"))
+    assert problems(f"{HEAD}units: {{a: {{fmu: plant}}}}\n", swaps=[f"a={name}"])
+    with pytest.raises(ScenarioError):
+        load_scenario(Path(name))
+
+
+def test_a_name_with_a_line_feed_can_be_swapped_in_and_is_not_found() -> None:
+    (said,) = problems(f"{HEAD}units: {{a: {{fmu: plant}}}}\n", swaps=["a=pl\nant"])
+    assert "no FMU 'pl\\nant'" in said
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
+def test_pipes_devices_and_loops_of_links_are_not_read() -> None:
+    os.mkfifo("pipe.yaml")
+    os.symlink("loop.yaml", "loop.yaml")
+    for path, why in (
+        (Path("pipe.yaml"), "it is a pipe, a socket or a device, not a file"),
+        (Path("/dev/zero"), "it is a pipe, a socket or a device, not a file"),
+        (Path("loop.yaml"), "Too many levels of symbolic links"),
+    ):
+        with pytest.raises(ScenarioError) as caught:
+            load_scenario(path)
+        assert caught.value.problems == [f"{path}: cannot read this scenario file: {why}"]
+
+
+def test_a_file_that_is_too_large_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(yaml_lines, "TEXT", 1000)
+    (said,) = problems("a" * 1001)
+    assert said == "a.yaml: cannot read this scenario file: it is larger than 0.001 MB"
+
+
+def test_of_very_many_problems_the_first_ones_are_told() -> None:
+    units = "".join(f"  u{i}: {{fmi: plant}}\n" for i in range(1000))
+    said = problems(f"{HEAD}units:\n{units}")
+    assert len(said) == yaml_lines.PROBLEMS + 1
+    assert said[-1] == "a.yaml: there may be more; these are the first 200 problems"
+
+
+def said_of(load: object, text: str) -> list[str]:
+    Path("b.yaml").write_text(text)
+    with pytest.raises(ScenarioError) as caught:
+        load(Path("b.yaml"))  # type: ignore[operator]
+    assert caught.value.__cause__ is None
+    return caught.value.problems
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            f"{SWEEP}axes: {{a: {{vary: plant.mass, from: 1, to: 2, count: 1000000000}}}}\n",
+            "b.yaml:4: axes.a.count: ",
+        ),
+        (
+            f"{SWEEP}axes:\n"
+            + "".join(f"  a{i}: {{vary: plant.p{i}, from: 1, to: 2, count: 1000}}\n" for i in range(3)),
+            "b.yaml:1: 1000000000 runs; at most 100000 are taken",
+        ),
+        (
+            f"{SWEEP}design: latin_hypercube\nseed: 1\nruns: 1000000000\n"
+            "axes: {a: {vary: plant.mass, from: 1, to: 2}}\n",
+            "b.yaml:1: 1000000000 runs; at most 100000 are taken",
+        ),
+    ],
+)
+def test_a_sweep_of_too_many_runs_is_refused_before_they_are_listed(text: str, expected: str) -> None:
+    assert said_of(load_sweep, text)[0].startswith(expected)
+
+
+def test_a_study_of_too_many_runs_is_refused_before_they_are_listed() -> None:
+    hundred = list(range(100))
+    for_each = f"{{a: {hundred}, b: {hundred}, c: {hundred}}}"
+    text = f'{STUDY}  - {{name: "{{a}}{{b}}{{c}}", scenario: a.yaml, for: {for_each}}}\n'
+    assert said_of(load_study, text) == [
+        "b.yaml:4: runs[0].for: stands for 1000000 runs; at most 10000 are taken"
+    ]
+    text = STUDY + "".join(
+        f'  - {{name: "{i}/{{a}}/{{b}}", scenario: a.yaml, for: {{a: {hundred}, b: {hundred}}}}}\n'
+        for i in range(2)
+    )
+    assert said_of(load_study, text) == ["b.yaml:3: runs: more than 10000 runs; no more are taken"]
+
+
+def test_a_grid_of_too_many_cells_is_refused() -> None:
+    many = list(range(200))
+    text = (
+        f"{STUDY}  - {{name: x, scenario: a.yaml}}\n"
+        f'grids: {{g: {{title: t, metric: m, run: "{{a}}{{b}}", rows: {{a: {many}}}, '
+        f"columns: {{b: {many}}}}}}}\n"
+    )
+    assert said_of(load_study, text) == ["b.yaml:5: grids.g: 40000 runs; at most 10000 are taken"]
+
+
+@pytest.mark.parametrize("text", ["a + " * 5000 + "a", "(" * 300 + "a" + ")" * 300, "-" * 390 + "a", "a\0"])
+def test_an_expression_beyond_measure_is_refused_or_computed(text: str) -> None:
+    try:
+        parse(text)
+    except ValueError as error:
+        assert len(str(error)) < 200
+
+
+def test_a_bad_address_in_an_ssp_archive_is_refused_with_its_line() -> None:
+    ssd = (
+        '<ssd:SystemStructureDescription xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription" '
+        'name="x" version="1.0">\n<ssd:System name="s"><ssd:Elements>\n'
+        '<ssd:Component name="a" source="http://[bad.fmu"/>\n'
+        "</ssd:Elements></ssd:System></ssd:SystemStructureDescription>"
+    )
+    with zipfile.ZipFile("a.ssp", "w") as archive:
+        archive.writestr("SystemStructure.ssd", ssd)
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(Path("a.ssp"))
+    assert caught.value.problems == ["a.ssp/SystemStructure.ssd:3: source 'http://[bad.fmu' is no address"]
+
+
+def test_an_ssp_archive_that_unpacks_without_limit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "UNPACKED", 1_000_000)
+    with zipfile.ZipFile("a.ssp", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("SystemStructure.ssd", bytes(3_000_000))
+    with pytest.raises(
+        ScenarioError, match="cannot read this SSP archive: unpacked it has 3 MB, more than 1 MB"
+    ):
+        load_scenario(Path("a.ssp"))
+
+
+def test_what_nobody_foresaw_becomes_a_sentence_that_keeps_its_cause() -> None:
+    with pytest.raises(ScenarioError) as caught, reading("scenario file", "a.yaml", ScenarioError):
+        raise KeyError("secret")
+    assert caught.value.problems == [
+        "a.yaml: cannot read this scenario file: something in it is not understood (KeyError: 'secret')"
+    ]
+    assert isinstance(caught.value.__cause__, KeyError)

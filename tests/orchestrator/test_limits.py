@@ -1,0 +1,69 @@
+"""Work that is bounded: large systems in near-linear time, limits that are said before memory is filled."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import pytest
+
+from orchestrator.commands.check import show
+from orchestrator.errors import WiringError
+from orchestrator.scenario.load import load_scenario
+from orchestrator.wiring.make_plan import make_plan
+
+from ..trials.large import write_ring
+
+pytestmark = pytest.mark.usefixtures("cache")
+
+
+def lines_run(function: Callable[[], object]) -> int:
+    """Return how many lines of the orchestrator a call executes, rounds of loops and comprehensions too."""
+    count = 0
+
+    def local(frame: FrameType, event: str, argument: Any) -> Any:
+        nonlocal count
+        count += event == "line"
+        return local
+
+    def trace(frame: FrameType, event: str, argument: Any) -> Any:
+        return local if "/orchestrator/" in frame.f_code.co_filename else None
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        function()
+    finally:
+        sys.settrace(before)
+    return count
+
+
+@pytest.mark.parametrize("follows", ["nothing", "one", "all", "unsaid"])
+def test_twice_the_units_and_variables_take_twice_the_work(
+    follows: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scenarios = [
+        write_ring(tmp_path / str(n), units=n, variables=20 * n, follows=follows) for n in (8, 16, 32)
+    ]
+
+    def check(scenario: Path) -> None:
+        show(make_plan(load_scenario(scenario)), scenario)
+
+    check(scenarios[0])  # modules are imported, caches filled
+    small, double, fourfold = (lines_run(lambda file=file: check(file)) for file in scenarios)
+    assert double - small < fourfold - double < 2.5 * (double - small)
+
+
+def test_a_real_loop_through_very_many_units_is_cut_short_in_its_sentence(tmp_path: Path) -> None:
+    scenario = write_ring(tmp_path, units=30, variables=120, follows="unsaid")
+    plan = make_plan(load_scenario(scenario))
+    (note,) = plan.notes
+    assert note.startswith("possible algebraic loop: unit_29.u29_y0 -> unit_0.u29_y0 -> ")
+    assert "42 more -> unit_29.u29_y0;" in note
+    closed = write_ring(tmp_path / "closed", units=30, variables=120, follows="closed")
+    with pytest.raises(WiringError) as caught:
+        make_plan(load_scenario(closed))
+    assert [len(problem) < 1000 for problem in caught.value.problems] == [True, True]
