@@ -26,7 +26,7 @@ from .check import defects
 from .closure import Parts, Sources
 from .compiler import compile_launcher
 from .mark import Mark, read_mark
-from .recipe import PythonRecipe, Recipe, natural_name
+from .recipe import TOOL, PythonRecipe, Recipe, natural_name
 from .staging import PYTHONFMU
 
 HERE = Path(__file__).resolve().parent
@@ -114,7 +114,7 @@ def build_all(
 
 def component_mark(recipe: Recipe, root: Path = COMPONENTS) -> Mark:
     """Return the mark of a component of the project, still without its key."""
-    return Mark(recipe.name, "", f"components/{recipe.source.relative_to(root).as_posix()}")
+    return Mark(recipe.name, key="", source=f"components/{recipe.source.relative_to(root).as_posix()}")
 
 
 def build_component(
@@ -197,7 +197,7 @@ def bring_up_to_date(recipe: Recipe, target: Path, mark: Mark, force: bool = Fal
         BuildError: each problem begins with the FMU's name.
     """
     try:
-        mark = replace(mark, key=recipe.key())
+        mark = replace(mark, key=recipe.key(), tool=TOOL)
         if not force and read_mark(target) == mark:
             return False
         files, modules = recipe.make()

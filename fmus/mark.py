@@ -19,6 +19,7 @@ class Mark:
     name: str
     key: str
     source: str  # of a component: from the folder above components/; of a file: from the FMU's folder
+    tool: str = ""  # what built it
     home: str = ""  # of a file: name of the FMU's folder; a copy in another folder is the user's own affair
     role: str = ""  # of a file: the folder of its role
     defaults: Mapping[str, Any] = field(default_factory=dict)  # default values other than the source's

@@ -7,6 +7,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -19,6 +20,7 @@ from .compiler import compile_launcher, compiler_tools
 from .evidence import Looks
 from .staging import PYTHONFMU, missing_signals, staged, variant
 
+TOOL = f"yawbench {version('yawbench')}, pythonfmu {version('pythonfmu')}"
 HERE = Path(__file__).resolve().parent
 
 
@@ -79,8 +81,8 @@ class PythonRecipe:
                 text = variant(stage.component(module), self.name, self.defaults)
             module = (*module[:-1], f"{module[-1]}_variant")
             files = files | {"/".join(module) + ".py": text}
-        version = _hash(files)[:12]
-        package, entry = f"yawbench_{version}", f"{self.name}_{version}"
+        digest = _hash(files)[:12]
+        package, entry = f"yawbench_{digest}", f"{self.name}_{digest}"
         with staged(files, package, entry) as stage:
             component = stage.component(module)
             problems = missing_signals(ROLES[module[0]], component.variables)
@@ -88,7 +90,7 @@ class PythonRecipe:
                 raise BuildError(problems)
             built = stage.build(self.name, component)
             launcher, _ = compile_launcher()
-            return pack(built, name=self.name, version=version, launcher=launcher), (package, entry)
+            return pack(built, name=self.name, version=digest, launcher=launcher), (package, entry)
 
 
 def natural_name(module: Parts) -> str:
@@ -99,7 +101,7 @@ def natural_name(module: Parts) -> str:
 @cache
 def _builder() -> str:
     """Return a hash of this builder and of what it takes from PythonFMU."""
-    content = hashlib.sha256()
+    content = hashlib.sha256(TOOL.encode())
     for file in [*sorted(HERE.glob("*.py")), *_from_pythonfmu()]:
         content.update(file.read_bytes())
     return content.hexdigest()

@@ -75,6 +75,16 @@ class Variable:
 
 
 @dataclass(frozen=True)
+class Built:
+    """What an FMU was built from here."""
+
+    source: str  # of a component: from the folder above components/; else: from the FMU's folder
+    key: str  # of the sources and of all else that decided what the FMU's bytes are
+    tool: str
+    current: bool  # whether it would come out the same if it were built now
+
+
+@dataclass(frozen=True)
 class Fmu:
     """An FMU unpacked in the cache."""
 
@@ -90,6 +100,7 @@ class Fmu:
     description: str = ""
     once_per_process: bool = False
     fmi: int = 2  # major version of the standard
+    built: Built | None = None  # None: elsewhere, or nobody has looked
     python_modules: dict[str, str] = field(default_factory=dict)
     """Of a PythonFMU unit: top-level module in resources/ -> hash of its content."""
     refused: dict[str, str] = field(default_factory=dict)

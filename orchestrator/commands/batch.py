@@ -27,15 +27,18 @@ def say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def run_all(jobs: Sequence[Job], folder: Path, *, workers: int | None) -> list[Outcome]:
+def run_all(jobs: Sequence[Job], folder: Path, *, workers: int | None, build: bool) -> list[Outcome]:
     """Run all jobs, after making sure that every one can start, and report each as it ends.
 
+    `build`: build first what is stale of the FMUs that they use.
+
     Raises:
-        ScenarioError: a job cannot start; none has been.
+        BuildError, ScenarioError: a job cannot start; none has been.
     """
     from ..studies.jobs import check, execute
 
-    check(jobs)
+    for note in check(jobs, build=build):
+        say(f"note: {note}")
     with stoppable(folder):
         return execute(jobs, workers=workers, done=_progress(len(jobs)))
 

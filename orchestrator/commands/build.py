@@ -26,8 +26,11 @@ Force = Annotated[bool, typer.Option("--force", help="Build also what has not ch
 def build(components: Components = None, out: Target = None, force: Force = False) -> None:
     """Build the FMUs whose sources have changed."""
     from fmus.build import HERE, build_all, build_component, find_recipes
+    from fmus.upkeep import writable
 
-    target = out or HERE
+    target = out or writable(HERE)
+    if out is None and target != HERE:
+        print(f"{HERE} cannot be written; FMUs go to {target}", file=sys.stderr)
     known = find_recipes()
     named = list(components or ())
     for name in named:

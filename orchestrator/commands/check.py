@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .options import Fmus, ScenarioFile, Set, Swap
+from .options import Fmus, NoBuild, ScenarioFile, Set, Swap
+from .planning import plan_of_scenario
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -18,13 +19,16 @@ PIPE_WIDTH = 140
 """Columns of what goes into a pipe or a file."""
 
 
-def check(scenario: ScenarioFile, swap: Swap = None, set_: Set = None, fmus: Fmus = None) -> None:
+def check(
+    scenario: ScenarioFile,
+    swap: Swap = None,
+    set_: Set = None,
+    fmus: Fmus = None,
+    no_build: NoBuild = False,
+) -> None:
     """Validate a scenario; show units, wires and their order."""
-    from ..scenario.load import load_scenario
-    from ..scenario.overrides import read_changes
-    from ..wiring.make_plan import make_plan
 
-    plan = make_plan(load_scenario(scenario, changes=read_changes(swap or (), set_ or ())), fmus=fmus)
+    plan = plan_of_scenario(scenario, swap, set_, fmus=fmus, build=not no_build)
     show(plan, scenario)
     for note in plan.notes:
         print(f"note: {note}", file=sys.stderr)

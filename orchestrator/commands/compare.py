@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .batch import Jobs
-from .options import CallLimit, Fmus, Format, Isolate, Out, ScenarioFile, Set, isolation
+from .options import CallLimit, Fmus, Format, Isolate, NoBuild, Out, ScenarioFile, Set, isolation
 
 Swaps = Annotated[
     list[str],
@@ -28,6 +28,7 @@ def compare(
     set_: Set = None,
     out: Out = None,
     fmus: Fmus = None,
+    no_build: NoBuild = False,
     jobs: Jobs = None,
     format_: Format = "csv",
     isolate: Isolate = False,
@@ -59,7 +60,7 @@ def compare(
     limit = isolation(isolate, call_limit)
     made = variants(scenario, swap, read_changes(settings=set_ or ()), folder, fmus)
     work = [replace(job, format=format_, call_limit=limit) for job in made]
-    outcomes = run_all(work, folder, workers=jobs)
+    outcomes = run_all(work, folder, workers=jobs, build=not no_build)
     comparison = judge_comparison(outcomes)
     for_all = changes_of_all([changes_in(run.results.run) for run in comparison.runs])
     title = str(comparison.runs[0].results.run.get("title") or "") if comparison.runs else ""

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from ..plan import Algorithm
-from .options import Fmus, Out, ScenarioFile, Set, Swap
+from .options import Fmus, NoBuild, Out, ScenarioFile, Set, Swap
 
 Halvings = Annotated[
     int, typer.Option("--halvings", metavar="N", min=2, max=10, help="How often the step is halved.")
@@ -34,6 +34,7 @@ def converge(
     set_: Set = None,
     out: Out = None,
     fmus: Fmus = None,
+    no_build: NoBuild = False,
 ) -> None:
     """Halve the step size again and again; show error and order.
 
@@ -71,7 +72,7 @@ def converge(
         changes=given,
         fmus=fmus,
     )
-    outcomes = run_all(work, folder, workers=1)
+    outcomes = run_all(work, folder, workers=1, build=not no_build)
     rows = measure(outcomes, signal)
     title = with_changes(f"Convergence of {signal}, {scenario.stem}", given)
     table = convergence_table(rows, title)

@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from .options import Fmus, ScenarioFile, Set, Swap
+from .options import Fmus, NoBuild, ScenarioFile, Set, Swap
+from .planning import plan_of_scenario
 
 Archive = Annotated[
     Path | None, typer.Option("--out", metavar="FILE", help="The archive; default: <scenario>.ssp, here.")
@@ -16,18 +17,20 @@ Archive = Annotated[
 
 
 def export_ssp(
-    scenario: ScenarioFile, swap: Swap = None, set_: Set = None, out: Archive = None, fmus: Fmus = None
+    scenario: ScenarioFile,
+    swap: Swap = None,
+    set_: Set = None,
+    out: Archive = None,
+    fmus: Fmus = None,
+    no_build: NoBuild = False,
 ) -> None:
     """Write a scenario and its FMUs as an SSP 1.0 archive.
 
     SSP: System Structure and Parameterization. `yawbench run` reads it back and gives the same numbers.
     """
     from ..interop.ssp_write import write_ssp
-    from ..scenario.load import load_scenario
-    from ..scenario.overrides import read_changes
-    from ..wiring.make_plan import make_plan
 
-    plan = make_plan(load_scenario(scenario, changes=read_changes(swap or (), set_ or ())), fmus=fmus)
+    plan = plan_of_scenario(scenario, swap, set_, fmus=fmus, build=not no_build)
     for note in plan.notes:
         print(f"note: {note}", file=sys.stderr)
     path = out or Path(f"{scenario.stem}.ssp")

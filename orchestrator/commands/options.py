@@ -29,6 +29,14 @@ Fmus = Annotated[
     Path | None,
     typer.Option("--fmus", metavar="DIR", help="Folder of the FMUs; default: the nearest fmus/ folder."),
 ]
+NoBuild = Annotated[
+    bool,
+    typer.Option(
+        "--no-build",
+        envvar="YAWBENCH_NO_BUILD",
+        help="Take FMUs as they are, also those whose sources have changed; they are built anew otherwise.",
+    ),
+]
 Format = Annotated[
     str,
     typer.Option(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import Fmus, Out, Set, Swap
+from .options import Fmus, NoBuild, Out, Set, Swap
 
 if TYPE_CHECKING:
     from ..plan import Change
@@ -47,6 +47,7 @@ def plot(
     set_: Set = None,
     out: Out = None,
     fmus: Fmus = None,
+    no_build: NoBuild = False,
 ) -> None:
     """Draw runs, one or several laid over each other.
 
@@ -67,7 +68,7 @@ def plot(
     if label and len(label) != len(sources):
         given = f"{counted(len(label), 'label')}, {counted(len(sources), 'folder')}"
         raise ScenarioError(f"--label: needs one for each folder of results ({given})")
-    folders = _recorded(sources, read_changes(swap or (), set_ or ()), fmus)
+    folders = _recorded(sources, read_changes(swap or (), set_ or ()), fmus, build=not no_build)
     labels = label or distinct(folders)
     runs = [Run(name, load_results(folder)) for name, folder in zip(labels, folders, strict=True)]
     figures: dict[str, Sequence[str]] = {"overview": panel or OVERVIEW}
@@ -81,7 +82,9 @@ def plot(
         say(f"{paths[0]}, {paths[1].name}")
 
 
-def _recorded(sources: Sequence[Path], changes: tuple[Change, ...], fmus: Path | None) -> list[Path]:
+def _recorded(
+    sources: Sequence[Path], changes: tuple[Change, ...], fmus: Path | None, *, build: bool
+) -> list[Path]:
     """Return the folders of all results, after making the runs of scenarios that have none.
 
     Raises:
@@ -97,9 +100,9 @@ def _recorded(sources: Sequence[Path], changes: tuple[Change, ...], fmus: Path |
     if changes and not scenarios:
         raise ScenarioError("--swap and --set change a scenario; only folders of results are given")
     jobs = {source: Job(source.stem, source, default_folder(source), changes, fmus) for source in scenarios}
-    once = Once()
+    once = Once(build=build)
     stale = [job for job in jobs.values() if staleness(plan_of(job, once), job.out)]
-    outcomes = run_all(stale, Path("results"), workers=None) if stale else []
+    outcomes = run_all(stale, Path("results"), workers=None, build=build) if stale else []
     for outcome in outcomes:
         if not outcome.ok:
             raise typer.Exit(outcome.exit_status)

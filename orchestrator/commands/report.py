@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from .batch import Jobs
-from .options import Fmus, Format
+from .options import Fmus, Format, NoBuild
 
 Studies = Annotated[
     list[Path] | None,
@@ -28,6 +28,7 @@ def report(
     studies: Studies = None,
     out: Out = None,
     fmus: Fmus = None,
+    no_build: NoBuild = False,
     jobs: Jobs = None,
     format_: Format = "csv",
     again: Again = False,
@@ -63,7 +64,8 @@ def report(
         folders = [out] if len(paths) == 1 else below
     hold(context, *folders)
     every = [
-        wanted(path, folder, fmus=fmus, format=format_) for path, folder in zip(paths, folders, strict=True)
+        wanted(path, folder, fmus=fmus, format=format_, build=not no_build)
+        for path, folder in zip(paths, folders, strict=True)
     ]
     chapters, failed = [], False
     for one in every:
@@ -72,7 +74,7 @@ def report(
         if not no_run:
             good = len(one.jobs) - len(work)
             say(f"{one.study.spec.title}: {counted(len(work), 'run')} to make, {good} with good results")
-            outcomes = run_all(work, one.folder, workers=jobs) if work else []
+            outcomes = run_all(work, one.folder, workers=jobs, build=not no_build) if work else []
         with stoppable(one.folder), pool(jobs) as workers:
             findings = judge_study(one.study, one.folder, outcomes, each=workers.map)
             for problem in write_study(findings, one.folder, each=workers.map):

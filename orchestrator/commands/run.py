@@ -12,7 +12,8 @@ from typing import Annotated
 
 import typer
 
-from .options import CallLimit, Fmus, Format, Isolate, Out, ScenarioFile, Set, Swap, isolation
+from .options import CallLimit, Fmus, Format, Isolate, NoBuild, Out, ScenarioFile, Set, Swap, isolation
+from .planning import plan_of_scenario
 
 Metrics = Annotated[
     list[str] | None,
@@ -36,6 +37,7 @@ def run(
     set_: Set = None,
     out: Out = None,
     fmus: Fmus = None,
+    no_build: NoBuild = False,
     format_: Format = "csv",
     metric: Metrics = None,
     isolate: Isolate = False,
@@ -52,16 +54,12 @@ def run(
     from ..results.formats import check_format
     from ..results.lock import refuse_below_others
     from ..results.size import size_note
-    from ..scenario.load import load_scenario
-    from ..scenario.overrides import read_changes
     from ..titles import changed, with_changes
-    from ..wiring.make_plan import make_plan
 
     check_format(format_)
     metrics = _metric_names(metric or ())
     limit = isolation(isolate, call_limit)
-    loaded = load_scenario(scenario, changes=read_changes(swap or (), set_ or ()))
-    plan = make_plan(loaded, fmus=fmus, isolated=isolate)
+    plan = plan_of_scenario(scenario, swap, set_, fmus=fmus, build=not no_build, isolated=isolate)
     if named := [name for name in metric or () if name != "standard"]:
         from ..metrics import run_metrics
 

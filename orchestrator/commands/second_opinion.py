@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import Fmus, ScenarioFile, Set, Swap
+from .options import Fmus, NoBuild, ScenarioFile, Set, Swap
+from .planning import plan_of_scenario
 
 if TYPE_CHECKING:
     from ..interop.second_opinion import Opinion
@@ -28,6 +29,7 @@ def second_opinion(
     swap: Swap = None,
     set_: Set = None,
     fmus: Fmus = None,
+    no_build: NoBuild = False,
     master: Masters = None,
     one_core: Pinned = True,
 ) -> None:
@@ -38,10 +40,7 @@ def second_opinion(
     """
     from ..errors import ScenarioError, SimulationError
     from ..interop.second_opinion import MASTERS, second_opinion
-    from ..scenario.load import load_scenario
-    from ..scenario.overrides import read_changes
     from ..titles import changed
-    from ..wiring.make_plan import make_plan
     from ..wording import hint
 
     known = {one.title.lower(): one for one in MASTERS}
@@ -49,7 +48,7 @@ def second_opinion(
         if name.lower() not in known:
             raise ScenarioError(f"--master {name}: there is no such master{hint(name, known, lead='known')}")
     chosen = [known[name.lower()] for name in master or known]
-    plan = make_plan(load_scenario(scenario, changes=read_changes(swap or (), set_ or ())), fmus=fmus)
+    plan = plan_of_scenario(scenario, swap, set_, fmus=fmus, build=not no_build)
     if plan.changes:
         print(f"changed: {changed(plan.changes)}", file=sys.stderr)
     with tempfile.TemporaryDirectory(prefix="yawbench-") as folder:

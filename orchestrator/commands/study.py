@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .batch import Jobs
-from .options import CallLimit, Fmus, Format, Isolate, Out, isolation
+from .options import CallLimit, Fmus, Format, Isolate, NoBuild, Out, isolation
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file (YAML).", metavar="STUDY")]
 NoRun = Annotated[
@@ -21,6 +21,7 @@ def study(
     file: StudyFile,
     out: Out = None,
     fmus: Fmus = None,
+    no_build: NoBuild = False,
     jobs: Jobs = None,
     format_: Format = "csv",
     no_run: NoRun = False,
@@ -51,7 +52,7 @@ def study(
     if not no_run:
         made = [run.job(folder, fmus) for run in loaded.runs.values()]
         work = [replace(job, format=format_, call_limit=limit) for job in made]
-        outcomes = run_all(work, folder, workers=jobs)
+        outcomes = run_all(work, folder, workers=jobs, build=not no_build)
     with stoppable(folder), pool(jobs) as workers:
         findings = judge_study(loaded, folder, outcomes, each=workers.map)
         problems = write_study(findings, folder, each=workers.map)
@@ -59,19 +60,19 @@ def study(
         say(problem)
     print_tables(all_tables(findings))
     if no_run:
-        for name, why in _stale(file, folder, fmus).items():
+        for name, why in _stale(file, folder, fmus, build=not no_build).items():
             say(f"{name}: not what a run would give now: {why}")
     say(f"Results, figures and tables: {folder} (begin with {folder / REPORT})")
     if findings.failed:
         raise typer.Exit(1)
 
 
-def _stale(file: Path, folder: Path, fmus: Path | None) -> dict[str, str]:
+def _stale(file: Path, folder: Path, fmus: Path | None, *, build: bool) -> dict[str, str]:
     """Return run -> why its results are not those of a run made now, as far as that can be told."""
     from ..errors import YawbenchError
     from ..pages.report import still_stale, wanted
 
     try:
-        return still_stale(wanted(file, folder, fmus=fmus, format="csv"))
+        return still_stale(wanted(file, folder, fmus=fmus, format="csv", build=build))
     except YawbenchError:  # scenarios or FMUs are not here: results can be judged without them
         return {}

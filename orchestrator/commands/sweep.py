@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .batch import Jobs
-from .options import CallLimit, Fmus, Format, Isolate, Out, Set, Swap, isolation
+from .options import CallLimit, Fmus, Format, Isolate, NoBuild, Out, Set, Swap, isolation
 
 if TYPE_CHECKING:
     from ..studies.jobs import Outcome
@@ -40,6 +40,7 @@ def sweep(
     set_: Set = None,
     out: Out = None,
     fmus: Fmus = None,
+    no_build: NoBuild = False,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
     keep: Keep = False,
@@ -55,6 +56,7 @@ def sweep(
     figures. Every run has a process of its own. An interrupted sweep goes on where it was; nothing
     that is finished is run again.
     """
+    from ..fmu.opener import stale_fmus
     from ..results.formats import check_format
     from ..scenario.overrides import read_changes
     from ..studies.jobs import pool
@@ -75,7 +77,11 @@ def sweep(
     hold(context, folder)
     with stoppable(folder):
         with _bar("planning", len(loaded.points), quiet=True) as planning:
-            planned = plan_sweep(loaded, folder / "runs", fmus, call_limit=limit, progress=planning)
+            planned = plan_sweep(
+                loaded, folder / "runs", fmus, call_limit=limit, build=not no_build, progress=planning
+            )
+        for note in stale_fmus(planned.fmus.values()):
+            say(f"note: {note}")
         runner = _runner(planned, jobs, scheduler)
         with contextlib.closing(Journal(folder, loaded.identity, fresh=fresh)) as journal:
             left = left_to_do(planned, journal.records, keep=keep, format=format_)

@@ -56,8 +56,8 @@ def found_studies(folder: Path = SCENARIOS) -> list[Path]:
     return sorted(titles, key=lambda path: (first[path.parent], path.stem != "study", titles[path]))
 
 
-def wanted(path: Path, folder: Path, *, fmus: Path | None, format: str) -> Wanted:
-    """Read a study and look which of its runs have results that are still good.
+def wanted(path: Path, folder: Path, *, fmus: Path | None, format: str, build: bool = False) -> Wanted:
+    """Read a study and look which of its runs have results that are still good; `build`: see `Once`.
 
     Raises:
         YawbenchError: the study, a scenario or an FMU is wrong.
@@ -66,7 +66,7 @@ def wanted(path: Path, folder: Path, *, fmus: Path | None, format: str) -> Wante
 
     study = load_study(path)
     jobs = {name: replace(run.job(folder, fmus), format=format) for name, run in study.runs.items()}
-    once = Once()
+    once = Once(build=build)
     plans = {name: planned(job, once) for name, job in jobs.items()}
     found = {name: staleness(plans[name][1], job.out) for name, job in jobs.items()}
     return Wanted(study, folder, jobs, plans, {name: why for name, why in found.items() if why})

@@ -57,6 +57,7 @@ def _fmu(unit: Unit, plan: Plan) -> dict[str, Any]:
         "guid": fmu.guid,
         "generation_tool": fmu.generation_tool,
         "fmi_version": f"{fmu.fmi}.0",
+        "built": None if fmu.built is None else asdict(fmu.built),
         "step_size": float(unit.period * plan.step),
         "parameters": dict(unit.parameters),
         "origins": {name: origin for name, origin in unit.origins.items() if origin != "default"},

@@ -16,9 +16,9 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import ResultsError, ScenarioError, YawbenchError
+from ..errors import BuildError, ResultsError, ScenarioError, YawbenchError
 from ..master.interrupts import StopFlag, interrupts
-from ..plan import Change, Fmu, Plan
+from ..plan import Change, Plan
 from ..results.read import Results, load_results
 from ..scenario import yaml_lines
 from ..scenario.yaml_lines import Document
@@ -73,25 +73,19 @@ NEEDED = ("orchestrator.wiring.make_plan", "orchestrator.master.simulate", "matp
 
 
 class Once:
-    """Files read and FMUs opened once for many plans."""
+    """Files read and FMUs opened once for many plans; `build`: see `Opener`."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, build: bool = False) -> None:
+        from ..fmu.opener import Opener
+
         self._documents: dict[Path, Document] = {}
-        self._fmus: dict[Path, Fmu] = {}
+        self.opener = Opener(build=build)
 
     def read(self, path: Path, *, what: str) -> Document:
         """Return what `yaml_lines.read` does, a copy each time."""
         if path not in self._documents:
             self._documents[path] = yaml_lines.read(path, what=what)
         return copy.deepcopy(self._documents[path])
-
-    def open(self, path: Path) -> Fmu:
-        """Return what `open_fmu` does."""
-        if path not in self._fmus:
-            from ..fmu.archive import open_fmu
-
-            self._fmus[path] = open_fmu(path)
-        return self._fmus[path]
 
 
 def plan_of(job: Job, once: Once | None = None) -> Plan:
@@ -111,7 +105,7 @@ def planned(job: Job, once: Once | None = None) -> tuple[Scenario, Plan]:
     once = once or Once()
     scenario = load_scenario(job.scenario, changes=job.changes, read=once.read)
     isolated = job.call_limit is not None
-    plan = make_plan(scenario, fmus=job.fmus, open_=once.open, isolated=isolated)
+    plan = make_plan(scenario, fmus=job.fmus, opener=once.opener, isolated=isolated)
     if not job.record:
         return scenario, plan
     recorded = {f"{unit}.{variable}": (unit, variable) for unit, variable in plan.record}
@@ -122,24 +116,30 @@ def planned(job: Job, once: Once | None = None) -> tuple[Scenario, Plan]:
     return scenario, replace(plan, record=tuple(recorded[name] for name in job.record))
 
 
-def check(jobs: Sequence[Job]) -> None:
-    """Make sure that every job can start.
+def check(jobs: Sequence[Job], *, build: bool = False) -> list[str]:
+    """Make sure that every job can start; return a sentence per FMU that is stale (see `Opener`).
 
     Raises:
+        BuildError: FMUs that are stale and cannot be built.
         ScenarioError: with everything that is wrong with any of them, each problem once.
     """
-    once = Once()
-    problems = dict.fromkeys(problem for job in jobs for problem in _problems(job, once))
+    from ..fmu.opener import stale_fmus
+
+    once = Once(build=build)
+    found = [_plan_or_problems(job, once) for job in jobs]
+    problems = dict.fromkeys(problem for one in found if isinstance(one, list) for problem in one)
     if problems:
         raise ScenarioError(problems)
+    return stale_fmus(unit.fmu for one in found if isinstance(one, Plan) for unit in one.units)
 
 
-def _problems(job: Job, once: Once) -> list[str]:
+def _plan_or_problems(job: Job, once: Once) -> Plan | list[str]:
     try:
-        plan_of(job, once)
+        return plan_of(job, once)
+    except BuildError:
+        raise
     except YawbenchError as error:
         return error.problems
-    return []
 
 
 def run_job(job: Job) -> str:

@@ -15,7 +15,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from ..errors import ScenarioError, YawbenchError
+from ..errors import BuildError, ScenarioError, YawbenchError
 from ..metrics.run_metrics import metric, results_to_be, unit_in
 from ..plan import Fmu, Plan
 from ..results.run_record import version_of
@@ -66,6 +66,7 @@ def plan_sweep(
     fmus: Path | None = None,
     *,
     call_limit: float | None = None,
+    build: bool = False,
     progress: Callable[[int], None] = lambda done: None,
 ) -> Planned:
     """Plan all runs.
@@ -75,12 +76,14 @@ def plan_sweep(
         out: folder of the results of runs that keep them.
         fmus: folder of FMUs given by name.
         call_limit: of a call of an FMU [s], in a process per unit; None: units share one.
+        build: build first what is stale of the FMUs.
         progress: told how many runs are planned.
 
     Raises:
+        BuildError: FMUs that are stale and cannot be built.
         ScenarioError: with everything that is wrong with any run, each problem once.
     """
-    once = Once()
+    once = Once(build=build)
     metrics = [
         (key, spec.metric, list(spec.window) if spec.window else None)
         for key, spec in sweep.spec.metrics.items()
@@ -93,6 +96,8 @@ def plan_sweep(
             plan = plan_of(job, once)
             key = run_key(plan, metrics)
             runs.append(PlannedRun(number, point, replace(job, out=out / key[:12]), plan, key))
+        except BuildError:
+            raise
         except YawbenchError as error:
             for problem in error.problems:
                 problems.setdefault(*_of_axis(sweep, job, problem))

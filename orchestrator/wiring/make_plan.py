@@ -18,8 +18,8 @@ from fractions import Fraction
 from functools import cache
 from pathlib import Path
 
-from ..errors import ModelDescriptionError, WiringError
-from ..fmu.archive import open_fmu
+from ..errors import BuildError, ModelDescriptionError, WiringError
+from ..fmu.opener import Opener, stale_fmus
 from ..fmu.search import find_fmu, find_folder
 from ..fmu.shadowing import shadowed_modules
 from ..plan import Fmu, Plan, Unit, Wire
@@ -35,7 +35,7 @@ def make_plan(
     scenario: Scenario,
     *,
     fmus: Path | None = None,
-    open_: Callable[[Path], Fmu] = open_fmu,
+    opener: Opener | None = None,
     isolated: bool = False,
 ) -> Plan:
     """Open the scenario's FMUs and connect them.
@@ -43,15 +43,16 @@ def make_plan(
     Args:
         scenario: as loaded.
         fmus: the folder that holds FMUs given by name; None: the nearest `fmus/` that holds any.
-        open_: how to open an archive, called as `open_fmu`.
+        opener: of the FMUs; default: one that builds nothing.
         isolated: each unit will have a process of its own (see `master.isolation`).
 
     Raises:
         ModelDescriptionError: FMUs that are missing, damaged or not supported.
+        BuildError: FMUs that are stale and cannot be built.
         WiringError: everything that is wrong with parameters and connections.
     """
-    opened, replaced = _open_all(scenario, fmus, open_)
-    notes: list[str] = list(scenario.document.notes)
+    opened, replaced = _open_all(scenario, fmus, opener or Opener())
+    notes: list[str] = [*scenario.document.notes, *stale_fmus(opened.values())]
     origins: dict[str, dict[str, str]] = {name: {} for name in opened}
     parameters = Parameters(scenario, opened, replaced, notes, origins).of_units()
     connector = Connector(scenario, opened, replaced, notes, origins)
@@ -95,34 +96,39 @@ def make_plan(
 
 
 def _open_all(
-    scenario: Scenario, fmus: Path | None, open_: Callable[[Path], Fmu]
+    scenario: Scenario, fmus: Path | None, opener: Opener
 ) -> tuple[dict[str, Fmu], Callable[[str], Fmu | None]]:
     """Return the FMU of each unit, and a function that gives the one a swap has replaced, if it is there."""
     document = scenario.document
     problems: dict[str, None] = {}
-    folder = fmus
+    folder = fmus or Path()
     if fmus is not None and not fmus.is_dir():
         raise ModelDescriptionError(f"--fmus {fmus}: no such folder")
     if fmus is None and not all(is_path(spec.fmu) for spec in scenario.units.values()):
-        folder = find_folder(scenario.path)
+        folder = find_folder(scenario.path, opener=opener)
 
     @cache
-    def opened(fmu: str) -> Fmu:
-        return open_(find_fmu(fmu, scenario=scenario.path, fmus=folder))
+    def opened(fmu: str, build: bool = True) -> Fmu:
+        return opener.open(find_fmu(fmu, scenario=scenario.path, fmus=folder, opener=opener, build=build))
 
     def replaced(unit: str) -> Fmu | None:
         try:
-            return opened(scenario.replaced[unit])
+            return opened(scenario.replaced[unit], build=False)
         except ModelDescriptionError:
             return None
 
     found: dict[str, Fmu] = {}
+    not_built: dict[str, None] = {}
     for name, spec in scenario.units.items():
         try:
             found[name] = opened(spec.fmu)
-        except ModelDescriptionError as error:  # noqa: PERF203 - all problems are collected
+        except BuildError as error:  # noqa: PERF203 - all problems are collected
+            not_built.update(dict.fromkeys(error.problems))
+        except ModelDescriptionError as error:
             place = document.place(("units", name, "fmu"))
             problems.update({f"{place}: {problem}": None for problem in error.problems})
+    if not_built:
+        raise BuildError(not_built)
     if problems:
         raise ModelDescriptionError(problems)
     return found, replaced

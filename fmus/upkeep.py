@@ -1,0 +1,143 @@
+"""FMUs that are made of the sources as they are now: before a scenario runs, what is stale is built.
+
+An FMU was built here if its archive says so. Its key is compared with the one that its sources have
+now. To find that key takes a tenth of a second; it is kept in the cache with its evidence, which
+takes a few milliseconds to look at. FMUs are built in their place: those of the project's
+components in its folder `fmus/`, those of somebody's own files where they were built. A copy that
+somebody put elsewhere is never touched, only told of. Where the folder cannot be written, FMUs are
+built into the cache.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from orchestrator.cache import cache_folder, keep, recall
+from orchestrator.errors import BuildError
+from orchestrator.plan import Built
+
+from .evidence import Looks, content_digest
+from .mark import Mark, read_mark
+
+if TYPE_CHECKING:
+    from .recipe import Recipe
+
+HERE = Path(__file__).resolve().parent
+KEYS = "keys"
+"""Store of keys, with their evidence, in the cache."""
+BUILT = "fmus"
+"""Folder of the cache for FMUs whose own folder cannot be written."""
+_NO_KEY = "none"
+"""Of sources that cannot be read or parsed."""
+
+
+class Upkeep:
+    """Brings FMUs up to date, each once. `tell` is called with the name of each that is built."""
+
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        self._tell = tell
+        self._looks = Looks()
+        self._recipes: dict[str, Recipe] = {}
+        self._found: dict[tuple[Path, bool], tuple[Path, Built | None]] = {}
+
+    def bring(self, archive: Path, *, build: bool) -> tuple[Path, Built | None]:
+        """Return the archive to open in place of `archive`, and what it was built from if that is here.
+
+        If it does not exist and cannot be built, it is returned all the same.
+
+        Raises:
+            BuildError: it has to be built, and cannot be.
+        """
+        if (archive, build) not in self._found:
+            self._found[archive, build] = self._bring(archive, build)
+        return self._found[archive, build]
+
+    def _bring(self, archive: Path, build: bool) -> tuple[Path, Built | None]:
+        places = (archive, in_cache(archive.parent) / archive.name)
+        marks = {place: read_mark(place) for place in places if place.exists()}
+        if archive in marks and marks[archive] is None:
+            return archive, None
+        found, mark = next(((p, m) for p, m in marks.items() if m), (archive, Mark(archive.stem, "", "")))
+        key = self._key(archive, mark)
+        for place, its in marks.items():
+            if its and its.key == key:
+                return place, _built(its, current=True)
+        at_home = _is_at_home(archive, mark)
+        if key is not None and at_home and build:
+            return self._build(archive, mark)
+        gone = mark.is_component and at_home  # its source, so that it is not made of what is there
+        stale = bool(marks) and (key is not None or gone)
+        return found, _built(mark, current=False) if stale else None
+
+    def _key(self, archive: Path, mark: Mark) -> str | None:
+        """Return the key that the FMU would get if it were built now, None if its source is not here."""
+        entry = content_digest(str(archive).encode())
+        about = asdict(replace(mark, key=""))
+        record = json.loads(recall(KEYS, entry) or b"{}")
+        if record.get("of") == about and self._looks.confirm(record["evidence"]):
+            return record["key"]
+        try:
+            recipe = self._recipe(archive, mark)
+            if recipe is None:
+                return None
+            key = recipe.key()
+        except (BuildError, OSError):
+            return _NO_KEY
+        record = {"of": about, "key": key, "evidence": recipe.evidence()}
+        keep(KEYS, entry, json.dumps(record).encode())
+        return key
+
+    def _recipe(self, archive: Path, mark: Mark) -> Recipe | None:
+        """Return how an FMU is built, None if its source is not here."""
+        from .build import (  # takes a tenth of a second; nobody waits if all is current
+            find_recipes,
+            recipe_of,
+        )
+
+        if mark.is_component:
+            if not mark.source and not _is_at_home(archive, mark):
+                return None  # no FMU, and nothing says that it could be one of ours
+            self._recipes = self._recipes or find_recipes()
+            return self._recipes.get(mark.name)
+        source = (archive.parent / mark.source).resolve()
+        if not source.exists() or not _is_at_home(archive, mark):
+            return None
+        return recipe_of(source, role=mark.role or None, name=mark.name, defaults=mark.defaults)
+
+    def _build(self, archive: Path, mark: Mark) -> tuple[Path, Built]:
+        from .build import bring_up_to_date, component_mark
+
+        target = writable(archive.parent) / archive.name
+        recipe = self._recipe(archive, mark)
+        assert recipe is not None
+        if mark.is_component:
+            mark = component_mark(recipe)
+        bring_up_to_date(recipe, target, mark)
+        self._tell(recipe.name)
+        made = read_mark(target)
+        assert made is not None
+        return target, _built(made, current=True)
+
+
+def writable(folder: Path) -> Path:
+    """Return where FMUs are built that belong into `folder`."""
+    return folder if os.access(folder, os.W_OK) else in_cache(folder)
+
+
+def in_cache(folder: Path) -> Path:
+    """Return where FMUs stand whose own folder cannot be written."""
+    return cache_folder() / BUILT / content_digest(str(folder).encode())
+
+
+def _built(mark: Mark, *, current: bool) -> Built:
+    return Built(mark.source, mark.key, mark.tool, current)
+
+
+def _is_at_home(archive: Path, mark: Mark) -> bool:
+    """Return whether an FMU stands where it was built, so far as can be told."""
+    return archive.parent.resolve() == HERE if mark.is_component else archive.parent.name == mark.home

@@ -1,0 +1,40 @@
+"""The plan of the one scenario that a command is about, its FMUs up to date."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..plan import Plan
+
+
+def plan_of_scenario(
+    scenario: Path,
+    swap: Sequence[str] | None,
+    set_: Sequence[str] | None,
+    *,
+    fmus: Path | None,
+    build: bool,
+    isolated: bool = False,
+) -> Plan:
+    """Return the plan of a scenario with all that options change in it.
+
+    Args:
+        scenario: file.
+        swap, set_: options as given.
+        fmus: folder of FMUs given by name.
+        build: build first what is stale of the FMUs that it uses.
+        isolated: each unit will have a process of its own.
+
+    Raises:
+        YawbenchError: the scenario, an option or an FMU is wrong, or a component cannot be built.
+    """
+    from ..fmu.opener import Opener
+    from ..scenario.load import load_scenario
+    from ..scenario.overrides import read_changes
+    from ..wiring.make_plan import make_plan
+
+    loaded = load_scenario(scenario, changes=read_changes(swap or (), set_ or ()))
+    return make_plan(loaded, fmus=fmus, opener=Opener(build=build), isolated=isolated)

@@ -1,0 +1,75 @@
+"""FMUs opened for plans: each once, and before that brought up to date with its sources if they are here."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import fmus
+
+from ..plan import Built, Fmu
+from .archive import open_fmu
+
+if TYPE_CHECKING:
+    from fmus.upkeep import Upkeep
+
+
+HOME = Path(fmus.__file__).resolve().parent
+"""Folder of the FMUs of the project's own components."""
+
+
+class Opener:
+    """Opens the FMUs of one plan or many.
+
+    Args:
+        build: build what is stale, or missing and can be built. Only who starts runs does so, and
+            once for all of them; what each run finds stale then, its plan says.
+    """
+
+    def __init__(self, *, build: bool = False) -> None:
+        self.build = build
+        self._opened: dict[Path, Fmu] = {}
+        self._built: dict[Path, Built | None] = {}
+
+    @cached_property
+    def _upkeep(self) -> Upkeep:
+        from fmus.upkeep import Upkeep
+
+        return Upkeep(lambda name: print(f"{name}: built", file=sys.stderr, flush=True))
+
+    def bring(self, archive: Path, *, build: bool = True) -> Path:
+        """Return the archive to open in place of `archive`, built if need be; it may not exist.
+
+        Raises:
+            BuildError: its sources cannot be made into an FMU.
+        """
+        path, self._built[path] = self._upkeep.bring(archive, build=build and self.build)
+        return path
+
+    def open(self, archive: Path) -> Fmu:
+        """Return an FMU as `open_fmu` does, with what it was built from if it has been brought."""
+        if archive not in self._opened:
+            self._opened[archive] = replace(open_fmu(archive), built=self._built.get(archive))
+        return self._opened[archive]
+
+    def names(self, folder: Path) -> list[str]:
+        """Return the names of the FMUs that a folder holds, or that can be built into it."""
+        held = {path.stem for path in folder.glob("*.fmu")}
+        if self.build and folder.resolve() == HOME:
+            from fmus.build import find_recipes
+
+            held |= find_recipes().keys()
+        return sorted(held)
+
+
+def stale_fmus(fmus: Iterable[Fmu]) -> list[str]:
+    """Return a sentence for every FMU that is not made of its sources as they are."""
+    stale = {fmu.path: fmu.built.source for fmu in fmus if fmu.built is not None and not fmu.built.current}
+    return [
+        f"{path.name} is not made of {source or 'its sources'} as it is now; 'yawbench build' makes it anew"
+        for path, source in stale.items()
+    ]

@@ -1,0 +1,255 @@
+"""What is stale is built before a scenario runs, and nothing else is."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fmus.evidence import Looks
+from tests.checkout import copy_checkout, run_in
+
+DRIVER = "title: Driver\nstop_time: 0.01\nstep_size: 0.001\nunits: {driver: {fmu: driver_sine}}\n"
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the checkout, all FMUs that the tests use up to date."""
+    folder = copy_checkout(tmp_path_factory.mktemp("upkeep"))
+    (folder / "driver.yaml").write_text(DRIVER)
+    done = run_in(folder, "yawbench", "build", YAWBENCH_CACHE=str(folder / "cache"))
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture
+def project(built: Path, tmp_path: Path) -> Path:
+    """A copy of it to spoil."""
+    folder = tmp_path / "project"
+    shutil.copytree(built, folder, symlinks=True, ignore=shutil.ignore_patterns("docs", "tests", "cache"))
+    return folder
+
+
+def yawbench(project: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return run_in(
+        project, "yawbench", *arguments, **{"YAWBENCH_CACHE": str(project / "cache"), **environment}
+    )
+
+
+def edit(project: Path, old: str, new: str) -> None:
+    file = project / "components" / "drivers" / "sine.py"
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+
+
+def record(project: Path, folder: str = "out") -> dict:
+    return json.loads((project / folder / "run.json").read_text())["fmus"]["driver"]
+
+
+def double(project: Path) -> None:
+    """Change what the driver does: its amplitude's default is another."""
+    file = project / "components" / "drivers" / "sine.py"
+    text = file.read_text()
+    changed = text.replace("amplitude: float = parameter(", "amplitude: float = parameter(2.0 * ", 1)
+    assert changed != text
+    file.write_text(changed)
+
+
+def spoil(project: Path) -> None:
+    with (project / "components" / "drivers" / "sine.py").open("a") as file:
+        file.write("\nundefined_name\n")
+
+
+def test_an_edited_component_takes_effect_in_the_next_run(project):
+    first = yawbench(project, "run", "driver.yaml", "--out", "out")
+    assert (first.returncode, "built" in first.stderr) == (0, False)
+    amplitude = record(project)["defaults"]["amplitude"]
+    assert record(project)["built"]["current"] is True
+    assert record(project)["built"]["source"] == "components/drivers/sine.py"
+    key = record(project)["built"]["key"]
+    double(project)
+    second = yawbench(project, "run", "driver.yaml", "--out", "out")
+    assert second.stderr.startswith("driver_sine: built\n")
+    assert record(project)["defaults"]["amplitude"] == 2 * amplitude
+    assert record(project)["built"]["key"] != key
+    assert "built" not in yawbench(project, "run", "driver.yaml", "--out", "out").stderr
+
+
+def test_a_broken_component_ends_the_run_before_it_begins_and_keeps_the_good_fmu(project):
+    yawbench(project, "run", "driver.yaml", "--out", "out")
+    good, results = (project / "fmus/driver_sine.fmu").read_bytes(), record(project)
+    spoil(project)
+    for _ in range(2):
+        done = yawbench(project, "run", "driver.yaml", "--out", "out")
+        assert done.returncode == 1
+        assert done.stderr.startswith(
+            "driver_sine: NameError: name 'undefined_name' is not defined (drivers/sine.py:"
+        )
+        assert done.stderr.count("\n") == 1
+    assert (project / "fmus/driver_sine.fmu").read_bytes() == good
+    assert record(project) == results
+    edit(project, "\nundefined_name\n", "")
+    done = yawbench(project, "run", "driver.yaml", "--out", "out")
+    assert (done.returncode, "built" in done.stderr) == (0, False)  # the FMU is the one of these sources
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "check driver.yaml",
+        "compare driver.yaml --swap driver=driver_sine,driver_ramp",
+        "converge driver.yaml --signal driver.steer_angle",
+        "plot driver.yaml",
+        "export-ssp driver.yaml",
+        "second-opinion driver.yaml",
+        "sweep sweep.yaml",
+        "study scenarios/fnn_sideslip/study.yaml",
+        "report scenarios/fnn_sideslip/study.yaml",
+    ],
+)
+def test_every_command_that_opens_fmus_builds_what_is_stale_first(project, command):
+    (project / "sweep.yaml").write_text(
+        "title: Two\nscenario: driver.yaml\n"
+        "axes:\n  amplitude: {vary: driver.amplitude, values: [0.1, 0.2]}\n"
+        "metrics:\n  angle: {metric: peak(steer_angle)}\n"
+    )
+    spoil(project)
+    done = yawbench(project, *command.split())
+    assert done.stderr.startswith("driver_sine: NameError: name 'undefined_name'"), done.stderr
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    assert not (project / "results").exists()
+
+
+def test_runs_of_a_comparison_say_that_they_are_made_of_the_sources_as_they_are(project):
+    double(project)
+    done = yawbench(
+        project,
+        "compare",
+        "driver.yaml",
+        "--swap",
+        "driver=driver_sine,driver_sine:amplitude=0.5",
+        "--out",
+        "out",
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("driver_sine: built\n") == 1
+    found = [json.loads(file.read_text()) for file in (project / "out").glob("*/run.json")]
+    assert [run["fmus"]["driver"]["built"]["current"] for run in found] == [True, True]
+
+
+@pytest.mark.parametrize("how", [{"option": "--no-build"}, {"YAWBENCH_NO_BUILD": "1"}])
+def test_without_building_a_stale_fmu_runs_with_a_note_and_its_record_says_so(project, how):
+    old = (project / "fmus/driver_sine.fmu").read_bytes()
+    double(project)
+    option = [how["option"]] if "option" in how else []
+    environment = {} if "option" in how else how
+    done = yawbench(project, "run", "driver.yaml", "--out", "out", *option, **environment)
+    assert done.returncode == 0
+    assert done.stderr.startswith(
+        "note: driver_sine.fmu is not made of components/drivers/sine.py as it is now; "
+        "'yawbench build' makes it anew\n"
+    )
+    assert record(project)["built"]["current"] is False
+    assert (project / "fmus/driver_sine.fmu").read_bytes() == old
+
+
+def test_only_fmus_that_the_scenario_uses_are_built(project):
+    with (project / "components/tyres/linear.py").open("a") as file:
+        file.write("\n1 +\n")
+    double(project)
+    assert yawbench(project, "run", "driver.yaml", "--out", "out").stderr.startswith("driver_sine: built\n")
+
+
+def test_a_component_that_has_no_fmu_yet_is_built(project):
+    (project / "fmus/driver_sine.fmu").unlink()
+    shutil.copy(project / "components/drivers/sine.py", project / "components/drivers/new.py")
+    done = yawbench(project, "run", "driver.yaml", "--swap", "driver=driver_new", "--out", "out")
+    assert done.stderr.startswith("driver_new: built\n")
+    assert done.returncode == 0
+    assert not (project / "fmus/driver_sine.fmu").exists()
+    for file in (project / "fmus").glob("*.fmu"):
+        file.unlink()
+    assert yawbench(project, "run", "driver.yaml", "--out", "out").stderr.startswith("driver_sine: built\n")
+    done = yawbench(project, "run", "driver.yaml", "--swap", "driver=driver_sin", "--out", "out")
+    assert (done.returncode, "did you mean 'driver_sine'?" in done.stderr) == (2, True)
+
+
+def test_an_fmu_of_a_users_own_file_is_built_where_it_was_built_and_a_copy_is_let_be(project, tmp_path):
+    own = tmp_path / "mine" / "drivers" / "steady.py"
+    own.parent.mkdir(parents=True)
+    text = (project / "components/drivers/sine.py").read_text()
+    own.write_text(text.replace("from ..", "from components."))
+    assert yawbench(project, "build", str(own), "--out", str(tmp_path / "mine/fmus")).returncode == 0
+    fmu = tmp_path / "mine/fmus/driver_steady.fmu"
+    copy = tmp_path / "mine/kept/driver_steady.fmu"
+    copy.parent.mkdir()
+    shutil.copy(fmu, copy)
+    old = fmu.read_bytes()
+    own.write_text(own.read_text() + "\n# another\n")
+    done = yawbench(project, "run", "driver.yaml", "--swap", f"driver={fmu}", "--out", "out")
+    assert done.stderr.startswith("driver_steady: built\n")
+    assert fmu.read_bytes() != old
+    assert record(project)["built"]["source"] == "../drivers/steady.py"
+    done = yawbench(project, "run", "driver.yaml", "--swap", f"driver={copy}", "--out", "out")
+    assert "built" not in done.stderr
+    assert copy.read_bytes() == old
+    shutil.rmtree(own.parent)  # sent to somebody without its source, it is an FMU like any other
+    done = yawbench(project, "run", "driver.yaml", "--swap", f"driver={fmu}", "--out", "out")
+    assert (done.returncode, record(project)["built"]) == (0, None)
+
+
+def test_a_copy_of_a_components_fmu_in_another_folder_is_told_of_and_not_touched(project):
+    shutil.copytree(project / "fmus", project / "before", ignore=shutil.ignore_patterns("*.py", "*.[ch]"))
+    old = (project / "before/driver_sine.fmu").read_bytes()
+    double(project)
+    done = yawbench(project, "run", "driver.yaml", "--fmus", "before", "--out", "out")
+    assert (done.returncode, "note: driver_sine.fmu is not made of" in done.stderr) == (0, True)
+    assert (project / "before/driver_sine.fmu").read_bytes() == old
+
+
+def test_nobody_waits_for_the_builder_if_everything_is_current(project):
+    yawbench(project, "check", "driver.yaml")
+    script = (
+        "import sys; from orchestrator.cli import main\n"
+        "try: main(['check', 'driver.yaml'])\n"
+        "except SystemExit: print('fmus.build' in sys.modules, 'pythonfmu' in sys.modules)\n"
+    )
+    done = run_in(project, "python", "-c", script, YAWBENCH_CACHE=str(project / "cache"))
+    assert done.stdout.endswith("False False\n"), done.stderr
+
+
+def test_an_edit_that_leaves_size_and_time_alone_is_noticed(tmp_path):
+    file = tmp_path / "a.py"
+    file.write_text("1")
+    evidence = Looks().evidence([file, tmp_path, "env:YAWBENCH_X"])
+    times = file.stat()
+    file.write_text("2")
+    os.utime(file, ns=(times.st_atime_ns, times.st_mtime_ns))
+    assert not Looks().confirm(evidence)
+    file.write_text("1")
+    assert Looks().confirm(evidence)
+    (tmp_path / "__pycache__").mkdir()
+    assert Looks().confirm(evidence)
+    (tmp_path / "b.py").touch()
+    assert not Looks().confirm(evidence)
+
+
+def test_a_file_that_comes_before_a_known_one_makes_an_fmu_stale(project):
+    """A package goes before a module of the same name, without any known file being changed."""
+    yawbench(project, "check", "driver.yaml")
+    package = project / "components/driving/speed_holding"
+    package.mkdir()
+    (package / "__init__.py").write_text("undefined_name\n")
+    done = yawbench(project, "check", "driver.yaml")
+    assert "name 'undefined_name' is not defined" in done.stderr
+
+
+if sys.platform != "linux":
+    pytestmark = pytest.mark.skip("checked on Linux")
