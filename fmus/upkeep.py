@@ -58,7 +58,7 @@ class Upkeep:
         return self._found[archive, build]
 
     def _bring(self, archive: Path, build: bool) -> tuple[Path, Built | None]:
-        places = (archive, in_cache(archive.parent) / archive.name)
+        places = dict.fromkeys((archive, writable(archive.parent) / archive.name))
         marks = {place: read_mark(place) for place in places if place.exists()}
         if archive in marks and marks[archive] is None:
             return archive, None

@@ -16,12 +16,15 @@ import hashlib
 import os
 import re
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import ModelDescriptionError
 
 _PLAIN_PATH = re.compile(r"[A-Za-z0-9_.~/\\: -]+")
+KEEP_DAYS = 60
+"""What has not been used, or kept anew, for so long is deleted when something else is kept."""
 _DIGITS = 32
 """Of a hash in the name of a kept file."""
 
@@ -32,17 +35,14 @@ def cache_folders() -> Iterator[Path]:
     Raises:
         ModelDescriptionError: there is none.
     """
-    from platformdirs import user_cache_path
-
-    chosen = os.environ.get("YAWBENCH_CACHE")
-    wanted = Path(chosen).absolute() if chosen else user_cache_path("yawbench")
+    wanted = _wanted()
     problems = []
     not_plain = (
         f"{wanted}: FMUs cannot be unpacked here: the path holds more than ASCII letters, digits, "
         "spaces and ._~-; name another folder in YAWBENCH_CACHE"
     )
-    found = wanted.is_absolute() and bool(_PLAIN_PATH.fullmatch(str(wanted)))  # "~" if there is no home
-    if found:
+    found = wanted is not None and bool(_PLAIN_PATH.fullmatch(str(wanted)))
+    if wanted is not None and found:
         yield wanted
     user = os.getuid() if hasattr(os, "getuid") else os.environ.get("USERNAME", "user").encode().hex()
     for base in dict.fromkeys((_temporary(), os.environ.get("PUBLIC", "/tmp"))):
@@ -59,8 +59,31 @@ def cache_folders() -> Iterator[Path]:
 
 
 def cache_folder() -> Path:
-    """Return the best of `cache_folders`."""
-    return next(cache_folders())
+    """Return the best of `cache_folders` that can be written.
+
+    Raises:
+        ModelDescriptionError: there is none.
+    """
+    for folder in cache_folders():
+        with contextlib.suppress(OSError):
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if os.access(folder, os.W_OK | os.X_OK):
+                return folder
+    raise ModelDescriptionError("no folder for the cache can be written; name one in YAWBENCH_CACHE")
+
+
+def _wanted() -> Path | None:
+    """Return the folder that the environment asks for, or the user's; None without a home."""
+    from platformdirs import user_cache_path
+
+    chosen = os.environ.get("YAWBENCH_CACHE")
+    if chosen:
+        return Path(chosen).absolute()
+    try:
+        folder = user_cache_path("yawbench")
+    except RuntimeError:
+        return None
+    return folder if folder.is_absolute() else None
 
 
 def _temporary() -> str:
@@ -85,8 +108,8 @@ def recall(store: str, key: str) -> bytes | None:
     """Return what was kept under `key`, None if nothing was or it is not whole."""
     with contextlib.suppress(ModelDescriptionError):
         for folder in cache_folders():
-            for file in folder.glob(f"{store}/{key}-*"):
-                with contextlib.suppress(OSError):
+            with contextlib.suppress(OSError):
+                for file in folder.glob(f"{store}/{key}-*"):
                     content = file.read_bytes()
                     if is_whole(file, content):
                         return content
@@ -106,9 +129,11 @@ def keep(store: str, key: str, content: bytes) -> None:
                 write_durably(file, content)
             except OSError:
                 continue
-            for other in file.parent.glob(f"{key}-*"):
-                if other != file:
-                    other.unlink(missing_ok=True)
+            oldest = time.time() - KEEP_DAYS * 86400.0
+            for other in file.parent.iterdir():
+                with contextlib.suppress(OSError):
+                    if other != file and (other.name.startswith(f"{key}-") or other.stat().st_mtime < oldest):
+                        other.unlink()
             return
 
 

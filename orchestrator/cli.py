@@ -29,6 +29,7 @@ COMMANDS = (
     "sweep",
     "export-ssp",
     "second-opinion",
+    "cache",
 )
 """Each a module of `orchestrator.commands` with a function of the same name, `_` for `-`."""
 

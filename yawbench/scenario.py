@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import ScenarioError, SimulationError
+from orchestrator.fmu.opener import Opener
 from orchestrator.master.opening import open_unit
 from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.plan import Change, Fmu, Plan, Value
+from orchestrator.plan import Change, Plan, Value
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wording import hint
@@ -135,15 +136,12 @@ class Scenario:
         """Return what a run does: units in order, wires, constants, time grid.
 
         Raises:
-            YawbenchError: an FMU is missing, or the units cannot be connected.
+            YawbenchError: an FMU is missing, a component whose source has changed cannot be built, or
+                the units cannot be connected.
         """
-        from orchestrator.fmu.archive import open_fmu
-
-        def opened(path: Path) -> Fmu:
-            program = self.programs.get(path)
-            return program.fmu if program else open_fmu(path)
-
-        plan = make_plan(self.loaded, open_=opened)
+        programs = {path: program.fmu for path, program in self.programs.items()}
+        opener = Opener(build=True, tell=lambda text: None, opened=programs)
+        plan = make_plan(self.loaded, opener=opener)
         notes = tuple(
             f"{unit.name}: {unit.fmu.name} is plain Python of this process, no FMU"
             for unit in plan.units

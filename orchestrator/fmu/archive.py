@@ -27,7 +27,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
-from ..cache import cache_folders
+from ..cache import KEEP_DAYS, cache_folders
 from ..errors import ModelDescriptionError
 from ..files import PACKED, TooLargeError, check_archive, read_bytes, reason
 from ..plan import Fmu
@@ -37,9 +37,6 @@ from .binary import binary_problem
 
 FORMAT = 4
 """Of the cache's entries; part of their names, so versions of this program do not quarrel."""
-
-KEEP_DAYS = 60
-"""An entry unused for so long is deleted when another is made."""
 
 _FILE_TIME = 946_684_800
 """Of every unpacked file, 2000-01-01 [s]: what Python compiles of a module stays good when it is put back."""

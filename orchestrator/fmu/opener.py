@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -22,24 +22,38 @@ HOME = Path(fmus.__file__).resolve().parent
 """Folder of the FMUs of the project's own components."""
 
 
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
 class Opener:
     """Opens the FMUs of one plan or many.
 
     Args:
         build: build what is stale, or missing and can be built. Only who starts runs does so, and
             once for all of them; what each run finds stale then, its plan says.
+        tell: called with a line for every FMU that is built.
+        opened: FMUs that need not be opened, by the path that stands for each.
     """
 
-    def __init__(self, *, build: bool = False) -> None:
+    def __init__(
+        self,
+        *,
+        build: bool = False,
+        tell: Callable[[str], None] = _say,
+        opened: Mapping[Path, Fmu] | None = None,
+    ) -> None:
         self.build = build
-        self._opened: dict[Path, Fmu] = {}
+        self._tell = tell
+        self._given = dict(opened or {})
+        self._opened: dict[tuple[Path, Built | None], Fmu] = {}
         self._built: dict[Path, Built | None] = {}
 
     @cached_property
     def _upkeep(self) -> Upkeep:
         from fmus.upkeep import Upkeep
 
-        return Upkeep(lambda name: print(f"{name}: built", file=sys.stderr, flush=True))
+        return Upkeep(lambda name: self._tell(f"{name}: built"))
 
     def bring(self, archive: Path, *, build: bool = True) -> Path:
         """Return the archive to open in place of `archive`, built if need be; it may not exist.
@@ -47,14 +61,19 @@ class Opener:
         Raises:
             BuildError: its sources cannot be made into an FMU.
         """
+        if archive in self._given:
+            return archive
         path, self._built[path] = self._upkeep.bring(archive, build=build and self.build)
         return path
 
     def open(self, archive: Path) -> Fmu:
         """Return an FMU as `open_fmu` does, with what it was built from if it has been brought."""
-        if archive not in self._opened:
-            self._opened[archive] = replace(open_fmu(archive), built=self._built.get(archive))
-        return self._opened[archive]
+        if archive in self._given:
+            return self._given[archive]
+        built = self._built.get(archive)
+        if (archive, built) not in self._opened:
+            self._opened[archive, built] = replace(open_fmu(archive), built=built)
+        return self._opened[archive, built]
 
     def names(self, folder: Path) -> list[str]:
         """Return the names of the FMUs that a folder holds, or that can be built into it."""

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import copy
 import multiprocessing
+import multiprocessing.util
 import os
 import signal
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -29,6 +31,10 @@ if TYPE_CHECKING:
 
 GRACE = 5.0
 """Time that a process has to end, and a run to write what it has recorded [s]."""
+LONGEST_FOLDER = 60
+"""Bytes of a folder's path that leave room for the names of sockets in it; chosen: they need 36."""
+SHORT_FOLDER = "/tmp"
+"""Where they go if the folder for temporary files has a longer path."""
 LOOK_EVERY = 0.2
 """Time between two looks whether to stop [s]."""
 
@@ -222,11 +228,28 @@ def pool(workers: int | None = None) -> ProcessPoolExecutor:
 
 def _context() -> Any:
     """Return how processes start: from a server that has imported once what each needs, or afresh."""
-    if "forkserver" not in multiprocessing.get_all_start_methods():
+    if "forkserver" not in multiprocessing.get_all_start_methods() or not _has_place_for_sockets():
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["__main__", *NEEDED])
     return context
+
+
+def _has_place_for_sockets() -> bool:
+    """Give multiprocessing a folder whose path is short enough for sockets, if one can be written.
+
+    It makes its own where `tempfile` says, and asks only once; a socket's path has 108 bytes.
+    """
+    usual = tempfile.tempdir
+    try:
+        if len(os.fsencode(tempfile.gettempdir())) > LONGEST_FOLDER:
+            tempfile.tempdir = SHORT_FOLDER
+        multiprocessing.util.get_temp_dir()
+    except OSError:
+        return False
+    finally:
+        tempfile.tempdir = usual
+    return True
 
 
 @dataclass

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -122,3 +124,27 @@ def test_results_can_be_read_by_several_processes(tmp_path):
     folders = [write(car(n=5), tmp_path / name) for name in "ab"]
     with pool(2) as workers:
         assert [results.folder for results in workers.map(read_back, folders)] == folders
+
+
+@pytest.mark.parametrize("fallback", ["/tmp", "/does/not/exist"])
+def test_runs_start_where_the_path_of_temporary_files_is_too_long_for_sockets(fallback, tmp_path):
+    """A socket's path has 108 bytes; processes are started through one, or else afresh."""
+    folder = tmp_path / ("long" * 40)
+    folder.mkdir()
+    script = (
+        "from pathlib import Path\n"
+        "from orchestrator.studies import jobs\n"
+        f"jobs.SHORT_FOLDER = {fallback!r}\n"
+        "if __name__ == '__main__':\n"
+        "    job = jobs.Job('a', Path('a.yaml'), Path('out'))\n"
+        "    (outcome,) = jobs.execute([job], run=print)\n"
+        "    print(outcome.problems)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        env=os.environ | {"TMPDIR": str(folder)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stdout.endswith("()\n"), done.stderr

@@ -1,0 +1,115 @@
+"""The cache: nothing in it is believed unseen, and it serves whoever may write where."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from orchestrator.cache import cache_folder, keep, recall, write_durably
+from orchestrator.cli import main
+from orchestrator.fmu.archive import open_fmu
+
+from .fake_fmus import make_fmu
+
+
+@pytest.fixture
+def full(cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache with an unpacked FMU, a launcher, and what others have put there."""
+    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path / "temporary"))
+    monkeypatch.setenv("PUBLIC", "/ö")
+    open_fmu(make_fmu(tmp_path / "a.fmu", files={"resources/table.txt": b"1 2 3"}))
+    keep("launcher", "0123", b"a launcher")
+    (cache / "letters").mkdir()
+    (cache / f"{'0' * 32}-1").mkdir()
+    return cache
+
+
+def told(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[str, str]:
+    with pytest.raises(SystemExit) as ended:
+        main(["cache", *arguments])
+    assert not ended.value.code
+    return capsys.readouterr()
+
+
+def test_what_is_kept_comes_back_until_something_else_is_kept(cache):
+    keep("store", "key", b"one")
+    assert recall("store", "key") == b"one"
+    keep("store", "key", b"two")
+    assert recall("store", "key") == b"two"
+    assert len(list(cache.glob("store/*"))) == 1
+    assert recall("store", "other") is None
+
+
+@pytest.mark.parametrize("harm", [b"", b"tw", b"twx"])
+def test_what_is_damaged_does_not_come_back(cache, harm):
+    keep("store", "key", b"two")
+    (file,) = cache.glob("store/*")
+    file.write_bytes(harm)
+    assert recall("store", "key") is None
+
+
+def test_a_file_that_cannot_be_put_in_place_leaves_what_stood_there(tmp_path, monkeypatch):
+    file = tmp_path / "a"
+    write_durably(file, b"old")
+
+    def refuse(*_):
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(os, "fsync", refuse)
+    with pytest.raises(OSError, match="Input/output error"):
+        write_durably(file, b"new")
+    assert file.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_show_tells_what_there_is_and_touches_nothing(full, capsys):
+    before = sorted(full.rglob("*"))
+    out, _ = told(capsys)
+    assert out.splitlines()[:4] == [
+        str(full), "  unpacked FMUs: 1, 0.0 MB", "  launchers: 1, 0.0 MB", "  left over: 1, 0.0 MB",
+    ]  # fmt: skip
+    assert sorted(full.rglob("*")) == before
+
+
+def test_verify_deletes_what_is_damaged_and_nothing_else(full, capsys):
+    assert told(capsys, "verify")[1] == "everything is whole\n"
+    (launcher,) = full.glob("launcher/*")
+    launcher.write_bytes(b"a laun")
+    (table,) = full.glob("*/fmu/resources/table.txt")
+    table.write_bytes(b"9 2 3")
+    out, err = told(capsys, "verify")
+    assert "  unpacked FMUs: 1, 0.0 MB, 1 deleted" in out
+    assert err == "damaged: 2\n"
+    assert not launcher.exists()
+    assert not table.exists()
+    assert told(capsys, "verify")[1] == "everything is whole\n"
+
+
+def test_clear_deletes_what_is_ours(full, capsys):
+    told(capsys, "clear")
+    assert sorted(path.name for path in full.iterdir()) == ["launcher", "letters"]
+    assert list((full / "launcher").iterdir()) == []
+
+
+def test_a_home_that_is_none_gives_a_temporary_cache(tmp_path, monkeypatch):
+    monkeypatch.delenv("YAWBENCH_CACHE", raising=False)
+    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
+
+    def no_home(name):
+        raise RuntimeError("could not determine the home directory")
+
+    for without in (lambda name: Path("~/.cache") / name, no_home):
+        monkeypatch.setattr("platformdirs.user_cache_path", without)
+        assert cache_folder() == tmp_path / f"yawbench-{os.getuid()}"
+
+
+def test_a_cache_that_cannot_be_made_is_passed_over(tmp_path, monkeypatch):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "file" / "cache"))
+    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
+    assert cache_folder() == tmp_path / f"yawbench-{os.getuid()}"
+    keep("store", "key", b"two")
+    assert recall("store", "key") == b"two"
+    assert open_fmu(make_fmu(tmp_path / "a.fmu")).directory.is_relative_to(cache_folder())
