@@ -59,7 +59,7 @@ class Upkeep:
 
     def _bring(self, archive: Path, build: bool) -> tuple[Path, Built | None]:
         places = dict.fromkeys((archive, writable(archive.parent) / archive.name))
-        marks = {place: read_mark(place) for place in places if place.exists()}
+        marks = {place: read_mark(place) for place in places if os.path.exists(place)}
         if archive in marks and marks[archive] is None:
             return archive, None
         found, mark = next(((p, m) for p, m in marks.items() if m), (archive, Mark(archive.stem, "", "")))

@@ -261,6 +261,7 @@ def test_any_user_runs_a_project_that_he_cannot_write(built, home):
         os.chmod(folder, 0o755)
         project = Path(folder, "project")
         shutil.copytree(built, project, ignore=shutil.ignore_patterns("docs", "tests", "cache", ".venv"))
+        project.chmod(0o755)
         _run_as_nobody(project, Path(folder, "room"), home)
 
 
