@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 from .wording import cut
 
 Value = float | int | bool | str
-OF_RUN = ("stop_time", "step_size", "algorithm")
+OF_RUN = ("start_time", "stop_time", "step_size", "algorithm")
 """What a change gives without naming a unit."""
 FACTS = ("friction", "speed")
 """What one change tells all units that have to know it (see `wiring.facts`)."""
@@ -114,6 +114,10 @@ class Fmu:
     needs_tool: bool = False
     """Whether it needs the tool that made it."""
 
+    def doubts(self) -> list[str]:
+        """Return a sentence for everything that is formally wrong with the model description."""
+        return [f"the model description is not valid FMI {self.fmi}.0: {flaw}" for flaw in self.flaws]
+
     def of(self, causality: str) -> list[Variable]:
         """Return the variables of one causality, in the order of the model description."""
         return [v for v in self.variables.values() if v.causality == causality]
@@ -131,6 +135,8 @@ class Unit:
     origins: dict[str, str] = field(default_factory=dict)
     """Parameter or constant -> where its value comes from: "default" (the FMU), "vehicle", "scenario", or the
     origin of the change that gave it."""
+    tolerance: float | None = None
+    """Relative, of the FMU's own solver; None: that of its default experiment, if it has one."""
 
 
 @dataclass(frozen=True)
@@ -178,6 +184,7 @@ class Plan:
     step: Fraction  # communication step size [s]
     n_steps: int
     algorithm: Algorithm
+    start: Fraction = Fraction(0)  # time of communication point 0 [s]
     title: str = ""
     scenario: dict = field(default_factory=dict)  # as run, for run.json
     notes: tuple[str, ...] = ()  # worth telling the user, but no error
@@ -185,4 +192,4 @@ class Plan:
 
     def time(self, k: int) -> float:
         """Return the time [s] of communication point `k`, correctly rounded."""
-        return float(k * self.step)
+        return float(self.start + k * self.step)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .options import Fmus, NoBuild, ScenarioFile, Set, Swap
+from .options import Fmus, NoBuild, NoValidate, ScenarioFile, Set, Swap
 from .planning import plan_of_scenario
 
 if TYPE_CHECKING:
@@ -25,13 +25,17 @@ def check(
     set_: Set = None,
     fmus: Fmus = None,
     no_build: NoBuild = False,
+    no_validate: NoValidate = False,
 ) -> None:
     """Validate a scenario; show units, wires and their order."""
 
-    plan = plan_of_scenario(scenario, swap, set_, fmus=fmus, build=not no_build)
+    plan = plan_of_scenario(scenario, swap, set_, fmus=fmus, build=not no_build, validate=not no_validate)
     show(plan, scenario)
     for note in plan.notes:
         print(f"note: {note}", file=sys.stderr)
+    for unit in plan.units:
+        for doubt in unit.fmu.doubts():
+            print(f"warning: {unit.name}: {doubt}", file=sys.stderr)
 
 
 def show(plan: Plan, scenario: Path) -> None:

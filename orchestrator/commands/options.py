@@ -20,8 +20,8 @@ Set = Annotated[
     typer.Option(
         "--set",
         metavar="UNIT.PARAMETER=VALUE",
-        help="Set a parameter of a unit; also vehicle.NAME, inputs.NAME, UNIT.step_size, stop_time, "
-        "step_size, algorithm. Repeatable.",
+        help="Set a parameter of a unit; also vehicle.NAME, inputs.NAME, UNIT.step_size, start_time, "
+        "stop_time, step_size, algorithm. Repeatable.",
     ),
 ]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results.")]
@@ -35,6 +35,13 @@ NoBuild = Annotated[
         "--no-build",
         envvar="YAWBENCH_NO_BUILD",
         help="Take FMUs as they are, also those whose sources have changed; they are built anew otherwise.",
+    ),
+]
+NoValidate = Annotated[
+    bool,
+    typer.Option(
+        "--no-validate",
+        help="Use FMUs whose model descriptions are formally wrong, and warn of what is wrong.",
     ),
 ]
 Format = Annotated[

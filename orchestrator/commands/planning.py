@@ -18,6 +18,7 @@ def plan_of_scenario(
     fmus: Path | None,
     build: bool,
     isolated: bool = False,
+    validate: bool = True,
 ) -> Plan:
     """Return the plan of a scenario with all that options change in it.
 
@@ -27,6 +28,7 @@ def plan_of_scenario(
         fmus: folder of FMUs given by name.
         build: build first what is stale of the FMUs that it uses.
         isolated: each unit will have a process of its own.
+        validate: refuse FMUs whose model descriptions are formally wrong.
 
     Raises:
         YawbenchError: the scenario, an option or an FMU is wrong, or a component cannot be built.
@@ -36,5 +38,5 @@ def plan_of_scenario(
     from ..scenario.overrides import read_changes
     from ..wiring.make_plan import make_plan
 
-    loaded = load_scenario(scenario, changes=read_changes(swap or (), set_ or ()))
+    loaded = load_scenario(scenario, changes=read_changes(swap or (), set_ or ()), validate=validate)
     return make_plan(loaded, fmus=fmus, opener=Opener(build=build), isolated=isolated)

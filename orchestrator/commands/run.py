@@ -12,7 +12,19 @@ from typing import Annotated
 
 import typer
 
-from .options import CallLimit, Fmus, Format, Isolate, NoBuild, Out, ScenarioFile, Set, Swap, isolation
+from .options import (
+    CallLimit,
+    Fmus,
+    Format,
+    Isolate,
+    NoBuild,
+    NoValidate,
+    Out,
+    ScenarioFile,
+    Set,
+    Swap,
+    isolation,
+)
 from .planning import plan_of_scenario
 
 Metrics = Annotated[
@@ -42,6 +54,7 @@ def run(
     metric: Metrics = None,
     isolate: Isolate = False,
     call_limit: CallLimit = None,
+    no_validate: NoValidate = False,
 ) -> None:
     """Run a scenario and write results.csv and run.json.
 
@@ -59,7 +72,9 @@ def run(
     check_format(format_)
     metrics = _metric_names(metric or ())
     limit = isolation(isolate, call_limit)
-    plan = plan_of_scenario(scenario, swap, set_, fmus=fmus, build=not no_build, isolated=isolate)
+    plan = plan_of_scenario(
+        scenario, swap, set_, fmus=fmus, build=not no_build, validate=not no_validate, isolated=isolate
+    )
     if named := [name for name in metric or () if name != "standard"]:
         from ..metrics import run_metrics
 
@@ -80,6 +95,8 @@ def run(
         _say(f"warning: {message.unit} at t = {message.time:.9g} s: {grade}{text}")
     if len(info.warnings) > SHOWN:
         _say(f"warning: {len(info.warnings) - SHOWN} more, see {folder / 'run.json'}")
+    if info.ended:
+        _say(f"ended: {info.ended}")
     _say(f"{folder}: {info.rows} rows of {info.columns} variables in {info.wall_time:.2f} s")
     if metrics:
         from ..results.read import load_results

@@ -140,6 +140,6 @@ def provenance(runs: Sequence[Run]) -> str:
         for fmu in record.get("fmus", {}).values()
     )
     parts += [f"FMUs: {', '.join(fmus)}"] if fmus else []
-    unfinished = [run.label for run in runs if run.results.run.get("status") != "completed"]
+    unfinished = [r.label for r in runs if r.results.ended or r.results.run.get("status") != "completed"]
     parts += [f"ended early: {', '.join(unfinished)}"] if unfinished else []
     return " · ".join(parts)

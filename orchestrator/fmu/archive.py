@@ -66,7 +66,9 @@ def open_fmu(path: Path | str, *, validate: bool = True) -> Fmu:
             problem = problem or ModelDescriptionError(_no_room(path, folder, error))
             continue
         if validate and fmu.flaws:
-            raise ModelDescriptionError(f"{fmu.path}: {fmu_description.invalid(fmu.fmi, fmu.flaws)}")
+            more = f" (and {len(fmu.flaws) - 1} more)" if len(fmu.flaws) > 1 else ""
+            way = "; 'validate: false' for the unit, or --no-validate, makes it a warning"
+            raise ModelDescriptionError(f"{fmu.path}: {fmu.doubts()[0].rstrip('.')}{more}{way}")
         if wrong := binary_problem(fmu):
             raise ModelDescriptionError(f"{fmu.path}: {wrong}")
         return fmu

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 from xml.etree import ElementTree
@@ -42,9 +42,9 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
             description = read_model_description(io.BytesIO(raw), validate=False)
         variables, refused = scalars(description, root)
     except Exception as error:  # fmpy raises whatever its parsing meets
-        if flaws:
-            raise ModelDescriptionError(f"{path}: {invalid(fmi, flaws)}") from None
         reason = _one_line(error) or type(error).__name__
+        if flaws:
+            reason = f"it is not valid FMI {fmi}.0: {flaws[0].rstrip('.')} ({reason})"
         raise ModelDescriptionError(f"{path}: the model description cannot be used: {reason}") from None
     kind = description.coSimulation
     experiment = description.defaultExperiment
@@ -69,12 +69,6 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
         tolerance=_tolerance(experiment),
         needs_tool=kind.needsExecutionTool,
     )
-
-
-def invalid(fmi: int, flaws: Sequence[str]) -> str:
-    """Return the sentence that says what is formally wrong with a model description."""
-    more = f" (and {len(flaws) - 1} more)" if len(flaws) > 1 else ""
-    return f"the model description is not valid FMI {fmi}.0: {flaws[0]}{more}"
 
 
 def _one_line(problem: object) -> str:

@@ -46,7 +46,7 @@ class Opener:
         self.build = build
         self._tell = tell
         self._given = dict(opened or {})
-        self._opened: dict[tuple[Path, Built | None], Fmu] = {}
+        self._opened: dict[tuple[Path, Built | None, bool], Fmu] = {}
         self._built: dict[Path, Built | None] = {}
 
     @cached_property
@@ -66,14 +66,15 @@ class Opener:
         path, self._built[path] = self._upkeep.bring(archive, build=build and self.build)
         return path
 
-    def open(self, archive: Path) -> Fmu:
+    def open(self, archive: Path, *, validate: bool = True) -> Fmu:
         """Return an FMU as `open_fmu` does, with what it was built from if it has been brought."""
         if archive in self._given:
             return self._given[archive]
         built = self._built.get(archive)
-        if (archive, built) not in self._opened:
-            self._opened[archive, built] = replace(open_fmu(archive), built=built)
-        return self._opened[archive, built]
+        key = (archive, built, validate)
+        if key not in self._opened:
+            self._opened[key] = replace(open_fmu(archive, validate=validate), built=built)
+        return self._opened[key]
 
     def names(self, folder: Path) -> list[str]:
         """Return the names of the FMUs that a folder holds, or that can be built into it."""

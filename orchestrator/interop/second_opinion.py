@@ -120,6 +120,8 @@ def second_opinion(
         raise WiringError(
             f"{plan.title or 'this system'}: nothing to compare: no output of type Real is recorded"
         )
+    if plan.start:
+        raise WiringError("a second opinion is of runs that begin at 0 s: leave start_time out")
     ours: dict[bool, tuple[Request, dict[str, Recording]]] = {}
     opinions = []
     for master in masters:

@@ -250,7 +250,7 @@ def _add_enumerations(root: _Element, enumerations: Mapping[str, Mapping[str, in
 
 def _add_experiment(root: _Element, plan: Plan) -> None:
     experiment = SubElement(root, f"{{{SSD}}}DefaultExperiment")
-    experiment.set("startTime", "0.0")
+    experiment.set("startTime", repr(plan.time(0)))
     experiment.set("stopTime", repr(plan.time(plan.n_steps)))
     algorithm = SubElement(_annotation(experiment, OSP_ANNOTATION), f"{{{OSP}}}Algorithm")
     SubElement(algorithm, f"{{{OSP}}}FixedStepAlgorithm", baseStepSize=_decimal(plan.step))

@@ -64,7 +64,8 @@ def initialize(memory: Memory, check: Check, log: Log) -> int:
     """
     plan = memory.plan
     for station in memory.stations:
-        experiment = Experiment(plan.time(0), plan.time(plan.n_steps))
+        tolerance = station.unit.tolerance or station.unit.fmu.tolerance
+        experiment = Experiment(plan.time(0), plan.time(plan.n_steps), tolerance)
         check(station.name, "initialization", station.slave.setup(experiment))
         _put(station, station.unit.parameters, "setting parameters", check)
         _put(station, _known_inputs(memory, station), "setting inputs", check)

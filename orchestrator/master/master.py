@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -23,14 +24,26 @@ from ..plan import Plan, Value
 from .failure import describe
 from .initialization import initialize
 from .interrupts import StopFlag
-from .log import MASTER, OK, WARNING, Log
+from .log import DISCARD, MASTER, OK, WARNING, Log
 from .memory import Memory
 from .program import Operation, Programs
 from .slave import Slave, Status
 
+ALMOST = 1e-6
+"""Part of a step by which an FMU may be short of its end; chosen: rounding of its own times."""
+
 
 class Interrupted(SimulationError):
     """The run was asked to stop."""
+
+
+class Ended(Exception):
+    """A unit wants the run to end, which is no failure: `unit`, at `time` [s]."""
+
+    def __init__(self, reason: str, *, unit: str, time: float) -> None:
+        super().__init__(reason)
+        self.unit = unit
+        self.time = time
 
 
 class Master:
@@ -41,6 +54,7 @@ class Master:
         self.log = log
         self.stop = stop
         self.completed = -1
+        log.time.value = plan.time(0)
         self.passes = 0
         self.memory = memory = Memory(plan, slaves)
         slow = {s.unit.period for s in memory.stations} - {1}
@@ -66,6 +80,8 @@ class Master:
         """Outputs that are recorded and on no wire, all of whose values have been finite so far."""
         self._expected = np.arange(memory.n_outputs)  # to be finite
         self._ones = np.ones(memory.n_outputs)
+        self._ending: Ended | None = None
+        self._points: Iterator[int] = iter(())  # left to be stepped to
 
     def initialize(self, row: np.ndarray, others: list[list[Value]]) -> None:
         """Bring all units to the start, and record it like `advance`.
@@ -89,8 +105,10 @@ class Master:
             SimulationError: a unit fails or a wire is not finite. `completed` tells how many rows
                 are whole.
             Interrupted: the stop flag was raised.
+            Ended: a unit wants no more.
         """
-        p, q = self.plan.step.numerator, self.plan.step.denominator
+        q = math.lcm(self.plan.step.denominator, self.plan.start.denominator)
+        s, p = int(self.plan.start * q), int(self.plan.step * q)  # the k-th point is at (s + k p) / q
         stop = self.stop
         first, cycle = self.completed + 1, self.programs.cycle
         points = range(first, min(end, first + cycle - 1) + 1)
@@ -99,24 +117,27 @@ class Master:
         clocks = list(self._clocks.items())
         total, ones, finite = self.memory.now.dot, self._ones, math.isfinite
         take, recorded, time = self.memory.pool.take, self._recorded, self.memory.time
-        for k, row in zip(range(first, end + 1), rows, strict=False):
+        self._points = iter(range(first, end + 1))
+        for k, row in zip(self._points, rows, strict=False):
             if stop.requested:
                 now = self.plan.time(k - 1)
                 raise Interrupted(f"the run was interrupted at t = {now:.9g} s", unit=None, time=now)
             for period, clock in clocks:
                 if k % period == 0:
-                    clock.value = (k - period) * p / q
+                    clock.value = (s + (k - period) * p) / q
             for call in calls[k % cycle]:
                 status = call()
                 if status:
                     self._answer(k, call, status)
             if not finite(total(ones)):
                 self._check_finite(k)
-            time.value = k * p / q
+            time.value = (s + k * p) / q
             take(recorded, None, row, "clip")
             if self._recorded_others:
                 others.append(self._values_of_others())
             self.completed = k
+        if self._ending is not None:
+            raise self._ending
 
     def inputs_of(self, unit: str) -> dict[str, Value]:
         """Return the inputs with which a unit was last stepped."""
@@ -136,11 +157,14 @@ class Master:
         """Judge a call during initialization, where a logged error counts whatever the status is."""
         status = self.memory.of[unit].slave.note(status)
         if status > WARNING or self.log.errors(unit):
-            raise self._failure(describe(unit, what, 0.0, status, self.log), unit, 0.0)
+            start = self.plan.time(0)
+            raise self._failure(describe(unit, what, start, status, self.log), unit, start)
         if status == WARNING:
             self._note_warning(unit, what)
         if self.stop.requested:
-            raise Interrupted("the run was interrupted during initialization", unit=None, time=0.0)
+            raise Interrupted(
+                "the run was interrupted during initialization", unit=None, time=self.plan.time(0)
+            )
 
     def _answer(self, k: int, call: Callable[[], Status | None], status: Status) -> None:
         """Judge a call of the step from `k` - 1 to `k` that did not return OK."""
@@ -154,8 +178,22 @@ class Master:
             return
         self._check_finite(k)  # a value that went wrong upstream explains this failure
         time = self.plan.time(k - station.unit.period)
+        if status == DISCARD and kind == "step" and (reached := station.slave.ended()) is not None:
+            self._end(k, operation.unit, time if math.isnan(reached) else reached)
+            return
         sentence = describe(operation.unit, _WORDS[kind], time, status, self.log)
         raise self._failure(sentence, operation.unit, time)
+
+    def _end(self, k: int, unit: str, time: float) -> None:
+        """End the run because a unit wants to: now, or after this step if it has done all of it."""
+        now = self.log.time.value
+        said = [" ".join(m.text.split()) for m in self.log.messages if m.unit == unit and m.time >= now]
+        reason = f": {said[-1]}" if said else ", without a reason"
+        ending = Ended(f"{unit} ended the run at t = {time:.9g} s{reason}", unit=unit, time=time)
+        if time < self.plan.time(k) - ALMOST * float(self.plan.step):
+            raise ending
+        self._ending = self._ending or ending
+        deque(self._points, maxlen=0)
 
     def _failure(self, sentence: str, unit: str, time: float) -> SimulationError:
         """Return what ends the run because of a unit."""

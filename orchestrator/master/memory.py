@@ -90,6 +90,7 @@ class Memory:
         self.others: dict[tuple[str, str], Value] = {}
         self.time_at = len(self.pool) - 1
         self.time = ctypes.c_double.from_buffer(self.pool.data, 8 * self.time_at)
+        self.time.value = plan.time(0)
         self._place_outputs()
         self._place_inputs(2 * n_out, 2 * n_out + n_in)
 

@@ -24,8 +24,8 @@ from ..results.read import Results
 from ..results.recorder import BLOCK, Recorder
 from ..results.run_record import run_record
 from .interrupts import StopFlag, interrupts
-from .log import Log, Message
-from .master import Interrupted, Master
+from .log import MASTER, WARNING, Log, Message
+from .master import Ended, Interrupted, Master
 from .opening import open_unit
 from .slave import Slave
 
@@ -52,6 +52,7 @@ class RunInfo:
     wall_time: float  # of initialization and stepping [s]
     passes: int  # of initialization
     warnings: list[Message] = field(default_factory=list)
+    ended: str | None = None  # why a unit ended it before its stop time
 
 
 def simulate(
@@ -66,7 +67,8 @@ def simulate(
 
     A run that fails or is interrupted (Ctrl-C, SIGTERM) writes what it has recorded, and why it
     ended, before it raises. Results of an earlier run in `out` are replaced as a whole; a run that fails
-    leaves those of one that reached its end, and puts its own into `failed` beside them. All is on the
+    leaves those of one that reached its end, and puts its own into `failed` beside them. A run that a unit
+    wants to end is complete, and says so. All is on the
     disk before the units are terminated and freed.
 
     Args:
@@ -87,7 +89,10 @@ def simulate(
     run = _go(plan, recorder, progress, opener)
     passes = run.master.passes if run.master else 0
     warnings = list(run.log.warnings())
-    return RunInfo(Path(out), recorder.written, len(plan.record), run.id, run.wall_time, passes, warnings)
+    ended = None if run.ended is None else str(run.ended)
+    return RunInfo(
+        Path(out), recorder.written, len(plan.record), run.id, run.wall_time, passes, warnings, ended
+    )
 
 
 def simulate_in_memory(
@@ -140,6 +145,7 @@ class _Run:
         self.log = Log()
         self.stop = StopFlag()
         self.master: Master | None = None
+        self.ended: Ended | None = None
         self.id = uuid.uuid4().hex[:12]
         self._slaves: dict[str, Slave] = {}
         self._record: dict[str, Any] = {}  # of the run that has ended
@@ -161,10 +167,16 @@ class _Run:
         """Open, initialize, step."""
         corrupted: set[Path] = set()
         for unit in self.plan.units:
+            for doubt in unit.fmu.doubts():
+                self.log.add(unit.name, WARNING, MASTER, doubt, self.plan.time(0))
             self._slaves[unit.name] = opener(unit, self.log, corrupted)
         self.master = Master(self.plan, self._slaves, self.log, self.stop)
         self.master.initialize(self.recorder.rows[0], self.recorder.others)
-        self._step(self.master)
+        try:
+            self._step(self.master)
+        except Ended as ending:
+            self.ended = ending
+            self._flush()
 
     def end(self) -> None:
         """Terminate and free the units, and note in the record what they said to it."""
@@ -245,6 +257,8 @@ class _Run:
         self._writing = True
         self._ended_by = getattr(error, "unit", None)
         ended = {"wall_time": self.wall_time, "error": self._explained(error), "units_freed": False}
+        if self.ended is not None:
+            ended["ended"] = {"unit": self.ended.unit, "time": self.ended.time, "message": str(self.ended)}
         record = self._recorded(status) | self.log.record(self._ended_by) | ended
         self.recorder.finish(record)
         self._record, self._writing = record, False

@@ -87,6 +87,8 @@ def frames_of(results: Results) -> Frames:
         notes.append("the plant tells no sizes: a mid-size car is drawn")
     if failed := results.run.get("status", "completed") != "completed":
         notes.append(f"the run did not end as planned; shown until {time[-1]:.2f} s")
+    elif results.ended:
+        notes.append(results.ended)
     return Frames(car, channels | forces | grip, tuple(_lanes(results)), tuple(notes), failed)
 
 

@@ -44,6 +44,12 @@ class Results:
         """The file that the columns come from."""
         return self.folder / str(self.run.get("results", RESULTS_FILE))
 
+    @property
+    def ended(self) -> str | None:
+        """Why a unit ended the run before its stop time, None if none did."""
+        ended = self.run.get("ended")
+        return str(ended.get("message")) if isinstance(ended, dict) else None
+
     def __getitem__(self, column: str) -> np.ndarray:
         try:
             return self.columns[column]

@@ -31,7 +31,9 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
         "rows": 0,
         "algorithm": plan.algorithm,
         "step_size": float(plan.step),
+        "start_time": plan.time(0),
         "stop_time": plan.time(plan.n_steps),
+        "ended": None,
         "evaluation_order": list(units),
         "units": {"time": "s", **columns},
         "fmus": {name: _fmu(unit, plan) for name, unit in units.items()},
@@ -59,6 +61,7 @@ def _fmu(unit: Unit, plan: Plan) -> dict[str, Any]:
         "fmi_version": f"{fmu.fmi}.0",
         "built": None if fmu.built is None else asdict(fmu.built),
         "step_size": float(unit.period * plan.step),
+        "tolerance": unit.tolerance or fmu.tolerance,
         "parameters": dict(unit.parameters),
         "origins": {name: origin for name, origin in unit.origins.items() if origin != "default"},
         # what the FMU has for the others

@@ -24,6 +24,7 @@ def load_scenario(
     *,
     changes: Sequence[Change] = (),
     read: Callable[..., Document] = yaml_lines.read,
+    validate: bool = True,
 ) -> Scenario:
     """Read a scenario file, or an SSP archive.
 
@@ -31,6 +32,7 @@ def load_scenario(
         path: the YAML file, or the archive.
         changes: what is other than in the file; see `overrides`.
         read: how to read a file, called as `yaml_lines.read`; what it returns is changed.
+        validate: False: use FMUs though their model descriptions are formally wrong.
 
     Raises:
         ScenarioError: with everything that is wrong with the file, its vehicle file, the changes.
@@ -43,6 +45,8 @@ def load_scenario(
     replaced, effective = overrides.apply_changes(document, vehicle_document, wanted)
     if archive and isinstance(document.data, dict):
         _ask_for_times(document)
+    if not validate:
+        overrides.leave_unvalidated(document)
 
     scenario = strict.validate(Scenario, document)
     parameters = strict.validate(Vehicle, vehicle_document)
@@ -91,7 +95,12 @@ def _check_time_grid(document: Document) -> None:
     step = _seconds(data.get("step_size"))
     if step is None:
         return
-    times: list[tuple[Key, object]] = [(("stop_time",), data.get("stop_time"))]
+    start, stop = _read(quantities.instant, data.get("start_time", 0)), _seconds(data.get("stop_time"))
+    if start is not None and stop is not None and not start < stop:
+        what = f"must be after start_time, {float(start):.12g} s (got {float(stop):.12g} s)"
+        document.report(("stop_time",), what)
+        return
+    times: list[tuple[Key, object]] = [(("stop_time",), None if stop is None else stop - (start or 0))]
     units = data.get("units")
     for name, unit in units.items() if isinstance(units, dict) else ():
         if isinstance(unit, dict):
@@ -101,19 +110,26 @@ def _check_time_grid(document: Document) -> None:
         if time is None or time % step == 0:
             continue
         below = time // step * step
+        from_start = (start or 0) if key == ("stop_time",) else 0
         change = document.override(("step_size",))
         origin = f" ({change})" if change else ""
-        nearest = listed([f"{float(t):.12g} s" for t in (below, below + step) if t > 0], last="or")
+        allowed = [t + from_start for t in (below, below + step) if t > 0]
+        nearest = listed([f"{float(t):.12g} s" for t in allowed], last="or")
+        after = f" from {float(from_start):.12g} s on" if from_start else ""
         document.report(
             key,
-            f"{float(time):.12g} s is no integer multiple of the communication step "
+            f"{float(time):.12g} s{after} is no integer multiple of the communication step "
             f"{float(step):.12g} s{origin}; nearest allowed: {nearest}",
         )
 
 
 def _seconds(value: object) -> Fraction | None:
+    return _read(quantities.seconds, value)
+
+
+def _read(parse: Callable[[object], Fraction], value: object) -> Fraction | None:
     try:
-        return quantities.seconds(value)
+        return parse(value)
     except ValueError:
         return None
 

@@ -78,7 +78,7 @@ def changes_of(
 
 def changes_of_run(spec: Any, origin: str) -> list[Change]:
     """Return the changes that the fields `stop_time`, `step_size` and `algorithm` of a file's part give."""
-    given = [(place, getattr(spec, place)) for place in OF_RUN]
+    given = [(place, getattr(spec, place, None)) for place in OF_RUN]
     return [
         Change(place, float(value) if isinstance(value, Fraction) else value, origin)
         for place, value in given
@@ -141,6 +141,13 @@ def apply_vehicle(document: Document, changes: Iterable[Change]) -> None:
     for change in changes:
         if change.place == "vehicle":
             _put(document, ("vehicle",), change, os.path.abspath(str(change.value)))
+
+
+def leave_unvalidated(document: Document) -> None:
+    """Let every unit use its FMU though the model description is formally wrong."""
+    for spec in _mapping(document.data, "units").values():
+        if isinstance(spec, dict):
+            spec["validate"] = False
 
 
 def apply_to_all_runs(document: Document, changes: Iterable[Change]) -> None:

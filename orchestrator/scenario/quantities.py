@@ -99,23 +99,38 @@ def _spellings(unit: str, target: Measure) -> list[str]:
     return list(dict.fromkeys((unit, *fitting)))
 
 
+def instant(value: object) -> Fraction:
+    """Return a point of time in s as an exact fraction of what is written: 0.001 is 1/1000.
+
+    Raises:
+        ValueError: not a time.
+    """
+    time = _time(value)
+    if abs(time) > LONGEST:
+        raise ValueError(f"must be a time of at most {LONGEST:g} s (got {value!r})")
+    return time
+
+
 def seconds(value: object) -> Fraction:
-    """Return a time in s as an exact fraction of what is written: 0.001 is 1/1000.
+    """Return a span of time in s as an exact fraction of what is written.
 
     Raises:
         ValueError: not a positive time.
     """
-    if isinstance(value, str):
-        time = convert(value, "s")
-    elif isinstance(value, Fraction):
-        time = value
-    elif isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < math.inf:
-        time = Fraction(repr(value))
-    else:
-        raise ValueError(f"must be a time in s (got {short(value)})")
+    time = _time(value)
     if not 0 < time <= LONGEST:
         limit = f" and at most {LONGEST:g} s" if time > 0 else ""
         raise ValueError(f"must be a time above 0 s{limit} (got {value!r})")
     if time < SHORTEST:
         raise ValueError(f"must be a time of at least {float(SHORTEST):g} s (got {value!r})")
-    return Fraction(time)
+    return time
+
+
+def _time(value: object) -> Fraction:
+    if isinstance(value, str):
+        return Fraction(convert(value, "s"))
+    if isinstance(value, Fraction):
+        return value
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < math.inf:
+        return Fraction(repr(value))
+    raise ValueError(f"must be a time in s (got {short(value)})")

@@ -86,12 +86,22 @@ def _source(value: object) -> Endpoint | list[str] | None:
     return None if value is None else _end(value)
 
 
+def _tolerance(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value < 1:
+        raise ValueError(f"must be a number between 0 and 1 (got {short(value)})")
+    return float(value)
+
+
 _SCALAR_SCHEMA = {"type": ["number", "boolean", "string"]}
 _TIME_SCHEMA = {"type": ["number", "string"]}
 Scalar = Annotated[Value, PlainValidator(_plain), WithJsonSchema(_SCALAR_SCHEMA)]
 Number = Annotated[float, PlainValidator(_number), WithJsonSchema({"type": "number"})]
+Tolerance = Annotated[float, PlainValidator(_tolerance), WithJsonSchema({"type": "number"})]
 Time = Annotated[
     Fraction, PlainValidator(quantities.seconds), PlainSerializer(float), WithJsonSchema(_TIME_SCHEMA)
+]
+Instant = Annotated[
+    Fraction, PlainValidator(quantities.instant), PlainSerializer(float), WithJsonSchema(_TIME_SCHEMA)
 ]
 Variables = Annotated[Endpoint, PlainValidator(endpoint), WithJsonSchema({"type": "string"})]
 UnitName = Annotated[str, AfterValidator(_unit_name)]
@@ -103,6 +113,12 @@ class UnitSpec(Strict):
     fmu: str = Field(description="Name of an FMU in fmus/, or the path of any .fmu", min_length=1)
     step_size: Time | None = Field(None, description="s, an integer multiple of the communication step")
     parameters: dict[str, Scalar] = Field({}, description="Values of this unit's parameters")
+    tolerance: Tolerance | None = Field(
+        None, description="Relative, of the FMU's own solver; left out: that of its default experiment"
+    )
+    validate_: bool = Field(
+        True, alias="validate", description="Refuse an FMU whose description is formally wrong; false: warn"
+    )
 
 
 _END_SCHEMA = {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}
@@ -168,6 +184,7 @@ class Scenario(Strict):
     title: str = ""
     source: str = Field("", description="Where the scenario comes from: paper, section, figure")
     vehicle: str | None = Field(None, description="Path of a vehicle file")
+    start_time: Instant = Field(Fraction(0), description="s")
     stop_time: Time = Field(description="s, an integer multiple of the communication step")
     step_size: Time = Field(description="s, communication step")
     algorithm: Algorithm = Field("extrapolated", description="How units are coupled")
@@ -227,4 +244,6 @@ class Scenario(Strict):
         """Return everything that the file, the vehicle file and the changes say, as JSON-ready data."""
         data = dict(self._document.data)
         times = {"stop_time": float(self.stop_time), "step_size": float(self.step_size)}
+        if self.start_time:
+            times["start_time"] = float(self.start_time)
         return {"file": str(self.path), **data, **times, "vehicle_parameters": self.vehicle_parameters}

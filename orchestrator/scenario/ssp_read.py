@@ -143,8 +143,8 @@ def _experiment(root: _Element) -> dict[str, Any]:
     found: dict[str, Any] = {}
     experiment = root.find(f"{{{SSD}}}DefaultExperiment")
     if experiment is not None:
-        if number(experiment, "startTime", 0.0) != 0.0:
-            raise Refused("runs begin at 0 s: another startTime is not supported", experiment)
+        if start := number(experiment, "startTime", 0.0):
+            found["start_time"] = start
         if experiment.get("stopTime") is not None:
             found["stop_time"] = number(experiment, "stopTime")
     for tag, attribute in (

@@ -94,6 +94,7 @@ _MUST_BE = {
     "too_short": "not empty",
     "float_type": "a number",
     "finite_number": "a finite number",
+    "bool_type": "true or false",
 }
 
 

@@ -119,6 +119,7 @@ def metric_table(comparison: Comparison, title: str, changed: str = "") -> Table
         if any(cell is not None for cell in cells):
             chosen = metric(name)
             table.rows.append([chosen.title, chosen.formula, *cells, *("failed" for _ in comparison.failed)])
+    table.notes += [f"{run.label}: {run.results.ended}" for run in comparison.runs if run.results.ended]
     return table
 
 
@@ -131,8 +132,9 @@ def write_comparison(comparison: Comparison, table: Table, out: Path, changed: s
     written = [path.name for name, figure in figures.items() for path in save(figure, out / name)]
     names = [name for name in STANDARD if any(name in v for v in comparison.values.values())]
     units = {name: value.unit for values in comparison.values.values() for name, value in values.items()}
+    early = {run.label: run.results.ended for run in comparison.runs}
     rows: list[list[Cell]] = [
-        [label, "completed", *(values.get(name) for name in names)]
+        [label, early[label] or "completed", *(values.get(name) for name in names)]
         for label, values in comparison.values.items()
     ]
     rows += [[label, f"failed: {why}", *(None for _ in names)] for label, why in comparison.failed.items()]

@@ -66,7 +66,7 @@ def judge_study(study: Study, out: Path, outcomes: Iterable[Outcome] = (), *, ea
         chosen, window = metric(spec.metric), spec.window
         for name, run in results.items():
             value = evaluate(run, chosen, window)
-            if value is not None:
+            if value is not None and (window or not run.ended):  # of a shorter run it is another metric
                 values[name, key] = value
     runs, derived = list(study.runs), derive(study.spec, values)
     claims = [judge(claim, values, runs, derived) for claim in study.spec.claims]
@@ -152,6 +152,8 @@ def _run_table(findings: Findings, spec: TableSpec) -> Table:
             table.notes.append(f"{run.row}: {findings.failed[run.name]}")
         else:
             cells = [findings.values.get((run.name, key)) for key in spec.metrics]
+            if early := findings.results[run.name].ended:
+                table.notes.append(f"{run.row}: {early}; what is of the whole run, or later, has no result")
             if some:
                 judged = said[run.name]
                 words = "; ".join(f"{j.claim.short} ({j.claim.source})" for j in judged)

@@ -45,5 +45,6 @@ def measure(job: Any) -> Measured:
     measured: Measured = {}
     for key, name, window in job.metrics:
         value = evaluate(results, metric(name), window)
-        measured[key] = None if value is None else (value.number, value.unit)
+        short = results.ended and not window  # of a run that a unit has ended early it is another metric
+        measured[key] = None if value is None or short else (value.number, value.unit)
     return measured

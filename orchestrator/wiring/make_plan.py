@@ -26,6 +26,7 @@ from ..plan import Fmu, Plan, Unit, Wire
 from ..scenario.load import Scenario
 from ..scenario.overrides import is_path
 from .connections import Connector
+from .functions import missing_functions
 from .order import evaluate
 from .parameters import Parameters
 from .recording import recorded
@@ -70,6 +71,16 @@ def make_plan(
         "one of these units has to give an output that does not follow its input directly"
         for loop in evaluation.loops
     ]
+    units = {
+        name: Unit(
+            name, fmu, _period(scenario, name), parameters[name], constants[name], origins[name],
+            tolerance=scenario.units[name].tolerance,
+        )
+        for name, fmu in opened.items()
+    }  # fmt: skip
+    if not problems:  # all variables are known
+        lacking = missing_functions(units.values(), wires, record)
+        problems = [f"{scenario.path}: {text}" for text in lacking]
     if problems:
         raise WiringError(problems)
     notes += [
@@ -77,16 +88,13 @@ def make_plan(
         "so a wire against the evaluation order uses earlier values"
         for loop in evaluation.possible_loops[:1]
     ]
-    units = {
-        name: Unit(name, fmu, _period(scenario, name), parameters[name], constants[name], origins[name])
-        for name, fmu in opened.items()
-    }
     return Plan(
         units=tuple(units[name] for name in evaluation.order),
         wires=_sorted(wires, evaluation.order, opened),
         record=record,
         step=scenario.step_size,
-        n_steps=int(scenario.stop_time / scenario.step_size),
+        n_steps=int((scenario.stop_time - scenario.start_time) / scenario.step_size),
+        start=scenario.start_time,
         algorithm=scenario.algorithm,
         title=scenario.title,
         scenario=scenario.as_run(),
@@ -108,12 +116,13 @@ def _open_all(
         folder = find_folder(scenario.path, opener=opener)
 
     @cache
-    def opened(fmu: str, build: bool = True) -> Fmu:
-        return opener.open(find_fmu(fmu, scenario=scenario.path, fmus=folder, opener=opener, build=build))
+    def opened(fmu: str, validate: bool, build: bool = True) -> Fmu:
+        path = find_fmu(fmu, scenario=scenario.path, fmus=folder, opener=opener, build=build)
+        return opener.open(path, validate=validate)
 
     def replaced(unit: str) -> Fmu | None:
         try:
-            return opened(scenario.replaced[unit], build=False)
+            return opened(scenario.replaced[unit], scenario.units[unit].validate_, build=False)
         except ModelDescriptionError:
             return None
 
@@ -121,7 +130,7 @@ def _open_all(
     not_built: dict[str, None] = {}
     for name, spec in scenario.units.items():
         try:
-            found[name] = opened(spec.fmu)
+            found[name] = opened(spec.fmu, spec.validate_)
         except BuildError as error:  # noqa: PERF203 - all problems are collected
             not_built.update(dict.fromkeys(error.problems))
         except ModelDescriptionError as error:

@@ -23,9 +23,19 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture(scope="session")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A compiled FMU library from elsewhere: it doubles its inputs, and answers a step as it is told."""
-    file = tmp_path_factory.mktemp("foreign") / "foreign.so"
+    return compiled(HERE / "foreign.c", tmp_path_factory.mktemp("foreign") / "foreign.so")
+
+
+@pytest.fixture(scope="session")
+def bare_library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same without the functions that many FMUs leave out, those for texts among them."""
+    return compiled(HERE / "foreign.c", tmp_path_factory.mktemp("bare") / "foreign.so", "-DBARE")
+
+
+def compiled(source: Path, target: Path, *options: str) -> Path:
+    """Return the library that is made of a file of C."""
     compiler = shlex.split(os.environ.get("CC", "cc"))
     include = HERE.parents[1] / "fmus"
-    source = HERE / "foreign.c"
-    subprocess.run([*compiler, "-shared", "-fPIC", "-w", f"-I{include}", source, "-o", file], check=True)
-    return file
+    flags = ["-shared", "-fPIC", "-w", f"-I{include}", *options]
+    subprocess.run([*compiler, *flags, source, "-o", target, "-lm"], check=True)
+    return target

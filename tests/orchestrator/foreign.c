@@ -1,7 +1,8 @@
 /* A co-simulation FMU without Python: doubles its inputs, answers the step at 0.25 s as it is told.
  *
  * Its GUID says how it treats the parameter: {reset} forgets it when the experiment is set up, {deaf} takes
- * nothing, {mute} does not tell it. */
+ * nothing, {mute} does not tell it; {whole} and {half} want to end the run in the step at 0.25 s, having done
+ * all or half of it; {solver} gives start time and tolerance as its Real output. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,7 +18,8 @@
 typedef struct {
     fmi2CallbackFunctions host;
     char name[64];
-    double real;
+    double real, reached, solver;
+    int done;
     int integer, boolean, answer;
     char given[64], made[80], guid[16];
 } Instance;
@@ -59,8 +61,13 @@ EXPORT fmi2Status fmi2Terminate(fmi2Component c)
 
 EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean keep)
 {
-    (void)h, (void)keep;
+    (void)keep;
     Instance *in = c;
+    if (!strcmp(in->guid, "{whole}") || !strcmp(in->guid, "{half}")) {
+        in->reached = t + (!strcmp(in->guid, "{whole}") ? h : h / 2);
+        in->done = t > 0.249;
+        return in->done ? fmi2Discard : fmi2OK;
+    }
     if (t < 0.249 || t > 0.251 || in->answer == fmi2OK || in->answer >= AT_THE_END) {
         return fmi2OK;
     }
@@ -104,9 +111,11 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolea
 
 EXCHANGE(Integer, in->integer = v[i], v[i] = 2 * in->integer, v[i] = in->integer)
 EXCHANGE(Boolean, in->boolean = v[i], v[i] = !in->boolean, v[i] = in->boolean)
+#ifndef BARE
 EXCHANGE(String, snprintf(in->given, sizeof in->given, "%s", v[i]),
          (snprintf(in->made, sizeof in->made, "<%s>", in->given), v[i] = in->made),
          v[i] = in->given)
+#endif
 
 EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Real v[])
 {
@@ -119,11 +128,15 @@ EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[], siz
 
 EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2Real v[])
 {
+    const Instance *in = c;
     for (size_t i = 0; i < n; i++) {
         if (r[i] != OUTPUT && r[i] != INPUT) {
             return fmi2Error;
         }
-        v[i] = (r[i] == OUTPUT ? 2 : 1) * ((Instance *)c)->real;
+        v[i] = (r[i] == OUTPUT ? 2 : 1) * in->real;
+        if (r[i] == OUTPUT && !strcmp(in->guid, "{solver}")) {
+            v[i] = in->solver;
+        }
     }
     return fmi2OK;
 }
@@ -131,20 +144,34 @@ EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[], siz
 EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerant, fmi2Real tolerance, fmi2Real start,
                                       fmi2Boolean stops, fmi2Real stop)
 {
-    (void)tolerant, (void)tolerance, (void)start, (void)stops, (void)stop;
+    (void)stops, (void)stop;
     Instance *in = c;
+    in->solver = tolerant ? start + tolerance : start;
     if (strcmp(in->guid, "{reset}") == 0) {
         in->answer = 0;
     }
     return fmi2OK;
 }
 
+EXPORT fmi2Status fmi2GetBooleanStatus(fmi2Component c, fmi2StatusKind kind, fmi2Boolean *value)
+{
+    *value = kind == 3 && ((Instance *)c)->done; /* terminated */
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, fmi2StatusKind kind, fmi2Real *value)
+{
+    *value = kind == 2 ? ((Instance *)c)->reached : 0; /* last successful time */
+    return fmi2OK;
+}
+
 #define ALWAYS_OK(Name, parameters) \
     EXPORT fmi2Status fmi2##Name parameters { return fmi2OK; }
 
-ALWAYS_OK(SetDebugLogging, (fmi2Component c, fmi2Boolean on, size_t n, const fmi2String names[]))
 ALWAYS_OK(EnterInitializationMode, (fmi2Component c))
 ALWAYS_OK(ExitInitializationMode, (fmi2Component c))
+#ifndef BARE /* without what many leave out */
+ALWAYS_OK(SetDebugLogging, (fmi2Component c, fmi2Boolean on, size_t n, const fmi2String names[]))
 ALWAYS_OK(Reset, (fmi2Component c))
 ALWAYS_OK(GetFMUstate, (fmi2Component c, fmi2FMUstate *s))
 ALWAYS_OK(SetFMUstate, (fmi2Component c, fmi2FMUstate s))
@@ -160,10 +187,9 @@ ALWAYS_OK(GetRealOutputDerivatives, (fmi2Component c, const fmi2ValueReference r
                                      fmi2Real v[]))
 ALWAYS_OK(CancelStep, (fmi2Component c))
 ALWAYS_OK(GetStatus, (fmi2Component c, fmi2StatusKind k, fmi2Status *s))
-ALWAYS_OK(GetRealStatus, (fmi2Component c, fmi2StatusKind k, fmi2Real *v))
 ALWAYS_OK(GetIntegerStatus, (fmi2Component c, fmi2StatusKind k, fmi2Integer *v))
-ALWAYS_OK(GetBooleanStatus, (fmi2Component c, fmi2StatusKind k, fmi2Boolean *v))
 ALWAYS_OK(GetStringStatus, (fmi2Component c, fmi2StatusKind k, fmi2String *v))
 
 EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
 EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
+#endif

@@ -10,7 +10,11 @@ import fmpy
 import pytest
 
 from orchestrator.cli import main
+from orchestrator.metrics.run_metrics import evaluate, metric
+from orchestrator.pages.freshness import staleness
 from orchestrator.results.read import load_results
+from orchestrator.scenario.load import load_scenario
+from orchestrator.wiring.make_plan import make_plan
 
 HERE = Path(__file__).parent
 INPUT, OUTPUT, ANSWER = 1000001, 4000000000, 7
@@ -28,7 +32,7 @@ step_size: 0.05
 inputs: {constants}
 units:
   a: {{fmu: ./{fmu}}}
-  b: {{fmu: ./{fmu}, parameters: {{answer: {answer}}}}}
+  b: {{fmu: ./{fmu}, parameters: {{answer: {answer}}}{more}}}
 {record}
 connections:
 {connections}
@@ -38,7 +42,7 @@ KINDS = {"Real": 0.75, "Integer": -21, "Boolean": "true", "String": "größer"}
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux")
 
 
-def description(*kinds, guid):
+def description(*kinds, guid, more=""):
     """Return a model description without optional capabilities, with large and sparse references."""
     variables = [
         f'<ScalarVariable name="answer" valueReference="{ANSWER}" causality="parameter"'
@@ -57,7 +61,7 @@ def description(*kinds, guid):
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n'
         f'<fmiModelDescription fmiVersion="2.0" modelName="foreign" guid="{guid}">'
-        f'<CoSimulation modelIdentifier="foreign"/>{MODES if "Enumeration" in kinds else ""}'
+        f'<CoSimulation modelIdentifier="foreign"/>{more}{MODES if "Enumeration" in kinds else ""}'
         f"<ModelVariables>{''.join(variables)}</ModelVariables>"
         f"<ModelStructure><Outputs>{outputs}</Outputs><InitialUnknowns>{outputs}</InitialUnknowns>"
         "</ModelStructure></fmiModelDescription>"
@@ -68,10 +72,13 @@ def description(*kinds, guid):
 def run(library, tmp_path, capsys):
     """Run two units of an FMU, the second fed by the first; return status, words and results."""
 
-    def go(*arguments, answer=0, given=KINDS, guid="{good}", scale="", record=""):
+    def go(
+        *arguments, answer=0, given=KINDS, guid="{good}", scale="", record="",
+        binary=library, change=lambda xml: xml, more="",
+    ):  # fmt: skip
         with zipfile.ZipFile(tmp_path / "foreign.fmu", "w") as archive:
-            archive.writestr("modelDescription.xml", description(*given, guid=guid))
-            archive.write(library, f"binaries/{fmpy.platform}/foreign.so")
+            archive.writestr("modelDescription.xml", change(description(*given, guid=guid)))
+            archive.write(binary, f"binaries/{fmpy.platform}/foreign.so")
         comma = ", " if scale else ""
         constants = ", ".join(f"a.{kind}_in: {value}" for kind, value in given.items())
         (tmp_path / "two.yaml").write_text(
@@ -79,6 +86,7 @@ def run(library, tmp_path, capsys):
                 constants=f"{{{constants}}}",
                 fmu="foreign.fmu",
                 answer=answer,
+                more=more,
                 record=record,
                 connections="\n".join(
                     f"  - {{from: a.{kind}_out, to: b.{kind}_in{comma}{scale}}}" for kind in given
@@ -222,3 +230,98 @@ def test_text_parameters_and_inputs_are_recorded_by_name(run, isolate, form):
     assert set(results["b.Integer_in"]) == {-42}
     assert set(results["b.Real_in"]) == {1.5}
     assert results.run["rows"] == 11
+
+
+@together_and_apart
+@pytest.mark.parametrize(("guid", "rows", "reached"), [("{whole}", 7, 0.3), ("{half}", 6, 0.275)])
+def test_an_fmu_that_wants_to_end_ends_the_run_in_good_order(run, isolate, guid, rows, reached):
+    status, said, results = run(*isolate, guid=guid)
+    assert status == 0, said
+    assert f"ended: a ended the run at t = {reached} s" in said
+    assert results.time.size == rows
+    assert (results.run["status"], results.run["error"]) == ("completed", None)
+    assert results.run["ended"]["unit"] == "a"
+    assert results.run["ended"]["time"] == pytest.approx(reached)
+    assert results["b.Real_out"].tolist() == [3.0] * rows
+
+
+def test_a_run_that_an_fmu_has_ended_is_fresh_and_lacks_metrics_of_later_windows(run, tmp_path, capsys):
+    results = run(guid="{whole}")[2]
+    plan = make_plan(load_scenario(tmp_path / "two.yaml"))
+    assert staleness(plan, tmp_path / "out") is None
+    peak = metric("peak(b.Real_out)")
+    assert evaluate(results, peak, (0.0, 0.3)) is not None
+    assert evaluate(results, peak, (0.0, 0.4)) is None
+
+
+@together_and_apart
+def test_start_time_and_tolerance_reach_the_fmu(run, isolate):
+    status, said, results = run(*isolate, "--set", "start_time=0.25", guid="{solver}")
+    assert status == 0, said
+    assert results.time.tolist() == [0.25, 0.3, 0.35, 0.4, 0.45, 0.5]
+    assert results["b.Real_out"][-1] == 0.25
+    default = '<DefaultExperiment tolerance="1e-4"/>'
+    with_default = lambda xml: xml.replace("<ModelVariables>", f"{default}<ModelVariables>")  # noqa: E731
+    assert run(*isolate, guid="{solver}", change=with_default)[2]["b.Real_out"][-1] == 1e-4
+    results = run(*isolate, guid="{solver}", change=with_default, more=", tolerance: 1e-6")[2]
+    assert (results["a.Real_out"][-1], results["b.Real_out"][-1]) == (1e-4, 1e-6)
+    assert results.run["fmus"]["b"]["tolerance"] == 1e-6
+
+
+@pytest.mark.parametrize(
+    ("setting", "sentence"),
+    [
+        ("start_time=0.5", "must be after start_time, 0.5 s (got 0.5 s)"),
+        ("start_time=0.02", "0.48 s from 0.02 s on is no integer multiple of the communication step 0.05 s"),
+    ],
+)
+def test_a_start_time_that_does_not_fit_is_said(run, setting, sentence):
+    status, said, _ = run("--set", setting)
+    assert status == 2
+    assert sentence in said
+
+
+WRONG = {
+    "given": {"Real": 0.75},
+    "change": lambda xml: xml.replace('<Real start="0"/>', '<Real unit="bar" start="0"/>'),
+}
+
+
+def test_a_description_that_is_formally_wrong_runs_with_a_warning_if_asked_to(run):
+    status, said, _ = run(**WRONG)
+    assert status == 2
+    assert "a: " in said or "two.yaml" in said
+    assert "not valid FMI 2.0: The unit" in said
+    assert "--no-validate, makes it a warning" in said
+    status, said, results = run("--no-validate", **WRONG)
+    assert status == 0, said
+    assert 'warning: a at t = 0 s: the model description is not valid FMI 2.0: The unit "bar"' in said
+    assert [w["unit"] for w in results.run["warnings"]] == ["a", "b"]
+    assert results["b.Real_out"][-1] == 3.0
+
+
+def test_one_unit_may_be_left_unvalidated_by_the_scenario(run):
+    status, said, _ = run(**WRONG, more=", validate: false")
+    assert status == 2
+    assert "two.yaml:7: units.a.fmu" in said
+    assert "units.b" not in said
+
+
+@together_and_apart
+def test_an_fmu_without_optional_functions_runs(run, bare_library, isolate):
+    numbers = {kind: value for kind, value in KINDS.items() if kind != "String"}
+    status, said, results = run(*isolate, given=numbers, binary=bare_library)
+    assert status == 0, said
+    assert results["b.Integer_out"][-1] == -84
+
+
+def test_an_fmu_without_a_function_that_is_needed_is_refused_before_the_run(
+    run, bare_library, tmp_path, capsys
+):
+    status, said, results = run(binary=bare_library)
+    assert (status, results) == (2, None)
+    assert "a: the library of foreign lacks fmi2SetString, which String_in needs" in said
+    with pytest.raises(SystemExit) as exit_:
+        main(["check", str(tmp_path / "two.yaml")])
+    assert exit_.value.code == 2
+    assert "a: the library of foreign lacks fmi2GetString, which String_out needs" in capsys.readouterr().err

@@ -99,7 +99,7 @@ def test_the_schema_can_be_printed() -> None:
             [
                 "a.yaml:1: 'stop_time' is missing",
                 "a.yaml:2: stop_tim: unknown key; did you mean 'stop_time'? allowed here: title, source, "
-                "vehicle, stop_time, step_size, algorithm, inputs, units, connections and record",
+                "vehicle, start_time, stop_time, step_size, algorithm, inputs, units, connections and record",
             ],
         ),
         (
@@ -107,7 +107,7 @@ def test_the_schema_can_be_printed() -> None:
             "fmu: driver_sine, parametres",
             [
                 "a.yaml:6: units.driver.parametres: unknown key; did you mean 'parameters'? "
-                "allowed here: fmu, step_size and parameters"
+                "allowed here: fmu, step_size, parameters, tolerance and validate"
             ],
         ),
         (
@@ -339,7 +339,8 @@ def test_settings_change_times_and_algorithm_of_the_run_and_steps_of_units(file:
         ),
         (
             {"settings": ["stop=3"]},
-            "--set stop=3: write --set UNIT.PARAMETER=VALUE, or stop_time, step_size or algorithm=VALUE",
+            "--set stop=3: write --set UNIT.PARAMETER=VALUE, or start_time, stop_time, step_size or "
+            "algorithm=VALUE",
         ),
         (
             {"settings": ["step_size=0.0015"]},

@@ -386,7 +386,7 @@ def test_a_start_value_of_a_connected_input_counts_for_nothing(feedback, fmus, t
             'source="a.fmu" sourceBase="component"',
             "is in a component",
         ),
-        ('startTime="0.0"', 'startTime="1.0"', "runs begin at 0 s"),
+        ('startTime="0.0"', 'startTime="1.0"', "must be after start_time, 1 s"),
         ('value="25.0"', 'value="fast"', "'fast' is not of type Real"),
         ("</ssd:System>", "", "not well-formed"),
     ],
