@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -16,23 +16,37 @@ Archive = Annotated[
 ]
 
 
+Standard = Annotated[Literal["1.0", "2.0"], typer.Option("--standard", help="Version of SSP.")]
+For = Annotated[
+    Literal["all", "omsimulator"],
+    typer.Option("--for", help="Leave out what OMSimulator refuses, and say what that is."),
+]
+
+
 def export_ssp(
     scenario: ScenarioFile,
     swap: Swap = None,
     set_: Set = None,
     out: Archive = None,
+    for_: For = "all",
+    standard: Standard = "1.0",
     fmus: Fmus = None,
     no_build: NoBuild = False,
 ) -> None:
-    """Write a scenario and its FMUs as an SSP 1.0 archive.
+    """Write a scenario and its FMUs as an SSP archive.
 
     SSP: System Structure and Parameterization. `yawbench run` reads it back and gives the same numbers.
     """
+    from ..interop.omsimulator import for_omsimulator
     from ..interop.ssp_write import write_ssp
 
     plan = plan_of_scenario(scenario, swap, set_, fmus=fmus, build=not no_build)
-    for note in plan.notes:
+    notes = list(plan.notes)
+    if for_ == "omsimulator":
+        plan, more = for_omsimulator(plan)
+        notes += more
+    for note in notes:
         print(f"note: {note}", file=sys.stderr)
     path = out or Path(f"{scenario.stem}.ssp")
-    write_ssp(plan, path)
+    write_ssp(plan, path, standard)
     print(f"{path}: {len(plan.units)} units, {len(plan.wires)} connections", file=sys.stderr)

@@ -1,8 +1,9 @@
-"""A plan as an SSP 1.0 archive that other programs, and this one, can run.
+"""A plan as an SSP archive that other programs, and this one, can run.
 
 SSP has no place for the communication step, the units' own steps and the algorithm. They stand in
-annotations: the steps in those of the Open Simulation Platform, which libcosim understands, all
-that `yawbench run` needs beyond them in one of our own.
+annotations: the steps in those of the Open Simulation Platform, which libcosim understands, and of
+OMSimulator, all that `yawbench run` needs beyond them in one of our own. There too is the title, for
+the name of a structure is an identifier to other programs.
 
 Only what is connected has a connector. A constant is a parameter value by the name of its input:
 that is how libcosim and Ecos take it, and fmpy gives an input connector without a connection the
@@ -14,11 +15,13 @@ from __future__ import annotations
 import io
 import math
 import re
+import unicodedata
 import zipfile
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from importlib.metadata import version
 from pathlib import Path
+from typing import Literal
 
 from lxml import etree
 from lxml.etree import SubElement, _Element
@@ -26,10 +29,12 @@ from lxml.etree import SubElement, _Element
 from ..errors import ResultsError
 from ..fmu.archive import read_archive
 from ..plan import Fmu, Plan, Unit, Value, Variable, Wire
-from ..scenario.measurement_units import Measure, measure_of
+from ..scenario.measurement_units import BASE_UNITS, Measure, measure_of
 from ..scenario.ssp_names import (
     DESCRIPTION_FILE,
     NAMESPACES,
+    OMS,
+    OMS_ANNOTATION,
     OSP,
     OSP_ANNOTATION,
     OWN,
@@ -44,10 +49,13 @@ from ..titles import with_changes
 from ..writing import write_whole
 
 _FILE_TIME = (1980, 1, 1, 0, 0, 0)
-_BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
-def write_ssp(plan: Plan, path: Path) -> None:
+Version = Literal["1.0", "2.0"]
+"""Of the standard. What is written here is the same in both but for the number."""
+
+
+def write_ssp(plan: Plan, path: Path, standard: Version = "1.0") -> None:
     """Write the plan and its FMUs into the archive `path`.
 
     Raises:
@@ -56,7 +64,7 @@ def write_ssp(plan: Plan, path: Path) -> None:
     """
     sources = _sources(plan)
     try:
-        structure = system_structure(plan)
+        structure = system_structure(plan, standard)
     except ValueError as error:  # a control character in a text
         raise ResultsError(f"{path}: cannot write this archive: {error}") from None
     description = etree.tostring(structure, xml_declaration=True, encoding="UTF-8", pretty_print=True)
@@ -79,15 +87,15 @@ def _put(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
     archive.writestr(info, content)
 
 
-def system_structure(plan: Plan) -> _Element:
+def system_structure(plan: Plan, standard: Version = "1.0") -> _Element:
     """Return the system structure description of a plan.
 
     Raises:
         ValueError: XML cannot hold what the plan holds.
     """
     root = etree.Element(f"{{{SSD}}}SystemStructureDescription", nsmap=NAMESPACES)
-    root.set("version", "1.0")
-    root.set("name", with_changes(plan.title, plan.changes) or "scenario")
+    root.set("version", standard)
+    root.set("name", _identifier(with_changes(plan.title, plan.changes)))
     if plan.scenario.get("source"):
         root.set("description", str(plan.scenario["source"]))
     root.set("generationTool", f"yawbench {version('yawbench')}")
@@ -103,10 +111,34 @@ def system_structure(plan: Plan) -> _Element:
         connections = SubElement(system, f"{{{SSD}}}Connections")
         for wire in plan.wires:
             _add_connection(connections, wire)
+    _add_step(system, plan)
+    for parameter_set in root.iter(f"{{{SSV}}}ParameterSet"):
+        parameter_set.set("version", standard)
     _add_enumerations(root, enumerations)
     _add_units(root, spelled)
     _add_experiment(root, plan)
     return root
+
+
+def _identifier(title: str) -> str:
+    """Return a title as an identifier: letters without accents, digits and _."""
+    plain = unicodedata.normalize("NFKD", title).encode("ascii", "ignore").decode()
+    name = re.sub(r"\W+", "_", plain).strip("_") or "scenario"
+    return f"_{name}" if name[0].isdigit() else name
+
+
+def _add_step(system: _Element, plan: Plan) -> None:
+    """Write the communication step as OMSimulator wants it, without which it takes no system.
+
+    Its master steps all units alike and does not look at the tolerances; it wants some.
+    """
+    annotations = SubElement(_annotation(system, OMS_ANNOTATION), f"{{{OMS}}}Annotations")
+    master = SubElement(
+        SubElement(annotations, f"{{{OMS}}}SimulationInformation"), f"{{{OMS}}}FixedStepMaster"
+    )
+    step = _decimal(plan.step)
+    tolerances = {"absoluteTolerance": "1e-4", "relativeTolerance": "1e-4"}
+    master.attrib.update({"description": "oms-ma", "stepSize": step, **tolerances})
 
 
 def _add_connection(above: _Element, wire: Wire) -> None:
@@ -228,7 +260,7 @@ def _add_units(above: _Element, spelled: Mapping[str, Measure]) -> None:
     for name, measure in spelled.items():
         unit = SubElement(units, f"{{{SSC}}}Unit", name=name)
         base = SubElement(unit, f"{{{SSC}}}BaseUnit")
-        for symbol, power in zip(_BASE_UNITS, measure.powers, strict=True):
+        for symbol, power in zip(BASE_UNITS, measure.powers, strict=True):
             if power:
                 base.set(symbol, str(power))
         factor = float(measure.factor) * math.pi**measure.pi
@@ -255,6 +287,7 @@ def _add_experiment(root: _Element, plan: Plan) -> None:
     algorithm = SubElement(_annotation(experiment, OSP_ANNOTATION), f"{{{OSP}}}Algorithm")
     SubElement(algorithm, f"{{{OSP}}}FixedStepAlgorithm", baseStepSize=_decimal(plan.step))
     own = SubElement(_annotation(experiment, OWN_ANNOTATION), f"{{{OWN}}}Scenario")
+    own.set("title", with_changes(plan.title, plan.changes))
     own.set("stepSize", _decimal(plan.step))
     own.set("algorithm", plan.algorithm)
     for pattern in _recorded(plan):

@@ -19,7 +19,8 @@ from functools import cache
 from ..plan import UnitDefinition
 from ..wording import short
 
-Powers = tuple[int, int, int, int, int, int, int, int]  # kg m s A K mol cd rad
+BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+Powers = tuple[int, int, int, int, int, int, int, int]  # of BASE_UNITS
 
 _NONE: Powers = (0,) * 8
 
@@ -45,8 +46,7 @@ class Measure:
 
 
 def _unit(factor: int | str = 1, pi: int = 0, **powers: int) -> Measure:
-    names = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-    return Measure(Fraction(factor), pi, tuple(powers.get(n, 0) for n in names))  # type: ignore[arg-type]
+    return Measure(Fraction(factor), pi, tuple(powers.get(n, 0) for n in BASE_UNITS))  # type: ignore[arg-type]
 
 
 _PREFIXED = {

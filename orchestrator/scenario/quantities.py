@@ -72,14 +72,25 @@ def convert(text: str, unit: str | None, definition: UnitDefinition | None = Non
         raise ValueError(
             f"{text!r} is not a value in {unit}: use {listed(_spellings(unit, target), last='or')}"
         )
+    value = converted(number, source, target)
+    if value == math.inf:
+        raise ValueError(f"must be a finite number in {unit} (got {text!r})")
+    return value
+
+
+def converted(number: Fraction, source: Measure, target: Measure) -> Fraction | float:
+    """Return a number in `source` as one in `target`, a unit of the same powers.
+
+    It is exact where that can be, and infinite where no float is as large.
+    """
     exact = (number * source.factor + source.offset - target.offset) / target.factor
     turns = source.pi - target.pi
     try:
         value = float(exact) * math.pi**turns
     except OverflowError:
-        value = math.inf
-    if not math.isfinite(value):
-        raise ValueError(f"must be a finite number in {unit} (got {text!r})")
+        return math.inf
+    if math.isinf(value):
+        return math.inf
     return exact if turns == 0 else value
 
 

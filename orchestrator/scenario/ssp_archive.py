@@ -5,11 +5,12 @@ Nothing is unpacked to disk, and no address leads out of the archive.
 
 from __future__ import annotations
 
+import contextlib
 import io
 import posixpath
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import unquote, urlsplit
@@ -18,7 +19,9 @@ from lxml import etree
 from lxml.etree import _Element
 
 from ..files import PACKED, TooLargeError, check_archive, read_bytes, reason
+from ..plan import UnitDefinition
 from ..wording import short
+from .measurement_units import BASE_UNITS, Measure, measure_of
 
 LARGEST = 100_000_000
 """Bytes that a description may take, unpacked. Chosen: a thousand times what one of ours takes."""
@@ -45,6 +48,12 @@ class Declared(NamedTuple):
 
     causality: str
     unit: str | None = None
+    definition: UnitDefinition | None = None
+
+    @property
+    def measure(self) -> Measure | None:
+        """What its unit means, None if it has none or one that nobody knows."""
+        return measure_of(self.unit, self.definition)
 
 
 class Archive:
@@ -131,17 +140,33 @@ class Archive:
 
 
 def _declared(description: _Element) -> Iterator[tuple[str, Declared]]:
+    """Yield the variables of a model description of FMI 2.0 or 3.0."""
     types = {
-        str(one.get("name")): real.get("unit")
-        for one in description.iter("SimpleType")
-        if (real := one.find("Real")) is not None
+        str(one.get("name")): (one if one.get("unit") else next(iter(one), one)).get("unit")
+        for one in description.iterfind("TypeDefinitions/*")
     }
-    for variable in description.iter("ScalarVariable"):
-        real = variable.find("Real")
+    definitions = unit_definitions(description.iterfind("UnitDefinitions/Unit"))
+    for variable in description.iterfind("ModelVariables/*"):
+        kind = variable if variable.tag != "ScalarVariable" else variable.find("Real")
         unit = None
-        if real is not None:
-            unit = real.get("unit") or types.get(str(real.get("declaredType")))
-        yield str(variable.get("name")), Declared(variable.get("causality", "local"), unit)
+        if kind is not None:
+            unit = kind.get("unit") or types.get(str(kind.get("declaredType")))
+        declared = Declared(variable.get("causality", "local"), unit, definitions.get(str(unit)))
+        yield str(variable.get("name")), declared
+
+
+def unit_definitions(units: Iterable[_Element]) -> dict[str, UnitDefinition]:
+    """Return what `Unit` elements define, those of FMI or of SSP, by name."""
+    found = {}
+    for unit in units:
+        base = unit.find("{*}BaseUnit")
+        if base is None:
+            continue
+        with contextlib.suppress(ValueError):  # a malformed number defines nothing
+            powers = tuple(int(base.get(name, "0")) for name in BASE_UNITS)
+            scale = (float(base.get(key, default)) for key, default in (("factor", "1"), ("offset", "0")))
+            found[str(unit.get("name"))] = UnitDefinition(powers, *scale)
+    return found
 
 
 def _parser() -> etree.XMLParser:

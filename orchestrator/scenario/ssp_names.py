@@ -14,7 +14,7 @@ SSM = "http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
 OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
 OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
 OWN = "urn:yawbench:ssp:1"
-NAMESPACES = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP, "yawbench": OWN}
+NAMESPACES = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP, "oms": OMS, "yawbench": OWN}
 """All declared at the root, with the prefixes that libcosim and Ecos take for granted: they compare
 text, and libcosim takes a declaration further down for content."""
 
@@ -23,4 +23,5 @@ VALUES_TYPE = "application/x-ssp-parameter-set"
 MAPPING_TYPE = "application/x-ssp-parameter-mapping"
 
 OSP_ANNOTATION = "com.opensimulationplatform"
+OMS_ANNOTATION = "org.openmodelica"
 OWN_ANNOTATION = "yawbench"

@@ -6,14 +6,16 @@ the standard has it. The communication step and the units' own come from the ann
 Simulation Platform or of OMSimulator, all that SSP cannot say from our own; archives from elsewhere may
 lack them.
 
-What has no counterpart here is refused by name: signal dictionaries, transformations in connections,
+What has no counterpart here is refused by name: signal dictionaries, mappings in connections,
 components that are no FMUs.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +25,7 @@ from ..wording import fold, listed
 from .overrides import RESERVED
 from .ssp_archive import Archive, Refused
 from .ssp_names import DESCRIPTION_FILE, OMS, OSP, OWN, SSD
+from .ssp_scale import AS_IT_IS, automatic, scale
 from .ssp_structure import End, Structure, read_structure
 from .ssp_structure import Path as ElementPath
 from .ssp_values import Given, number, read_values
@@ -86,12 +89,19 @@ def _scenario(archive: Archive, document: Document) -> dict[str, Any]:
         else:
             units[names[path]]["parameters"][variable] = value
     return {
-        "title": root.get("name", ""),
+        "title": _title(root),
         "source": root.get("description", ""),
         "units": units,
         "connections": connections,
         "inputs": inputs,
     } | _experiment(root)
+
+
+def _title(root: _Element) -> str:
+    """Return the title, which the name of a structure, an identifier, cannot hold."""
+    own = root.find(f".//{{{OWN}}}Scenario")
+    name = root.get("name", "")
+    return name if own is None else own.get("title", name)
 
 
 def _unit_names(structure: Structure, document: Document) -> dict[ElementPath, str]:
@@ -118,22 +128,41 @@ def _values_through_connectors(structure: Structure, given: Mapping[End, Given])
             one for one in structure.upstream(end) if one in given and one.element in structure.systems
         ]
         if through and end.element in structure.components:
-            passed[end] = given[through[-1]]
+            passed[end] = _passed_on(structure, given[through[-1]], through[-1], end)
     return {**given, **passed}
+
+
+def _passed_on(structure: Structure, given: Given, connector: End, end: End) -> Given:
+    """Return a value that a system's connector has as it arrives at a component."""
+    ways = structure.upstream(end)
+    way = scale(structure, [*reversed(ways[: ways.index(connector) + 1]), end])
+    if way == AS_IT_IS:
+        return given
+    value = given.for_variable(structure.connector(connector))
+    if not isinstance(value, float):
+        raise Refused(f"{end}: only numbers can be converted on the way from {connector}", given.parameter)
+    return replace(given, value=way[0] * value + way[1], unit=None, factor=1.0, offset=0.0)
 
 
 def _connections(
     structure: Structure, names: Mapping[ElementPath, str]
-) -> tuple[list[dict[str, str]], set[End]]:
+) -> tuple[list[dict[str, Any]], set[End]]:
     """Return the connections from component to component, and what they drive."""
-    connections, driven = [], set()
+    connections: list[dict[str, Any]] = []
+    driven = set()
     for end in structure.sources:
-        source = structure.upstream(end)[-1]
+        source, *way = *reversed(structure.upstream(end)), end
         if end.element not in structure.components or source.element not in structure.components:
             continue
-        connections.append(
-            {"from": f"{names[source.element]}.{source.name}", "to": f"{names[end.element]}.{end.name}"}
-        )
+        ends: dict[str, Any] = {
+            "from": f"{names[source.element]}.{source.name}",
+            "to": f"{names[end.element]}.{end.name}",
+        }
+        gain, offset = scale(structure, [source, *way])
+        usual = automatic(structure, source, end)
+        if usual is None or not all(map(math.isclose, (gain, offset), usual)):
+            ends |= {"gain": gain, "offset": offset}
+        connections.append(ends)
         driven.add(end)
     return connections, driven
 

@@ -6,14 +6,16 @@ connectors do. Seen from inside a system, its own inputs give values and its out
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from lxml import etree
 from lxml.etree import _Element
 
-from .ssp_archive import Archive, Declared, Refused
+from ..plan import UnitDefinition
+from .measurement_units import Measure
+from .ssp_archive import Archive, Declared, Refused, unit_definitions
 from .ssp_names import FMU_TYPE, SSD
 
 Path = tuple[str, ...]
@@ -49,10 +51,23 @@ class Structure:
     components: dict[Path, Component] = field(default_factory=dict)
     systems: dict[Path, _Element] = field(default_factory=dict)
     """From the inside out: the outermost is the last."""
-    kinds: dict[Path, dict[str, str]] = field(default_factory=dict)
-    """Of each element's connectors."""
+    connectors: dict[Path, dict[str, Declared]] = field(default_factory=dict)
+    """Of each element, by name: kind and unit, as far as the archive says them."""
     sources: dict[End, tuple[End, _Element]] = field(default_factory=dict)
     """What gives an end its value, and the connection that says so."""
+
+    def unit_inside(self, end: End) -> Measure | None:
+        """Return the unit of a variable as its FMU declares it, or if it does not, that of the connector."""
+        known = self.components[end.element].variables if end.element in self.components else {}
+        return (known[end.name].measure if end.name in known else None) or self.connector(end).measure
+
+    def unit_outside(self, end: End) -> Measure | None:
+        """Return the unit of a connector, or if it has none, that of the variable behind it."""
+        return self.connector(end).measure or self.unit_inside(end)
+
+    def connector(self, end: End) -> Declared:
+        """Return what the archive says of a connector; nothing, if that is nothing."""
+        return self.connectors[end.element].get(end.name, Declared(""))
 
     def upstream(self, end: End) -> list[End]:
         """Return what an end takes its value from: connectors of systems, then perhaps a component's output.
@@ -75,7 +90,7 @@ class Structure:
         if path in self.components:
             known = self.components[path].variables
             return End(path, name) if name in known or not known else None
-        if name in self.kinds[path]:
+        if name in self.connectors[path]:
             return End(path, name)
         for inner in (*self.components, *self.systems):
             if inner[:-1] == path and inner and name.startswith(f"{inner[-1]}."):
@@ -92,12 +107,19 @@ def read_structure(archive: Archive, system: _Element) -> Structure:
         Refused: it holds what has no counterpart here.
     """
     structure = Structure()
-    _add_system(structure, archive, system, ())
+    definitions = unit_definitions(system.iterfind(f"../{{{SSD}}}Units/*"))
+    _add_system(structure, archive, system, (), definitions)
     return structure
 
 
-def _add_system(structure: Structure, archive: Archive, system: _Element, path: Path) -> None:
-    structure.kinds[path] = _connectors(system)
+def _add_system(
+    structure: Structure,
+    archive: Archive,
+    system: _Element,
+    path: Path,
+    definitions: Mapping[str, UnitDefinition],
+) -> None:
+    structure.connectors[path] = _connectors(system, definitions)
     names: set[str] = set()
     for one in system.iterfind(f"{{{SSD}}}Elements/*"):
         kind, name = etree.QName(one).localname, one.get("name", "")
@@ -106,10 +128,10 @@ def _add_system(structure: Structure, archive: Archive, system: _Element, path: 
         names.add(name)
         inner = (*path, name)
         if kind == "System":
-            _add_system(structure, archive, one, inner)
+            _add_system(structure, archive, one, inner, definitions)
         elif kind == "Component":
             structure.components[inner] = _component(archive, one, inner)
-            structure.kinds[inner] = _connectors(one)
+            structure.connectors[inner] = _connectors(one, definitions)
         elif kind == "SignalDictionaryReference":
             raise Refused(f"a signal dictionary ({name}) is not supported", one)
         else:
@@ -122,9 +144,12 @@ def _add_system(structure: Structure, archive: Archive, system: _Element, path: 
     structure.systems[path] = system
 
 
-def _connectors(element: _Element) -> dict[str, str]:
-    found = element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector")
-    return {str(one.get("name")): one.get("kind", "") for one in found}
+def _connectors(element: _Element, definitions: Mapping[str, UnitDefinition]) -> dict[str, Declared]:
+    found = {}
+    for one in element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector"):
+        unit = next((kind.get("unit") for kind in one if kind.get("unit")), None)
+        found[str(one.get("name"))] = Declared(one.get("kind", ""), unit, definitions.get(str(unit)))
+    return found
 
 
 def _component(archive: Archive, element: _Element, path: Path) -> Component:
@@ -142,10 +167,6 @@ def _component(archive: Archive, element: _Element, path: Path) -> Component:
 
 def _directed(structure: Structure, connection: _Element, path: Path) -> tuple[End, End]:
     """Return what gives and what takes a value by a connection in the system `path`."""
-    transformation = transformation_of(connection)
-    if transformation is not None:
-        kind = etree.QName(transformation).localname
-        raise Refused(f"a {kind} in a connection is not supported: connect without one", transformation)
     start, end = (_end(structure, connection, which, path) for which in ("start", "end"))
     start_gives, end_gives = (_gives(structure, one, path) for one in (start, end))
     if start_gives is not None and start_gives == end_gives:
@@ -156,10 +177,10 @@ def _directed(structure: Structure, connection: _Element, path: Path) -> tuple[E
 
 def _end(structure: Structure, connection: _Element, which: str, path: Path) -> End:
     element, name = connection.get(f"{which}Element"), connection.get(f"{which}Connector", "")
-    inner = path if element is None else (*path, element)
-    if inner not in structure.kinds:
+    inner = (*path, element) if element else path
+    if inner not in structure.connectors:
         raise Refused(f"a connection names {element!r}: there is no such component", connection)
-    if inner not in structure.components and name not in structure.kinds[inner]:
+    if inner not in structure.components and name not in structure.connectors[inner]:
         system = f"the system {'.'.join(inner)}" if inner else "the system"
         raise Refused(
             f"a connection names the connector {name!r}: {system} has none of this name", connection
@@ -169,20 +190,9 @@ def _end(structure: Structure, connection: _Element, which: str, path: Path) -> 
 
 def _gives(structure: Structure, end: End, path: Path) -> bool | None:
     """Return whether an end gives a value in the system `path`, None if nothing says so."""
-    kind = structure.kinds[end.element].get(end.name, "")
+    kind = structure.connector(end).causality
     if end.element in structure.components:
         declared = structure.components[end.element].variables.get(end.name)
         kind = declared.causality if declared else kind
     gives = _GIVES.get(kind)
     return gives if gives is None or end.element != path else not gives
-
-
-def transformation_of(element: _Element) -> _Element | None:
-    """Return the transformation of a connection or a mapping, None if it has none."""
-    return next(_transformations(element), None)
-
-
-def _transformations(element: _Element) -> Iterator[_Element]:
-    for one in element.iterchildren("{*}*"):
-        if etree.QName(one).localname.endswith("Transformation"):
-            yield one

@@ -8,15 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from typing import Any
 
 from lxml import etree
 from lxml.etree import _Element
 
-from .quantities import convert
-from .ssp_archive import Archive, Declared, Refused
+from ..plan import UnitDefinition
+from .measurement_units import measure_of
+from .quantities import converted
+from .ssp_archive import Archive, Declared, Refused, unit_definitions
 from .ssp_names import MAPPING_TYPE, SSD, SSM, SSV, VALUES_TYPE
-from .ssp_structure import End, Structure, transformation_of
+from .ssp_structure import End, Structure
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,7 @@ class Given:
     value: Any
     unit: str | None
     parameter: _Element
+    definition: UnitDefinition | None = None  # of the unit, if the archive gives one
     factor: float = 1.0
     offset: float = 0.0
 
@@ -35,18 +39,29 @@ class Given:
         Raises:
             Refused: a transformation of what is no number, or of a unit that does not fit.
         """
-        unit = declared.unit if declared else None
-        plain = isinstance(self.value, (bool, str)) or self.unit is None or unit is None or self.unit == unit
-        text = f"{self.value!r} {self.unit}"
+        value = self._in_unit_of(declared)
         if (self.factor, self.offset) == (1.0, 0.0):
-            return self.value if plain else text
-        if not isinstance(self.value, float):
-            raise Refused(f"{self._name}: a LinearTransformation is for Real values", self.parameter)
-        try:
-            number = self.value if plain else float(convert(text, unit))
-        except ValueError as error:
-            raise Refused(f"{self._name}: {error}", self.parameter) from None
-        return self.factor * number + self.offset
+            return value
+        if isinstance(value, (bool, str)):
+            raise Refused(
+                f"{self._name}: a LinearTransformation is for numbers (got {value})", self.parameter
+            )
+        result = self.factor * value + self.offset
+        if isinstance(value, float):
+            return result
+        if not result.is_integer():
+            raise Refused(f"{self._name}: {result:g} is no whole number", self.parameter)
+        return int(result)
+
+    def _in_unit_of(self, declared: Declared | None) -> Any:
+        """Return the value converted, or with its unit where that does not fit, for wiring to refuse it."""
+        unit = declared.unit if declared else None
+        if not isinstance(self.value, float) or self.unit is None or unit is None or self.unit == unit:
+            return self.value
+        source, target = measure_of(self.unit, self.definition), declared.measure if declared else None
+        if source is None or target is None or source.powers != target.powers:
+            return f"{self.value!r} {self.unit}"
+        return float(converted(Fraction(repr(self.value)), source, target))
 
     @property
     def _name(self) -> str:
@@ -89,8 +104,10 @@ def _bound(archive: Archive, element: _Element) -> Iterator[tuple[str, Given]]:
                 raise Refused("parameters are bound that are nowhere", binding)
             values = archive.xml(archive.member(binding), f"{{{SSV}}}ParameterSet")
         mapping = _mapping(archive, binding)
+        definitions = unit_definitions(values.iterfind(f"{{{SSV}}}Units/*"))
         for parameter in values.iterfind(f"{{{SSV}}}Parameters/{{{SSV}}}Parameter"):
             name, given = binding.get("prefix", "") + parameter.get("name", ""), _value(parameter)
+            given = replace(given, definition=definitions.get(str(given.unit)))
             if mapping is None:
                 yield name, given
             for entry in (mapping or {}).get(name, ()):
@@ -121,16 +138,23 @@ def _transformed(given: Given, entry: _Element) -> Given:
     """Return a value with what a mapping does to it."""
     if entry.get("suppressUnitConversion") in ("true", "1"):
         given = replace(given, unit=None)
-    transformation = transformation_of(entry)
-    if transformation is None:
-        return given
-    kind = etree.QName(transformation).localname
-    if kind != "LinearTransformation":
-        raise Refused(f"a {kind} is not supported", transformation)
-    factor, offset = (
-        number(transformation, key, default) for key, default in (("factor", 1.0), ("offset", 0.0))
-    )
+    factor, offset = linear(entry)
     return replace(given, factor=factor, offset=offset)
+
+
+def linear(element: _Element) -> tuple[float, float]:
+    """Return factor and offset by which a connection or a mapping transforms numbers.
+
+    Raises:
+        Refused: its transformation is of another kind, or one of them is no number.
+    """
+    for one in element.iterchildren("{*}*"):
+        kind = etree.QName(one).localname
+        if kind == "LinearTransformation":
+            return number(one, "factor", 1.0), number(one, "offset", 0.0)
+        if kind.endswith("Transformation"):
+            raise Refused(f"{kind} is not supported: only LinearTransformation is", one)
+    return 1.0, 0.0
 
 
 def _value(parameter: _Element) -> Given:
