@@ -114,6 +114,11 @@ class Fmu:
     needs_tool: bool = False
     """Whether it needs the tool that made it."""
 
+    @property
+    def compiled(self) -> bool:
+        """True for an FMU that is not written in Python, where the bench has less to say."""
+        return not self.python_modules
+
     def doubts(self) -> list[str]:
         """Return a sentence for everything that is formally wrong with the model description."""
         return [f"the model description is not valid FMI {self.fmi}.0: {flaw}" for flaw in self.flaws]

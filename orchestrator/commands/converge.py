@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from ..plan import Algorithm
-from .options import Fmus, NoBuild, Out, ScenarioFile, Set, Swap
+from .options import CallLimit, Fmus, Isolate, NoBuild, Out, ScenarioFile, Set, Swap, isolation
 
 Halvings = Annotated[
     int, typer.Option("--halvings", metavar="N", min=2, max=10, help="How often the step is halved.")
@@ -35,6 +35,8 @@ def converge(
     out: Out = None,
     fmus: Fmus = None,
     no_build: NoBuild = False,
+    isolate: Isolate = False,
+    call_limit: CallLimit = None,
 ) -> None:
     """Halve the step size again and again; show error and order.
 
@@ -42,6 +44,7 @@ def converge(
     follow each other, so that their wall times can be compared. Without --out, results go to
     results/<folder of the scenario>/<its name>-converge.
     """
+    from dataclasses import replace
     from typing import get_args
 
     from ..errors import ScenarioError
@@ -61,6 +64,7 @@ def converge(
             raise ScenarioError(f"--algorithm {name}: no such algorithm{guess}")
     default = default_folder(scenario)
     folder = out or default.with_name(f"{default.name}-converge")
+    limit = isolation(isolate, call_limit)
     hold(context, folder)
     given = read_changes(swap or (), set_ or ())
     work = refinements(
@@ -72,7 +76,8 @@ def converge(
         changes=given,
         fmus=fmus,
     )
-    outcomes = run_all(work, folder, workers=1, build=not no_build)
+    isolated = [replace(job, call_limit=limit) for job in work]
+    outcomes = run_all(isolated, folder, workers=1, build=not no_build)
     rows = measure(outcomes, signal)
     title = with_changes(f"Convergence of {signal}, {scenario.stem}", given)
     table = convergence_table(rows, title)

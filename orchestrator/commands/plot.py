@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import Fmus, NoBuild, Out, Set, Swap
+from .options import CallLimit, Fmus, Isolate, NoBuild, Out, Set, Swap, isolation
 
 if TYPE_CHECKING:
     from ..plan import Change
@@ -48,6 +48,8 @@ def plot(
     out: Out = None,
     fmus: Fmus = None,
     no_build: NoBuild = False,
+    isolate: Isolate = False,
+    call_limit: CallLimit = None,
 ) -> None:
     """Draw runs, one or several laid over each other.
 
@@ -68,7 +70,8 @@ def plot(
     if label and len(label) != len(sources):
         given = f"{counted(len(label), 'label')}, {counted(len(sources), 'folder')}"
         raise ScenarioError(f"--label: needs one for each folder of results ({given})")
-    folders = _recorded(sources, read_changes(swap or (), set_ or ()), fmus, build=not no_build)
+    limit = isolation(isolate, call_limit)
+    folders = _recorded(sources, read_changes(swap or (), set_ or ()), fmus, limit, build=not no_build)
     labels = label or distinct(folders)
     runs = [Run(name, load_results(folder)) for name, folder in zip(labels, folders, strict=True)]
     figures: dict[str, Sequence[str]] = {"overview": panel or OVERVIEW}
@@ -83,7 +86,12 @@ def plot(
 
 
 def _recorded(
-    sources: Sequence[Path], changes: tuple[Change, ...], fmus: Path | None, *, build: bool
+    sources: Sequence[Path],
+    changes: tuple[Change, ...],
+    fmus: Path | None,
+    limit: float | None,
+    *,
+    build: bool,
 ) -> list[Path]:
     """Return the folders of all results, after making the runs of scenarios that have none.
 
@@ -99,7 +107,10 @@ def _recorded(
     scenarios = [source for source in sources if source.suffix in SCENARIOS and not source.is_dir()]
     if changes and not scenarios:
         raise ScenarioError("--swap and --set change a scenario; only folders of results are given")
-    jobs = {source: Job(source.stem, source, default_folder(source), changes, fmus) for source in scenarios}
+    jobs = {
+        source: Job(source.stem, source, default_folder(source), changes, fmus, call_limit=limit)
+        for source in scenarios
+    }
     once = Once(build=build)
     stale = [job for job in jobs.values() if staleness(plan_of(job, once), job.out)]
     outcomes = run_all(stale, Path("results"), workers=None, build=build) if stale else []

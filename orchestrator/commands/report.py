@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from .batch import Jobs
-from .options import Fmus, Format, NoBuild
+from .options import CallLimit, Fmus, Format, Isolate, NoBuild, isolation
 
 Studies = Annotated[
     list[Path] | None,
@@ -33,6 +33,8 @@ def report(
     format_: Format = "csv",
     again: Again = False,
     no_run: NoRun = False,
+    isolate: Isolate = False,
+    call_limit: CallLimit = None,
 ) -> None:
     """Write one page that reproduces the papers.
 
@@ -56,6 +58,7 @@ def report(
     if again and no_run:
         raise ScenarioError("--again and --no-run contradict each other")
     check_format(format_)
+    limit = isolation(isolate, call_limit)
     paths = list(dict.fromkeys(studies or found_studies()))
     folders = [default_folder(path) for path in paths]
     page_folder = out or (folders[0] if len(folders) == 1 else Path(os.path.commonpath(folders)))
@@ -64,7 +67,7 @@ def report(
         folders = [out] if len(paths) == 1 else below
     hold(context, *folders)
     every = [
-        wanted(path, folder, fmus=fmus, format=format_, build=not no_build)
+        wanted(path, folder, fmus=fmus, format=format_, call_limit=limit, build=not no_build)
         for path, folder in zip(paths, folders, strict=True)
     ]
     chapters, failed = [], False

@@ -88,7 +88,7 @@ def run(
         _say(f"changed: {changed(plan.changes)}")
     title = with_changes(plan.title or scenario.stem, plan.changes)
     with _bar(title) as progress, opener_of(plan, limit) as opener:
-        info = simulate(plan, folder, progress=progress, opener=opener, format=format_)
+        info = simulate(plan, folder, progress=progress, opener=opener, format=format_, apart=True)
     for message in info.warnings[:SHOWN]:
         grade = "" if message.status == WARNING else f"{STATUS[message.status]}: "
         text = " ".join(message.text.split())

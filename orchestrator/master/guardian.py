@@ -53,7 +53,7 @@ def stand_guard(reading: int, others: Iterable[int]) -> None:
     for descriptor in (reading, *others):
         os.set_inheritable(descriptor, False)  # by programs that the FMU starts
     os.setsid()  # what it sends to its group is not for the guardian
-    _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    die_with_parent()
     if os.getppid() != guardian:
         os._exit(1)
 
@@ -123,6 +123,11 @@ def _has_children() -> bool:
     except ChildProcessError:
         return False
     return True
+
+
+def die_with_parent() -> None:
+    """Let this process be killed when the one that has forked it ends (Linux)."""
+    _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _prctl(option: int, value: int) -> None:

@@ -76,7 +76,7 @@ class IsolatedSlave:
         """
         match content:
             case int():
-                self._log.dropped += content
+                self._log.drop(content)
             case [int() as status, str() as category, str() as text]:
                 self._log.add(self.name, status, category, text)
             case _:

@@ -79,10 +79,14 @@ class Log:
             return
         self._counts[unit] += 1
         if self._counts[unit] > KEPT and category not in (MASTER, PROCESS):
-            self.dropped += 1
+            self.drop(1)
             return
         at = self.time.value if time is None else time
         self.messages.append(Message(unit, at, status, category, text[:LONGEST].rstrip()))
+
+    def drop(self, count: int) -> None:
+        """Count messages that are not kept."""
+        self.dropped += count
 
     def errors(self, unit: str) -> list[Message]:
         """Return the unit's messages with a status worse than Warning, without tracebacks."""

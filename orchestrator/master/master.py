@@ -21,6 +21,7 @@ import numpy as np
 
 from ..errors import SimulationError
 from ..plan import Plan, Value
+from ..wording import listed
 from .failure import describe
 from .initialization import initialize
 from .interrupts import StopFlag
@@ -28,6 +29,7 @@ from .log import DISCARD, MASTER, OK, WARNING, Log
 from .memory import Memory
 from .program import Operation, Programs
 from .slave import Slave, Status
+from .surroundings import Surroundings
 
 ALMOST = 1e-6
 """Part of a step by which an FMU may be short of its end; chosen: rounding of its own times."""
@@ -49,12 +51,25 @@ class Ended(Exception):
 class Master:
     """One run of a plan. `completed` is the last communication point at which all values stand."""
 
-    def __init__(self, plan: Plan, slaves: Mapping[str, Slave], log: Log, stop: StopFlag) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        slaves: Mapping[str, Slave],
+        log: Log,
+        stop: StopFlag,
+        reached: ctypes.c_int64 | None = None,
+    ) -> None:
+        """Connect the units.
+
+        Args:
+            reached: gets what `completed` is, for others to see.
+        """
         self.plan = plan
         self.log = log
         self.stop = stop
         self.completed = -1
         log.time.value = plan.time(0)
+        self._reached = ctypes.c_int64(-1) if reached is None else reached
         self.passes = 0
         self.memory = memory = Memory(plan, slaves)
         slow = {s.unit.period for s in memory.stations} - {1}
@@ -82,6 +97,7 @@ class Master:
         self._ones = np.ones(memory.n_outputs)
         self._ending: Ended | None = None
         self._points: Iterator[int] = iter(())  # left to be stepped to
+        self._surroundings = Surroundings()
 
     def initialize(self, row: np.ndarray, others: list[list[Value]]) -> None:
         """Bring all units to the start, and record it like `advance`.
@@ -94,7 +110,7 @@ class Master:
         self.memory.pool.take(self._recorded, None, row, "clip")
         if self._recorded_others:
             others.append(self._values_of_others())
-        self.completed = 0
+        self.completed = self._reached.value = 0
 
     def advance(self, end: int, rows: Sequence[np.ndarray], others: list[list[Value]]) -> None:
         """Step to communication point `end`, filling one of `rows` per point.
@@ -109,7 +125,7 @@ class Master:
         """
         q = math.lcm(self.plan.step.denominator, self.plan.start.denominator)
         s, p = int(self.plan.start * q), int(self.plan.step * q)  # the k-th point is at (s + k p) / q
-        stop = self.stop
+        stop, reached = self.stop, self._reached
         first, cycle = self.completed + 1, self.programs.cycle
         points = range(first, min(end, first + cycle - 1) + 1)
         self._operations = {k % cycle: self.programs.at(k) for k in points}
@@ -135,9 +151,32 @@ class Master:
             take(recorded, None, row, "clip")
             if self._recorded_others:
                 others.append(self._values_of_others())
-            self.completed = k
+            self.completed = reached.value = k
         if self._ending is not None:
             raise self._ending
+
+    def check_surroundings(self, since: int) -> None:
+        """Make sure that no unit has changed for the others how they compute.
+
+        Args:
+            since: communication point at which that was so. What has been recorded since is given up.
+
+        Raises:
+            SimulationError: one has.
+        """
+        if not self._surroundings.arithmetic_changed():
+            return
+        time = self.plan.time(since)
+        units = self.plan.units
+        among = [u.name for u in units if u.fmu.compiled] or [u.name for u in units]
+        self._surroundings.restore("", self.log)
+        self.completed = self._reached.value = since
+        raise SimulationError(
+            f"after t = {time:.9g} s a unit ({listed(among, last='or')}) changed how numbers are rounded, "
+            "flushed to zero or trapped, also for all others; with --isolate it does so for itself alone",
+            unit=among[0] if len(among) == 1 else None,
+            time=time,
+        )
 
     def inputs_of(self, unit: str) -> dict[str, Value]:
         """Return the inputs with which a unit was last stepped."""
@@ -150,11 +189,16 @@ class Master:
                 values[variable.name] = self.memory.other(wire)
         return values
 
+    def operation_of(self, k: int, call: Callable[[], Status | None]) -> Operation:
+        """Return the operation of the step to `k` that a call belongs to."""
+        return next(op for op in self._operations[k % self.programs.cycle] if op.call is call)
+
     def _values_of_others(self) -> list[Value]:
         return [self.memory.others[key] for key in self._recorded_others]
 
     def _check_initialization(self, unit: str, what: str, status: Status) -> None:
         """Judge a call during initialization, where a logged error counts whatever the status is."""
+        self._surroundings.restore(unit, self.log)
         status = self.memory.of[unit].slave.note(status)
         if status > WARNING or self.log.errors(unit):
             start = self.plan.time(0)
@@ -168,20 +212,19 @@ class Master:
 
     def _answer(self, k: int, call: Callable[[], Status | None], status: Status) -> None:
         """Judge a call of the step from `k` - 1 to `k` that did not return OK."""
-        operations = self._operations[k % self.programs.cycle]
-        operation = next(op for op in operations if op.call is call)
+        operation = self.operation_of(k, call)
         station = self.memory.of[operation.unit]
         status = station.slave.note(status)
         kind = station.slave.part(operation.kind)
         if status == WARNING:
-            self._note_warning(operation.unit, _WORDS[kind])
+            self._note_warning(operation.unit, WORDS[kind])
             return
         self._check_finite(k)  # a value that went wrong upstream explains this failure
         time = self.plan.time(k - station.unit.period)
         if status == DISCARD and kind == "step" and (reached := station.slave.ended()) is not None:
             self._end(k, operation.unit, time if math.isnan(reached) else reached)
             return
-        sentence = describe(operation.unit, _WORDS[kind], time, status, self.log)
+        sentence = describe(operation.unit, WORDS[kind], time, status, self.log)
         raise self._failure(sentence, operation.unit, time)
 
     def _end(self, k: int, unit: str, time: float) -> None:
@@ -236,7 +279,7 @@ class Master:
                 self._expected = self._expected[self._expected != at]
 
 
-_WORDS = {"set": "setting inputs", "step": "step", "get": "reading outputs"}
+WORDS = {"set": "setting inputs", "step": "step", "get": "reading outputs"}
 
 
 def _spelled(value: float) -> str:

@@ -8,6 +8,7 @@ from ..plan import Unit
 from .fmi2 import Fmi2Slave
 from .fmi3 import Fmi3Slave
 from .log import Log
+from .surroundings import Surroundings
 from .unit import FmuSlave
 
 SLAVES: dict[int, type[FmuSlave]] = {2: Fmi2Slave, 3: Fmi3Slave}
@@ -16,4 +17,8 @@ SLAVES: dict[int, type[FmuSlave]] = {2: Fmi2Slave, 3: Fmi3Slave}
 
 def open_unit(unit: Unit, log: Log, corrupted: set[Path]) -> FmuSlave:
     """Return the instance of a unit; arguments and errors are those of `FmuSlave`."""
-    return SLAVES[unit.fmu.fmi](unit, log, corrupted)
+    surroundings = Surroundings()
+    try:
+        return SLAVES[unit.fmu.fmi](unit, log, corrupted)
+    finally:
+        surroundings.restore(unit.name, log)

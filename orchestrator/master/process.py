@@ -19,7 +19,7 @@ START_LIMIT = 60.0
 """Time that a process may take to start [s]; chosen: Python is read from a slow disk in less."""
 LOOK_EVERY = 200
 """Time between two looks at the clock while an answer is waited for [ms]."""
-STOP_GRACE = 2.0
+STOP_GRACE = 1.0
 """Time that a call may still take when the run is to stop [s]; chosen: as long as one likes to wait."""
 CLOSING = 1.0
 """Time in which a process that has closed its pipe is seen to end [s]."""
@@ -141,10 +141,7 @@ class UnitProcess:
         self.end()
         if code is None:
             return "its process closed the pipe to the master{where}"
-        if code >= 0:
-            return f"its process ended itself with exit status {code}{{where}}"
-        cause = ", sent from outside or for want of memory," if -code == signal.SIGKILL else ""
-        return f"its process died of {signal_name(-code)}{cause}{{where}}"
+        return f"its process {how_it_ended(code)}{{where}}"
 
     def _wait(self, limit: float) -> int | None:
         try:
@@ -170,9 +167,13 @@ class UnitProcess:
             self._popen.wait()
 
 
-def signal_name(number: int) -> str:
-    """Return "SIGSEGV" or, of a signal without a name, "signal 42"."""
+def how_it_ended(code: int) -> str:
+    """Return what a process did that has ended with this code, as `subprocess` gives it."""
+    if code >= 0:
+        return f"ended itself with exit status {code}"
     try:
-        return signal.Signals(number).name
+        name = signal.Signals(-code).name
     except ValueError:
-        return f"signal {number}"
+        name = f"signal {-code}"
+    cause = ", sent from outside or for want of memory," if -code == signal.SIGKILL else ""
+    return f"died of {name}{cause}"

@@ -13,33 +13,14 @@ from typing import Any
 
 from ..errors import ModelDescriptionError, SimulationError
 from ..plan import Place, Unit
-from .exchange import FAILED, GET, LOG, REPLY, SET, STEP, Board, Channel
+from .exchange import FAILED, GET, REPLY, SET, STEP, Board, Channel
 from .guardian import stand_guard
-from .log import KEPT, OK, WARNING, Log
+from .log import OK, WARNING
 from .opening import open_unit
+from .relay import Relay
 from .slave import Experiment
+from .surroundings import Surroundings
 from .unit import FmuSlave
-
-
-class Relay(Log):
-    """Passes on what FMUs log at once, for one may be about to crash; a flood it only counts."""
-
-    def __init__(self, channel: Channel) -> None:
-        super().__init__()
-        self._channel = channel
-
-    def add(self, unit: str, status: int, category: str, text: str, time: float | None = None) -> None:
-        kept, dropped = len(self.messages), self.dropped
-        super().add(unit, status, category, text, time)
-        if len(self.messages) > kept:
-            self._channel.send(LOG, (status, category, self.messages[-1].text))
-        elif self.dropped > dropped and self.dropped % KEPT == 0:
-            self._channel.send(LOG, KEPT)
-
-    def finish(self) -> None:
-        """Pass on how many messages have been counted since the last thousand."""
-        if self.dropped % KEPT:
-            self._channel.send(LOG, self.dropped % KEPT)
 
 
 class Worker:
@@ -48,7 +29,8 @@ class Worker:
     def __init__(self, channel: Channel, memory: int) -> None:
         self._channel = channel
         self._memory = memory
-        self._log = Relay(channel)
+        self._log = Relay(channel, lambda message: (message.status, message.category, message.text))
+        self._surroundings: Surroundings | None = Surroundings()  # until it is stepped
         self._slave: FmuSlave
 
     def serve(self) -> None:
@@ -62,6 +44,8 @@ class Worker:
             else:
                 name, arguments = self._channel.ordered()
                 reply = getattr(self, name)(*arguments)
+                if self._surroundings is not None:
+                    self._surroundings.restore("", self._log)
             if os.getpid() != process:
                 return
             if parts:
@@ -123,6 +107,7 @@ class Worker:
         return self._slave.enter()
 
     def exit(self) -> int:
+        self._surroundings = None
         return self._slave.exit()
 
     def ended(self) -> float | None:

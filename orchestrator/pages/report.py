@@ -56,7 +56,15 @@ def found_studies(folder: Path = SCENARIOS) -> list[Path]:
     return sorted(titles, key=lambda path: (first[path.parent], path.stem != "study", titles[path]))
 
 
-def wanted(path: Path, folder: Path, *, fmus: Path | None, format: str, build: bool = False) -> Wanted:
+def wanted(
+    path: Path,
+    folder: Path,
+    *,
+    fmus: Path | None,
+    format: str,
+    call_limit: float | None = None,
+    build: bool = False,
+) -> Wanted:
     """Read a study and look which of its runs have results that are still good; `build`: see `Once`.
 
     Raises:
@@ -65,7 +73,10 @@ def wanted(path: Path, folder: Path, *, fmus: Path | None, format: str, build: b
     from dataclasses import replace
 
     study = load_study(path)
-    jobs = {name: replace(run.job(folder, fmus), format=format) for name, run in study.runs.items()}
+    jobs = {
+        name: replace(run.job(folder, fmus), format=format, call_limit=call_limit)
+        for name, run in study.runs.items()
+    }
     once = Once(build=build)
     plans = {name: planned(job, once) for name, job in jobs.items()}
     found = {name: staleness(plans[name][1], job.out) for name, job in jobs.items()}

@@ -45,11 +45,19 @@ class Block:
         self.written = 0
         self.columns = list(columns)
         self._order = [0, *_order(real)]
-        self._block = np.zeros((BLOCK, 1 + sum(real)))
-        self.rows = list(self._block)
+        self.lay(np.zeros((BLOCK, 1 + sum(real))))
         self.others: list[list[Value]] = []
         self._real = [name for name, is_real in zip(columns, real, strict=True) if is_real]
         self._extremes = np.full((2, sum(real)), np.nan)
+
+    def lay(self, block: np.ndarray) -> None:
+        """Take rows from this memory from here on, of shape (BLOCK, 1 + Reals)."""
+        self._block = block
+        self.rows = list(block)
+
+    def write(self, count: int) -> None:
+        """Take over the first `count` of `rows`; they are then free again."""
+        raise NotImplementedError
 
     def extremes(self) -> dict[str, dict[str, float]]:
         """Return the smallest and the largest value of every Real in what has been written."""

@@ -159,7 +159,7 @@ def run_job(job: Job) -> str:
 
     plan = plan_of(job)
     with opener_of(plan, job.call_limit) as opener:
-        return simulate(plan, job.out, opener=opener, format=job.format).id
+        return simulate(plan, job.out, opener=opener, format=job.format, apart=True).id
 
 
 def default_workers() -> int:

@@ -38,7 +38,7 @@ def measure(job: Any) -> Measured:
 
     with opener_of(job.plan, job.call_limit) as opener:
         if job.keep:
-            simulate(job.plan, job.out, opener=opener, format=job.format)
+            simulate(job.plan, job.out, opener=opener, format=job.format, apart=True)
             results = load_results(job.out)
         else:
             results = simulate_in_memory(job.plan, opener=opener)

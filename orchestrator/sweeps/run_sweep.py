@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from ..errors import ResultsError
-from ..master.simulate import KEPT
+from ..master.run import KEPT
 from ..studies.jobs import Outcome, read_back
 from .journal import Journal, Record
 from .local import run_here

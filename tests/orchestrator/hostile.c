@@ -255,7 +255,7 @@ EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[], siz
     third /= 3.0; /* shows the rounding mode */
     tiny *= 1e-3; /* shows whether small numbers are flushed to zero */
     for (size_t i = 0; i < n; i++) {
-        v[i] = r[i] == 2 ? 2.0 * in->x + third : tiny * 1e308 + strtod("0.5", NULL); /* shows the locale */
+        v[i] = r[i] == 1 ? in->x : r[i] == 2 ? 2.0 * in->x + third : tiny * 1e308 + strtod("0.5", NULL); /* shows the locale */
         if (r[i] == 3 && strcmp(in->name, "bad") == 0 && wants("value:nan", in->t)) v[i] = zero / zero;
         if (r[i] == 3 && strcmp(in->name, "bad") == 0 && wants("value:inf", in->t)) v[i] = 1.0 / zero;
         if (r[i] == 2 && strcmp(in->name, "bad") == 0 && wants("value:wired_nan", in->t)) v[i] = zero / zero;

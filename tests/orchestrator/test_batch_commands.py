@@ -310,3 +310,28 @@ def test_plot_says_what_is_wrong(yawbench, folder):
     assert (status, said) == (2, "o/off: nothing to draw, no run recorded any of roll_angle.\n")
     status, _, said = yawbench("plot", "o/off", "--label", "a", "--label", "b")
     assert (status, said) == (2, "--label: needs one for each folder of results (2 labels, 1 folder)\n")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["compare", "half.yaml", "--swap", "controller=controller_off"],
+        ["converge", "half.yaml", "--signal", "controller.yaw_moment"],
+        ["plot", "half.yaml"],
+        ["report", "study.yaml"],
+        ["study", "study.yaml"],
+    ],
+    ids=lambda command: command[0],
+)
+def test_every_command_that_makes_runs_isolates_units_if_told(command, folder, fmus, monkeypatch):
+    limits = []
+
+    def run_all(jobs, folder, **options):
+        limits.extend(job.call_limit for job in jobs)
+        raise SystemExit(7)
+
+    monkeypatch.setattr("orchestrator.commands.batch.run_all", run_all)
+    with pytest.raises(SystemExit) as exit_:
+        main([*command, "--fmus", str(fmus), "--isolate", "--call-limit", "3 s"])
+    assert exit_.value.code == 7
+    assert set(limits) == {3.0}

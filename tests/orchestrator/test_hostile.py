@@ -20,6 +20,12 @@ pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux"),
     pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler"),
 ]
+TOGETHER = (
+    "load:exit", "enter:segfault", "step:exit", "step:_exit", "step:kill", "step:execute", "step:hang",
+    "step:deaf", "step:leave_thread", "step:fork", "step:garbage", "step:close", "step:rounding",
+    "leave:trap", "enter:flush", "load:folder", "step:signals", "set:flood", "terminate:segfault",
+    "free:_exit", "free:thread", "free:log_after", "value:nan", "value:huge_text",
+)  # fmt: skip
 APART = (
     "load:exit", "enter:segfault", "step:_exit", "step:hang", "step:daemon", "step:child_crash", "step:fork",
     "step:garbage", "step:zeros", "step:endless", "step:pickle", "step:close", "get:stop", "set:flood",
@@ -27,8 +33,9 @@ APART = (
 )  # fmt: skip
 
 
-def test_an_isolated_unit_that_does_harm_ends_its_run_with_a_sentence_and_leaves_nothing(tmp_path):
-    cases = [Case(does, isolated=True) for does in APART]
+@pytest.mark.parametrize(("isolated", "harm"), [(False, TOGETHER), (True, APART)], ids=["together", "apart"])
+def test_a_unit_that_does_harm_ends_its_run_with_a_sentence_and_the_results_so_far(isolated, harm, tmp_path):
+    cases = [Case(does, isolated) for does in harm]
     assert attack(cases, tmp_path) == {case: [] for case in cases}
 
 

@@ -52,7 +52,7 @@ def foreign(tmp_path):
             if file.name == "idea.c":
                 assert STEP in text
                 text = text.replace(STEP, f"if (t > 0.0495) {{ {act} }}\n    {STEP}")
-                text = f"#include <signal.h>\n#include <stdlib.h>\n{text}"
+                text = f"#include <signal.h>\n#include <stdlib.h>\n#include <unistd.h>\n{text}"
             file.write_text(text)
         return build_component(tmp_path / "components" / "controllers" / "idea", tmp_path / "built")
 
@@ -150,16 +150,25 @@ def test_an_fmu_that_ends_the_process_is_named(foreign, run):
 
 
 @needs_cc
-def test_without_isolation_the_same_crash_takes_the_process_with_it(foreign, fmus, tmp_path):
-    fmu = foreign("raise(SIGSEGV);")
-    done = subprocess.run(
-        [
-            sys.executable, "-m", "orchestrator.cli", "run", str(CAR), "--fmus", str(fmus),
-            "--out", str(tmp_path / "out"), "--set", "stop_time=0.1", "--swap", f"controller={fmu}",
-        ],
-        capture_output=True, cwd=ROOT, check=False,
-    )  # fmt: skip
-    assert done.returncode < 0
+@pytest.mark.parametrize(
+    ("act", "did"),
+    [
+        ("raise(SIGSEGV);", "died of SIGSEGV"),
+        ("exit(0);", "ended itself with exit status 0"),
+        ("_exit(0);", "ended itself with exit status 0"),
+    ],
+)
+@pytest.mark.parametrize("format_", ["csv", "parquet"])
+def test_without_isolation_too_an_end_without_a_word_is_a_sentence_and_the_results_so_far(
+    act, did, format_, foreign, run
+):
+    status, said, results = run(foreign(act), "--format", format_, isolate=False)
+    assert status == 1
+    assert f"controller: step failed at t = 0.05 s: the process of the run {did}\n" in said
+    assert results.run["status"] == "failed"
+    assert results.run["error"]["unit"] == "controller"
+    assert results.time[-1] == 0.051  # the controller takes two steps at once
+    assert np.all(np.isfinite(results["plant.velocity_x"]))
 
 
 @needs_cc

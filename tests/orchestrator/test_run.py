@@ -268,10 +268,10 @@ def test_a_value_that_is_not_finite_stops_the_run_and_names_its_wire(
     fmu = tmp_path / "controller_faulty.fmu"
     status, said = yawbench(scenario, "--out", tmp_path / "out", "--swap", f"controller={fmu}")
     assert status == 1
-    assert said.splitlines()[0] == (
+    assert (
         f"controller: yaw_moment is {word} at t = 0.016 s, on the wire controller.yaw_moment -> "
         "allocator.yaw_moment"
-    )
+    ) in said.splitlines()
     assert load_results(tmp_path / "out").time[-1] == 0.015
 
 
@@ -302,14 +302,14 @@ def run_process(*arguments):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="os.kill ends the process there")
-def test_a_second_ctrl_c_leaves_a_component_that_never_comes_back(faulty, fmus, tmp_path):
-    scenario = faulty("while True: os.kill(os.getpid(), signal.SIGINT)")
+def test_ctrl_c_ends_a_component_that_never_comes_back(faulty, fmus, tmp_path):
+    scenario = faulty("os.kill(os.getppid(), signal.SIGINT)\n            while True: pass")
     done = run_process("run", scenario, "--fmus", fmus, "--out", tmp_path / "out")
     assert done.returncode == 1
     assert done.stderr == (
-        "yawbench: the run was interrupted inside a unit; "
-        f"results so far: {tmp_path / 'out'}\n"
-    )  # fmt: skip
+        "the run was interrupted: controller: step failed at t = 0.05 s: the process of the run did not come "
+        f"back\nWhat was recorded until then: {tmp_path / 'out'}\n"
+    )
     results = load_results(tmp_path / "out")
     assert results.run["status"] == "interrupted"
     assert results.time[-1] == 0.05

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import faulthandler
 import itertools
 import json
+import mmap
 import os
 import shlex
 import signal
@@ -57,7 +59,7 @@ KINDS = {
 VALUES = ("nan", "inf", "wired_nan", "huge_text", "no_text", "not_utf8", "count")
 OTHERS = (*(f"value:{what}" for what in VALUES), "free:log_after")
 
-PATIENCE = 3.0
+PATIENCE = 4.0
 """Time after which a run that hangs gets a Ctrl-C [s]."""
 LIMIT = 10.0
 """Time within which it has to end then, and any other run has to [s]."""
@@ -88,7 +90,7 @@ SCENARIO = f"""
 title: A unit that does harm between two that do not
 stop_time: {STEP * STEPS}
 step_size: {STEP}
-inputs: {{good.x: 1.0, good.text_in: a, bad.text_in: b}}
+inputs: {{good.x: 1.0, good.text_in: text, bad.text_in: text}}
 units:
   good: {{fmu: ./hostile.fmu}}
   bad: {{fmu: ./hostile.fmu}}
@@ -181,6 +183,10 @@ def start(case: Case, scenario: Path, folder: Path) -> Running:
     status = 70
     try:
         os.setsid()
+        (folder / "mark").write_bytes(b"a run's processes have this file mapped")
+        with (folder / "mark").open("rb") as file:
+            mark = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)  # noqa: F841  see left_over
+        faulthandler.disable()  # it is for the tests that this may be part of
         os.environ |= {"HOSTILE": case.does, "HOSTILE_RUN": str(folder), "HOSTILE_LOCALE": _comma_locale()}
         for descriptor, name in ((1, "stdout"), (2, "stderr")):
             file = os.open(folder / name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
@@ -220,12 +226,10 @@ def verdict(run: Running, status: int) -> list[str]:
         problems.append("traceback")
     if "\x1b" in said and "print" not in case.does and "garbage" not in case.does:
         problems.append("an escape sequence reached the terminal")
-    if status != 0 and not any(word in said for word in ("good: ", "bad: ", "the run ")):
+    if status != 0 and not any(word in said for word in ("good: ", "bad: ", "the run ", "a unit ")):
         problems.append("no sentence")
     if case.isolated and run.interrupted is not None:
         problems.append("had to be interrupted")
-    if run.interrupted is not None and status != 1:
-        problems.append(f"interrupted, but exit status {status}")
     try:
         record = json.loads((out / "run.json").read_text())
         with (out / "results.csv").open(newline="") as file:
@@ -238,7 +242,7 @@ def verdict(run: Running, status: int) -> list[str]:
         problems.append("run.json counts other rows")
     expected = {"completed": STEPS + 1}.get(record["status"], 0)
     if case.call in (*STEPPING, "value"):
-        expected = max(expected, round(ACTS_AT / STEP))
+        expected = max(expected, 1 if case.kind == "changes the process" else round(ACTS_AT / STEP))
     if case.call in ENDING:
         expected = STEPS + 1
     if len(rows) < expected:
@@ -248,7 +252,7 @@ def verdict(run: Running, status: int) -> list[str]:
         problems.append(f"wrong values of {', '.join(sorted(wrong))}")
     if (run.folder / "out" / "run.json").stat().st_size > 1_000_000:
         problems.append("run.json is too large")
-    if left := left_over(run.folder):
+    if (left := left_over(run.folder)) and (case.isolated or "daemon" not in case.does):
         problems.append(f"{len(left)} processes are left over")
         for pid in left:
             with contextlib.suppress(OSError):
@@ -258,13 +262,14 @@ def verdict(run: Running, status: int) -> list[str]:
 
 def left_over(folder: Path) -> list[int]:
     """Return the processes that a run has left behind."""
-    mark, found = f"HOSTILE_RUN={folder}".encode(), []
+    marks = {"environ": f"HOSTILE_RUN={folder}\0".encode(), "maps": f"{folder}/mark".encode()}
+    found = set()
     for entry in Path("/proc").iterdir():
-        if entry.name.isdecimal():
+        for file, mark in marks.items():
             with contextlib.suppress(OSError):
-                if mark in (entry / "environ").read_bytes().split(b"\0"):
-                    found.append(int(entry.name))
-    return found
+                if entry.name.isdecimal() and mark in (entry / file).read_bytes():
+                    found.add(int(entry.name))
+    return sorted(found)
 
 
 def attack(cases: Iterable[Case], folder: Path, at_once: int = 3) -> dict[Case, list[str]]:

@@ -1,0 +1,289 @@
+"""A run whose units are stepped in a process of their own, while the results are kept in this one.
+
+A unit that crashes, calls exit, hangs, or closes all files, does so to the other process: this one sees it
+end without the word that a run ends with, and still has every row. So no run of foreign code ends in
+silence, and Ctrl-C always works, whatever the FMU does with signals.
+
+Chosen over isolating every foreign FMU by default, which costs 30 to 70 us per unit and step, and over a
+hook that the C library calls at exit(), which neither _exit() nor a signal asks. This costs a fork, a few
+milliseconds per run, and nothing per step; while one process writes a block of rows the other fills the
+next. What it does not give is a wall between units: see `surroundings` for what they may change for each
+other, and `isolation` for the wall. It needs fork(), and is used on Linux alone.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import select
+import signal
+import sys
+import threading
+import time
+from typing import Any
+
+from .. import errors
+from ..errors import SimulationError
+from ..plan import Plan, Value
+from ..results.recorder import BLOCK, Block
+from ..wording import listed
+from .course import Opener, Progress, hand_over
+from .exchange import LOG, REPLY, Channel, Garbled
+from .interrupts import StopFlag, stop_requested_at
+from .log import MASTER, WARNING, Log
+from .master import Ended, Interrupted
+from .opening import open_unit
+from .process import CLOSING, how_it_ended
+from .stepping import ENDED, FREE, PROGRESS, ROWS, TAKEN, WHERE, Shared, step_units
+
+LOOK_EVERY = 100
+"""Time between two looks whether the run is to stop [ms]."""
+ASK_AFTER, KILL_AFTER = 1.5, 3.0
+"""Time after a wish to stop at which the process is asked where it is, and is killed [s]; chosen: a step is
+over long before."""
+END_LIMIT = 10.0
+"""Time that units may take to be terminated and freed [s]; the results are written by then."""
+
+
+class _Lost(Exception):
+    """The process has ended, or has been killed; the text says how, as "it died"."""
+
+
+def can_be_apart() -> bool:
+    """Return whether a run can be stepped in a process of its own: signals are for the main thread."""
+    return sys.platform == "linux" and threading.current_thread() is threading.main_thread()
+
+
+class CourseApart:
+    """The course of one run in another process; arguments and methods are those of `course.Course`."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        rows: Block,
+        log: Log,
+        stop: StopFlag,
+        progress: Progress | None = None,
+    ) -> None:
+        self.plan = plan
+        self.passes = 0
+        self.handed_over = 0
+        self._rows = rows
+        self.writing = False
+        self.ended: Ended | None = None
+        self._log = log
+        self._stop = stop
+        self._progress = progress or (lambda done, total: None)
+        self._shared = Shared(len(rows.rows[0]))
+        self._blocks = 0  # written
+        self._inputs: dict[str, Value] = {}
+        self._where: tuple[str, str] | None = None
+        self._process: int | None = None
+        self._suspects: list[str] = []  # units that may have ended the process
+        self._told_end = False
+        self._closed = False  # no more rows are written
+
+    def inputs_of(self, unit: str) -> dict[str, Value]:
+        """Return the inputs with which the unit that has failed was last stepped."""
+        return self._inputs
+
+    def go(self, opener: Opener) -> None:
+        if opener is open_unit:
+            self._suspects = [u.name for u in self.plan.units if u.fmu.compiled]
+        self._fork(opener)
+        try:
+            self.passes, ending, failed = self._hear(ENDED)
+        except _Lost as lost:
+            raise self._death(str(lost)) from None
+        self._told_end = True
+        if ending is not None:
+            reason, unit, at = ending
+            self.ended = Ended(reason, unit=unit, time=at)
+        if failed is not None:
+            self._inputs = failed["inputs"]
+            raise _rebuilt(failed)
+
+    def _fork(self, opener: Opener) -> None:
+        commands, writing = os.pipe()
+        reading, answers = os.pipe()
+        asked, self._asking = os.pipe()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        ctypes.CDLL(None).fflush(None)
+        self._process = os.fork()
+        if self._process == 0:
+            step_units(self.plan, opener, self._stop, self._shared, Channel(commands, answers), asked)
+        for descriptor in (commands, answers, asked):
+            os.close(descriptor)
+        self._channel = Channel(reading, writing, self._wait_for_more)
+        self._poll = select.poll()
+        self._poll.register(reading, select.POLLIN)
+        self._told_to_stop = False
+        self._deadline: float | None = None
+
+    def _hear(self, wanted: int) -> Any:
+        """Take what comes until it is the record that is wanted; return its content."""
+        try:
+            while True:
+                self._wait_for_more()
+                kind = self._channel.hear()
+                if kind is None:
+                    raise EOFError
+                if kind not in (LOG, ROWS, PROGRESS, WHERE, wanted):
+                    raise Garbled(f"byte {kind}")
+                content = self._channel.receive()
+                if kind == wanted:
+                    return content
+                self._take(kind, content)
+                self._check_time()
+        except EOFError:
+            raise _Lost(self._how_it_ended()) from None
+        except Garbled as error:
+            self._kill()
+            raise _Lost(
+                f"wrote into the pipe of the process of the run what is no message ({error})"
+            ) from None
+
+    def _take(self, kind: int, content: Any) -> None:
+        match kind, content:
+            case _, [int() as first, int() as count, list() as others] if kind == ROWS:
+                if first != self.handed_over:
+                    raise Garbled(f"rows from {first}, not {self.handed_over}")
+                self._record(count, others)
+                self._blocks += 1
+                with contextlib.suppress(BrokenPipeError):
+                    self._channel.say(TAKEN)
+            case _, [int() as done, int() as total] if kind == PROGRESS:
+                self._progress(done, total)
+            case _, [str() as unit, str() as what] if kind == WHERE:
+                self._where = unit, what
+            case _, None if kind == WHERE:
+                pass
+            case _, int() if kind == LOG:
+                self._log.drop(content)
+            case _, [str() as unit, int() as status, str() as category, str() as text, float() as at] if (
+                kind == LOG
+            ):
+                self._log.add(unit, status, category, text, at)
+            case _:
+                raise Garbled(f"a record {kind}")
+
+    def _record(self, count: int, others: list[list[Value]]) -> None:
+        self.handed_over += count
+        self._rows.lay(self._shared.blocks[self._blocks % 2])
+        self._rows.others[:] = others
+        self._closed, closed = True, self._closed  # if this fails, what comes after it is no use
+        if not closed:
+            hand_over(self._rows, count, self.plan.time(max(0, self.handed_over - 1)))
+            self._closed = False
+
+    def flush(self) -> None:
+        """Write the rows that the process has left behind."""
+        count = self._shared.completed.value + 1 - self.handed_over
+        others = []
+        if len(self.plan.record) + 1 > len(self._rows.rows[0]):  # there are such as are no Reals
+            others = self._shared.kept(count) if count <= BLOCK else []
+            count = len(others)
+        self._record(min(count, BLOCK), others)
+        self._closed = True
+
+    def _wait_for_more(self) -> None:
+        while not self._poll.poll(LOOK_EVERY):
+            self._check_time()
+            if self._has_ended() and not self._poll.poll(0):
+                raise EOFError  # something that a unit has started holds the pipe open
+
+    def _check_time(self) -> None:
+        """Tell the process to stop when that is wished; kill it if it does not, or takes too long to end."""
+        now, asked = time.monotonic(), stop_requested_at()
+        if asked is not None and not self._told_to_stop:
+            self._told_to_stop = True
+            self._signal(signal.SIGTERM)
+        if asked is not None and now - asked > ASK_AFTER:
+            with contextlib.suppress(OSError):
+                os.write(self._asking, b"?")
+        late = self._deadline is not None and now > self._deadline
+        if late or (asked is not None and now - asked > KILL_AFTER):
+            self._kill()
+            raise _Lost("did not come back")
+
+    def _signal(self, number: int) -> None:
+        if self._process is not None:
+            with contextlib.suppress(OSError):
+                os.kill(self._process, number)
+
+    def _kill(self) -> int | None:
+        """Make sure that the process has ended, and return its status."""
+        if self._process is None:
+            return None
+        with contextlib.suppress(OSError):
+            os.killpg(self._process, signal.SIGKILL)  # with what units have started
+        self._signal(signal.SIGKILL)
+        _, status = os.waitpid(self._process, 0)
+        self._process = None
+        self._channel.close()
+        os.close(self._asking)
+        return os.waitstatus_to_exitcode(status)
+
+    def _has_ended(self) -> bool:
+        assert self._process is not None
+        return os.waitid(os.P_PID, self._process, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
+
+    def _how_it_ended(self) -> str:
+        """Return what the process did, which has closed its pipe."""
+        end = time.monotonic() + CLOSING
+        while not self._has_ended():
+            if time.monotonic() > end:
+                self._kill()
+                return "closed its pipe"
+            time.sleep(0.001)
+        code = self._kill()
+        assert code is not None
+        return how_it_ended(code).rstrip(",")
+
+    def _death(self, did: str) -> SimulationError:
+        """Return what ends the run when its process did."""
+        completed = self._shared.completed.value
+        unit, doing = self._where or (None, "step" if completed >= 0 else "initialization")
+        if unit is None and len(self._suspects) == 1:
+            unit = self._suspects[0]
+        period = next((u.period for u in self.plan.units if u.name == unit), 1)
+        now = self.plan.time(max(0, completed + 1 - period if (completed + 1) % period == 0 else completed))
+        sentence = f"{doing} failed at t = {now:.9g} s: the process of the run {did}"
+        if unit is not None:
+            sentence = f"{unit}: {sentence}"
+        elif self._suspects:
+            sentence += f"; --isolate tells in which unit (not in Python are {listed(self._suspects)})"
+        if self._stop.requested:
+            return Interrupted(f"the run was interrupted: {sentence}", unit=unit, time=now)
+        return SimulationError(sentence, unit=unit, time=now)
+
+    def end(self) -> None:
+        """Let the process terminate and free the units; what becomes of it costs the results nothing."""
+        if self._process is None:
+            return
+        self._closed, self._where = True, None
+        self._deadline = time.monotonic() + END_LIMIT
+        try:
+            if not self._told_end:
+                self._signal(signal.SIGTERM)
+                self._hear(ENDED)
+            self._channel.say(FREE)
+            self._hear(REPLY)
+        except (_Lost, OSError) as lost:
+            unit = self._where[0] if self._where else ", ".join(self._suspects) or "the units"
+            text = f"when units were terminated and freed, the process of the run {lost}"
+            self._log.add(unit, WARNING, MASTER, text, self.plan.time(max(0, self._shared.completed.value)))
+        self._kill()
+
+
+def _rebuilt(failed: dict[str, Any]) -> Exception:
+    """Return the error that the other process has told of."""
+    if not failed["known"]:
+        return RuntimeError(failed["problems"][0])
+    if failed["kind"] == Interrupted.__name__:
+        return Interrupted(failed["problems"], unit=failed["unit"], time=failed["time"])
+    if failed["kind"] == SimulationError.__name__:
+        return SimulationError(failed["problems"], unit=failed["unit"], time=failed["time"])
+    return getattr(errors, failed["kind"])(failed["problems"])

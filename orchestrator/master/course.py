@@ -1,0 +1,151 @@
+"""The course of a run: units opened, initialized, stepped, freed."""
+
+from __future__ import annotations
+
+import ctypes
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from ..errors import ResultsError, SimulationError
+from ..plan import Plan, Unit, Value
+from ..results.recorder import BLOCK
+from .interrupts import StopFlag
+from .log import MASTER, WARNING, Log
+from .master import Ended, Master
+from .slave import Slave
+
+Progress = Callable[[int, int], None]
+"""Called a few times a second with the communication points done and those in all."""
+
+Opener = Callable[[Unit, Log, set[Path]], Slave]
+"""Makes the instance of a unit (see `opening.open_unit`)."""
+
+
+class Rows(Protocol):
+    """What a run fills: `rows` with Reals, one per communication point, `others` with what is none."""
+
+    rows: list[np.ndarray]
+    others: list[list[Value]]
+
+    def write(self, count: int) -> None:
+        """Take over the first `count` of them; they are then free again."""
+
+
+REPORT_EVERY = 0.2
+"""Time between two reports of progress [s], while a single step does not take longer."""
+
+
+def hand_over(rows: Rows, count: int, time: float) -> None:
+    """Let a recorder write rows, the last of which is of this time [s].
+
+    Raises:
+        SimulationError: it cannot.
+    """
+    try:
+        rows.write(count)
+    except ResultsError as error:
+        kept = "; the rows that fit are kept" if getattr(rows, "rows_stay", False) else ""
+        problem = f"{error.problems[0].rstrip('.')} (at t = {time:.9g} s){kept}."
+        raise SimulationError(problem, unit=None, time=time) from None
+
+
+class Course:
+    """The course of one run in this process.
+
+    Args:
+        rows: where rows go, a recorder's `rows` and `others`, before its `write` is called with their number.
+        reached: gets the last communication point at which all values stand, for others to see.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        rows: Rows,
+        log: Log,
+        stop: StopFlag,
+        progress: Progress | None = None,
+        reached: ctypes.c_int64 | None = None,
+    ) -> None:
+        self.plan = plan
+        self.handed_over = 0  # rows given away
+        self.writing = False
+        self.ended: Ended | None = None  # by a unit, before the plan's end
+        self._rows = rows
+        self._log = log
+        self._stop = stop
+        self._progress = progress
+        self._reached = reached
+        self._master: Master | None = None
+        self._slaves: dict[str, Slave] = {}
+
+    @property
+    def passes(self) -> int:
+        """Of initialization."""
+        return 0 if self._master is None else self._master.passes
+
+    def inputs_of(self, unit: str) -> dict[str, Value]:
+        """Return the inputs with which a unit was last stepped."""
+        return {} if self._master is None else self._master.inputs_of(unit)
+
+    def go(self, opener: Opener) -> None:
+        """Open, initialize, step."""
+        corrupted: set[Path] = set()
+        for unit in self.plan.units:
+            for doubt in unit.fmu.doubts():
+                self._log.add(unit.name, WARNING, MASTER, doubt, self.plan.time(0))
+            self._slaves[unit.name] = opener(unit, self._log, corrupted)
+        self._master = Master(self.plan, self._slaves, self._log, self._stop, self._reached)
+        with np.errstate(all="ignore"):  # what is not finite is found by looking, not by warning
+            self._master.initialize(self._rows.rows[0], self._rows.others)
+            try:
+                self._step(self._master)
+            except Ended as ending:
+                self.ended = ending
+                self.flush()
+
+    def _step(self, master: Master) -> None:
+        """Step to the end, in stretches short enough to report progress between them."""
+        total, stretch, reported = self.plan.n_steps, 1, time.perf_counter()
+        while master.completed < total:
+            filled = master.completed + 1 - self.handed_over
+            if filled == BLOCK:
+                self.flush()
+                filled = 0
+            end = min(total, master.completed + min(stretch, BLOCK - filled))
+            since = master.completed
+            try:
+                master.advance(end, self._rows.rows[filled:], self._rows.others)
+            except Ended:
+                master.check_surroundings(since)
+                raise
+            master.check_surroundings(since)
+            now = time.perf_counter()
+            if now - reported < REPORT_EVERY:
+                stretch = min(2 * stretch, BLOCK)
+                continue
+            stretch, reported = max(1, stretch // 2), now
+            if self._progress is not None:
+                self._progress(master.completed, total)
+        self.flush()
+        if self._progress is not None:
+            self._progress(total, total)
+
+    def flush(self) -> None:
+        """Hand over all whole rows."""
+        completed = -1 if self._master is None else self._master.completed
+        count = completed + 1 - self.handed_over
+        self.handed_over += count
+        self.writing = True
+        try:
+            hand_over(self._rows, count, self.plan.time(max(0, self.handed_over - 1)))
+        finally:
+            self.writing = False
+
+    def end(self) -> None:
+        """Terminate and free the units."""
+        for slave in reversed(self._slaves.values()):
+            slave.free()
