@@ -26,6 +26,7 @@ from .check import defects
 from .closure import Parts, Sources
 from .compiler import compile_launcher
 from .mark import Mark, read_mark
+from .presentation import CREDITS, presented
 from .recipe import TOOL, PythonRecipe, Recipe, natural_name
 from .staging import PYTHONFMU
 
@@ -201,6 +202,8 @@ def bring_up_to_date(recipe: Recipe, target: Path, mark: Mark, force: bool = Fal
         if not force and read_mark(target) == mark:
             return False
         files, modules = recipe.make()
+        credits = CREDITS if mark.is_component else {}
+        files = presented(files, recipe.listing(), role=recipe.role, credits=credits)
         put(target, to_bytes(files, mark), *modules)
     except BuildError as error:
         raise BuildError([f"{recipe.name}: {problem}" for problem in error.problems]) from None

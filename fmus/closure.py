@@ -2,7 +2,8 @@
 
 Only the closure is packed and only the closure is hashed, so touching `mathematics/fuzzy.py` changes the
 FMUs that use it and no other. Imports are read from the syntax tree; nothing is executed. Every
-absolute import must be of the standard library, because the host's Python may have nothing else.
+absolute import must be of the standard library, because the host's Python may have nothing else, or
+of what the component declares as its `host_packages`.
 Two are allowed and made relative: `components.<...>`, as a file outside this project writes it, and
 `pythonfmu.<...>`, of which each FMU carries its own copy, so that another FMU's version of
 PythonFMU in the same process cannot come between.
@@ -11,6 +12,7 @@ PythonFMU in the same process cannot come between.
 from __future__ import annotations
 
 import ast
+import contextlib
 import re
 import sys
 from collections.abc import Iterator, Mapping
@@ -31,6 +33,8 @@ class _Module:
 
     text: str
     imports: tuple[tuple[Parts, str], ...]  # and where: file:line
+    outside: tuple[tuple[str, str], ...] = ()  # packages outside the standard library, and where
+    host_packages: tuple[str, ...] = ()  # of these, those that the component in it declares
     file: Path | None = None
     digest: str = ""  # of the file's content
 
@@ -62,6 +66,8 @@ class Sources:
         folders: set[Path] = set()
         waiting = [(module, "")]
         seen: set[Parts] = set()
+        first = self._module(module)
+        allowed = first.host_packages if first is not None else ()
         while waiting:
             parts, where = waiting.pop()
             if parts in seen:
@@ -76,6 +82,9 @@ class Sources:
             is_package = self.file(parts).name == "__init__.py"
             files["/".join((*parts, "__init__") if is_package else parts) + ".py"] = found.text
             waiting += found.imports
+            for package, line in found.outside:
+                if package not in allowed:
+                    raise BuildError(f"{line}: imports {package}, {_WAYS_OUT.format(package=package)}")
             if found.file is not None:
                 evidence[str(found.file)] = found.digest
                 folders.add(found.file.parent)  # a new file in it can come before one that is known
@@ -124,20 +133,28 @@ class Sources:
         package = parts if file.name == "__init__.py" else parts[:-1]
         lines = text.split("\n")
         imports: list[tuple[Parts, str]] = []
+        outside: list[tuple[str, str]] = []
         for node in _imports(tree):
             where = f"{name}:{node.lineno}"
             if isinstance(node, ast.Import):
-                for alias in node.names:
-                    _check_standard(alias.name, where)
+                outside += [(top, where) for alias in node.names if (top := _outside(alias.name, where))]
                 continue
             base = self._base(node, package, where)
             if base is None:
+                outside += [(top, where)] if (top := _outside(node.module or "", where)) else []
                 continue
             if node.level == 0:
                 _make_relative(lines, node, levels=len(package) + 1)
             modules = [base] + [(*base, a.name) for a in node.names if self.file((*base, a.name)).exists()]
             imports += [(module, f"{where}: ") for module in modules]
-        return _Module("\n".join(lines), tuple(imports), file, content_digest(content))
+        return _Module(
+            "\n".join(lines),
+            tuple(imports),
+            tuple(outside),
+            _declared_packages(tree),
+            file,
+            content_digest(content),
+        )
 
     def _base(self, node: ast.ImportFrom, package: Parts, where: str) -> Parts | None:
         """Return the module of the package that a `from` imports from, None for the standard library."""
@@ -147,7 +164,6 @@ class Sources:
                 return names[1:]
             if names[0] == "pythonfmu" and len(names) > 1:
                 return names
-            _check_standard(".".join(names), where)
             return None
         if node.level > len(package) + 1:
             raise BuildError(f"{where}: the relative import goes beyond the package of the components")
@@ -174,15 +190,30 @@ def _imports(tree: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
             yield from _imports(node)
 
 
-def _check_standard(name: str, where: str) -> None:
+_WAYS_OUT = (
+    "which is outside the standard library; an FMU must run in a Python that has nothing else installed. "
+    'Declare host_packages = ("{package}",) in the component if every host\'s Python has it, take an FMU '
+    "from elsewhere, or run the controller as plain Python with the library `yawbench`"
+)
+
+
+def _outside(name: str, where: str) -> str | None:
+    """Return the package that an absolute import needs beyond the standard library, if it does."""
     top = name.partition(".")[0]
     if top in ("components", "pythonfmu"):
         raise BuildError(f"{where}: write 'from {name}{'.<module>' if name == top else ''} import ...'")
-    if top not in sys.stdlib_module_names:
-        raise BuildError(
-            f"{where}: imports {name}, which is outside the standard library; an FMU must run in a Python "
-            "that has nothing else installed"
-        )
+    return None if top in sys.stdlib_module_names else top
+
+
+def _declared_packages(tree: ast.Module) -> tuple[str, ...]:
+    """Return what the classes of a module declare as `host_packages`, which must be written out."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None:
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            if any(isinstance(target, ast.Name) and target.id == "host_packages" for target in targets):
+                with contextlib.suppress(ValueError, TypeError):
+                    return tuple(map(str, ast.literal_eval(node.value)))
+    return ()
 
 
 def _make_relative(lines: list[str], node: ast.ImportFrom, *, levels: int) -> None:

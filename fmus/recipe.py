@@ -18,6 +18,7 @@ from .archive import pack
 from .closure import Parts, Sources
 from .compiler import compile_launcher, compiler_tools
 from .evidence import Looks
+from .presentation import icon
 from .staging import PYTHONFMU, missing_signals, staged, variant
 
 TOOL = f"yawbench {version('yawbench')}, pythonfmu {version('pythonfmu')}"
@@ -34,6 +35,13 @@ class Recipe(Protocol):
     @property
     def source(self) -> Path:
         """The file, or the folder of a unit in C."""
+
+    @property
+    def role(self) -> str:
+        """Such as "controller"."""
+
+    def listing(self) -> dict[str, str]:
+        """Return path -> text of what somebody has written for it alone."""
 
     def key(self) -> str:
         """Return a hash of all that decides what the FMU's bytes are."""
@@ -58,12 +66,20 @@ class PythonRecipe:
     def source(self) -> Path:
         return self.sources.file(self.module)
 
+    @property
+    def role(self) -> str:
+        return ROLES[self.module[0]].name
+
+    def listing(self) -> dict[str, str]:
+        path = "/".join(self.module) + ".py"
+        return {path: self._files[path]}
+
     @cached_property
     def _files(self) -> dict[str, str]:
         return self.sources.closure(self.module)
 
     def key(self) -> str:
-        parts = [self.name, ".".join(self.module), json.dumps(dict(self.defaults)), _builder()]
+        parts = [self.name, ".".join(self.module), json.dumps(dict(self.defaults)), _builder(self.role)]
         parts += [hashlib.sha256(compile_launcher()[0] or b"").hexdigest(), _hash(self._files)]
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
@@ -71,7 +87,7 @@ class PythonRecipe:
         self._files  # noqa: B018 - found once, with its evidence
         tools = [f"tool:{file}" for file in _from_pythonfmu()]
         return self.sources.evidence[self.module] | Looks().evidence(
-            [*sorted(HERE.glob("*.[pch]*")), *tools, *compiler_tools()]
+            [*sorted(HERE.glob("*.[pch]*")), *icon(self.role), *tools, *compiler_tools()]
         )
 
     def make(self) -> tuple[dict[str, bytes], tuple[str, ...]]:
@@ -99,10 +115,10 @@ def natural_name(module: Parts) -> str:
 
 
 @cache
-def _builder() -> str:
-    """Return a hash of this builder and of what it takes from PythonFMU."""
+def _builder(role: str) -> str:
+    """Return a hash of this builder, of what it takes from PythonFMU, and of the icon of a role."""
     content = hashlib.sha256(TOOL.encode())
-    for file in [*sorted(HERE.glob("*.py")), *_from_pythonfmu()]:
+    for file in [*sorted(HERE.glob("*.py")), *_from_pythonfmu(), *icon(role)]:
         content.update(file.read_bytes())
     return content.hexdigest()
 

@@ -29,7 +29,7 @@ PYTHONFMU = Path(pythonfmu.__file__).resolve().parent
 """Folder of the installed PythonFMU."""
 
 ENTRY = '''"""Entry module of the FMU {name}."""
-
+{needs}
 from {package}.{module} import {component}
 
 # At every instantiation PythonFMU's library runs these lines once more, with locals of their own,
@@ -42,6 +42,15 @@ if locals() is not globals():
     except Exception:  # a Python without ctypes
         globals().setdefault("_references", []).append(globals())
 '''
+
+NEEDS = """
+import sys
+from importlib.util import find_spec
+
+missing = [package for package in {packages!r} if find_spec(package) is None]
+if missing:
+    raise ImportError("{name} needs " + ", ".join(missing) + ", which this Python lacks: " + sys.prefix)
+"""
 
 VARIANT = '''"""{module} with a name or default values of its own."""
 
@@ -126,8 +135,15 @@ class Stage:
         """Let PythonFMU's builder write the FMU `name`; return its path."""
         script = self.folder / f"{self.entry}.py"
         module = component.__module__.partition(".")[2]
+        packages = component.host_packages
         script.write_text(
-            ENTRY.format(name=name, package=self.package, module=module, component=component.__name__),
+            ENTRY.format(
+                name=name,
+                package=self.package,
+                module=module,
+                component=component.__name__,
+                needs=NEEDS.format(name=name, packages=packages) if packages else "",
+            ),
             "utf-8",
         )
         try:

@@ -100,6 +100,7 @@ class Fmu:
     description: str = ""
     once_per_process: bool = False
     fmi: int = 2  # major version of the standard
+    host_packages: tuple[str, ...] = ()  # what the Python that runs it must have
     built: Built | None = None  # None: elsewhere, or nobody has looked
     python_modules: dict[str, str] = field(default_factory=dict)
     """Of a PythonFMU unit: top-level module in resources/ -> hash of its content."""

@@ -69,6 +69,12 @@ class Component(Fmi2Slave):
     sampled: ClassVar[bool] = False
     """True for a unit that samples (controller, allocator): its outputs are discrete."""
 
+    author: ClassVar[str] = ""
+    copyright: ClassVar[str] = ""
+    license: ClassVar[str] = ""
+    host_packages: ClassVar[tuple[str, ...]] = ()
+    """Packages outside the standard library that the Python of every host must have, such as "numpy"."""
+
     variables: ClassVar[tuple[Variable, ...]] = ()
     fmu_name: ClassVar[str] = ""
     """Name of the FMU: `<role>_<file>`, unless the class itself says otherwise."""
@@ -381,5 +387,9 @@ class Component(Fmi2Slave):
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         """Return the complete model description; `model_options` is not used."""
         return model_description.to_xml(
-            name=self.fmu_name, description=self.description or "", variables=self.variables
+            name=self.fmu_name,
+            description=self.description or "",
+            variables=self.variables,
+            credits={key: getattr(type(self), key) for key in ("author", "copyright", "license")},
+            host_packages=self.host_packages,
         )

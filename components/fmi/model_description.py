@@ -7,7 +7,7 @@ them from the content.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
 from .units import UNITS
@@ -22,8 +22,18 @@ LOG_CATEGORIES = {
 }
 
 
-def to_xml(*, name: str, description: str, variables: Sequence[Variable]) -> Element:
+def to_xml(
+    *,
+    name: str,
+    description: str,
+    variables: Sequence[Variable],
+    credits: Mapping[str, str],
+    host_packages: Sequence[str],
+) -> Element:
     """Return the element `fmiModelDescription`; value references are positions in `variables`.
+
+    `needsExecutionTool` is false: Python, which the process needs, is no tool in the sense of the
+    standard, and some hosts load nothing that says true. `credits` are attributes that may be empty.
 
     `InitialUnknowns` carry no list of dependencies, which by FMI 2.0.4, section 2.2.8, means
     that they depend on all knowns; outputs list exactly the inputs they depend on directly.
@@ -37,11 +47,14 @@ def to_xml(*, name: str, description: str, variables: Sequence[Variable]) -> Ele
         generationTool="yawbench",
         variableNamingConvention="flat",
     )
+    for key, text in credits.items():
+        if text:
+            root.set(key, text)
     SubElement(
         root,
         "CoSimulation",
         modelIdentifier=name,
-        needsExecutionTool="true",
+        needsExecutionTool="false",
         canHandleVariableCommunicationStepSize="true",
         canInterpolateInputs="false",
         canBeInstantiatedOnlyOncePerProcess="false",
@@ -59,6 +72,9 @@ def to_xml(*, name: str, description: str, variables: Sequence[Variable]) -> Ele
     for category, text in LOG_CATEGORIES.items():
         SubElement(categories, "Category", name=category, description=text)
     SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize="0.001")
+    if host_packages:  # FMI has no word for it
+        tool = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name="yawbench")
+        SubElement(tool, "hostPackages", names=" ".join(host_packages))
     listed = SubElement(root, "ModelVariables")
     for reference, variable in enumerate(variables):
         _scalar_variable(listed, reference, variable)

@@ -23,6 +23,7 @@ from orchestrator.fmu.binary import platform
 
 from ..compiler import compiler_command, compiler_tools
 from ..evidence import Looks
+from ..presentation import icon
 from .declaration import DESCRIPTION, header, read_declaration
 
 HERE = Path(__file__).resolve().parent
@@ -32,6 +33,7 @@ SHARED = (
     HERE / "unit.h",
     HERE.parent / "fmi2.h",
     HERE.parent / "archive.py",
+    HERE.parent / "presentation.py",
 )
 """What has a say in the FMU of every unit in C."""
 FLAGS = ("-std=c11", "-O2", "-Wall", "-Wextra", "-Wno-unused-parameter", "-fPIC", "-shared")
@@ -67,19 +69,28 @@ class CRecipe:
 
     @property
     def name(self) -> str:
-        return f"{ROLES[self.source.parent.name].name}_{self.source.name}"
+        return f"{self.role}_{self.source.name}"
+
+    @property
+    def role(self) -> str:
+        return ROLES[self.source.parent.name].name
+
+    def listing(self) -> dict[str, str]:
+        return {file.name: file.read_text("utf-8", "replace") for file in self._files()[1:]}
 
     def key(self) -> str:
         compiler = _compiler()
         version = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False).stdout
         content = hashlib.sha256("\0".join([self.name, *compiler, version, *FLAGS, *EXACT]).encode())
-        for file in [*SHARED, *self._files()]:
+        for file in [*SHARED, *icon(self.role), *self._files()]:
             data = file.read_bytes()
             content.update(f"{file.name}\0{len(data)}\0".encode() + data)
         return content.hexdigest()[:32]
 
     def evidence(self) -> dict[str, str]:
-        return Looks().evidence([self.source, self._twin, *SHARED, *self._files(), *compiler_tools()])
+        return Looks().evidence(
+            [self.source, self._twin, *SHARED, *icon(self.role), *self._files(), *compiler_tools()]
+        )
 
     @property
     def _twin(self) -> Path:

@@ -68,7 +68,14 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
         lacking=lacking(files.get(binary_of(fmi, identifier)), fmi),
         tolerance=_tolerance(experiment),
         needs_tool=kind.needsExecutionTool,
+        host_packages=_host_packages(root),
     )
+
+
+def _host_packages(root: ElementTree.Element) -> tuple[str, ...]:
+    """Return what one of our units needs of a Python beyond the standard library."""
+    needed = root.find("VendorAnnotations/Tool[@name='yawbench']/hostPackages")
+    return () if needed is None else tuple(needed.get("names", "").split())
 
 
 def _one_line(problem: object) -> str:
@@ -138,6 +145,6 @@ def from_record(record: dict[str, Any], *, path: Path, directory: Path) -> Fmu:
         if (unit := v.get("definition")) is not None:
             v["definition"] = UnitDefinition(tuple(unit["powers"]), unit["factor"], unit["offset"])
         variables[v["name"]] = Variable(**v)
-    tuples = {key: tuple(record[key]) for key in ("flaws", "lacking")}
+    tuples = {key: tuple(record[key]) for key in ("flaws", "lacking", "host_packages")}
     fields = {**record, **tuples, "variables": variables}
     return Fmu(name=path.stem, path=path, directory=directory, **fields)

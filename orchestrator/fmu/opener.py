@@ -6,12 +6,15 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import fmus
 
+from ..errors import ModelDescriptionError
 from ..plan import Built, Fmu
+from ..wording import listed
 from .archive import open_fmu
 
 if TYPE_CHECKING:
@@ -73,7 +76,14 @@ class Opener:
         built = self._built.get(archive)
         key = (archive, built, validate)
         if key not in self._opened:
-            self._opened[key] = replace(open_fmu(archive, validate=validate), built=built)
+            fmu = open_fmu(archive, validate=validate)
+            lacking = [name for name in fmu.host_packages if find_spec(name) is None]
+            if lacking:
+                raise ModelDescriptionError(
+                    f"{archive}: needs {listed(lacking)} in the Python that runs it, which this one lacks: "
+                    f"{sys.prefix}"
+                )
+            self._opened[key] = replace(fmu, built=built)
         return self._opened[key]
 
     def names(self, folder: Path) -> list[str]:
@@ -92,4 +102,12 @@ def stale_fmus(fmus: Iterable[Fmu]) -> list[str]:
     return [
         f"{path.name} is not made of {source or 'its sources'} as it is now; 'yawbench build' makes it anew"
         for path, source in stale.items()
+    ]
+
+
+def host_needs(fmus: Iterable[Fmu]) -> list[str]:
+    """Return a sentence for every FMU that needs more of a host's Python than the standard library."""
+    needs = {fmu.name: fmu.host_packages for fmu in fmus if fmu.host_packages}
+    return [
+        f"{name} needs {listed(packages)} in the Python of every host" for name, packages in needs.items()
     ]

@@ -19,7 +19,7 @@ from functools import cache
 from pathlib import Path
 
 from ..errors import BuildError, ModelDescriptionError, WiringError
-from ..fmu.opener import Opener, stale_fmus
+from ..fmu.opener import Opener, host_needs, stale_fmus
 from ..fmu.search import find_fmu, find_folder
 from ..fmu.shadowing import shadowed_modules
 from ..plan import Fmu, Plan, Unit, Wire
@@ -53,7 +53,7 @@ def make_plan(
         WiringError: everything that is wrong with parameters and connections.
     """
     opened, replaced = _open_all(scenario, fmus, opener or Opener())
-    notes: list[str] = [*scenario.document.notes, *stale_fmus(opened.values())]
+    notes: list[str] = [*scenario.document.notes, *stale_fmus(opened.values()), *host_needs(opened.values())]
     origins: dict[str, dict[str, str]] = {name: {} for name in opened}
     parameters = Parameters(scenario, opened, replaced, notes, origins).of_units()
     connector = Connector(scenario, opened, replaced, notes, origins)

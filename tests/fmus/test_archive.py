@@ -6,10 +6,12 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from importlib.metadata import version
 from xml.etree import ElementTree
 
 import pytest
 from fmpy.validation import validate_fmu
+from lxml import html
 
 from components.fmi.roles import ROLES
 from fmus import compiler
@@ -68,6 +70,38 @@ def test_every_variable_carries_unit_description_and_dependencies(archive, name)
     assert capabilities["canGetAndSetFMUstate"] == capabilities["canSerializeFMUstate"] == "true"
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_host_is_shown_who_made_an_fmu_what_it_is_and_that_it_needs_no_tool(archive, name):
+    with zipfile.ZipFile(archive(name)) as fmu:
+        root = ElementTree.fromstring(fmu.read("modelDescription.xml"))
+        page = html.fromstring(fmu.read("documentation/index.html"))
+        icon = fmu.read("model.png")
+    assert root.find("CoSimulation").get("needsExecutionTool") == "false"
+    shown = ("author", "copyright", "license", "version", "description", "generationDateAndTime")
+    assert [key for key in shown if not root.get(key)] == []
+    assert root.get("generationTool") == f"yawbench {version('yawbench')}"
+    assert icon.startswith(b"\x89PNG")
+    assert len(icon) < 6000
+    rows = {row[0].text_content(): row for row in page.iter("tr") if len(row) > 3}
+    for variable in root.iter("ScalarVariable"):
+        row = [cell.text_content() for cell in rows[variable.get("name")]]
+        assert row[-1] == variable.get("description")
+        assert row[1] == variable[0].get("unit", "")
+    assert "class " in page.xpath("//h3/following-sibling::pre")[0].text_content()
+
+
+def test_credits_of_a_users_own_component_are_those_that_it_declares(tmp_path):
+    file = tmp_path / "controllers" / "idea.py"
+    file.parent.mkdir()
+    text = (COMPONENTS / "controllers" / "off.py").read_text().replace("from ..", "from components.")
+    for credits in ({}, {"author": "Ada", "license": "CC0-1.0"}):
+        declared = "".join(f"    {key} = {value!r}\n" for key, value in credits.items())
+        file.write_text(text.replace("    outputs =", f"{declared}    outputs ="))
+        with zipfile.ZipFile(build_component(file, tmp_path / "out")) as fmu:
+            root = ElementTree.fromstring(fmu.read("modelDescription.xml"))
+        assert {key: root.get(key) for key in ("author", "copyright", "license") if root.get(key)} == credits
+
+
 def test_an_archive_holds_what_the_fmu_needs_and_nothing_else(archive):
     with zipfile.ZipFile(archive("controller_off")) as fmu:
         names = fmu.namelist()
@@ -78,6 +112,8 @@ def test_an_archive_holds_what_the_fmu_needs_and_nothing_else(archive):
         "binaries/linux64/controller_off.so",
         "binaries/linux64/libpythonfmu-export.so",
         "binaries/win64/controller_off.dll",
+        "documentation/index.html",
+        "model.png",
         "modelDescription.xml",
         f"resources/{module}.py",
         "resources/slavemodule.txt",

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 import tempfile
 
 import pytest
 
+from fmus import check
 from fmus.build import COMPONENTS, build_all, build_component
-from orchestrator.errors import BuildError
+from fmus.check import defects
+from orchestrator.errors import BuildError, ModelDescriptionError
+from orchestrator.fmu.opener import Opener, host_needs
 from tests.fmus.bare import Fmu, Unit
 
 GOOD = '''"""A controller."""
@@ -96,8 +100,79 @@ def test_an_import_from_outside_the_standard_library_is_refused(attempt):
     (problem,) = attempt(("from dataclasses import", "import numpy\nfrom dataclasses import"))
     assert problem == (
         "controller_idea: controllers/idea.py:5: imports numpy, which is outside the standard library; "
-        "an FMU must run in a Python that has nothing else installed"
+        'an FMU must run in a Python that has nothing else installed. Declare host_packages = ("numpy",) in '
+        "the component if every host's Python has it, take an FMU from elsewhere, or run the controller as "
+        "plain Python with the library `yawbench`"
     )
+
+
+NEEDY = (
+    ("from dataclasses import dataclass", "import {package}\nfrom dataclasses import dataclass"),
+    ('    inputs = ("yaw_rate",)', '    host_packages = ("{package}",)\n    inputs = ("yaw_rate",)'),
+)
+
+
+def needy(package):
+    """Return the controller with an import of a package that it declares."""
+    text = GOOD
+    for old, new in NEEDY:
+        text = text.replace(old, new.format(package=package))
+    return text
+
+
+def test_a_package_that_the_component_declares_may_be_imported(tmp_path, unpack):
+    file = tmp_path / "controllers" / "idea.py"
+    file.parent.mkdir()
+    file.write_text(needy("numpy").replace("(-self.p.gain", "(numpy.float64(-1.0) * self.p.gain"))
+    fmu = build_component(file, tmp_path / "out")
+    unit = Unit(Fmu(unpack(fmu)), yaw_rate=0.5)
+    unit.start()
+    assert unit.outputs() == [-50.0]
+    unit.free()
+    opener = Opener()
+    opened = opener.open(opener.bring(fmu))
+    assert opened.host_packages == ("numpy",)
+    assert host_needs([opened]) == ["controller_idea needs numpy in the Python of every host"]
+    assert (
+        "The host's Python must have: numpy." in (opened.directory / "documentation/index.html").read_text()
+    )
+
+
+def test_a_host_without_a_declared_package_is_told_in_one_sentence(tmp_path, monkeypatch):
+    module = tmp_path / "modules" / "rare_package.py"
+    module.parent.mkdir()
+    module.touch()
+    file = tmp_path / "controllers" / "idea.py"
+    file.parent.mkdir()
+    file.write_text(needy("rare_package"))
+    with monkeypatch.context() as patch:
+        patch.syspath_prepend(str(module.parent))
+        restart_checker()  # a process with this path
+        fmu = build_component(file, tmp_path / "out")
+        assert Opener().open(fmu)
+    sys.modules.pop("rare_package", None)
+    restart_checker()
+    with pytest.raises(ModelDescriptionError) as caught:
+        Opener().open(fmu)
+    assert str(caught.value).startswith(
+        f"{fmu}: needs rare_package in the Python that runs it, which this one "
+    )
+    (problem,) = defects(fmu)
+    assert "controller_idea needs rare_package, which this Python lacks: " in problem
+
+
+def restart_checker():
+    if check._checker is not None:
+        check._end(check._checker)
+        check._checker = None
+
+
+def test_a_package_that_is_not_the_declared_one_is_refused(attempt):
+    (problem,) = attempt(
+        ('    inputs = ("yaw_rate",)', '    host_packages = ("scipy",)\n    inputs = ("yaw_rate",)'),
+        ("from dataclasses import", "import numpy\nfrom dataclasses import"),
+    )
+    assert "imports numpy" in problem
 
 
 def test_an_import_that_only_type_checkers_see_is_allowed(tmp_path):
