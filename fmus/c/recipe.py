@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 import uuid
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
@@ -39,6 +40,9 @@ SHARED = (
 FLAGS = ("-std=c11", "-O2", "-Wall", "-Wextra", "-Wno-unused-parameter", "-fPIC", "-shared")
 EXACT = ("-fvisibility=hidden", "-ffp-contract=off")  # no fused multiply-add: the same numbers everywhere
 LINUX = ("-Wl,--build-id=none", "-Wl,-z,defs", "-s")
+TO_WINDOWS = "x86_64-w64-mingw32-gcc"
+"""A compiler for 64-bit Windows; if it is there, the FMU gets a library for it as well."""
+WINDOWS = ("-static", "-Wl,--no-insert-timestamp", "-s")
 
 
 def find_c_components(root: Path) -> dict[str, Path]:
@@ -80,8 +84,8 @@ class CRecipe:
 
     def key(self) -> str:
         compiler = _compiler()
-        version = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False).stdout
-        content = hashlib.sha256("\0".join([self.name, *compiler, version, *FLAGS, *EXACT]).encode())
+        versions = [_version(compiler), _version([TO_WINDOWS]) if _reaches_windows() else "", *WINDOWS]
+        content = hashlib.sha256("\0".join([self.name, *compiler, *versions, *FLAGS, *EXACT]).encode())
         for file in [*SHARED, *icon(self.role), *self._files()]:
             data = file.read_bytes()
             content.update(f"{file.name}\0{len(data)}\0".encode() + data)
@@ -89,7 +93,15 @@ class CRecipe:
 
     def evidence(self) -> dict[str, str]:
         return Looks().evidence(
-            [self.source, self._twin, *SHARED, *icon(self.role), *self._files(), *compiler_tools()]
+            [
+                self.source,
+                self._twin,
+                *SHARED,
+                *icon(self.role),
+                *self._files(),
+                *compiler_tools(),
+                f"tool:{TO_WINDOWS}",
+            ]
         )
 
     @property
@@ -111,12 +123,25 @@ class CRecipe:
         role = ROLES[self.source.parent.name]
         root, variables = read_declaration(description.read_bytes(), self.name, role)
         root.set("guid", _guid(root, sources))
-        binary = _compile(compiler, sources, header(variables, root.get("guid", "")))
+        declared = header(variables, root.get("guid", ""))
         system, suffix = platform()
-        return {
+        files = {
             DESCRIPTION: ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n",
-            f"binaries/{system}/{self.name}{suffix}": binary,
-        }, ()
+            f"binaries/{system}/{self.name}{suffix}": _compile(
+                compiler, sources, declared, LINUX if sys.platform == "linux" else ()
+            ),
+        }
+        if _reaches_windows():
+            files[f"binaries/win64/{self.name}.dll"] = _compile([TO_WINDOWS], sources, declared, WINDOWS)
+        return files, ()
+
+
+def _reaches_windows() -> bool:
+    return sys.platform == "linux" and shutil.which(TO_WINDOWS) is not None
+
+
+def _version(compiler: Sequence[str]) -> str:
+    return subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False).stdout
 
 
 def _compiler() -> list[str]:
@@ -134,9 +159,11 @@ def _guid(root: ElementTree.Element, sources: dict[str, bytes]) -> str:
     return f"{{{uuid.UUID(bytes=content.digest()[:16])}}}"
 
 
-def _compile(compiler: list[str], sources: dict[str, bytes], header: str) -> bytes:
+def _compile(
+    compiler: list[str], sources: dict[str, bytes], header: str, system_flags: Sequence[str]
+) -> bytes:
     """Return the shared library; what the compiler warns of goes to stderr."""
-    flags = [*FLAGS, *EXACT, *(LINUX if sys.platform == "linux" else ())]
+    flags = [*FLAGS, *EXACT, *system_flags]
     with tempfile.TemporaryDirectory(prefix="yawbench_") as temporary:
         for name, data in sources.items():  # relative names: bytes must not depend on where they stand
             Path(temporary, name).write_bytes(data)

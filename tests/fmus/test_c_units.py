@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import subprocess
+import zipfile
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
 from fmus.build import HERE as FMUS
 from fmus.build import build_all, build_component
+from fmus.c.recipe import TO_WINDOWS
 from fmus.mark import read_mark
 from orchestrator.errors import BuildError
 from orchestrator.scaffold.controller import controller_files, layout
@@ -182,3 +187,64 @@ def test_the_shared_part_compiles_without_warnings(folder, tmp_path, capfd):
     build_component(folder, tmp_path / "out")
     assert capfd.readouterr().err == ""
     assert (FMUS / "c" / "unit.h").is_file()
+
+
+@pytest.mark.skipif(shutil.which(TO_WINDOWS) is None, reason=f"there is no {TO_WINDOWS}")
+def test_a_unit_in_c_gets_a_library_for_windows_where_a_compiler_makes_one(folder, tmp_path):
+    first = build_component(folder, tmp_path / "a")
+    with zipfile.ZipFile(first) as fmu:
+        names = {name for name in fmu.namelist() if name.startswith("binaries/")}
+        assert names == {"binaries/linux64/controller_idea.so", "binaries/win64/controller_idea.dll"}
+        for name in names:
+            (tmp_path / Path(name).name).write_bytes(fmu.read(name))
+    objdump = TO_WINDOWS.replace("gcc", "objdump")
+    linux, windows = (
+        subprocess.run([*map(str, command)], capture_output=True, text=True, check=True).stdout
+        for command in (
+            ("nm", "-D", "--defined-only", tmp_path / "controller_idea.so"),
+            (objdump, "-p", tmp_path / "controller_idea.dll"),
+        )
+    )
+    exported = {line.split()[-1] for line in linux.splitlines() if "fmi2" in line}
+    assert exported
+    assert exported <= set(windows.split("[Ordinal/Name Pointer] Table")[1].split())
+    assert "libgcc" not in windows
+    once = first.read_bytes()
+    assert build_component(folder, tmp_path / "a", force=True).read_bytes() == once
+
+
+WINE = shutil.which("wine64") or next(iter(Path("/usr/lib/wine").glob("wine64")), None)
+
+
+@pytest.mark.skipif(
+    WINE is None or shutil.which(TO_WINDOWS) is None, reason="needs wine and a cross compiler"
+)
+def test_the_library_for_windows_steps_as_the_one_for_linux(folder, tmp_path):
+    with zipfile.ZipFile(build_component(folder, tmp_path / "a")) as fmu:
+        (tmp_path / "unit.dll").write_bytes(fmu.read("binaries/win64/controller_idea.dll"))
+        guid = ElementTree.fromstring(fmu.read("modelDescription.xml")).get("guid")
+    source = Path(__file__).with_name("host_windows.c")
+    subprocess.run([TO_WINDOWS, f"-I{FMUS}", source, "-o", tmp_path / "host.exe"], check=True)
+    done = subprocess.run(
+        [WINE, tmp_path / "host.exe", guid],
+        cwd=tmp_path,
+        env=os.environ | {"WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    unit = Unit(Fmu(unpacked(build_component(folder, tmp_path / "a"), tmp_path / "unpacked")))
+    unit.set(yaw_rate_ref=0.1)
+    unit.start()
+    expected = []
+    for i in range(10):
+        unit.step(0.001 * i, 0.001)
+        expected += unit.outputs()
+    assert [float.fromhex(line) for line in done.stdout.split()] == expected
+
+
+def unpacked(fmu, folder):
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(folder)
+    return folder
