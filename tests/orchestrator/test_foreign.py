@@ -68,6 +68,14 @@ def description(*kinds, guid, more=""):
     )
 
 
+def write_fmu(path, binary, *kinds, guid="{good}", change=lambda xml: xml):
+    """Write an FMU with an input and an output of each kind; return its path."""
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", change(description(*kinds, guid=guid)))
+        archive.write(binary, f"binaries/{fmpy.platform}/foreign.so")
+    return path
+
+
 @pytest.fixture
 def run(library, tmp_path, capsys):
     """Run two units of an FMU, the second fed by the first; return status, words and results."""
@@ -76,9 +84,7 @@ def run(library, tmp_path, capsys):
         *arguments, answer=0, given=KINDS, guid="{good}", scale="", record="",
         binary=library, change=lambda xml: xml, more="",
     ):  # fmt: skip
-        with zipfile.ZipFile(tmp_path / "foreign.fmu", "w") as archive:
-            archive.writestr("modelDescription.xml", change(description(*given, guid=guid)))
-            archive.write(binary, f"binaries/{fmpy.platform}/foreign.so")
+        write_fmu(tmp_path / "foreign.fmu", binary, *given, guid=guid, change=change)
         comma = ", " if scale else ""
         constants = ", ".join(f"a.{kind}_in: {value}" for kind, value in given.items())
         (tmp_path / "two.yaml").write_text(

@@ -1,0 +1,228 @@
+"""FMUs of FMI 3.0 behind the master, beside fmpy's own simulation of them."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.cli import main
+from orchestrator.results.read import load_results
+
+from . import models3
+from .conftest import compiled
+from .models3 import make_fmu
+from .test_foreign import write_fmu
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux")
+together_and_apart = pytest.mark.parametrize("isolate", [[], ["--isolate"]], ids=["together", "apart"])
+
+
+@pytest.fixture(scope="session")
+def models(tmp_path_factory):
+    """The compiled library of all models."""
+    folder = tmp_path_factory.mktemp("models3")
+    (folder / "stubs.h").write_text(models3.stubs(), encoding="utf-8")
+    return compiled(models3.HERE / "models3.c", folder / "models3.so", f"-I{folder}")
+
+
+@pytest.fixture
+def run(models, tmp_path, capsys):
+    """Run a scenario of units given as name -> (model or path, other keys); return status, words, results."""
+
+    def go(units, *arguments, command="run", stop_time=1.0, step_size=0.1, **keys):
+        given = {}
+        for name, (fmu, more) in units.items():
+            path = fmu if isinstance(fmu, Path) else make_fmu(tmp_path, fmu, models)
+            given[name] = {"fmu": str(path), **more}
+        scenario = tmp_path / "s.yaml"
+        data = {"stop_time": stop_time, "step_size": step_size, "units": given, **keys}
+        scenario.write_text(json.dumps(data), encoding="utf-8")
+        out = tmp_path / "out"
+        where = ["--out", str(out)] if command == "run" else []
+        with pytest.raises(SystemExit) as exit_:
+            main([command, str(scenario), *where, *arguments])
+        said = capsys.readouterr()
+        results = load_results(out) if (out / "run.json").exists() else None
+        return exit_.value.code or 0, said.err + said.out, results
+
+    return go
+
+
+def by_fmpy(tmp_path, model, **options):
+    """Return what fmpy makes of an FMU that a test has written."""
+    from fmpy import simulate_fmu
+
+    return simulate_fmu(str(tmp_path / f"{model}.fmu"), output_interval=0.1, **options)
+
+
+@together_and_apart
+@pytest.mark.parametrize(
+    ("model", "parameters"),
+    [("Dahlquist", {"k": 2.5}), ("VanDerPol", {"mu": 3.0}), ("BouncingBall", {"e": 0.5, "g": -20.0})],
+)
+def test_models_agree_with_fmpys_own_simulation(run, tmp_path, model, parameters, isolate):
+    status, said, results = run({"a": (model, {"parameters": parameters})}, *isolate, stop_time=5)
+    assert status == 0, said
+    theirs = by_fmpy(tmp_path, model, stop_time=5, start_values=parameters)
+    assert results.run["fmus"]["a"]["fmi_version"] == "3.0"
+    for column in results:
+        difference = np.abs(results[column] - theirs[column.removeprefix("a.")])
+        assert difference.max() < 1e-12, column
+
+
+EVERY = {
+    "Float64": -0.1, "Float32": 0.1, "Int8": -128, "UInt8": 255, "Int16": -32768, "UInt16": 65535,
+    "Int32": -(2**31), "UInt32": 2**32 - 1, "Int64": -(2**53), "UInt64": 2**53, "Boolean": True,
+}  # fmt: skip
+
+
+@together_and_apart
+def test_every_type_passes_from_unit_to_unit(run, tmp_path, isolate):
+    constants = {f"a.{kind}_in": value for kind, value in EVERY.items()}
+    constants |= {"a.String_in": "größer", "a.mode_in": "wet"}
+    wires = [{"from": f"a.{kind}_out", "to": f"b.{kind}_in"} for kind in (*EVERY, "String", "mode")]
+    status, said, results = run(
+        {"a": ("Every", {}), "b": ("Every", {})}, *isolate, inputs=constants, connections=wires
+    )
+    assert status == 0, said
+    for unit in "ab":
+        last = {kind: results[f"{unit}.{kind}_out"][-1] for kind in EVERY}
+        assert last == {**EVERY, "Float32": float(np.float32(0.1))}
+        assert results[f"{unit}.mode_out"][-1] == 4
+    theirs = by_fmpy(tmp_path, "Every", start_values={f"{k}_in": v for k, v in EVERY.items()}, stop_time=1)
+    for kind in EVERY:
+        assert theirs[f"{kind}_out"][-1] == results[f"a.{kind}_out"][-1]
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "sentence"),
+    [
+        ("Int8", 128, "must be a whole number from -128 to 127 (got 128)"),
+        ("UInt64", -1, "must be a whole number from 0 to 18446744073709551615 (got -1)"),
+        ("Float32", 1e39, "must be a finite number (got 1e+39)"),
+    ],
+)
+def test_a_constant_that_a_type_cannot_hold_is_refused(run, kind, value, sentence):
+    constants = {f"a.{k}_in": v for k, v in EVERY.items()} | {"a.String_in": "", "a.mode_in": "dry"}
+    status, said, _ = run({"a": ("Every", {})}, inputs={**constants, f"a.{kind}_in": value})
+    assert status == 2
+    assert sentence in said
+
+
+@together_and_apart
+def test_a_value_on_a_wire_that_a_type_cannot_hold_ends_the_run(run, isolate):
+    constants = {f"{k}_in": v for k, v in EVERY.items() if k not in ("Int8", "Int64")}
+    constants |= {"a.Int8_in": 1, "a.Int64_in": 1000, "b.Int64_in": 1, "String_in": "", "mode_in": "dry"}
+    wires = [{"from": "a.Int64_out", "to": "b.Int8_in"}]
+    units = {"a": ("Every", {}), "b": ("Every", {})}
+    status, said, _ = run(units, *isolate, inputs=constants, connections=wires)
+    assert status == 1
+    assert "b: setting inputs failed at t = 0 s: 1000 does not fit into a variable of type Int8" in said
+
+
+@together_and_apart
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
+def test_arrays_are_wired_set_and_recorded_element_by_element(run, library, tmp_path, isolate, algorithm):
+    matrix = {"A[1,1]": 1.0, "A[1,2]": 2.0, "A[2,1]": 3.0}  # A[2,2] keeps its start value, 1
+    units = {"d": ("Dahlquist", {}), "m": ("Matrix", {"parameters": matrix}), "n": ("Matrix", {})}
+    wires = [{"from": "d.x", "to": "m.u[2]"}, {"from": "m.y[*]", "to": "n.u[*]"}]
+    status, said, results = run(
+        units, *isolate, inputs={"m.u[1]": 10.0}, connections=wires, algorithm=algorithm
+    )
+    assert status == 0, said
+    x = np.array([0.99 ** (10 * k) for k in range(11)])
+    assert np.allclose(results["d.x"], x, rtol=1e-12)
+    seen = x if algorithm != "jacobi" else np.array([x[0], *x[:-1]])
+    assert np.allclose(results["m.y[1]"], 10 + 2 * seen, rtol=1e-12)
+    assert np.allclose(results["m.y[2]"], 30 + seen, rtol=1e-12)
+    assert results["n.result[2]"].tolist() == results["n.y[2]"].tolist()  # an alias
+    if algorithm != "jacobi":
+        assert results["n.y[1]"].tolist() == results["m.y[1]"].tolist()
+
+
+@together_and_apart
+def test_units_of_both_versions_share_a_scenario(run, tmp_path, library, isolate):
+    old = write_fmu(tmp_path / "foreign.fmu", library, "Real")
+    units = {"d": ("Dahlquist", {}), "old": (old, {}), "m": ("Matrix", {})}
+    wires = [{"from": "d.x", "to": "old.Real_in"}, {"from": "old.Real_out", "to": "m.u[1]"}]
+    status, said, results = run(units, *isolate, inputs={"m.u[2]": 1.0}, connections=wires)
+    assert status == 0, said
+    assert results["m.y[1]"].tolist() == (2 * results["d.x"]).tolist()
+    assert [results.run["fmus"][u]["fmi_version"] for u in units] == ["3.0", "2.0", "3.0"]
+
+
+@together_and_apart
+def test_an_fmu_that_wants_to_end_ends_the_run_after_its_last_step(run, isolate):
+    status, said, results = run({"a": ("Stair", {})}, *isolate, stop_time=20, step_size=0.5)
+    assert status == 0, said
+    assert "ended: a ended the run at t = 9 s" in said
+    assert (results.time[-1], results["a.counter"][-1]) == (9.0, 10)
+    assert results.run["ended"]["time"] == 9.0
+
+
+@together_and_apart
+def test_a_step_from_which_an_fmu_returns_early_is_gone_to_its_end(run, isolate):
+    status, said, results = run({"a": ("Early", {})}, *isolate)
+    assert status == 0, said
+    assert np.allclose(results["a.gone"], results.time, atol=1e-12)
+
+
+@together_and_apart
+def test_an_fmu_that_returns_early_and_stays_is_an_error(run, isolate):
+    status, said, _ = run({"a": ("Stuck", {})}, *isolate)
+    assert status == 1
+    assert "a: step failed at t = 0 s: it returned early and stays at t = 0 s" in said
+
+
+@together_and_apart
+def test_a_parameter_that_does_not_take_ends_the_run(run, isolate):
+    status, said, _ = run({"a": ("Deaf", {"parameters": {"k": 2.0}})}, *isolate)
+    assert status == 1
+    assert "a: a parameter did not take the value that was set: k is 1 1/s, not 2 1/s" in said
+
+
+@together_and_apart
+def test_an_fmu_that_refuses_to_be_instantiated_says_why(run, isolate):
+    status, said, _ = run({"a": ("Refusing", {})}, *isolate)
+    assert status == 1
+    assert "a: " in said
+    assert "Refusing.fmu cannot be instantiated: no licence; 100%s of them are taken" in said
+
+
+@pytest.mark.parametrize(
+    ("model", "more", "to", "sentence"),
+    [
+        ("Matrix", {"parameters": {"n": 3}}, None, "structural parameter, which can only keep its start"),
+        ("Every", {}, "b.raw", "b.raw is Binary, which is not supported"),
+        ("Every", {}, "b.tick", "b.tick is a Clock, which is not supported"),
+    ],
+)
+def test_what_is_not_supported_is_refused_where_it_is_asked_for(run, model, more, to, sentence):
+    constants = {f"{k}_in": v for k, v in EVERY.items()} | {"String_in": "", "mode_in": "dry"}
+    inputs = constants if model == "Every" else {"u[*]": 0.0}
+    wires = [{"from": "a.Int8_out", "to": to}] if to else []
+    status, said, _ = run({"a": (model, {}), "b": (model, more)}, inputs=inputs, connections=wires)
+    assert status == 2
+    assert sentence in said
+
+
+@pytest.mark.parametrize(
+    ("interface", "words"),
+    [("ModelExchange", "model exchange"), ("ScheduledExecution", "scheduled execution")],
+)
+def test_other_interfaces_are_refused(run, tmp_path, models, interface, words):
+    path = make_fmu(tmp_path, "Dahlquist", models, interface=interface)
+    status, said, _ = run({"a": (path, {})})
+    assert status == 2
+    assert f"an FMU for {words} only; supported are FMI 2.0 and 3.0 for co-simulation" in said
+
+
+def test_check_shows_arrays_and_their_constants(run):
+    status, said, _ = run({"m": ("Matrix", {})}, command="check", inputs={"m.u[*]": 2.5})
+    assert status == 0, said
+    assert "m.u[1]" in said or "m.u[*]" in said
+    assert "Nothing is wrong" in said
