@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+if TYPE_CHECKING:
+    import numpy as np
 
 from .wording import cut
 
@@ -129,6 +132,33 @@ class Fmu:
         return [v for v in self.variables.values() if v.causality == causality]
 
 
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Values of an input over time, from a file."""
+
+    file: str  # as the scenario names it
+    column: str
+    sha256: str  # of the file
+    held: bool  # each value holds until the next; else they are joined by straight lines
+    times: np.ndarray  # shape (n,) [s], increasing
+    values: np.ndarray  # shape (n,), in the input's unit
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """Return the values at some times [s]; before the first and after the last, these hold."""
+        import numpy as np
+
+        if not self.held:
+            return np.interp(times, self.times, self.values)
+        found = np.searchsorted(self.times, times, side="right") - 1
+        return self.values[np.clip(found, 0, None)]
+
+    def first(self, time: float) -> Value:
+        """Return the value at the time [s] at which a run begins."""
+        import numpy as np
+
+        return self.at(np.array([time])).tolist()[0]
+
+
 @dataclass(frozen=True)
 class Unit:
     """One instance of an FMU in a scenario."""
@@ -137,12 +167,14 @@ class Unit:
     fmu: Fmu
     period: int  # in communication steps
     parameters: dict[str, Value]
-    constants: dict[str, Value]  # inputs that no unit drives
+    constants: dict[str, Value]  # inputs that no unit drives; of those with a series, the first value
     origins: dict[str, str] = field(default_factory=dict)
     """Parameter or constant -> where its value comes from: "default" (the FMU), "vehicle", "scenario", or the
     origin of the change that gave it."""
     tolerance: float | None = None
     """Relative, of the FMU's own solver; None: that of its default experiment, if it has one."""
+    series: dict[str, Series] = field(default_factory=dict)
+    """Inputs that follow a time series."""
 
 
 @dataclass(frozen=True)

@@ -145,7 +145,12 @@ def _constant_rows(units: Iterable[Unit]) -> Iterable[Sequence[str]]:
 
     for unit in units:
         by_value: dict[tuple[str, Value], list[str]] = {}
+        for name, series in unit.series.items():
+            how = "held" if series.held else "linear"
+            yield f"{unit.name}.{name}", f"{series.file}: {series.column}, {how}"
         for name, value in unit.constants.items():
+            if name in unit.series:
+                continue
             by_value.setdefault((unit.fmu.variables[name].unit or "1", value), []).append(name)
         for (measure, value), names in by_value.items():
             shown = _assignment("", value, measure).removeprefix(" = ")

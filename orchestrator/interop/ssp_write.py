@@ -46,6 +46,7 @@ from ..scenario.ssp_names import (
     SSV,
 )
 from ..titles import with_changes
+from ..wording import fold, listed
 from ..writing import write_whole
 
 _FILE_TIME = (1980, 1, 1, 0, 0, 0)
@@ -62,6 +63,9 @@ def write_ssp(plan: Plan, path: Path, standard: Version = "1.0") -> None:
         ResultsError: it cannot be written, or not in XML.
         ModelDescriptionError: an FMU is not there any more.
     """
+    followed = [f"{unit.name}.{name}" for unit in plan.units for name in unit.series]
+    if followed:
+        raise ResultsError(f"{path}: an archive has no place for the time series of {listed(fold(followed))}")
     sources = _sources(plan)
     try:
         structure = system_structure(plan, standard)

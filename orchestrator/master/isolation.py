@@ -57,7 +57,7 @@ class IsolatedSlave:
             raise self._refused(f"{unit.name}: {lost.in_('its start')}") from None
         try:
             # what the process needs of the FMU, which leaves out some hundred variables
-            failed = process.ask("open", replace(unit, fmu=replace(unit.fmu, variables={})))
+            failed = process.ask("open", replace(unit, fmu=replace(unit.fmu, variables={}), series={}))
         except Lost as lost:
             reason = lost.in_(f"{self._prefix}Instantiate or before")
             raise self._refused(f"{unit.name}: {unit.fmu.path} cannot be instantiated: {reason}") from None

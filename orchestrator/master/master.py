@@ -184,7 +184,8 @@ class Master:
         values: dict[str, Value] = {v.name: float(u) for v, u in zip(s.inputs, s.u, strict=True)}
         for variable, wire in s.other_inputs:
             if wire is None:
-                values[variable.name] = s.unit.constants[variable.name]
+                constant = s.unit.constants[variable.name]
+                values[variable.name] = self.memory.others.get((unit, variable.name), constant)
             elif (wire.source, wire.output) in self.memory.others:  # else its source has not been read yet
                 values[variable.name] = self.memory.other(wire)
         return values

@@ -59,6 +59,11 @@ class Station:
         return self.unit.name
 
     @property
+    def driven(self) -> bool:
+        """True if a Real input may change during a run."""
+        return any(self.wires) or any(v.name in self.unit.series for v in self.inputs)
+
+    @property
     def sampled(self) -> bool:
         """True for a unit that samples: it has outputs and all of them are discrete."""
         outputs = self.unit.fmu.of("output")

@@ -18,6 +18,7 @@ from ..plan import Place
 from .coupling import Weights, weights
 from .log import OK
 from .memory import Memory, Station
+from .series import feeding
 from .slave import Status
 
 KEPT = 1024
@@ -43,6 +44,9 @@ class Programs:
         self.cycle = math.lcm(*(s.unit.period for s in memory.stations))
         self._made: dict[int, list[Operation]] = {}
         self._gathers: dict[tuple, list[Operation]] = {}
+        self._feeds = {
+            s.name: Operation(s.name, "gather", feeding(memory, s)) for s in memory.stations if s.unit.series
+        }
 
     def at(self, k: int) -> list[Operation]:
         """Return what is to be done from communication point `k` - 1 to `k`."""
@@ -59,7 +63,7 @@ class Programs:
         beginning = [s for s in m.placed if (k - 1) % s.unit.period == 0]
         ending = [s for s in m.stations if k % s.unit.period == 0]
         fast = [s for s in beginning if s.unit.period == 1 and s.inputs]
-        operations = []
+        operations = [self._feeds[s.name] for s in beginning if s.unit.series]
         if fast:
             sources = np.concatenate([s.sources for s in fast])
             operations.append(Operation("", "gather", _held(m, sources, m.inputs[: len(sources)])))
@@ -76,6 +80,7 @@ class Programs:
         operations: list[Operation] = []
         for s in self._memory.stations:
             if k % s.unit.period == 0:
+                operations += [self._feeds[s.name]] if s.unit.series else []
                 operations += self._gathering(s, k)
                 operations += _setting(self._memory, s)
                 operations.append(Operation(s.name, "step", s.calls.step))
@@ -86,7 +91,7 @@ class Programs:
 
     def _gathering(self, s: Station, k: int) -> list[Operation]:
         m = self._memory
-        if not any(s.wires):
+        if not s.driven:
             return []
         per_input = []
         for variable, wire in zip(s.inputs, s.wires, strict=True):
@@ -175,9 +180,10 @@ def _copy(source: np.ndarray, target: np.ndarray) -> Callable[[], None]:
 
 def _setting(m: Memory, s: Station) -> list[Operation]:
     operations = []
-    if any(s.wires):
+    if s.driven:
         operations.append(Operation(s.name, "set", s.calls.set))
-    driven = {v.place[:2] for v, wire in s.other_inputs if wire is not None}  # of an array all elements
+    moving = [v for v, wire in s.other_inputs if wire is not None or v.name in s.unit.series]
+    driven = {v.place[:2] for v in moving}  # of an array all elements
     others = [(v, wire) for v, wire in s.other_inputs if v.place[:2] in driven]
     for kind in dict.fromkeys(v.place.type for v, _ in others):
         chosen = [(v, wire) for v, wire in others if v.place.type == kind]

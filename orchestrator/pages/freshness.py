@@ -24,6 +24,12 @@ COMPARED = {
     "title": "the scenario has changed",
 }
 """Key of a run's record -> what it means if it differs from the plan's."""
+_OF_UNIT = {
+    "parameters": "parameters",
+    "constants": "constants",
+    "series": "time series",
+    "step_size": "step",
+}
 PROGRAMS = ("yawbench", "orchestrator", "fmpy", "pythonfmu", "numpy")
 """Programs whose version, or sources, have a say in the numbers."""
 
@@ -68,8 +74,8 @@ def _changed_fmu(recorded: Mapping[str, Any], wanted: Mapping[str, Any]) -> str 
         known = recorded.get(unit, {})
         if known.get("sha256") != fmu["sha256"]:
             return f"{unit}: another {fmu['name']}.fmu"
-        for key, words in (("parameters", "parameters"), ("constants", "constants"), ("step_size", "step")):
-            if known.get(key) != fmu[key]:
+        for key, words in _OF_UNIT.items():
+            if known.get(key) != fmu.get(key):
                 return f"{unit}: other {words}"
     return None
 

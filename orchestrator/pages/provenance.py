@@ -135,7 +135,8 @@ def _vehicle_group(scenario: Scenario, file: Path) -> Group:
 def _constants(group: Group, scenario: Scenario, unit: Unit, comments: _Comments) -> None:
     alike: dict[str, list[str]] = {}
     for name, value in unit.constants.items():
-        alike.setdefault(text_of(value), []).append(name)
+        series = unit.series.get(name)
+        alike.setdefault(f"{series.file}: {series.column}" if series else text_of(value), []).append(name)
     for value_text, names in alike.items():
         for name in fold(names):
             _constant(group, scenario, unit, comments, name, value_text)

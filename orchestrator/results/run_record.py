@@ -9,7 +9,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from ..plan import Plan, Unit, Wire
+from ..plan import Plan, Series, Unit, Wire
 from ..sources import OF_RESULTS, sources_hash
 
 
@@ -66,8 +66,13 @@ def _fmu(unit: Unit, plan: Plan) -> dict[str, Any]:
         "origins": {name: origin for name, origin in unit.origins.items() if origin != "default"},
         # what the FMU has for the others
         "defaults": {v.name: v.start for v in fmu.of("parameter") if v.name not in unit.parameters},
-        "constants": dict(unit.constants),
-    }
+        "constants": {name: value for name, value in unit.constants.items() if name not in unit.series},
+    } | ({"series": {name: _series(one) for name, one in unit.series.items()}} if unit.series else {})
+
+
+def _series(series: Series) -> dict[str, Any]:
+    how = "held" if series.held else "linear"
+    return {"file": series.file, "column": series.column, "interpolation": how, "sha256": series.sha256}
 
 
 def versions() -> dict[str, str]:

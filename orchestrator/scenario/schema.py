@@ -11,14 +11,16 @@ import math
 import re
 from fractions import Fraction
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import (
     AfterValidator,
+    Discriminator,
     Field,
     PlainSerializer,
     PlainValidator,
     PrivateAttr,
+    Tag,
     WithJsonSchema,
     model_validator,
 )
@@ -127,6 +129,37 @@ Source = Annotated[Endpoint | list[str] | None, PlainValidator(_source), WithJso
 Target = Annotated[Endpoint | list[str], PlainValidator(_end), WithJsonSchema(_END_SCHEMA)]
 
 
+class SeriesSpec(Strict):
+    """A time series from a file, CSV, Parquet or ASAM MDF 4, in place of a constant.
+
+    Headers may name units (`delta [deg]`), and values are converted to that of the input. Under
+    `extrapolated`, an input that is integrated takes the value in the middle of the step, so a straight
+    line between two values counts to second order; `jacobi` takes that at its beginning.
+    """
+
+    file: str = Field(description="Path, relative to the scenario", min_length=1)
+    column: str | None = Field(
+        None,
+        description="Its name; a `*` is what that of the key stands for; left out: the input's",
+    )
+    time: str = Field("time", description="Column of times, in s if it names no unit; not of MDF")
+    interpolation: Literal["linear", "held"] = Field(
+        "linear", description="Between two values; what is no Real is held"
+    )
+    extrapolate: Literal["refuse", "hold"] = Field(
+        "refuse", description="What to do in a run beyond the file's times"
+    )
+
+
+def _is_series(value: object) -> str:
+    return "series" if isinstance(value, dict) else "value"
+
+
+InputValue = Annotated[
+    Annotated[Scalar, Tag("value")] | Annotated[SeriesSpec, Tag("series")], Discriminator(_is_series)
+]
+
+
 class Connection(Strict):
     """Connections beyond equal names; `*` in both ends connects everything that matches in pairs.
 
@@ -188,7 +221,7 @@ class Scenario(Strict):
     stop_time: Time = Field(description="s, an integer multiple of the communication step")
     step_size: Time = Field(description="s, communication step")
     algorithm: Algorithm = Field("extrapolated", description="How units are coupled")
-    inputs: dict[str, Scalar] = Field({}, description="[unit.]pattern -> constant; see below")
+    inputs: dict[str, InputValue] = Field({}, description="[unit.]pattern -> constant or time series")
     units: dict[UnitName, UnitSpec] = Field(description="Name -> unit", min_length=1)
     connections: list[Connection] = Field([], description="Connections beyond equal names")
     record: list[Variables] | None = Field(

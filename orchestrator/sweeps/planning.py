@@ -129,6 +129,9 @@ def run_key(plan: Plan, metrics: Any) -> str:
     content = {
         "yawbench": [version_of("yawbench"), sources_hash(OF_METRICS)],
         "units": [[u.name, u.fmu.sha256, u.period, u.parameters, u.constants] for u in plan.units],
+        "series": [
+            [u.name, name, s.sha256, s.column, s.held] for u in plan.units for name, s in u.series.items()
+        ],
         "wires": [[w.source, w.output, w.target, w.input] for w in plan.wires],
         "record": plan.record,
         "step": str(plan.step),

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import replace
 
-from ..plan import Fmu, Value, Variable, Wire
+from ..plan import Fmu, Series, Value, Variable, Wire
 from ..scenario.load import Connection, Scenario
 from ..scenario.yaml_lines import PROBLEMS, Key, dotted
 from ..wording import WHEELS, fold, fold_sentences, hint, listed
@@ -49,14 +49,14 @@ class Connector:
         self._refused: set[Input] = set()  # by equal names
         self._fitting: dict[object, dict[str, list[str]]] = {}  # kind of an input -> see `_fitting_outputs`
 
-    def connect(self) -> tuple[list[Wire], dict[str, dict[str, Value]]]:
-        """Return all wires, and each unit's constants."""
+    def connect(self) -> tuple[list[Wire], dict[str, dict[str, Value | Series]]]:
+        """Return all wires, and each unit's constants and time series."""
         wires = self._by_connections()
         given = constants(self._scenario, self._fmus, self._replaced, self._notes, self._found)
         own = {target for target, constant in given.items() if constant.of_unit}
         self._note_overruled(own - wires.keys())
         ambiguous = self._by_names(wires, own | self._refused)
-        values = {}
+        values: dict[Input, Value | Series] = {}
         for target, constant in self._given(given, wires).items():
             values[target] = constant.value
             self._origins[target[0]][target[1]] = constant.origin
@@ -73,7 +73,7 @@ class Connector:
         fitted = [self._fitted(wire, key) for wire, key in wires.values()]
         self._note_units(wire for wire, key in wires.values() if self._scale(key) is None)
         self._tell()
-        by_unit: dict[str, dict[str, Value]] = {unit: {} for unit in self._fmus}
+        by_unit: dict[str, dict[str, Value | Series]] = {unit: {} for unit in self._fmus}
         for (unit, name), value in values.items():
             by_unit[unit][name] = value
         return fitted, by_unit
@@ -87,7 +87,7 @@ class Connector:
                 overruled.setdefault((unit, source), []).append(name)
         for (unit, source), names in sorted(overruled.items()):
             for name in fold([v for v in self._inputs[unit] if v in names]):
-                self._notes.append(f"{unit}.{name} is constant: {source}.{name} does not drive it")
+                self._notes.append(f"{unit}.{name} has a value of its own: {source}.{name} does not drive it")
 
     def _explicit(self, unit: str) -> bool:
         """Return whether only the scenario's connections count for the inputs of a unit."""

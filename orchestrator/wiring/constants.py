@@ -1,16 +1,18 @@
-"""The constants that the scenario gives to inputs, each of the most specific pattern."""
+"""The constants and time series that the scenario gives to inputs, each of the most specific pattern."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from ..plan import Fmu, Value
+from ..plan import Fmu, Series, Value
 from ..scenario.load import Scenario
+from ..scenario.schema import SeriesSpec
 from ..scenario.yaml_lines import Key
 from ..wording import fold, hint
 from .parameters import origin, value_for
 from .patterns import Replaced, had, matching
+from .series import series_reader
 
 Input = tuple[str, str]  # unit, variable
 
@@ -19,7 +21,7 @@ Input = tuple[str, str]  # unit, variable
 class Constant:
     """What the scenario gives to one input."""
 
-    value: Value
+    value: Value | Series
     key: Key
     origin: str
     of_unit: bool  # the key names the unit, so it goes before equal names
@@ -40,21 +42,23 @@ def constants(
 ) -> dict[Input, Constant]:
     """Return what `inputs` gives to each input; problems and remarks go to the two lists."""
     found: dict[Input, Constant] = {}
+    read = series_reader(scenario)
     inputs = {unit: {v.name: v for v in fmu.of("input")} for unit, fmu in fmus.items()}
     for pattern, raw in scenario.inputs.items():
         key: Key = ("inputs", pattern)
         prefix, _, rest = pattern.partition(".")
         of_unit = prefix in fmus
         units, name_pattern = ([prefix], rest) if of_unit else (list(fmus), pattern)
-        targets = [(u, name) for u in units for name in matching(name_pattern, inputs[u]).values()]
-        if not targets and had(scenario, replaced, units, name_pattern, "input"):
+        parts = {(u, name): part for u in units for part, name in matching(name_pattern, inputs[u]).items()}
+        if not parts and had(scenario, replaced, units, name_pattern, "input"):
             notes.append(f"inputs.{pattern} is left out: no unit has such an input after the swap")
-        elif not targets:
+        elif not parts:
             problems.append((key, f"no input matches{_alike(name_pattern, units, fmus)}"))
-        for unit, name in targets:
-            value = raw
+        for (unit, name), part in parts.items():
+            variable = fmus[unit].variables[name]
+            value: Value | Series = 0
             try:
-                value = value_for(fmus[unit].variables[name], raw)
+                value = read(raw, part, variable) if isinstance(raw, SeriesSpec) else value_for(variable, raw)
             except ValueError as error:
                 problems.append((key, f"{error}, for {unit}.{name}"))
             one = Constant(value, key, origin(scenario.document, key), of_unit, "*" not in pattern)

@@ -22,7 +22,7 @@ from ..errors import BuildError, ModelDescriptionError, WiringError
 from ..fmu.opener import Opener, host_needs, stale_fmus
 from ..fmu.search import find_fmu, find_folder
 from ..fmu.shadowing import shadowed_modules
-from ..plan import Fmu, Plan, Unit, Wire
+from ..plan import Fmu, Plan, Series, Unit, Value, Wire
 from ..scenario.load import Scenario
 from ..scenario.overrides import is_path
 from .connections import Connector
@@ -57,7 +57,8 @@ def make_plan(
     origins: dict[str, dict[str, str]] = {name: {} for name in opened}
     parameters = Parameters(scenario, opened, replaced, notes, origins).of_units()
     connector = Connector(scenario, opened, replaced, notes, origins)
-    wires, constants = connector.connect()
+    wires, values = connector.connect()
+    constants, series = _divided(values, float(scenario.start_time))
     record = recorded(scenario, opened, replaced, notes)
     if not isolated:
         _check_instances(scenario, opened)
@@ -73,8 +74,9 @@ def make_plan(
     ]
     units = {
         name: Unit(
-            name, fmu, _period(scenario, name), parameters[name], constants[name], origins[name],
-            tolerance=scenario.units[name].tolerance,
+            name, fmu, _period(scenario, name), parameters[name],
+            constants[name],
+            origins[name], tolerance=scenario.units[name].tolerance, series=series[name],
         )
         for name, fmu in opened.items()
     }  # fmt: skip
@@ -101,6 +103,21 @@ def make_plan(
         notes=tuple(notes),
         changes=scenario.changes,
     )
+
+
+def _divided(
+    values: Mapping[str, Mapping[str, Value | Series]], start: float
+) -> tuple[dict[str, dict[str, Value]], dict[str, dict[str, Series]]]:
+    """Return what each unit's inputs begin with at `start` [s], and the time series of some of them."""
+    first = {
+        unit: {name: v.first(start) if isinstance(v, Series) else v for name, v in given.items()}
+        for unit, given in values.items()
+    }
+    series = {
+        unit: {name: v for name, v in given.items() if isinstance(v, Series)}
+        for unit, given in values.items()
+    }
+    return first, series
 
 
 def _open_all(

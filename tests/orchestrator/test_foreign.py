@@ -331,3 +331,20 @@ def test_an_fmu_without_a_function_that_is_needed_is_refused_before_the_run(
         main(["check", str(tmp_path / "two.yaml")])
     assert exit_.value.code == 2
     assert "a: the library of foreign lacks fmi2GetString, which String_out needs" in capsys.readouterr().err
+
+
+@together_and_apart
+def test_a_foreign_unit_takes_time_series_of_every_type(run, isolate, tmp_path):
+    (tmp_path / "d.csv").write_text("time,r,i,b,s\n0,0,1,0,x\n0.25,1,2,1,y\n0.5,2,3,0,z\n", encoding="utf-8")
+    given = {
+        kind: f"{{file: d.csv, column: {name}}}"
+        for kind, name in (("Real", "r"), ("Integer", "i"), ("Boolean", "b"), ("String", "s"))
+    }
+    status, said, results = run(*isolate, given=given, record="record: ['a.*', a.String_out]")
+    assert status == 0, said
+    # the output follows the input at once, so it is that of the end of the step; it doubles and negates
+    assert results["a.Real_out"].tolist() == pytest.approx([8 * t for t in results.time])
+    assert results["a.Integer_out"].tolist() == [2] * 5 + [4] * 5 + [6]
+    assert results["a.Boolean_out"].tolist() == [1] * 5 + [0] * 5 + [1]
+    assert results["a.String_out"].tolist() == ["<x>"] * 5 + ["<y>"] * 5 + ["<z>"]
+    assert set(results.run["fmus"]["a"]["series"]) == {f"{kind}_in" for kind in given}

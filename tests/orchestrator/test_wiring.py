@@ -730,8 +730,8 @@ def test_a_constant_that_names_the_unit_goes_before_equal_names_with_a_note() ->
     assert [w.target for w in made.wires if w.output == "steer_angle"] == ["controller"]
     assert not [w for w in made.wires if w.input.startswith("slip_ratio")]
     assert made.notes == (
-        "plant.steer_angle is constant: driver.steer_angle does not drive it",
-        "tyre.slip_ratio_* is constant: plant.slip_ratio_* does not drive it",
+        "plant.steer_angle has a value of its own: driver.steer_angle does not drive it",
+        "tyre.slip_ratio_* has a value of its own: plant.slip_ratio_* does not drive it",
     )
 
 

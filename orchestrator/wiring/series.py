@@ -1,0 +1,136 @@
+"""Time series for inputs: in the unit and type of the input, and complete for the run."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..files import reason
+from ..plan import Series, Value, Variable
+from ..scenario.load import Scenario
+from ..scenario.measurement_units import Measure, conversion, measure_of
+from ..scenario.schema import SeriesSpec
+from .parameters import value_for
+from .series_file import SeriesFile
+
+Reader = Callable[[SeriesSpec, str, Variable], Series]
+"""Gives an input what a specification says, for what the `*` of its key stands for ("" without one)."""
+
+_SECOND, _ONE = measure_of("s"), measure_of("1")
+
+
+def series_reader(scenario: Scenario) -> Reader:
+    """Return what reads the time series of a scenario, every file once.
+
+    It raises ValueError with a sentence: the file or a column is missing or no use, the unit does not
+    fit, the times do not cover the run.
+    """
+
+    @cache
+    def opened(file: str) -> SeriesFile:
+        path = Path(os.path.normpath(scenario.path.parent / file))
+        try:
+            return SeriesFile(path)
+        except OSError as error:
+            raise ValueError(f"{path}: {reason(error)}") from None
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None
+
+    def read(spec: SeriesSpec, part: str, variable: Variable) -> Series:
+        file = opened(spec.file)
+        name = (spec.column or variable.name).replace("*", part)
+        try:
+            column = file.column(name, spec.time)
+            times = _numbers(column.times, f"time {spec.time!r}") * _gain(column.time_unit, _SECOND)[0]
+            values = _values(column.values, column.unit, name, variable)
+            _check_times(times, scenario, spec)
+        except ValueError as error:
+            raise ValueError(f"{spec.file}: {error}") from None
+        held = spec.interpolation == "held" or variable.type != "Real"
+        return Series(spec.file, name, file.sha256, held, times, values)
+
+    return read
+
+
+def _gain(unit: str | None, target: Measure | None) -> tuple[float, float]:
+    """Return gain and offset from a column's unit."""
+    if unit is None or target is None:
+        return 1.0, 0.0
+    source = measure_of(unit)
+    between = None if source is None else conversion(source, target)
+    if between is None:
+        raise ValueError(f"its unit {unit!r} does not fit")
+    return between
+
+
+def _numbers(column: np.ndarray, what: str) -> np.ndarray:
+    """Return a column as finite numbers."""
+    try:
+        numbers = column.astype(float)
+    except (TypeError, ValueError):
+        row = next(i for i, cell in enumerate(column, start=1) if not _is_number(cell))
+        raise ValueError(f"{what}: value {row} is no number ({column[row - 1]!r})") from None
+    bad = np.flatnonzero(~np.isfinite(numbers))
+    if bad.size:
+        raise ValueError(f"{what}: value {bad[0] + 1} is not finite ({numbers[bad[0]]:g})")
+    return numbers
+
+
+def _is_number(cell: Any) -> bool:
+    try:
+        float(cell)
+    except (TypeError, ValueError):
+        return False
+    return True
+
+
+def _values(column: np.ndarray, unit: str | None, name: str, variable: Variable) -> np.ndarray:
+    """Return a column's values as the variable takes them."""
+    if variable.type == "Real":
+        try:
+            gain, offset = _gain(unit, measure_of(variable.unit, variable.definition))
+        except ValueError as error:
+            raise ValueError(f"column {name!r}: {error}: {variable.unit or 'none'} is wanted") from None
+        numbers = _numbers(column, f"column {name!r}")
+        numbers = numbers if (gain, offset) == (1.0, 0.0) else gain * numbers + offset
+        for extreme in (numbers.min(), numbers.max()):
+            value_for(variable, float(extreme))
+        return numbers
+    taken = np.empty(len(column), dtype=object)
+    for i, cell in enumerate(column.tolist()):
+        try:
+            taken[i] = value_for(variable, _plain(cell, variable))
+        except ValueError as error:  # noqa: PERF203 - the first is told
+            raise ValueError(f"column {name!r}: value {i + 1} {error}") from None
+    return taken
+
+
+def _plain(cell: Any, variable: Variable) -> Value:
+    """Return a cell as a scenario would say it: files know no whole numbers, and truth as 1."""
+    if variable.type == "Boolean" and cell in (0, 1):
+        return bool(cell)
+    return int(cell) if isinstance(cell, float) and cell.is_integer() else cell
+
+
+def _check_times(times: np.ndarray, scenario: Scenario, spec: SeriesSpec) -> None:
+    back = np.flatnonzero(np.diff(times) <= 0)
+    if back.size:
+        at = int(back[0]) + 1
+        raise ValueError(f"time must increase: {times[at]:g} s follows {times[at - 1]:g} s (value {at + 1})")
+    if spec.extrapolate == "hold":
+        return
+    start, stop = float(scenario.start_time), float(scenario.stop_time)
+    slack = 1e-9 * max(abs(start), abs(stop))
+    last = float(times[-1])
+    if spec.interpolation == "held" and len(times) > 1:
+        last += float(times[-1] - times[-2])  # its last value holds as long as the one before
+    if times[0] > start + slack or last < stop - slack:
+        raise ValueError(
+            f"covers {times[0]:g} to {times[-1]:g} s of a run from {start:g} to {stop:g} s; "
+            "'extrapolate: hold' would hold its ends"
+        )

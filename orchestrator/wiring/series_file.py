@@ -1,0 +1,168 @@
+"""Files of time series: columns by name, with the units of measurement that their headers give.
+
+CSV (`,`, `;` or tab), Parquet, ASAM MDF 4. A header may name a unit, `delta [deg]`; Parquet has it in
+the field's metadata, MDF in the channel. Results of a run here have theirs in the run.json beside them.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..files import read_bytes
+from ..wording import hint
+
+LARGEST = 1_000_000_000
+"""Bytes of a file. Chosen: it is held in memory."""
+BESIDE = "run.json"
+_HEADER = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column as it stands in the file, and the times of its values."""
+
+    times: np.ndarray  # shape (rows,) [time_unit]
+    values: np.ndarray  # shape (rows,), numbers or text
+    time_unit: str | None
+    unit: str | None
+
+
+class SeriesFile:
+    """A file of columns, read into memory.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: a sentence; so does `column`.
+    """
+
+    def __init__(self, path: Path) -> None:
+        raw = read_bytes(path, largest=LARGEST)
+        self.sha256 = hashlib.sha256(raw).hexdigest()
+        kinds: dict[str, Callable[[bytes], _Table]] = {".csv": _csv, ".parquet": _parquet, ".mf4": _mdf}
+        if path.suffix.lower() not in kinds:
+            raise ValueError(f"must be a file of type {', '.join(kinds)}")
+        self._table = kinds[path.suffix.lower()](raw)
+        self._beside = _units_beside(path)
+
+    def column(self, name: str, time: str) -> Column:
+        """Return a column and the one of its times, which in MDF every channel has of its own."""
+        at = self._find(name)
+        own = self._table.times(at) if self._table.times else None
+        if own is not None:
+            return Column(own, self._table.values(at), "s", self._unit(at))
+        clock = self._find(time)
+        return Column(self._table.values(clock), self._table.values(at), self._unit(clock), self._unit(at))
+
+    def _find(self, name: str) -> int:
+        names = self._table.names
+        found = [i for i, one in enumerate(names) if one == name] or [
+            i for i, one in enumerate(self._table.headers) if one == name
+        ]
+        if len(found) > 1:
+            raise ValueError(f"{len(found)} columns are called {name!r}")
+        if not found:
+            raise ValueError(f"has no column {name!r}{hint(name, names, lead='it has')}")
+        return found[0]
+
+    def _unit(self, at: int) -> str | None:
+        return self._table.units[at] or self._beside.get(self._table.names[at]) or None
+
+
+class _Table:
+    """Headers, and a function that gives the values of a column by its number."""
+
+    times: Callable[[int], np.ndarray] | None = None
+
+    def __init__(self, headers: list[str], values: Callable[[int], np.ndarray]) -> None:
+        matches = [_HEADER.fullmatch(header) for header in headers]
+        self.headers = headers
+        self.names = [m["name"] if m else h.strip() for m, h in zip(matches, headers, strict=True)]
+        self.units: list[str | None] = [m["unit"].strip() if m else None for m in matches]
+        self.values = values
+
+
+def _csv(raw: bytes) -> _Table:
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise ValueError("is not UTF-8") from None
+    first = text.partition("\n")[0]
+    delimiter = max(",;\t", key=first.count)
+    rows = [row for row in csv.reader(io.StringIO(text, newline=""), delimiter=delimiter) if row]
+    if len(rows) < 2:
+        raise ValueError("has no rows")
+    for number, row in enumerate(rows, start=1):
+        if len(row) != len(rows[0]):
+            raise ValueError(f"row {number} has {len(row)} values for {len(rows[0])} columns")
+    return _Table(rows[0], lambda at: _numbers([row[at] for row in rows[1:]]))
+
+
+def _numbers(cells: list[str]) -> np.ndarray:
+    try:
+        return np.array([float(cell) for cell in cells])
+    except ValueError:
+        return np.array(cells, dtype=object)
+
+
+def _parquet(raw: bytes) -> _Table:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.read_table(pa.BufferReader(raw))
+    except pa.ArrowInvalid as error:
+        raise ValueError(f"is no Parquet file, or damaged: {error}") from None
+    made = _Table(table.column_names, lambda at: table.column(at).to_numpy())
+    for at, field in enumerate(table.schema):
+        made.units[at] = made.units[at] or (field.metadata or {}).get(b"unit", b"").decode()
+    return made
+
+
+def _mdf(raw: bytes) -> _Table:
+    try:
+        import asammdf
+    except ImportError:
+        raise ValueError("ASAM MDF needs the package asammdf: pip install 'yawbench[mdf]'") from None
+    try:
+        mdf: Any = asammdf.MDF(io.BytesIO(raw))
+        places = [
+            (group, index, channel)
+            for group, one in enumerate(mdf.groups)
+            for index, channel in enumerate(one.channels)
+            if index != mdf.masters_db.get(group)
+        ]
+    except Exception as error:  # asammdf raises whatever its parsing meets
+        raise ValueError(f"is no MDF file, or damaged: {' '.join(str(error).split())}") from None
+
+    def signal(at: int) -> Any:
+        group, index, _ = places[at]
+        return mdf.get(group=group, index=index)
+
+    def values(at: int) -> np.ndarray:
+        samples = signal(at).samples
+        return np.char.decode(samples, "utf-8").astype(object) if samples.dtype.kind == "S" else samples
+
+    made = _Table([channel.name for _, _, channel in places], values)
+    made.times = lambda at: signal(at).timestamps
+    made.units = [channel.unit for _, _, channel in places]
+    return made
+
+
+def _units_beside(path: Path) -> Mapping[str, str]:
+    """Return the units of recorded results."""
+    try:
+        record = json.loads(read_bytes(path.parent / BESIDE, largest=LARGEST))
+        units = record["units"] if record.get("results", "results.csv") == path.name else {}
+        return {str(name): str(unit) for name, unit in units.items() if unit}
+    except (OSError, ValueError, KeyError, AttributeError):
+        return {}

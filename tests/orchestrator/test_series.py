@@ -1,0 +1,321 @@
+"""Time series as inputs: read from files, checked before the run, exact at the instants of the coupling."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.cli import main
+from orchestrator.errors import ResultsError, YawbenchError
+from orchestrator.interop.ssp_write import write_ssp
+from orchestrator.master.simulate import simulate
+from orchestrator.pages.freshness import staleness
+from orchestrator.plan import Plan, Series
+from orchestrator.results.read import load_results
+from orchestrator.scenario.load import load_scenario
+from orchestrator.wiring.make_plan import make_plan
+
+from .fake_fmus import WHEELS, Var, make_fmu, out
+from .fakes import Behaviour, Stage
+from .fakes import make_plan as fake_plan
+
+pytestmark = pytest.mark.usefixtures("cache")
+
+
+class Witness(Behaviour):
+    """Writes down its inputs at every step: `middle` is integrated, `end` is passed through."""
+
+    inputs = ("middle", "end", "count", "word")
+    outputs = {"y": ("end",)}
+    types = {"count": "Integer", "word": "String"}
+
+    def __init__(self) -> None:
+        self.seen: list[tuple] = []
+
+    def advance(self, t, h, u):
+        self.seen.append((t, *(u[name] for name in self.inputs)))
+
+    def output(self, t, u):
+        return {"y": u["end"]}
+
+
+def ramp(*, held: bool = False) -> Series:
+    return Series("f.csv", "c", "0", held, np.array([0.0, 0.3, 2.0]), np.array([1.0, 4.0, -13.0]))
+
+
+def texts(*values: object) -> Series:
+    return Series("f.csv", "c", "0", True, np.array([0.0, 0.25, 0.5]), np.array(values, dtype=object))
+
+
+def run(algorithm: str, period: int, tmp_path: Path, *, held: bool = False) -> list[tuple]:
+    witness = Witness()
+    series = {
+        "middle": ramp(held=held),
+        "end": ramp(held=held),
+        "count": texts(7, 8, 9),
+        "word": texts(*"abc"),
+    }
+    plan = fake_plan(
+        {"w": witness},
+        step="1/8", n_steps=12, algorithm=algorithm, periods={"w": period},  # type: ignore[arg-type]
+        constants={"w": {name: one.first(0.0) for name, one in series.items()}},
+    )  # fmt: skip
+    plan.units[0].series.update(series)
+    simulate(plan, tmp_path, opener=Stage({"w": witness}))
+    return witness.seen
+
+
+@pytest.mark.parametrize("period", [1, 3])
+@pytest.mark.parametrize(
+    ("algorithm", "middle", "end"),
+    [("jacobi", 0.0, 0.0), ("gauss_seidel", 1.0, 1.0), ("extrapolated", 0.5, 1.0)],
+)
+def test_a_series_has_its_exact_value_where_the_coupling_asks(algorithm, middle, end, period, tmp_path):
+    seen = run(algorithm, period, tmp_path)
+    assert len(seen) == 12 // period
+    h = period / 8
+    for t, at_middle, at_end, count, word in seen:
+        assert at_middle == pytest.approx(np.interp(t + middle * h, [0, 0.3, 2], [1, 4, -13]), abs=1e-12)
+        assert at_end == pytest.approx(np.interp(t + end * h, [0, 0.3, 2], [1, 4, -13]), abs=1e-12)
+        place = min(int((t + end * h) * 4 + 1e-9), 2)
+        assert (count, word) == ((7, 8, 9)[place], "abc"[place])
+
+
+def test_a_held_series_keeps_each_value_until_the_next(tmp_path):
+    seen = run("gauss_seidel", 1, tmp_path, held=True)
+    assert [one[1] for one in seen[:4]] == [1.0, 1.0, 4.0, 4.0]
+
+
+def test_an_instant_given_in_decimals_counts_as_reached(tmp_path):
+    """0.1 + 0.2 is more than 0.3 in binary numbers, and 3 x 0.1 too."""
+    witness = Witness()
+    series = Series("f", "c", "0", True, np.array([0.0, 0.1 + 0.2]), np.array([0.0, 1.0]))
+    plan = fake_plan(
+        {"w": witness}, step="1/10", n_steps=4, algorithm="gauss_seidel",
+        constants={"w": {"middle": 0.0, "end": 0.0, "count": 0, "word": ""}},
+    )  # fmt: skip
+    plan.units[0].series.update(middle=series)
+    simulate(plan, tmp_path, opener=Stage({"w": witness}))
+    assert [one[1] for one in witness.seen] == [0.0, 0.0, 1.0, 1.0]
+
+
+class Area(Behaviour):
+    """Integrates its input."""
+
+    inputs = ("rate",)
+    outputs = {"x": ()}
+
+    def start(self, u):
+        self.x = 0.0
+
+    def advance(self, t, h, u):
+        self.x += h * u["rate"]
+
+    def output(self, t, u):
+        return {"x": self.x}
+
+
+@pytest.mark.parametrize(("algorithm", "order"), [("extrapolated", 2.0), ("jacobi", 1.0)])
+def test_an_integrated_series_is_of_second_order_when_extrapolated(algorithm, order, tmp_path):
+    times = np.linspace(0.0, 1.0, 1001)
+    error = []
+    for n in (10, 20):
+        units = {"a": Area()}
+        plan = fake_plan(units, step=f"1/{n}", n_steps=n, algorithm=algorithm, constants={"a": {"rate": 1.0}})
+        plan.units[0].series.update(rate=Series("f", "c", "0", False, times, np.exp(times)))
+        simulate(plan, tmp_path / str(n), opener=Stage(units))
+        error.append(abs(load_results(tmp_path / str(n))["a.x"][-1] - (math.e - 1)))
+    assert math.log2(error[0] / error[1]) == pytest.approx(order, abs=0.1)
+
+
+# From files
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working directory elsewhere, and a scenario's folder with FMUs and data."""
+    make_fmu(
+        tmp_path / "fmus/plant.fmu",
+        inputs=[
+            Var("steer_angle", "rad", minimum=-2.0),
+            Var("torque_*", "N.m"),
+            Var("gear", type="Integer", start=1),
+            Var("on", type="Boolean", start=False),
+        ],
+        outputs=[out("yaw_rate", unit="rad/s")],
+    )
+    make_fmu(tmp_path / "fmus/driver.fmu", outputs=[out("steer_angle", unit="rad")])
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs/data.csv").write_text(
+        "\ufefftime [ms],delta [deg],t_fl,t_fr,t_rl,t_rr,gear,on\n"
+        "0,0,1,2,3,4,1,0\n500,90,1,2,3,4,2,1\n1000,180,1,2,3,4,3,0\n",
+        encoding="utf-8",
+    )
+    return tmp_path
+
+
+GIVEN = {
+    "plant.steer_angle": "{file: data.csv, column: delta}",
+    "torque_*": "{file: data.csv, column: t_*}",
+    "gear": "{file: data.csv}",
+    "on": "{file: data.csv}",
+}
+
+
+def scenario(**changed: str | None) -> Path:
+    """Write a scenario; arguments are inputs, with _ for the dot of `plant.`"""
+    given = GIVEN | {k.replace("plant_", "plant.", 1): v for k, v in changed.items()}
+    inputs = "".join(f'  "{key}": {value}\n' for key, value in given.items() if value is not None)
+    path = Path("runs/a.yaml")
+    path.write_text(f"stop_time: 1\nstep_size: 0.1\nunits: {{plant: {{fmu: plant}}}}\ninputs:\n{inputs}")
+    return path
+
+
+def plan_of(path: Path) -> Plan:
+    return make_plan(load_scenario(path))
+
+
+def problem(path: Path) -> str:
+    with pytest.raises(YawbenchError) as caught:
+        plan_of(path)
+    assert caught.value.exit_status == 2
+    (sentence,) = caught.value.problems
+    return sentence.partition(": ")[2]
+
+
+def test_columns_are_read_relative_to_the_scenario_in_units_and_types_of_the_inputs(folder: Path) -> None:
+    (plant,) = plan_of(scenario()).units
+    steer = plant.series["steer_angle"]
+    assert steer.times.tolist() == [0.0, 0.5, 1.0]
+    assert steer.values.tolist() == pytest.approx([0.0, math.pi / 2, math.pi])
+    assert [plant.series[f"torque_{w}"].values[0] for w in WHEELS] == [1, 2, 3, 4]
+    assert plant.series["gear"].values.tolist() == [1, 2, 3]
+    assert plant.series["on"].values.tolist() == [False, True, False]
+    assert plant.series["gear"].held
+    assert plant.constants["gear"] == 1
+    assert steer.sha256 == hashlib.sha256(Path("runs/data.csv").read_bytes()).hexdigest()
+
+
+def test_a_series_for_a_units_input_goes_before_equal_names(folder: Path) -> None:
+    path = scenario()
+    path.write_text(path.read_text().replace("units: {", "units: {driver: {fmu: driver}, "))
+    made = plan_of(path)
+    assert made.wires == ()
+    assert made.notes == ("plant.steer_angle has a value of its own: driver.steer_angle does not drive it",)
+
+
+@pytest.mark.parametrize("form", ["parquet", "mf4", "csv"])
+def test_recorded_results_are_a_source_with_their_units(form, folder, monkeypatch) -> None:
+    """Of a run of any format; degrees that were recorded arrive as radians."""
+
+    class Clock(Behaviour):
+        outputs = {"angle": ()}
+
+        def output(self, t, u):
+            return {"angle": 90.0 * t}
+
+    units = {"driver": Clock()}
+    plan = fake_plan(units, step="1/10", n_steps=10)
+    variables = plan.units[0].fmu.variables
+    object.__setattr__(variables["angle"], "unit", "deg")
+    simulate(plan, folder / "recorded", opener=Stage(units), format=form)
+    file = f"../recorded/results.{form}"
+    path = scenario(plant_steer_angle=f"{{file: {file}, column: driver.angle}}")
+    (plant,) = plan_of(path).units
+    assert plant.series["steer_angle"].values[-1] == pytest.approx(math.pi / 2)
+    assert plant.series["steer_angle"].times[-1] == pytest.approx(1.0)
+
+
+def test_check_and_run_json_tell_of_a_series_and_a_changed_file_makes_results_stale(folder, capsys) -> None:
+    path = scenario()
+    with pytest.raises(SystemExit) as ended:
+        main(["check", str(path)])
+    shown = " ".join(capsys.readouterr().out.split())
+    assert not ended.value.code
+    assert "plant.steer_angle data.csv: delta, linear" in shown
+    assert "plant.gear data.csv: gear, held" in shown
+
+    class Plant(Behaviour):
+        def output(self, t, u):
+            return {"yaw_rate": u["steer_angle"]}
+
+    simulate(plan_of(path), folder / "out", opener=Stage({"plant": Plant()}))
+    record = json.loads((folder / "out/run.json").read_text())["fmus"]["plant"]
+    digest = hashlib.sha256(Path("runs/data.csv").read_bytes()).hexdigest()
+    assert record["series"]["steer_angle"] == {
+        "file": "data.csv", "column": "delta", "interpolation": "linear", "sha256": digest
+    }  # fmt: skip
+    assert "steer_angle" not in record["constants"]
+    assert staleness(plan_of(path), folder / "out") is None
+    data = Path("runs/data.csv")
+    data.write_text(data.read_text().replace("500,90", "500,91"))
+    assert staleness(plan_of(path), folder / "out") == "plant: other time series"
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ("{file: dta.csv}", "runs/dta.csv: "),
+        ("{file: data.txt}", "runs/data.txt: "),
+        ("{file: data.csv, column: dlta}", "data.csv: has no column 'dlta'; did you mean 'delta'?"),
+        ("{file: data.csv, column: delta, time: t}", "data.csv: has no column 't'"),
+        (
+            "{file: data.csv, column: 't_fl [m]'}",
+            "data.csv: has no column 't_fl [m]'; did you mean 't_fl'?",
+        ),
+        ("{file: data.csv, column: word}", "data.csv: column 'word': value 2 is no number ('high')"),
+        ("{file: data.csv, column: gap}", "data.csv: column 'gap': value 2 is not finite (nan)"),
+        (
+            "{file: data.csv, column: mass}",
+            "data.csv: column 'mass': its unit 'kg' does not fit: rad is wanted",
+        ),
+        ("{file: data.csv, column: low}", "data.csv: must be at least -2 rad (got -7.0)"),
+        ("{file: data.csv, column: twice}", "data.csv: 2 columns are called 'twice'"),
+        ("{file: back.csv, column: x}", "back.csv: time must increase: 0.5 s follows 0.5 s (value 3)"),
+        (
+            "{file: short.csv, column: x}",
+            "short.csv: covers 0 to 0.5 s of a run from 0 to 1 s; 'extrapolate: hold' would hold its ends",
+        ),
+        ("{file: uneven.csv, column: x}", "runs/uneven.csv: row 3 has 1 values for 2 columns"),
+        ("{file: empty.csv, column: x}", "runs/empty.csv: has no rows"),
+        ("{file: data.csv, colum: x}", "unknown key; did you mean 'column'?"),
+        ("{column: x}", "'file' is missing"),
+        ("{file: data.csv, interpolation: cubic}", "must be 'linear' or 'held' (got 'cubic')"),
+    ],
+)
+def test_what_is_wrong_with_a_series_is_said_before_the_run(given: str, says: str, folder: Path) -> None:
+    runs = folder / "runs"
+    (runs / "data.csv").write_text(
+        "time [s];delta;t_fl;word;gap;mass [kg];low;twice;twice\n"
+        "0;0;0;1;1;1;0;0;0\n0.5;0;0;high;nan;1;-7;0;0\n1;0;0;1;1;1;0;0;0\n"
+    )
+    (runs / "data.txt").write_text("")
+    (runs / "back.csv").write_text("time,x\n0,0\n0.5,1\n0.5,2\n1,0\n")
+    (runs / "short.csv").write_text("time\tx\n0\t0\n0.5\t1\n")
+    (runs / "uneven.csv").write_text("time,x\n0,0\n1\n")
+    (runs / "empty.csv").write_text("time,x\n")
+    path = scenario(plant_steer_angle=given, gear="1", on="true", **{"torque_*": "0"})
+    assert says in problem(path)
+
+
+def test_a_series_may_hold_its_ends_and_a_held_one_reaches_one_interval_on(folder: Path) -> None:
+    (folder / "runs/short.csv").write_text("time,x\n0.25,1\n0.5,2\n")
+    hold = "{file: short.csv, column: x, extrapolate: hold}"
+    (plant,) = plan_of(scenario(plant_steer_angle=hold)).units
+    assert plant.series["steer_angle"].at(np.array([0.0, 0.375, 9.0])).tolist() == [1.0, 1.5, 2.0]
+    (folder / "runs/short.csv").write_text("time,x\n0,1\n0.5,2\n")
+    held = "{file: short.csv, column: x, interpolation: held}"
+    assert plan_of(scenario(plant_steer_angle=held)).units[0].series["steer_angle"].held
+
+
+def test_an_archive_for_other_programs_has_no_place_for_a_series(folder: Path) -> None:
+    with pytest.raises(
+        ResultsError, match=r"no place for the time series of plant\.steer_angle, plant\.torque_"
+    ):
+        write_ssp(plan_of(scenario()), folder / "a.ssp")
