@@ -68,6 +68,8 @@ def _options(
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with 0, 1 (the run failed) or 2 (the input is wrong)."""
     _make_printable()
+    if not os.environ.get(TRACEBACK):  # what a library's objects complain of when they go is for nobody
+        sys.unraisablehook = lambda _: None
     try:
         _application()(arguments)
     except YawbenchError as error:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..wording import printable
+
 if TYPE_CHECKING:
     from ..studies.jobs import Job, Outcome
     from ..studies.tables import Table
@@ -24,7 +26,7 @@ WIDTH = 140
 
 def say(text: str) -> None:
     """Write a message for the user, apart from what the command gives out."""
-    print(text, file=sys.stderr, flush=True)
+    print(printable(text), file=sys.stderr, flush=True)
 
 
 def run_all(jobs: Sequence[Job], folder: Path, *, workers: int | None, build: bool) -> list[Outcome]:

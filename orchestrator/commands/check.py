@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..wording import printable
+from .batch import say
 from .options import Fmus, NoBuild, NoValidate, ScenarioFile, Set, Swap
 from .planning import plan_of_scenario
 
@@ -32,10 +34,10 @@ def check(
     plan = plan_of_scenario(scenario, swap, set_, fmus=fmus, build=not no_build, validate=not no_validate)
     show(plan, scenario)
     for note in plan.notes:
-        print(f"note: {note}", file=sys.stderr)
+        say(f"note: {note}")
     for unit in plan.units:
         for doubt in unit.fmu.doubts():
-            print(f"warning: {unit.name}: {doubt}", file=sys.stderr)
+            say(f"warning: {unit.name}: {doubt}")
 
 
 def show(plan: Plan, scenario: Path) -> None:
@@ -54,9 +56,9 @@ def _print(plan: Plan, scenario: Path, console: Console) -> None:
     from ..titles import changed
     from ..wiring.order import evaluate
 
-    console.print(f"{scenario}: {plan.title}" if plan.title else f"{scenario}")
+    console.print(printable(f"{scenario}: {plan.title}" if plan.title else f"{scenario}"))
     if plan.changes:
-        console.print(f"changed: {changed(plan.changes)}")
+        console.print(printable(f"changed: {changed(plan.changes)}"))
     console.print(
         f"{_number(plan.n_steps * plan.step)} s in {plan.n_steps} steps of {_number(1000 * plan.step)} ms, "
         f"{plan.algorithm}; {len(plan.wires)} wires, {len(plan.record)} outputs recorded"
@@ -82,7 +84,7 @@ def _show(console: Console, title: str, columns: Sequence[str], rows: Iterable[S
         column.no_wrap = True
     table.columns[-1].overflow = "fold"  # names are never cut
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*map(printable, row))
     if table.row_count:
         console.print(f"\n{title}", style="bold")
         console.print(Padding(table, (0, 0, 0, 2), expand=False))

@@ -51,7 +51,7 @@ def converge(
     from ..figures.style import save
     from ..scenario.overrides import read_changes
     from ..studies.converge import convergence_figure, convergence_table, measure, refinements, write_rows
-    from ..studies.tables import for_markdown
+    from ..studies.tables import for_markdown, harmless
     from ..titles import with_changes
     from ..wording import hint
     from ..writing import write_whole
@@ -82,7 +82,7 @@ def converge(
     title = with_changes(f"Convergence of {signal}, {scenario.stem}", given)
     table = convergence_table(rows, title)
     write_rows(rows, folder / "converge.csv")
-    write_whole(folder / "converge.md", for_markdown(table))
+    write_whole(folder / "converge.md", harmless(for_markdown(table)))
     print_tables([table])
     files = ["converge.csv", "converge.md"]
     if any(row.error for row in rows):

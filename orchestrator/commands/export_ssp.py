@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
+from .batch import say
 from .options import Fmus, NoBuild, ScenarioFile, Set, Swap
 from .planning import plan_of_scenario
 
@@ -46,7 +46,7 @@ def export_ssp(
         plan, more = for_omsimulator(plan)
         notes += more
     for note in notes:
-        print(f"note: {note}", file=sys.stderr)
+        say(f"note: {note}")
     path = out or Path(f"{scenario.stem}.ssp")
     write_ssp(plan, path, standard)
-    print(f"{path}: {len(plan.units)} units, {len(plan.wires)} connections", file=sys.stderr)
+    say(f"{path}: {len(plan.units)} units, {len(plan.wires)} connections")

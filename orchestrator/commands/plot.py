@@ -58,7 +58,7 @@ def plot(
     figure of one run goes into its folder, that of several into the folder that holds them all.
     """
     from ..errors import ScenarioError
-    from ..figures.panels import Run, shown_by
+    from ..figures.panels import Run, check_panels, shown_by
     from ..figures.plots import OVERVIEW, draw
     from ..figures.style import save
     from ..results.read import load_results
@@ -74,6 +74,7 @@ def plot(
     folders = _recorded(sources, read_changes(swap or (), set_ or ()), fmus, limit, build=not no_build)
     labels = label or distinct(folders)
     runs = [Run(name, load_results(folder)) for name, folder in zip(labels, folders, strict=True)]
+    check_panels(runs, panel or ())
     figures: dict[str, Sequence[str]] = {"overview": panel or OVERVIEW}
     target = folders[0]
     if len(runs) > 1:

@@ -12,6 +12,7 @@ from typing import Annotated
 
 import typer
 
+from .batch import say
 from .options import (
     CallLimit,
     Fmus,
@@ -83,21 +84,21 @@ def run(
     refuse_below_others(folder)
     for note in (*plan.notes, size_note(plan, folder, format_)):
         if note:
-            _say(f"note: {note}")
+            say(f"note: {note}")
     if plan.changes:
-        _say(f"changed: {changed(plan.changes)}")
+        say(f"changed: {changed(plan.changes)}")
     title = with_changes(plan.title or scenario.stem, plan.changes)
     with _bar(title) as progress, opener_of(plan, limit) as opener:
         info = simulate(plan, folder, progress=progress, opener=opener, format=format_, apart=True)
     for message in info.warnings[:SHOWN]:
         grade = "" if message.status == WARNING else f"{STATUS[message.status]}: "
         text = " ".join(message.text.split())
-        _say(f"warning: {message.unit} at t = {message.time:.9g} s: {grade}{text}")
+        say(f"warning: {message.unit} at t = {message.time:.9g} s: {grade}{text}")
     if len(info.warnings) > SHOWN:
-        _say(f"warning: {len(info.warnings) - SHOWN} more, see {folder / 'run.json'}")
+        say(f"warning: {len(info.warnings) - SHOWN} more, see {folder / 'run.json'}")
     if info.ended:
-        _say(f"ended: {info.ended}")
-    _say(f"{folder}: {info.rows} rows of {info.columns} variables in {info.wall_time:.2f} s")
+        say(f"ended: {info.ended}")
+    say(f"{folder}: {info.rows} rows of {info.columns} variables in {info.wall_time:.2f} s")
     if metrics:
         from ..results.read import load_results
         from ..studies.tables import metrics_of_run
@@ -119,10 +120,6 @@ def _metric_names(given: Sequence[str]) -> list[str]:
 def default_folder(scenario: Path) -> Path:
     """Return where the results of a scenario file go if nothing else is said."""
     return Path("results", scenario.absolute().parent.name, scenario.stem)
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr)
 
 
 @contextlib.contextmanager

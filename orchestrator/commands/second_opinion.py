@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .batch import say
 from .options import Fmus, NoBuild, ScenarioFile, Set, Swap
 from .planning import plan_of_scenario
 
@@ -50,7 +51,7 @@ def second_opinion(
     chosen = [known[name.lower()] for name in master or known]
     plan = plan_of_scenario(scenario, swap, set_, fmus=fmus, build=not no_build)
     if plan.changes:
-        print(f"changed: {changed(plan.changes)}", file=sys.stderr)
+        say(f"changed: {changed(plan.changes)}")
     with tempfile.TemporaryDirectory(prefix="yawbench-") as folder:
         try:
             opinions = second_opinion(
@@ -58,7 +59,7 @@ def second_opinion(
                 Path(folder),
                 masters=chosen,
                 pinned=one_core,
-                said=lambda text: print(f"running in {text}", file=sys.stderr),
+                said=lambda text: say(f"running in {text}"),
             )
         except RuntimeError as error:
             raise SimulationError(str(error), unit=None, time=0.0) from None

@@ -15,9 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import ScenarioError
 from ..metrics.run_metrics import columns_of, reference_of
-from ..metrics.signals import words
+from ..metrics.signals import variable_of, words
 from ..results.read import Results
+from ..wording import cut, fold, hint
 from .display import digits_of, in_formula, shown_unit
 from .portrait import curves_of, draw_portrait, signals_of
 from .style import REFERENCE, ROW, WIDTH, line_style, literal, note_above
@@ -97,6 +99,24 @@ def panels_of(runs: Sequence[Run], name: str) -> list[Panel]:
 def shown_by(runs: Sequence[Run], names: Sequence[str]) -> list[Panel]:
     """Return all panels that the names stand for, in order."""
     return [panel for name in names for panel in panels_of(runs, name)]
+
+
+def check_panels(runs: Sequence[Run], names: Sequence[str]) -> None:
+    """Make sure that every name stands for a panel of at least one run.
+
+    Raises:
+        ScenarioError: with a sentence for each name that does not.
+    """
+    recorded = fold(list(dict.fromkeys(variable_of(column) for run in runs for column in run.results)))
+    errors = [f"{name}_error" for name in recorded if panels_of(runs, f"{name}_error")]
+    known = [*recorded, *errors, "path"]
+    problems = [
+        f"--panel {cut(name)}: no run has recorded it{hint(name, known, lead='there are')}"
+        for name in names
+        if not panels_of(runs, name)
+    ]
+    if problems:
+        raise ScenarioError(problems)
 
 
 def _one_wheel(runs: Sequence[Run], name: str, k: int, heading: str) -> Callable[[Axes], None]:

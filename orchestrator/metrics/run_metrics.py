@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import ResultsError, ScenarioError
-from ..wording import WHEELS, fold, hint
+from ..wording import WHEELS, closest, fold, hint, short
 from .measures import MEASURES, Measure
 from .signals import symbol, variable_of, words
 
@@ -110,7 +110,12 @@ def metric(name: str) -> Metric:
     """
     match = re.fullmatch(r"(\w+)\(([\w.*]+)\)", name.replace(" ", ""))
     if match is None:
-        raise ScenarioError(f"{name!r} is no metric; write measure(signal), for example {STANDARD[0]}.")
+        meant = [f"{one}({name[len(one) + 1 :]})" for one in MEASURES if name.startswith(f"{one}_")]
+        likely = max(meant, key=lambda one: one.index("("), default=closest(name, STANDARD))
+        guess = f"did you mean {likely!r}? " if likely else ""
+        raise ScenarioError(
+            f"{short(name)} is no metric; {guess}write measure(signal), for example {STANDARD[0]}."
+        )
     measure, signal = match.groups()
     if measure not in MEASURES:
         raise ScenarioError(

@@ -9,6 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from ..studies.study import FAILS, HOLDS, NOT_JUDGED
+from ..wording import printable
 
 SIGNS = {HOLDS: ("good", "✓"), NOT_JUDGED: ("open", "–"), **{word: ("bad", "✗") for word in FAILS.values()}}
 """Verdict -> class of its style, sign: told apart without colours too."""
@@ -20,6 +21,7 @@ def render(template: str, **facts: Any) -> str:
         loader=PackageLoader("orchestrator.pages"),
         autoescape=True,
         undefined=StrictUndefined,
+        finalize=lambda value: printable(value) if type(value) is str else value,
         trim_blocks=True,
         lstrip_blocks=True,
     )

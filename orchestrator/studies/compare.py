@@ -18,7 +18,7 @@ from ..scenario.overrides import is_path, swap_of
 from ..writing import write_whole
 from .jobs import Job, Outcome, read_back
 from .study_schema import text_of
-from .tables import Cell, Table, for_markdown, si, write_csv
+from .tables import Cell, Table, for_markdown, harmless, si, write_csv
 
 PANELS = (
     "steer_angle",
@@ -141,5 +141,5 @@ def write_comparison(comparison: Comparison, table: Table, out: Path, changed: s
     write_csv(out / METRICS, ["run", "status", *(f"{name} [{si(units[name])}]" for name in names)], rows)
     failed = "".join(f"\n{label} failed: {why}\n" for label, why in comparison.failed.items())
     pictures = "".join(f"\n![{name}]({name})\n" for name in written if name.endswith(".png"))
-    write_whole(out / REPORT, f"{for_markdown(table)}{failed}{pictures}")
+    write_whole(out / REPORT, harmless(f"{for_markdown(table)}{failed}{pictures}"))
     return [*written, METRICS, REPORT]

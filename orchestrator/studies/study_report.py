@@ -19,7 +19,7 @@ from .claims import Judgement, condition_text
 from .study import Each, Findings, all_tables, heading, verdict
 from .study_file import FIGURES
 from .study_schema import si_number
-from .tables import for_markdown, si, write_csv
+from .tables import for_markdown, harmless, si, write_csv
 
 REPORT, METRICS, RECORD = "study.md", "metrics.csv", "study.json"
 
@@ -28,7 +28,7 @@ def write_study(findings: Findings, out: Path, *, each: Each = map) -> list[str]
     """Write everything that a study leaves on disk into `out`; return what could not be drawn."""
     drawn, problems = draw_figures(findings, out, each)
     write_metrics(findings, out / METRICS)
-    write_whole(out / REPORT, _markdown(findings, drawn))
+    write_whole(out / REPORT, harmless(_markdown(findings, drawn)))
     record = json.dumps(_record(findings, drawn), indent=1, ensure_ascii=False, allow_nan=False)
     write_whole(out / RECORD, record + "\n")
     return problems

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 from ..figures.display import shown
 from ..metrics.run_metrics import Value, evaluate_all, metric
 from ..titles import changes_in, with_changes
+from ..wording import printable
 from ..writing import write_whole
 
 if TYPE_CHECKING:
@@ -50,7 +52,12 @@ class Table:
 def _shown(cell: Cell) -> str:
     if cell is None:
         return "-"
-    return shown(cell.number, cell.unit) if isinstance(cell, Value) else cell
+    return shown(cell.number, cell.unit) if isinstance(cell, Value) else printable(cell)
+
+
+def harmless(text: str) -> str:
+    """Return Markdown in which no HTML of a user's text is left but line breaks."""
+    return re.sub(r"<(?!br>)", "&lt;", printable(text))
 
 
 def for_terminal(table: Table) -> rich.console.Group:
@@ -67,11 +74,11 @@ def for_terminal(table: Table) -> rich.console.Group:
         if number:  # a long heading is no reason for a broad column
             widest = max(MIN_HEADING, *(len(row[i]) for row in rows))
             heading = "\n".join(textwrap.wrap(heading, widest, break_long_words=False)) or heading
-        shape.add_column(Text(heading), justify="right" if number else "left", no_wrap=number)
+        shape.add_column(Text(printable(heading)), justify="right" if number else "left", no_wrap=number)
     for row in rows:
         shape.add_row(*(Text(cell) for cell in row))
-    notes = [Text(note) for note in table.notes]
-    return Group(*([Text(table.title, "bold")] if table.title else []), shape, *notes)
+    notes = [Text(printable(note)) for note in table.notes]
+    return Group(*([Text(printable(table.title), "bold")] if table.title else []), shape, *notes)
 
 
 def for_markdown(table: Table) -> str:

@@ -8,7 +8,7 @@ from ..errors import ResultsError
 from ..figures.style import save
 from ..metrics.run_metrics import metric
 from ..studies.study import Each
-from ..studies.tables import Cell, Table, for_markdown
+from ..studies.tables import Cell, Table, for_markdown, harmless
 from ..titles import changed
 from ..wording import counted
 from ..writing import write_whole
@@ -79,7 +79,7 @@ def _page(swept: Swept, drawn: dict[str, str]) -> str:
             [point_text(swept.planned, run), "; ".join(swept.record(run).problems)] for run in failed
         ]
         parts.append(for_markdown(Table("Runs that failed", ["run", "why"], [*rows])))
-    return "\n".join(parts)
+    return harmless("\n".join(parts))
 
 
 def _metrics(swept: Swept) -> Table:

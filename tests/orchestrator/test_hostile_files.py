@@ -5,11 +5,15 @@ from __future__ import annotations
 import os
 import re
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from orchestrator import files
+from orchestrator.cli import main
+from orchestrator.commands.batch import print_tables, say
+from orchestrator.commands.check import show
 from orchestrator.errors import ScenarioError, YawbenchError
 from orchestrator.files import reading
 from orchestrator.scenario import yaml_lines
@@ -17,6 +21,7 @@ from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import read_changes
 from orchestrator.studies.derived import parse
 from orchestrator.studies.study_file import load_study
+from orchestrator.studies.tables import Table, for_markdown, harmless
 from orchestrator.sweeps.sweep_file import load_sweep
 from orchestrator.wiring.make_plan import make_plan
 
@@ -225,3 +230,30 @@ def test_what_nobody_foresaw_becomes_a_sentence_that_keeps_its_cause() -> None:
         "a.yaml: cannot read this scenario file: something in it is not understood (KeyError: 'secret')"
     ]
     assert isinstance(caught.value.__cause__, KeyError)
+
+
+ESCAPES = "\x1b[31mred \u202e <script>alert(1)</script>"
+
+
+def test_what_an_escape_sequence_would_do_never_reaches_the_terminal(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    say(f"note: {ESCAPES}")
+    print_tables([Table(ESCAPES, [ESCAPES], [[ESCAPES]], [ESCAPES])])
+    Path("a.yaml").write_text(f"{HEAD}units: {{a: {{fmu: plant}}}}\n")
+    plan = make_plan(load_scenario(Path("a.yaml")))
+    show(replace(plan, title=ESCAPES), Path(f"{ESCAPES}.yaml"))
+    with pytest.raises(SystemExit):
+        main(["check", f"{ESCAPES}.yaml"])
+    out, err = capsys.readouterr()
+    assert out.count("\\x1b[31mred") == 6
+    assert err.count("\\x1b[31mred") == 2
+    assert not set("\x1b\u202e") & set(out + err)
+
+
+def test_pages_and_markdown_hold_no_escape_sequences_and_no_html_of_users() -> None:
+    table = Table(ESCAPES, [ESCAPES], [[ESCAPES, ESCAPES]], [ESCAPES])
+    text = harmless(f"# {ESCAPES}\n{for_markdown(table)}")
+    assert text.count("&lt;script>") == 6
+    assert not set("\x1b\u202e") & set(text)
+    assert "<script" not in text

@@ -208,7 +208,9 @@ def test_of_two_units_with_the_signal_the_plants_counts():
 def test_an_unknown_measure_is_an_error_that_names_the_nearest():
     with pytest.raises(ScenarioError, match="there is no measure 'peek'; did you mean 'peak'"):
         metric("peek(sideslip)")
-    with pytest.raises(ScenarioError, match=r"is no metric; write measure\(signal\)"):
+    with pytest.raises(
+        ScenarioError, match=r"is no metric; did you mean .peak\(sideslip\).\? write measure\(signal\)"
+    ):
         metric("sideslip")
 
 
@@ -226,3 +228,17 @@ def test_numbers_are_shown_in_the_units_people_read():
 
 def test_the_usual_columns_of_a_car_carry_their_units():
     assert set(car().columns) == set(UNITS)
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("peak_sideslip", "peak(sideslip)"),
+        ("rms_error_yaw_rate", "rms_error(yaw_rate)"),
+        ("peak(sideslip", "peak(sideslip)"),
+    ],
+)
+def test_a_metric_written_otherwise_is_asked_whether_it_is_meant(name: str, meant: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        metric(name)
+    assert f"is no metric; did you mean {meant!r}? write measure(signal)" in str(caught.value)

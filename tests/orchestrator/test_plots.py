@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.errors import ResultsError
-from orchestrator.figures.panels import Run, thinned
+from orchestrator.errors import ResultsError, ScenarioError
+from orchestrator.figures.panels import Run, check_panels, thinned
 from orchestrator.figures.plots import draw, provenance, title_of
 from orchestrator.figures.style import LINES, NOTE_WIDTH, REFERENCE, save
 
@@ -280,3 +280,14 @@ def test_portraits_stand_side_by_side_and_keep_the_labels_of_their_axes():
 def test_a_portrait_of_a_signal_that_was_not_recorded_does_not_exist():
     with pytest.raises(ResultsError):
         draw([Run("a", car())], ["yaw_rate(roll_angle)"])
+
+
+def test_a_panel_that_no_run_has_is_refused_with_the_likely_one() -> None:
+    runs = [Run("a", car())]
+    check_panels(runs, ["sideslip", "sideslip_error", "yaw_rate(sideslip)"])
+    with pytest.raises(ScenarioError) as caught:
+        check_panels(runs, ["sidslip", "sideslip_eror", "sideslip"])
+    assert caught.value.problems == [
+        "--panel sidslip: no run has recorded it; did you mean 'sideslip'?",
+        "--panel sideslip_eror: no run has recorded it; did you mean 'sideslip_error'?",
+    ]
