@@ -47,18 +47,18 @@ def compare(
 
     from ..pages.compare_page import write_page
     from ..results.formats import check_format
+    from ..results.naming import default_folder
     from ..scenario.overrides import read_changes
     from ..studies.compare import judge_comparison, metric_table, variants, write_comparison
     from ..titles import changed, changes_in, changes_of_all
     from .batch import hold, print_tables, run_all, say
-    from .run import default_folder
 
-    default: Path = default_folder(scenario)
-    folder = out or default.with_name(f"{default.name}-compare")
+    for_each = read_changes(settings=set_ or ())
+    folder: Path = out or default_folder(scenario, for_each, suffix="-compare")
     check_format(format_)
     hold(context, folder)
     limit = isolation(isolate, call_limit)
-    made = variants(scenario, swap, read_changes(settings=set_ or ()), folder, fmus)
+    made = variants(scenario, swap, for_each, folder, fmus)
     work = [replace(job, format=format_, call_limit=limit) for job in made]
     outcomes = run_all(work, folder, workers=jobs, build=not no_build)
     comparison = judge_comparison(outcomes)

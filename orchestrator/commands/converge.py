@@ -49,6 +49,7 @@ def converge(
 
     from ..errors import ScenarioError
     from ..figures.style import save
+    from ..results.naming import default_folder
     from ..scenario.overrides import read_changes
     from ..studies.converge import convergence_figure, convergence_table, measure, refinements, write_rows
     from ..studies.tables import for_markdown, harmless
@@ -56,17 +57,15 @@ def converge(
     from ..wording import hint
     from ..writing import write_whole
     from .batch import hold, print_tables, run_all, say
-    from .run import default_folder
 
     for name in algorithm or ():
         if name not in get_args(Algorithm):
             guess = hint(name, get_args(Algorithm), lead="there are")
             raise ScenarioError(f"--algorithm {name}: no such algorithm{guess}")
-    default = default_folder(scenario)
-    folder = out or default.with_name(f"{default.name}-converge")
     limit = isolation(isolate, call_limit)
-    hold(context, folder)
     given = read_changes(swap or (), set_ or ())
+    folder = out or default_folder(scenario, given, suffix="-converge")
+    hold(context, folder)
     work = refinements(
         scenario,
         halvings=halvings,

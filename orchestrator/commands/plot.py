@@ -73,7 +73,7 @@ def plot(
     limit = isolation(isolate, call_limit)
     folders = _recorded(sources, read_changes(swap or (), set_ or ()), fmus, limit, build=not no_build)
     labels = label or distinct(folders)
-    runs = [Run(name, load_results(folder)) for name, folder in zip(labels, folders, strict=True)]
+    runs = [Run(name, load_results(folder, thin=True)) for name, folder in zip(labels, folders, strict=True)]
     check_panels(runs, panel or ())
     figures: dict[str, Sequence[str]] = {"overview": panel or OVERVIEW}
     target = folders[0]
@@ -101,19 +101,19 @@ def _recorded(
     """
     from ..errors import ScenarioError
     from ..pages.freshness import staleness
+    from ..results.naming import default_folder
     from ..studies.jobs import Job, Once, plan_of
     from .batch import run_all
-    from .run import default_folder
 
     scenarios = [source for source in sources if source.suffix in SCENARIOS and not source.is_dir()]
     if changes and not scenarios:
         raise ScenarioError("--swap and --set change a scenario; only folders of results are given")
-    jobs = {
-        source: Job(source.stem, source, default_folder(source), changes, fmus, call_limit=limit)
-        for source in scenarios
-    }
-    once = Once(build=build)
-    stale = [job for job in jobs.values() if staleness(plan_of(job, once), job.out)]
+    jobs, stale, once = {}, [], Once(build=build)
+    for source in scenarios:
+        plan = plan_of(Job(source.stem, source, Path(), changes, fmus), once)
+        job = Job(source.stem, source, default_folder(source, plan.changes), changes, fmus, call_limit=limit)
+        jobs[source] = job
+        stale += [job] if staleness(plan, job.out) else []
     outcomes = run_all(stale, Path("results"), workers=None, build=build) if stale else []
     for outcome in outcomes:
         if not outcome.ok:

@@ -47,13 +47,13 @@ def report(
     from ..pages.chapter import chapter
     from ..pages.report import PAGE, found_studies, report_page, still_stale, wanted
     from ..results.formats import check_format
+    from ..results.naming import default_folder
     from ..studies.jobs import Outcome, pool
     from ..studies.study import all_tables, judge_study
     from ..studies.study_report import write_study
     from ..wording import counted
     from ..writing import write_whole
     from .batch import hold, print_tables, run_all, say, stoppable
-    from .run import default_folder
 
     if again and no_run:
         raise ScenarioError("--again and --no-run contradict each other")

@@ -7,7 +7,6 @@ import os
 import sys
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -38,6 +37,11 @@ Metrics = Annotated[
     ),
 ]
 
+Name = Annotated[
+    str | None,
+    typer.Option("--name", metavar="NAME", help="Name of the folder for the results, below results/."),
+]
+
 SHOWN = 5
 """Warnings shown; all are in run.json."""
 BESIDE = 36
@@ -49,6 +53,7 @@ def run(
     swap: Swap = None,
     set_: Set = None,
     out: Out = None,
+    name: Name = None,
     fmus: Fmus = None,
     no_build: NoBuild = False,
     format_: Format = "csv",
@@ -59,18 +64,23 @@ def run(
 ) -> None:
     """Run a scenario and write results.csv and run.json.
 
-    Without --out, results go to results/<folder of the scenario>/<its name>; those of an earlier run
-    there are replaced.
+    Without --out, results go to results/<folder of the scenario>/<its name>, with what --swap and --set
+    change behind the name, or to NAME in its place. Those of an earlier run there are replaced; by a run
+    that fails only if that failed too, else its own go to failed/ beside them.
     """
+    from ..errors import ScenarioError
     from ..master.isolation import opener_of
     from ..master.log import STATUS, WARNING
     from ..master.simulate import simulate
     from ..results.formats import check_format
     from ..results.lock import refuse_below_others
+    from ..results.naming import default_folder
     from ..results.size import size_note
     from ..titles import changed, with_changes
 
     check_format(format_)
+    if out and name:
+        raise ScenarioError("--out names the folder and --name a part of its path: give one of them")
     metrics = _metric_names(metric or ())
     limit = isolation(isolate, call_limit)
     plan = plan_of_scenario(
@@ -80,7 +90,7 @@ def run(
         from ..metrics import run_metrics
 
         run_metrics.check_metrics(plan, map(run_metrics.metric, named))
-    folder = out or default_folder(scenario)
+    folder = out or default_folder(scenario, plan.changes, name=name)
     refuse_below_others(folder)
     for note in (*plan.notes, size_note(plan, folder, format_)):
         if note:
@@ -117,9 +127,6 @@ def _metric_names(given: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def default_folder(scenario: Path) -> Path:
-    """Return where the results of a scenario file go if nothing else is said."""
-    return Path("results", scenario.absolute().parent.name, scenario.stem)
 
 
 @contextlib.contextmanager

@@ -36,12 +36,12 @@ def study(
     from dataclasses import replace
 
     from ..results.formats import check_format
+    from ..results.naming import default_folder
     from ..studies.jobs import Outcome, pool
     from ..studies.study import all_tables, judge_study
     from ..studies.study_file import load_study
     from ..studies.study_report import REPORT, write_study
     from .batch import hold, print_tables, run_all, say, stoppable
-    from .run import default_folder
 
     check_format(format_)
     limit = isolation(isolate, call_limit)

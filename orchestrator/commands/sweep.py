@@ -58,6 +58,7 @@ def sweep(
     """
     from ..fmu.opener import stale_fmus
     from ..results.formats import check_format
+    from ..results.naming import default_folder
     from ..scenario.overrides import read_changes
     from ..studies.jobs import pool
     from ..sweeps.journal import Journal
@@ -68,12 +69,12 @@ def sweep(
     from ..sweeps.table import Swept, point_text
     from ..titles import changed
     from .batch import hold, print_tables, say, stoppable
-    from .run import default_folder
 
     check_format(format_)
     limit = isolation(isolate, call_limit)
-    loaded = load_sweep(file, changes=read_changes(swap or (), set_ or ()))
-    folder = out or default_folder(file)
+    given = read_changes(swap or (), set_ or ())
+    loaded = load_sweep(file, changes=given)
+    folder = out or default_folder(file, given)
     hold(context, folder)
     with stoppable(folder):
         with _bar("planning", len(loaded.points), quiet=True) as planning:

@@ -58,6 +58,8 @@ def draw(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    if early := [run for run in runs if run.results.time.size < 2]:
+        raise ResultsError(nothing_recorded(early[0]))
     found = shown_by(runs, panels)
     if not found:
         where = ", ".join(str(run.results.folder) for run in runs)
@@ -87,6 +89,13 @@ def draw(
             foot, said = f"{foot} · changed: {said}", ""
         frame(figure, ROW * sum(heights), _legend(figure, runs), title or title_of(runs), foot, said)
     return figure
+
+
+def nothing_recorded(run: Run) -> str:
+    """Return a sentence on a run that has ended before there was anything to draw."""
+    error = run.results.run.get("error") or {}
+    why = f": {' '.join(str(error['message']).split())}" if error.get("message") else ""
+    return f"{run.results.folder}: nothing to draw, this run ended at its start{why}."
 
 
 def _rows(panels: Sequence[Panel]) -> list[list[Panel]]:

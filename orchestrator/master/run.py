@@ -44,7 +44,7 @@ class Run:
         self._stop = StopFlag()
         course = CourseApart if apart else Course
         self._course: Course | CourseApart = course(plan, recorder, self.log, self._stop, progress)
-        self._record: dict[str, Any] = {}  # of the run that has ended
+        self._saved = False
         self._ended_by: str | None = None  # unit
         self._started = datetime.now(timezone.utc)
         self._began = time.perf_counter()
@@ -97,10 +97,10 @@ class Run:
             self._saving or self._course.writing or self._apart
         ):  # units that are apart are not waited for long anyway
             return
-        doing = "while its units were freed" if self._record else "inside a unit"
+        doing = "while its units were freed" if self._saved else "inside a unit"
         error = Interrupted(f"the run was interrupted {doing}", unit=None, time=self.log.time.value)
         try:
-            if not self._record:
+            if not self._saved:
                 self._fail(error)
         finally:
             where = "" if self.recorder.place is None else f"; results so far: {self.recorder.place}"
@@ -116,15 +116,15 @@ class Run:
             ended["ended"] = {"unit": self.ended.unit, "time": self.ended.time, "message": str(self.ended)}
         record = self._recorded(status) | self.log.record(self._ended_by) | ended
         self.recorder.finish(record)
-        self._record, self._saving = record, False
+        self._saved, self._saving = True, False
 
     def _end(self) -> None:
         """Terminate and free the units; add to the record, which is written by then, what they said."""
         try:
             self._course.end()
         finally:
-            freed = {**self._record, **self.log.record(self._ended_by), "units_freed": True}
-            self.recorder.close(freed if self._record else None)
+            freed = {**self.log.record(self._ended_by), "units_freed": True}
+            self.recorder.close(freed if self._saved else None)
 
     def _recorded(self, status: str) -> dict[str, Any]:
         return {"id": self.id, **run_record(self.plan, status=status, started=self._started)}

@@ -10,8 +10,11 @@ from typing import Any
 
 from ..errors import ResultsError
 from ..plan import Plan
+from ..results.digest import checksum
+from ..results.folder import COMPLETED, is_dead
 from ..results.formats import RESULTS_FILE, RUN_FILE
 from ..results.read import load_results
+from ..results.record import load_record
 from ..results.run_record import run_record
 
 COMPARED = {
@@ -36,19 +39,19 @@ PROGRAMS = ("yawbench", "orchestrator", "fmpy", "pythonfmu", "numpy")
 
 def staleness(plan: Plan, folder: Path) -> str | None:
     """Return why the results in a folder are not those of the plan, None if they are."""
-    try:
-        recorded = json.loads((folder / RUN_FILE).read_text(encoding="utf-8"))
-    except OSError:
+    if not (folder / RUN_FILE).is_file():
         return "no results yet"
-    except ValueError:
-        return "the record cannot be read"
-    if not isinstance(recorded, dict) or recorded.get("status") != "completed":
+    try:
+        recorded = load_record(folder)
+    except ResultsError:
+        return "the last run has died" if is_dead(folder) else "the record cannot be read"
+    if recorded.get("status") != COMPLETED:
         return "the run did not reach its end"
     results = folder / str(recorded.get("results", RESULTS_FILE))
     if not results.is_file():
         return "the results are missing"
-    if not _whole(results, recorded.get("rows", 0)):
-        return "the results are cut off"
+    if not _whole(results, recorded):
+        return "the results were changed or cut off"
     planned = run_record(plan, status="completed", started=datetime.now(timezone.utc))
     wanted = json.loads(json.dumps(planned, default=str))
     for key, sentence in COMPARED.items():
@@ -59,12 +62,12 @@ def staleness(plan: Plan, folder: Path) -> str | None:
     )
 
 
-def _whole(results: Path, rows: int) -> bool:
-    """Return whether a file of results holds all rows that its run has written."""
+def _whole(results: Path, recorded: Mapping[str, Any]) -> bool:
+    """Return whether a file of results is the one that its run has written."""
     try:
-        if results.suffix == ".csv":
-            return not rows or results.read_bytes().count(b"\n") > rows  # the first line is the header
-        return load_results(results.parent).time.size >= rows
+        if known := recorded.get("checksum"):
+            return known == checksum(results)
+        return load_results(results.parent).time.size >= recorded.get("rows", 0)
     except (OSError, ResultsError):
         return False
 

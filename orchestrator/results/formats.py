@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -23,9 +23,6 @@ FILES = {"csv": RESULTS_FILE, "parquet": "results.parquet", "mf4": "results.mf4"
 
 PART = ".part"
 """What the names of a run's files end in while it goes on."""
-
-Table = dict[str, np.ndarray]
-"""Column, `time` first -> its values: float64, or text."""
 
 _RECORDERS = {"csv": "recorder.Recorder", "parquet": "parquet.ParquetRecorder", "mf4": "mdf.MdfRecorder"}
 
@@ -51,21 +48,38 @@ def recorder_of(name: str) -> type[Recorder]:
     return getattr(importlib.import_module(f".{module}", __package__), kind)
 
 
-def reader_of(file: str) -> Callable[[Path], Table] | None:
-    """Return what reads a file of results by its name, None if no format's file is called so.
+def source_of(path: Path, texts: Sequence[str] | None = None) -> Source:
+    """Return a file of results, to be read.
 
-    A reader raises OSError or ValueError if the file is not what a run writes.
+    Args:
+        path: of the file; its name says the format.
+        texts: columns that hold text, if the file itself does not say; None: they look like it.
+
+    Raises:
+        OSError, ValueError: it is not what a run writes.
+        ResultsError: a package that the format needs is missing.
     """
-    if file == RESULTS_FILE:
-        from .read import read_csv
+    if path.name == FILES["csv"]:
+        from .csv_file import CsvFile
 
-        return read_csv
-    if file == FILES["parquet"]:
-        from .parquet import read_parquet
+        return CsvFile(path, texts)
+    if path.name == FILES["parquet"]:
+        from .parquet import ParquetFile
 
-        return read_parquet
-    if file == FILES["mf4"]:
-        from .mdf import read_mdf
+        return ParquetFile(path)
+    from .mdf import MdfFile
 
-        return read_mdf
-    return None
+    return MdfFile(path)
+
+
+class Source(Protocol):
+    """A file of results that is read in blocks of rows.
+
+    Its methods raise OSError or ValueError if the file is not what a run writes.
+    """
+
+    names: list[str]
+    """Of all columns, `time` first."""
+
+    def blocks(self, columns: Sequence[str]) -> Iterator[list[np.ndarray]]:
+        """Yield some rows after the other of chosen columns: float64, or text."""

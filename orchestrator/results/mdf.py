@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
+from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 from types import ModuleType
@@ -13,7 +15,7 @@ import numpy as np
 from ..errors import ResultsError
 from ..titles import changes_in, with_changes
 from .columnar import ColumnRecorder, plain
-from .formats import FILES, Table
+from .formats import FILES
 
 
 def asammdf() -> ModuleType:
@@ -64,29 +66,46 @@ def _samples(array: np.ndarray) -> np.ndarray:
     return array.astype(np.uint8) if array.dtype == bool else array
 
 
-def read_mdf(path: Path) -> Table:
-    """Return the columns of an MDF file of one channel group.
+class MdfFile:
+    """An MDF file of results, of one channel group (see `formats.Source`).
 
     Raises:
-        OSError, ValueError: it cannot be read.
         ResultsError: asammdf is not installed.
     """
-    package = asammdf()
-    if not path.exists():
-        raise FileNotFoundError(path)
-    try:
-        with package.MDF(path) as mdf:
-            channels = [channel.name for channel in mdf.groups[0].channels]
-            table = {"time": plain(mdf.get_master(0))}
-            for index, name in enumerate(channels):
-                if index != mdf.masters_db.get(0):
-                    samples = mdf.get(group=0, index=index).samples
-                    table[name] = plain(_decoded(samples))
-    except (OSError, ValueError):
-        raise
-    except Exception as error:  # asammdf raises MdfException and whatever its parsing meets
-        raise ValueError(" ".join(str(error).split()) or type(error).__name__) from None
-    return table
+
+    ROWS = 200_000
+    """Read at a time; chosen: a column of them is no more than some megabytes."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        with self._open() as mdf:
+            (group,) = mdf.groups
+            master = mdf.masters_db.get(0)
+            self._places = {one.name: i for i, one in enumerate(group.channels) if i != master}
+            self.names = ["time", *(one.name for i, one in enumerate(group.channels) if i != master)]
+            self._rows = int(group.channel_group.cycles_nr)
+
+    @contextlib.contextmanager
+    def _open(self) -> Iterator[Any]:
+        try:
+            with asammdf().MDF(self._path) as mdf:
+                yield mdf
+        except (OSError, ValueError, ResultsError):
+            raise
+        except Exception as error:  # asammdf raises MdfException and whatever its parsing meets
+            raise ValueError(" ".join(str(error).split()) or type(error).__name__) from None
+
+    def blocks(self, columns: Sequence[str]) -> Iterator[list[np.ndarray]]:
+        """Yield some rows after the other of chosen columns."""
+        with self._open() as mdf:
+            for begin in range(0, self._rows, self.ROWS):
+                part: dict[str, Any] = {"record_offset": begin, "record_count": self.ROWS}
+                yield [
+                    plain(mdf.get_master(0, **part))
+                    if name == "time"
+                    else plain(_decoded(mdf.get(group=0, index=self._places[name], **part).samples))
+                    for name in columns
+                ]
 
 
 def _decoded(samples: np.ndarray) -> np.ndarray:

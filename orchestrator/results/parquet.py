@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..errors import ResultsError
 from .columnar import ColumnRecorder, plain
-from .formats import FILES, Table
+from .formats import FILES
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -79,17 +81,16 @@ def _field(name: str, array: pa.Array, unit: str | None) -> pa.Field:
     return pa.field(name, array.type, metadata={UNIT: unit or ""})
 
 
-def read_parquet(path: Path) -> Table:
-    """Return the columns of a Parquet file.
+class ParquetFile:
+    """A Parquet file of results (see `formats.Source`)."""
 
-    Raises:
-        OSError, ValueError: it cannot be read.
-    """
-    import pyarrow.parquet as pq
+    def __init__(self, path: Path) -> None:
+        import pyarrow.parquet as pq
 
-    if not path.exists():
-        raise FileNotFoundError(path)
-    table = pq.ParquetFile(path).read()  # by itself, whatever the folder above is called
-    return {
-        name: plain(column.to_numpy()) for name, column in zip(table.column_names, table.columns, strict=True)
-    }
+        self._file = pq.ParquetFile(path)  # by itself, whatever the folder above is called
+        self.names = list(self._file.schema_arrow.names)
+
+    def blocks(self, columns: Sequence[str]) -> Iterator[list[np.ndarray]]:
+        """Yield some rows after the other of chosen columns."""
+        for batch in self._file.iter_batches(columns=list(columns)):
+            yield [plain(batch.column(name).to_numpy(zero_copy_only=False)) for name in columns]

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import json
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -14,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import ResultsError
-from ..files import read_bytes, reads
-from ..wording import listed
-from .folder import settle
-from .formats import FILES, RESULTS_FILE, RUN_FILE, Table, reader_of
-
-RECORD = 100_000_000
-"""Bytes of run.json. Chosen: a thousand times what one of ours has."""
+from ..files import check_regular, reads, reason
+from ..wording import listed, short
+from .digest import checksum
+from .folder import COMPLETED
+from .formats import FILES, RESULTS_FILE, RUN_FILE, source_of
+from .record import load_record
+from .thinning import thinned
 
 __all__ = ["RESULTS_FILE", "RUN_FILE", "Results", "load_results"]
 
@@ -106,86 +104,105 @@ class Results:
 
 
 @reads("recorded run", ResultsError)
-def load_results(folder: Path | str) -> Results:
+def load_results(
+    folder: Path | str,
+    *,
+    only: Callable[[Results], Iterable[str]] | None = None,
+    thin: bool = False,
+) -> Results:
     """Read the results of one run; those of a failed run too, as far as they go.
 
+    Args:
+        folder: of the results.
+        only: returns which columns are read, given results without rows; default: all.
+        thin: leave out rows that a drawing of a long run can do without (see `thinning`).
+
     Raises:
-        ResultsError: a file is missing, unreadable, cut off or not what `yawbench run` writes.
+        ResultsError: a file is missing, unreadable, cut off, changed or not what `yawbench run` writes, or
+            the last run in the folder has died.
     """
     folder = Path(folder)
-    settle(folder)
-    run_file = folder / RUN_FILE
-    try:
-        run = json.loads(read_bytes(run_file, largest=RECORD).decode())
-    except FileNotFoundError:
-        raise ResultsError(
-            f"{folder}: no results here, {RUN_FILE} is missing; "
-            f"make them with 'yawbench run SCENARIO --out {folder}'."
-        ) from None
-    except NotADirectoryError:
-        holds = f", {folder.parent}" if folder.name in (RUN_FILE, *FILES.values()) else ""
-        raise ResultsError(f"{folder}: is a file; name the folder that holds the results{holds}.") from None
-    except OSError as error:
-        raise ResultsError(f"{run_file}: cannot be read: {error.strerror or error}.") from None
-    except ValueError as error:
-        raise ResultsError(f"{run_file}: cannot be read: {error}") from None
-    if not isinstance(run, dict):
-        raise ResultsError(f"{run_file}: is not the record of a run.")
-    file = str(run.get("results", RESULTS_FILE))
-    path, reader = folder / file, reader_of(file)
-    if reader is None:
+    run = load_record(folder)
+    name = str(run.get("results", RESULTS_FILE))
+    if name not in FILES.values():
         known = listed(FILES.values(), last="or")
-        raise ResultsError(f"{run_file}: names {file!r} as the file of results; it must be {known}.")
+        raise ResultsError(f"{folder / RUN_FILE}: names {name!r} as the file of results; it must be {known}.")
+    path = folder / name
     try:
-        columns = reader(path)
+        check_regular(path)
+        file = source_of(path, run.get("texts"))
+        _check_names(file.names)
+        _check_checksum(path, run)
+        empty = _empty(folder, file.names, run)
+        columns = list(dict.fromkeys(only(empty))) if only else file.names[1:]
+        blocks = _in_order(file.blocks(["time", *columns]))
+        if thin:
+            blocks = thinned(blocks, ["time", *columns], run.get("rows", 0))
+        time, *values = _joined(blocks, 1 + len(columns))
     except FileNotFoundError:
         raise ResultsError(f"{path}: is missing, though {RUN_FILE} is there.") from None
     except (OSError, ValueError) as error:
-        raise ResultsError(f"{path}: cannot be read: {error}") from None
-    if next(iter(columns), "") != "time":
-        raise ResultsError(f"{path}: the first column must be 'time'.")
-    rows = columns["time"].size
-    if run.get("status") == "completed" and rows < run.get("rows", 0):
-        raise ResultsError(f"{path}: holds {rows} of the {run['rows']} rows of its run; run it again.")
-    units = {name: str(run.get("units", {}).get(name) or "") for name in columns}
-    return Results(folder, columns.pop("time"), columns, units, run)
+        raise ResultsError(f"{path}: cannot be read: {reason(error)}") from None
+    if run.get("status") == COMPLETED and not thin and time.size < run.get("rows", 0):
+        raise ResultsError(f"{path}: holds {time.size} of the {run['rows']} rows of its run; run it again.")
+    return Results(folder, time, dict(zip(columns, values, strict=True)), empty.units, run)
 
 
-def read_csv(path: Path) -> Table:
-    """Return the columns of a CSV file.
+def _check_names(names: Sequence[str]) -> None:
+    if names[:1] != ["time"]:
+        raise ValueError("the first column must be 'time'")
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        raise ValueError(f"more than one column is called {short(twice[0])}")
+
+
+def _empty(folder: Path, names: Sequence[str], run: dict[str, Any]) -> Results:
+    """Return the results of a run without rows."""
+    units = {name: str(run.get("units", {}).get(name) or "") for name in names}
+    return Results(folder, np.empty(0), {name: np.empty(0) for name in names[1:]}, units, run)
+
+
+def _check_checksum(path: Path, run: dict[str, Any]) -> None:
+    """Make sure that a file of results is the one that its run wrote, as far as the record can tell.
 
     Raises:
-        OSError, ValueError: it cannot be read.
+        ValueError: it is another, or cut off.
     """
-    with path.open(encoding="utf-8", newline="") as stream:
-        names = next(csv.reader(stream), [])
-    if names[:1] != ["time"]:
-        return {name: np.empty(0) for name in names}
-    return dict(zip(names, _read_columns(path, len(names)), strict=True))
+    known = run.get("checksum")
+    if not known:
+        return
+    if known != checksum(path):
+        raise ValueError(
+            f"it is not what its run has written (its checksum in {RUN_FILE} is another); run it again, or "
+            f"remove the checksum if you have changed the file yourself"
+        )
 
 
-def _read_columns(path: Path, n: int) -> list[np.ndarray]:
-    """Return the columns below the header: float64, or str where a column holds text."""
-    with path.open(encoding="utf-8", newline="") as stream:
-        next(stream)
-        rest = stream.read()
-    if not rest:
-        return [np.empty(0) for _ in range(n)]
-    try:
-        table = np.loadtxt(rest.splitlines(), delimiter=",", ndmin=2)
-        if table.shape[1] != n:
-            raise ValueError(f"{table.shape[1]} values in a row for {n} columns")
-        return list(np.ascontiguousarray(table.T))
-    except ValueError:
-        rows = list(csv.reader(io.StringIO(rest, newline="")))
-    uneven = [i for i, row in enumerate(rows, start=2) if len(row) != n]
-    if uneven:
-        raise ValueError(f"line {uneven[0]} has {len(rows[uneven[0] - 2])} values for {n} columns")
-    return [_column(text) for text in zip(*rows, strict=True)]
+def _in_order(blocks: Iterator[list[np.ndarray]]) -> Iterator[list[np.ndarray]]:
+    """Yield the blocks after making sure that time goes on from row to row."""
+    last, row = -np.inf, 0
+    for block in blocks:
+        time = block[0]
+        if time.dtype.kind != "f":
+            raise ValueError(f"row {row + 1}: time {short(str(time[0]))} is no number")
+        wrong = np.flatnonzero(~(np.diff(time, prepend=last) > 0))
+        if wrong.size:
+            at = int(wrong[0])
+            before = time[at - 1] if at else last
+            raise ValueError(f"row {row + at + 1}: time {time[at]:.9g} s does not follow {before:.9g} s")
+        last, row = time[-1] if time.size else last, row + time.size
+        yield block
 
 
-def _column(text: tuple[str, ...]) -> np.ndarray:
-    try:
-        return np.array([float(item) for item in text])
-    except ValueError:
-        return np.array(text)
+def _joined(blocks: Iterable[list[np.ndarray]], columns: int) -> list[np.ndarray]:
+    """Return the columns of all blocks: float64, or text."""
+    parts = list(blocks)
+    if not parts:
+        return [np.empty(0) for _ in range(columns)]
+    found = []
+    for k in range(columns):
+        column = np.concatenate([part[k] for part in parts])
+        found.append(column.astype(str) if column.dtype.kind in "OSU" else column.astype(float, copy=False))
+        for part in parts:
+            part[k] = np.empty(0)  # a long run would need twice the memory
+    return found

@@ -18,13 +18,14 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
 from ..errors import ResultsError
 from ..plan import Value
 from ..writing import reason, write_whole
+from .digest import checksum, shown
 from .folder import RUNNING, put_in_place, tidy
 from .formats import PART, RESULTS_FILE, RUN_FILE
 from .lock import Lock
@@ -112,7 +113,7 @@ class Recorder(Block):
             self._lock.release()
             raise ResultsError(f"{folder}: results cannot be written here: {reason(error)}.") from None
         self._size = 0
-        self._digest: Any = hashlib.sha256()
+        self._digest: Any = hashlib.sha256()  # None once rows have been cut off
         try:
             self._begin()
         except ResultsError:
@@ -205,13 +206,12 @@ class Recorder(Block):
         """Let go of the folder.
 
         Args:
-            run: the record as it is now, if something has happened since `finish`.
+            run: what has changed in the record since `finish`.
         """
         if run is not None:
-            with contextlib.suppress(OSError):  # the results are there, and so is their record
-                self._write_record(
-                    self._whole(run), self._home / self.place.relative_to(self.folder) / RUN_FILE
-                )
+            record = self._home / self.place.relative_to(self.folder) / RUN_FILE
+            with contextlib.suppress(OSError):  # the results are there, and so is what is known of them
+                self._write_record({**self._record, **run}, record)
         self._lock.release()
 
     def _complete(self, run: dict[str, Any]) -> None:
@@ -220,13 +220,12 @@ class Recorder(Block):
     def _whole(self, run: dict[str, Any]) -> dict[str, Any]:
         """Return a run's record with what only the recorder knows."""
         file = {} if self.file == RESULTS_FILE else {"results": self.file}
-        return {**run, "rows": self.written, **file, "checksum": self._checksum(), **self.extremes()}
+        known = {"rows": self.written, **file, "checksum": self._checksum(), **self.extremes()}
+        self._record = {**run, **known}
+        return self._record
 
     def _checksum(self) -> str:
-        if self._digest is None:  # rows were cut off
-            with self._path.open("rb") as stream:
-                self._digest = digest_of(stream)
-        return f"sha256:{self._digest.hexdigest()}"
+        return checksum(self._path) if self._digest is None else shown(self._digest)
 
     def _write_record(self, run: dict[str, Any], path: Path | None = None) -> None:
         text = json.dumps(_plain(run), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
@@ -257,14 +256,6 @@ class Recorder(Block):
             self._path.unlink(missing_ok=True)
             self._run_path.unlink(missing_ok=True)
         self._lock.release()
-
-
-def digest_of(stream: BinaryIO) -> Any:
-    """Return the SHA-256 of a file that is open for reading."""
-    digest = hashlib.sha256()
-    while block := stream.read(1 << 20):
-        digest.update(block)
-    return digest
 
 
 def _order(real: Sequence[bool]) -> list[int]:

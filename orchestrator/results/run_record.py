@@ -36,6 +36,7 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
         "ended": None,
         "evaluation_order": list(units),
         "units": {"time": "s", **columns},
+        "texts": [f"{u}.{name}" for u, name in plan.record if units[u].fmu.variables[name].type == "String"],
         "fmus": {name: _fmu(unit, plan) for name, unit in units.items()},
         "changes": [asdict(change) for change in plan.changes],
         "connections": [_connection(wire) for wire in plan.wires],

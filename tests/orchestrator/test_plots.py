@@ -291,3 +291,14 @@ def test_a_panel_that_no_run_has_is_refused_with_the_likely_one() -> None:
         "--panel sidslip: no run has recorded it; did you mean 'sideslip'?",
         "--panel sideslip_eror: no run has recorded it; did you mean 'sideslip_error'?",
     ]
+
+
+@pytest.mark.parametrize("rows", [0, 1])
+def test_a_run_that_ended_at_its_start_is_one_sentence(rows):
+    ended = results({name: np.zeros(rows) for name in ("plant.yaw_rate", "plant.sideslip")}, np.zeros(rows))
+    ended.run.update(status="failed", error={"message": "plant: initialization failed"})
+    with pytest.raises(ResultsError) as caught:
+        draw([Run("good", car()), Run("ended", ended)])
+    assert caught.value.problems == [
+        "made_up: nothing to draw, this run ended at its start: plant: initialization failed."
+    ]

@@ -1,8 +1,11 @@
+import hashlib
 import json
 
+import numpy as np
 import pytest
 
 from orchestrator.errors import ResultsError
+from orchestrator.results import thinning
 from orchestrator.results.read import load_results
 
 RUN = {
@@ -102,7 +105,7 @@ def test_results_that_were_cut_off_are_no_results(folder):
         ("run.json", "{", r"run\.json: cannot be read: "),
         ("run.json", "[]", r"run\.json: is not the record of a run\.$"),
         ("results.csv", None, r"results\.csv: is missing, though run\.json is there\.$"),
-        ("results.csv", "", r"results\.csv: the first column must be 'time'\.$"),
+        ("results.csv", "", r"results\.csv: cannot be read: the first column must be 'time'$"),
         (
             "results.csv",
             "time,a.x\n0.0,1.0\n0.1\n",
@@ -119,3 +122,85 @@ def test_missing_and_broken_files_are_one_sentence(folder, name, text, sentence)
     with pytest.raises(ResultsError, match=sentence) as caught:
         load_results(folder)
     assert len(caught.value.problems) == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("time,a.x,a.x\n0.0,1.0,2.0\n", "more than one column is called 'a.x'"),
+        ("time,a.x\n0.0,1.0\n0.0,1.0\n", "row 2: time 0 s does not follow 0 s"),
+        ("time,a.x\n0.1,1.0\n0.0,1.0\n", "row 2: time 0 s does not follow 0.1 s"),
+        ("time,a.x\nnan,1.0\n", "row 1: time nan s does not follow -inf s"),
+        ("time,a.x\n0.0,1.0\n0.1,wet\n", "line 3: 'wet' in column 'a.x' is no number"),
+        ("time,a.x\n0.0,1.0\n0.1,\n", "line 3: '' in column 'a.x' is no number"),
+        ("time,a.x\n0.0,1.0\n\n0.1,1.0\n", "line 3 has 0 values for 2 columns"),
+        ("time,a.x\nnoon,1.0\n", "row 1: time 'noon' is no number"),
+    ],
+)
+def test_what_is_wrong_in_a_file_of_results_is_named_with_its_place(folder, text, sentence):
+    (folder / "results.csv").write_text(text)
+    with pytest.raises(ResultsError) as caught:
+        load_results(folder)
+    assert caught.value.problems == [f"{folder / 'results.csv'}: cannot be read: {sentence}"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"rows": "many"}, "rows: input should be a valid integer (got 'many')"),
+        ({"rows": -1}, "rows: input should be greater than or equal to 0 (got -1)"),
+        ({"units": ["s"]}, "units: input should be a valid dictionary (got ['s'])"),
+        ({"fmus": {"car": "plant"}}, "fmus.car: input should be a valid dictionary"),
+        ({"error": "no"}, "error: input should be a valid dictionary (got 'no')"),
+        ({"status": 1, "rows": "x"}, "status: input should be a valid string (got 1) (1 more like it)"),
+    ],
+)
+def test_a_record_of_another_kind_is_one_sentence(folder, changes, sentence):
+    (folder / "run.json").write_text(json.dumps({**RUN, **changes}))
+    with pytest.raises(ResultsError) as caught:
+        load_results(folder)
+    (problem,) = caught.value.problems
+    assert problem.startswith(f"{folder / 'run.json'}: is not the record of a run: {sentence}")
+
+
+def test_a_changed_file_of_results_is_found_by_its_checksum(folder):
+    known = f"sha256:{hashlib.sha256(CSV.encode()).hexdigest()}"
+    (folder / "run.json").write_text(json.dumps({**RUN, "checksum": known}))
+    assert len(load_results(folder).time) == 2
+    (folder / "results.csv").write_text(CSV.replace("0.5", "0.6"))
+    with pytest.raises(ResultsError, match=r"it is not what its run has written \(its checksum in run\.json"):
+        load_results(folder)
+
+
+def test_names_may_go_over_lines(folder):
+    (folder / "results.csv").write_text('time,"a.long\nname",a.x\n0.0,1.0,2.0\n')
+    assert load_results(folder)["a.long\nname"].tolist() == [1.0]
+
+
+def test_only_chosen_columns_are_read(folder):
+    results = load_results(folder, only=lambda all_: [name for name in all_ if name.startswith("ecu")])
+    assert list(results) == ["ecu.yaw_moment", "ecu.yaw_rate_error"]
+    assert results["ecu.yaw_moment"].tolist() == [-5.0, -6.0]
+
+
+def test_a_long_run_is_thinned_to_rows_that_hold_every_peak(folder, monkeypatch):
+    rows = 40_000
+    time = np.arange(rows) / 1000
+    noise = np.random.default_rng(2)
+    signal = np.sin(time) + 1e-3 * noise.standard_normal(rows)
+    signal[[1234, 30_001]] = 5.0, -7.0
+    reference = signal.copy()
+    reference[20_002] += 0.5  # a peak of the error alone
+    gap = np.where(np.arange(rows) == 777, np.nan, 0.0)
+    table = np.column_stack([time, signal, reference, gap])
+    np.savetxt(folder / "results.csv", table, "%.17g", ",", header="time,a.x,b.x_ref,a.gap", comments="")
+    (folder / "run.json").write_text(json.dumps({"status": "completed", "rows": rows}))
+    assert len(load_results(folder, thin=True).time) == rows  # a drawing of this is quick
+    monkeypatch.setattr(thinning, "LONG", 1000)
+    thin = load_results(folder, thin=True)
+    assert len(thin.time) < 10 * thinning.STRETCHES < rows
+    assert {1.234, 30.001, 20.002, 0.777, 0.0, time[-1]} <= set(thin.time)
+    kept = np.searchsorted(time, thin.time)
+    for name, values in (("a.x", signal), ("b.x_ref", reference), ("a.gap", gap)):
+        np.testing.assert_array_equal(thin[name], values[kept])
+    assert np.max(np.abs(thin["a.x"] - thin["b.x_ref"])) == np.max(np.abs(signal - reference))

@@ -170,6 +170,27 @@ def test_results_go_to_a_folder_named_after_the_scenario(yawbench, tmp_path, mon
     assert len(load_results(tmp_path / "results" / "study" / "car").time) == 51
 
 
+def test_runs_of_other_settings_and_one_that_fails_leave_all_results_readable(
+    yawbench, faulty, tmp_path, monkeypatch
+):
+    scenario = faulty('raise ValueError("no")')
+    monkeypatch.chdir(tmp_path)
+    good = ("--swap", "controller=controller_off", "--name", "good")
+    assert yawbench(scenario, *good)[0] == 0
+    assert yawbench(scenario, "--swap", "controller=controller_off", "--set", "driver.amplitude=0.03")[0] == 0
+    status, said = yawbench(scenario, "--name", "good")
+    assert status == 1
+    (results,) = Path("results").iterdir()
+    assert f"What was recorded until then: {results / 'good' / 'failed'}" in said
+    assert {folder.name: load_results(folder).run["status"] for folder in results.iterdir()} == {
+        "good": "completed",
+        f"{scenario.stem},controller=controller_off,driver.amplitude=0.03": "completed",
+    }
+    assert load_results(results / "good" / "failed").run["status"] == "failed"
+    assert len(load_results(results / "good").time) > len(load_results(results / "good" / "failed").time)
+    assert yawbench(scenario, "--name", "good", "--out", "x")[0] == 2
+
+
 def test_a_swapped_unit_and_a_set_parameter_reach_the_run(yawbench, tmp_path):
     scenario = car(tmp_path)
     yawbench(scenario, "--out", tmp_path / "a")

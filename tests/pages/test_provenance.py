@@ -20,6 +20,7 @@ from orchestrator.pages.provenance import (
     kind_of,
     meaning_and_origin,
 )
+from orchestrator.results.digest import checksum
 from orchestrator.results.run_record import run_record
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
@@ -168,9 +169,10 @@ def test_constants_are_shown_with_their_own_values_and_meanings(folder):
 def recorded(plan, folder: Path, **changes) -> Path:
     """Write what a run of a plan leaves, with changes."""
     folder.mkdir(parents=True, exist_ok=True)
-    record = run_record(plan, status="completed", started=datetime.now(timezone.utc)) | changes
+    (folder / "results.csv").write_text("time,x\n0.0,1.0\n0.1,2.0\n")
+    record = run_record(plan, status="completed", started=datetime.now(timezone.utc))
+    record |= {"rows": 2, "checksum": checksum(folder / "results.csv")} | changes
     (folder / "run.json").write_text(json.dumps(record))
-    (folder / "results.csv").touch()
     return folder
 
 
@@ -207,10 +209,10 @@ def test_missing_failed_and_damaged_results_are_stale(folder, tmp_path):
     assert staleness(plan, recorded(plan, tmp_path / "a", status="failed")) == "the run did not reach its end"
     (recorded(plan, tmp_path / "b") / "results.csv").unlink()
     assert staleness(plan, tmp_path / "b") == "the results are missing"
-    cut = recorded(plan, tmp_path / "c", rows=2) / "results.csv"
-    cut.write_text("time,x\n0.0,1.0\n0.1,2.0\n")
-    assert staleness(plan, cut.parent) is None
+    cut = recorded(plan, tmp_path / "c") / "results.csv"
     cut.write_text("time,x\n0.0,1.0\n0.1,2.")
-    assert staleness(plan, cut.parent) == "the results are cut off"
+    assert staleness(plan, cut.parent) == "the results were changed or cut off"
+    (recorded(plan, tmp_path / "d") / "run.json.part").write_text('{"status": "running"}')
+    assert staleness(plan, tmp_path / "d") == "the last run has died"
     (tmp_path / "b" / "run.json").write_text("{")
     assert staleness(plan, tmp_path / "b") == "the record cannot be read"

@@ -1,0 +1,62 @@
+"""Where results go if nothing else is said: a folder named after the file and what was changed.
+
+    results/<folder of the file>/<its name>                                        as it stands
+    results/<folder of the file>/<its name>,controller=controller_off,stop_time=2  changed
+
+Whoever looks for the results of a scenario asks here, with the changes of its plan.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from ..errors import ScenarioError
+from ..plan import Change, Value
+
+LONGEST = 100
+"""Characters of a name; chosen: short enough for a table, and far from what disks allow (255 bytes)."""
+
+
+def default_folder(
+    file: Path, changes: Iterable[Change] = (), *, suffix: str = "", name: str | None = None
+) -> Path:
+    """Return the folder of the results of a scenario, study or sweep file.
+
+    Args:
+        file: whose results they are.
+        changes: against the file, in their order.
+        suffix: of the file's name, for other results than those of a run of it.
+        name: in place of one made of the file and the changes.
+
+    Raises:
+        ScenarioError: no folder can be called so.
+    """
+    above = Path("results", file.absolute().parent.name)
+    if name is None:
+        return above / _with_changes(f"{file.stem}{suffix}", changes)
+    if not name.strip(". ") or re.search(r'[\x00-\x1f/\\:*?"<>|]', name) or len(name.encode()) > 200:
+        raise ScenarioError(f"--name {name}: must be the name of one folder; a path is given with --out")
+    return above / name
+
+
+def _with_changes(stem: str, changes: Iterable[Change]) -> str:
+    """Return a name with changes behind it: readable, and with a hash where that does not say all."""
+    given = list(changes)
+    values = [_text(one.value) for one in given]
+    of_files = [one.swaps or one.place == "vehicle" for one in given]
+    names = [re.split(r"[/\\]", v)[-1] if file else v for v, file in zip(values, of_files, strict=True)]
+    readable = ",".join([stem, *(f"{one.place}={name}" for one, name in zip(given, names, strict=True))])
+    portable = re.sub(r"[^\w.,=+-]", "_", readable, flags=re.ASCII)
+    if not given or (names == values and portable == readable and len(portable) <= LONGEST):
+        return readable
+    exact = repr([(one.place, one.value) for one in given])
+    return f"{portable[: LONGEST - 7].rstrip('.')}~{hashlib.sha256(exact.encode()).hexdigest()[:6]}"
+
+
+def _text(value: Value) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:.10g}" if isinstance(value, float) else str(value)

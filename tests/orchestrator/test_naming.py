@@ -1,0 +1,57 @@
+"""Folders of results, named after the scenario and what was changed in it."""
+
+from pathlib import Path
+
+import pytest
+
+from orchestrator.errors import ScenarioError
+from orchestrator.plan import Change
+from orchestrator.results.naming import LONGEST, default_folder
+
+FILE = Path("scenarios/paper/25mps.yaml")
+
+
+def folder(*changes, **given):
+    return default_folder(
+        FILE, [Change(place, value, "--set") for place, value in changes], **given
+    ).as_posix()
+
+
+def test_a_plain_run_has_the_name_of_its_scenario():
+    assert folder() == "results/paper/25mps"
+    assert folder(suffix="-compare") == "results/paper/25mps-compare"
+
+
+def test_what_is_changed_stands_behind_the_name():
+    assert folder(("controller", "controller_off"), ("vehicle.mass", 1200), ("stop_time", 0.5)) == (
+        "results/paper/25mps,controller=controller_off,vehicle.mass=1200,stop_time=0.5"
+    )
+
+
+def test_what_no_path_can_hold_is_told_apart_by_a_hash():
+    all_wheels, told = folder(("inputs.friction*", 0.3)), folder(("inputs.friction_", 0.3))
+    assert all_wheels.startswith("results/paper/25mps,inputs.friction_=0.3~")
+    assert told == "results/paper/25mps,inputs.friction_=0.3"
+    assert folder(("plant.initial_speed", "80 km/h")).startswith(
+        "results/paper/25mps,plant.initial_speed=80_km_h~"
+    )
+    here, there = folder(("controller", "/a/it.fmu")), folder(("controller", "/b/it.fmu"))
+    assert here != there
+    assert here.startswith("results/paper/25mps,controller=it.fmu~")
+
+
+def test_a_long_name_is_cut_and_told_apart_by_a_hash():
+    many = [(f"unit.parameter_{i}", i) for i in range(40)]
+    name = Path(folder(*many)).name
+    assert len(name) <= LONGEST
+    assert name != Path(folder(*many[:-1], ("unit.parameter_39", 0))).name
+
+
+def test_a_name_may_be_given():
+    assert folder(("controller", "controller_off"), name="no control") == "results/paper/no control"
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", "a/b", "a\\b", "a\nb", "x" * 300])
+def test_a_name_that_is_no_name_of_a_folder_is_a_sentence(name):
+    with pytest.raises(ScenarioError, match="must be the name of one folder; a path is given with --out"):
+        folder(name=name)
