@@ -127,8 +127,6 @@ def _metric_names(given: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-
-
 @contextlib.contextmanager
 def _bar(title: str) -> Iterator[Callable[[int, int], None] | None]:
     """Show a progress bar on a terminal while the block runs, and nothing elsewhere.

@@ -25,8 +25,8 @@ from .lock import Lock, holder_of
 
 FAILED = "failed"
 """Folder of a failed run's results below those of one that reached its end."""
-RUNNING, COMPLETED = "running", "completed"
-"""What a record says of a run that goes on, and of one that reached its end."""
+RUNNING, COMPLETED, DIED = "running", "completed", "died"
+"""What a record says of a run that goes on, that reached its end, that was salvaged after its death."""
 
 
 def place_of(folder: Path, status: str) -> Path:
@@ -117,6 +117,12 @@ def is_dead(folder: Path) -> bool:
     """Return whether the last run in a folder has died."""
     part = folder / f"{RUN_FILE}{PART}"
     return part.exists() and holder_of(folder) is None and not _is_final(folder)
+
+
+def unfinished(folder: Path) -> dict[str, Any] | None:
+    """Return the record of the run that goes on in a folder, or has died there; None if there is none."""
+    part = folder / f"{RUN_FILE}{PART}"
+    return _record(part) if part.exists() and not _is_final(folder) else None
 
 
 def _is_final(folder: Path) -> bool:

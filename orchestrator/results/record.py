@@ -62,13 +62,18 @@ class _Record(_Part):
     largest: dict[str, float | str] = {}
 
 
-def load_record(folder: Path) -> dict[str, Any]:
+def load_record(folder: Path, *, settled: bool = False) -> dict[str, Any]:
     """Return the record of the run whose results stand in a folder.
+
+    Args:
+        folder: of the results.
+        settled: read the record of earlier results though the last run has died.
 
     Raises:
         ResultsError: there is none, it is not what `yawbench run` writes, or the last run here has died.
     """
-    settle(folder)
+    if not settled:
+        settle(folder)
     file = folder / RUN_FILE
     with reading("record of a run", file, ResultsError):
         try:

@@ -10,7 +10,7 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from ..figures.display import shown
 from ..metrics.run_metrics import Value, evaluate_all, metric
@@ -74,7 +74,8 @@ def for_terminal(table: Table) -> rich.console.Group:
         if number:  # a long heading is no reason for a broad column
             widest = max(MIN_HEADING, *(len(row[i]) for row in rows))
             heading = "\n".join(textwrap.wrap(heading, widest, break_long_words=False)) or heading
-        shape.add_column(Text(printable(heading)), justify="right" if number else "left", no_wrap=number)
+        side: Literal["left", "right"] = "right" if number else "left"
+        shape.add_column(Text(printable(heading)), justify=side, no_wrap=number, overflow="fold")
     for row in rows:
         shape.add_row(*(Text(cell) for cell in row))
     notes = [Text(printable(note)) for note in table.notes]

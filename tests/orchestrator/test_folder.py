@@ -8,20 +8,26 @@ import sys
 
 import pytest
 
-from orchestrator.errors import ResultsError
+from orchestrator.errors import ResultsError, SimulationError
 from orchestrator.master.simulate import simulate
 from orchestrator.results import folder as module
 from orchestrator.results.lock import LOCK_FILE, Lock, holder_of, writing
 from orchestrator.results.read import load_results
+from orchestrator.results.runs import found_runs
+from orchestrator.results.salvage import lost_format, salvage
+from orchestrator.studies.listing import runs_table
 
-from .fakes import Clock, Stage, make_plan
+from .fakes import Clock, Function, Stage, make_plan
 
 needs_locks = pytest.mark.skipif(sys.platform == "win32", reason="folders cannot be locked")
 
 
-def run(folder, *, n_steps=10, **signals):
+def run(folder, *, n_steps=10, wire=False, **signals):
     units = {"a": Clock(**(signals or {"x": math.sin}))}
-    return simulate(make_plan(units, n_steps=n_steps), folder, opener=Stage(units))
+    if wire:
+        units["b"] = Function(lambda t, u: {"y": u["x"]}, ["x"], ["y"])
+    plan = make_plan(units, ["a.x -> b.x"] if wire else [], n_steps=n_steps)
+    return simulate(plan, folder, opener=Stage(units))
 
 
 DIES = """
@@ -29,13 +35,14 @@ import math, os, sys
 from orchestrator.master.simulate import simulate
 from tests.orchestrator.fakes import Clock, Stage, make_plan
 units = {"a": Clock(x=lambda t: os._exit(0) if t > 1.2 else t)}
-simulate(make_plan(units, step="1/1000", n_steps=3000), sys.argv[1], opener=Stage(units))
+plan = make_plan(units, step="1/1000", n_steps=3000)
+simulate(plan, sys.argv[1], opener=Stage(units), format=sys.argv[2])
 """
 
 
-def die(folder):
+def die(folder, format="csv"):
     """Make a run whose process ends without a word after 1.2 s."""
-    done = subprocess.run([sys.executable, "-c", DIES, str(folder)], timeout=60)
+    done = subprocess.run([sys.executable, "-c", DIES, str(folder), format], timeout=60)
     assert done.returncode == 0
 
 
@@ -56,6 +63,56 @@ def test_results_of_a_run_before_one_that_died_do_not_pass_for_its_own(tmp_path)
     with pytest.raises(ResultsError, match=r"the run begun at .* ended without a word; .*yawbench salvage"):
         load_results(tmp_path)
     assert len((tmp_path / "results.csv").read_text().splitlines()) == 12
+
+
+@needs_locks
+@pytest.mark.parametrize("before", [True, False])
+def test_what_a_dead_run_recorded_can_be_salvaged(before, tmp_path):
+    if before:
+        run(tmp_path)
+    die(tmp_path)
+    with (tmp_path / "results.csv.part").open("ab") as stream:
+        stream.write(b"1.5,2.5e-1")  # a row that was cut off
+    place, rows = salvage(tmp_path)
+    assert place == (tmp_path / "failed" if before else tmp_path)
+    results = load_results(place)
+    assert rows == len(results.time) == results.run["rows"] == 1024  # two whole blocks
+    assert results.run["status"] == "died"
+    assert "ended without a word" in results.run["error"]["message"]
+    if before:
+        assert load_results(tmp_path).run["status"] == "completed"
+    with pytest.raises(ResultsError, match="no run has died here; there is nothing to salvage"):
+        salvage(tmp_path)
+    assert not [path for path in tmp_path.rglob("*") if path.name.endswith((".part", LOCK_FILE))]
+
+
+@needs_locks
+def test_of_a_format_that_is_only_read_whole_nothing_is_kept_but_the_results_before(tmp_path):
+    run(tmp_path)
+    die(tmp_path, "parquet")
+    assert lost_format(tmp_path) == "results.parquet"
+    assert salvage(tmp_path) == (tmp_path, 0)
+    assert names(tmp_path) == ["results.csv", "run.json"]
+    assert len(load_results(tmp_path).time) == 11
+
+
+@needs_locks
+def test_a_list_of_runs_shows_those_that_died_and_failed_beside_the_good_one(tmp_path):
+    run(tmp_path / "a")
+    with pytest.raises(SimulationError):
+        run(tmp_path / "a", x=lambda t: math.nan if t > 0.05 else t, wire=True)
+    die(tmp_path / "a")
+    die(tmp_path / "b")
+    salvage(tmp_path / "b")
+    run(tmp_path / "c")
+    (tmp_path / "c" / "run.json").write_text("{")
+    found = {(one.folder.relative_to(tmp_path).as_posix(), one.status) for one in found_runs(tmp_path)}
+    assert found == {
+        ("a", "completed"), ("a/failed", "failed"), ("a", "died"), ("b", "died"), ("c", "unreadable")
+    }  # fmt: skip
+    table = runs_table(found_runs(tmp_path))
+    assert next(row[0] for row in table.rows) == str(tmp_path / "c")
+    assert any("ended without a word" in note for note in table.notes)
 
 
 @needs_locks

@@ -1,0 +1,80 @@
+"""`yawbench list`: what there is to work with, and what has been made of it."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import Fmus
+
+
+class What(str, Enum):
+    """What can be listed."""
+
+    runs = "runs"
+    scenarios = "scenarios"
+    fmus = "fmus"
+    vehicles = "vehicles"
+    signals = "signals"
+    metrics = "metrics"
+
+
+Wanted = Annotated[What, typer.Argument(help="What to list.", metavar="WHAT")]
+Place = Annotated[
+    Path | None,
+    typer.Argument(
+        help="Of runs, scenarios, FMUs and vehicles: the folder to look in, default results, scenarios or "
+        "the nearest fmus. Of signals: a scenario; default: all FMUs.",
+        metavar="PLACE",
+    ),
+]
+
+
+def list(what: Wanted, place: Place = None, fmus: Fmus = None) -> None:
+    """List runs, scenarios, fmus, vehicles, signals or metrics.
+
+    Of runs it says when they began, of which scenario, what was changed, how they ended, and the largest
+    sideslip, yaw rate and lateral acceleration.
+    """
+    from ..results.runs import found_runs
+    from ..studies import listing
+    from .batch import print_tables
+
+    if what is What.runs:
+        table = listing.runs_table(found_runs(place or Path("results")))
+    elif what is What.scenarios:
+        kinds = ("a scenario", "a study file", "a sweep file")
+        table = listing.files_table(place or Path("scenarios"), kinds)
+    elif what is What.vehicles:
+        table = listing.files_table(place or Path("scenarios"), ("a vehicle file",))
+    elif what is What.metrics:
+        table = listing.metrics_table()
+    elif what is What.signals and place is not None:
+        table = listing.recorded_table(_plan(place, fmus))
+    else:
+        found, problems = listing.fmus_in(_folder_of_fmus(place or fmus))
+        table = listing.fmus_table(found, problems)
+        if what is What.signals:
+            table = listing.signals_table(found)
+    print_tables([table])
+
+
+def _plan(scenario: Path, fmus: Path | None):  # type: ignore[no-untyped-def]
+    from ..scenario.load import load_scenario
+    from ..wiring.make_plan import make_plan
+
+    return make_plan(load_scenario(scenario), fmus=fmus)
+
+
+def _folder_of_fmus(given: Path | None) -> Path:
+    from ..errors import ModelDescriptionError
+    from ..fmu.search import find_folder
+
+    if given is None:
+        return find_folder(Path("here"))
+    if not any(given.glob("*.fmu")):
+        raise ModelDescriptionError(f"{given}: holds no FMUs")
+    return given

@@ -1,0 +1,70 @@
+"""Making readable results of what a run that died has recorded."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+from ..errors import ResultsError
+from ..writing import reason, write_whole
+from .csv_file import CsvFile
+from .digest import checksum
+from .folder import DIED, is_dead, put_in_place, tidy, unfinished
+from .formats import FILES, PART, RESULTS_FILE, RUN_FILE
+from .lock import Lock
+
+WHY = "the process of this run ended without a word"
+
+
+def salvage(folder: Path) -> tuple[Path, int]:
+    """Give the run that died in a folder a record and a file of the whole rows that it wrote.
+
+    They go where those of a run that failed do. Formats other than CSV can be read only whole: of them
+    nothing is kept, and the folder is as it was before the run.
+
+    Returns:
+        where the results are, and the number of rows.
+
+    Raises:
+        ResultsError: no run has died here, or its results cannot be read or written.
+    """
+    if not is_dead(folder):
+        raise ResultsError(f"{folder}: no run has died here; there is nothing to salvage")
+    lock = Lock(folder)
+    try:
+        path = folder / f"{RESULTS_FILE}{PART}"
+        rows = _keep_whole_rows(path) if path.exists() else 0
+        if rows:
+            record = unfinished(folder) or {}
+            ended = {"status": DIED, "rows": rows, "checksum": checksum(path), "error": {"message": WHY}}
+            text = json.dumps({**record, **ended}, indent=1, ensure_ascii=False)
+            write_whole(folder / f"{RUN_FILE}{PART}", text + "\n")
+            return put_in_place(folder), rows
+        tidy(folder)
+        return folder, 0
+    except OSError as error:
+        raise ResultsError(f"{folder}: what is left cannot be put in place: {reason(error)}.") from None
+    except ValueError as error:
+        raise ResultsError(f"{path}: cannot be read: {error}") from None
+    finally:
+        lock.release()
+
+
+def _keep_whole_rows(path: Path) -> int:
+    """Cut off what stands behind the last whole row; return the number of rows."""
+    end = 0
+    with path.open("rb") as stream:
+        position = 0
+        while block := stream.read(1 << 20):
+            if b"\n" in block:
+                end = position + block.rfind(b"\n") + 1
+            position += len(block)
+    os.truncate(path, end)
+    return sum(len(time) for (time,) in CsvFile(path).blocks(["time"])) if end else 0
+
+
+def lost_format(folder: Path) -> str | None:
+    """Return the file of a format other than CSV that the run that died in a folder was writing."""
+    others = (name for name in FILES.values() if name != RESULTS_FILE)
+    return next((name for name in others if (folder / f"{name}{PART}").exists()), None)

@@ -1,0 +1,120 @@
+"""`yawbench list` and `yawbench diff`: tables of what there is, and of what differs between two runs."""
+
+import numpy as np
+import pytest
+
+from orchestrator.cli import main
+from orchestrator.pages.run_differences import differences
+from orchestrator.results.runs import found_runs
+from orchestrator.studies.listing import runs_table
+
+from .recorded import car, write
+
+
+@pytest.fixture
+def yawbench(capsys):
+    def run(*arguments):
+        with pytest.raises(SystemExit) as exit_:
+            main([*map(str, arguments)])
+        captured = capsys.readouterr()
+        return exit_.value.code or 0, captured.out, captured.err
+
+    return run
+
+
+def ends(results):
+    """Return what the record of a run says of the largest values."""
+    return {
+        "smallest": {name: float(values.min()) for name, values in results.columns.items()},
+        "largest": {name: float(values.max()) for name, values in results.columns.items()},
+    }
+
+
+def test_a_list_of_runs_tells_when_what_changed_and_what_came_out(tmp_path):
+    plain, lively = car(), car(2.0)
+    write(plain, tmp_path / "plain", started="2025-01-01T10:00:00+00:00", **ends(plain))
+    change = {"place": "vehicle.mass", "value": 1200, "origin": "--set"}
+    write(
+        lively, tmp_path / "heavy", started="2024-01-01T10:00:00+00:00", changes=[change],
+        scenario={"file": "scenarios/paper/25mps.yaml"}, **ends(lively),
+    )  # fmt: skip
+    table = runs_table(found_runs(tmp_path))
+    heavy, light = (dict(zip(table.headings, row, strict=True)) for row in table.rows)
+    assert (heavy["run"], light["run"]) == (str(tmp_path / "heavy"), str(tmp_path / "plain"))
+    assert heavy["begun"].startswith("2024-01-01 ")
+    assert heavy["scenario"] == "paper/25mps"
+    assert heavy["changed"] == "vehicle.mass = 1200"
+    assert light["changed"] is None
+    for row, results in ((heavy, lively), (light, plain)):
+        assert row["status"] == "completed"
+        assert row["max|β|"].number == np.max(np.abs(results["plant.sideslip"]))
+        assert row["max|r|"].unit == "rad/s"
+
+
+def test_what_differs_between_two_runs_stands_in_two_tables(yawbench, tmp_path):
+    fmu = {"name": "plant_made_up", "sha256": "0" * 64, "parameters": {"mass": 1100.0, "width": 1.5}}
+    write(car(), tmp_path / "one", fmus={"plant": fmu}, connections=[{"from": "a.x", "to": "b.x"}])
+    heavy = {**fmu, "parameters": {"mass": 1200.0, "width": 1.5}}
+    write(car(1.5), tmp_path / "other", fmus={"plant": heavy}, stop_time=9.0)
+    status, out, _ = yawbench("diff", tmp_path / "one", tmp_path / "other")
+    assert status == 0
+    rows = {line.split()[0]: line.split()[1:] for line in out.splitlines() if line.strip()}
+    assert rows["plant.mass"] == ["1100", "1200"]
+    assert "plant.width" not in rows
+    assert rows["stop_time"] == ["-", "9"]
+    assert rows["a.x"] == ["->", "b.x", "connected", "-"]
+    apart = np.max(np.abs(car()["plant.sideslip"] - car(1.5)["plant.sideslip"]))
+    assert f"{np.degrees(apart):.3f} °" in " ".join(rows["plant.sideslip"])
+    assert "driver.steer_angle" not in rows
+
+
+def test_of_two_units_of_another_kind_only_shared_parameters_are_compared():
+    def run(name, **parameters):
+        return {"fmus": {"controller": {"name": name, "sha256": name, "parameters": parameters}}}
+
+    found = differences(run("pid", gain=1, limit=2), run("fuzzy", width=1, limit=3))
+    assert [one.place for one in found] == ["controller", "controller.limit"]
+
+
+def test_runs_that_are_the_same_say_so(yawbench, tmp_path):
+    write(car(), tmp_path / "one")
+    write(car(), tmp_path / "other")
+    status, out, said = yawbench("diff", tmp_path / "one", tmp_path / "other")
+    assert (status, out) == (0, "")
+    assert said == "The runs are the same, in what they were made of and in every number.\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("runs", "none"), "none: there is no such folder; name one that holds results"),
+        (("runs", "."), ".: holds no results; make some with 'yawbench run SCENARIO'"),
+        (("scenarios", "."), ".: holds no file that is a scenario or a study file or a sweep file"),
+        (("vehicles", "none"), "none: there is no such folder"),
+        (("fmus", "."), ".: holds no FMUs"),
+    ],
+)
+def test_a_list_of_nothing_is_one_sentence(arguments, sentence, yawbench, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert yawbench("list", *arguments) == (2, "", f"{sentence}\n")
+
+
+def test_files_are_listed_by_their_kind(yawbench, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s").mkdir()
+    (tmp_path / "s" / "car.yaml").write_text("title: A car\nparameters: {mass: 1}\n")
+    (tmp_path / "s" / "sine.yaml").write_text("title: A sine\nunits: {}\n")
+    (tmp_path / "s" / "broken.yaml").write_text("title: [\n")
+    status, out, _ = yawbench("list", "vehicles", "s")
+    assert status == 0
+    assert out.split()[-5:] == ["s/car.yaml", "vehicle", "file", "A", "car"]
+    assert "sine" not in out
+    assert "A sine" in yawbench("list", "scenarios", "s")[1]
+
+
+def test_signals_metrics_and_fmus_of_the_project_are_listed(yawbench):
+    assert "wheel_torque_*" in yawbench("list", "signals")[1]
+    assert "relative_peak_error(x)" in yawbench("list", "metrics")[1]
+    fmus = yawbench("list", "fmus")[1]
+    assert "controller_fnn" in fmus
+    assert "plant_seven_dof" in fmus
