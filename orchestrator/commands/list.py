@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from .options import Fmus
+from .planning import plan_of_scenario
 
 
 class What(str, Enum):
@@ -53,7 +54,7 @@ def list(what: Wanted, place: Place = None, fmus: Fmus = None) -> None:
     elif what is What.metrics:
         table = listing.metrics_table()
     elif what is What.signals and place is not None:
-        table = listing.recorded_table(_plan(place, fmus))
+        table = listing.recorded_table(plan_of_scenario(place, None, None, fmus=fmus, build=True))
     else:
         found, problems = listing.fmus_in(_folder_of_fmus(place or fmus))
         table = listing.fmus_table(found, problems)
@@ -62,19 +63,13 @@ def list(what: Wanted, place: Place = None, fmus: Fmus = None) -> None:
     print_tables([table])
 
 
-def _plan(scenario: Path, fmus: Path | None):  # type: ignore[no-untyped-def]
-    from ..scenario.load import load_scenario
-    from ..wiring.make_plan import make_plan
-
-    return make_plan(load_scenario(scenario), fmus=fmus)
-
-
 def _folder_of_fmus(given: Path | None) -> Path:
     from ..errors import ModelDescriptionError
+    from ..fmu.opener import Opener
     from ..fmu.search import find_folder
 
     if given is None:
-        return find_folder(Path("here"))
+        return find_folder(Path("here"), opener=Opener(build=False))
     if not any(given.glob("*.fmu")):
         raise ModelDescriptionError(f"{given}: holds no FMUs")
     return given
