@@ -20,7 +20,8 @@ import pythonfmu
 import pythonfmu.fmi2slave
 from pythonfmu import FmuBuilder
 
-from components.fmi.roles import Role, wheels
+from components.fmi.roles import Role
+from components.fmi.wheels import wheels
 from orchestrator.errors import BuildError
 
 from .closure import Parts
@@ -58,7 +59,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..fmi.variables import changed
+from ..fmi.variables import like
 from .{module} import {component} as Base
 
 
@@ -212,7 +213,7 @@ def variant(component: type[Any], name: str, defaults: Mapping[str, Any]) -> str
             check(parameters[key], value)
         except ValueError as error:
             raise BuildError(str(error)) from None
-        fields.append(f"    {key}: {kind} = changed(Base.Parameters, {key!r}, {value!r})")
+        fields.append(f"    {key}: {kind} = like(Base.Parameters, {key!r}, {value!r})")
     module = component.__module__.rpartition(".")[2]
     return VARIANT.format(
         module=module, component=component.__name__, name=name, fields="\n".join(fields)

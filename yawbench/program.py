@@ -24,8 +24,9 @@ from xml.etree import ElementTree
 import numpy as np
 
 from components.fmi.component import Component
-from components.fmi.roles import ROLES, wheels
+from components.fmi.roles import ROLES
 from components.fmi.variables import output, parameter, signal
+from components.fmi.wheels import wheels
 from orchestrator.errors import ScenarioError
 from orchestrator.fmu.description import describe
 from orchestrator.master.log import ERROR, OK, Log

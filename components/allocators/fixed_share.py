@@ -14,20 +14,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..cars.published_cars import PaperA
 from ..cars.wheel_kinematics import lever_arms
 from ..control_laws.moment_sharing import add_drive_force, share_moment
 from ..fmi.component import Component
-from ..fmi.variables import output, parameter, signal
+from ..fmi.variables import like, output, parameter, signal
 
 
 @dataclass(frozen=True)
 class FixedShareParameters:
     """Geometry of the car and the shares."""
 
-    cg_to_front_axle: float = parameter(
-        1.256, "m", "Distance a of the centre of mass from the front axle; paper A, table 1", minimum=0.1
-    )
-    track_width: float = parameter(1.65, "m", "Track width d; paper A, table 1", minimum=0.1)
+    cg_to_front_axle: float = like(PaperA, "cg_to_front_axle")
+    track_width: float = like(PaperA, "track_width")
     left_share: float = parameter(
         0.5, "1", "Share s_l of the moment on the left side; paper A: half", minimum=0.0, maximum=1.0
     )

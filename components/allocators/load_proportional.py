@@ -21,22 +21,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..cars.published_cars import PaperA
 from ..cars.wheel_kinematics import lever_arms
-from ..control_laws.moment_sharing import NO_FORCE, Four, add_drive_force, share_moment
+from ..control_laws.moment_sharing import NO_FORCE, add_drive_force, share_moment
 from ..control_laws.side_forces import SIDE_FORCES, load_share, share_sides
 from ..fmi.component import Component
-from ..fmi.roles import wheels
-from ..fmi.variables import output, parameter, signal
+from ..fmi.variables import like, output, parameter, signal
+from ..fmi.wheels import Four, wheels
 
 
 @dataclass(frozen=True)
 class LoadProportionalParameters:
     """Geometry of the car."""
 
-    cg_to_front_axle: float = parameter(
-        1.256, "m", "Distance a of the centre of mass from the front axle; paper A, table 1", minimum=0.1
-    )
-    track_width: float = parameter(1.65, "m", "Track width d; paper A, table 1", minimum=0.1)
+    cg_to_front_axle: float = like(PaperA, "cg_to_front_axle")
+    track_width: float = like(PaperA, "track_width")
     side_forces: str = parameter(
         "all_wheels",
         None,

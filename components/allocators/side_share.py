@@ -12,21 +12,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..cars.published_cars import PaperB
 from ..cars.wheel_kinematics import lever_arms
 from ..control_laws.moment_sharing import add_drive_force
 from ..control_laws.side_forces import SIDE_FORCES, share_sides
 from ..fmi.component import Component
-from ..fmi.variables import output, parameter, signal
+from ..fmi.variables import like, output, parameter, signal
 
 
 @dataclass(frozen=True)
 class SideShareParameters:
     """Geometry of the car and the shares."""
 
-    cg_to_front_axle: float = parameter(
-        1.04, "m", "Distance a of the centre of mass from the front axle; paper B, table 1", minimum=0.1
-    )
-    track_width: float = parameter(1.48, "m", "Track width d; paper B, table 1", minimum=0.1)
+    cg_to_front_axle: float = like(PaperB, "cg_to_front_axle")
+    track_width: float = like(PaperB, "track_width")
     front_share_left: float = parameter(
         0.5,
         "1",

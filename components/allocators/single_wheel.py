@@ -32,10 +32,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..cars.published_cars import PaperC
 from ..cars.wheel_kinematics import lever_arms
-from ..control_laws.moment_sharing import NO_FORCE, Four, add_drive_force, share_moment
+from ..control_laws.moment_sharing import NO_FORCE, add_drive_force, share_moment
 from ..fmi.component import Component
-from ..fmi.variables import output, parameter, signal
+from ..fmi.variables import like, output, parameter, signal
+from ..fmi.wheels import Four
 
 FL, FR, RL, RR = range(4)
 LEFT = (FL, RL)
@@ -48,12 +50,8 @@ ONE_WHEEL: tuple[Four, ...] = (
 class SingleWheelParameters:
     """Geometry of the car, reading of the rule and dead band."""
 
-    cg_to_front_axle: float = parameter(
-        1.4, "m", "Distance a of the centre of mass from the front axle; paper C, table 1", minimum=0.1
-    )
-    track_width: float = parameter(
-        1.6, "m", "Track width d; chosen: the 1.36 m of paper C's table 1 cannot be right", minimum=0.1
-    )
+    cg_to_front_axle: float = like(PaperC, "cg_to_front_axle")
+    track_width: float = like(PaperC, "track_width")
     wheel_choice: str = parameter(
         "guarded",
         None,

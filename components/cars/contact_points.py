@@ -15,10 +15,11 @@ from collections.abc import Sequence
 from math import cos, sin
 from typing import TYPE_CHECKING, NamedTuple
 
+from .plane_body import Geometry
+from .wheel_kinematics import Eight
+
 if TYPE_CHECKING:
     from .ride import Ride
-
-Eight = tuple[float, float, float, float, float, float, float, float]
 
 
 class Contact(NamedTuple):
@@ -37,15 +38,16 @@ class Contact(NamedTuple):
     moment: float  # about the vertical axis at rest [N.m]
 
 
-def contact(delta: float, forces: Sequence[float], *, a: float, b: float, half_track: float) -> Contact:
+def contact(delta: float, f_x: Sequence[float], f_y: Sequence[float], p: Geometry) -> Contact:
     """Return the tyre forces in vehicle axes.
 
     Args:
         delta: steer angle of both front wheels [rad].
-        forces: F_x of fl, fr, rl, rr, then F_y, wheel axes [N].
-        a, b, half_track: distances of axles and wheels from the car's centre of mass [m].
+        f_x, f_y: forces of fl, fr, rl, rr, wheel axes [N].
+        p: geometry of the car.
     """
-    f_fl, f_fr, x_rl, x_rr, g_fl, g_fr, y_rl, y_rr = forces
+    f_fl, f_fr, x_rl, x_rr = f_x
+    g_fl, g_fr, y_rl, y_rr = f_y
     c = cos(delta)
     s = sin(delta)
     x_fl = f_fl * c - g_fl * s
@@ -54,7 +56,8 @@ def contact(delta: float, forces: Sequence[float], *, a: float, b: float, half_t
     y_fr = f_fr * s + g_fr * c
     front = y_fl + y_fr
     rear = y_rl + y_rr
-    moment = a * front - b * rear + half_track * ((x_fr - x_fl) + (x_rr - x_rl))
+    moment = p.cg_to_front_axle * front - p.cg_to_rear_axle * rear
+    moment += 0.5 * p.track_width * ((x_fr - x_fl) + (x_rr - x_rl))
     x = (x_fl + x_fr) + (x_rl + x_rr)
     return Contact(x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr, x, front + rear, moment)
 

@@ -9,24 +9,30 @@ add up to m g.
 
 from __future__ import annotations
 
-G = 9.81  # m/s2
+from typing import Protocol
+
+from ..fmi.wheels import Four
+from ..mathematics.constants import G
+from .plane_body import Geometry
 
 
-def quasi_static_loads(
-    a_x: float, a_y: float, *, mass: float, a: float, b: float, track_width: float, height: float
-) -> tuple[float, float, float, float]:
-    """Return F_z [N] of fl, fr, rl, rr from the accelerations [m/s2].
+class Weight(Geometry, Protocol):
+    """A car's geometry, its mass m [kg] and the height h [m] of its centre of mass."""
 
-    Args:
-        mass: m [kg].
-        a, b: distances of front and rear axle from the centre of mass [m].
-        track_width, height: d, h [m].
-    """
-    weight = mass * G
-    lift = mass * height
+    @property
+    def mass(self) -> float: ...
+    @property
+    def cg_height(self) -> float: ...
+
+
+def quasi_static_loads(a_x: float, a_y: float, p: Weight) -> Four:
+    """Return F_z [N] of fl, fr, rl, rr from the accelerations [m/s2]."""
+    a, b = p.cg_to_front_axle, p.cg_to_rear_axle
+    weight = p.mass * G
+    lift = p.mass * p.cg_height
     front = min(max((weight * b - lift * a_x) / (a + b), 0.0), weight)
     rear = weight - front
-    across = lift * a_y / ((a + b) * track_width)
+    across = lift * a_y / ((a + b) * p.track_width)
     front *= 0.5
     rear *= 0.5
     front_across = min(max(b * across, -front), front)

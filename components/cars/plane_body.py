@@ -16,23 +16,37 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import cos, sin
+from typing import Protocol
 
-Four = tuple[float, float, float, float]
+from ..fmi.wheels import Four
+
 Motion = tuple[float, float, float, float, float, float]
 """v_x, v_y [m/s], r [rad/s], x, y [m], psi [rad]."""
 
 _GAUSS = 0.5 - 0.5 / 3.0**0.5
 
 
-def resultants(delta: float, forces: Sequence[float], *, a: float, b: float, half_track: float) -> Four:
+class Geometry(Protocol):
+    """Where the wheels of a car stand: a, b and d [m], as the parameters of every car say it."""
+
+    @property
+    def cg_to_front_axle(self) -> float: ...
+    @property
+    def cg_to_rear_axle(self) -> float: ...
+    @property
+    def track_width(self) -> float: ...
+
+
+def resultants(delta: float, f_x: Sequence[float], f_y: Sequence[float], p: Geometry) -> Four:
     """Return X, Y_f, Y_r [N] and M [N.m] of the tyre forces, vehicle axes.
 
     Args:
         delta: steer angle of both front wheels [rad].
-        forces: F_x of fl, fr, rl, rr, then F_y, wheel axes [N].
-        a, b, half_track: distances of axles and wheels from the centre of mass [m].
+        f_x, f_y: forces of fl, fr, rl, rr, wheel axes [N].
+        p: geometry of the car.
     """
-    x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr = forces
+    x_fl, x_fr, x_rl, x_rr = f_x
+    y_fl, y_fr, y_rl, y_rr = f_y
     c = cos(delta)
     s = sin(delta)
     x = x_fl + x_fr
@@ -40,7 +54,12 @@ def resultants(delta: float, forces: Sequence[float], *, a: float, b: float, hal
     front = x * s + y * c
     rear = y_rl + y_rr
     turn = (y_fl - y_fr) * s + (x_fr - x_fl) * c + (x_rr - x_rl)
-    return x * c - y * s + (x_rl + x_rr), front, rear, a * front - b * rear + half_track * turn
+    return (
+        x * c - y * s + (x_rl + x_rr),
+        front,
+        rear,
+        p.cg_to_front_axle * front - p.cg_to_rear_axle * rear + 0.5 * p.track_width * turn,
+    )
 
 
 def move(motion: Motion, h: float, *, a_x: float, a_y: float, dr: float) -> Motion:

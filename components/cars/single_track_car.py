@@ -13,6 +13,7 @@ equations (1)-(4) with their errata; paper D, equation (3).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 SMALLEST = 1e-3
 """1 + K v^2 is held here where an oversteering car has no steady state any more."""
@@ -28,6 +29,18 @@ class SingleTrackCar:
     b: float
     c_f: float
     c_r: float
+
+    @classmethod
+    def of(cls, p: Any, yaw_inertia: float = 1.0) -> SingleTrackCar:
+        """Return the car of these parameters; its yaw inertia is no matter in a steady turn."""
+        return cls(
+            p.mass,
+            yaw_inertia,
+            p.cg_to_front_axle,
+            p.cg_to_rear_axle,
+            p.cornering_stiffness_front,
+            p.cornering_stiffness_rear,
+        )
 
     def stability_factor(self) -> float:
         """Return K [s2/m2], positive for an understeering car."""

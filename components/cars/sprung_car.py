@@ -5,18 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..fmi.variables import parameter
+from ..mathematics.constants import G
+from .car import StartParameters
+from .published_cars import PaperC
+from .resistance import ResistanceParameters
 from .ride import Ride
-
-G = 9.81  # m/s2
 
 
 @dataclass(frozen=True)
-class FourteenDofParameters:
+class FourteenDofParameters(StartParameters, ResistanceParameters, PaperC):
     """A large saloon: paper C, table 1, where it says anything."""
 
-    mass: float = parameter(
-        1830.0, "kg", "Vehicle mass m; paper C, table 1: 1650 kg sprung; chosen: 45 kg per wheel", minimum=1.0
-    )
     sprung_mass: float = parameter(1650.0, "kg", "Sprung mass m_s; paper C, table 1", minimum=1.0)
     front_unsprung_share: float = parameter(
         0.5, "1", "Front part of the unsprung mass; chosen: equal wheels", minimum=0.01, maximum=0.99
@@ -39,18 +38,6 @@ class FourteenDofParameters:
         "kg.m2",
         "Product of inertia I_xz of the sprung mass about its own centre, positive where its front is heavy "
         "on top; chosen: principal axes along the car",
-    )
-    cg_to_front_axle: float = parameter(
-        1.4, "m", "Distance a of the centre of mass from the front axle; paper C, table 1", minimum=0.1
-    )
-    cg_to_rear_axle: float = parameter(
-        1.65, "m", "Distance b of the centre of mass from the rear axle; paper C, table 1", minimum=0.1
-    )
-    track_width: float = parameter(
-        1.6,
-        "m",
-        "Track width d; chosen: paper C prints 1.36, implausible with this wheelbase; peaks change by 1-4 %",
-        minimum=0.1,
     )
     cg_height: float = parameter(
         0.5093, "m", "Height h of the centre of mass; chosen: that of the sprung mass 0.53", minimum=0.0
@@ -87,32 +74,17 @@ class FourteenDofParameters:
     tyre_vertical_stiffness: float = parameter(
         230000.0, "N/m", "Tyre spring k_t; chosen: a passenger car's, wheel hop at 12 Hz", minimum=1.0
     )
-    wheel_radius: float = parameter(
-        0.33, "m", "Rolling radius R; chosen: tyre of 0.34 unloaded", minimum=0.05
-    )
     wheel_inertia: float = parameter(
         1.5, "kg.m2", "Inertia J of one wheel; chosen: a passenger car's", minimum=0.01
     )
     drag_coefficient: float = parameter(0.3, "1", "Drag coefficient C_D; chosen: a saloon's", minimum=0.0)
     frontal_area: float = parameter(2.2, "m2", "Frontal area A; chosen: a saloon's", minimum=0.0)
-    air_density: float = parameter(1.2258, "kg/m3", "Air density rho; chosen: that of paper B", minimum=0.0)
     rolling_resistance: float = parameter(
         0.012, "1", "Rolling resistance f; chosen: a passenger car tyre's", minimum=0.0
     )
-    rolling_fade_speed: float = parameter(
-        0.1, "m/s", "Rolling resistance fades below this speed; chosen: hardly moving", minimum=0.001
-    )
     initial_speed: float = parameter(25.0, "m/s", "Speed at the start; paper C: 90 km/h")
-    initial_sideslip: float = parameter(0.0, "rad", "Sideslip angle at the start; chosen: none")
-    initial_yaw_rate: float = parameter(0.0, "rad/s", "Yaw rate at the start; chosen: none")
     initial_heave: float = parameter(
         0.0, "m", "Height of body and wheels above rest at the start; chosen: on the road"
-    )
-    low_speed: float = parameter(
-        0.5,
-        "m/s",
-        "Slips refer to this speed when the wheel is slower; chosen: keeps a parked car quiet at 1 ms",
-        minimum=0.001,
     )
     slip_stiffness_per_load: float = parameter(
         22.0,

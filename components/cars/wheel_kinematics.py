@@ -18,8 +18,9 @@ from __future__ import annotations
 
 from math import atan2, cos, sin, sqrt
 
+from ..fmi.wheels import Four
+
 Eight = tuple[float, float, float, float, float, float, float, float]
-Four = tuple[float, float, float, float]
 
 
 def wheel_velocities(

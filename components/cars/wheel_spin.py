@@ -39,26 +39,22 @@ and nothing is changed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import expm1
 
 BEARABLE = 0.6
 """lambda h that a force taken from the last two steps can bear well; above 1 it swings up."""
 
-Four = tuple[float, float, float, float]
-
 
 def spin(
     w: float,
     h: float,
-    *,
     torque: float,
     f_x: float,
     v: float,
     v_end: float,
+    stiffness: float,
     radius: float,
     inertia: float,
-    stiffness: float,
     v_low: float,
     slip_stiffness: float = 0.0,
     tyre_slip: float = 0.0,
@@ -70,8 +66,8 @@ def spin(
         torque: wheel torque T [N.m], below zero a friction torque.
         f_x: longitudinal tyre force [N], held.
         v, v_end: longitudinal velocity of the wheel at start and end of the step, wheel axes [m/s].
-        radius, inertia: R [m], J [kg.m2].
         stiffness: about the tyre's slip stiffness dF_x/dkappa at its load [N], where it does not say.
+        radius, inertia: R [m], J [kg.m2].
         v_low: speed to which the slip of a slower wheel refers [m/s].
         slip_stiffness: the tyre's own C = dF_x/dkappa [N]; 0 if it does not say.
         tyre_slip: the slip that `f_x` and `slip_stiffness` belong to [1].
@@ -128,45 +124,3 @@ def spin(
     if braked and (w * w_end < 0.0 or (w == 0.0 and w_end * moment < 0.0)):
         return 0.0
     return w_end
-
-
-def spin_wheels(
-    spins: Sequence[float],
-    h: float,
-    *,
-    torque: Sequence[float],
-    f_x: Sequence[float],
-    slip_stiffness: Sequence[float],
-    tyre_slip: Sequence[float],
-    load: Sequence[float],
-    v: Sequence[float],
-    v_end: Sequence[float],
-    radius: float,
-    inertia: float,
-    stiffness_per_load: float,
-    v_low: float,
-) -> Four:
-    """Return the angular velocities [rad/s] of fl, fr, rl, rr after `h` [s]; see `spin`.
-
-    Args:
-        load: vertical loads at the start of the step [N].
-        stiffness_per_load: slip stiffness over load [1] of tyres that do not say theirs.
-    """
-    w_fl, w_fr, w_rl, w_rr = [
-        spin(
-            spins[i],
-            h,
-            torque=torque[i],
-            f_x=f_x[i],
-            v=v[i],
-            v_end=v_end[i],
-            radius=radius,
-            inertia=inertia,
-            stiffness=stiffness_per_load * load[i],
-            v_low=v_low,
-            slip_stiffness=slip_stiffness[i],
-            tyre_slip=tyre_slip[i],
-        )
-        for i in (0, 1, 2, 3)
-    ]
-    return w_fl, w_fr, w_rl, w_rr

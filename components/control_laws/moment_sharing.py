@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-Four = tuple[float, float, float, float]
+from ..fmi.wheels import Four
 
 LEAST_CARRIED = 0.05
 

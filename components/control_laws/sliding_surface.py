@@ -14,6 +14,10 @@ Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw mom
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..cars.published_cars import PaperB
+from ..fmi.variables import like, parameter
 
 ERRORS = (
     "yaw_rate_ref",
@@ -30,6 +34,25 @@ SURFACE = ("yaw_rate_ref", "sideslip_ref", "yaw_rate", "sideslip")
 """Those that the sliding surface itself follows."""
 
 
+@dataclass(frozen=True)
+class SurfaceParameters:
+    """Of the surface, of its boundary layer and of the moment's limits; the paper names none but I_z."""
+
+    boundary_layer: float = parameter(
+        0.1, "rad/s", "Half width Delta of the boundary layer; chosen: about 6 deg/s", minimum=0.0
+    )
+    sideslip_weight: float = parameter(
+        -0.25, "1/s", "Weight w of the sideslip error; negative, see control_laws.sliding_surface; chosen"
+    )
+    yaw_inertia: float = like(PaperB, "yaw_inertia")
+    moment_limit: float = parameter(
+        10000.0, "N.m", "Largest yaw moment; chosen: m g d / 2, what the road can give at mu 1", minimum=0.0
+    )
+    fade_speed: float = parameter(
+        2.0, "m/s", "Below it the moment fades out; chosen: walking pace", minimum=0.001
+    )
+
+
 def sign(s: float) -> float:
     """Return -1, 0 or 1."""
     return float((s > 0.0) - (s < 0.0))
@@ -42,28 +65,33 @@ def saturation(s: float, layer: float) -> float:
     return s / layer
 
 
-def surface(u: Sequence[float], w: float) -> tuple[float, float]:
-    """Return the sliding surface s [rad/s] and the demand without reaching law [rad/s2].
+class SlidingSurface:
+    """The law at one instant: the surface s [rad/s], and the moment that a reaching law adds up to.
 
     Args:
         u: the signals `ERRORS`.
-        w: weight of the sideslip [1/s], equation (19).
+        p: of the law.
     """
-    r_ref, beta_ref, dr_ref, dbeta_ref, r, beta, dbeta = u
-    return (r_ref - r) + w * (beta_ref - beta), dr_ref + w * (dbeta_ref - dbeta)
 
+    def __init__(self, u: Sequence[float], p: SurfaceParameters) -> None:
+        r_ref, beta_ref, dr_ref, dbeta_ref, r, beta, dbeta = u
+        w = p.sideslip_weight
+        self.p = p
+        self.s = (r_ref - r) + w * (beta_ref - beta)
+        self.equivalent = dr_ref + w * (dbeta_ref - dbeta)  # the demand without reaching law [rad/s2]
 
-def demand(s: float, equivalent: float, switched: float, *, eps: float, k_d: float, i_z: float) -> float:
-    """Return the yaw moment M [N.m], equation (23).
+    def moment(self, *, eps: float, k_d: float, speed: float, switching: str = "saturation") -> float:
+        """Return the yaw moment M [N.m], equation (23), within its limits.
 
-    Args:
-        s: sliding surface [rad/s].
-        equivalent: the demand without the reaching law [rad/s2], from `surface`.
-        switched: sign(s) or sat(s / Delta) [1].
-        eps, k_d: gains of the reaching law [rad/s2], [1/s].
-        i_z: yaw inertia [kg.m2].
-    """
-    return i_z * (equivalent + eps * switched + k_d * s)
+        Args:
+            eps, k_d: gains of the reaching law [rad/s2], [1/s].
+            speed: of the car [m/s].
+            switching: "sign" or "saturation", equation (24).
+        """
+        p, s = self.p, self.s
+        switched = sign(s) if switching == "sign" else saturation(s, p.boundary_layer)
+        moment = p.yaw_inertia * (self.equivalent + eps * switched + k_d * s)
+        return limit(moment, p.moment_limit, speed, p.fade_speed)
 
 
 def limit(moment: float, most: float, speed: float, fade_speed: float) -> float:

@@ -28,22 +28,20 @@ nothing); the fades.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
-from ..fmi.variables import parameter
+from ..cars.published_cars import PaperB
+from ..fmi.variables import like, parameter
 from ..tyre_models.slip_curve import slip_for_force
-
-Curve = tuple[Callable[[float], float], float]
-"""F_x [N] of kappa, and a slip that is surely on its stable branch, of the order of the optimum."""
+from ..tyre_models.tyre import Curve
 
 
 @dataclass(frozen=True)
 class SlipControlParameters:
     """Of the wheel, the law and the limits; the gains are those tried for paper B."""
 
-    wheel_radius: float = parameter(0.313, "m", "Wheel radius R; chosen: that of tyre set 1", minimum=0.05)
-    wheel_inertia: float = parameter(2.1, "kg.m2", "Inertia J of one wheel; paper B, table 1", minimum=0.0)
+    wheel_radius: float = like(PaperB, "wheel_radius")
+    wheel_inertia: float = like(PaperB, "wheel_inertia")
     optimum_share: float = parameter(
         0.95, "1", "Largest slip over the optimum; paper B", minimum=0.1, maximum=0.99
     )

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..control_laws import sliding_surface
+from ..control_laws.sliding_surface import ERRORS, SURFACE, SlidingSurface, SurfaceParameters
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter
 from ..mathematics.fuzzy import Mamdani, Partition
@@ -31,7 +31,7 @@ TABLE = """
 
 
 @dataclass(frozen=True)
-class FuzzySlidingModeParameters:
+class FuzzySlidingModeParameters(SurfaceParameters):
     """Of the law and of the ranges that the paper leaves open."""
 
     largest_reaching_rate: float = parameter(
@@ -45,19 +45,6 @@ class FuzzySlidingModeParameters:
     )
     largest_friction: float = parameter(
         1.0, "1", "Friction from which mu is BB; chosen: dry asphalt", minimum=1e-6
-    )
-    boundary_layer: float = parameter(
-        0.1, "rad/s", "Half width Delta of the boundary layer; chosen: about 6 deg/s", minimum=0.0
-    )
-    sideslip_weight: float = parameter(
-        -0.25, "1/s", "Weight w of the sideslip error; negative, see control_laws.sliding_surface; chosen"
-    )
-    yaw_inertia: float = parameter(1343.1, "kg.m2", "Yaw inertia I_z; paper B, table 1", minimum=1.0)
-    moment_limit: float = parameter(
-        10000.0, "N.m", "Largest yaw moment; chosen: m g d / 2, what the road can give at mu 1", minimum=0.0
-    )
-    fade_speed: float = parameter(
-        2.0, "m/s", "Below it the moment fades out; chosen: walking pace", minimum=0.001
     )
 
 
@@ -79,10 +66,10 @@ class FuzzySlidingMode(Component):
 
     Parameters = FuzzySlidingModeParameters
     sampled = True
-    inputs = (*sliding_surface.ERRORS, "velocity_x", "steer_angle", "friction")
+    inputs = (*ERRORS, "velocity_x", "steer_angle", "friction")
     outputs = (
-        output("yaw_moment", *sliding_surface.ERRORS, "velocity_x", "steer_angle", "friction"),
-        output("sliding_surface", *sliding_surface.SURFACE, unit="rad/s", text="Sliding surface s"),
+        output("yaw_moment", *ERRORS, "velocity_x", "steer_angle", "friction"),
+        output("sliding_surface", *SURFACE, unit="rad/s", text="Sliding surface s"),
         output("reaching_rate", "steer_angle", "friction", unit="rad/s2", text="Gain eps as set on line"),
         output("reaching_gain", "steer_angle", "friction", unit="1/s", text="Gain k_d as set on line"),
     )
@@ -92,8 +79,6 @@ class FuzzySlidingMode(Component):
 
     def output(self, t, u):
         p = self.p
-        s, equivalent = sliding_surface.surface(u[:7], p.sideslip_weight)
         eps, k_d = self.gains(u[9], abs(u[8]))
-        switched = sliding_surface.saturation(s, p.boundary_layer)
-        moment = sliding_surface.demand(s, equivalent, switched, eps=eps, k_d=k_d, i_z=p.yaw_inertia)
-        return sliding_surface.limit(moment, p.moment_limit, u[7], p.fade_speed), s, eps, k_d
+        law = SlidingSurface(u[:7], p)
+        return law.moment(eps=eps, k_d=k_d, speed=u[7]), law.s, eps, k_d

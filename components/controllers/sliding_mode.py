@@ -11,13 +11,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..control_laws import sliding_surface
+from ..control_laws.sliding_surface import ERRORS, SURFACE, SlidingSurface, SurfaceParameters
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter
 
 
 @dataclass(frozen=True)
-class SlidingModeParameters:
+class SlidingModeParameters(SurfaceParameters):
     """Of the law; the paper names none of its gains."""
 
     switching: str = parameter(
@@ -29,19 +29,6 @@ class SlidingModeParameters:
     reaching_gain: float = parameter(
         10.0, "1/s", "Gain k_d of the sliding surface; chosen: 0.1 s time constant", minimum=0.0
     )
-    boundary_layer: float = parameter(
-        0.1, "rad/s", "Half width Delta of the boundary layer; chosen: about 6 deg/s", minimum=0.0
-    )
-    sideslip_weight: float = parameter(
-        -0.25, "1/s", "Weight w of the sideslip error; negative, see control_laws.sliding_surface; chosen"
-    )
-    yaw_inertia: float = parameter(1343.1, "kg.m2", "Yaw inertia I_z; paper B, table 1", minimum=1.0)
-    moment_limit: float = parameter(
-        10000.0, "N.m", "Largest yaw moment; chosen: m g d / 2, what the road can give at mu 1", minimum=0.0
-    )
-    fade_speed: float = parameter(
-        2.0, "m/s", "Below it the moment fades out; chosen: walking pace", minimum=0.001
-    )
 
 
 class SlidingMode(Component):
@@ -49,20 +36,14 @@ class SlidingMode(Component):
 
     Parameters = SlidingModeParameters
     sampled = True
-    inputs = (*sliding_surface.ERRORS, "velocity_x")
+    inputs = (*ERRORS, "velocity_x")
     outputs = (
-        output("yaw_moment", *sliding_surface.ERRORS, "velocity_x"),
-        output("sliding_surface", *sliding_surface.SURFACE, unit="rad/s", text="Sliding surface s"),
+        output("yaw_moment", *ERRORS, "velocity_x"),
+        output("sliding_surface", *SURFACE, unit="rad/s", text="Sliding surface s"),
     )
 
     def output(self, t, u):
         p = self.p
-        s, equivalent = sliding_surface.surface(u[:7], p.sideslip_weight)
-        if p.switching == "sign":
-            switched = sliding_surface.sign(s)
-        else:
-            switched = sliding_surface.saturation(s, p.boundary_layer)
-        moment = sliding_surface.demand(
-            s, equivalent, switched, eps=p.reaching_rate, k_d=p.reaching_gain, i_z=p.yaw_inertia
-        )
-        return sliding_surface.limit(moment, p.moment_limit, u[7], p.fade_speed), s
+        law = SlidingSurface(u[:7], p)
+        moment = law.moment(eps=p.reaching_rate, k_d=p.reaching_gain, speed=u[7], switching=p.switching)
+        return moment, law.s

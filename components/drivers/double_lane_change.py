@@ -22,11 +22,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, sin
 
+from ..cars.published_cars import PaperC
 from ..cars.single_track_car import SingleTrackCar
 from ..driving.lane_change import LaneChangeParameters, Track
 from ..driving.speed_holding import HeldSpeedParameters, SpeedHold
 from ..fmi.component import Component
-from ..fmi.variables import output, parameter
+from ..fmi.variables import like, output, parameter
 from ..mathematics.first_order_lag import Stage
 
 
@@ -55,13 +56,9 @@ class DoubleLaneChangeParameters(HeldSpeedParameters, LaneChangeParameters):
     steering_ratio: float = parameter(
         17.0, "1", "Hand-wheel angle over road-wheel angle; chosen: large saloon", minimum=0.1
     )
-    mass: float = parameter(1830.0, "kg", "Vehicle mass; paper C, table 1, and wheels", minimum=1.0)
-    cg_to_front_axle: float = parameter(
-        1.4, "m", "Distance a of the centre of mass from the front axle; paper C, table 1", minimum=0.1
-    )
-    cg_to_rear_axle: float = parameter(
-        1.65, "m", "Distance b of the centre of mass from the rear axle; paper C, table 1", minimum=0.1
-    )
+    mass: float = like(PaperC, "mass")
+    cg_to_front_axle: float = like(PaperC, "cg_to_front_axle")
+    cg_to_rear_axle: float = like(PaperC, "cg_to_rear_axle")
     cornering_stiffness_front: float = parameter(
         62618.0, "N/rad", "Stiffness C_f of the front axle; paper C, table 1", minimum=1.0
     )
@@ -97,16 +94,8 @@ class DoubleLaneChange(Component):
     )
 
     def configure(self):
-        p = self.p
-        self.track = Track(p)
-        self.car = SingleTrackCar(
-            p.mass,
-            1.0,  # yaw inertia: no matter in a steady turn
-            p.cg_to_front_axle,
-            p.cg_to_rear_axle,
-            p.cornering_stiffness_front,
-            p.cornering_stiffness_rear,
-        )
+        self.track = Track(self.p)
+        self.car = SingleTrackCar.of(self.p)
 
     def start(self, t, u):
         p = self.p

@@ -6,14 +6,13 @@
 
 The pulse begins and ends at once, as a panic stop does. What the car cannot carry out, because the
 road has less grip, is the business of wheel control and tyres. A steer time of zero makes it a step.
-
-Stimuli live in a unit, not in the master, so that they are exact at every instant.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..driving.hand_wheel import ramp
 from ..fmi.component import Component
 from ..fmi.variables import parameter
 
@@ -48,10 +47,7 @@ def pulse_force(t: float, p: ForcePulseParameters) -> float:
 
 def held_steer(t: float, p: ForcePulseParameters) -> float:
     """Return the steer angle [rad] at time `t` [s]."""
-    late = t - p.steer_start_time
-    if late <= 0.0:
-        return 0.0
-    return p.final_steer_angle if late >= p.steer_time else p.final_steer_angle * late / p.steer_time
+    return ramp(t - p.steer_start_time, p.steer_time, p.final_steer_angle)
 
 
 class ForcePulse(Component):

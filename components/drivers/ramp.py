@@ -13,45 +13,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..driving.speed_holding import HeldSpeedParameters, SpeedHold
-from ..fmi.component import Component
-from ..fmi.variables import parameter, signal
+from ..driving.hand_wheel import HandWheelDriver, SteeringParameters, ramp
+from ..driving.speed_holding import HeldSpeedParameters
+from ..fmi.variables import parameter
 
 
 @dataclass(frozen=True)
-class RampParameters(HeldSpeedParameters):
+class RampParameters(SteeringParameters, HeldSpeedParameters):
     """Of the steering input."""
 
     amplitude: float = parameter(1.5, "rad", "Final angle of the hand wheel; paper C, section 3.3")
     ramp_time: float = parameter(2.0, "s", "Duration of the ramp; paper C, section 3.3", minimum=0.0)
-    start_time: float = parameter(1.0, "s", "Time at which the ramp begins; chosen: 1 s straight ahead")
-    steering_ratio: float = parameter(
-        17.0, "1", "Hand-wheel angle over road-wheel angle; chosen: large saloon", minimum=0.1
-    )
 
 
-def ramp_steer(t: float, p: RampParameters) -> float:
-    """Return the hand-wheel angle [rad] at time `t` [s]."""
-    late = t - p.start_time
-    if late <= 0.0:
-        return 0.0
-    return p.amplitude if late >= p.ramp_time else p.amplitude * late / p.ramp_time
-
-
-class Ramp(Component):
+class Ramp(HandWheelDriver):
     """Open-loop steering to an angle, held there, at a held speed."""
 
     Parameters = RampParameters
-    inputs = (signal("velocity_x", optional=True),)
-    outputs = ("steer_angle", "drive_force", "steering_wheel_angle")
 
-    def start(self, t, u):
-        self.speed = SpeedHold(self.p)
-        self.speed.start(u[0])
-
-    def advance(self, t, h, u):
-        self.speed.advance(t, h, u[0])
-
-    def output(self, t, u):
-        hand = ramp_steer(t, self.p)
-        return hand / self.p.steering_ratio, self.speed.force, hand
+    def hand_wheel_angle(self, t: float) -> float:
+        p = self.p
+        return ramp(t - p.start_time, p.ramp_time, p.amplitude)

@@ -5,9 +5,6 @@
 
 With the default steering ratio of one the amplitude is that of the road wheels. The speed is held if
 `speed_gain` says so (`driving.speed_holding`).
-
-Stimuli live in a unit, not in the master, so that they are exact at every instant and not
-quantised to whole communication steps.
 """
 
 from __future__ import annotations
@@ -15,13 +12,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..driving.speed_holding import SpeedHold, SpeedHoldingParameters
-from ..fmi.component import Component
-from ..fmi.variables import parameter, signal
+from ..driving.hand_wheel import HandWheelDriver, SteeringParameters
+from ..driving.speed_holding import SpeedHoldingParameters
+from ..fmi.variables import parameter
 
 
 @dataclass(frozen=True)
-class SineParameters(SpeedHoldingParameters):
+class SineParameters(SteeringParameters, SpeedHoldingParameters):
     """Of the steering input; papers A and B name a sine but neither amplitude nor period."""
 
     amplitude: float = parameter(0.05, "rad", "Amplitude at the hand wheel; chosen: paper A at 15 m/s")
@@ -34,7 +31,6 @@ class SineParameters(SpeedHoldingParameters):
     frequency: float = parameter(
         0.2, "Hz", "Frequency; chosen: one period of 5 s, as in paper A's figure 6", minimum=0.0
     )
-    start_time: float = parameter(1.0, "s", "Time of the first zero crossing; chosen: 1 s straight ahead")
     periods: float = parameter(1.0, "1", "Number of periods, then straight ahead; chosen: one", minimum=0.0)
 
 
@@ -46,20 +42,10 @@ def sine_steer(t: float, p: SineParameters) -> float:
     return p.amplitude * math.sin(2.0 * math.pi * phase)
 
 
-class Sine(Component):
+class Sine(HandWheelDriver):
     """Open-loop sine steering; the speed may be held."""
 
     Parameters = SineParameters
-    inputs = (signal("velocity_x", optional=True),)
-    outputs = ("steer_angle", "drive_force", "steering_wheel_angle")
 
-    def start(self, t, u):
-        self.speed = SpeedHold(self.p)
-        self.speed.start(u[0])
-
-    def advance(self, t, h, u):
-        self.speed.advance(t, h, u[0])
-
-    def output(self, t, u):
-        hand = sine_steer(t, self.p)
-        return hand / self.p.steering_ratio, self.speed.force, hand
+    def hand_wheel_angle(self, t: float) -> float:
+        return sine_steer(t, self.p)

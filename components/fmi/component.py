@@ -7,9 +7,10 @@ A component declares parameters, inputs and outputs on its class and overrides u
     advance(t, h, u)    the state from t to t + h (t in s, h in s)
     output(t, u)        all outputs at t in declared order; changes nothing
 
-`u` is the list of all inputs in declared order, `*` expanded to fl, fr, rl, rr. Whatever a
-component stores on `self` in these methods is its state: it is saved and restored with the FMU
-state, bit for bit, without being listed anywhere.
+`u` is the list of all inputs in declared order, `*` expanded to fl, fr, rl, rr; `self.by_signal(u)`
+has one item per declared signal instead, a list of four for a `*`. Whatever a component stores on
+`self` in these methods is its state: it is saved and restored with the FMU state, bit for bit,
+without being listed anywhere.
 
 What PythonFMU 0.7.0 makes necessary, and is done here once for all:
 
@@ -33,6 +34,8 @@ import os
 import pickle
 import sys
 import traceback
+from collections.abc import Callable, Sequence
+from operator import itemgetter
 from typing import Any, ClassVar
 from xml.etree.ElementTree import Element
 
@@ -50,6 +53,7 @@ from .variables import (
     output_variables,
     parameter_variables,
 )
+from .wheels import wheels
 
 _CATEGORY = {
     Fmi2Status.ok: "logAll",
@@ -58,6 +62,19 @@ _CATEGORY = {
     Fmi2Status.error: "logStatusError",
     Fmi2Status.fatal: "logStatusFatal",
 }
+
+
+def _picker(inputs: Sequence[str | Signal]) -> Callable[[list[float]], tuple[Any, ...]]:
+    """Return what makes one item per declared signal of a list of all inputs."""
+    places: list[int | slice] = []
+    end = 0
+    for item in inputs:
+        begin = end
+        end += len(wheels(item if isinstance(item, str) else item.name))
+        places.append(begin if end == begin + 1 else slice(begin, end))
+    if len(places) > 1:
+        return itemgetter(*places)
+    return lambda u: tuple([u[place] for place in places])
 
 
 class Component(Fmi2Slave):
@@ -75,6 +92,9 @@ class Component(Fmi2Slave):
     host_packages: ClassVar[tuple[str, ...]] = ()
     """Packages outside the standard library that the Python of every host must have, such as "numpy"."""
 
+    by_signal: ClassVar[Any]
+    """Of the inputs `u`, one item per declared signal: a number, or a list of four for a `*`."""
+
     variables: ClassVar[tuple[Variable, ...]] = ()
     fmu_name: ClassVar[str] = ""
     """Name of the FMU: `<role>_<file>`, unless the class itself says otherwise."""
@@ -90,6 +110,7 @@ class Component(Fmi2Slave):
         pars = parameter_variables(cls.Parameters)
         pars.sort(key=lambda v: v.type != "Real")  # stable: all Reals have the lowest references
         cls.variables = (*ins, *outs, *pars)
+        cls.by_signal = staticmethod(_picker(cls.inputs))
         cls._n_in = len(ins)
         cls._n_io = len(ins) + len(outs)
         cls._n_real = sum(v.type == "Real" for v in cls.variables)

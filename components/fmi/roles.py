@@ -9,9 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-WHEELS = ("fl", "fr", "rl", "rr")
-"""The four wheels, always in this order: front left, front right, rear left, rear right."""
-
 
 @dataclass(frozen=True)
 class Role:
@@ -57,10 +54,3 @@ ROLES: dict[str, Role] = {
     "roads": Role("road", outputs=("friction_*", "friction")),
 }
 """Folder below `components/` -> role."""
-
-
-def wheels(pattern: str) -> tuple[str, ...]:
-    """Return the names that `pattern` stands for: four if it holds a `*`, else itself."""
-    if "*" not in pattern:
-        return (pattern,)
-    return tuple(pattern.replace("*", wheel) for wheel in WHEELS)

@@ -12,9 +12,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from .roles import WHEELS, wheels
 from .signals import LEAST, SIGNALS
 from .units import UNITS
+from .wheels import WHEEL_NAMES, WHEELS, wheels
 
 _FMI_TYPES = {"float": "Real", "int": "Integer", "bool": "Boolean", "str": "String"}
 
@@ -137,10 +137,10 @@ def parameter(
     return field(default=default, metadata=metadata)
 
 
-def changed(parameters: type, name: str, default: float | int | bool | str) -> Any:
-    """Declare anew, with another default value, a field that a dataclass of parameters has."""
+def like(parameters: type, name: str, default: float | int | bool | str | None = None) -> Any:
+    """Declare anew a field that a dataclass of parameters has, with another default value if given."""
     (original,) = (f for f in dataclasses.fields(parameters) if f.name == name)
-    return field(default=default, metadata=original.metadata)
+    return field(default=original.default if default is None else default, metadata=original.metadata)
 
 
 @dataclass(frozen=True)
@@ -239,10 +239,7 @@ def output_variables(
     return variables
 
 
-_WHEEL_NAMES = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
-
-
 def _on_wheel(s: Signal, name: str) -> str:
     """Return the description of one scalar, naming the wheel where there is one."""
-    wheel = _WHEEL_NAMES.get(name[-2:]) if name[-3:-2] == "_" else None
+    wheel = WHEEL_NAMES.get(name[-2:]) if name[-3:-2] == "_" else None
     return s.description if wheel is None else f"{s.description}, {wheel}"

@@ -11,6 +11,10 @@ values already below -0.25, which a car on dry road reaches with locked rear whe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+Values = Sequence[float]
+
 
 def weights(t_1: float, t_2: float, t_3: float) -> tuple[float, float, float]:
     """Return what three values, `t_1` <= `t_2` <= `t_3` [s] old, weigh in the line's value at age zero.
@@ -23,3 +27,23 @@ def weights(t_1: float, t_2: float, t_3: float) -> tuple[float, float, float]:
     slope = t / (d_1 * d_1 + d_2 * d_2 + d_3 * d_3)
     third = 1.0 / 3.0
     return third - slope * d_1, third - slope * d_2, third - slope * d_3
+
+
+class Carried:
+    """Values at the middles of the last two steps and the lengths [s] of these; at the start `values`."""
+
+    def __init__(self, values: Values) -> None:
+        self.values_1 = self.values_2 = values
+        self.h_1 = self.h_2 = self.h_3 = 0.0
+        self.weights = (1.0, 0.0, 0.0)
+
+    def to_end(self, h: float, values: Values) -> Values:
+        """Return the values at the end of a step of `h` > 0 [s] from those at its middle."""
+        if not h == self.h_1 == self.h_2 == self.h_3:
+            h_1, h_2 = self.h_1, self.h_2
+            self.weights = weights(0.5 * h, 0.5 * h_1 + h, 0.5 * h_2 + h_1 + h)
+            self.h_1, self.h_2, self.h_3 = h, h_1, h_2
+        k_0, k_1, k_2 = self.weights
+        stages = zip(values, self.values_1, self.values_2)  # noqa: B905 - strict= costs a tenth
+        self.values_1, self.values_2 = values, self.values_1
+        return [k_0 * a + k_1 * b + k_2 * c for a, b, c in stages]

@@ -10,10 +10,8 @@ from __future__ import annotations
 
 from math import cos, exp, sin, sinh, sqrt
 
-Four = tuple[float, float, float, float]
 
-
-def transition(s: float, q: float, h: float) -> Four:
+def transition(s: float, q: float, h: float) -> tuple[float, float, float, float]:
     """Return Phi(h) by rows, from s [1/s], q [1/s2] and the time `h` [s]."""
     discriminant = s * s - q
     if discriminant < 0.0:

@@ -31,101 +31,43 @@ motion by `cars.plane_body`, wheels by `cars.wheel_spin`.
 
 from __future__ import annotations
 
-from ..cars.car_signals import INPUTS, MOTION, WHEELS, initial_motion, motion_outputs, wheel_outputs
+from collections.abc import Sequence
+from typing import Any
+
+from ..cars.car import DRIVEN_WHEELS, MOTION, DrivenCar
 from ..cars.plane_body import move, resultants
-from ..cars.rolling_body import RollingCarParameters, RollModel, accelerations, longitudinal, vertical_loads
-from ..cars.wheel_kinematics import wheel_velocities
-from ..cars.wheel_spin import spin_wheels
-from ..fmi.component import Component
-from ..mathematics import carry
+from ..cars.rolling_body import RollingBody, RollingCarParameters
+from ..mathematics.carry import Values
 from ..mathematics.oscillator import transition
 
 
-class EightDof(Component):
+class EightDof(DrivenCar):
     """Car with eight degrees of freedom (plane motion, roll, four wheel spins), loads through roll."""
 
     Parameters = RollingCarParameters
-    inputs = INPUTS
-    outputs = (*MOTION, "roll_angle", "roll_rate", *WHEELS)
+    outputs = (*MOTION, "roll_angle", "roll_rate", *DRIVEN_WHEELS)
 
-    def configure(self):
-        self.roll = RollModel.of(self.p)
+    def configure(self) -> None:
+        self.body = RollingBody(self.p)
         self.step_size = 0.0
 
-    def start(self, t, u):
-        p = self.p
-        self.motion = initial_motion(p)
-        self.steer_angle = u[0]
-        self.wheels = self._wheels()
-        self.spins = tuple([v / p.wheel_radius for v in self.wheels[:4]])  # rolling freely
-        forces = self._resultants(u[0], u)
-        roll = self.roll
+    def rest(self, signals: Sequence[Any]) -> Values:
+        held = resultants(signals[0], signals[1], signals[2], self.p)
         phi = 0.0
         for _ in range(20):  # the body hangs in its springs; sin(phi) - phi is tiny
-            phi = roll.forcing(forces[1] + forces[2], phi, p) / roll.stiffness
+            phi = self.body.forcing(held[1] + held[2], phi) / self.body.stiffness
         self.angle, self.rate = phi, 0.0
-        self.history = ((0.0, forces), (0.0, forces))  # age [s] and resultants at the last two middles
-        self.ages = (0.0, 0.0, 0.0)
-        self._finish(forces)
+        return held
 
-    def advance(self, t, h, u):
-        delta_end = u[0]
-        if h <= 0.0:  # nothing moves
-            self.steer_angle = delta_end
-            self.wheels = self._wheels()
-            return
-        p = self.p
-        forces = self._resultants(0.5 * (self.steer_angle + delta_end), u)
-        x, y_f, y_r, moment = forces
-        self._move(h, x, y_f + y_r, moment)
-        self.steer_angle = delta_end
-        before = self.wheels
-        self.wheels = self._wheels()
-        self.spins = spin_wheels(
-            self.spins,
-            h,
-            torque=u[9:13],
-            f_x=u[1:5],
-            slip_stiffness=u[13:17],
-            tyre_slip=u[17:21],
-            load=self.loads,
-            v=before,
-            v_end=self.wheels,
-            radius=p.wheel_radius,
-            inertia=p.wheel_inertia,
-            stiffness_per_load=p.slip_stiffness_per_load,
-            v_low=p.low_speed,
-        )
-        (age_1, forces_1), (age_2, forces_2) = self.history
-        ages = (0.5 * h, age_1 + h, age_2 + h)
-        if ages != self.ages:
-            self.ages = ages
-            self.weights = carry.weights(*ages)
-        k_0, k_1, k_2 = self.weights
-        self.history = ((0.5 * h, forces), (age_1 + h, forces_1))
-        self._finish(
-            tuple([k_0 * a + k_1 * b + k_2 * c for a, b, c in zip(forces, forces_1, forces_2)])  # noqa: B905
-        )
-
-    def output(self, t, u):
-        p = self.p
-        wheels = wheel_outputs(self.wheels, self.spins, self.loads, radius=p.wheel_radius, v_low=p.low_speed)
-        return (*motion_outputs(self.motion, *self.end, p.low_speed), self.angle, self.rate, *wheels)
-
-    def _resultants(self, delta, u):
-        p = self.p
-        return resultants(
-            delta, u[1:9], a=p.cg_to_front_axle, b=p.cg_to_rear_axle, half_track=0.5 * p.track_width
-        )
-
-    def _move(self, h, x, y, moment):
-        """Take roll and plane motion over `h` [s] under held resultants [N], [N.m]."""
-        p, roll = self.p, self.roll
+    def move(self, h: float, delta: float, signals: Sequence[Any]) -> Values:
+        p, body = self.p, self.body
+        x, y_f, y_r, moment = held = resultants(delta, signals[1], signals[2], self.p)
+        y = y_f + y_r
         if h != self.step_size:
             self.step_size = h
-            self.transition = transition(roll.decay, roll.stiffness, h)
+            self.transition = transition(body.decay, body.stiffness, h)
         phi, dphi = self.angle, self.rate
-        rest = roll.forcing(y, phi + 0.5 * h * dphi, p) / roll.stiffness
+        rest = body.forcing(y, phi + 0.5 * h * dphi) / body.stiffness
         t_11, t_12, t_21, t_22 = self.transition
         offset = phi - rest
         self.angle = phi_end = rest + (t_11 * offset + t_12 * dphi)
@@ -133,8 +75,8 @@ class EightDof(Component):
         v_x, v_y, r = self.motion[:3]
         dr = moment / p.yaw_inertia
         half = 0.5 * h
-        a_y = (y + roll.coupling * (dphi_end - dphi) / h) / p.mass  # mean over the step
-        a_x = longitudinal(
+        a_y = (y + body.coupling * (dphi_end - dphi) / h) / p.mass  # mean over the step
+        a_x = body.longitudinal(
             x,
             v_x=v_x + half * (self.end[0] + v_y * r),  # at the middle of the step
             v_y=v_y + half * (a_y - v_x * r),
@@ -142,30 +84,17 @@ class EightDof(Component):
             phi=0.5 * (phi + phi_end),
             dphi=(phi_end - phi) / h,
             dr=dr,
-            p=p,
-            roll=roll,
         )
         self.motion = move(self.motion, h, a_x=a_x, a_y=a_y, dr=dr)
+        return held
 
-    def _finish(self, forces):
-        """Set accelerations and loads from the resultants at the present time."""
+    def finish(self, carried: Values) -> None:
+        x, y_f, y_r, moment = carried
         v_x, v_y, r = self.motion[:3]
         phi, dphi = self.angle, self.rate
-        self.end = accelerations(forces, v_x=v_x, v_y=v_y, r=r, phi=phi, dphi=dphi, p=self.p, roll=self.roll)[
-            :2
-        ]
-        self.loads = vertical_loads(forces, phi=phi, dphi=dphi, p=self.p)
+        held = x, y_f, y_r, moment
+        self.end = self.body.accelerations(held, v_x=v_x, v_y=v_y, r=r, phi=phi, dphi=dphi)
+        self.loads = self.body.vertical_loads(held, phi=phi, dphi=dphi)
 
-    def _wheels(self):
-        """Return the velocities of the wheels [m/s], longitudinal and lateral."""
-        p = self.p
-        v_x, v_y, r = self.motion[:3]
-        return wheel_velocities(
-            v_x,
-            v_y,
-            r=r,
-            delta=self.steer_angle,
-            a=p.cg_to_front_axle,
-            b=p.cg_to_rear_axle,
-            half_track=0.5 * p.track_width,
-        )
+    def output(self, t: float, u: list[float]) -> tuple[float, ...]:
+        return (*self.motion_values(), self.angle, self.rate, *self.wheel_values())

@@ -28,18 +28,19 @@ springs are stiff or the step is long.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import degrees, pi
+from typing import Any
 
-from ..cars.car_signals import INPUTS, MOTION, WHEELS, initial_motion, motion_outputs, wheel_outputs
+from ..cars.car import DRIVEN_WHEELS, MOTION, DrivenCar
 from ..cars.contact_points import contact, contact_velocities
 from ..cars.plane_body import move
-from ..cars.resistance import resistance
+from ..cars.resistance import Resistance
 from ..cars.ride import AT_REST, RESOLVED, loads, move_ride
-from ..cars.sprung_car import FourteenDofParameters, G, ride_of
-from ..cars.wheel_spin import spin_wheels
-from ..fmi.component import Component
+from ..cars.sprung_car import FourteenDofParameters, ride_of
+from ..cars.wheel_kinematics import Eight
 from ..fmi.variables import output
-from ..mathematics import carry
+from ..mathematics.carry import Values
 
 ROLLED_OVER = 0.25 * pi
 """Roll or pitch [rad] from which on these equations are wrong; chosen: half way on to its side."""
@@ -47,43 +48,25 @@ ROLLED_OVER = 0.25 * pi
 HEAVE = output("heave", unit="m", text="Height of the sprung mass's centre above its place at rest")
 
 
-class FourteenDof(Component):
+class FourteenDof(DrivenCar):
     """Car with fourteen degrees of freedom (body in space, wheel travel, wheel spins) on tyre springs."""
 
     Parameters = FourteenDofParameters
-    inputs = INPUTS
-    outputs = (*MOTION, "roll_angle", "roll_rate", "pitch_angle", HEAVE, *WHEELS)
+    outputs = (*MOTION, "roll_angle", "roll_rate", "pitch_angle", HEAVE, *DRIVEN_WHEELS)
 
-    def configure(self):
-        p = self.p
-        self.ride = ride_of(p)
+    def configure(self) -> None:
+        self.ride = ride_of(self.p)
         self.longest = RESOLVED / self.ride.fastest()
-        self.drag = 0.5 * p.air_density * p.drag_coefficient * p.frontal_area
-        self.rolling = p.rolling_resistance * p.mass * G
+        self.resistance = Resistance.of(self.p)
 
-    def start(self, t, u):
-        p = self.p
-        self.motion = initial_motion(p)
-        high = p.initial_heave
+    def rest(self, signals: Sequence[Any]) -> Values:
+        high = self.p.initial_heave
         self.body: tuple[float, ...] = (high, 0.0, 0.0, high, high, high, high, *AT_REST[7:])
-        self.steer_angle = u[0]
-        self.wheels = self._wheels()
-        self.spins = tuple([v / p.wheel_radius for v in self.wheels[:4]])  # rolling freely
-        self.loads = loads(self.body, self.ride)
-        held = self._contact(u[0], u)
-        self.history = ((0.0, held.x, held.y),) * 2  # age [s] and forces at the last two middles
-        self.ages = (0.0, 0.0, 0.0)
-        self.end = self._accelerations(held.x, held.y)
+        held = contact(signals[0], signals[1], signals[2], self.p)
+        return held.x, held.y
 
-    def advance(self, t, h, u):
-        delta_end = u[0]
-        if h <= 0.0:  # nothing moves
-            self.steer_angle = delta_end
-            self.wheels = self._wheels()
-            return
-        p = self.p
-        held = self._contact(0.5 * (self.steer_angle + delta_end), u)
-        x, y = held.x, held.y
+    def move(self, h: float, delta: float, signals: Sequence[Any]) -> Values:
+        held = contact(delta, signals[1], signals[2], self.p)
         v_x, v_y, r = self.motion[:3]
         r_end, *body = move_ride(r, self.body, h, held=held, ride=self.ride, longest=self.longest)
         _, roll, pitch = body[:3]
@@ -92,63 +75,22 @@ class FourteenDof(Component):
                 f"the car has rolled over: roll {degrees(roll):.3g}, pitch {degrees(pitch):.3g} degrees; "
                 f"its equations end at {degrees(ROLLED_OVER):g}"
             )
-        middle = v_x + 0.5 * h * (self.end[0] + v_y * r)
-        resisting = resistance(middle, drag=self.drag, rolling=self.rolling, fade=p.rolling_fade_speed)
-        self.motion = move(self.motion, h, a_x=(x - resisting) / p.mass, a_y=y / p.mass, dr=(r_end - r) / h)
+        a_x, a_y = self._accelerations(held.x, held.y, v_x + 0.5 * h * (self.end[0] + v_y * r))
+        self.motion = move(self.motion, h, a_x=a_x, a_y=a_y, dr=(r_end - r) / h)
         self.body = tuple(body)
-        self.steer_angle = delta_end
-        before = self.wheels
-        self.wheels = self._wheels()
-        self.spins = spin_wheels(
-            self.spins,
-            h,
-            torque=u[9:13],
-            f_x=u[1:5],
-            slip_stiffness=u[13:17],
-            tyre_slip=u[17:21],
-            load=self.loads,
-            v=before,
-            v_end=self.wheels,
-            radius=p.wheel_radius,
-            inertia=p.wheel_inertia,
-            stiffness_per_load=p.slip_stiffness_per_load,
-            v_low=p.low_speed,
-        )
+        return held.x, held.y
+
+    def finish(self, carried: Values) -> None:
+        x, y = carried
         self.loads = loads(self.body, self.ride)
-        (age_1, x_1, y_1), (age_2, x_2, y_2) = self.history
-        ages = (0.5 * h, age_1 + h, age_2 + h)
-        if ages != self.ages:
-            self.ages = ages
-            self.weights = carry.weights(*ages)
-        k_0, k_1, k_2 = self.weights
-        self.history = ((0.5 * h, x, y), (age_1 + h, x_1, y_1))
-        self.end = self._accelerations(k_0 * x + k_1 * x_1 + k_2 * x_2, k_0 * y + k_1 * y_1 + k_2 * y_2)
+        self.end = self._accelerations(x, y, self.motion[0])
 
-    def output(self, t, u):
-        p = self.p
-        a_x, a_y = self.end
+    def output(self, t: float, u: list[float]) -> tuple[float, ...]:
         heave, roll, pitch = self.body[:3]
-        roll_rate = self.body[8]
-        motion = motion_outputs(self.motion, a_x, a_y, p.low_speed)
-        wheels = wheel_outputs(self.wheels, self.spins, self.loads, radius=p.wheel_radius, v_low=p.low_speed)
-        return (*motion, roll, roll_rate, pitch, heave, *wheels)
+        return (*self.motion_values(), roll, self.body[8], pitch, heave, *self.wheel_values())
 
-    def _contact(self, delta, u):
-        p = self.p
-        return contact(
-            delta, u[1:9], a=p.cg_to_front_axle, b=p.cg_to_rear_axle, half_track=0.5 * p.track_width
-        )
-
-    def _accelerations(self, x, y):
-        """Return a_x, a_y [m/s2] at the present time from the tyre forces there [N]."""
-        p = self.p
-        resisting = resistance(
-            self.motion[0], drag=self.drag, rolling=self.rolling, fade=p.rolling_fade_speed
-        )
-        return (x - resisting) / p.mass, y / p.mass
-
-    def _wheels(self):
-        """Return the velocities of the contact points [m/s], longitudinal and lateral."""
+    def wheel_velocities(self) -> Eight:
+        """Return the velocities [m/s] of the contact points in wheel axes, longitudinal and lateral."""
         p = self.p
         v_x, v_y, r = self.motion[:3]
         return contact_velocities(
@@ -161,3 +103,8 @@ class FourteenDof(Component):
             a=p.cg_to_front_axle,
             b=p.cg_to_rear_axle,
         )
+
+    def _accelerations(self, x: float, y: float, v_x: float) -> tuple[float, float]:
+        """Return a_x, a_y [m/s2] from the tyre forces [N] and the speed [m/s]."""
+        mass = self.p.mass
+        return (x - self.resistance.force(v_x)) / mass, y / mass

@@ -24,22 +24,23 @@ Gauss's rule with two points.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, sin
+from typing import Any
 
-from ..cars.car_signals import MOTION, initial_motion, motion_outputs
+from ..cars.car import MOTION, Car, StartParameters, of_steered_wheels
 from ..cars.load_transfer import quasi_static_loads
-from ..cars.plane_body import Motion
-from ..cars.wheel_kinematics import earth_velocity, slip_angle, wheel_velocities
-from ..fmi.component import Component
-from ..fmi.variables import output, parameter
-from ..mathematics import carry
+from ..cars.plane_body import Geometry, Motion
+from ..cars.wheel_kinematics import earth_velocity
+from ..fmi.variables import parameter
+from ..mathematics.carry import Values
 
 _GAUSS = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
 
 
 @dataclass(frozen=True)
-class TwoDofParameters:
+class TwoDofParameters(StartParameters):
     """The car of paper D."""
 
     mass: float = parameter(1820.0, "kg", "Vehicle mass m; paper D", minimum=1.0)
@@ -53,30 +54,21 @@ class TwoDofParameters:
     track_width: float = parameter(1.5, "m", "Track width d; paper D", minimum=0.1)
     cg_height: float = parameter(0.5, "m", "Height h of the centre of mass; paper D", minimum=0.0)
     initial_speed: float = parameter(25.0, "m/s", "Speed at the start; its part along x is kept; paper D")
-    initial_sideslip: float = parameter(0.0, "rad", "Sideslip angle at the start; chosen: none")
-    initial_yaw_rate: float = parameter(0.0, "rad/s", "Yaw rate at the start; chosen: none")
-    low_speed: float = parameter(
-        0.5,
-        "m/s",
-        "Slip angles refer to this speed when the wheel is slower; chosen: as other plants",
-        minimum=0.001,
-    )
 
 
-def lateral_resultants(
-    delta: float, f_y: tuple[float, ...] | list[float], *, a: float, b: float, half_track: float
-) -> tuple[float, float]:
+def lateral_resultants(delta: float, f_y: Sequence[float], p: Geometry) -> tuple[float, float]:
     """Return the force Y [N] and the moment [N.m] of the lateral tyre forces; equations (1), (2).
 
     Args:
         delta: steer angle of both front wheels [rad].
         f_y: lateral forces of fl, fr, rl, rr, wheel axes [N].
-        a, b, half_track: distances of axles and wheels from the centre of mass [m].
+        p: geometry of the car.
     """
     y_fl, y_fr, y_rl, y_rr = f_y
     front = (y_fl + y_fr) * cos(delta)
     rear = y_rl + y_rr
-    return front + rear, a * front - b * rear + half_track * (y_fl - y_fr) * sin(delta)
+    moment = p.cg_to_front_axle * front - p.cg_to_rear_axle * rear
+    return front + rear, moment + 0.5 * p.track_width * (y_fl - y_fr) * sin(delta)
 
 
 def drift(motion: Motion, h: float, *, a_y: float, dr: float) -> Motion:
@@ -92,83 +84,31 @@ def drift(motion: Motion, h: float, *, a_y: float, dr: float) -> Motion:
     return v_x, v_y + h * (a_y - v_x * turned), r + h * dr, x, y, psi + h * turned
 
 
-class TwoDof(Component):
+class TwoDof(Car):
     """Car with two degrees of freedom (lateral, yaw) at constant speed on four tyres, quasi-static loads."""
 
     Parameters = TwoDofParameters
     inputs = ("steer_angle", "tyre_force_x_*", "tyre_force_y_*", "yaw_moment")
     outputs = (
         *MOTION,
-        output("slip_angle_fl", "steer_angle"),
-        output("slip_angle_fr", "steer_angle"),
-        "slip_angle_rl",
-        "slip_angle_rr",
+        *of_steered_wheels("slip_angle"),
         "slip_ratio_*",
         "vertical_load_*",
-        output("wheel_velocity_fl", "steer_angle"),
-        output("wheel_velocity_fr", "steer_angle"),
-        "wheel_velocity_rl",
-        "wheel_velocity_rr",
+        *of_steered_wheels("wheel_velocity"),
     )
 
-    def start(self, t, u):
-        p = self.p
-        self.motion = initial_motion(p)
-        self.steer_angle = u[0]
-        a_y = self._resultants(u[0], u)[0] / p.mass
-        self.history = ((0.0, a_y), (0.0, a_y))  # age [s] and acceleration at the last two middles
-        self._finish(a_y)
+    def rest(self, signals: Sequence[Any]) -> Values:
+        return (lateral_resultants(signals[0], signals[2], self.p)[0] / self.p.mass,)
 
-    def advance(self, t, h, u):
-        delta, self.steer_angle = self.steer_angle, u[0]
-        if h <= 0.0:  # nothing moves
-            self._finish(self.a_y)
-            return
-        p = self.p
-        force, moment = self._resultants(0.5 * (delta + u[0]), u)
-        a_y = force / p.mass
-        self.motion = drift(self.motion, h, a_y=a_y, dr=(moment + u[9]) / p.yaw_inertia)
-        (age_1, y_1), (age_2, y_2) = self.history
-        k_0, k_1, k_2 = carry.weights(0.5 * h, age_1 + h, age_2 + h)
-        self.history = ((0.5 * h, a_y), (age_1 + h, y_1))
-        self._finish(k_0 * a_y + k_1 * y_1 + k_2 * y_2)
+    def move(self, h: float, delta: float, signals: Sequence[Any]) -> Values:
+        yaw_moment = signals[3]
+        force, moment = lateral_resultants(delta, signals[2], self.p)
+        a_y = force / self.p.mass
+        self.motion = drift(self.motion, h, a_y=a_y, dr=(moment + yaw_moment) / self.p.yaw_inertia)
+        return (a_y,)
 
-    def output(self, t, u):
-        low = self.p.low_speed
+    def finish(self, carried: Values) -> None:
+        (a_y,) = carried
         _, v_y, r = self.motion[:3]
-        v_fl, v_fr, v_rl, v_rr, side_fl, side_fr, side_rl, side_rr = self.wheels
-        return (
-            *motion_outputs(self.motion, -v_y * r, self.a_y, low),
-            slip_angle(v_fl, side_fl, low),
-            slip_angle(v_fr, side_fr, low),
-            slip_angle(v_rl, side_rl, low),
-            slip_angle(v_rr, side_rr, low),
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            *self.loads,
-            v_fl,
-            v_fr,
-            v_rl,
-            v_rr,
-        )
-
-    def _resultants(self, delta, u):
-        p = self.p
-        return lateral_resultants(
-            delta, u[5:9], a=p.cg_to_front_axle, b=p.cg_to_rear_axle, half_track=0.5 * p.track_width
-        )
-
-    def _finish(self, a_y):
-        """Set lateral acceleration [m/s2], wheel velocities and loads at the present time."""
-        p = self.p
-        a, b = p.cg_to_front_axle, p.cg_to_rear_axle
-        v_x, v_y, r = self.motion[:3]
-        self.a_y = a_y
-        self.wheels = wheel_velocities(
-            v_x, v_y, r=r, delta=self.steer_angle, a=a, b=b, half_track=0.5 * p.track_width
-        )
-        self.loads = quasi_static_loads(
-            0.0, a_y, mass=p.mass, a=a, b=b, track_width=p.track_width, height=p.cg_height
-        )
+        self.end = -v_y * r, a_y
+        self.loads = quasi_static_loads(0.0, a_y, self.p)

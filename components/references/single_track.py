@@ -27,26 +27,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import atan, exp
 
+from ..cars.published_cars import PaperB
 from ..cars.single_track_car import SingleTrackCar
 from ..fmi.component import Component
-from ..fmi.variables import output, parameter, signal
+from ..fmi.variables import like, output, parameter, signal
+from ..mathematics.constants import G
 from ..mathematics.integrators import rk4
-
-G = 9.81  # m/s2
 
 
 @dataclass(frozen=True)
 class SingleTrackParameters:
     """The car of paper B, table 1, and the limits."""
 
-    mass: float = parameter(1350.0, "kg", "Vehicle mass m; paper B, table 1", minimum=1.0)
-    yaw_inertia: float = parameter(1343.1, "kg.m2", "Yaw inertia I_z; paper B, table 1", minimum=1.0)
-    cg_to_front_axle: float = parameter(
-        1.04, "m", "Distance a of the centre of mass from the front axle; paper B, table 1", minimum=0.1
-    )
-    cg_to_rear_axle: float = parameter(
-        1.56, "m", "Distance b of the centre of mass from the rear axle; paper B, table 1", minimum=0.1
-    )
+    mass: float = like(PaperB, "mass")
+    yaw_inertia: float = like(PaperB, "yaw_inertia")
+    cg_to_front_axle: float = like(PaperB, "cg_to_front_axle")
+    cg_to_rear_axle: float = like(PaperB, "cg_to_rear_axle")
     cornering_stiffness_front: float = parameter(
         91600.0, "N/rad", "Stiffness C_f of the front axle; chosen: that of the tyres of set 1", minimum=1.0
     )
@@ -97,15 +93,7 @@ class SingleTrack(Component):
     )
 
     def configure(self):
-        p = self.p
-        self.car = SingleTrackCar(
-            p.mass,
-            p.yaw_inertia,
-            p.cg_to_front_axle,
-            p.cg_to_rear_axle,
-            p.cornering_stiffness_front,
-            p.cornering_stiffness_rear,
-        )
+        self.car = SingleTrackCar.of(self.p, self.p.yaw_inertia)
 
     def start(self, t, u):
         self.feed = self._feed(u)

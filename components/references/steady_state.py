@@ -22,10 +22,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..cars.published_cars import PaperA
 from ..fmi.component import Component
-from ..fmi.variables import output, parameter, signal
+from ..fmi.variables import like, output, parameter, signal
+from ..mathematics.constants import G
 
-G = 9.81  # m/s2
 SMALLEST = 1e-3
 
 
@@ -33,13 +34,9 @@ SMALLEST = 1e-3
 class SteadyStateParameters:
     """Of the single-track model and of its limits."""
 
-    mass: float = parameter(1100.0, "kg", "Vehicle mass m; paper A, table 1", minimum=1.0)
-    cg_to_front_axle: float = parameter(
-        1.256, "m", "Distance a of the centre of mass from the front axle; paper A, table 1", minimum=0.1
-    )
-    cg_to_rear_axle: float = parameter(
-        1.368, "m", "Distance b of the centre of mass from the rear axle; paper A, table 1", minimum=0.1
-    )
+    mass: float = like(PaperA, "mass")
+    cg_to_front_axle: float = like(PaperA, "cg_to_front_axle")
+    cg_to_rear_axle: float = like(PaperA, "cg_to_rear_axle")
     cornering_stiffness_front: float = parameter(
         100000.0,
         "N/rad",

@@ -153,16 +153,11 @@ def loaded_tyre(f_z: float, mu: float, c: Coefficients1987) -> LoadedTyre | None
     )
 
 
-def forces_1987(kappa: float, alpha: float, tyre: LoadedTyre) -> tuple[float, float]:
-    """Return (F_x, F_y) [N] at the interface's longitudinal slip `kappa` [1] and slip angle `alpha` [rad]."""
-    return forces_stiffness_1987(kappa, alpha, tyre)[:2]
+def forces_1987(kappa: float, alpha: float, tyre: LoadedTyre) -> tuple[float, float, float]:
+    """Return F_x, F_y and dF_x/dkappa [N] at the interface's slip `kappa` [1] and slip angle `alpha` [rad].
 
-
-def forces_stiffness_1987(kappa: float, alpha: float, tyre: LoadedTyre) -> tuple[float, float, float]:
-    """Return what `forces_1987` does, then dF_x/dkappa [N] at constant slip angle.
-
-    With F_x = D_x f_x(k) kappa / n, n^2 = kappa^2 + T^2, T = eta(k) tan(alpha), times the derivative of the
-    practical slip.
+    The slope, at constant slip angle: F_x = D_x f_x(k) kappa / n, n^2 = kappa^2 + T^2,
+    T = eta(k) tan(alpha), times the derivative of the practical slip.
     """
     c_x, d_x, k_x, e_x, c_y, d_y, k_y, e_y = tyre
     tan_alpha, forward = lateral_slip(alpha)

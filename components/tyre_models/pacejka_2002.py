@@ -160,28 +160,21 @@ def longitudinal_force(kappa: float, curve: LongitudinalCurve) -> float:
     return weight * force if weight > 0.0 else 0.0
 
 
-def forces_and_moment(
-    kappa: float, alpha: float, f_z: float, mu: float, c: Coefficients
-) -> tuple[float, float, float]:
-    """Return (F_x [N], F_y [N], M_z [N.m]) of one wheel in ISO 8855 axes at the contact point.
+def wheel_forces(
+    kappa: float, alpha: float, f_z: float, mu: float, axle: Coefficients
+) -> tuple[float, float, float, float]:
+    """Return F_x, F_y [N], M_z [N.m] and dF_x/dkappa [N] of one wheel, at the contact point, ISO 8855.
+
+    The slope, at constant slip angle, is a difference over `SLIP_STEP` away from |kappa| = 1, beyond which
+    slip has no meaning.
 
     Args:
         kappa, alpha: longitudinal slip [1] and slip angle [rad] as the interface defines them.
         f_z, mu: vertical load [N] and friction coefficient [1].
-        c: the axle's set.
-    """
-    return forces_moment_stiffness(kappa, alpha, f_z, mu, c)[:3]
-
-
-def forces_moment_stiffness(
-    kappa: float, alpha: float, f_z: float, mu: float, c: Coefficients
-) -> tuple[float, float, float, float]:
-    """Return what `forces_and_moment` does, then dF_x/dkappa [N] at constant slip angle.
-
-    The slope is a difference over `SLIP_STEP` away from |kappa| = 1, beyond which slip has no meaning.
+        axle: its set.
     """
     tan_alpha, forward = lateral_slip(alpha)
-    curve = longitudinal_curve(tan_alpha, forward, f_z, mu, c)
+    curve = longitudinal_curve(tan_alpha, forward, f_z, mu, axle)
     if curve is None:
         return 0.0, 0.0, 0.0, 0.0
     f_x = longitudinal_force(kappa, curve)
@@ -189,12 +182,12 @@ def forces_moment_stiffness(
     stiffness = (longitudinal_force(kappa + step, curve) - f_x) / step
     kappa = practical_slip(kappa, forward)
 
-    per_reference, similar = c[0]
+    per_reference, similar = axle[0]
     friction = mu * per_reference
     scale = 1.0 / friction
     (
         f_top, load_scale, c_y, d1, d2, e1, e2, k1, k2, k4, rb1, rb2, rc, re1, re2, rh1, rh2,
-    ) = c[2]  # fmt: skip
+    ) = axle[2]  # fmt: skip
     load = f_z if f_z < f_top else f_top
     df = load * load_scale - 1.0
     peak = d1 + d2 * df
@@ -206,7 +199,7 @@ def forces_moment_stiffness(
     slip_x = kappa * scale
     tan_w, kappa_w = (slip_y, slip_x) if similar else (tan_alpha, kappa)
     cos_alpha = (1.0 if forward else -1.0) / sqrt(1.0 + tan_alpha * tan_alpha)
-    odd = c[4]
+    odd = axle[4]
     x = slip_y
     s_v = induced = 0.0
     if odd:
@@ -239,7 +232,7 @@ def forces_moment_stiffness(
         weight /= cos(rc * atan(y))
     f_y = weight * f_y if weight > 0.0 else 0.0
 
-    q1, q2, q3, c_t, d1, d2, e1, e2, e3, lever = c[3]
+    q1, q2, q3, c_t, d1, d2, e1, e2, e3, lever = axle[3]
     b_t = q1 + df * (q2 + df * q3)
     e = e1 + df * (e2 + df * e3)
     lever *= (f_y + induced) * load / f_z

@@ -150,14 +150,14 @@ class Coefficients(NamedTuple):
     asymmetric: tuple[float, ...]  # empty when switched off
 
 
-def coefficients(p: MagicFormulaParameters, axle: str) -> Coefficients:
-    """Return the set `p` made ready for the axle "front" or "rear".
+def coefficients(p: MagicFormulaParameters, name: str) -> Coefficients:
+    """Return the set `p` made ready for the axle called "front" or "rear".
 
     Raises:
         ValueError: a peak or a stiffness vanishes or changes its sign below maximum_load.
     """
     top = p.maximum_load / p.nominal_load
-    for name, at_zero, at_top in (
+    for what, at_zero, at_top in (
         ("mu_x (PDX1, PDX2)", p.PDX1 - p.PDX2, p.PDX1 + p.PDX2 * (top - 1.0)),
         ("mu_y (PDY1, PDY2)", p.PDY1 - p.PDY2, p.PDY1 + p.PDY2 * (top - 1.0)),
         ("K_x (PKX1, PKX2)", p.PKX1 - p.PKX2, p.PKX1 + p.PKX2 * (top - 1.0)),
@@ -165,13 +165,13 @@ def coefficients(p: MagicFormulaParameters, axle: str) -> Coefficients:
     ):
         if at_zero * at_top <= 0.0:
             raise ValueError(
-                f"the Magic Formula's {name} must keep its sign from no load to maximum_load = "
+                f"the Magic Formula's {what} must keep its sign from no load to maximum_load = "
                 f"{p.maximum_load:g} N: correct the set or lower maximum_load"
             )
     mu_x = p.friction_scale_x
     mu_y = p.friction_scale_y
-    k_x = getattr(p, f"slip_stiffness_scale_{axle}")
-    k_y = getattr(p, f"cornering_stiffness_scale_{axle}")
+    k_x = getattr(p, f"slip_stiffness_scale_{name}")
+    k_y = getattr(p, f"cornering_stiffness_scale_{name}")
     load_scale = 1.0 / p.nominal_load
     radius = p.unloaded_radius
     odd = p.asymmetric_terms

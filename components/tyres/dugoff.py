@@ -23,8 +23,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, sin, sqrt
 
-from ..fmi.component import Component
-from ..fmi.variables import output, parameter
+from ..fmi.variables import parameter
+from ..tyre_models.tyre import Curve, Tyre
 
 
 @dataclass(frozen=True)
@@ -96,27 +96,18 @@ def dugoff_slip_stiffness(
     return grip / n * ((1.0 - 0.5 * s) * slope * q_y * q_y / n_2 - 0.5 * turn * q_x)
 
 
-class Dugoff(Component):
+class Dugoff(Tyre):
     """Dugoff tyres on four wheels: combined slip, friction per wheel."""
 
     Parameters = DugoffParameters
-    inputs = ("slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*")
-    outputs = (
-        output("tyre_force_x_*", "slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*"),
-        output("tyre_force_y_*", "slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*"),
-        output("slip_stiffness_*", "slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*"),
-        output("tyre_slip_ratio_*", "slip_ratio_*"),
-    )
 
-    def output(self, t, u):
-        c_x = self.p.longitudinal_stiffness
-        c_y = self.p.cornering_stiffness
-        x_fl, y_fl = dugoff(u[0], u[4], f_z=u[8], mu=u[12], c_x=c_x, c_y=c_y)
-        x_fr, y_fr = dugoff(u[1], u[5], f_z=u[9], mu=u[13], c_x=c_x, c_y=c_y)
-        x_rl, y_rl = dugoff(u[2], u[6], f_z=u[10], mu=u[14], c_x=c_x, c_y=c_y)
-        x_rr, y_rr = dugoff(u[3], u[7], f_z=u[11], mu=u[15], c_x=c_x, c_y=c_y)
-        k_fl = dugoff_slip_stiffness(u[0], u[4], f_z=u[8], mu=u[12], c_x=c_x, c_y=c_y)
-        k_fr = dugoff_slip_stiffness(u[1], u[5], f_z=u[9], mu=u[13], c_x=c_x, c_y=c_y)
-        k_rl = dugoff_slip_stiffness(u[2], u[6], f_z=u[10], mu=u[14], c_x=c_x, c_y=c_y)
-        k_rr = dugoff_slip_stiffness(u[3], u[7], f_z=u[11], mu=u[15], c_x=c_x, c_y=c_y)
-        return x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr, k_fl, k_fr, k_rl, k_rr, *u[4:8]
+    @staticmethod
+    def wheel(kappa: float, alpha: float, f_z: float, mu: float, axle: DugoffParameters) -> tuple[float, ...]:
+        c_x, c_y = axle.longitudinal_stiffness, axle.cornering_stiffness
+        f_x, f_y = dugoff(alpha, kappa, f_z=f_z, mu=mu, c_x=c_x, c_y=c_y)
+        return f_x, f_y, dugoff_slip_stiffness(alpha, kappa, f_z=f_z, mu=mu, c_x=c_x, c_y=c_y)
+
+    @classmethod
+    def curve(cls, alpha: float, f_z: float, mu: float, axle: DugoffParameters) -> Curve:
+        c_x, c_y = axle.longitudinal_stiffness, axle.cornering_stiffness
+        return lambda kappa: dugoff(alpha, kappa, f_z=f_z, mu=mu, c_x=c_x, c_y=c_y)[0], mu * f_z / c_x

@@ -6,37 +6,22 @@ the default set, of a 205/60R15, in `tyre_models/pacejka_2002_set.py`.
 
 from __future__ import annotations
 
-from ..fmi.component import Component
-from ..fmi.variables import output
-from ..tyre_models.pacejka_2002 import forces_moment_stiffness
-from ..tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
-
-_INPUTS = ("slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*")
+from ..tyre_models.pacejka_2002 import lateral_slip, longitudinal_curve, longitudinal_force, wheel_forces
+from ..tyre_models.pacejka_2002_set import Coefficients, MagicFormulaParameters, coefficients
+from ..tyre_models.tyre import Curve, Tyre, law_outputs, no_force
 
 
-class MagicFormula(Component):
+class MagicFormula(Tyre):
     """Magic Formula tyres (2002 form) on four wheels: combined slip, aligning moment, friction per wheel."""
 
     Parameters = MagicFormulaParameters
-    inputs = _INPUTS
-    outputs = (
-        output("tyre_force_x_*", *_INPUTS),
-        output("tyre_force_y_*", *_INPUTS),
-        output("aligning_moment_*", *_INPUTS),
-        output("slip_stiffness_*", *_INPUTS),
-        output("tyre_slip_ratio_*", "slip_ratio_*"),
-    )
+    outputs = law_outputs("tyre_force_x_*", "tyre_force_y_*", "aligning_moment_*", "slip_stiffness_*")
+    axle = staticmethod(coefficients)
+    wheel = staticmethod(wheel_forces)
 
-    def configure(self):
-        self.front = coefficients(self.p, "front")
-        self.rear = coefficients(self.p, "rear")
-
-    def output(self, t, u):
-        front = self.front
-        rear = self.rear
-        x_fl, y_fl, z_fl, k_fl = forces_moment_stiffness(u[4], u[0], u[8], u[12], front)
-        x_fr, y_fr, z_fr, k_fr = forces_moment_stiffness(u[5], u[1], u[9], u[13], front)
-        x_rl, y_rl, z_rl, k_rl = forces_moment_stiffness(u[6], u[2], u[10], u[14], rear)
-        x_rr, y_rr, z_rr, k_rr = forces_moment_stiffness(u[7], u[3], u[11], u[15], rear)
-        forces = x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr, z_fl, z_fr, z_rl, z_rr
-        return *forces, k_fl, k_fr, k_rl, k_rr, *u[4:8]
+    @classmethod
+    def curve(cls, alpha: float, f_z: float, mu: float, axle: Coefficients) -> Curve:
+        curve = longitudinal_curve(*lateral_slip(alpha), f_z, mu, axle)
+        if curve is None:
+            return no_force, 1.0
+        return lambda kappa: longitudinal_force(kappa, curve), curve.d / curve.stiffness

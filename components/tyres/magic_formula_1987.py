@@ -6,43 +6,33 @@ moment: the set has none.
 
 from __future__ import annotations
 
-from ..fmi.component import Component
-from ..fmi.variables import output
 from ..tyre_models.bakker_1987 import (
+    Coefficients1987,
     MagicFormula1987Parameters,
     coefficients_1987,
-    forces_stiffness_1987,
+    forces_1987,
     loaded_tyre,
 )
+from ..tyre_models.tyre import Curve, Tyre, no_force
 
-_INPUTS = ("slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*")
 
-
-class MagicFormula1987(Component):
+class MagicFormula1987(Tyre):
     """Magic Formula tyres (1987 form) on four wheels: combined slip by similarity, friction per wheel."""
 
     Parameters = MagicFormula1987Parameters
-    inputs = _INPUTS
-    outputs = (
-        output("tyre_force_x_*", *_INPUTS),
-        output("tyre_force_y_*", *_INPUTS),
-        output("slip_stiffness_*", *_INPUTS),
-        output("tyre_slip_ratio_*", "slip_ratio_*"),
-    )
 
-    def configure(self):
-        self.coefficients = coefficients_1987(self.p)
+    @staticmethod
+    def axle(p: MagicFormula1987Parameters, name: str) -> Coefficients1987:
+        return coefficients_1987(p)
 
-    def output(self, t, u):
-        longitudinal = []
-        lateral = []
-        stiffness = []
-        for wheel in range(4):
-            tyre = loaded_tyre(u[8 + wheel], u[12 + wheel], self.coefficients)
-            f_x, f_y, slope = (
-                (0.0, 0.0, 0.0) if tyre is None else forces_stiffness_1987(u[4 + wheel], u[wheel], tyre)
-            )
-            longitudinal.append(f_x)
-            lateral.append(f_y)
-            stiffness.append(slope)
-        return *longitudinal, *lateral, *stiffness, *u[4:8]
+    @staticmethod
+    def wheel(kappa: float, alpha: float, f_z: float, mu: float, axle: Coefficients1987) -> tuple[float, ...]:
+        tyre = loaded_tyre(f_z, mu, axle)
+        return (0.0, 0.0, 0.0) if tyre is None else forces_1987(kappa, alpha, tyre)
+
+    @classmethod
+    def curve(cls, alpha: float, f_z: float, mu: float, axle: Coefficients1987) -> Curve:
+        tyre = loaded_tyre(f_z, mu, axle)
+        if tyre is None:
+            return no_force, 1.0
+        return lambda kappa: forces_1987(kappa, alpha, tyre)[0], tyre.d_x / tyre.k_x

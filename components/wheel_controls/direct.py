@@ -10,15 +10,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..cars.published_cars import PaperA
 from ..fmi.component import Component
-from ..fmi.variables import output, parameter
+from ..fmi.variables import like, output, parameter
 
 
 @dataclass(frozen=True)
 class DirectParameters:
     """Of the wheel and its motor."""
 
-    wheel_radius: float = parameter(0.31, "m", "Wheel radius R; paper A, table 1", minimum=0.05)
+    wheel_radius: float = like(PaperA, "wheel_radius")
     torque_limit: float = parameter(
         400.0, "N.m", "Largest torque T_max of a wheel; chosen: in-wheel motor of this class", minimum=0.0
     )

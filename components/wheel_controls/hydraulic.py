@@ -19,8 +19,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..cars.published_cars import PaperC
 from ..fmi.component import Component
-from ..fmi.variables import output, parameter
+from ..fmi.variables import like, output, parameter
 from ..mathematics.first_order_lag import Stage
 
 
@@ -28,7 +29,7 @@ from ..mathematics.first_order_lag import Stage
 class HydraulicParameters:
     """Of brakes, hydraulics and slip release."""
 
-    wheel_radius: float = parameter(0.33, "m", "Wheel radius R; chosen: large saloon, rolling", minimum=0.05)
+    wheel_radius: float = like(PaperC, "wheel_radius")
     brake_factor_front: float = parameter(
         2.2e-4, "m3", "Torque per pressure C of a front brake; chosen: large saloon", minimum=1e-7
     )

@@ -17,8 +17,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from components.fmi.component import Component
-from components.fmi.roles import WHEELS
 from components.fmi.variables import output, parameter
+from components.fmi.wheels import WHEELS
 from components.plants.fourteen_dof import FourteenDof
 
 from .loop import Loop

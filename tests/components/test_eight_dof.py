@@ -12,13 +12,13 @@ from components.cars.wheel_spin import spin
 from components.drivers.sine import Sine
 from components.plants.eight_dof import EightDof
 from components.plants.seven_dof import SevenDof
-from components.tyre_models.pacejka_2002 import forces_and_moment
 from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
 from components.tyres.dugoff import Dugoff
 from components.tyres.magic_formula import MagicFormula
 
 from . import monolith, monolith_b
 from .loop import Loop
+from .magic import forces_and_moment
 from .stand import Stand
 
 WHEELS = ("fl", "fr", "rl", "rr")

@@ -13,7 +13,7 @@ from components.controllers.fnn import Fnn
 from components.controllers.fuzzy_sideslip import FuzzySideslip
 from components.controllers.off import Off
 from components.drivers.sine import Sine
-from components.fmi.roles import WHEELS
+from components.fmi.wheels import WHEELS
 from components.plants.seven_dof import SevenDof
 from components.references.steady_state import SteadyState
 from components.tyres.dugoff import Dugoff

@@ -13,8 +13,9 @@ from components.controllers.fuzzy_sliding_mode import FuzzySlidingMode
 from components.controllers.sliding_mode import SlidingMode
 from components.plants.eight_dof import EightDof
 from components.references.single_track import SingleTrack
-from components.tyre_models.pacejka_2002 import forces_and_moment
 from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
+
+from .magic import forces_and_moment
 
 CAR = Path(__file__).parents[2] / "scenarios" / "vehicles" / "four_wheel_drive_car.yaml"
 UNITS = (SingleTrack, SlidingMode, FuzzySlidingMode, SideShare, Lag, EightDof)

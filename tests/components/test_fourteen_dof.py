@@ -10,16 +10,16 @@ import pytest
 
 from components.cars.sprung_car import FourteenDofParameters, G, ride_of
 from components.drivers.sine import Sine
-from components.fmi.roles import WHEELS
+from components.fmi.wheels import WHEELS
 from components.plants.eight_dof import EightDof
 from components.plants.fourteen_dof import FourteenDof
-from components.tyre_models.pacejka_2002 import forces_and_moment
 from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
 from components.tyres.dugoff import Dugoff
 from components.tyres.magic_formula import MagicFormula
 
 from . import monolith, monolith_c
 from .loop import Loop
+from .magic import forces_and_moment
 from .stand import Stand
 
 P = FourteenDofParameters()

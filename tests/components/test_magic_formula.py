@@ -11,7 +11,6 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from components.tyre_models.pacejka_2002 import (
-    forces_and_moment,
     lateral_slip,
     longitudinal_curve,
     longitudinal_force,
@@ -21,6 +20,7 @@ from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coef
 from components.tyre_models.slip_curve import slip_stiffness
 from components.tyres.magic_formula import MagicFormula
 
+from .magic import forces_and_moment
 from .stand import Stand
 
 LOADS = (2000.0, 4000.0, 6000.0)

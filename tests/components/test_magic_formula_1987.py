@@ -10,12 +10,12 @@ import pytest
 from components.tyre_models.bakker_1987 import (
     MagicFormula1987Parameters,
     coefficients_1987,
-    forces_1987,
     loaded_tyre,
 )
 from components.tyre_models.slip_curve import slip_stiffness
 from components.tyres.magic_formula_1987 import MagicFormula1987
 
+from .magic import forces_1987
 from .stand import Stand
 
 

@@ -17,12 +17,12 @@ from . import monolith_c
 P = FourteenDofParameters()
 RIDE = ride_of(P)
 A, B, T = P.cg_to_front_axle, P.cg_to_rear_axle, 0.5 * P.track_width
-FREE = contact(0.0, (0.0,) * 8, a=A, b=B, half_track=T)
+FREE = contact(0.0, (0.0,) * 4, (0.0,) * 4, P)
 LONGEST = RESOLVED / RIDE.fastest()
 
 
 def pushed(f_x, f_y):
-    return contact(0.0, [*f_x, *f_y], a=A, b=B, half_track=T)
+    return contact(0.0, f_x, f_y, P)
 
 
 def small_state(random, size):

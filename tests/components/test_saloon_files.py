@@ -16,10 +16,11 @@ from components.tyre_models.bakker_1987 import (
     coefficients_1987,
     loaded_tyre,
 )
-from components.tyre_models.pacejka_2002 import forces_and_moment
 from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
 from components.tyres.magic_formula import MagicFormula
 from components.tyres.magic_formula_1987 import MagicFormula1987
+
+from .magic import forces_and_moment
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "vehicles"
 G = 9.81

@@ -7,8 +7,9 @@ from math import atan2, cos, isfinite, sin
 import numpy as np
 import pytest
 
-from components.fmi.roles import WHEELS
-from components.plants.seven_dof import SevenDof, SevenDofParameters, vertical_loads
+from components.cars.load_transfer import quasi_static_loads
+from components.fmi.wheels import WHEELS
+from components.plants.seven_dof import SevenDof, SevenDofParameters
 
 from .stand import Stand
 
@@ -191,20 +192,20 @@ def test_a_driving_torque_spins_the_wheel_up_and_a_tyre_force_slows_it():
 
 def test_the_loads_always_add_up_to_the_weight():
     for a_x, a_y in np.random.default_rng(2).uniform(-40, 40, (500, 2)):
-        loads = vertical_loads(a_x, a_y, P)
+        loads = quasi_static_loads(a_x, a_y, P)
         assert sum(loads) == pytest.approx(WEIGHT, rel=1e-14)
         assert min(loads) >= 0.0
 
 
 def test_braking_loads_the_front_axle_by_the_moment_of_inertia_force():
-    level, braking = vertical_loads(0.0, 0.0, P), vertical_loads(-5.0, 0.0, P)
+    level, braking = quasi_static_loads(0.0, 0.0, P), quasi_static_loads(-5.0, 0.0, P)
     shift = P.mass * 5.0 * P.cg_height / (2 * L)
     changes = [b - a for a, b in zip(level, braking, strict=True)]
     assert changes == pytest.approx([shift, shift, -shift, -shift], rel=1e-12)
 
 
 def test_a_left_turn_loads_the_right_wheels_by_the_moment_of_inertia_force():
-    level, turning = vertical_loads(0.0, 0.0, P), vertical_loads(0.0, 4.0, P)
+    level, turning = quasi_static_loads(0.0, 0.0, P), quasi_static_loads(0.0, 4.0, P)
     fl, fr, rl, rr = (b - a for a, b in zip(level, turning, strict=True))
     assert (fr - fl + rr - rl) * 0.5 * P.track_width == pytest.approx(P.mass * 4.0 * P.cg_height, rel=1e-12)
     assert (fl, rl) == pytest.approx((-fr, -rr))
@@ -213,16 +214,16 @@ def test_a_left_turn_loads_the_right_wheels_by_the_moment_of_inertia_force():
 
 def test_a_wheel_lifts_at_the_rollover_limit_and_the_other_then_carries_its_axle():
     limit = 9.81 * P.track_width / (2 * P.cg_height)
-    assert min(vertical_loads(0.0, 0.999 * limit, P)) > 0.0
-    fl, fr, rl, rr = vertical_loads(0.0, 1.001 * limit, P)
+    assert min(quasi_static_loads(0.0, 0.999 * limit, P)) > 0.0
+    fl, fr, rl, rr = quasi_static_loads(0.0, 1.001 * limit, P)
     assert (fl, rl) == (0.0, 0.0)
     assert fr == pytest.approx(WEIGHT * P.cg_to_rear_axle / L)
     assert rr == pytest.approx(WEIGHT * P.cg_to_front_axle / L)
 
 
 def test_an_axle_lifts_under_extreme_braking_and_the_other_carries_the_car():
-    assert vertical_loads(-100.0, 0.0, P) == pytest.approx((WEIGHT / 2, WEIGHT / 2, 0.0, 0.0))
-    assert vertical_loads(100.0, 0.0, P) == pytest.approx((0.0, 0.0, WEIGHT / 2, WEIGHT / 2))
+    assert quasi_static_loads(-100.0, 0.0, P) == pytest.approx((WEIGHT / 2, WEIGHT / 2, 0.0, 0.0))
+    assert quasi_static_loads(100.0, 0.0, P) == pytest.approx((0.0, 0.0, WEIGHT / 2, WEIGHT / 2))
 
 
 def test_loads_of_a_step_follow_from_its_forces():
@@ -231,7 +232,7 @@ def test_loads_of_a_step_follow_from_its_forces():
     stand.start(**forces)
     y = stand.step(0.001, **forces)
     assert y["acceleration_y"] == pytest.approx(3800.0 / P.mass)
-    assert wheel_values(y, "vertical_load") == pytest.approx(vertical_loads(0.0, 3800.0 / P.mass, P))
+    assert wheel_values(y, "vertical_load") == pytest.approx(quasi_static_loads(0.0, 3800.0 / P.mass, P))
 
 
 def test_after_initialization_loads_and_accelerations_follow_no_force_at_once():

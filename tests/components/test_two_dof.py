@@ -13,19 +13,20 @@ from scipy.integrate import solve_ivp
 from components.cars.load_transfer import quasi_static_loads
 from components.drivers.sine import Sine
 from components.fmi.component import Component
-from components.fmi.roles import ROLES, WHEELS, wheels
+from components.fmi.roles import ROLES
 from components.fmi.variables import parameter
+from components.fmi.wheels import WHEELS, wheels
 from components.plants.two_dof import TwoDof, TwoDofParameters
 from components.tyre_models.bakker_1987 import (
     MagicFormula1987Parameters,
     coefficients_1987,
-    forces_1987,
     loaded_tyre,
 )
 from components.tyres.linear import LinearTyre
 from components.tyres.magic_formula_1987 import MagicFormula1987
 
 from .loop import Loop
+from .magic import forces_1987
 from .stand import Stand
 
 P = TwoDofParameters()
@@ -185,9 +186,7 @@ def test_wheel_loads_carry_the_moment_of_the_lateral_acceleration_and_no_more():
     assert fl + fr == pytest.approx(M * G * B / L, rel=1e-14)
     assert rl + rr == pytest.approx(M * G * A / L, rel=1e-14)
     assert 0.5 * D * (fr - fl + rr - rl) == pytest.approx(4200.0 * H, rel=1e-12)
-    assert (fl, fr, rl, rr) == pytest.approx(
-        quasi_static_loads(0.0, 4200.0 / M, mass=M, a=A, b=B, track_width=D, height=H)
-    )
+    assert (fl, fr, rl, rr) == pytest.approx(quasi_static_loads(0.0, 4200.0 / M, P))
 
 
 def test_a_wheel_that_lifts_leaves_its_load_to_the_other():

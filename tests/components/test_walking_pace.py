@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from components.drivers.sine import Sine
-from components.fmi.roles import WHEELS
+from components.fmi.wheels import WHEELS
 from components.plants.eight_dof import EightDof
 from components.plants.fourteen_dof import FourteenDof
 from components.plants.seven_dof import SevenDof
-from components.tyre_models.pacejka_2002 import forces_and_moment
 from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
 from components.tyres.dugoff import Dugoff
 from components.tyres.linear import LinearTyre
@@ -21,6 +20,7 @@ from components.tyres.magic_formula_1987 import MagicFormula1987
 
 from . import monolith, monolith_b
 from .loop import Loop
+from .magic import forces_and_moment
 
 
 def four(name, *values):

@@ -18,7 +18,8 @@ from components.tyres.linear import LinearTyre
 from components.tyres.magic_formula import MagicFormula
 from components.tyres.magic_formula_1987 import MagicFormula1987
 from components.wheel_controls.direct import Direct
-from components.wheel_controls.slip import CURVES, Slip, SlipParameters, tyre_sets
+from components.wheel_controls.slip import TYRES as KNOWN
+from components.wheel_controls.slip import Slip, SlipParameters
 
 from .loop import Loop
 from .stand import Stand
@@ -46,9 +47,14 @@ TYRES = {
 }
 
 
+def curve_of(p, axle, alpha=0.0, f_z=4000.0, mu=1.0):
+    tyre = KNOWN[p.tyre]
+    return tyre.curve(alpha, f_z, mu, tyre.axle(p, axle))
+
+
 def tyre_curve(alpha, f_z, mu, **given):
     p = SlipParameters(**given)
-    return CURVES[p.tyre](alpha, f_z, mu, tyre_sets(p)[0])
+    return curve_of(p, "front", alpha, f_z, mu)
 
 
 def slip_limits(force, sign):
@@ -178,7 +184,7 @@ def test_the_curve_that_is_inverted_is_that_of_the_tyre_unit(name):
 
 def test_each_axle_has_its_own_stiffness():
     p = SlipParameters(slip_stiffness_scale_front=0.8, slip_stiffness_scale_rear=1.2)
-    front, rear = [CURVES[p.tyre](0.0, 4000.0, 1.0, c)[0](1e-6) for c in tyre_sets(p)]
+    front, rear = [curve_of(p, axle)[0](1e-6) for axle in ("front", "rear")]
     assert front / rear == pytest.approx(0.8 / 1.2, rel=1e-4)
 
 
@@ -212,7 +218,7 @@ def test_the_torque_gives_the_slip_rate_asked_for_in_both_branches():
 
 def torque_of(request, kappa=0.0, *, w, v, dv=0.0, f_z=4000.0, mu=0.8, h=0.001, **given):
     p = SlipParameters(**given)
-    curve = CURVES[p.tyre](0.0, f_z, mu, tyre_sets(p)[0])
+    curve = curve_of(p, "front", 0.0, f_z, mu)
     return wheel_torque(request, kappa, curve, w=w, v=v, dv=dv, sample_time=h, p=p)[0]
 
 

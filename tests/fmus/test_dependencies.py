@@ -15,7 +15,7 @@ import struct
 import pytest
 
 from components.fmi.component import Component
-from components.fmi.roles import WHEELS
+from components.fmi.wheels import WHEELS
 from fmus.build import find_components
 from tests.components.stand import Stand
 from tests.fmus.plausible import plausible

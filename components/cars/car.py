@@ -1,0 +1,227 @@
+"""The bases of plants: a car on four wheels, and one whose wheels are driven and braked.
+
+A plant adds its body in four methods, called in this order:
+
+    rest(signals)               the body at start time; returns what is carried (see below)
+    move(h, delta, signals)     body and `self.motion` over a step of held forces; returns what is carried
+    wheel_velocities()          of the wheels at the present motion and steer angle
+    finish(carried)             `self.end` (a_x, a_y) and `self.loads` at the present time
+
+and, if its body has outputs of its own, in `output`.
+
+`signals` are the inputs, one item each: steer angle, tyre forces x and y, then the plant's own; forces are
+those at the middle of the step. What `rest` and `move` return belongs to that middle; it is carried to
+the step's end (`mathematics.carry`) and handed to `finish`.
+
+    beta = atan2(v_y, v_x)        dbeta/dt = (v_x a_y - v_y a_x) / (v_x^2 + v_y^2) - r
+
+Front wheels turn with the steer angle, so their slips and velocities follow it at the same instant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import atan2, cos, sin
+from typing import Any
+
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter, signal
+from ..fmi.wheels import Four
+from ..mathematics.carry import Carried, Values
+from .plane_body import Motion
+from .wheel_kinematics import Eight, slip_angle, slip_ratio, wheel_velocities
+from .wheel_spin import spin
+
+MOTION = (
+    "velocity_x",
+    "velocity_y",
+    "yaw_rate",
+    "sideslip",
+    "sideslip_rate",
+    "acceleration_x",
+    "acceleration_y",
+    "position_x",
+    "position_y",
+    "yaw_angle",
+)
+"""Outputs of every car: its plane motion."""
+
+
+def of_steered_wheels(name: str) -> tuple[Any, ...]:
+    """Declare an output of four wheels, of which those in front follow the steer angle at once."""
+    front = [output(f"{name}_{wheel}", "steer_angle") for wheel in ("fl", "fr")]
+    return (*front, f"{name}_rl", f"{name}_rr")
+
+
+WHEEL_SLIPS = (*of_steered_wheels("slip_angle"), *of_steered_wheels("slip_ratio"), "vertical_load_*")
+"""Outputs of every car: slips and loads of its wheels."""
+
+DRIVEN_WHEELS = (*WHEEL_SLIPS, "wheel_speed_*", *of_steered_wheels("wheel_velocity"))
+"""Outputs of a car whose wheels are driven and braked."""
+
+
+@dataclass(frozen=True)
+class StartParameters:
+    """How a car begins, and what slip means when it hardly moves."""
+
+    initial_sideslip: float = parameter(0.0, "rad", "Sideslip angle at the start; chosen: none")
+    initial_yaw_rate: float = parameter(0.0, "rad/s", "Yaw rate at the start; chosen: none")
+    low_speed: float = parameter(
+        0.5,
+        "m/s",
+        "Slips refer to this speed when the wheel is slower; chosen: keeps a parked car quiet at 1 ms",
+        minimum=0.001,
+    )
+
+
+class Car(Component):
+    """Base: a car on four wheels that roll freely."""
+
+    motion: Motion
+    steer_angle: float
+    wheels: Eight
+    end: tuple[float, float]
+    loads: Four
+
+    # ---- for the plant ----------------------------------------------------------------------
+
+    def rest(self, signals: Sequence[Any]) -> Values:
+        """Set the body's state at start time from the inputs, by signal; return what is carried."""
+        raise NotImplementedError
+
+    def move(self, h: float, delta: float, signals: Sequence[Any]) -> Values:
+        """Take body and motion over `h` > 0 [s]; return what is carried.
+
+        Args:
+            h: step [s].
+            delta: steer angle at the middle of the step [rad].
+            signals: the inputs, by signal; forces are held over the step.
+        """
+        raise NotImplementedError
+
+    def finish(self, carried: Values) -> None:
+        """Set `self.end`, accelerations [m/s2], and `self.loads` [N] at the present time."""
+        raise NotImplementedError
+
+    def wheel_velocities(self) -> Eight:
+        """Return the velocities [m/s] of the wheels in wheel axes: four longitudinal, four lateral."""
+        p = self.p
+        v_x, v_y, r = self.motion[:3]
+        return wheel_velocities(
+            v_x,
+            v_y,
+            r=r,
+            delta=self.steer_angle,
+            a=p.cg_to_front_axle,
+            b=p.cg_to_rear_axle,
+            half_track=0.5 * p.track_width,
+        )
+
+    # ---- what all plants do -----------------------------------------------------------------
+
+    def start(self, t: float, u: list[float]) -> None:
+        p = self.p
+        signals = self.by_signal(u)
+        v_x = p.initial_speed * cos(p.initial_sideslip)
+        v_y = p.initial_speed * sin(p.initial_sideslip)
+        self.motion = v_x, v_y, p.initial_yaw_rate, 0.0, 0.0, 0.0
+        self.steer_angle = signals[0]
+        carried = self.rest(signals)
+        self.carried = Carried(carried)
+        self.wheels = self.wheel_velocities()
+        self.start_wheels()
+        self.finish(carried)
+
+    def advance(self, t: float, h: float, u: list[float]) -> None:
+        signals = self.by_signal(u)
+        delta = signals[0]
+        before, self.steer_angle = self.steer_angle, delta
+        if h <= 0.0:  # nothing moves
+            self.wheels = self.wheel_velocities()
+            return
+        carried = self.move(h, 0.5 * (before + delta), signals)
+        v = self.wheels
+        self.wheels = self.wheel_velocities()
+        self.turn_wheels(h, v, signals)
+        self.finish(self.carried.to_end(h, carried))
+
+    def output(self, t: float, u: list[float]) -> tuple[float, ...]:
+        return (*self.motion_values(), *self.wheel_values())
+
+    def motion_values(self) -> tuple[float, ...]:
+        """Return the values of `MOTION`."""
+        v_x, v_y, r, x, y, psi = self.motion
+        a_x, a_y = self.end
+        low = self.p.low_speed
+        turning = (v_x * a_y - v_y * a_x) / max(v_x * v_x + v_y * v_y, low * low)
+        return v_x, v_y, r, atan2(v_y, v_x), turning - r, a_x, a_y, x, y, psi
+
+    def wheel_values(self) -> tuple[float, ...]:
+        """Return the values of the wheels' outputs."""
+        low = self.p.low_speed
+        v_fl, v_fr, v_rl, v_rr, side_fl, side_fr, side_rl, side_rr = self.wheels
+        return (
+            slip_angle(v_fl, side_fl, low),
+            slip_angle(v_fr, side_fr, low),
+            slip_angle(v_rl, side_rl, low),
+            slip_angle(v_rr, side_rr, low),
+            *self.rolling_values(),
+        )
+
+    def start_wheels(self) -> None:
+        """Set the wheels' state at start time."""
+
+    def turn_wheels(self, h: float, v: Eight, signals: Sequence[Any]) -> None:
+        """Take the wheels' state over `h` [s], from the velocities `v` [m/s] at its start."""
+
+    def rolling_values(self) -> tuple[float, ...]:
+        """Return the values of the wheels' outputs after their slip angles."""
+        return (0.0, 0.0, 0.0, 0.0, *self.loads, *self.wheels[:4])
+
+
+class DrivenCar(Car):
+    """Base: a car whose wheels spin under drive and brake torques (`cars.wheel_spin`)."""
+
+    inputs = (
+        "steer_angle",
+        "tyre_force_x_*",
+        "tyre_force_y_*",
+        "wheel_torque_*",
+        signal("slip_stiffness_*", optional=True),
+        signal("tyre_slip_ratio_*", optional=True),
+    )
+
+    spins: Four
+
+    def start_wheels(self) -> None:
+        v_fl, v_fr, v_rl, v_rr = self.wheels[:4]
+        radius = self.p.wheel_radius
+        self.spins = v_fl / radius, v_fr / radius, v_rl / radius, v_rr / radius  # rolling freely
+
+    def turn_wheels(self, h: float, v: Eight, signals: Sequence[Any]) -> None:
+        p = self.p
+        _, f_x, _, torque, slip_stiffness, tyre_slip = signals
+        radius, inertia, v_low = p.wheel_radius, p.wheel_inertia, p.low_speed
+        per_load = p.slip_stiffness_per_load
+        # Of eight velocities the first four, the longitudinal ones.
+        wheels = zip(self.spins, torque, f_x, v, self.wheels, self.loads, slip_stiffness, tyre_slip)  # noqa: B905
+        w_fl, w_fr, w_rl, w_rr = [
+            spin(w, h, t, f, v_0, v_1, per_load * load, radius, inertia, v_low, c, kappa)
+            for w, t, f, v_0, v_1, load, c, kappa in wheels
+        ]
+        self.spins = w_fl, w_fr, w_rl, w_rr
+
+    def rolling_values(self) -> tuple[float, ...]:
+        v_fl, v_fr, v_rl, v_rr = velocities = self.wheels[:4]
+        w_fl, w_fr, w_rl, w_rr = spins = self.spins
+        radius, low = self.p.wheel_radius, self.p.low_speed
+        return (
+            slip_ratio(w_fl * radius, v_fl, low),
+            slip_ratio(w_fr * radius, v_fr, low),
+            slip_ratio(w_rl * radius, v_rl, low),
+            slip_ratio(w_rr * radius, v_rr, low),
+            *self.loads,
+            *spins,
+            *velocities,
+        )

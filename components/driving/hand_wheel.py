@@ -1,0 +1,54 @@
+"""The base of open-loop drivers: a hand-wheel angle over time, at a speed that may be held.
+
+    delta(t) = delta_h(t) / steering_ratio
+
+A manoeuvre is one function of time. Stimuli live in a unit, not in the master, so that they are exact at
+every instant and not quantised to whole communication steps. The speed: `driving.speed_holding`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..fmi.component import Component
+from ..fmi.variables import parameter, signal
+from .speed_holding import SpeedHold
+
+
+@dataclass(frozen=True)
+class SteeringParameters:
+    """Of the steering and of when it begins."""
+
+    steering_ratio: float = parameter(
+        17.0, "1", "Hand-wheel angle over road-wheel angle; chosen: large saloon", minimum=0.1
+    )
+    start_time: float = parameter(1.0, "s", "Time at which steering begins; chosen: 1 s straight ahead")
+
+
+def ramp(late: float, duration: float, final: float) -> float:
+    """Return what rises from 0 to `final` over `duration` [s], `late` [s] after its begin; a step if 0 s."""
+    if late <= 0.0:
+        return 0.0
+    return final if late >= duration else final * late / duration
+
+
+class HandWheelDriver(Component):
+    """Base: steers by `hand_wheel_angle`, and holds the speed if told to."""
+
+    inputs = (signal("velocity_x", optional=True),)
+    outputs = ("steer_angle", "drive_force", "steering_wheel_angle")
+
+    def hand_wheel_angle(self, t: float) -> float:
+        """Return the hand-wheel angle [rad] at `t` [s]."""
+        raise NotImplementedError
+
+    def start(self, t: float, u: list[float]) -> None:
+        self.speed = SpeedHold(self.p)
+        self.speed.start(u[0])
+
+    def advance(self, t: float, h: float, u: list[float]) -> None:
+        self.speed.advance(t, h, u[0])
+
+    def output(self, t: float, u: list[float]) -> tuple[float, float, float]:
+        hand = self.hand_wheel_angle(t)
+        return hand / self.p.steering_ratio, self.speed.force, hand
