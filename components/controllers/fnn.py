@@ -18,11 +18,11 @@ q_j = sum_k(n_2k w_jk), and du/ds_1j is (x_1 - c_1j) / s_1j times that.
 
 Learning pauses while the moment is at its limit or above the learning limit, where torques may
 saturate: what the network asks for is then not what the car gets, and e would wind the weights
-up. Under violent excitation this is not enough (40 m/s, 0.03 rad, mu 0.65: max|e| is some 160 % of
+up. Under violent excitation this is not enough (40 m/s, 0.03 rad, mu 0.65: max|e| is some 130 % of
 max|beta_ref| with learning, 12 % with frozen weights), and not the cause: with all limits lifted it
 is the same. Learning integrates e; where tanh flattens, the proportional and damping parts of the
 control vanish, the integral does not, and the loop oscillates. `recall` pulls each weight towards its
-initial value, by |e|, and cures that (0.1: 12 %, unchanged in the paper's runs): e-modification, K. S.
+initial value, by |e|, and cures that (0.1: 13 %, unchanged in the paper's runs): e-modification, K. S.
 Narendra, A. M. Annaswamy, IEEE Trans. Automatic Control 32(2), 1987, 134-145. The paper has
 none, so it is off by default.
 

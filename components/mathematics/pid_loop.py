@@ -2,7 +2,7 @@
 
     u = K_p e + I + K_d q
     dI/dt = K_i e                       but I never moves u beyond its limit, only back towards it
-    tau dq/dt = (slope of e) - q        solved exactly over a sample; tau = 0: the backward difference
+    q the slope of e, smoothed by a lag of tau (`mathematics.slope`)
 
 I is kept in units of the output, so gains may change on line without a jump of the output.
 
@@ -19,8 +19,10 @@ open and names neither filter nor limit.
 
 from __future__ import annotations
 
-from math import exp, inf
+from math import inf
 from typing import NamedTuple
+
+from .slope import Slope
 
 
 class Gains(NamedTuple):
@@ -45,16 +47,18 @@ class Pid:
     def start(self, e: float) -> None:
         """Begin with the error `e`: no integral, no derivative."""
         self.error = e
-        self.slope = 0.0
+        self.rate = Slope(e, self.tau)
         self.area = 0.0  # under the error, over the last sample
         self.integral = 0.0
 
+    @property
+    def slope(self) -> float:
+        """The filtered derivative of the error."""
+        return self.rate.rate
+
     def see(self, e: float, h: float) -> None:
         """Take in the error `e` at the end of a sample of `h` [s]."""
-        if h > 0.0:
-            kept = exp(-h / self.tau) if self.tau > 0.0 else 0.0
-            slope = (e - self.error) / h
-            self.slope = slope + (self.slope - slope) * kept
+        self.rate.see(e, h)
         self.area = 0.5 * h * (self.error + e)
         self.error = e
 

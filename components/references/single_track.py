@@ -9,9 +9,9 @@ alone leaves yaw rate and sideslip of two different turns; limiting the steer an
 model keeps them of one. Paper B limits the outputs, paper D needs the steer angle limited first.
 
 Sliding mode needs the rates of the limited references. One mechanism serves all modes: the slope of
-the limited output over the step, smoothed by a first-order lag,  tau dq/dt = slope - q,  solved
-exactly; with tau = 0 it is the backward difference. So the rates belong to what is shown, corners
-included, and a jump of the reference gives a pulse of the area of the jump.
+the limited output over the step, smoothed by a first-order lag (`mathematics.slope`). So the rates
+belong to what is shown, corners included, and a jump of the reference gives a pulse of the area of the
+jump.
 
 The model takes the steer angle and the speed in a straight line from the last value to the new one.
 Below `low_speed`, where its time constants vanish, it runs at that speed and the yaw rate is scaled
@@ -25,7 +25,7 @@ technology, equation (3).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan, exp
+from math import atan
 
 from ..cars.published_cars import PaperB
 from ..cars.single_track_car import SingleTrackCar
@@ -33,6 +33,7 @@ from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
 from ..mathematics.constants import G
 from ..mathematics.integrators import rk4
+from ..mathematics.slope import Slope
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,7 @@ class SingleTrack(Component):
         self.feed = self._feed(u)
         self.model = self._steady(*self.feed)  # a dynamic model starts in its steady state
         self.limited = self._limit(u)
-        self.rates = (0.0, 0.0)
+        self.rates = [Slope(value, self.p.rate_time_constant) for value in self.limited]
 
     def advance(self, t, h, u):
         delta, v = self.feed
@@ -116,23 +117,14 @@ class SingleTrack(Component):
                 )
 
             self.model = rk4(along, 0.0, h, self.model)
-        beta, r = self.limited
-        self.limited = beta_end, r_end = self._limit(u)
-        if h > 0.0:
-            tau = self.p.rate_time_constant
-            kept = exp(-h / tau) if tau > 0.0 else 0.0
-            q_beta, q_r = self.rates
-            slope_beta = (beta_end - beta) / h
-            slope_r = (r_end - r) / h
-            self.rates = (
-                slope_beta + (q_beta - slope_beta) * kept,
-                slope_r + (q_r - slope_r) * kept,
-            )
+        self.limited = self._limit(u)
+        for rate, value in zip(self.rates, self.limited, strict=True):
+            rate.see(value, h)
 
     def output(self, t, u):
         beta, r = self.limited
-        q_beta, q_r = self.rates
-        return r, beta, q_r, q_beta
+        beta_rate, r_rate = self.rates
+        return r, beta, r_rate.rate, beta_rate.rate
 
     def _feed(self, u):
         """Return steer angle [rad] and speed [m/s] as the model takes them."""

@@ -6,7 +6,8 @@
     beta_ref = beta_1,   |beta_ref| <= min(|mu g (b / v_x^2 - m a / (C_r L))|, beta_max)
 
 with positive axle stiffnesses C_f, C_r. `friction_share` is the share of mu that the limits use.
-The rates are backward differences over the unit's own step, zero at the start.
+The rates are slopes over the unit's own step, smoothed by a first-order lag (`mathematics.slope`), since a
+steering angle often comes in steps of a sensor; zero at the start.
 
 beta_1 / delta crosses zero at v_x^2 = b C_r L / (m a) (16 m/s for the car of paper A), and so does
 its limit. An oversteering car (K < 0) has no steady state from v_x^2 = -1 / K on: there
@@ -26,6 +27,7 @@ from ..cars.published_cars import PaperA
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
 from ..mathematics.constants import G
+from ..mathematics.slope import Slope
 
 SMALLEST = 1e-3
 
@@ -58,6 +60,9 @@ class SteadyStateParameters:
         "rad",
         "Largest reference sideslip beta_max; chosen: 6 degrees, the paper names none",
         minimum=0.0,
+    )
+    rate_time_constant: float = parameter(
+        0.005, "s", "Lag tau of the rates; chosen: one sample of the controllers", minimum=0.0
     )
 
 
@@ -114,14 +119,15 @@ class SteadyState(Component):
     def configure(self):
         self.k = stability_factor(self.p)
 
-    def start(self, t, u):
+    def start(self, t: float, u: list[float]) -> None:
         self.now = steady_state(u[0], u[1], mu=u[2], k=self.k, p=self.p)
-        self.rates = (0.0, 0.0)
+        self.rates = [Slope(value, self.p.rate_time_constant) for value in self.now]
 
-    def advance(self, t, h, u):
-        r_before, beta_before = self.now
-        r, beta = self.now = steady_state(u[0], u[1], mu=u[2], k=self.k, p=self.p)
-        self.rates = ((r - r_before) / h, (beta - beta_before) / h) if h > 0.0 else (0.0, 0.0)
+    def advance(self, t: float, h: float, u: list[float]) -> None:
+        self.now = steady_state(u[0], u[1], mu=u[2], k=self.k, p=self.p)
+        for rate, value in zip(self.rates, self.now, strict=True):
+            rate.see(value, h)
 
-    def output(self, t, u):
-        return self.now + self.rates
+    def output(self, t: float, u: list[float]) -> tuple[float, ...]:
+        r_rate, beta_rate = self.rates
+        return *self.now, r_rate.rate, beta_rate.rate

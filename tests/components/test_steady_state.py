@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from itertools import pairwise
+from math import isfinite, pi, sin
 
 import pytest
 
+from components.references.single_track import SingleTrack
 from components.references.steady_state import (
     SteadyState,
     SteadyStateParameters,
@@ -20,6 +22,7 @@ FREE = SteadyStateParameters(limited=False)
 A, B, M, C = P.cg_to_front_axle, P.cg_to_rear_axle, P.mass, P.cornering_stiffness_rear
 L = A + B
 K = stability_factor(P)
+RATES = ("yaw_acceleration_ref", "sideslip_rate_ref")
 
 
 def reference(delta, v_x, mu=1.0, p=P):
@@ -110,7 +113,7 @@ def test_the_reference_is_finite_for_any_speed_friction_and_car():
 
 
 def test_rates_are_zero_at_the_start_and_then_differences_over_the_units_own_step():
-    stand = Stand(SteadyState)
+    stand = Stand(SteadyState, rate_time_constant=0.0)
     first = stand.start(steer_angle=0.01, velocity_x=20.0, friction=0.8)
     assert (first["yaw_acceleration_ref"], first["sideslip_rate_ref"]) == (0.0, 0.0)
     for h, angle in ((0.002, 0.011), (0.005, 0.008)):
@@ -118,6 +121,42 @@ def test_rates_are_zero_at_the_start_and_then_differences_over_the_units_own_ste
         assert y["yaw_acceleration_ref"] == (y["yaw_rate_ref"] - first["yaw_rate_ref"]) / h
         assert y["sideslip_rate_ref"] == (y["sideslip_ref"] - first["sideslip_ref"]) / h
         first = y
+
+
+@pytest.mark.parametrize("component", [SteadyState, SingleTrack])
+@pytest.mark.parametrize("tau", [0.0, 0.005])
+def test_a_last_step_as_short_as_a_rounding_error_leaves_the_rates_as_they_are(component, tau):
+    stand = Stand(component, rate_time_constant=tau)
+    stand.start(steer_angle=0.0, velocity_x=25.0)
+    before = stand.step(0.001, steer_angle=0.001, velocity_x=25.0)
+    after = stand.step(1e-12, steer_angle=0.002, velocity_x=25.0)
+    assert after["yaw_rate_ref"] > 1.9 * before["yaw_rate_ref"] > 0.0
+    for name in RATES:
+        assert after[name] == before[name]
+    # What was left out counts in the next step: the mean slope over both is that of the whole change.
+    last = stand.step(0.001, steer_angle=0.003, velocity_x=25.0)
+    if tau == 0.0:
+        for name, value in zip(RATES, ("yaw_rate_ref", "sideslip_ref"), strict=True):
+            assert last[name] == pytest.approx((last[value] - before[value]) / 0.001, rel=1e-8)
+
+
+def varying(quantum, **parameters):
+    """Return the variation [rad/s2] of the yaw acceleration asked for in one sine of steering."""
+    stand = Stand(SteadyState, **parameters)
+    stand.start(steer_angle=0.0, velocity_x=25.0)
+    given = []
+    for k in range(1, 5001):
+        delta = 0.0325 * sin(2.0 * pi * 0.2 * 0.001 * k)
+        delta = quantum * round(delta / quantum) if quantum else delta
+        given.append(stand.step(0.001, steer_angle=delta, velocity_x=25.0)["yaw_acceleration_ref"])
+    return sum(abs(b - a) for a, b in pairwise(given))
+
+
+def test_a_steering_angle_in_steps_of_a_sensor_shakes_the_rates_a_fifth_as_much_as_its_differences():
+    quantum = 1.1e-4  # 0.1 degrees of the hand wheel
+    assert varying(quantum, rate_time_constant=0.0) > 100.0 * varying(0.0)
+    assert varying(quantum) < 0.2 * varying(quantum, rate_time_constant=0.0)
+    assert varying(quantum, rate_time_constant=0.02) < 0.055 * varying(quantum, rate_time_constant=0.0)
 
 
 def test_friction_is_one_until_somebody_sets_it():

@@ -30,7 +30,7 @@ SOME = ["controller_off", "driver_sine", "tyre_linear"]
 def checkout(tmp_path):
     """A copy of three components and of what they need, in a folder of another name."""
     root = tmp_path / "another checkout" / "components"
-    for room in ("fmi", "mathematics", "driving"):
+    for room in ("fmi", "mathematics", "driving", "tyre_models"):
         shutil.copytree(COMPONENTS / room, root / room, ignore=shutil.ignore_patterns("__pycache__"))
     (root / "__init__.py").write_bytes((COMPONENTS / "__init__.py").read_bytes())
     for path in ("controllers/off.py", "drivers/sine.py", "tyres/linear.py"):
