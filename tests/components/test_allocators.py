@@ -80,15 +80,6 @@ def test_no_moment_asks_for_no_force():
         assert forces(component, 0.0, delta=0.2) == [0.0] * 4
 
 
-def test_the_mirrored_request_gives_the_mirrored_forces_to_the_last_bit():
-    for moment, delta, (a, b, c, d), _ in cases(100, 3):
-        left = forces(LoadProportional, moment, delta=delta, loads=(a, b, c, d), drive=300.0)
-        right = forces(LoadProportional, -moment, delta=-delta, loads=(b, a, d, c), drive=300.0)
-        assert right == [left[1], left[0], left[3], left[2]]
-        left, right = forces(FixedShare, moment, delta=delta), forces(FixedShare, -moment, delta=-delta)
-        assert right == [left[1], left[0], left[3], left[2]]
-
-
 @pytest.mark.parametrize("component", [LoadProportional, FixedShare])
 def test_a_wheel_without_an_arm_is_left_out_without_a_jump_and_the_others_carry_the_moment(component):
     fl, *_ = forces(component, 1000.0, delta=DEAD_ANGLE)

@@ -33,11 +33,6 @@ def test_largest_moment_is_the_centroid_of_the_outermost_set():
     assert moment(1.0, 1.0, moment_range=900.0) == pytest.approx(-800.0, abs=1e-9)
 
 
-def test_left_and_right_are_mirror_images():
-    for e, rate in [(0.001, 0.05), (-0.012, 0.11), (0.03, -0.02)]:
-        assert moment(e, rate) == pytest.approx(-moment(-e, -rate), abs=1e-9)
-
-
 def test_a_step_gives_what_a_start_with_the_same_inputs_gives():
     stand = Stand(FuzzySideslip)
     stand.start()

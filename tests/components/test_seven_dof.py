@@ -312,18 +312,6 @@ def test_steering_during_the_step_is_right_to_at_least_the_third_power_of_the_st
         assert coarse / fine > 7.0
 
 
-def test_a_step_undone_and_repeated_gives_the_same_bits():
-    stand = car(initial_speed=25.0)
-    stand.start()
-    for k in range(5):
-        stand.step(0.001 * (1 + k % 2), **HARD)
-    kept = stand.unit._get_fmu_state()
-    first = [stand.step(0.001, **MIRRORED), stand.step(0.003, **HARD)]
-    stand.step(0.1, **HARD)
-    stand.unit._set_fmu_state(kept)
-    assert [stand.step(0.001, **MIRRORED), stand.step(0.003, **HARD)] == first
-
-
 # ---- walking pace and rest
 
 

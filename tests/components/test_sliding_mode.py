@@ -88,14 +88,3 @@ def test_the_moment_keeps_to_its_limit_and_fades_out_at_walking_pace():
     assert outputs(stand, *small, speed=0.5)[0] == pytest.approx(0.25 * whole)
     assert outputs(stand, *small, speed=0.0)[0] == 0.0
     assert outputs(stand, *small, speed=-5.0)[0] == 0.0
-
-
-def test_left_and_right_are_mirrored_to_the_last_bit():
-    rng = random.Random(2)
-    for switching in ("sign", "saturation"):
-        stand = Stand(SlidingMode, switching=switching)
-        stand.start()
-        for _ in range(50):
-            errors = [rng.uniform(-0.2, 0.2) for _ in ERRORS]
-            moment, surface = outputs(stand, *errors)
-            assert outputs(stand, *(-e for e in errors)) == (-moment, -surface)
