@@ -61,7 +61,7 @@ class Lag(Component):
         output("brake_torque_*", unit="N.m", text="Torque of the wheel's friction brake, never positive"),
     )
 
-    def start(self, t, u):
+    def start(self, t: float, u: list[float]) -> None:
         p = self.p
         self.motors = [
             Stage(tau=p.motor_time_constant, delay=p.motor_delay, rate=p.motor_rate_limit) for _ in range(4)
@@ -70,14 +70,14 @@ class Lag(Component):
             Stage(tau=p.brake_time_constant, delay=p.brake_delay, rate=p.brake_rate_limit) for _ in range(4)
         ]
 
-    def advance(self, t, h, u):
+    def advance(self, t: float, h: float, u: list[float]) -> None:
         p = self.p
         for request, motor, brake in zip(u, self.motors, self.brakes, strict=True):
             asked_motor, asked_brake = blend(request, p.motor_torque_limit, p.friction_brake_torque_limit)
             motor.advance(t, h, asked_motor)
             brake.advance(t, h, asked_brake)
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         motors = [stage.value for stage in self.motors]
         brakes = [stage.value for stage in self.brakes]
         return [m + b for m, b in zip(motors, brakes, strict=True)] + motors + brakes

@@ -49,7 +49,7 @@ class FixedShare(Component):
     outputs = (output("force_request_*", "yaw_moment", "drive_force", "steer_angle"),)
     sampled = True
 
-    def configure(self):
+    def configure(self) -> None:
         p = self.p
         left, right = p.left_share, 1.0 - p.left_share
         self.shares = (
@@ -59,7 +59,7 @@ class FixedShare(Component):
             right * (1.0 - p.front_share_right),
         )
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         p = self.p
         moment, drive, delta = u
         half_track = 0.5 * p.track_width

@@ -96,7 +96,7 @@ class LoadProportional(Component):
     )
     sampled = True
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         p = self.p
         return share_by_load(
             u[0],

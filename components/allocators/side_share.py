@@ -56,7 +56,7 @@ class SideShare(Component):
     outputs = (output("force_request_*", "yaw_moment", "drive_force", "steer_angle"),)
     sampled = True
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         p = self.p
         moment, drive, delta = u
         half_track = 0.5 * p.track_width

@@ -115,14 +115,14 @@ class SingleWheel(Component):
         output("force_request_*", "yaw_moment", "drive_force", "steer_angle", "yaw_rate", "yaw_rate_ref"),
     )
 
-    def start(self, t, u):
+    def start(self, t: float, u: list[float]) -> None:
         self.braking = False
         self._decide(u)
 
-    def advance(self, t, h, u):
+    def advance(self, t: float, h: float, u: list[float]) -> None:
         self._decide(u)
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         p = self.p
         moment, drive, delta, r, r_ref = u
         forces = NO_FORCE
@@ -139,7 +139,7 @@ class SingleWheel(Component):
             )
         return forces if drive == 0.0 else add_drive_force(forces, drive, p.drive_front_share)
 
-    def _decide(self, u):
+    def _decide(self, u: list[float]) -> None:
         p = self.p
         share = p.release_share if self.braking else 1.0
         self.braking = abs(u[0]) > share * p.moment_threshold and (

@@ -101,7 +101,7 @@ class Ride(NamedTuple):
         )
         moving -= self.yaw_sprung * (r * phi * dtheta + 0.5 * r * r * (phi * phi + theta * theta))
         stored = self.gravity_roll * (cos(phi) - 1.0) + self.gravity_pitch * (cos(theta) - 1.0)
-        travel = []
+        travel: list[float] = []
         for u, du, x, side, m, load, k in zip(
             wheels,
             speeds,

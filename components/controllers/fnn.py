@@ -133,7 +133,8 @@ def network_output(
 ) -> float:
     """Return u of the inputs x_1, x_2; equations (24)-(27). Centres and widths: one list per input."""
     n_1, n_2 = map(normalised_grades, x, centres, widths)
-    return sum(map(mul, firing_strengths(n_1, n_2), weights))
+    u: float = sum(map(mul, firing_strengths(n_1, n_2), weights))
+    return u
 
 
 def set_gradients(
@@ -195,24 +196,24 @@ class Fnn(Component):
     )
     sampled = True
 
-    def configure(self):
+    def configure(self) -> None:
         p = self.p
         self.sensitivity = p.plant_jacobian * p.error_scale / 0.001  # of a rate of 1, per second
         self.initial = initial_weights()
 
-    def start(self, t, u):
+    def start(self, t: float, u: list[float]) -> None:
         self.weights = self.initial
         self.centres = [list(CENTRES), list(CENTRES)]
         self.widths = [[self.p.set_width] * N_SETS, [self.p.set_width] * N_SETS]
         self._sample(u, 0.0)
 
-    def advance(self, t, h, u):
+    def advance(self, t: float, h: float, u: list[float]) -> None:
         self._sample(u, h)
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         return self.moment, self.learning_error, dist(self.weights, self.initial)
 
-    def _sample(self, u, h):
+    def _sample(self, u: list[float], h: float) -> None:
         """Take the moment from the network as it is, then let it learn for `h` [s]."""
         p = self.p
         beta_ref, beta, beta_ref_rate, beta_rate = u
@@ -228,7 +229,7 @@ class Fnn(Component):
             self.learning_error = e
             self._learn((x_1, x_2), strengths, e, h)
 
-    def _learn(self, x, strengths, e, h):
+    def _learn(self, x: tuple[float, float], strengths: list[float], e: float, h: float) -> None:
         """Take one step of gradient descent on E = e^2 / 2, scaled with the sample time `h` [s]."""
         p = self.p
         slope = self.sensitivity * h * e

@@ -85,20 +85,20 @@ class FuzzyFeedback(Component):
         output("sideslip_part", *SIDESLIP, unit="N.m", text="Moment W_2 M_2 of the sideslip system"),
     )
 
-    def configure(self):
+    def configure(self) -> None:
         p = self.p
         sets = Partition.even(FIVE)
         self.surface = Mamdani(sets, sets, [sets], FIVE_BY_FIVE[p.rule_table])
         self.moments = (p.yaw_rate_weight * p.yaw_rate_moment, -p.sideslip_weight * p.sideslip_moment)
 
-    def start(self, t, u):
+    def start(self, t: float, u: list[float]) -> None:
         self.yaw_rate = Pid(self.p.rate_filter)
         self.yaw_rate.start(u[0] - u[1])
 
-    def advance(self, t, h, u):
+    def advance(self, t: float, h: float, u: list[float]) -> None:
         self.yaw_rate.see(u[0] - u[1], h)
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         p = self.p
         e_r = self.yaw_rate
         (share_r,) = self.surface(

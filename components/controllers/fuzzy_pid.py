@@ -139,7 +139,7 @@ class FuzzyPid(Component):
         ),
     )
 
-    def configure(self):
+    def configure(self) -> None:
         p = self.p
         yaw_rate, sideslip = base_gains(p)
         self.yaw_rate = GainSchedule(
@@ -157,22 +157,22 @@ class FuzzyPid(Component):
             reading=p.table_reading,
         )
 
-    def start(self, t, u):
+    def start(self, t: float, u: list[float]) -> None:
         self.loops = YawLoops(self.p.derivative_filter)
         self.loops.start(*u[:4])
         self._decide()
 
-    def advance(self, t, h, u):
+    def advance(self, t: float, h: float, u: list[float]) -> None:
         self.loops.see(*u[:4], h=h)
         self._decide()
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         p = self.p
         yaw_rate, sideslip = self.gains
         moment = limit(self.moment, p.moment_limit, u[4], p.fade_speed)
         return moment, self.loops.integral(), yaw_rate.p, sideslip.p
 
-    def _decide(self):
+    def _decide(self) -> None:
         yaw_rate: Pid = self.loops.yaw_rate
         sideslip: Pid = self.loops.sideslip  # its error is actual minus reference
         self.gains = (

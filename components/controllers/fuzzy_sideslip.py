@@ -64,7 +64,7 @@ class FuzzySideslip(Component):
     outputs = (output("yaw_moment", *_SEEN),)
     sampled = True
 
-    def configure(self):
+    def configure(self) -> None:
         p = self.p
         self.surface = Mamdani(
             Partition.even(SEVEN, -p.error_range, p.error_range),
@@ -73,16 +73,16 @@ class FuzzySideslip(Component):
             RULES,
         )
 
-    def start(self, t, u):
+    def start(self, t: float, u: list[float]) -> None:
         self._sample(u)
 
-    def advance(self, t, h, u):
+    def advance(self, t: float, h: float, u: list[float]) -> None:
         self._sample(u)
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         return (self.moment,)
 
-    def _sample(self, u):
+    def _sample(self, u: list[float]) -> None:
         beta_ref, beta, beta_ref_rate, beta_rate = u
         (share,) = self.surface(beta_ref - beta, beta_ref_rate - beta_rate)
         self.moment = -self.p.moment_range * share

@@ -74,10 +74,10 @@ class FuzzySlidingMode(Component):
         output("reaching_gain", "steer_angle", "friction", unit="1/s", text="Gain k_d as set on line"),
     )
 
-    def configure(self):
+    def configure(self) -> None:
         self.gains = gain_system(self.p)
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         p = self.p
         eps, k_d = self.gains(u[9], abs(u[8]))
         law = SlidingSurface(u[:7], p)

@@ -11,5 +11,5 @@ class Off(Component):
     outputs = ("yaw_moment",)
     sampled = True
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         return (0.0,)

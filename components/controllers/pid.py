@@ -82,18 +82,18 @@ class PidController(Component):
         output("integral_term", *SEEN, unit="N.m", text="Integral part of the moment"),
     )
 
-    def configure(self):
+    def configure(self) -> None:
         self.gains = base_gains(self.p)
 
-    def start(self, t, u):
+    def start(self, t: float, u: list[float]) -> None:
         self.loops = YawLoops(self.p.derivative_filter)
         self.loops.start(*u[:4])
         self.moment = self.loops.moment(*self.gains, limit=self.p.moment_limit)
 
-    def advance(self, t, h, u):
+    def advance(self, t: float, h: float, u: list[float]) -> None:
         self.loops.see(*u[:4], h=h)
         self.moment = self.loops.moment(*self.gains, limit=self.p.moment_limit)
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         p = self.p
         return limit(self.moment, p.moment_limit, u[4], p.fade_speed), self.loops.integral()

@@ -42,7 +42,7 @@ class SlidingMode(Component):
         output("sliding_surface", *SURFACE, unit="rad/s", text="Sliding surface s"),
     )
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         p = self.p
         law = SlidingSurface(u[:7], p)
         moment = law.moment(eps=p.reaching_rate, k_d=p.reaching_gain, speed=u[7], switching=p.switching)

@@ -93,24 +93,24 @@ class DoubleLaneChange(Component):
         ),
     )
 
-    def configure(self):
+    def configure(self) -> None:
         self.track = Track(self.p)
         self.car = SingleTrackCar.of(self.p)
 
-    def start(self, t, u):
+    def start(self, t: float, u: list[float]) -> None:
         p = self.p
         self.speed = SpeedHold(p)
         self.speed.start(u[0])
         self.hands = Stage(tau=p.steering_lag, delay=p.reaction_delay, rate=p.steering_wheel_rate_limit)
         self.wanted = self._wanted(u)
 
-    def advance(self, t, h, u):
+    def advance(self, t: float, h: float, u: list[float]) -> None:
         self.speed.advance(t, h, u[0])
         before = self.wanted
         self.wanted = self._wanted(u)  # positions are those of the end of the step
         self.hands.advance(t, h, 0.5 * (before + self.wanted))
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         hand = self.hands.value
         return (
             hand / self.p.steering_ratio,
@@ -120,11 +120,12 @@ class DoubleLaneChange(Component):
             self.track.overrun(u[1], u[2], u[3]),
         )
 
-    def _wanted(self, u):
+    def _wanted(self, u: list[float]) -> float:
         """Return the hand-wheel angle [rad] that the driver wants."""
         p = self.p
         v, x, y, psi = u
         preview = max(v * p.preview_time, p.least_preview)
         yaw_gain, _ = self.car.gains(max(v, 0.1))
         delta = arc(x, y, psi, track=self.track, preview=preview) * max(v, 0.1) / yaw_gain
-        return min(max(p.steering_ratio * delta, -p.steering_wheel_limit), p.steering_wheel_limit)
+        wanted: float = min(max(p.steering_ratio * delta, -p.steering_wheel_limit), p.steering_wheel_limit)
+        return wanted

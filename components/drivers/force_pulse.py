@@ -56,5 +56,5 @@ class ForcePulse(Component):
     Parameters = ForcePulseParameters
     outputs = ("steer_angle", "drive_force")
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         return held_steer(t, self.p), pulse_force(t, self.p)

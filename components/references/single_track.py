@@ -24,6 +24,7 @@ technology, equation (3).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan
 
@@ -93,16 +94,16 @@ class SingleTrack(Component):
         output("sideslip_rate_ref", "steer_angle", "velocity_x", "friction"),
     )
 
-    def configure(self):
+    def configure(self) -> None:
         self.car = SingleTrackCar.of(self.p, self.p.yaw_inertia)
 
-    def start(self, t, u):
+    def start(self, t: float, u: list[float]) -> None:
         self.feed = self._feed(u)
         self.model = self._steady(*self.feed)  # a dynamic model starts in its steady state
         self.limited = self._limit(u)
         self.rates = [Slope(value, self.p.rate_time_constant) for value in self.limited]
 
-    def advance(self, t, h, u):
+    def advance(self, t: float, h: float, u: list[float]) -> None:
         delta, v = self.feed
         delta_end, v_end = self.feed = self._feed(u)
         if self.p.mode == "steady_state":
@@ -110,23 +111,24 @@ class SingleTrack(Component):
         elif h > 0.0:
             derivatives = self.car.derivatives
 
-            def along(time, state):
+            def along(time: float, state: Sequence[float]) -> tuple[float, float]:
                 part = time / h
                 return derivatives(
                     state[0], state[1], delta=delta + part * (delta_end - delta), v=v + part * (v_end - v)
                 )
 
-            self.model = rk4(along, 0.0, h, self.model)
+            beta, r = rk4(along, 0.0, h, self.model)
+            self.model = beta, r
         self.limited = self._limit(u)
         for rate, value in zip(self.rates, self.limited, strict=True):
             rate.see(value, h)
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         beta, r = self.limited
         beta_rate, r_rate = self.rates
         return r, beta, r_rate.rate, beta_rate.rate
 
-    def _feed(self, u):
+    def _feed(self, u: list[float]) -> tuple[float, float]:
         """Return steer angle [rad] and speed [m/s] as the model takes them."""
         p = self.p
         v = max(u[1], p.low_speed)
@@ -134,12 +136,12 @@ class SingleTrack(Component):
             return limited_steer(u[0], v, mu=max(u[2], 0.0), car=self.car, share=p.friction_share), v
         return u[0], v
 
-    def _steady(self, delta, v):
+    def _steady(self, delta: float, v: float) -> tuple[float, float]:
         """Return (beta [rad], r [rad/s]) of the steady turn."""
         r_gain, beta_gain = self.car.gains(v)
         return beta_gain * delta, r_gain * delta
 
-    def _limit(self, u):
+    def _limit(self, u: list[float]) -> tuple[float, float]:
         """Return (beta_ref [rad], r_ref [rad/s]) of the model's state; equations (17), (18)."""
         p = self.p
         beta, r = self.model

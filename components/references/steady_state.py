@@ -116,7 +116,7 @@ class SteadyState(Component):
         output("sideslip_rate_ref", "steer_angle", "velocity_x", "friction"),
     )
 
-    def configure(self):
+    def configure(self) -> None:
         self.k = stability_factor(self.p)
 
     def start(self, t: float, u: list[float]) -> None:

@@ -39,7 +39,7 @@ class Direct(Component):
     outputs = (output("torque_request_*", "force_request_*"),)
     sampled = True
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         radius = self.p.wheel_radius
         limit = self.p.torque_limit
         return [limited_torque(force, radius, limit) for force in u]

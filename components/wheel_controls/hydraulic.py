@@ -91,7 +91,7 @@ class Hydraulic(Component):
         output("brake_pressure_*", unit="Pa", text="Pressure in the wheel's brake cylinder"),
     )
 
-    def configure(self):
+    def configure(self) -> None:
         p = self.p
         if p.full_release_slip < p.release_slip:
             raise ValueError(
@@ -101,7 +101,7 @@ class Hydraulic(Component):
         front, rear = p.brake_factor_front, p.brake_factor_rear
         self.factors = (front, front, rear, rear)
 
-    def start(self, t, u):
+    def start(self, t: float, u: list[float]) -> None:
         p = self.p
         self.requests = u[:4]
         self.cylinders = [
@@ -109,14 +109,14 @@ class Hydraulic(Component):
             for _ in range(4)
         ]
 
-    def advance(self, t, h, u):
+    def advance(self, t: float, h: float, u: list[float]) -> None:
         p = self.p
         for i, cylinder in enumerate(self.cylinders):
             asked = asked_pressure(self.requests[i], u[4 + i], u[8 + i], factor=self.factors[i], p=p)
             cylinder.advance(t, h, asked)
         self.requests = u[:4]
 
-    def output(self, t, u):
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         p = self.p
         pressures = [cylinder.value for cylinder in self.cylinders]
         torques = [

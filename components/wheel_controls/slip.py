@@ -69,7 +69,7 @@ class Slip(Component):
     )
     sampled = True
 
-    def configure(self):
+    def configure(self) -> None:
         tyre = TYRES[self.p.tyre]
         self.axles = [tyre.axle(self.p, name) for name in ("front", "front", "rear", "rear")]
 
