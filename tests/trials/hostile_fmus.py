@@ -218,6 +218,10 @@ def verdict(run: Running, status: int) -> list[str]:
     case, out = run.case, run.folder / "out"
     said = (run.folder / "stderr").read_text(errors="replace")
     problems = []
+    left = left_over(run.folder)
+    for pid in left:
+        with contextlib.suppress(OSError):
+            os.kill(pid, signal.SIGKILL)
     if status == -999:
         return ["did not end"]
     if status not in (0, 1, 2):
@@ -252,11 +256,8 @@ def verdict(run: Running, status: int) -> list[str]:
         problems.append(f"wrong values of {', '.join(sorted(wrong))}")
     if (run.folder / "out" / "run.json").stat().st_size > 1_000_000:
         problems.append("run.json is too large")
-    if (left := left_over(run.folder)) and (case.isolated or "daemon" not in case.does):
+    if left and (case.isolated or "daemon" not in case.does):
         problems.append(f"{len(left)} processes are left over")
-        for pid in left:
-            with contextlib.suppress(OSError):
-                os.kill(pid, signal.SIGKILL)
     return problems
 
 
