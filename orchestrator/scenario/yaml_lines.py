@@ -154,13 +154,16 @@ def _composed(text: str) -> tuple[Any, Any]:
         RecursionError: it is nested too deeply.
     """
     from ruamel.yaml import YAML
+    from ruamel.yaml.docinfo import DocInfo
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
     yaml = YAML(typ="safe", pure=True)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # an anchor that is given again is no mistake
+            yaml.doc_infos.append(DocInfo())  # where a %YAML line goes
             constructor, _ = yaml.get_constructor_parser(text)
+            _limit_depth(yaml)
             return constructor.composer.get_single_node(), constructor
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
@@ -171,6 +174,18 @@ def _composed(text: str) -> tuple[Any, Any]:
         raise _NotYamlError(0, str(error)) from None
     except (ValueError, OverflowError) as error:  # such as an escape beyond Unicode
         raise _NotYamlError(yaml.reader.line + 1, str(error)) from None
+
+
+def _limit_depth(yaml: Any) -> None:
+    """Let a scanner refuse very many brackets in each other: its work is that of their square."""
+    scanner, begin = yaml.scanner, yaml.scanner.fetch_flow_collection_start
+
+    def fetch(*arguments: Any, **options: Any) -> Any:
+        if len(scanner.flow_context) > DEEPEST:
+            raise _NotYamlError(yaml.reader.line + 1, f"more than {DEEPEST} brackets in each other")
+        return begin(*arguments, **options)
+
+    scanner.fetch_flow_collection_start = fetch
 
 
 class _TooMuchError(Exception):

@@ -69,13 +69,22 @@ def test_merge_keys_that_would_fill_the_memory_are_refused(document):
 
 
 def test_a_chain_of_aliases_too_deep_to_follow_is_refused(document):
-    opened, closed = "[" * 100, "]" * 100
+    opened, closed = "[" * 30, "]" * 30
     lines = [f"x0: &x0 {opened}{closed}", *(f"x{n}: &x{n} {opened}*x{n - 1}{closed}" for n in range(1, 20))]
     (sentence,) = document("\n".join(lines)).sentences()
-    assert sentence.startswith("a.yaml:1: x0: is nested too deeply: at most 40 collections in each other")
+    assert sentence.startswith("a.yaml:2: x1: is nested too deeply: at most 40 collections in each other")
 
 
 def test_a_long_list_without_aliases_is_no_bomb(document, monkeypatch):
     monkeypatch.setattr("orchestrator.scenario.yaml_lines.ALIASED", 50)
     numbers = list(range(100))
     assert document(f"a: {numbers}").data == {"a": numbers}
+
+
+def test_a_line_that_names_the_version_of_yaml_is_read(document):
+    assert document("%YAML 1.2\n---\na: yes\n").data == {"a": "yes"}
+
+
+def test_very_many_brackets_are_refused_before_they_are_scanned(document):
+    (sentence,) = document("a:\n  " + "[" * 100_000).sentences()
+    assert sentence == "a.yaml:2: not valid YAML: more than 40 brackets in each other"

@@ -6,16 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from .mutations import UNFORESEEN, bad, trial
+from .mutations import LIMIT, UNFORESEEN, bad, trial
 
 SAMPLE = {"files": range(60), "ssp": range(20), "results": range(20), "commands": range(4)}
-PATIENCE = 120.0
-"""Time that a file may take here [s]: on a machine that does much else."""
 
 
 @pytest.mark.parametrize("group", SAMPLE)
 def test_files_made_wrong_at_random_are_taken_or_answered_in_a_sentence(group: str, tmp_path: Path) -> None:
-    ((_, tally),) = trial({group: list(SAMPLE[group])}, 11, tmp_path, PATIENCE, 1)
+    ((_, tally),) = trial({group: list(SAMPLE[group])}, 11, tmp_path, LIMIT, 1)
     assert not bad(tally), "\n".join(tally.notes)
     assert sum(tally.counts.values()) == len(SAMPLE[group])
     assert not [note for note in tally.notes if note.startswith(UNFORESEEN)]
