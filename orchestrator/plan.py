@@ -213,6 +213,17 @@ class Change:
 
 
 @dataclass(frozen=True)
+class Finding:
+    """A remark, as data, on what is no mistake but hardly meant: on given values, or on a run's course."""
+
+    kind: str  # "spin", "two values", ...
+    place: str | None = None  # unit.variable
+    value: float | None = None  # the value furthest off
+    time: float | None = None  # when it began [s]; None: before the run
+    says: str = ""  # in a sentence
+
+
+@dataclass(frozen=True)
 class Plan:
     """Units in evaluation order, wires, and the time grid in integers."""
 
@@ -227,6 +238,7 @@ class Plan:
     scenario: dict = field(default_factory=dict)  # as run, for run.json
     notes: tuple[str, ...] = ()  # worth telling the user, but no error
     changes: tuple[Change, ...] = ()  # against the scenario file
+    findings: tuple[Finding, ...] = ()  # on given values
 
     def time(self, k: int) -> float:
         """Return the time [s] of communication point `k`, correctly rounded."""

@@ -72,6 +72,7 @@ def run(
     from ..master.isolation import opener_of
     from ..master.log import STATUS, WARNING
     from ..master.simulate import simulate
+    from ..metrics.plausibility import first_of_each
     from ..results.formats import check_format
     from ..results.lock import refuse_below_others
     from ..results.naming import default_folder
@@ -108,6 +109,8 @@ def run(
         say(f"warning: {len(info.warnings) - SHOWN} more, see {folder / 'run.json'}")
     if info.ended:
         say(f"ended: {info.ended}")
+    for finding in first_of_each(info.findings):
+        say(f"note: {finding.says}")
     say(f"{folder}: {info.rows} rows of {info.columns} variables in {info.wall_time:.2f} s")
     if metrics:
         from ..results.read import load_results

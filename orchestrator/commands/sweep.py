@@ -63,7 +63,7 @@ def sweep(
     from ..studies.jobs import pool
     from ..sweeps.journal import Journal
     from ..sweeps.planning import plan_sweep
-    from ..sweeps.report import REPORT, limit_tables, write_sweep
+    from ..sweeps.report import REPORT, findings_text, limit_tables, write_sweep
     from ..sweeps.run_sweep import finish, left_to_do
     from ..sweeps.sweep_file import load_sweep
     from ..sweeps.table import Swept, point_text
@@ -102,6 +102,8 @@ def sweep(
         say(f"{point_text(planned, run)} failed: {'; '.join(swept.record(run).problems)}")
     if len(swept.failed) > SHOWN:
         say(f"{len(swept.failed) - SHOWN} more failed")
+    if found := findings_text(swept):
+        say(f"note: {found}")
     say(f"Table and figures: {folder} (begin with {folder / REPORT})")
     if swept.failed:
         raise typer.Exit(1)

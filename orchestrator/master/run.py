@@ -7,10 +7,12 @@ import os
 import sys
 import time
 import uuid
+from dataclasses import asdict
 from datetime import datetime, timezone
 from typing import Any
 
 from ..errors import ResultsError, SimulationError, YawbenchError
+from ..metrics.plausibility import Watch
 from ..plan import Plan
 from ..results.columnar import MemoryRecorder
 from ..results.folder import COMPLETED, RUNNING
@@ -38,6 +40,8 @@ class Run:
     ) -> None:
         self.plan = plan
         self.recorder = recorder
+        self.watch = Watch(plan)
+        recorder.looks.append(self.watch.look)
         self.log = Log()
         self.id = uuid.uuid4().hex[:12]
         self._apart = apart
@@ -112,6 +116,7 @@ class Run:
         self._saving = True
         self._ended_by = getattr(error, "unit", None)
         ended = {"wall_time": self.wall_time, "error": self._explained(error), "units_freed": False}
+        ended["findings"] = [asdict(one) for one in (*self.plan.findings, *self.watch.findings())]
         if self.ended is not None:
             ended["ended"] = {"unit": self.ended.unit, "time": self.ended.time, "message": str(self.ended)}
         record = self._recorded(status) | self.log.record(self._ended_by) | ended

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..plan import Plan
+from ..plan import Finding, Plan
 from ..results.columnar import MemoryRecorder
 from ..results.formats import recorder_of
 from ..results.read import Results
@@ -28,6 +28,7 @@ class RunInfo:
     passes: int  # of initialization
     warnings: list[Message] = field(default_factory=list)
     ended: str | None = None  # why a unit ended it before its stop time
+    findings: tuple[Finding, ...] = ()  # on the run's course
 
 
 def simulate(
@@ -68,7 +69,15 @@ def simulate(
     run.make(opener)
     warnings, ended = list(run.log.warnings()), None if run.ended is None else str(run.ended)
     return RunInfo(
-        Path(out), recorder.written, len(plan.record), run.id, run.wall_time, run.passes, warnings, ended
+        Path(out),
+        recorder.written,
+        len(plan.record),
+        run.id,
+        run.wall_time,
+        run.passes,
+        warnings,
+        ended,
+        run.watch.findings(),
     )
 
 

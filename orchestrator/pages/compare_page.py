@@ -14,7 +14,7 @@ from ..metrics.run_metrics import STANDARD, Value, metric
 from ..results.read import Results
 from ..studies.compare import FIGURES, Comparison
 from ..studies.jobs import Job, Once, planned
-from ..studies.tables import Cell, Table
+from ..studies.tables import Cell, Table, marked, remarks
 from ..wording import counted
 from ..writing import write_whole
 from .animation import MOST, assets
@@ -95,6 +95,7 @@ def compare_page(
         assets=assets(),
         source=str(recorded[0].run.get("scenario", {}).get("source") or "") if recorded else "",
         summary=_summary(comparison),
+        remarks=remarks((run.label, run.results) for run in runs),
         failed=comparison.failed,
         table=metric_facts(comparison) if runs else None,
         partings=[_parted(run.label, runs[0].label, recorded[0], run.results) for run in runs[1:]],
@@ -129,7 +130,7 @@ def metric_facts(comparison: Comparison) -> dict[str, Any]:
             for k, value in enumerate(values[1:], start=1):
                 cells[k] = MetricCell(cells[k].value, difference(values[0], value))
             rows.append(MetricRow(metric(name).title, metric(name).formula, cells))
-    return {"labels": labels, "rows": rows}
+    return {"labels": [marked(run.label, run.results) for run in comparison.runs], "rows": rows}
 
 
 def difference(first: Value | None, other: Value | None) -> str:

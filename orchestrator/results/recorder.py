@@ -16,7 +16,7 @@ import io
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +49,7 @@ class Block:
         self.lay(np.zeros((BLOCK, 1 + sum(real))))
         self.others: list[list[Value]] = []
         self._real = [name for name, is_real in zip(columns, real, strict=True) if is_real]
+        self.looks: list[Callable[[np.ndarray], None]] = []  # told of every block: time, then Reals
         self._extremes = np.full((2, sum(real)), np.nan)
 
     def lay(self, block: np.ndarray) -> None:
@@ -66,9 +67,11 @@ class Block:
         return {"smallest": smallest, "largest": largest}
 
     def _look_at(self, rows: np.ndarray) -> None:
-        """Take note of the extremes of a block, in which NaN are none."""
+        """Take note of the extremes of a block, in which NaN are none; let others look at it."""
         np.fmin(self._extremes[0], np.fmin.reduce(rows[:, 1:]), out=self._extremes[0])
         np.fmax(self._extremes[1], np.fmax.reduce(rows[:, 1:]), out=self._extremes[1])
+        for look in self.looks:
+            look(rows)
 
 
 class Recorder(Block):

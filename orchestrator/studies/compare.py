@@ -18,7 +18,7 @@ from ..scenario.overrides import is_path, swap_of
 from ..writing import write_whole
 from .jobs import Job, Outcome, read_back
 from .study_schema import text_of
-from .tables import Cell, Table, for_markdown, harmless, si, write_csv
+from .tables import Cell, Table, for_markdown, harmless, marked, remarks, si, write_csv
 
 PANELS = (
     "steer_angle",
@@ -112,8 +112,10 @@ def judge_comparison(outcomes: Sequence[Outcome]) -> Comparison:
 
 def metric_table(comparison: Comparison, title: str, changed: str = "") -> Table:
     """Return a table with one row per metric and one column per run; `changed` for all stands below."""
-    labels = [*comparison.values, *comparison.failed]
-    table = Table(title, ["metric", "", *labels], notes=[f"changed: {changed}"] if changed else [])
+    labels = [*(marked(run.label, run.results) for run in comparison.runs), *comparison.failed]
+    notes = [f"changed: {changed}"] if changed else []
+    notes += remarks((run.label, run.results) for run in comparison.runs)
+    table = Table(title, ["metric", "", *labels], notes=notes)
     for name in STANDARD:
         cells: list[Cell] = [values.get(name) for values in comparison.values.values()]
         if any(cell is not None for cell in cells):

@@ -15,7 +15,7 @@ from .grids import correlation, grid_table
 from .jobs import Outcome, read_back
 from .study_file import Study, StudyRun
 from .study_schema import DerivedSpec, MetricSpec, Reference, StudySpec, TableSpec, si_number
-from .tables import Cell, Table
+from .tables import Cell, Table, marked, remarks
 
 HOLDS, NOT_JUDGED = "holds", "not judged"
 FAILS = {"claims": "does not reproduce", "checks": "does not hold"}
@@ -159,7 +159,9 @@ def _run_table(findings: Findings, spec: TableSpec) -> Table:
                 words = "; ".join(f"{j.claim.short} ({j.claim.source})" for j in judged)
                 cells[1:1] = [words or None, "; ".join(verdict(j, "claims") for j in judged) or None]
                 table.notes += [f"{run.row}: {j.claim.note}" for j in judged if j.claim.note]
-        table.rows.append([run.row, *cells])
+        results = findings.results.get(run.name)
+        table.rows.append([marked(run.row, results) if results else run.row, *cells])
+        table.notes += remarks([(run.row, results)]) if results else []
     return table
 
 

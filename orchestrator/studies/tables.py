@@ -7,12 +7,13 @@ import io
 import math
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from ..figures.display import shown
+from ..metrics.plausibility import findings_in, first_of_each
 from ..metrics.run_metrics import Value, evaluate_all, metric
 from ..titles import changes_in, with_changes
 from ..wording import printable
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
     from ..results.read import Results
 
+MARK = "†"
+"""Behind the name of a run whose course had something remarkable."""
 MIN_HEADING = 12
 """Characters of a heading over numbers before it is broken at a space."""
 
@@ -92,6 +95,21 @@ def for_markdown(table: Table) -> str:
     head = [f"**{table.title}**", ""] if table.title else []
     notes = ["", *(f"{note}  " for note in table.notes)] if table.notes else []
     return "\n".join([*head, line(table.headings), line(rule), *map(line, table.text()), *notes]) + "\n"
+
+
+def marked(label: str, results: Results) -> str:
+    """Return what a table calls a run, with a mark if something in its course was remarkable."""
+    return f"{label} {MARK}" if _remarkable(results) else label
+
+
+def remarks(runs: Iterable[tuple[str, Results]]) -> list[str]:
+    """Return a note for each run (label, results) with a mark."""
+    return [f"{MARK} {label}: {says}" for label, results in runs if (says := _remarkable(results))]
+
+
+def _remarkable(results: Results) -> str:
+    found = [one for one in findings_in(results.run) if one.time is not None]
+    return "; ".join(one.says for one in first_of_each(found))
 
 
 def metrics_of_run(results: Results, names: Sequence[str]) -> Table:

@@ -26,6 +26,7 @@ class Record:
 
     values: Measured
     problems: tuple[str, ...] = ()
+    findings: tuple[str, ...] = ()  # kinds of what was remarkable in it
 
     @property
     def ok(self) -> bool:
@@ -99,7 +100,8 @@ class Journal:
             ResultsError: the journal cannot be written.
         """
         if last:
-            self._append({"key": key, "values": record.values, "problems": record.problems})
+            entry = {"key": key, "values": record.values, "problems": record.problems}
+            self._append(entry | ({"findings": record.findings} if record.findings else {}))
         self.records[key] = record
 
     def _append(self, entry: dict[str, Any]) -> None:
@@ -120,7 +122,7 @@ class Journal:
 
 def _record(entry: dict[str, Any]) -> tuple[str, Record]:
     values = {key: value and (float(value[0]), str(value[1])) for key, value in entry["values"].items()}
-    return str(entry["key"]), Record(values, tuple(entry["problems"]))
+    return str(entry["key"]), Record(values, tuple(entry["problems"]), tuple(entry.get("findings", ())))
 
 
 def _whole_lines(data: bytes) -> tuple[list[bytes], int]:

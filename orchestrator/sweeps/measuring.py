@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
+from ..metrics.plausibility import findings_in
 from ..metrics.run_metrics import evaluate, metric
 from ..plan import Plan
 from ..studies.jobs import Job
@@ -14,6 +15,13 @@ Metrics = tuple[tuple[str, str, tuple[float, float] | None], ...]
 
 Measured = dict[str, tuple[float, str] | None]
 """Key of a metric -> its value and unit, None where the run gives none."""
+
+
+class Measures(NamedTuple):
+    """What a run hands back: its metrics, and the kinds of what was remarkable in it."""
+
+    values: Measured
+    findings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -26,7 +34,7 @@ class Measurement(Job):
     keep: bool = False
 
 
-def measure(job: Any) -> Measured:
+def measure(job: Any) -> Measures:
     """Make the run of a `Measurement` in this process; return its metrics.
 
     Raises:
@@ -47,4 +55,5 @@ def measure(job: Any) -> Measured:
         value = evaluate(results, metric(name), window)
         short = results.ended and not window  # of a run that a unit has ended early it is another metric
         measured[key] = None if value is None or short else (value.number, value.unit)
-    return measured
+    kinds = dict.fromkeys(one.kind for one in findings_in(results.run) if one.time is not None)
+    return Measures(measured, tuple(kinds))

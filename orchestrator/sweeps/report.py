@@ -45,6 +45,12 @@ def write_sweep(swept: Swept, out: Path, *, each: Each = map) -> list[str]:
     return problems
 
 
+def findings_text(swept: Swept) -> str:
+    """Return in how many runs something was remarkable, `spin in 3 of 20 runs`; "" for none."""
+    total = counted(len(swept.planned.runs), "run")
+    return ", ".join(f"{kind} in {count} of {total}" for kind, count in swept.findings().items())
+
+
 def _draw(wanted: tuple[Swept, FigureSpec, Path]) -> str | None:
     swept, figure, stem = wanted
     try:
@@ -71,6 +77,8 @@ def _page(swept: Swept, drawn: dict[str, str]) -> str:
     head += [f"{counted(len(runs), 'run')} of `{spec.scenario}`, one row each in `{TABLE}`{ended}.", ""]
     if words := changed(swept.planned.sweep.for_all):
         head += [f"Changed in all runs: {words}.", ""]
+    if found := findings_text(swept):
+        head += [f"{found}; which, says the column `findings`.", ""]
     parts = ["\n".join(head), for_markdown(_metrics(swept))]
     parts += [for_markdown(table) for table in limit_tables(swept)]
     parts += [f"![{title}]({path})\n" for title, path in drawn.items()]

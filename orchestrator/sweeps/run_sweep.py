@@ -72,7 +72,8 @@ def finish(
         assert isinstance(job, Measurement)
         problems = tuple(text for text in outcome.problems if not text.startswith(KEPT))
         final = outcome.ok or (outcome.exit_status == 1 and not outcome.died)  # else it may go well next time
-        journal.add(job.key, Record(outcome.value or {}, problems), last=final)
+        values, findings = outcome.value or ({}, ())
+        journal.add(job.key, Record(values, problems, findings), last=final)
         told(outcome)
 
     runner(left, done)

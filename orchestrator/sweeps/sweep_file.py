@@ -20,7 +20,7 @@ from ..wording import hint
 from .design import Level, Point, levels_of, points
 from .schema import AxisSpec, FigureSpec, SweepSpec
 
-COLUMNS = ("run", "status", "reason", "key")
+COLUMNS = ("run", "status", "reason", "findings", "key")
 """Columns of the table beside the axes and the metrics."""
 
 

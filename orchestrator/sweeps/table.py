@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -48,6 +49,10 @@ class Swept:
         runs = [replace(run, plan=None) for run in self.planned.runs]  # type: ignore[arg-type]
         return Swept(replace(self.planned, runs=runs), self.records)
 
+    def findings(self) -> dict[str, int]:
+        """Return what was remarkable in runs, by its kind, with the number of such runs."""
+        return Counter(kind for run in self.planned.runs for kind in self.record(run).findings)
+
     @property
     def failed(self) -> list[PlannedRun]:
         """The runs that failed."""
@@ -70,7 +75,7 @@ def point_text(planned: Planned, run: PlannedRun) -> str:
 
 
 def write_table(swept: Swept, path: Path) -> None:
-    """Write the table as Parquet: run, axes, status, reason, metrics, key; units in the fields' metadata.
+    """Write the table as Parquet: run, axes, how each ended, metrics, key; units in the fields' metadata.
 
     Raises:
         ResultsError: it cannot be written.
@@ -95,6 +100,9 @@ def write_table(swept: Swept, path: Path) -> None:
     ends = ["completed" if swept.record(run).ok else "failed" for run in runs]
     reasons = ["; ".join(swept.record(run).problems) or None for run in runs]
     columns += [(pa.field("status", pa.string()), ends), (pa.field("reason", pa.string()), reasons)]
+    about = {"description": "what was remarkable in the run's course, by its kind"}
+    kinds = [", ".join(swept.record(run).findings) or None for run in runs]
+    columns.append((pa.field("findings", pa.string(), metadata=about), kinds))
     for key, one in spec.metrics.items():
         chosen = metric(one.metric)
         about = {"metric": chosen.name, "description": chosen.definition, "unit": si(swept.unit(key))}

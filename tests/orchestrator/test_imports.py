@@ -13,8 +13,8 @@ STAGES = (
     {"fmu"},
     {"wiring"},
     {"results"},
-    {"master"},  # hands rows to a recorder of `results`
     {"metrics"},
+    {"master"},  # hands rows to a recorder of `results`, has `metrics` look at them
     {"figures"},
     {"studies"},
     {"interop", "sweeps", "scaffold"},

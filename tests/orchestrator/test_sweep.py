@@ -147,7 +147,7 @@ def test_one_row_per_run_with_units_and_figures_and_a_page(moods, yawbench, tmp_
     assert status == 0, err
     table = pq.read_table(tmp_path / "out" / "sweep.parquet")
     assert table.column_names == [
-        "run", "level", "amplitude", "status", "reason", "moment", "steer", "key",
+        "run", "level", "amplitude", "status", "reason", "findings", "moment", "steer", "key",
     ]  # fmt: skip
     units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in table.schema}
     assert units["level"] == units["moment"] == "N.m"

@@ -194,3 +194,13 @@ def test_the_record_of_a_swap_reads_back_as_it_was(yawbench, tmp_path):
         Change("controller", "controller_off", "--swap"),
         Change("stop_time", 0.01, "--set"),
     )
+
+
+def test_a_car_at_90_m_per_s_that_spins_says_so(yawbench, tmp_path):
+    given = ("--swap", "controller=controller_off", "--set", "plant.initial_speed=90", "--set", "stop_time=3")
+    _, said = yawbench("run", SCENARIO, *given, "--out", "r")
+    assert "note: the car is faster than 70 m/s (252 km/h): 90 m/s at 0 s" in said
+    record = json.loads((tmp_path / "r/run.json").read_text())
+    assert {"kind": "speed", "place": "plant.velocity_x", "time": 0.0}.items() <= next(
+        one for one in record["findings"] if one["kind"] == "speed"
+    ).items()

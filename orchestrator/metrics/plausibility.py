@@ -1,0 +1,217 @@
+"""Remarks on a finished run that no engineer would let pass: it spins, lifts wheels, leaves its model.
+
+`CHECKS` is the whole list; a line more there is a check more. Each looks at the signals that a run recorded,
+block by block while it runs. None is an error: a car without control does spin.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..plan import Finding, Plan
+from ..wording import WHEELS
+from .run_metrics import columns_of, results_to_be
+
+G = 9.81
+"""Standard gravity, rounded as in the components [m/s2]."""
+Signals = Sequence[np.ndarray]
+"""The values of a check's signals over a block, in their order; shape (rows,) each."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """What counts as remarkable: some value of signals beyond a limit.
+
+    `says` may hold `{limit}`, `{value}`, `{size}` (without its sign), `{time}`, `{column}` and `{wheel}`.
+    """
+
+    kind: str
+    signals: tuple[str, ...]  # of the dictionary; with `*` every wheel is looked at for itself
+    value: Callable[[Signals], np.ndarray]
+    limit: float  # remarkable are values above it, in the unit that `says` uses
+    says: str
+    why: str  # where the limit comes from
+    below: bool = False  # remarkable are values below the limit
+    over_friction: bool = False  # the value is divided by the highest friction of the road
+
+
+def _size(x: Signals) -> np.ndarray:
+    return np.abs(x[0])
+
+
+def _degrees(x: Signals) -> np.ndarray:
+    return np.degrees(np.abs(x[0]))
+
+
+def _plain(x: Signals) -> np.ndarray:
+    return x[0]
+
+
+def _gravities(x: Signals) -> np.ndarray:
+    return np.hypot(x[0], x[1]) / G
+
+
+CHECKS: tuple[Check, ...] = (
+    Check(
+        "spin", ("sideslip",), _degrees, 45.0,
+        "the car spins: its sideslip angle passes {limit} degrees at {time} s and reaches {value} degrees",
+        "chosen: more than front wheels can be steered against",
+    ),
+    Check(
+        "wheel lift", ("vertical_load_*",), _plain, 1.0,
+        "the {wheel} wheel lifts off at {time} s",
+        "chosen: a load of less than 1 N is none", below=True,
+    ),
+    Check(
+        "roll over", ("roll_angle",), _degrees, 15.0,
+        "the car leans {value} degrees, beyond what models with linear springs are valid for "
+        "({limit} degrees, at {time} s)",
+        "chosen: bump stops, which the models leave out, are reached before it",
+    ),
+    Check(
+        "backwards", ("velocity_x",), _plain, -0.1,
+        "the car rolls backwards from {time} s, at up to {size} m/s",
+        "chosen: above the creep of a car that has stopped", below=True,
+    ),
+    Check(
+        "speed", ("velocity_x",), _size, 70.0,
+        "the car is faster than {limit} m/s (252 km/h): {value} m/s at {time} s",
+        "chosen: above the top speed of the cars that the papers speak of",
+    ),
+    Check(
+        "steer angle", ("steer_angle",), _degrees, 60.0,
+        "the front wheels are steered by {value} degrees, more than {limit} at {time} s",
+        "chosen: above the steering lock of passenger cars, 35 to 50 degrees",
+    ),
+    Check(
+        "grip", ("acceleration_x", "acceleration_y"), _gravities, 1.5,
+        "the car accelerates by {value} times what the road's friction gives, from {time} s beyond {limit}",
+        "chosen: tyres of the catalogue reach 1.2 of the friction they are told", over_friction=True,
+    ),
+)  # fmt: skip
+"""What is looked at after every run."""
+
+WHEEL_WORDS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
+
+
+class Watch:
+    """Looks at the rows of a run as they come, and tells what was remarkable in them."""
+
+    def __init__(self, plan: Plan, checks: Iterable[Check] = CHECKS) -> None:
+        results = results_to_be(plan)
+        types = {f"{u.name}.{v.name}": v.type for u in plan.units for v in u.fmu.variables.values()}
+        reals = [f"{unit}.{name}" for unit, name in plan.record if types[f"{unit}.{name}"] == "Real"]
+        place = {column: 1 + k for k, column in enumerate(reals)}
+        friction = _highest_friction(plan)
+        self._seen: list[_Seen] = []
+        for check in (*checks, *_ranges(plan)):
+            if check.over_friction and not friction:
+                continue
+            found = [columns_of(results, signal) for signal in check.signals]
+            for columns in zip(*found, strict=False):
+                if all(column in place for column in columns):
+                    scale = 1 / friction if check.over_friction and friction else 1.0
+                    self._seen.append(_Seen(check, columns, [place[c] for c in columns], scale))
+
+    def look(self, rows: np.ndarray) -> None:
+        """Look at rows: shape (n, 1 + Real columns), time first."""
+        for one in self._seen:
+            one.look(rows)
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Return what was remarkable, in the order of the checks."""
+        return tuple(filter(None, (one.finding() for one in self._seen)))
+
+
+class _Seen:
+    """What one check has seen so far of its columns."""
+
+    def __init__(self, check: Check, columns: Sequence[str], places: list[int], scale: float) -> None:
+        self.check = check
+        self.columns = columns
+        self._places = places
+        self._scale = scale
+        self._sign = -1.0 if check.below else 1.0
+        self._time: float | None = None
+        self._most = -math.inf
+
+    def look(self, rows: np.ndarray) -> None:
+        x = self._sign * self._scale * self.check.value([rows[:, k] for k in self._places])
+        largest = float(np.fmax.reduce(x, initial=-math.inf))
+        if largest <= self._sign * self.check.limit:
+            return
+        if self._time is None:
+            self._time = float(rows[np.argmax(x > self._sign * self.check.limit), 0])
+        self._most = max(self._most, largest)
+
+    def finding(self) -> Finding | None:
+        if self._time is None:
+            return None
+        value, column = self._sign * self._most, self.columns[0]
+        says = self.check.says.format(
+            limit=f"{self.check.limit:g}",
+            value=f"{value:.3g}",
+            size=f"{abs(value):.3g}",
+            time=f"{self._time:.3g}",
+            wheel=WHEEL_WORDS.get(column[-2:], ""),
+            column=column,
+        )
+        return Finding(self.check.kind, column, value, self._time, says)
+
+
+def _ranges(plan: Plan) -> Iterator[Check]:
+    """Yield a check for every recorded output that its FMU, or one that it feeds, states limits for."""
+    units = {unit.name: unit.fmu.variables for unit in plan.units}
+    limits = {(unit, name): [units[unit][name]] for unit, name in plan.record}
+    for wire in plan.wires:
+        if (wire.source, wire.output) in limits and not wire.converts:
+            limits[wire.source, wire.output].append(units[wire.target][wire.input])
+    why = "the model description"
+    for (unit, name), variables in limits.items():
+        lowest = max((v.minimum for v in variables if v.minimum is not None), default=None)
+        highest = min((v.maximum for v in variables if v.maximum is not None), default=None)
+        for limit, below in ((lowest, True), (highest, False)):
+            if limit is not None:
+                says = "{column} is {value} at {time} s, beyond the {limit} that its model is valid for"
+                # a little beyond is rounding
+                margin = 1e-9 * max(1.0, abs(limit)) * (-1 if below else 1)
+                yield Check("range", (f"{unit}.{name}",), _plain, limit + margin, says, why, below)
+
+
+def _highest_friction(plan: Plan) -> float | None:
+    """Return the highest friction that units are told; None if it is no constant, or not told at all."""
+    known = [
+        float(value)
+        for unit in plan.units
+        for name, value in unit.constants.items()
+        if name in ("friction", *(f"friction_{wheel}" for wheel in WHEELS))
+    ]
+    varies = any(wire.input.startswith("friction") for wire in plan.wires)
+    return max(known, default=0.0) or None if not varies else None
+
+
+def findings_in(run: Mapping[str, Any]) -> tuple[Finding, ...]:
+    """Return the findings in a run's record."""
+    given = run.get("findings")
+    return tuple(
+        Finding(
+            str(one["kind"]), one.get("place"), one.get("value"), one.get("time"), str(one.get("says", ""))
+        )
+        for one in (given if isinstance(given, list) else ())
+        if isinstance(one, dict) and "kind" in one
+    )
+
+
+def first_of_each(findings: Iterable[Finding]) -> list[Finding]:
+    """Return the earliest finding of each kind: four wheels are one matter."""
+    first: dict[str, Finding] = {}
+    for found in findings:
+        known = first.setdefault(found.kind, found)
+        if (found.time or 0.0) < (known.time or 0.0):
+            first[found.kind] = found
+    return list(first.values())

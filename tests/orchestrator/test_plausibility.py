@@ -1,0 +1,118 @@
+"""What is remarkable in a run's course, and where that is said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.metrics.plausibility import CHECKS, Watch, findings_in, first_of_each
+from orchestrator.plan import Finding, Fmu, Plan, Unit, Variable, Wire
+from orchestrator.studies.tables import MARK, marked, remarks
+
+from .recorded import car
+
+WHEELS = ("fl", "fr", "rl", "rr")
+
+
+def variable(name, causality="output", unit="1", kind="Real", lowest=None, highest=None):
+    return Variable(name, 0, kind, causality, "continuous", unit, None, lowest, highest, "")
+
+
+def plan(**outputs):
+    """Return a plan whose plant records outputs: name -> their Variable's limits."""
+    variables = {name: variable(name, **about) for name, about in outputs.items()}
+    fmu = Fmu("plant_x", Path("x.fmu"), Path("x"), "", "", "x", "", False, variables)
+    tyre = replace(fmu, name="tyre_x", variables={"friction_fl": variable("friction_fl", "input")})
+    units = (Unit("plant", fmu, 1, {}, {}), Unit("tyre", tyre, 1, {}, {"friction_fl": 0.5}))
+    record = tuple(("plant", name) for name in outputs)
+    return Plan(units, (), record, Fraction(1, 100), 100, "jacobi")
+
+
+def found(made, *columns, blocks=4):
+    """Return the findings on columns that come in blocks, by kind."""
+    watch = Watch(made)
+    time = np.linspace(0.0, 1.0, len(columns[0]))
+    for rows in np.array_split(np.column_stack([time, *columns]), blocks):
+        watch.look(rows)
+    return {one.kind: one for one in first_of_each(watch.findings())}
+
+
+def test_a_car_that_spins_is_named_with_the_time_and_the_angle():
+    sideslip = np.radians(np.linspace(0.0, -90.0, 101))
+    one = found(plan(sideslip={"unit": "rad"}), sideslip)["spin"]
+    assert (one.place, one.time) == ("plant.sideslip", pytest.approx(0.51))
+    assert one.value == pytest.approx(90.0)
+    assert one.says == "the car spins: its sideslip angle passes 45 degrees at 0.51 s and reaches 90 degrees"
+
+
+def test_a_calm_run_has_no_findings():
+    angle = np.radians(np.linspace(0.0, 5.0, 50))
+    assert found(plan(sideslip={"unit": "rad"}, velocity_x={"unit": "m/s"}), angle, 25.0 + angle) == {}
+
+
+def test_the_first_wheel_that_lifts_is_named():
+    loads = {f"vertical_load_{wheel}": {"unit": "N"} for wheel in WHEELS}
+    time = np.linspace(0.0, 1.0, 101)
+    values = [np.where(time < at, 3000.0, 0.0) for at in (2.0, 0.9, 0.4, 2.0)]
+    one = found(plan(**loads), *values)["wheel lift"]
+    assert (one.place, one.time) == ("plant.vertical_load_rl", pytest.approx(0.4))
+    assert one.says == "the rear left wheel lifts off at 0.4 s"
+
+
+@pytest.mark.parametrize(
+    ("signal", "value", "kind"),
+    [
+        ("velocity_x", 90.0, "speed"),
+        ("velocity_x", -5.0, "backwards"),
+        ("roll_angle", 0.5, "roll over"),
+        ("steer_angle", 5.0, "steer angle"),
+    ],
+)
+def test_each_limit_is_looked_at(signal, value, kind):
+    assert list(found(plan(**{signal: {}}), np.full(10, value))) == [kind]
+
+
+def test_more_acceleration_than_the_road_gives_is_named():
+    made = plan(acceleration_x={}, acceleration_y={})
+    one = found(made, np.full(10, 6.0), np.full(10, 8.0))["grip"]
+    assert one.value == pytest.approx(10.0 / 9.81 / 0.5)
+    assert found(made, np.full(10, 3.0), np.full(10, 4.0)) == {}
+
+
+def test_where_friction_is_no_constant_grip_is_not_judged():
+    made = plan(acceleration_x={}, acceleration_y={})
+    road = replace(made, wires=(Wire("road", "friction_fl", "tyre", "friction_fl"),))
+    assert found(road, np.full(10, 60.0), np.full(10, 8.0)) == {}
+
+
+def test_a_value_outside_what_its_model_states_is_named():
+    made = plan(pressure={"lowest": 0.0, "highest": 2.0})
+    assert found(made, np.linspace(0.0, 2.0, 10)) == {}
+    one = found(made, np.linspace(0.0, 3.0, 101))["range"]
+    assert one.says == "plant.pressure is 3 at 0.67 s, beyond the 2 that its model is valid for"
+    assert found(made, np.linspace(0.0, -1.0, 101))["range"].value == pytest.approx(-1.0)
+
+
+def test_values_that_are_not_finite_are_no_findings():
+    assert found(plan(sideslip={}), np.array([0.0, np.nan, 0.1])) == {}
+
+
+def test_every_check_says_where_its_limit_comes_from():
+    assert all(check.why.startswith("chosen: ") for check in CHECKS)
+    assert len({check.kind for check in CHECKS}) == len(CHECKS)
+
+
+def test_a_run_with_findings_is_marked_in_tables():
+    results = car()
+    assert marked("a", results) == "a"
+    results.run["findings"] = [vars(Finding("spin", "plant.sideslip", 90.0, 1.0, "the car spins"))]
+    assert marked("a", results) == f"a {MARK}"
+    assert remarks([("a", results)]) == [f"{MARK} a: the car spins"]
+
+
+def test_a_record_of_another_shape_has_no_findings():
+    assert findings_in({}) == findings_in({"findings": "x"}) == findings_in({"findings": [3]}) == ()
