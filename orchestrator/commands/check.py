@@ -5,8 +5,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
+import typer
+
+from ..plan import OF_RUN
 from ..wording import printable
 from .batch import say
 from .options import Fmus, NoBuild, NoValidate, ScenarioFile, Set, Swap
@@ -17,6 +20,9 @@ if TYPE_CHECKING:
 
     from ..plan import Plan, Unit, Value, Wire
 
+All = Annotated[
+    bool, typer.Option("--all", help="Show every value, those too that are as the FMUs have them.")
+]
 PIPE_WIDTH = 140
 """Columns of what goes into a pipe or a file."""
 
@@ -26,13 +32,14 @@ def check(
     swap: Swap = None,
     set_: Set = None,
     fmus: Fmus = None,
+    all_: All = False,
     no_build: NoBuild = False,
     no_validate: NoValidate = False,
 ) -> None:
-    """Validate a scenario; show units, wires and their order."""
+    """Validate a scenario; show units, values and where they come from, wires and their order."""
 
     plan = plan_of_scenario(scenario, swap, set_, fmus=fmus, build=not no_build, validate=not no_validate)
-    show(plan, scenario)
+    show(plan, scenario, defaults=all_)
     for note in plan.notes:
         say(f"note: {note}")
     for unit in plan.units:
@@ -40,19 +47,19 @@ def check(
             say(f"warning: {unit.name}: {doubt}")
 
 
-def show(plan: Plan, scenario: Path) -> None:
+def show(plan: Plan, scenario: Path, *, defaults: bool = False) -> None:
     """Print what the plan of a scenario file holds: for a terminal in its width, for a pipe in lines."""
     from rich.console import Console
 
     width = None if sys.stdout.isatty() else PIPE_WIDTH
     console = Console(highlight=False, markup=False, emoji=False, width=width)
     with console.capture() as capture:
-        _print(plan, scenario, console)
+        _print(plan, scenario, console, defaults)
     for line in capture.get().splitlines():
         print(line.rstrip())
 
 
-def _print(plan: Plan, scenario: Path, console: Console) -> None:
+def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None:
     from ..titles import changed
     from ..wiring.order import evaluate
 
@@ -63,9 +70,12 @@ def _print(plan: Plan, scenario: Path, console: Console) -> None:
         f"{_number(plan.n_steps * plan.step)} s in {plan.n_steps} steps of {_number(1000 * plan.step)} ms, "
         f"{plan.algorithm}; {len(plan.wires)} wires, {len(plan.record)} outputs recorded"
     )
-    _show(console, "Units in evaluation order", ("unit", "FMU", "step", "parameters"), _unit_rows(plan))
+    _show(console, "Units in evaluation order", ("unit", "FMU", "step"), _unit_rows(plan))
+    values, hidden = _values(plan, defaults)
+    _show(console, "Values", ("what", "value", "from", "units"), values)
+    if hidden:
+        console.print(f"  {hidden} more are as the FMUs have them: --all shows them", style="dim")
     _show(console, "Wires", ("from", "to", "variables"), _wire_rows(plan))
-    _show(console, "Constants", ("input", "value"), _constant_rows(plan.units))
     direct = evaluate({unit.name: unit.fmu for unit in plan.units}, plan.wires).direct
     headings = ("unit", "after", "because its outputs follow")
     _show(console, "Why this order", headings, _order_rows(plan, direct))
@@ -96,20 +106,57 @@ def _number(value: object) -> str:
 
 def _unit_rows(plan: Plan) -> Iterable[Sequence[str]]:
     for unit in plan.units:
-        variables = unit.fmu.variables
-        differing = [
-            _assignment(name, value, variables[name].unit)
-            for name, value in unit.parameters.items()
-            if value != variables[name].start
-        ]
-        step = f"{_number(1000 * unit.period * plan.step)} ms"
-        otherwise = "all at their defaults" if unit.fmu.of("parameter") else "none"
-        yield unit.name, unit.fmu.name, step, ", ".join(differing) or otherwise
+        yield unit.name, unit.fmu.name, f"{_number(1000 * unit.period * plan.step)} ms"
 
 
-def _assignment(name: str, value: object, measure: str | None) -> str:
-    shown = f"{value:.6g}" if isinstance(value, float) else f"{value}"
-    return f"{name} = {shown}{f' {measure}' if measure and measure != '1' else ''}"
+def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
+    """Return a row for every value with its origin, and how many defaults are left out that do not matter."""
+    from ..wording import fold
+
+    given = {change.place: change.origin for change in plan.changes}
+    in_file = {name: "scenario" if name in plan.scenario else "default" for name in OF_RUN}
+    run = {
+        "stop_time": f"{_number(plan.n_steps * plan.step)} s",
+        "step_size": f"{_number(plan.step)} s",
+        "algorithm": plan.algorithm,
+    }
+    rows: list[Sequence[str]] = [
+        (name, value, given.get(name, in_file[name]), "all") for name, value in run.items()
+    ]
+    takers: dict[tuple[str, str, str], list[str]] = {}
+    hidden = 0
+    for unit in plan.units:
+        own = {v.name: unit.parameters.get(v.name, v.start) for v in unit.fmu.of("parameter")}
+        alike: dict[tuple[str, str], list[str]] = {}
+        constants = {name: value for name, value in unit.constants.items() if name not in unit.series}
+        for name, value in {**own, **constants}.items():
+            origin = unit.origins.get(name, "default")
+            if origin == "default" and not defaults and not _matters(unit, name):
+                hidden += 1
+            else:
+                alike.setdefault((_shown(value, unit.fmu.variables[name].unit), origin), []).append(name)
+        for (value_text, origin), names in alike.items():
+            for name in fold(names):
+                takers.setdefault((name, value_text, origin), []).append(unit.name)
+    rows += [(*key, ", ".join(units)) for key, units in takers.items()]
+    for unit in plan.units:
+        for name, series in unit.series.items():
+            how = "held" if series.held else "linear"
+            rows.append((name, f"{series.file}: {series.column}, {how}", unit.origins[name], unit.name))
+    return rows, hidden
+
+
+def _matters(unit: Unit, name: str) -> bool:
+    """Return whether a value is worth a line even if it is the FMU's own: the car, its speed, the road."""
+    from ..wiring.agreement import CAR
+    from ..wiring.facts import FACTS
+
+    return name in CAR or any(name in fact.inputs or fact.counts(unit, name) for fact in FACTS.values())
+
+
+def _shown(value: Value | None, measure: str | None) -> str:
+    text = f"{value:.6g}" if isinstance(value, float) else f"{value}"
+    return f"{text}{f' {measure}' if measure and measure != '1' else ''}"
 
 
 def _wire_rows(plan: Plan) -> Iterable[Sequence[str]]:
@@ -140,24 +187,6 @@ def _grouped(wires: Iterable[Wire]) -> dict[tuple[str, str], list[Wire]]:
     for wire in wires:
         groups.setdefault((wire.source, wire.target), []).append(wire)
     return groups
-
-
-def _constant_rows(units: Iterable[Unit]) -> Iterable[Sequence[str]]:
-    from ..wording import fold
-
-    for unit in units:
-        by_value: dict[tuple[str, Value], list[str]] = {}
-        for name, series in unit.series.items():
-            how = "held" if series.held else "linear"
-            yield f"{unit.name}.{name}", f"{series.file}: {series.column}, {how}"
-        for name, value in unit.constants.items():
-            if name in unit.series:
-                continue
-            by_value.setdefault((unit.fmu.variables[name].unit or "1", value), []).append(name)
-        for (measure, value), names in by_value.items():
-            shown = _assignment("", value, measure).removeprefix(" = ")
-            for name in fold(names):
-                yield f"{unit.name}.{name}", shown
 
 
 def _order_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]]:

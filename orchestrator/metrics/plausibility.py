@@ -191,7 +191,8 @@ def _highest_friction(plan: Plan) -> float | None:
         for name, value in unit.constants.items()
         if name in ("friction", *(f"friction_{wheel}" for wheel in WHEELS))
     ]
-    varies = any(wire.input.startswith("friction") for wire in plan.wires)
+    driven = [wire.input for wire in plan.wires] + [name for unit in plan.units for name in unit.series]
+    varies = any(name.startswith("friction") for name in driven)
     return max(known, default=0.0) or None if not varies else None
 
 

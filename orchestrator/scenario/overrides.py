@@ -1,11 +1,12 @@
 """What is changed in a scenario before it is validated.
 
-`--swap unit=fmu` replaces a unit's FMU; `--set unit.parameter=value` gives a parameter. Two names
+`--swap unit=fmu` replaces a unit's FMU; `--set unit.parameter=value` gives a parameter. Some names
 that no unit may have stand for more: `--set vehicle.mass=1200` changes the parameter set that all
-units share, `--set inputs.friction*=0.3` a constant. `--set stop_time=2`, `step_size` and `algorithm`
-change the run, `--set unit.step_size=0.01` the step of a unit. Studies and sweeps change the same places, and
-`vehicle` is the vehicle file itself. A value that was changed remembers by what, so that later messages name
-that in place of a line.
+units share, `--set inputs.friction*=0.3` a constant, `--set friction=0.3` and `speed` what every unit that
+has to know it is told. `--set stop_time=2`, `step_size` and `algorithm` change the run,
+`--set unit.step_size=0.01` the step of a unit. Studies and sweeps change the same places, and `vehicle` is
+the vehicle file itself. A value that was changed remembers by what, so that later messages name that in
+place of a line.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ScenarioError
-from ..plan import OF_RUN, Change, Value
+from ..plan import FACTS, OF_RUN, Change, Value
 from ..wording import hint, listed
 from . import yaml_lines
 from .yaml_lines import Document, Key
 
-RESERVED = ("vehicle", "inputs")
+RESERVED = ("vehicle", "inputs", *FACTS)
 """Words that `--set` understands in place of a unit."""
 
 
@@ -54,10 +55,10 @@ def read_changes(swaps: Iterable[str] = (), settings: Iterable[str] = ()) -> tup
     for text in settings:
         place, equals, raw = (part.strip() for part in text.partition("="))
         holder, dot, name = place.partition(".")
-        if equals and ((holder and dot and name) or place in OF_RUN):
+        if equals and ((holder and dot and name) or place in (*OF_RUN, *FACTS)):
             changes.append(Change(place, yaml_lines.scalar(raw), "--set"))
         else:
-            sentence = f"write --set UNIT.PARAMETER=VALUE, or {listed(OF_RUN, last='or')}=VALUE"
+            sentence = f"write --set UNIT.PARAMETER=VALUE, or {listed((*OF_RUN, *FACTS), last='or')}=VALUE"
             problems.append(f"--set {text}: {sentence}")
     if problems:
         raise ScenarioError(problems)
@@ -111,7 +112,7 @@ def apply_changes(
     for change in {change.place: change for change in changes}.values():
         holder, _, name = change.place.partition(".")
         spec = units.get(holder)
-        if change.place in OF_RUN:
+        if change.place in (*OF_RUN, *FACTS):
             differs = _put(document, (change.place,), change)
         elif change.place == "vehicle":
             differs = True  # see `apply_vehicle`
@@ -156,7 +157,7 @@ def apply_to_all_runs(document: Document, changes: Iterable[Change]) -> None:
         if change.place in OF_RUN:
             _put(document, (change.place,), change)
         else:
-            _put(document, ("set" if "." in change.place else "swap", change.place), change)
+            _put(document, ("swap" if change.swaps else "set", change.place), change)
 
 
 def _swap(document: Document, unit: str, change: Change) -> bool:

@@ -221,6 +221,8 @@ class Scenario(Strict):
     stop_time: Time = Field(description="s, an integer multiple of the communication step")
     step_size: Time = Field(description="s, communication step")
     algorithm: Algorithm = Field("extrapolated", description="How units are coupled")
+    friction: Scalar | None = Field(None, description="Of the road, for all units that have to know it")
+    speed: Scalar | None = Field(None, description="m/s, at the start and to be held")
     inputs: dict[str, InputValue] = Field({}, description="[unit.]pattern -> constant or time series")
     units: dict[UnitName, UnitSpec] = Field(description="Name -> unit", min_length=1)
     connections: list[Connection] = Field([], description="Connections beyond equal names")

@@ -23,6 +23,7 @@ from ..scenario import quantities
 from ..sources import OF_METRICS, sources_hash
 from ..studies.jobs import Job, Once, plan_of
 from ..studies.study_schema import si_number
+from ..wiring.facts import FACTS
 from .design import Level, Point
 from .schema import AxisSpec
 from .sweep_file import Sweep
@@ -203,6 +204,8 @@ def _unit(axis: AxisSpec, plan: Plan) -> str | None:
     holder, _, name = axis.vary[0].partition(".")
     if (name or holder) in ("stop_time", "step_size"):
         return "s"
+    if holder in FACTS:
+        return FACTS[holder].unit
     for unit in plan.units:
         given = unit.constants if holder == "inputs" else unit.parameters
         if holder not in ("inputs", "vehicle", unit.name):

@@ -36,7 +36,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, model_validator
 
-from ..plan import OF_RUN, Algorithm, Value
+from ..plan import FACTS, OF_RUN, Algorithm, Value
 from ..scenario.measurement_units import parse_unit
 from ..scenario.schema import Scalar, Time
 from ..scenario.strict import Strict
@@ -195,7 +195,7 @@ class AxisSpec(Strict):
 
 
 def _is_setting(place: str) -> bool:
-    return "." in place or place in OF_RUN
+    return "." in place or place in (*OF_RUN, *FACTS)
 
 
 def _is_quantity(value: object) -> bool:

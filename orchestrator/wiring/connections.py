@@ -200,9 +200,14 @@ class Connector:
     def _given(
         self, given: Mapping[Input, Constant], wires: Mapping[Input, tuple[Wire, Key]]
     ) -> dict[Input, Constant]:
-        """Return the constants without those for inputs that a wire drives, which are reported."""
+        """Return the constants without those for inputs that a wire drives, which are reported.
+
+        A fact is for those of its inputs that nothing drives.
+        """
         for target in given.keys() & wires.keys():
             wire, constant = wires[target][0], given[target]
+            if constant.of_fact:
+                continue
             unless = "" if constant.of_unit else f", unless its key names {wire.target}"
             driven = f"{wire.target}.{wire.input} is driven by {wire.source}.{wire.output}"
             self._report(constant.key, f"{driven}: a constant is for inputs that no unit drives{unless}")

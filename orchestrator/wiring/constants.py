@@ -1,20 +1,25 @@
-"""The constants and time series that the scenario gives to inputs, each of the most specific pattern."""
+"""What the scenario gives to inputs: constants and time series by the most specific pattern, then facts."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 
-from ..plan import Fmu, Series, Value
+from ..plan import Fmu, Series, Value, Variable
 from ..scenario.load import Scenario
 from ..scenario.schema import SeriesSpec
 from ..scenario.yaml_lines import Key
 from ..wording import fold, hint
+from .facts import facts_of
 from .parameters import origin, value_for
 from .patterns import Replaced, had, matching
 from .series import series_reader
 
 Input = tuple[str, str]  # unit, variable
+
+
+FACT, INPUTS, CHANGED_FACT, CHANGED_INPUTS = range(4)
+"""What goes before what: a fact that was changed goes before what the file gives, not before other changes."""
 
 
 @dataclass(frozen=True)
@@ -26,11 +31,17 @@ class Constant:
     origin: str
     of_unit: bool  # the key names the unit, so it goes before equal names
     exact: bool  # the key is no pattern
+    level: int = INPUTS
 
     @property
-    def rank(self) -> tuple[bool, bool]:
-        """By name before by `*`, then with the unit before without."""
-        return self.exact, self.of_unit
+    def rank(self) -> tuple[int, bool, bool]:
+        """By name before by `*`, then with the unit before without; all of `inputs` before facts."""
+        return self.level, self.exact, self.of_unit
+
+    @property
+    def of_fact(self) -> bool:
+        """Whether a fact gives it, to those of many inputs that nothing drives."""
+        return self.level in (FACT, CHANGED_FACT)
 
 
 def constants(
@@ -40,10 +51,11 @@ def constants(
     notes: list[str],
     problems: list[tuple[Key, str]],
 ) -> dict[Input, Constant]:
-    """Return what `inputs` gives to each input; problems and remarks go to the two lists."""
-    found: dict[Input, Constant] = {}
+    """Return what `inputs` and facts give to each input; problems and remarks go to the two lists."""
     read = series_reader(scenario)
     inputs = {unit: {v.name: v for v in fmu.of("input")} for unit, fmu in fmus.items()}
+    found = dict(_of_facts(scenario, inputs, problems))
+    fact_changed = any(one.level == CHANGED_FACT for one in found.values())
     for pattern, raw in scenario.inputs.items():
         key: Key = ("inputs", pattern)
         prefix, _, rest = pattern.partition(".")
@@ -61,15 +73,38 @@ def constants(
                 value = read(raw, part, variable) if isinstance(raw, SeriesSpec) else value_for(variable, raw)
             except ValueError as error:
                 problems.append((key, f"{error}, for {unit}.{name}"))
-            one = Constant(value, key, origin(scenario.document, key), of_unit, "*" not in pattern)
+            level = CHANGED_INPUTS if fact_changed and scenario.document.override(key) else INPUTS
+            given_by = origin(scenario.document, key)
+            one = Constant(value, key, given_by, of_unit, "*" not in pattern, level)
             other = found.setdefault((unit, name), one)
             if other.rank < one.rank:
                 found[unit, name] = one
+            elif other.of_fact and of_unit:  # the changed fact stands where a constant of the unit did
+                found[unit, name] = replace(other, of_unit=True)
             elif other.rank == one.rank and other is not one:
                 problems.append(
                     (key, f"{unit}.{name} has another constant already, by inputs.{other.key[1]}")
                 )
     return found
+
+
+def _of_facts(
+    scenario: Scenario, known: Mapping[str, Mapping[str, Variable]], problems: list[tuple[Key, str]]
+) -> Iterator[tuple[Input, Constant]]:
+    """Yield what facts give to inputs."""
+    for name, fact, raw, changed in facts_of(scenario):
+        key: Key = (name,)
+        takers = [(unit, one) for unit, inputs in known.items() for one in fact.inputs if one in inputs]
+        if fact.inputs and not takers:
+            problems.append((key, f"no unit has an input {name}"))
+        for unit, one in takers:
+            value = raw
+            try:
+                value = value_for(known[unit][one], raw)
+            except ValueError as error:
+                problems.append((key, f"{error}, for {unit}.{one}"))
+            level = CHANGED_FACT if changed else FACT
+            yield (unit, one), Constant(value, key, origin(scenario.document, key), False, True, level)
 
 
 def _alike(pattern: str, units: Iterable[str], fmus: Mapping[str, Fmu]) -> str:

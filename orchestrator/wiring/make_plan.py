@@ -25,6 +25,7 @@ from ..fmu.shadowing import shadowed_modules
 from ..plan import Fmu, Plan, Series, Unit, Value, Wire
 from ..scenario.load import Scenario
 from ..scenario.overrides import is_path
+from .agreement import remarks
 from .connections import Connector
 from .functions import missing_functions
 from .order import evaluate
@@ -90,6 +91,7 @@ def make_plan(
         "so a wire against the evaluation order uses earlier values"
         for loop in evaluation.possible_loops[:1]
     ]
+    findings = remarks(scenario, units)
     return Plan(
         units=tuple(units[name] for name in evaluation.order),
         wires=_sorted(wires, evaluation.order, opened),
@@ -100,8 +102,9 @@ def make_plan(
         algorithm=scenario.algorithm,
         title=scenario.title,
         scenario=scenario.as_run(),
-        notes=tuple(notes),
+        notes=(*notes, *(found.says for found in findings)),
         changes=scenario.changes,
+        findings=tuple(findings),
     )
 
 

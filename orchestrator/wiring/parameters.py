@@ -11,6 +11,7 @@ from ..scenario import quantities
 from ..scenario.load import Scenario
 from ..scenario.yaml_lines import Document, Key
 from ..wording import closest, fold, hint, listed, short
+from .facts import facts_of
 
 LARGEST, LARGEST_SINGLE = sys.float_info.max, (2 - 2**-23) * 2.0**127
 """Numbers of double and single precision."""
@@ -109,9 +110,12 @@ class Parameters:
         for unit, fmu in self._fmus.items():
             self._origins[unit].update((variable.name, "default") for variable in fmu.of("parameter"))
         self._from_vehicle(given)
+        by_change = self._from_facts(given)
         for unit, fmu in self._fmus.items():
             for name, raw in self._scenario.units[unit].parameters.items():
                 key = ("units", unit, "parameters", name)
+                if (unit, name) in by_change and not self._scenario.document.override(key):
+                    continue
                 if _is_parameter(fmu, name):
                     self._put(given, unit, name, raw, self._scenario.document, key)
                 elif self._left_out(unit, name, key):
@@ -120,6 +124,24 @@ class Parameters:
                     sentence = _unknown(unit, fmu, name)
                     self._scenario.document.report(key, sentence)
         return given
+
+    def _from_facts(self, given: dict[str, dict[str, Value]]) -> set[tuple[str, str]]:
+        """Give what facts tell; return the (unit, parameter) whose fact was changed."""
+        by_change: set[tuple[str, str]] = set()
+        for fact_name, fact, raw, changed in facts_of(self._scenario):
+            takers = [
+                (unit, name)
+                for unit, fmu in self._fmus.items()
+                for name in fact.parameters
+                if _is_parameter(fmu, name)
+            ]
+            for unit, name in takers:
+                self._put(given, unit, name, raw, self._scenario.document, (fact_name,))
+            by_change.update(takers if changed else ())
+            if fact.parameters and not takers:
+                sentence = f"no unit has a parameter {listed(fact.parameters, last='or')}"
+                self._scenario.document.report((fact_name,), sentence)
+        return by_change
 
     def _from_vehicle(self, given: dict[str, dict[str, Value]]) -> None:
         document = self._scenario.vehicle_document

@@ -78,7 +78,7 @@ def test_what_a_terminal_cannot_show_is_escaped() -> None:
     assert done.stdout.startswith(b"L\\xe4ufe 2/a.yaml: Single sine [mu 0.65]")
 
 
-def test_a_scenario_is_shown_with_units_wires_constants_and_the_reasons_of_its_order(
+def test_a_scenario_is_shown_with_units_values_wires_and_the_reasons_of_its_order(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert check("Läufe 2/a.yaml") == 0
@@ -91,21 +91,26 @@ Läufe 2/a.yaml: Single sine [mu 0.65]
 2 s in 2000 steps of 1 ms, extrapolated; 13 wires, 17 outputs recorded
 
 Units in evaluation order
-  unit    FMU     step  parameters
-  driver  driver  5 ms  none
-  plant   plant   1 ms  mass = 1200 kg
-  tyre    tyre    1 ms  none
+  unit    FMU     step
+  driver  driver  5 ms
+  plant   plant   1 ms
+  tyre    tyre    1 ms
+
+Values
+  what        value         from      units
+  stop_time   2 s           scenario  all
+  step_size   0.001 s       scenario  all
+  algorithm   extrapolated  default   all
+  friction    0.65          scenario  driver
+  mass        1200 kg       scenario  plant
+  note        default       scenario  plant
+  friction_*  0.65          scenario  tyre
 
 Wires
   from    to     variables
   driver  plant  steer_angle [rad], torque_* → wheel_torque_* [N.m]
   tyre    plant  tyre_force_* [N]
   plant   tyre   slip_angle_* [rad]
-
-Constants
-  input            value
-  driver.friction  0.65
-  tyre.friction_*  0.65
 
 Why this order
   unit   after   because its outputs follow
@@ -121,6 +126,32 @@ Nothing is wrong.
     )
 
 
+def test_a_value_says_where_it_comes_from_also_where_it_is_the_fmus_own(
+    capsys: pytest.CaptureFixture[str], folder: Path
+) -> None:
+    path = folder / "a.yaml"
+    path.write_text(SCENARIO.replace("parameters: {mass: 1.2 t, note: default}", "parameters: {}"))
+    assert check("Läufe 2/a.yaml", "--set", "plant.note=default", "--set", "stop_time=1") == 0
+    shown = capsys.readouterr().out
+    rows = [line.split() for line in shown.splitlines()]
+    assert ["mass", "1500", "kg", "default", "plant"] in rows
+    assert ["note", "default", "--set", "plant"] in rows
+    assert ["stop_time", "1", "s", "--set", "all"] in rows
+    assert "all at their defaults" not in shown
+
+
+def test_defaults_that_do_not_matter_are_shown_on_request(capsys: pytest.CaptureFixture[str]) -> None:
+    make_fmu(Path("fmus/driver.fmu"), inputs=[Var("friction")], parameters=[Var("gain", start=3.0)],
+             outputs=[out("steer_angle", unit="rad"), out("torque_*", unit="N.m")])  # fmt: skip
+    assert check("Läufe 2/a.yaml") == 0
+    shown = capsys.readouterr().out
+    assert " gain " not in shown
+    assert "1 more are as the FMUs have them: --all shows them" in shown
+    assert check("Läufe 2/a.yaml", "--all") == 0
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert ["gain", "3", "default", "driver"] in rows
+
+
 def test_options_are_applied_and_notes_go_to_stderr(capsys: pytest.CaptureFixture[str]) -> None:
     assert check("Läufe 2/a.yaml", "--swap", "plant=plant_other", "--fmus", "fmus") == 2
     assert capsys.readouterr().err.startswith("--swap plant=plant_other: no FMU 'plant_other' in fmus; ")
@@ -131,7 +162,7 @@ def test_options_are_applied_and_notes_go_to_stderr(capsys: pytest.CaptureFixtur
     )
     assert check("Läufe 2/a.yaml", "--swap", "plant=plant_other", "--set", "inputs.friction*=30 %") == 0
     shown = capsys.readouterr()
-    assert "  driver.friction  0.3\n" in shown.out
+    assert "  friction    0.3           --set     driver\n" in shown.out
     assert shown.err.splitlines() == [
         "note: plant.mass is left out: plant_other has no such parameter",
         "note: plant.note is left out: plant_other has no such parameter",

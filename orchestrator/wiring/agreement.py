@@ -1,0 +1,162 @@
+"""Remarks on values that are hardly meant: two for one matter, another car's, a slip of the pen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from typing import NamedTuple
+
+from ..plan import Finding, Unit, Value, Variable
+from ..scenario.load import Scenario
+from ..wording import fold, listed
+from .facts import FACTS
+
+CAR = (
+    "mass", "sprung_mass", "yaw_inertia", "roll_inertia", "cg_to_front_axle", "cg_to_rear_axle",
+    "track_width", "cg_height", "wheel_radius", "wheel_inertia", "cornering_stiffness_front",
+    "cornering_stiffness_rear", "steering_ratio",
+)  # fmt: skip
+"""Parameters that describe the car, whichever unit has to know them."""
+SAME = 1e-9
+"""Relative difference of values that count as equal: rounding of a conversion."""
+SLIPS = (
+    ("m/s", 70.0, "km/h", 3.6),  # chosen: above the top speed of nearly all cars
+    ("rad", 4 * math.pi, "deg", 180 / math.pi),  # chosen: two turns of a hand wheel
+)
+"""Measurement unit, the largest plausible value in it, the unit that was perhaps meant, factor to it."""
+
+
+class Told(NamedTuple):
+    """What a unit is told of something."""
+
+    unit: str
+    name: str
+    value: Value
+    origin: str
+    variable: Variable
+
+
+def remarks(scenario: Scenario, units: Mapping[str, Unit]) -> list[Finding]:
+    """Return remarks on the values that a scenario's units are given."""
+    return [
+        *_two_values(units),
+        *_other_cars(scenario, units),
+        *_slips(scenario, units),
+    ]
+
+
+def _two_values(units: Mapping[str, Unit]) -> Iterator[Finding]:
+    """Yield a remark for everything that two units are told differently.
+
+    Not if the scenario gives both values for their units, or both are the FMUs' own of what is no
+    property of the car: then they are meant.
+    """
+    in_facts = {name for fact in FACTS.values() for name in (*fact.inputs, *fact.parameters)}
+    groups: dict[str, list[Told]] = {}
+    for one in _parameters(units.values()):
+        groups.setdefault(one.name, []).append(one)
+    for name, told in groups.items():
+        if name not in in_facts and _one_matter(name, told) and _differ(told):
+            vehicle = f"--set vehicle.{name}=VALUE gives it to all of them that have no value of their own"
+            yield _finding(name, told, vehicle)
+    for name, fact in FACTS.items():
+        told = [one for one in _parameters(units.values()) if fact.counts(units[one.unit], one.name)]
+        told += [one for one in _constants(units.values()) if one.name in fact.inputs]
+        if _differ(told) and {one.origin for one in told} not in ({"scenario"}, {"default"}):
+            yield _finding(name, told, f"--set {name}=VALUE gives all of them one value")
+
+
+def _one_matter(name: str, told: list[Told]) -> bool:
+    """Return whether a parameter of several units is meant to have one value."""
+    origins = {one.origin for one in told}
+    measured_alike = len({one.variable.unit or "1" for one in told}) == 1
+    if len(told) < 2 or not measured_alike or origins == {"scenario"}:
+        return False
+    if origins == {"default"}:
+        return name in CAR
+    return name in CAR or "vehicle" in origins or not _differ(told, start=True)
+
+
+def _differ(told: list[Told], *, start: bool = False) -> bool:
+    """Return whether numbers differ: the values, or those that the FMUs have themselves."""
+    values = [one.variable.start if start else one.value for one in told]
+    if any(isinstance(value, bool) or not isinstance(value, (int, float)) for value in values):
+        return False
+    numbers = [float(value) for value in values]  # type: ignore[arg-type]
+    return len(numbers) > 1 and max(numbers) - min(numbers) > SAME * max(map(abs, numbers))
+
+
+def _parameters(units: Iterable[Unit]) -> Iterator[Told]:
+    for unit in units:
+        for variable in unit.fmu.of("parameter"):
+            value = unit.parameters.get(variable.name, variable.start)
+            if value is not None:
+                origin = unit.origins.get(variable.name, "default")
+                yield Told(unit.name, variable.name, value, origin, variable)
+
+
+def _constants(units: Iterable[Unit]) -> Iterator[Told]:
+    for unit in units:
+        for name, value in unit.constants.items():
+            if name not in unit.series:
+                origin = unit.origins.get(name, "default")
+                yield Told(unit.name, name, value, origin, unit.fmu.variables[name])
+
+
+def _finding(name: str, told: list[Told], way_out: str) -> Finding:
+    alike: dict[tuple[float, str], list[Told]] = {}
+    for one in told:
+        alike.setdefault((float(one.value), one.origin), []).append(one)  # type: ignore[arg-type]
+    parts = []
+    for (value, origin), some in alike.items():
+        names = fold([f"{one.unit}.{one.name}" for one in some])
+        parts.append(f"{listed(names)} {_measured(value, some[0].variable)} ({origin})")
+    first = next((one for one in told if one.origin not in ("default", "vehicle", "scenario")), told[0])
+    says = f"{name} has two values: {', '.join(parts)}; {way_out}"
+    return Finding("two values", f"{first.unit}.{first.name}", float(first.value), None, says)  # type: ignore[arg-type]
+
+
+def _other_cars(scenario: Scenario, units: Mapping[str, Unit]) -> Iterator[Finding]:
+    """Yield a remark for every property of the car that a unit has by default beside a vehicle file.
+
+    A ratio of 1 is no car's: it says that angles are those of the road wheels.
+    """
+    if not scenario.vehicle_parameters:
+        return
+    for one in _parameters(units.values()):
+        if one.name in CAR and one.origin == "default" and one.value != 1:
+            value = _measured(one.value, one.variable)
+            says = (
+                f"{one.unit}.{one.name} is {value}, the default of {units[one.unit].fmu.name}: "
+                "the vehicle file gives none"
+            )
+            yield Finding("default car", f"{one.unit}.{one.name}", float(one.value), None, says)
+
+
+def _slips(scenario: Scenario, units: Mapping[str, Unit]) -> Iterator[Finding]:
+    """Yield a remark for every number that was probably meant in another unit."""
+    for one in _parameters(units.values()):
+        spec = scenario.units[one.unit].parameters.get(one.name)
+        raw = scenario.vehicle_parameters.get(one.name) if spec is None else spec
+        told = [getattr(scenario, name) for name, fact in FACTS.items() if one.name in fact.parameters]
+        with_unit = any(isinstance(given, str) for given in (raw, *told))
+        if one.origin == "default" or with_unit or not isinstance(one.value, float):
+            continue
+        for unit, largest, meant, factor in SLIPS:
+            if one.variable.unit == unit and abs(one.value) > largest:
+                says = (
+                    f"{one.unit}.{one.name}: {one.value:g} {unit} is {factor * one.value:.4g} {meant}; "
+                    f"did you mean '{one.value:g} {meant}'?"
+                )
+                yield Finding("slip", f"{one.unit}.{one.name}", one.value, None, says)
+    for one in _constants(units.values()):
+        if one.name in FACTS["friction"].inputs and isinstance(one.value, float) and one.value > 2.0:
+            place = f"{one.unit}.{one.name}"
+            says = f"{place}: a friction of {one.value:g} is no road's; did you mean '{one.value:g} %'?"
+            yield Finding("slip", place, one.value, None, says)
+            return
+
+
+def _measured(value: Value, variable: Variable) -> str:
+    unit = variable.unit or "1"
+    return f"{value:.6g}{f' {unit}' if unit != '1' else ''}" if not isinstance(value, str) else value

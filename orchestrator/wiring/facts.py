@@ -1,0 +1,52 @@
+"""What one name tells all units that have to know it: the friction of the road, the speed of the car.
+
+    friction: 0.65         # every input `friction`, `friction_fl` .. `friction_rr` that no unit drives
+    speed: 80 km/h         # every parameter `initial_speed`, `target_speed`
+
+In a scenario a fact stands behind what is given by its own name; as a change (`--set friction=0.3`) it goes
+before what the file gives, so that one change reaches all. A line more in the table is a fact more, with
+a key of the same name in the schema of scenarios and in `plan.FACTS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from ..plan import FACTS as NAMES
+from ..plan import Unit, Value
+from ..scenario.load import Scenario
+from ..wording import WHEELS
+
+
+@dataclass(frozen=True)
+class Fact:
+    """What a fact reaches."""
+
+    unit: str
+    inputs: tuple[str, ...] = ()
+    parameters: dict[str, str] = field(default_factory=dict)
+    """Parameter -> the one of the same unit that turns it off if it is 0; "" if it always counts."""
+
+    def counts(self, unit: Unit, parameter: str) -> bool:
+        """Return whether a unit's parameter is one of the fact's, and not turned off."""
+        if parameter not in self.parameters:
+            return False
+        switch = self.parameters[parameter]
+        known = unit.fmu.variables.get(switch)
+        return known is None or unit.parameters.get(switch, known.start) != 0
+
+
+FACTS = {
+    "friction": Fact("1", inputs=("friction", *(f"friction_{wheel}" for wheel in WHEELS))),
+    "speed": Fact("m/s", parameters={"initial_speed": "", "target_speed": "speed_gain"}),
+}
+assert tuple(FACTS) == NAMES
+
+
+def facts_of(scenario: Scenario) -> Iterator[tuple[str, Fact, Value, bool]]:
+    """Yield name, fact, value and whether a change gave it, of all facts that a scenario tells."""
+    for name, fact in FACTS.items():
+        value = getattr(scenario, name)
+        if value is not None:
+            yield name, fact, value, scenario.document.override((name,)) is not None

@@ -1,0 +1,178 @@
+"""Facts that reach every unit which has to know them, and remarks on values that are hardly meant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from orchestrator.errors import WiringError
+from orchestrator.scenario.load import load_scenario
+from orchestrator.wiring.make_plan import make_plan
+from tests.changed import changed
+
+from .fake_fmus import WHEELS, Var, make_fmu, out
+
+pytestmark = pytest.mark.usefixtures("cache")
+
+SCENARIO = """\
+vehicle: car.yaml
+stop_time: 1
+step_size: 0.01
+{facts}
+units:
+  driver: {{fmu: driver_x, parameters: {{{driver}}}}}
+  reference: {{fmu: reference_x, parameters: {{{reference}}}}}
+  plant: {{fmu: plant_x, parameters: {{{plant}}}}}
+  tyre: {{fmu: tyre_x}}
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """A working directory with the FMUs of a car, each with a mass of its own."""
+    monkeypatch.chdir(tmp_path)
+    fmus = tmp_path / "fmus"
+    speed = Var("target_speed", "m/s", start=25.0), Var("speed_gain", "N.s/m", start=0.0)
+    steering = Var("steering_ratio", start=17.0), Var("amplitude", "rad", start=0.1)
+    smooth = Var("smoothness", start=1.0), Var("limited", type="Boolean", start=False)
+    make_fmu(fmus / "driver_x.fmu", outputs=[out("steer_angle", unit="rad")], parameters=[*speed, *steering])
+    make_fmu(
+        fmus / "reference_x.fmu",
+        inputs=[Var("friction")],
+        outputs=[out("yaw_rate_ref", unit="rad/s")],
+        parameters=[Var("mass", "kg", start=1300.0), *smooth],
+    )
+    make_fmu(
+        fmus / "plant_x.fmu",
+        outputs=[out("yaw_rate", unit="rad/s")],
+        parameters=[Var("mass", "kg", start=1100.0), Var("initial_speed", "m/s", start=25.0), smooth[0]],
+    )
+    make_fmu(fmus / "tyre_x.fmu", inputs=[Var("friction_*")], outputs=[out("tyre_force_x_*", unit="N")])
+    make_fmu(fmus / "road_x.fmu", outputs=[out("friction_*")])
+    return tmp_path
+
+
+def plan(*settings, facts='inputs: {"friction*": 0.65}', driver="", reference="", plant="",
+         car="mass: 1200, steering_ratio: 16", more=""):  # fmt: skip
+    """Return the plan of a scenario with these values, after --set."""
+    Path("car.yaml").write_text(f"parameters: {{{car}}}\n")
+    text = SCENARIO.format(facts=facts, driver=driver, reference=reference, plant=plant)
+    Path("a.yaml").write_text(text + more)
+    return make_plan(load_scenario("a.yaml", changes=changed(settings=settings)))
+
+
+def remarks(*settings, **values):
+    return [one.says for one in plan(*settings, **values).findings]
+
+
+def values(made, unit):
+    one = next(one for one in made.units if one.name == unit)
+    return {**one.parameters, **one.constants}
+
+
+def test_a_scenario_without_contradictions_has_no_remarks():
+    assert plan().findings == ()
+
+
+def test_a_change_of_what_the_reference_is_told_alone_names_the_tyres_that_keep_theirs():
+    made = plan("inputs.friction=0.3")
+    (one,) = made.findings
+    assert (one.kind, one.place, one.value) == ("two values", "reference.friction", 0.3)
+    assert one.says == (
+        "friction has two values: reference.friction 0.3 (--set), tyre.friction_* 0.65 (scenario); "
+        "--set friction=VALUE gives all of them one value"
+    )
+    assert one.says in made.notes
+
+
+@pytest.mark.parametrize(
+    "given", [{"facts": "friction: 0.3"}, {"facts": 'friction: 0.3\ninputs: {"friction_f*": 0.3}'}]
+)
+def test_one_name_gives_friction_to_all_units(given):
+    made = plan(**given)
+    assert values(made, "reference")["friction"] == 0.3
+    assert {values(made, "tyre")[f"friction_{wheel}"] for wheel in WHEELS} == {0.3}
+    assert made.findings == ()
+
+
+def test_a_changed_fact_goes_before_what_the_file_gives_and_behind_other_changes():
+    given = {"facts": "inputs: {friction: 0.5, friction_fl: 0.2, 'friction*': 0.65}"}
+    tyre = values(plan("friction=0.3", **given), "tyre")
+    assert {tyre[f"friction_{wheel}"] for wheel in WHEELS} == {0.3}
+    both = plan("friction=0.3", "inputs.friction_f*=0.1", **given)
+    assert [values(both, "tyre")[f"friction_{wheel}"] for wheel in WHEELS] == [0.1, 0.1, 0.3, 0.3]
+
+
+def test_a_fact_of_the_file_stands_behind_what_is_given_by_its_own_name():
+    made = plan(facts="friction: 0.6\nspeed: 72 km/h\ninputs: {friction_fl: 0.2}", plant="initial_speed: 30")
+    assert [values(made, "tyre")[f"friction_{wheel}"] for wheel in WHEELS] == [0.2, 0.6, 0.6, 0.6]
+    assert values(made, "plant")["initial_speed"] == 30.0
+    assert values(made, "driver")["target_speed"] == 20.0
+
+
+def test_one_speed_reaches_the_plant_and_the_driver():
+    made = plan("speed=72 km/h", plant="initial_speed: 30", driver="target_speed: 30, speed_gain: 100")
+    assert (values(made, "plant")["initial_speed"], values(made, "driver")["target_speed"]) == (20.0, 20.0)
+    assert made.changes[0].place == "speed"
+    assert made.findings == ()
+
+
+def test_friction_that_a_road_gives_is_left_to_it():
+    made = plan(facts="friction: 0.5", more="  road: {fmu: road_x}\n")
+    assert values(made, "reference") == {"mass": 1200.0, "friction": 0.5}
+    assert values(made, "tyre") == {}
+
+
+def test_a_fact_in_the_wrong_unit_is_refused():
+    with pytest.raises(WiringError, match="--set speed=3 kg: '3 kg' is not a value in m/s"):
+        plan("speed=3 kg")
+
+
+def test_a_speed_held_by_the_driver_that_is_not_the_cars_is_named():
+    held = {"driver": "speed_gain: 100"}
+    assert remarks("plant.initial_speed=80 km/h", **held) == [
+        "speed has two values: driver.target_speed 25 m/s (default), "
+        "plant.initial_speed 22.2222 m/s (--set); "
+        "--set speed=VALUE gives all of them one value"
+    ]
+    assert remarks("plant.initial_speed=80 km/h") == []  # the driver holds no speed
+
+
+def test_one_mass_for_the_reference_and_another_for_the_plant_is_named():
+    assert remarks("plant.mass=1500") == [
+        "mass has two values: reference.mass 1200 kg (vehicle), plant.mass 1500 kg (--set); "
+        "--set vehicle.mass=VALUE gives it to all of them that have no value of their own"
+    ]
+
+
+def test_two_values_that_the_scenario_gives_are_meant():
+    assert remarks(plant="mass: 1500", reference="mass: 1400", car="steering_ratio: 16") == []
+
+
+def test_the_fmus_own_values_of_what_is_no_property_of_the_car_are_meant():
+    assert remarks("reference.smoothness=1") == []
+    assert len(remarks("reference.smoothness=2")) == 1  # both FMUs have 1, so it is one matter
+
+
+def test_another_cars_steering_ratio_is_named():
+    assert remarks(car="mass: 1200") == [
+        "driver.steering_ratio is 17, the default of driver_x: the vehicle file gives none"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("setting", "sentence"),
+    [
+        ("plant.initial_speed=90", "plant.initial_speed: 90 m/s is 324 km/h; did you mean '90 km/h'?"),
+        ("driver.amplitude=30", "driver.amplitude: 30 rad is 1719 deg; did you mean '30 deg'?"),
+        ("friction=65", "reference.friction: a friction of 65 is no road's; did you mean '65 %'?"),
+    ],
+)
+def test_a_number_that_was_meant_in_another_unit_is_named(setting, sentence):
+    assert sentence in remarks(setting)
+
+
+def test_a_speed_that_names_its_unit_is_meant():
+    assert remarks("plant.initial_speed=324 km/h") == []
+    assert remarks("speed=324 km/h") == []
