@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..metrics.signals import symbol, variable_of
+from ..metrics.signals import si_of, symbol, variable_of
 
 _SHOWN: dict[str, tuple[str, float]] = {
     "rad": ("°", 180 / math.pi),
@@ -32,8 +32,12 @@ def in_formula(signal: str) -> str:
 
 
 def shown_unit(unit: str) -> tuple[str, float]:
-    """Return the unit that people read and the factor from SI; `%` stands for a ratio in per cent."""
-    return _SHOWN.get(unit, (unit.replace(".", "·"), 1.0))
+    """Return the unit that people read and the factor to it; `%` stands for a ratio in per cent."""
+    if unit in _SHOWN:
+        return _SHOWN[unit]
+    si, to_si = si_of(unit)
+    text, factor = _SHOWN.get(si, (si.replace(".", "·"), 1.0))
+    return text, to_si * factor
 
 
 def shown(value: float, unit: str, *, digits: int = 3) -> str:

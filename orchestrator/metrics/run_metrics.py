@@ -2,8 +2,8 @@
 
 A metric is a measure of a signal, written `measure(signal)`: `relative_peak_error(sideslip)`,
 `total_variation_rate(wheel_torque_*)`. Signals are named as in the signal dictionary, whatever the
-scenario calls its units (`plant.sideslip` where two units have one of that name); the reference of
-a signal `x` is the signal `x_ref`; of four wheels (`*`) the largest value counts. A metric whose
+scenario calls its units or an FMU from elsewhere its outputs (`plant.sideslip` where two units have one of
+that name); the reference of a signal `x` is the signal `x_ref`; of four wheels (`*`) the largest value counts. A metric whose
 signals a run does not have is absent, never zero.
 """
 
@@ -21,7 +21,7 @@ import numpy as np
 from ..errors import ResultsError, ScenarioError
 from ..wording import WHEELS, closest, fold, hint, short
 from .measures import MEASURES, Measure
-from .signals import symbol, variable_of, words
+from .signals import si_of, symbol, variable_of, words
 
 if TYPE_CHECKING:
     from ..plan import Plan
@@ -48,9 +48,6 @@ STANDARD = (
     "total_variation_rate(wheel_torque_*)",
 )
 """The metrics shown where nobody has chosen others."""
-
-ALIASES = {"wheel_torque_*": "torque_request_*"}
-"""Signal -> what stands in for it in a scenario whose units do not have it."""
 
 _PER_SECOND = {"1": "1/s", "m": "m/s", "m/s": "m/s2", "rad": "rad/s", "rad/s": "rad/s2", "rad/s2": "rad/s3"}
 _TIMES_SECOND = {"1": "s", "m/s": "m", "m/s2": "m/s", "rad/s": "rad", "rad/s2": "rad/s"}
@@ -131,9 +128,7 @@ def columns_of(results: Results, signal: str) -> list[str]:
     """
     names = [signal.replace("*", wheel) for wheel in WHEELS] if "*" in signal else [signal]
     found = [column for name in names if (column := _column(results, name)) is not None]
-    if len(found) == len(names):
-        return found
-    return columns_of(results, ALIASES[signal]) if signal in ALIASES else []
+    return found if len(found) == len(names) else []
 
 
 def _column(results: Results, name: str) -> str | None:
@@ -165,27 +160,27 @@ def evaluate(results: Results, chosen: Metric, window: tuple[float, float] | Non
         return None
     numbers = []
     for columns in signals:
-        samples = [results.columns[column][inside] for column in columns]
+        samples = [results.columns[c][inside] * si_of(results.units[c])[1] for c in columns]
         if chosen.measure.needs_rate and len(samples) == 1:
             samples.append(np.gradient(samples[0], t))
         numbers.append(chosen.measure.function(t, *samples))
     number = float(np.max(numbers))  # a NaN of one wheel is not lost
     if math.isnan(number):
         return None
-    return Value(number, chosen.unit(results.units[signals[0][0]]))
+    return Value(number, chosen.unit(si_of(results.units[signals[0][0]])[0]))
 
 
 def results_to_be(plan: Plan) -> Results:
     """Return results without rows: the columns that a plan will record."""
     from ..results.read import Results
+    from ..results.run_record import connections_of
 
     units = {unit.name: unit for unit in plan.units}
     variables = {f"{u}.{name}": units[u].fmu.variables[name] for u, name in plan.record}
     columns = {name: np.empty(0, float if v.type != "String" else str) for name, v in variables.items()}
     names = {name: {"name": unit.fmu.name} for name, unit in units.items()}
-    return Results(
-        Path(), np.empty(0), columns, {n: v.unit or "" for n, v in variables.items()}, {"fmus": names}
-    )
+    run = {"fmus": names, "connections": connections_of(plan)}
+    return Results(Path(), np.empty(0), columns, {n: v.unit or "" for n, v in variables.items()}, run)
 
 
 def check_metrics(plan: Plan, chosen: Iterable[Metric]) -> None:
@@ -212,14 +207,14 @@ def check_metrics(plan: Plan, chosen: Iterable[Metric]) -> None:
 def unit_in(results: Results, chosen: Metric) -> str | None:
     """Return the unit of a metric in a run, None if the run has not recorded its signals."""
     signals = _signals(results, chosen)
-    return chosen.unit(results.units[signals[0][0]]) if signals else None
+    return chosen.unit(si_of(results.units[signals[0][0]])[0]) if signals else None
 
 
 def _signals(results: Results, chosen: Metric) -> list[list[str]]:
     """Return the columns that each function call takes, one call per wheel; empty if any is missing."""
     signals = []
     for column in columns_of(results, chosen.signal):
-        if chosen.measure.signal_unit not in (None, results.units[column]):
+        if chosen.measure.signal_unit not in (None, si_of(results.units[column])[0]):
             return []
         columns = [column]
         rate = _column(results, f"{variable_of(column)}_rate") if chosen.measure.needs_rate else None

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from functools import cache
+
+from ..scenario.measurement_units import conversion, measure_of, parse_unit
+
 SYMBOLS: dict[str, str] = {
     "steer_angle": "δ",
     "steering_wheel_angle": "δ_H",
@@ -54,6 +58,21 @@ WORDS: dict[str, str] = {
     "slip_ratio_*": "Longitudinal slip",
     "wheel_speed_*": "Wheel speed",
 }
+
+
+SI = ("1", "s", "m", "kg", "N", "Pa", "rad", "m/s", "rad/s", "m/s2", "rad/s2", "N.m")
+"""Units that the signals of the dictionary have."""
+
+
+@cache
+def si_of(unit: str) -> tuple[str, float]:
+    """Return the unit of the dictionary that measures the same, and the factor to it."""
+    measure = measure_of(unit)
+    for si in SI if measure is not None and unit not in SI else ():
+        factors = conversion(measure, parse_unit(si))  # type: ignore[arg-type]
+        if factors is not None and factors[1] == 0.0:
+            return si, factors[0]
+    return unit, 1.0
 
 
 def variable_of(column: str) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import ResultsError
 from ..files import check_regular, reads, reason
+from ..scenario.measurement_units import conversion, measure_of
 from ..wording import listed, short
 from .digest import checksum
 from .folder import COMPLETED
@@ -67,6 +68,9 @@ class Results:
     def column(self, variable: str, *, role: str | None = None) -> str:
         """Return the column's full name for a variable, whatever its unit is called.
 
+        Where no unit has an output of that name, it is the output that feeds inputs of that name: the
+        `Mz` of an FMU from elsewhere, connected to `plant.yaw_moment`, is the yaw moment.
+
         Args:
             variable: name of a variable; a full name `unit.variable` is given back as it is.
             role: only units of this role ("plant", "controller", ...): units whose FMU's name
@@ -81,6 +85,8 @@ class Results:
         if role is not None:
             units = self.units_of_role(role)
             found = [name for name in found if name.partition(".")[0] in units]
+        if not found and role is None:
+            found = self._feeding(variable)
         if len(found) == 1:
             return found[0]
         if not found:
@@ -88,6 +94,17 @@ class Results:
         raise ResultsError(
             f"{self.file}: '{variable}' was recorded of more than one unit: {', '.join(found)}."
         )
+
+    def _feeding(self, variable: str) -> list[str]:
+        """Return the columns that feed inputs of a name as they are, but for the unit of measurement."""
+        wires = self.run.get("connections")
+        feeding = [
+            str(wire.get("from"))
+            for wire in (wires if isinstance(wires, list) else ())
+            if isinstance(wire, dict) and str(wire.get("to")).partition(".")[2] == variable
+            if _is_the_same(wire, self.units.get(str(wire.get("from"))))
+        ]
+        return [column for column in dict.fromkeys(feeding) if column in self.columns]
 
     def units_of_role(self, role: str) -> list[str]:
         """Return the names of the scenario's units that have the role, in evaluation order."""
@@ -101,6 +118,15 @@ class Results:
         close = get_close_matches(variable, [*self.columns, *short], n=1)
         hint = f"; did you mean '{close[0]}'?" if close else f"; recorded: {', '.join(self.columns)}."
         return f"{self.file}: no column '{variable}'{of} was recorded{hint}"
+
+
+def _is_the_same(wire: dict[str, Any], unit: str | None) -> bool:
+    """Return whether a wire hands on what the output of this unit says: at most in another unit."""
+    if "gain" not in wire:
+        return True
+    one, other = measure_of(unit), measure_of(wire.get("unit"))
+    factors = conversion(one, other) if one and other else None
+    return factors is not None and np.allclose(factors, (wire["gain"], wire.get("offset", 0.0)))
 
 
 @reads("recorded run", ResultsError)

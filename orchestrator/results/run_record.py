@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import datetime
 from functools import cache
@@ -39,16 +40,25 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
         "texts": [f"{u}.{name}" for u, name in plan.record if units[u].fmu.variables[name].type == "String"],
         "fmus": {name: _fmu(unit, plan) for name, unit in units.items()},
         "changes": [asdict(change) for change in plan.changes],
-        "connections": [_connection(wire) for wire in plan.wires],
+        "connections": connections_of(plan),
         "scenario": plan.scenario,
         "notes": list(plan.notes),
         "versions": versions(),
     }
 
 
-def _connection(wire: Wire) -> dict[str, Any]:
+def connections_of(plan: Plan) -> list[dict[str, Any]]:
+    """Return the wires of a plan: from, to, and where a number is converted how and into which unit."""
+    units = {unit.name: unit for unit in plan.units}
+    return [_connection(wire, units) for wire in plan.wires]
+
+
+def _connection(wire: Wire, units: Mapping[str, Unit]) -> dict[str, Any]:
     ends = {"from": f"{wire.source}.{wire.output}", "to": f"{wire.target}.{wire.input}"}
-    return ends | ({"gain": wire.gain, "offset": wire.offset} if wire.converts else {})
+    if not wire.converts:
+        return ends
+    unit = units[wire.target].fmu.variables[wire.input].unit
+    return ends | {"gain": wire.gain, "offset": wire.offset, "unit": unit}
 
 
 def _fmu(unit: Unit, plan: Plan) -> dict[str, Any]:

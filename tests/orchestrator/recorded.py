@@ -47,6 +47,10 @@ def run_record(units: dict[str, str], title: str = "Sine at 25 m/s") -> dict[str
         "status": "completed", "error": None, "title": title, "wall_time": 1.5, "algorithm": "extrapolated",
         "step_size": 0.001, "units": units, "fmus": fmus, "versions": {"yawbench": "0.1.0"},
         "scenario": {"title": title, "source": "paper A"},
+        "connections": [
+            {"from": f"wheel_control.torque_request_{w}", "to": f"plant.wheel_torque_{w}"}
+            for w in ("fl", "fr", "rl", "rr")
+        ],
     }  # fmt: skip
 
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import ScenarioError
-from orchestrator.figures.display import digits_of, shown
+from orchestrator.figures.display import digits_of, shown, shown_unit
+from orchestrator.figures.panels import Run, shown_by
 from orchestrator.metrics import catalogue, measures
-from orchestrator.metrics.run_metrics import STANDARD, evaluate, evaluate_all, metric
+from orchestrator.metrics.run_metrics import STANDARD, Value, evaluate, evaluate_all, metric
 
 from .recorded import UNITS, car, results
 
@@ -191,6 +192,30 @@ def test_the_largest_of_four_wheels_counts():
     columns = {f"actuator.wheel_torque_{w}": k * T for k, w in enumerate(("fl", "fr", "rl", "rr"))}
     wheels = results(columns, T, dict.fromkeys(columns, "N.m"))
     assert evaluate(wheels, metric("peak(wheel_torque_*)")).number == pytest.approx(6.0)
+
+
+def test_the_output_that_feeds_an_input_is_the_signal_of_that_name():
+    columns = {"mine.Mz": 2 * T, "mine.beta": T, "plant.yaw_rate": T}
+    run = results(columns, T, {"mine.Mz": "N.m", "mine.beta": "deg", "plant.yaw_rate": "rad/s"})
+    assert evaluate(run, metric("peak(yaw_moment)")) is None
+    run.run["connections"] = [
+        {"from": "mine.Mz", "to": "allocator.yaw_moment"},
+        {"from": "mine.Mz", "to": "plant.yaw_moment"},
+        {"from": "mine.beta", "to": "driver.sideslip", "gain": np.pi / 180, "offset": 0.0, "unit": "rad"},
+        {"from": "plant.yaw_rate", "to": "driver.turn", "gain": -1.0, "offset": 0.0, "unit": "rad/s"},
+    ]
+    assert evaluate(run, metric("peak(yaw_moment)")) == Value(2 * T[-1], "N.m")
+    assert evaluate(run, metric("peak(sideslip)")) == Value(pytest.approx(np.radians(T[-1])), "rad")
+    assert evaluate(run, metric("peak(turn)")) is None  # another sign is another signal
+    assert [panel.name for panel in shown_by([Run("a", run)], ["yaw_moment", "turn"])] == ["yaw_moment"]
+
+
+def test_values_in_other_units_are_measured_and_drawn_in_si():
+    run = results({"mine.yaw_moment": T}, T, {"mine.yaw_moment": "kN.m"})
+    assert evaluate(run, metric("peak(yaw_moment)")) == Value(pytest.approx(1000 * T[-1]), "N.m")
+    assert shown_unit("kN.m") == ("N·m", 1000.0)
+    assert shown_unit("deg") == ("°", pytest.approx(1.0))
+    assert shown_unit("widgets") == ("widgets", 1.0)
 
 
 def test_torque_requests_stand_in_where_no_actuator_is_between():
