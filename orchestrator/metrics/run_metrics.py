@@ -2,9 +2,9 @@
 
 A metric is a measure of a signal, written `measure(signal)`: `relative_peak_error(sideslip)`,
 `total_variation_rate(wheel_torque_*)`. Signals are named as in the signal dictionary, whatever the
-scenario calls its units or an FMU from elsewhere its outputs (`plant.sideslip` where two units have one of
-that name); the reference of a signal `x` is the signal `x_ref`; of four wheels (`*`) the largest value counts. A metric whose
-signals a run does not have is absent, never zero.
+scenario calls its units or an FMU from elsewhere its outputs (`plant.sideslip` where two units have
+one of that name); the reference of a signal `x` is the signal `x_ref`; of four wheels (`*`) the
+largest value counts. A metric whose signals a run does not have is absent, never zero.
 """
 
 from __future__ import annotations

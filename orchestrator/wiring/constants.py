@@ -19,7 +19,7 @@ Input = tuple[str, str]  # unit, variable
 
 
 FACT, INPUTS, CHANGED_FACT, CHANGED_INPUTS = range(4)
-"""What goes before what: a fact that was changed goes before what the file gives, not before other changes."""
+"""What goes before what: a changed fact before what the file gives, not before other changes."""
 
 
 @dataclass(frozen=True)
