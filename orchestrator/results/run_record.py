@@ -58,7 +58,7 @@ def _connection(wire: Wire, units: Mapping[str, Unit]) -> dict[str, Any]:
     if not wire.converts:
         return ends
     unit = units[wire.target].fmu.variables[wire.input].unit
-    return ends | {"gain": wire.gain, "offset": wire.offset, "unit": unit}
+    return ends | {"gain": wire.gain, "offset": wire.offset} | ({"unit": unit} if unit else {})
 
 
 def _fmu(unit: Unit, plan: Plan) -> dict[str, Any]:

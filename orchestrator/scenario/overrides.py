@@ -25,8 +25,10 @@ from ..wording import hint, listed
 from . import yaml_lines
 from .yaml_lines import Document, Key
 
-RESERVED = ("vehicle", "inputs", *FACTS)
+HOLDERS = ("vehicle", "inputs")
 """Words that `--set` understands in place of a unit."""
+RESERVED = (*HOLDERS, *FACTS)
+"""Names that no unit may have."""
 
 
 def is_path(fmu: str) -> bool:
@@ -121,7 +123,7 @@ def apply_changes(
         elif holder == "inputs":
             differs = _put(document, ("inputs", name), change)
         elif not isinstance(spec, dict):
-            known = (*units, *RESERVED) if name else units
+            known = (*units, *HOLDERS) if name else units
             sentence = f"{change}: the scenario has no unit {holder!r}"
             document.problem(0, sentence + hint(holder, known, lead="it has"))
             continue

@@ -117,20 +117,20 @@ def _finding(name: str, told: list[Told], way_out: str) -> Finding:
 
 
 def _other_cars(scenario: Scenario, units: Mapping[str, Unit]) -> Iterator[Finding]:
-    """Yield a remark for every property of the car that a unit has by default beside a vehicle file.
+    """Yield a remark if units have properties of the car by default beside a vehicle file.
 
     A ratio of 1 is no car's: it says that angles are those of the road wheels.
     """
-    if not scenario.vehicle_parameters:
-        return
-    for one in _parameters(units.values()):
-        if one.name in CAR and one.origin == "default" and one.value != 1:
-            value = _measured(one.value, one.variable)
-            says = (
-                f"{one.unit}.{one.name} is {value}, the default of {units[one.unit].fmu.name}: "
-                "the vehicle file gives none"
-            )
-            yield Finding("default car", f"{one.unit}.{one.name}", float(one.value), None, says)
+    found = [
+        one
+        for one in (_parameters(units.values()) if scenario.vehicle_parameters else ())
+        if one.name in CAR and one.origin == "default" and one.value != 1
+    ]
+    if found:
+        told = [f"{one.unit}.{one.name} {_measured(one.value, one.variable)}" for one in found]
+        says = f"not in the vehicle file, so as the FMUs have it: {listed(told)}"
+        first = found[0]
+        yield Finding("default car", f"{first.unit}.{first.name}", float(first.value), None, says)
 
 
 def _slips(scenario: Scenario, units: Mapping[str, Unit]) -> Iterator[Finding]:

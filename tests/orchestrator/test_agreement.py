@@ -157,7 +157,7 @@ def test_the_fmus_own_values_of_what_is_no_property_of_the_car_are_meant():
 
 def test_another_cars_steering_ratio_is_named():
     assert remarks(car="mass: 1200") == [
-        "driver.steering_ratio is 17, the default of driver_x: the vehicle file gives none"
+        "not in the vehicle file, so as the FMUs have it: driver.steering_ratio 17"
     ]
 
 

@@ -99,7 +99,8 @@ def test_the_schema_can_be_printed() -> None:
             [
                 "a.yaml:1: 'stop_time' is missing",
                 "a.yaml:2: stop_tim: unknown key; did you mean 'stop_time'? allowed here: title, source, "
-                "vehicle, start_time, stop_time, step_size, algorithm, inputs, units, connections and record",
+                "vehicle, start_time, stop_time, step_size, algorithm, friction, speed, inputs, units, "
+                "connections and record",
             ],
         ),
         (
@@ -339,8 +340,8 @@ def test_settings_change_times_and_algorithm_of_the_run_and_steps_of_units(file:
         ),
         (
             {"settings": ["stop=3"]},
-            "--set stop=3: write --set UNIT.PARAMETER=VALUE, or start_time, stop_time, step_size or "
-            "algorithm=VALUE",
+            "--set stop=3: write --set UNIT.PARAMETER=VALUE, or start_time, stop_time, step_size, algorithm, "
+            "friction or speed=VALUE",
         ),
         (
             {"settings": ["step_size=0.0015"]},

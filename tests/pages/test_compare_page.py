@@ -48,7 +48,7 @@ def texts(tree, path: str) -> list[str]:
 def test_metrics_stand_side_by_side_with_their_difference_from_the_first(tree):
     fuzzy = "controller_fuzzy_feedback"
     (table,) = tree.cssselect("table.first-free")
-    assert texts(table, "thead th")[2:] == ["controller_off", fuzzy, f"{fuzzy} rule_table=gentle"]
+    assert texts(table, "thead th")[2:] == ["controller_off †", fuzzy, f"{fuzzy} rule_table=gentle"]
     rows = {row[0].text_content(): row for row in table.cssselect("tbody tr")}
     cells = [" ".join(cell.text_content().split()) for cell in rows["Yaw moment: peak"][2:]]
     assert cells[0] == "0 N·m"
