@@ -115,7 +115,11 @@ class Run:
         """Write the record of the run and put the results in place."""
         self._saving = True
         self._ended_by = getattr(error, "unit", None)
-        ended: dict[str, Any] = {"wall_time": self.wall_time, "error": self._explained(error), "units_freed": False}
+        ended: dict[str, Any] = {
+            "wall_time": self.wall_time,
+            "error": self._explained(error),
+            "units_freed": False,
+        }
         ended["findings"] = [asdict(one) for one in (*self.plan.findings, *self.watch.findings())]
         if self.ended is not None:
             ended["ended"] = {"unit": self.ended.unit, "time": self.ended.time, "message": str(self.ended)}
