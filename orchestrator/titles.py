@@ -8,6 +8,9 @@ from typing import Any
 
 from .plan import Change
 
+OF_TIME = ("start_time", "stop_time", "step_size")
+"""Changes of the run that are times."""
+
 
 def changed(changes: Iterable[Change]) -> str:
     """Return changes in words, `controller_off for controller, inputs.friction* = 0.3`; "" for none."""
@@ -25,7 +28,8 @@ def in_words(change: Change) -> str:
     text = str(value).lower() if isinstance(value, bool) else str(value)
     if isinstance(value, float):
         text = f"{value:.10g}"
-    seconds = " s" if change.place.endswith(("stop_time", "step_size")) and not isinstance(value, str) else ""
+    is_time = change.place in OF_TIME or change.place.endswith(".step_size")
+    seconds = " s" if is_time and not isinstance(value, str) else ""
     return f"{change.place} = {text}{seconds}"
 
 

@@ -116,7 +116,8 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
     given = {change.place: change.origin for change in plan.changes}
     in_file = {name: "scenario" if name in plan.scenario else "default" for name in OF_RUN}
     run = {
-        "stop_time": f"{_number(plan.n_steps * plan.step)} s",
+        **({"start_time": f"{_number(plan.start)} s"} if plan.start else {}),
+        "stop_time": f"{_number(plan.time(plan.n_steps))} s",
         "step_size": f"{_number(plan.step)} s",
         "algorithm": plan.algorithm,
     }

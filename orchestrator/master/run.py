@@ -119,8 +119,8 @@ class Run:
             "wall_time": self.wall_time,
             "error": self._explained(error),
             "units_freed": False,
+            "findings": [asdict(one) for one in (*self.plan.findings, *self.watch.findings())],
         }
-        ended["findings"] = [asdict(one) for one in (*self.plan.findings, *self.watch.findings())]
         if self.ended is not None:
             ended["ended"] = {"unit": self.ended.unit, "time": self.ended.time, "message": str(self.ended)}
         record = self._recorded(status) | self.log.record(self._ended_by) | ended
