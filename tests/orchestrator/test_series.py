@@ -238,8 +238,8 @@ def test_check_and_run_json_tell_of_a_series_and_a_changed_file_makes_results_st
         main(["check", str(path)])
     shown = " ".join(capsys.readouterr().out.split())
     assert not ended.value.code
-    assert "plant.steer_angle data.csv: delta, linear" in shown
-    assert "plant.gear data.csv: gear, held" in shown
+    assert "steer_angle data.csv: delta, linear scenario plant" in shown
+    assert "gear data.csv: gear, held scenario plant" in shown
 
     class Plant(Behaviour):
         def output(self, t, u):
