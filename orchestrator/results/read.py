@@ -124,9 +124,10 @@ def _is_the_same(wire: dict[str, Any], unit: str | None) -> bool:
     """Return whether a wire hands on what the output of this unit says: at most in another unit."""
     if "gain" not in wire:
         return True
-    one, other = measure_of(unit), measure_of(wire.get("unit"))
+    given = (wire["gain"], wire.get("offset", 0.0))
+    one, other = measure_of(unit), measure_of(str(wire.get("unit")))
     factors = conversion(one, other) if one and other else None
-    return factors is not None and np.allclose(factors, (wire["gain"], wire.get("offset", 0.0)))
+    return factors is not None and all(isinstance(x, float) for x in given) and np.allclose(factors, given)
 
 
 @reads("recorded run", ResultsError)

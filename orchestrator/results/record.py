@@ -34,6 +34,14 @@ class _Error(_Part):
     message: str = ""
 
 
+class _Finding(_Part):
+    kind: str
+    place: str | None = None
+    value: float | None = None
+    time: float | None = None
+    says: str = ""
+
+
 class _Record(_Part):
     """What others rely on; all of it may be missing."""
 
@@ -54,6 +62,7 @@ class _Record(_Part):
     units: dict[str, str | None] = {}
     fmus: dict[str, _Fmu] = {}
     changes: list[dict[str, Any]] = []
+    findings: list[_Finding] = []
     connections: list[Any] = []
     scenario: dict[str, Any] = {}
     versions: dict[str, str] = {}
