@@ -27,6 +27,7 @@ class Slope:
         self.value = value
         self.elapsed = 0.0  # since then [s]
         self.rate = 0.0
+        self.h = self.kept = 0.0  # of the last step: its length [s], what is left of the rate after it
 
     def see(self, value: float, h: float) -> None:
         """Take in the value at the end of a step of `h` [s]."""
@@ -35,8 +36,9 @@ class Slope:
         if h < SHORTEST:
             self.elapsed = h
             return
-        kept = exp(-h / self.tau) if self.tau > 0.0 else 0.0
+        if h != self.h:
+            self.h, self.kept = h, exp(-h / self.tau) if self.tau > 0.0 else 0.0
         slope = (value - self.value) / h
-        self.rate = slope + (self.rate - slope) * kept
+        self.rate = slope + (self.rate - slope) * self.kept
         self.value = value
         self.elapsed = 0.0

@@ -120,8 +120,9 @@ class SingleTrack(Component):
             beta, r = rk4(along, 0.0, h, self.model)
             self.model = beta, r
         self.limited = self._limit(u)
-        for rate, value in zip(self.rates, self.limited, strict=True):
-            rate.see(value, h)
+        first, second = self.limited
+        self.rates[0].see(first, h)
+        self.rates[1].see(second, h)
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         beta, r = self.limited

@@ -125,8 +125,9 @@ class SteadyState(Component):
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
         self.now = steady_state(u[0], u[1], mu=u[2], k=self.k, p=self.p)
-        for rate, value in zip(self.rates, self.now, strict=True):
-            rate.see(value, h)
+        first, second = self.now
+        self.rates[0].see(first, h)
+        self.rates[1].see(second, h)
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...]:
         r_rate, beta_rate = self.rates

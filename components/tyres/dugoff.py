@@ -39,9 +39,7 @@ class DugoffParameters:
     )
 
 
-def dugoff(
-    alpha: float, kappa: float, *, f_z: float, mu: float, c_x: float, c_y: float
-) -> tuple[float, float]:
+def dugoff(alpha: float, kappa: float, f_z: float, mu: float, c_x: float, c_y: float) -> tuple[float, float]:
     """Return (F_x, F_y) [N] in wheel axes; equations (9)-(12), finite for every slip.
 
     Args:
@@ -68,9 +66,7 @@ def dugoff(
     return scale * q_x, scale * q_y
 
 
-def dugoff_slip_stiffness(
-    alpha: float, kappa: float, *, f_z: float, mu: float, c_x: float, c_y: float
-) -> float:
+def dugoff_slip_stiffness(alpha: float, kappa: float, f_z: float, mu: float, c_x: float, c_y: float) -> float:
     """Return dF_x/dkappa [N] at constant slip angle; arguments as of `dugoff`.
 
     F_x = C_x / (1 + kappa)^2 where the tyre grips; where it slides, with q_x' = C_x c and s' = ds/dkappa,
@@ -102,12 +98,18 @@ class Dugoff(Tyre):
     Parameters = DugoffParameters
 
     @staticmethod
-    def wheel(kappa: float, alpha: float, f_z: float, mu: float, axle: DugoffParameters) -> tuple[float, ...]:
-        c_x, c_y = axle.longitudinal_stiffness, axle.cornering_stiffness
-        f_x, f_y = dugoff(alpha, kappa, f_z=f_z, mu=mu, c_x=c_x, c_y=c_y)
-        return f_x, f_y, dugoff_slip_stiffness(alpha, kappa, f_z=f_z, mu=mu, c_x=c_x, c_y=c_y)
+    def axle(p: DugoffParameters, name: str) -> tuple[float, float]:
+        return p.longitudinal_stiffness, p.cornering_stiffness
+
+    @staticmethod
+    def wheel(
+        kappa: float, alpha: float, f_z: float, mu: float, axle: tuple[float, float]
+    ) -> tuple[float, ...]:
+        c_x, c_y = axle
+        f_x, f_y = dugoff(alpha, kappa, f_z, mu, c_x, c_y)
+        return f_x, f_y, dugoff_slip_stiffness(alpha, kappa, f_z, mu, c_x, c_y)
 
     @classmethod
-    def curve(cls, alpha: float, f_z: float, mu: float, axle: DugoffParameters) -> Curve:
-        c_x, c_y = axle.longitudinal_stiffness, axle.cornering_stiffness
-        return lambda kappa: dugoff(alpha, kappa, f_z=f_z, mu=mu, c_x=c_x, c_y=c_y)[0], mu * f_z / c_x
+    def curve(cls, alpha: float, f_z: float, mu: float, axle: tuple[float, float]) -> Curve:
+        c_x, c_y = axle
+        return lambda kappa: dugoff(alpha, kappa, f_z, mu, c_x, c_y)[0], mu * f_z / c_x
