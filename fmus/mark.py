@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from orchestrator.files import check_regular
+
 _SIGN = b"yawbench "
 
 
@@ -38,6 +40,7 @@ class Mark:
 def read_mark(fmu: Path) -> Mark | None:
     """Return the mark of an FMU that was built here, None for any other file, and for none."""
     try:
+        check_regular(fmu)
         with zipfile.ZipFile(fmu) as archive:
             comment = archive.comment
     except (OSError, ValueError, zipfile.BadZipFile):

@@ -127,6 +127,14 @@ def test_pipes_devices_and_loops_of_links_are_not_read() -> None:
         assert caught.value.problems == [f"{path}: cannot read this scenario file: {why}"]
 
 
+@pytest.mark.skipif(not os.path.exists("/dev/zero"), reason="no such device here")
+def test_a_device_in_place_of_an_fmu_or_a_vehicle_file_is_not_read() -> None:
+    (said,) = problems(f"{HEAD}units: {{a: {{fmu: /dev/zero}}}}\n")
+    assert said.endswith("/dev/zero: cannot read this FMU: it is a pipe, a socket or a device, not a file")
+    (said,) = problems(f"{HEAD}vehicle: /dev/zero\nunits: {{a: {{fmu: plant}}}}\n")
+    assert said == "/dev/zero: cannot read this vehicle file: it is a pipe, a socket or a device, not a file"
+
+
 def test_a_file_that_is_too_large_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(yaml_lines, "TEXT", 1000)
     (said,) = problems("a" * 1001)

@@ -8,7 +8,7 @@ import pytest
 
 from .mutations import LIMIT, UNFORESEEN, bad, trial
 
-SAMPLE = {"files": range(60), "ssp": range(20), "results": range(20), "commands": range(4)}
+SAMPLE = {"files": range(50), "ssp": range(10), "results": range(10), "commands": range(3)}
 
 
 @pytest.mark.parametrize("group", SAMPLE)
