@@ -8,19 +8,27 @@ import shlex
 import shutil
 import sys
 from enum import Enum
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
-    from ..scaffold.controller import Layout
+    from ..scaffold.beginnings import Beginning
 
 
 class Kind(str, Enum):
     """What can be begun with."""
 
     controller = "controller"
+    driver = "driver"
+    reference = "reference"
+    tyre = "tyre"
+    plant = "plant"
+    vehicle = "vehicle"
+    scenario = "scenario"
+    study = "study"
+    sweep = "sweep"
 
 
 class Language(str, Enum):
@@ -30,7 +38,7 @@ class Language(str, Enum):
     c = "c"
 
 
-What = Annotated[Kind, typer.Argument(help="What to begin: a controller.", metavar="controller")]
+What = Annotated[Kind, typer.Argument(help="What to begin.", metavar="KIND")]
 Name = Annotated[str, typer.Argument(help="Its name: lower-case letters, digits and _.", metavar="NAME")]
 Written = Annotated[Language, typer.Option("--language", help="What it is written in.")]
 Project = Annotated[
@@ -44,55 +52,57 @@ Project = Annotated[
 
 
 def new(kind: What, name: Name, language: Written = Language.python, out: Project = None) -> None:
-    """Write a working controller, its test and a scenario.
+    """Write something to begin with that works as it stands.
 
-    What to do next is printed. In a checkout of yawbench the files stand among its own, so
-    `yawbench build` finds them; elsewhere in folders controllers, tests and scenarios. Nothing is
-    ever overwritten.
+    KIND is a unit (controller, driver, reference, tyre, plant), written with its test and a scenario that
+    uses it; a vehicle with a scenario; a scenario; or a study or sweep of one. What to do next is
+    printed. In a checkout of yawbench the files stand among its own, so `yawbench build` finds
+    them; elsewhere in folders controllers, tests, scenarios and so on. Nothing is ever overwritten.
     """
     from fmus.build import COMPONENTS, find_recipes
 
-    from ..scaffold.controller import controller_files, layout, write_new
+    from ..errors import ScenarioError
+    from ..scaffold.beginnings import begin, write_new
     from ..scaffold.names import check_name
     from .batch import say
 
     check_name(name, role=kind.value, taken=set(find_recipes()))
+    if language is Language.c and kind is not Kind.controller:
+        raise ScenarioError("--language c: only a controller can be begun in C")
     root = COMPONENTS.parent
     checkout = root if (root / "scenarios").is_dir() else None  # None: installed without them
     here = checkout is not None and Path.cwd().resolve().is_relative_to(checkout)
     folder = out or (checkout if checkout is not None and here else Path())
-    places = layout(name, language.value, in_checkout=folder.resolve() == checkout)
-    files = controller_files(name, language.value, places)
-    write_new(files, folder, also=[places.source])
-    for path in files:
+    in_checkout = folder.resolve() == checkout
+    beginning = begin(kind.value, name, language.value, in_checkout=in_checkout)
+    also = [beginning.source] if beginning.source else []
+    write_new(beginning.files, folder, also=also)
+    for path in beginning.files:
         say(f"wrote {_shown(folder / path)}")
     say("Next:")
-    for command in _next(name, places, folder):
+    for command in _next(kind.value, name, beginning, folder, in_checkout):
         print(shlex.join(command))
 
 
-def _next(name: str, places: Layout, folder: Path) -> list[list[str]]:
-    """Return the commands that build, test, run and compare a new controller."""
-    yawbench = _program("yawbench")
-    python = _program("python")
-    source, test, scenario = (str(_shown(folder / path)) for path in _paths(places))
-    commands = []
-    if places.in_checkout:
-        commands.append([yawbench, "build"])
-    else:
-        fmus = str(_shown(folder / "fmus"))
-        commands += [[yawbench, "build", "--out", fmus], [yawbench, "build", source, "--out", fmus]]
-    if importlib.util.find_spec("pytest") is None:
-        commands.append([python, "-m", "pip", "install", "pytest"])
-    commands.append([python, "-m", "pytest", test])
-    commands.append([yawbench, "run", scenario])
-    against = f"controller=controller_off,controller_{name}"
-    commands.append([yawbench, "compare", scenario, "--swap", against])
+def _next(kind: str, name: str, begun: Beginning, folder: Path, in_checkout: bool) -> list[list[str]]:
+    """Return the commands that build, test and run what has been written."""
+    from ..scaffold.beginnings import UNITS
+
+    yawbench, python = _program("yawbench"), _program("python")
+    fmus = [] if in_checkout else ["--out", str(_shown(folder / "fmus"))]
+    commands = [[yawbench, "build", *fmus]]
+    if begun.source and not in_checkout:
+        commands.append([yawbench, "build", str(_shown(folder / begun.source)), *fmus])
+    if begun.test:
+        if importlib.util.find_spec("pytest") is None:
+            commands.append([python, "-m", "pip", "install", "pytest"])
+        commands.append([python, "-m", "pytest", str(_shown(folder / begun.test))])
+    main = str(_shown(folder / begun.main))
+    commands.append([yawbench, kind if kind in ("study", "sweep") else "run", main])
+    if begun.source:
+        other = "controller_off" if kind == "controller" else UNITS[kind][0]
+        commands.append([yawbench, "compare", main, "--swap", f"{kind}={other},{kind}_{name}"])
     return commands
-
-
-def _paths(places: Layout) -> tuple[PurePosixPath, PurePosixPath, PurePosixPath]:
-    return places.source, places.test, places.scenario
 
 
 def _shown(path: Path) -> Path:

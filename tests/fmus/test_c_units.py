@@ -16,7 +16,7 @@ from fmus.build import build_all, build_component
 from fmus.c.recipe import TO_WINDOWS
 from fmus.mark import read_mark
 from orchestrator.errors import BuildError
-from orchestrator.scaffold.controller import controller_files, layout
+from orchestrator.scaffold.beginnings import begin
 from tests.fmus.bare import ERROR, OK, Fmu, Refused, Unit
 from tests.fmus.programs import run
 
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no 
 @pytest.fixture
 def root(tmp_path):
     """A folder of components with one controller in C, `idea`."""
-    for path, text in controller_files("idea", "c", layout("idea", "c", in_checkout=True)).items():
+    for path, text in begin("controller", "idea", "c", in_checkout=True).files.items():
         file = tmp_path / path
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(text)

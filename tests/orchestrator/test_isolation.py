@@ -16,7 +16,7 @@ from orchestrator.errors import SimulationError
 from orchestrator.master.isolation import Isolation
 from orchestrator.master.simulate import simulate
 from orchestrator.results.read import load_results
-from orchestrator.scaffold.controller import controller_files, layout
+from orchestrator.scaffold.beginnings import begin
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
@@ -46,7 +46,7 @@ def foreign(tmp_path):
     """Build a controller in C that does `act` from t = 0.05 s on; return its path."""
 
     def build(act):
-        for path, text in controller_files("idea", "c", layout("idea", "c", in_checkout=True)).items():
+        for path, text in begin("controller", "idea", "c", in_checkout=True).files.items():
             file = tmp_path / path
             file.parent.mkdir(parents=True, exist_ok=True)
             if file.name == "idea.c":

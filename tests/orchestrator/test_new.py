@@ -1,4 +1,4 @@
-"""`yawbench new controller`: what it writes works as it stands, in Python and in C."""
+"""`yawbench new`: what it writes works as it stands."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from orchestrator.results.read import load_results
 from tests.checkout import copy_checkout, run_in
 
 UNITS = (
-    "driver_sine", "reference_steady_state", "controller_off", "allocator_load_proportional",
+    "driver_sine", "reference_steady_state", "controller_off", "controller_fnn", "controller_fuzzy_sideslip",
+    "allocator_load_proportional",
     "wheel_control_direct", "plant_seven_dof", "tyre_dugoff",
 )  # fmt: skip
 
@@ -24,12 +25,12 @@ pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no 
 
 @pytest.fixture
 def new(tmp_path, monkeypatch, capsys):
-    """Call `yawbench new controller` in an empty folder: exit status, printed commands, messages."""
+    """Call `yawbench new` in an empty folder: exit status, printed commands, messages."""
 
-    def call(*arguments: str) -> tuple[int, list[str], str]:
+    def call(*arguments: str, kind: str = "controller") -> tuple[int, list[str], str]:
         monkeypatch.chdir(tmp_path)
         with pytest.raises(SystemExit) as exit_:
-            main(["new", "controller", *arguments])
+            main(["new", kind, *arguments])
         said = capsys.readouterr()
         return int(exit_.value.code or 0), said.out.splitlines(), said.err
 
@@ -57,6 +58,65 @@ def project(tmp_path_factory):
         assert done.returncode == 0, done.stdout + done.stderr
         assert "pytest" not in command or "5 passed" in done.stdout
     return folder, printed
+
+
+@pytest.fixture(scope="module")
+def beginnings(project):
+    """The same folder with one beginning of every other kind, taken as far as a run."""
+    folder, _ = project
+    made = {}
+    for kind in ("driver", "reference", "tyre", "plant", "vehicle", "scenario", "study", "sweep"):
+        done = run_in(folder, "yawbench", "new", kind, f"my_{kind}")
+        assert done.returncode == 0, done.stderr
+        _, *commands = [shlex.split(line) for line in done.stdout.splitlines()]
+        for command in (c for c in commands if c[1] != "compare"):
+            done = run_in(folder, *command)
+            assert done.returncode == 0, done.stdout + done.stderr
+        made[kind] = done.stdout, commands[-1]
+    return folder, made
+
+
+@pytest.mark.parametrize(
+    ("role", "other"),
+    [
+        ("driver", "driver_sine"),
+        ("reference", "reference_steady_state"),
+        ("tyre", "tyre_dugoff"),
+        ("plant", "plant_seven_dof"),
+    ],
+)
+def test_a_unit_of_any_role_is_built_tested_and_run(beginnings, role, other):
+    folder, made = beginnings
+    run = load_results(folder / "results" / f"my_{role}" / "25mps")
+    assert run.run["fmus"][role]["name"] == f"{role}_my_{role}"
+    assert np.abs(run.find("yaw_rate")).max() > 0.01
+    _, last = made[role]
+    assert last[1:2] + last[-1:] == ["compare", f"{role}={other},{role}_my_{role}"]
+
+
+def test_a_new_plant_moves_much_as_the_shipped_one_whose_loads_change(beginnings):
+    folder, _ = beginnings
+    runs = [load_results(folder / "results" / name / "25mps") for name in ("my_plant", "my_scenario")]
+    yaw_rates = [run.find("yaw_rate") for run in runs]
+    assert 0.0 < np.abs(yaw_rates[0] - yaw_rates[1]).max() < 0.2 * np.abs(yaw_rates[1]).max()
+
+
+def test_a_new_vehicle_is_the_one_that_its_scenario_drives(beginnings):
+    folder, _ = beginnings
+    run = load_results(folder / "results" / "my_vehicle" / "25mps")
+    assert run.run["scenario"]["vehicle"] == "../vehicles/my_vehicle.yaml"
+    assert run.run["fmus"]["plant"]["parameters"]["mass"] == 1100
+
+
+def test_a_new_study_judges_its_claim_and_a_new_sweep_finds_its_limits(beginnings):
+    _, made = beginnings
+    assert "holds" in made["study"][0]
+    assert "neural network" in made["sweep"][0]
+
+
+def test_only_controllers_begin_in_c(new):
+    status, _, said = new("idea", "--language", "c", kind="tyre")
+    assert (status, said) == (2, "--language c: only a controller can be begun in C\n")
 
 
 def test_it_writes_a_source_a_test_and_a_scenario(tmp_path, new):
