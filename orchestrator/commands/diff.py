@@ -22,7 +22,7 @@ def diff(one: One, other: Other) -> None:
     from ..pages.run_differences import differences, differences_table, partings_table
     from ..results.read import load_results
     from .batch import print_tables, say
-    from .plot import distinct
+    from .recorded import distinct
 
     first, second = load_results(one), load_results(other)
     found, parted = differences(first.run, second.run), divergence(first, second)

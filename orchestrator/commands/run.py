@@ -32,7 +32,8 @@ Metrics = Annotated[
     typer.Option(
         "--metric",
         metavar="NAME",
-        help="Print a metric of the run, such as 'peak(sideslip)'; 'standard' prints the usual ones. "
+        help="Print a metric of the run, such as 'peak(sideslip)' or 'peak(sideslip) from 1 s to 3 s'; "
+        "'standard' prints the usual ones. "
         "Repeatable.",
     ),
 ]

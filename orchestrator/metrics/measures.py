@@ -194,6 +194,7 @@ MEASURES: dict[str, Measure] = {
     "displacement": Measure(
         displacement, "max|{x} - {x}(0)|", "largest distance from the first value", "{x}"
     ),
+    "value": Measure(final, "{x}(t)", "value at a time", "{x}"),
     "final": Measure(final, "{x}(T)", "last value", "{x}"),
     "effort": Measure(effort, "∫|{x}| dt", "control effort: integral of the absolute value", "{x}.s"),
     "total_variation": Measure(

@@ -4,7 +4,8 @@ A metric is a measure of a signal, written `measure(signal)`: `relative_peak_err
 `total_variation_rate(wheel_torque_*)`. Signals are named as in the signal dictionary, whatever the
 scenario calls its units or an FMU from elsewhere its outputs (`plant.sideslip` where two units have
 one of that name); the reference of a signal `x` is the signal `x_ref`; of four wheels (`*`) the
-largest value counts. A metric whose signals a run does not have is absent, never zero.
+largest value counts. A metric whose signals a run does not have is absent, never zero. It may be of a
+stretch of time, `peak(sideslip) from 1 s to 3 s`, or of a point, `value(sideslip) at 2 s`.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import ResultsError, ScenarioError
+from ..scenario.quantities import convert
 from ..wording import WHEELS, closest, fold, hint, short
 from .measures import MEASURES, Measure
 from .signals import si_of, symbol, variable_of, words
@@ -49,6 +51,11 @@ STANDARD = (
 )
 """The metrics shown where nobody has chosen others."""
 
+AT_A_TIME = "value"
+"""The measure of a point of time; all others are of a stretch."""
+Window = tuple[float, float]
+"""From, to [s]; equal: a point of time."""
+
 _PER_SECOND = {"1": "1/s", "m": "m/s", "m/s": "m/s2", "rad": "rad/s", "rad/s": "rad/s2", "rad/s2": "rad/s3"}
 _TIMES_SECOND = {"1": "s", "m/s": "m", "m/s2": "m/s", "rad/s": "rad", "rad/s2": "rad/s"}
 
@@ -60,6 +67,7 @@ class Metric:
     name: str
     measure: Measure
     signal: str
+    window: Window | None = None  # in place of the whole run
 
     @property
     def formula(self) -> str:
@@ -74,7 +82,8 @@ class Metric:
     @property
     def title(self) -> str:
         """The signal and the measure in few words."""
-        return f"{words(self.signal)}: {self.name.partition('(')[0].replace('_', ' ').replace('rms', 'RMS')}"
+        measure = self.name.partition("(")[0].replace("_", " ").replace("rms", "RMS")
+        return f"{words(self.signal)}: {measure}{during(self.window)}"
 
     def unit(self, signal_unit: str) -> str:
         """Return the metric's unit for a signal in `signal_unit`."""
@@ -99,13 +108,42 @@ class Value:
     unit: str
 
 
+def during(window: Window | None, lead: str = "") -> str:
+    """Return a window as the end of a phrase: ", 1 to 6 s", after a `lead` such as "from "; ", at 2 s"."""
+    if window is None:
+        return ""
+    first, last = window
+    return f", at {first:g} s" if first == last else f", {lead}{first:g} to {last:g} s"
+
+
+def window_of(text: str) -> Window:
+    """Return the window [s] written as `from 1 s to 3 s`, `1 to 3 s` or `at 2 s`.
+
+    Raises:
+        ValueError: it is none.
+    """
+    match = re.fullmatch(r"at\s+(.+)|(?:from\s+)?(.+?)\s+to\s+(.+)", text.strip())
+    if match is None:
+        raise ValueError(f"{short(text)} is no window: write from 1 s to 3 s, or at 2 s")
+    at, begin, end = match.groups()
+    first, last = (_time(one) for one in ((at, at) if at else (begin, end)))
+    if at is None and not first < last:
+        raise ValueError(f"{short(text)} ends before it begins")
+    return first, last
+
+
+def _time(text: str) -> float:
+    """Return a time in s, with its unit or without."""
+    return float(convert(text if re.search(r"[a-z]", text) else f"{text} s", "s"))
+
+
 def metric(name: str) -> Metric:
-    """Return the metric written as `measure(signal)`.
+    """Return the metric written as `measure(signal)`, perhaps with a window behind it: see `window_of`.
 
     Raises:
         ScenarioError: the name is not of that form, or there is no such measure.
     """
-    match = re.fullmatch(r"(\w+)\(([\w.*]+)\)", name.replace(" ", ""))
+    match = re.fullmatch(r"\s*(\w+)\s*\(\s*([\w.*]+)\s*\)\s*(.*?)\s*", name, re.DOTALL)
     if match is None:
         meant = [f"{one}({name[len(one) + 1 :]})" for one in MEASURES if name.startswith(f"{one}_")]
         likely = max(meant, key=lambda one: one.index("("), default=closest(name, STANDARD))
@@ -113,12 +151,23 @@ def metric(name: str) -> Metric:
         raise ScenarioError(
             f"{short(name)} is no metric; {guess}write measure(signal), for example {STANDARD[0]}."
         )
-    measure, signal = match.groups()
+    measure, signal, rest = match.groups()
     if measure not in MEASURES:
         raise ScenarioError(
             f"{name!r}: there is no measure {measure!r}{hint(measure, MEASURES, lead='known')}"
         )
-    return Metric(f"{measure}({signal})", MEASURES[measure], signal)
+    try:
+        window = window_of(rest) if rest else None
+    except ValueError as error:
+        raise ScenarioError(f"{short(name)}: {error}") from None
+    point = window is not None and window[0] == window[1]
+    if point != (measure == AT_A_TIME):
+        allowed = f"{AT_A_TIME}({signal}) at 2 s is of a point of time, all other measures of a stretch"
+        raise ScenarioError(f"{short(name)}: {allowed}")
+    written = f"{measure}({signal})"
+    if window is not None:
+        written += f" at {window[0]!r} s" if point else f" from {window[0]!r} s to {window[1]!r} s"
+    return Metric(written, MEASURES[measure], signal, window)
 
 
 def columns_of(results: Results, signal: str) -> list[str]:
@@ -141,11 +190,12 @@ def _column(results: Results, name: str) -> str | None:
     return None
 
 
-def evaluate(results: Results, chosen: Metric, window: tuple[float, float] | None = None) -> Value | None:
-    """Return a metric of a run over the whole run or a window [s].
+def evaluate(results: Results, chosen: Metric, window: Window | None = None) -> Value | None:
+    """Return a metric of a run over the whole run or a window [s], if none is given the metric's own.
 
     None if the run has no such signal or does not last for the window: part of it is another metric.
     """
+    window = window or chosen.window
     first, last = window or (-math.inf, math.inf)
     if (
         window
@@ -156,7 +206,11 @@ def evaluate(results: Results, chosen: Metric, window: tuple[float, float] | Non
     inside = (results.time >= first - 1e-9) & (results.time <= last + 1e-9)
     t = results.time[inside]
     signals = _signals(results, chosen)
-    if t.size < 2 or not signals:
+    if first == last and results.time.size:  # the nearest row, wherever the run has recorded one
+        inside = np.zeros(results.time.size, bool)
+        inside[np.argmin(np.abs(results.time - first))] = True
+        t = results.time[inside]
+    if (t.size < 2 and first != last) or not t.size or not signals:
         return None
     numbers = []
     for columns in signals:
@@ -192,7 +246,10 @@ def check_metrics(plan: Plan, chosen: Iterable[Metric]) -> None:
     results = results_to_be(plan)
     names = fold(list(dict.fromkeys(variable_of(column) for column in results)))
     problems = []
+    end = plan.time(plan.n_steps)
     for one in chosen:
+        if one.window is not None and not 0.0 <= one.window[0] <= one.window[1] <= end:
+            problems.append(f"{one.name}: the run lasts from 0 to {end:g} s")
         if columns_of(results, one.signal):
             if unit_in(results, one) is None:
                 why = f"{one.signal} has no reference or not the right unit"

@@ -1,4 +1,4 @@
-"""One or two runs seen from above, as a part of a page or a page of its own, with no server.
+"""Runs seen from above, as a part of a page or a page of its own, with no server.
 
     {{ assets() }}              once a page: style and script
     {{ fragment(runs) }}        as often as there are animations
@@ -20,7 +20,7 @@ from markupsafe import Markup
 
 from ..errors import ResultsError
 from ..figures.display import shown_unit
-from ..figures.style import line_style
+from ..figures.style import LINES, line_style
 from ..results.read import Results
 from .animation_frames import WHEELS, Frames, frames_of
 from .rendering import render
@@ -37,14 +37,14 @@ READOUTS = (
 """Channel, words, SI unit, decimals shown."""
 STRIP = ("sideslip", "yaw_rate", "steer_angle")
 """What the curve above the slider may show: the first that was recorded."""
-MOST = 2
-"""Runs in one animation; chosen: outlines of three cannot be told apart."""
+MOST = len(LINES)
+"""Runs in one animation: as many as there are colours."""
 
 Runs = Sequence[tuple[str, Results]]
 
 
 def fragment(runs: Runs, *, title: str = "") -> Markup:
-    """Return the animation of one or two runs (label, results) as a part of a page; it waits to be played.
+    """Return the animation of up to seven runs (label, results) as a part of a page; it waits to be played.
 
     Raises:
         ResultsError: a run's position or yaw angle was not recorded.
@@ -65,7 +65,7 @@ def page(runs: Runs, *, title: str = "", below: str = "", changed: str = "") -> 
     """Return a page of its own; it plays by itself unless the reader has asked for less motion.
 
     Args:
-        runs: one or two (label, results).
+        runs: up to seven (label, results).
         title: of the page; default: the labels.
         below: a line under the title.
         changed: what was changed against the scenario that the title names.
@@ -79,7 +79,7 @@ def page(runs: Runs, *, title: str = "", below: str = "", changed: str = "") -> 
 
 def _facts(runs: Runs, title: str, *, alone: bool = False) -> dict[str, Any]:
     if not 1 <= len(runs) <= MOST:
-        raise ResultsError(f"an animation shows one or two runs, not {len(runs)}.")
+        raise ResultsError(f"an animation shows one to {MOST} runs, not {len(runs)}.")
     shown = [(label, frames_of(results)) for label, results in runs]
     data = {"alone": alone, **data_of(shown)}
     names = " and ".join(label for label, _ in shown)

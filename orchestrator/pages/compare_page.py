@@ -17,7 +17,7 @@ from ..studies.jobs import Job, Once, planned
 from ..studies.tables import Cell, Table, marked, remarks
 from ..wording import counted
 from ..writing import write_whole
-from .animation import MOST, assets
+from .animation import assets
 from .diagram import diagrams
 from .divergence import SAME, SEEN, Divergence, Parting, divergence
 from .facts import animation_of, figure_of, fmus_of, made_by, programs_of
@@ -27,6 +27,8 @@ from .system import system_of
 
 PAGE = "compare.html"
 """Name of the page, beside the runs' folders."""
+AT_ONCE_SEEN = 3
+"""Runs seen from above; chosen: more cars in one place cover each other."""
 AT_ONCE = 8
 """Partings that are shown; the others unfold. Chosen: more than the wires around one unit."""
 RULE = (
@@ -85,7 +87,7 @@ def compare_page(
         for name, panels in FIGURES.items()
         if shown_by(runs, panels)
     ]
-    shown_runs = [(run.label, run.results) for run in runs[:MOST]]
+    shown_runs = [(run.label, run.results) for run in runs[:AT_ONCE_SEEN]]
     seen = animation_of(shown_runs, " and ".join(label for label, _ in shown_runs)) if runs else None
     return render(
         "compare.html.j2",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,10 +65,12 @@ def variants(
     jobs: list[Job] = []
     for combination in itertools.product(*choices.values()):
         chosen = dict(zip(choices, combination, strict=True))
-        label = " + ".join(_label(chosen[unit]) for unit in named)
+        label = " + ".join(_label(chosen[unit], choices[unit]) for unit in named)
         repeated = sum(job.label.partition(" (")[0] == label for job in jobs)
         label += f" ({repeated + 1})" if repeated else ""
-        folder = out / label.replace(" ", "")
+        folder = out / re.sub(r"[^\w.+=-]+", "_", label.replace(" + ", "+")).strip("_")
+        if any(job.out == folder for job in jobs):
+            folder = folder.with_name(f"{folder.name}_{len(jobs) + 1}")
         own_changes = [one for unit, text in chosen.items() for one in swap_of(unit, text, "--swap")]
         jobs.append(Job(label, scenario, folder, (*changes, *own_changes), fmus))
     return jobs
@@ -86,11 +89,15 @@ def _choices(swaps: Sequence[str]) -> dict[str, list[str]]:
     return choices
 
 
-def _label(text: str) -> str:
+def _label(text: str, choices: Sequence[str]) -> str:
+    """Return what tells a choice from the others: its FMU, unless all have it, and what they do not share."""
     fmu, *brought = swap_of("", text, "--swap")
+    others = [swap_of("", other, "--swap") for other in choices]
     name = str(fmu.value)
-    settings = [f"{change.place[1:]}={text_of(change.value)}" for change in brought]
-    return " ".join([Path(name).stem if is_path(name) else name, *settings])
+    shared = [one for one in brought if all(one in other for other in others)]
+    values = [f"{one.place[1:]}={text_of(one.value)}" for one in brought if one not in shared]
+    one_fmu = all(other[0] == fmu for other in others)
+    return " ".join([*([] if one_fmu and values else [Path(name).stem if is_path(name) else name]), *values])
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, 
 
 from ..errors import ScenarioError
 from ..figures.plots import OVERVIEW
-from ..metrics.run_metrics import metric
+from ..metrics.run_metrics import during, metric, window_of
 from ..plan import Algorithm
 from ..scenario.quantities import convert
 from ..scenario.schema import Scalar, Time
@@ -82,9 +82,11 @@ def _is_finite(value: object) -> bool:
 
 
 def _window(value: object) -> tuple[float, float]:
+    if isinstance(value, str):
+        return window_of(value)
     numbers = isinstance(value, list) and len(value) == 2 and all(map(_is_finite, value))
     if not numbers or not value[0] < value[1]:  # type: ignore[index]
-        raise ValueError(f"must be [from, to] in s, from before to (got {short(value)})")
+        raise ValueError(f"must be [from, to] in s, from before to, or 1 s to 3 s (got {short(value)})")
     return float(value[0]), float(value[1])  # type: ignore[index]
 
 
@@ -126,7 +128,7 @@ class MetricSpec(Strict):
 
     def during(self, lead: str = "") -> str:
         """Return the window as the end of a phrase: ", 1 to 6 s", after a `lead` such as "from "."""
-        return f", {lead}{self.window[0]:g} to {self.window[1]:g} s" if self.window else ""
+        return during(self.window or metric(self.metric).window, lead)
 
 
 class TableSpec(Strict):

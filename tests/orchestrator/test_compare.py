@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.commands.plot import distinct
+from orchestrator.commands.recorded import distinct
 from orchestrator.errors import ScenarioError
 from orchestrator.studies.compare import judge_comparison, metric_table, variants, write_comparison
 from orchestrator.studies.jobs import Job, Outcome
@@ -92,6 +92,17 @@ def test_an_fmu_may_bring_parameters_and_so_be_compared_with_itself(scenario):
         {"plant.mass": 2, "controller": "b"},
     ]
     assert len({job.out for job in jobs}) == 3
+
+
+def test_labels_say_the_values_that_differ_and_folders_can_be_read(scenario):
+    jobs = variants(scenario, ["controller=a:gain=20000:law=sign,a:gain=40000:law=sign"], (), Path("o"), None)
+    assert [job.label for job in jobs] == ["gain=20000", "gain=40000"]
+    assert [job.out for job in jobs] == [Path("o/gain=20000"), Path("o/gain=40000")]
+    jobs = variants(scenario, ["controller=a:law=x y:gain=2,b", "tyre=t,u"], (), Path("o"), None)
+    assert [job.label for job in jobs][:2] == ["a law=x y gain=2 + t", "a law=x y gain=2 + u"]
+    assert jobs[0].out == Path("o/a_law=x_y_gain=2+t")
+    alike = variants(scenario, ["controller=a:law=x y,a:law=x_y"], (), Path("o"), None)
+    assert len({job.out for job in alike}) == 2
 
 
 def test_parameters_alone_set_the_scenarios_own_fmu_against_itself(scenario):

@@ -11,7 +11,7 @@ from orchestrator.errors import ScenarioError
 from orchestrator.figures.display import digits_of, shown, shown_unit
 from orchestrator.figures.panels import Run, shown_by
 from orchestrator.metrics import catalogue, measures
-from orchestrator.metrics.run_metrics import STANDARD, Value, evaluate, evaluate_all, metric
+from orchestrator.metrics.run_metrics import AT_A_TIME, STANDARD, Value, evaluate, evaluate_all, metric
 
 from .recorded import UNITS, car, results
 
@@ -140,10 +140,11 @@ def test_every_standard_metric_applies_to_a_complete_car():
 
 def test_every_measure_can_be_applied_and_says_its_formula_and_unit():
     for name, measure in measures.MEASURES.items():
-        value = evaluate(car(1.2), metric(f"{name}(sideslip)"))
+        chosen = metric(f"{name}(sideslip){' at 2 s' if name == AT_A_TIME else ''}")
+        value = evaluate(car(1.2), chosen)
         assert value is not None
-        assert value.number >= 0 or name == "final"
-        assert "{" not in metric(f"{name}(sideslip)").formula
+        assert value.number >= 0 or name in ("final", AT_A_TIME)
+        assert "{" not in chosen.formula
         assert measure.definition
 
 
@@ -267,3 +268,39 @@ def test_a_metric_written_otherwise_is_asked_whether_it_is_meant(name: str, mean
     with pytest.raises(ScenarioError) as caught:
         metric(name)
     assert f"is no metric; did you mean {meant!r}? write measure(signal)" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "text", ["from 0.5 s to 1.5 s", "from 500 ms to 1.5 s", "from 0.5 to 1.5 s", "0.5 to 1.5"]
+)
+def test_a_metric_may_be_of_a_stretch_of_time(text):
+    run = results({"plant.sideslip": T}, T)
+    chosen = metric(f"peak(sideslip) {text}")
+    assert chosen.name == "peak(sideslip) from 0.5 s to 1.5 s"
+    assert metric(chosen.name) == chosen
+    assert evaluate(run, chosen) == evaluate(run, metric("peak(sideslip)"), (0.5, 1.5))
+    assert evaluate(run, chosen).number == pytest.approx(1.5)
+    assert chosen.title == "Sideslip angle: peak, 0.5 to 1.5 s"
+
+
+def test_a_value_may_be_of_a_point_of_time():
+    run = results({"plant.sideslip": T}, T)
+    chosen = metric("value(sideslip) at 750 ms")
+    assert (chosen.name, chosen.title) == ("value(sideslip) at 0.75 s", "Sideslip angle: value, at 0.75 s")
+    assert evaluate(run, chosen).number == pytest.approx(0.75)
+    assert evaluate(run, metric("value(sideslip) at 9 s")) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("peak(sideslip) at 2 s", "at 2 s is of a point of time, all other measures of a stretch"),
+        ("value(sideslip)", "at 2 s is of a point of time"),
+        ("peak(sideslip) from 3 s to 1 s", "ends before it begins"),
+        ("peak(sideslip) during 3 s", "is no window: write from 1 s to 3 s, or at 2 s"),
+        ("peak(sideslip) from 1 kg to 3 s", "'1 kg' is not a value in s"),
+    ],
+)
+def test_a_window_that_is_none_is_said(name, sentence):
+    with pytest.raises(ScenarioError, match=sentence):
+        metric(name)

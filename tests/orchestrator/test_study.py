@@ -140,7 +140,7 @@ def test_all_problems_of_a_study_are_reported_at_once(study):
         "row, swap, set, stop_time, step_size and algorithm",
         "metrics.error.metric: 'relative_peek_error(sideslip)': there is no measure 'relative_peek_error'"
         "; did you mean 'relative_peak_error'?",
-        "metrics.late.window: must be [from, to] in s, from before to (got [6.5])",
+        "metrics.late.window: must be [from, to] in s, from before to, or 1 s to 3 s (got [6.5])",
         "claims[0].holds_if[0].above: must be a number, a number with its unit ('5 %'), "
         "or {run: ..., metric: ...}",
         "figures[0].titel: unknown key; did you mean 'title'? allowed here: name, title, runs and panels",

@@ -55,7 +55,7 @@ def test_animate_refuses_what_it_cannot_show(yawbench, tmp_path, monkeypatch):
     assert status == 2
     assert said.count("\n") == 1
     assert "cannot be animated: position_x and position_y were not recorded" in said
-    assert yawbench("animate", "a", "b", "c") == (2, "an animation shows one or two runs, not 3\n")
+    assert yawbench("animate", *"abcdefgh") == (2, "an animation shows up to 7 runs, not 8\n")
     status, said = yawbench("animate", "nowhere")
     assert (status, "no results here" in said) == (2, True)
 

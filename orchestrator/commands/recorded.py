@@ -1,0 +1,94 @@
+"""Recorded runs that a command is given as folders of results or as scenarios."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from ..plan import Change
+
+Sources = Annotated[
+    list[Path],
+    typer.Argument(
+        help="Folders of results, or scenario files; several are laid over each other.", metavar="RESULTS..."
+    ),
+]
+Labels = Annotated[
+    list[str] | None,
+    typer.Option("--label", metavar="TEXT", help="Label of a run in the legend, in the order of RESULTS."),
+]
+SCENARIOS = (".yaml", ".yml", ".ssp")
+"""Endings of files that are scenarios."""
+
+
+def recorded(
+    sources: Sequence[Path],
+    changes: tuple[Change, ...],
+    fmus: Path | None,
+    limit: float | None,
+    *,
+    build: bool,
+) -> list[Path]:
+    """Return the folders of all results, after making the runs of scenarios that have none.
+
+    Raises:
+        ScenarioError: a scenario or an option is wrong.
+    """
+    from ..errors import ScenarioError
+    from ..pages.freshness import staleness
+    from ..results.naming import default_folder
+    from ..studies.jobs import Job, Once, plan_of
+    from .batch import run_all
+
+    scenarios = [source for source in sources if source.suffix in SCENARIOS and not source.is_dir()]
+    if changes and not scenarios:
+        raise ScenarioError("--swap and --set change a scenario; only folders of results are given")
+    jobs, stale, once = {}, [], Once(build=build)
+    for source in scenarios:
+        plan = plan_of(Job(source.stem, source, Path(), changes, fmus), once)
+        job = Job(source.stem, source, default_folder(source, plan.changes), changes, fmus, call_limit=limit)
+        jobs[source] = job
+        stale += [job] if staleness(plan, job.out) else []
+    outcomes = run_all(stale, Path("results"), workers=None, build=build) if stale else []
+    for outcome in outcomes:
+        if not outcome.ok:
+            raise typer.Exit(outcome.exit_status)
+    return [jobs[source].out if source in jobs else source for source in sources]
+
+
+def distinct(folders: Sequence[Path]) -> list[str]:
+    """Return the shortest ends of the paths that tell the folders apart."""
+    parts = [folder.absolute().parts for folder in folders]
+    longest = max(len(p) for p in parts)
+    for n in range(1, longest + 1):
+        names = ["/".join(p[-n:]) for p in parts]
+        if len(set(names)) == len(names):
+            return names
+    return ["/".join(p[-1:]) for p in parts]
+
+
+def labels_of(folders: Sequence[Path], given: Sequence[str] | None) -> list[str]:
+    """Return what the legend calls each run: the labels given, or `distinct`.
+
+    Raises:
+        ScenarioError: there are not as many labels as folders.
+    """
+    from ..errors import ScenarioError
+    from ..wording import counted
+
+    if given and len(given) != len(folders):
+        counts = f"{counted(len(given), 'label')}, {counted(len(folders), 'folder')}"
+        raise ScenarioError(f"--label: needs one for each folder of results ({counts})")
+    return list(given or distinct(folders))
+
+
+def folder_of_all(folders: Sequence[Path]) -> Path:
+    """Return where what shows all runs goes: the folder of the only one, or the one that holds them all."""
+    if len(folders) == 1:
+        return folders[0]
+    return Path(os.path.commonpath([folder.absolute().parent for folder in folders]))
