@@ -21,8 +21,7 @@ def in_words(change: Change) -> str:
     """Return a change in words."""
     value = change.value
     if change.swaps:
-        name = str(value)
-        return f"{Path(name).stem if name.lower().endswith('.fmu') else name} for {change.place}"
+        return f"{fmu_of(change)} for {change.place}"
     if change.place == "vehicle":
         return f"vehicle file {Path(str(value)).name}"
     text = str(value).lower() if isinstance(value, bool) else str(value)
@@ -56,13 +55,26 @@ def changes_of_all(every: Sequence[Sequence[Change]]) -> tuple[Change, ...]:
 
 
 def changed_each(labelled: Sequence[tuple[str, Sequence[Change]]]) -> str:
-    """Return what was changed for several runs (label, changes): for all, then for each by its label."""
+    """Return what was changed for several runs (label, changes): for all, then for each by its label.
+
+    A swap is not said again of a run that is called by its FMU.
+    """
     common = changes_of_all([changes for _, changes in labelled])
     parts = [changed(common)]
     for label, changes in labelled:
-        own = [one for one in changes if not _among(one, common)]
+        own = [one for one in changes if not _among(one, common) and not _is_said(one, label)]
         parts += [f"{label}: {changed(own)}"] if own else []
     return "; ".join(filter(None, parts))
+
+
+def _is_said(change: Change, label: str) -> bool:
+    return change.swaps and fmu_of(change) == label.rpartition("/")[2]
+
+
+def fmu_of(swap: Change) -> str:
+    """Return the name of the FMU that a swap puts in."""
+    name = str(swap.value)
+    return Path(name).stem if name.lower().endswith(".fmu") else name
 
 
 def _among(change: Change, changes: Iterable[Change]) -> bool:

@@ -24,9 +24,7 @@ def page() -> str:
         "x is the signal, x_ref its reference, T the duration of the run or of the window. A signal's rate "
         "is the recorded one, `x_rate`, else the difference quotient. A measure without a number is absent: "
         "an error relative to a reference of zero, a window that the run does not last for.",
-        "A metric may be of a stretch of time, `peak(sideslip) from 1 s to 3 s`, or with the measure `value` of a "
-        "point of it, `value(sideslip) at 2 s`. In files the same stretch can stand in `window`, as "
-        "`[1, 3]` or `1 s to 3 s`.",
+        "In files a stretch of time can also stand in `window`, as `[1, 3]` or `1 s to 3 s`.",
         "## Measures",
         table(("measure", "definition", "unit", "needs besides"), rows),
         "## Shown where nobody has chosen others",

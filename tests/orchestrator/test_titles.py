@@ -182,6 +182,7 @@ def test_changes_are_told_in_words():
     assert with_changes("Lane change", []) == "Lane change"
     assert changed_each([("a", [ICE]), ("b", [ICE])]) == "inputs.friction* = 0.3"
     assert changed_each([("a", []), ("b", [ICE])]) == "b: inputs.friction* = 0.3"
+    assert changed_each([("controller_off", [OFF, ICE]), ("b", [ICE])]) == "inputs.friction* = 0.3"
 
 
 def test_a_record_of_another_shape_names_no_changes():
