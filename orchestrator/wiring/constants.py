@@ -13,7 +13,6 @@ from ..wording import fold, hint
 from .facts import facts_of
 from .parameters import origin, value_for
 from .patterns import Replaced, had, matching
-from .series import series_reader
 
 Input = tuple[str, str]  # unit, variable
 
@@ -52,7 +51,11 @@ def constants(
     problems: list[tuple[Key, str]],
 ) -> dict[Input, Constant]:
     """Return what `inputs` and facts give to each input; problems and remarks go to the two lists."""
-    read = series_reader(scenario)
+    read = None
+    if any(isinstance(raw, SeriesSpec) for raw in scenario.inputs.values()):
+        from .series import series_reader  # needs numpy, which takes long to import
+
+        read = series_reader(scenario)
     inputs = {unit: {v.name: v for v in fmu.of("input")} for unit, fmu in fmus.items()}
     found = dict(_of_facts(scenario, inputs, problems))
     fact_changed = any(one.level == CHANGED_FACT for one in found.values())
@@ -70,7 +73,11 @@ def constants(
             variable = fmus[unit].variables[name]
             value: Value | Series = 0
             try:
-                value = read(raw, part, variable) if isinstance(raw, SeriesSpec) else value_for(variable, raw)
+                if isinstance(raw, SeriesSpec):
+                    assert read is not None
+                    value = read(raw, part, variable)
+                else:
+                    value = value_for(variable, raw)
             except ValueError as error:
                 problems.append((key, f"{error}, for {unit}.{name}"))
             level = CHANGED_INPUTS if fact_changed and scenario.document.override(key) else INPUTS
