@@ -22,8 +22,8 @@ from ..errors import ResultsError
 from ..writing import claim, fcntl, reason
 
 LOCK_FILE = ".yawbench-lock"
-LOOKS = 5
-"""Times that a lock is asked for again, 10 ms apart; chosen: a look at it takes microseconds."""
+LOOKS = 100
+"""Times that a lock is asked for again, 10 ms apart; chosen: runs whose command was killed end sooner."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class Lock:
 
 
 def _claimed(path: Path) -> int:
-    """Claim a file; one who only looks whether it is held (`holder_of`) is no reason to give up."""
+    """Claim a file; one who only looks at it (`holder_of`), or is about to end, is no reason to give up."""
     for _ in range(LOOKS):
         with contextlib.suppress(BlockingIOError):
             return claim(path)

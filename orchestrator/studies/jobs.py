@@ -14,11 +14,13 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import BuildError, ResultsError, ScenarioError, YawbenchError
+from ..master.guardian import die_with_parent
 from ..master.interrupts import StopFlag, interrupts
 from ..plan import Change, Plan
 from ..results.read import Results, load_results
@@ -232,6 +234,14 @@ def _context() -> Any:
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["__main__", *NEEDED])
+    # Ctrl-C is for the caller, who ends its processes: the server must not get it, nor any that it starts,
+    # not even while they import what they need
+    resource_tracker.ensure_running()
+    earlier = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        forkserver.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, earlier)
     return context
 
 
@@ -293,6 +303,7 @@ def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:
     """Do one job in a process of its own and report how it ended."""
     from ..master.master import Interrupted
 
+    die_with_parent(signal.SIGTERM)  # the server ends when the caller is killed, and this run with it
     if hasattr(os, "setpgrp"):
         os.setpgrp()  # Ctrl-C on the terminal is for the caller, who ends this process
     try:
@@ -303,7 +314,8 @@ def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:
     except BaseException as error:
         sys.excepthook(type(error), error, error.__traceback__)
         report = (1, [f"{type(error).__name__}: {error}"], None, False)
-    pipe.send(report)
+    with suppress(BrokenPipeError):  # the caller was killed
+        pipe.send(report)
     pipe.close()
 
 

@@ -104,6 +104,42 @@ def test_when_the_caller_stops_all_runs_end(tmp_path, monkeypatch, why):
         os.open(tmp_path / "fifo", os.O_WRONLY | os.O_NONBLOCK)
 
 
+def blocked(job):
+    """Return whether Ctrl-C is held back from this process."""
+    return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
+def test_ctrl_c_does_not_reach_a_run_even_while_its_process_starts(tmp_path):
+    (outcome,) = execute(jobs(tmp_path, "a"), run=blocked)
+    assert outcome.value is True
+    assert not blocked(None)  # the caller gets it
+
+
+CALLER = """
+import sys
+from pathlib import Path
+from orchestrator.studies.jobs import execute
+from tests.orchestrator.test_jobs import jobs, tell_and_wait
+execute(jobs(Path(sys.argv[1]), "waits"), run=tell_and_wait)
+"""
+
+
+def tell_and_wait(job):
+    """Say that the run has begun, and go on for as long as the process may."""
+    (job.out.parent / "begun").write_text("")
+    signal.pause()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs Linux to tell a process that its parent has ended")
+def test_a_run_ends_when_its_caller_is_killed(tmp_path):
+    os.mkfifo(tmp_path / "begun")
+    caller = subprocess.Popen([sys.executable, "-c", CALLER, str(tmp_path)], stdout=subprocess.PIPE)
+    (tmp_path / "begun").read_bytes()
+    caller.kill()
+    assert caller.communicate() == (b"", None)  # nobody holds its output any more
+
+
 def test_only_a_run_that_reached_its_end_is_read_back(tmp_path):
     write(car(n=5), tmp_path / "whole")
     write(car(n=5), tmp_path / "part", status="failed", error={"message": "plant: step failed"})

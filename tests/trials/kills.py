@@ -1,0 +1,185 @@
+"""Commands killed at random moments and called again: `python -m tests.trials.kills --each 20`.
+
+A command is stopped by SIGKILL or SIGTERM at a moment drawn from the time that it takes undisturbed. What
+it leaves is then looked at (no half result may pass for a whole one), the command is called again, and
+what that leaves must be the same as if nothing had happened: the same numbers to the last byte, and no
+file of the killed one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+from fmus.build import build_all
+from orchestrator.errors import ResultsError
+from orchestrator.results.formats import FILES, PART, RUN_FILE
+from orchestrator.results.lock import LOCK_FILE
+from orchestrator.results.read import load_results
+from orchestrator.writing import NEW
+from tests.orchestrator.test_batch_commands import SCENARIO, STUDY, UNITS
+
+SWEEP = """
+title: Half a sweep
+scenario: half.yaml
+axes: {amplitude: {vary: driver.amplitude, values: [0.01, 0.02, 0.03, 0.04, 0.05, 0.06], unit: rad}}
+metrics: {moment: {metric: peak(yaw_moment)}}
+"""
+COMMANDS = {
+    "run": ("run", "half.yaml", "--out", "out"),
+    "compare": ("compare", "half.yaml", "--swap", "controller=controller_off", "--out", "out"),
+    "study": ("study", "study.yaml", "--out", "out"),
+    "report": ("report", "study.yaml", "--out", "out"),
+    "sweep": ("sweep", "sweep.yaml", "--out", "out"),
+    "build": ("build", "--out", "out", *UNITS),
+}
+SAME = ("*.csv", "*.parquet", "*.fmu", "study.json")
+"""Files that are the same to the last byte, whatever happened before; others hold times and versions."""
+LITTER = (PART, NEW, LOCK_FILE, ".tmp")
+"""What the names of files end in that a command which has ended may not leave."""
+WHOLE = {".svg": b"</svg>", ".html": b"</html>", ".png": b"IEND\xaeB`\x82", ".json": b"}"}
+"""What the files end in that are written at once."""
+
+
+class Trial:
+    """A folder with scenario, study and sweep, in which commands are called."""
+
+    def __init__(self, place: Path, fmus: Path) -> None:
+        self.place = place
+        self._fmus = fmus
+        place.mkdir()
+        (place / "tmp").mkdir()
+        (place / "half.yaml").write_text(SCENARIO.replace("stop_time: 0.4", "stop_time: 40"))
+        (place / "study.yaml").write_text(STUDY)
+        (place / "sweep.yaml").write_text(SWEEP)
+
+    def start(self, command: str) -> subprocess.Popen[str]:
+        """Start a command in a group of its own."""
+        arguments = [sys.executable, "-m", "orchestrator.cli", *COMMANDS[command]]
+        if command != "build":
+            arguments += ["--fmus", str(self._fmus)]
+        environment = {**os.environ, "TMPDIR": str(self.place / "tmp")}
+        return subprocess.Popen(
+            arguments, cwd=self.place, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            env=environment, start_new_session=True,
+        )  # fmt: skip
+
+    def call(self, command: str) -> tuple[int, str, float]:
+        """Return exit status, what was said, and the time taken [s]."""
+        began = time.monotonic()
+        process = self.start(command)
+        said = process.communicate()[0]
+        return process.returncode, said, time.monotonic() - began
+
+    def kill(self, command: str, after: float, number: signal.Signals) -> bool:
+        """Start a command and stop it after a time [s]; return whether it was still there."""
+        process = self.start(command)
+        try:
+            process.communicate(timeout=after)
+            return False
+        except subprocess.TimeoutExpired:
+            process.send_signal(number)
+            process.communicate()
+            return True
+
+    def numbers(self) -> dict[str, bytes]:
+        """Return the content of all files that must be the same."""
+        out = self.place / "out"
+        return {
+            path.relative_to(out).as_posix(): path.read_bytes()
+            for pattern in SAME
+            for path in sorted(out.rglob(pattern))
+            if path.is_file()
+        }
+
+    def litter(self) -> Iterator[str]:
+        """Yield files that should not be there once a command has ended by itself."""
+        for path in (self.place / "out").rglob("*"):
+            if path.name.endswith(LITTER):
+                yield f"left behind: {path.relative_to(self.place)}"
+
+    def halves(self, whole: dict[str, bytes]) -> Iterator[str]:
+        """Yield results and pages that pass for whole and are not."""
+        out = self.place / "out"
+        for path in out.rglob("*"):
+            end = WHOLE.get(path.suffix)
+            if end is not None and path.is_file() and not path.read_bytes().rstrip().endswith(end):
+                yield f"half a file: {path.relative_to(out)}"
+        for record in [*out.rglob(RUN_FILE)]:
+            try:
+                results = load_results(record.parent)
+            except ResultsError:
+                continue
+            name = (record.parent / FILES["csv"]).relative_to(out).as_posix()
+            if results.run["status"] == "completed" and whole.get(name) != (out / name).read_bytes():
+                yield f"half a result passes for whole: {name}"
+
+
+def trial(command: str, each: int, seed: int, folder: Path, fmus: Path) -> tuple[Counter[str], list[str]]:
+    """Kill a command `each` times.
+
+    Returns:
+        how many trials had which outcome ("held", or what went wrong); sentences on what went wrong.
+    """
+    r = random.Random(f"{seed} {command}")
+    undisturbed = Trial(folder / f"{command} undisturbed", fmus)
+    status, said, duration = undisturbed.call(command)
+    assert status == 0, said
+    whole = undisturbed.numbers()
+    assert whole
+    counts: Counter[str] = Counter()
+    notes: list[str] = []
+    for number in range(each):
+        one = Trial(folder / f"{command} {number}", fmus)
+        if r.random() < 0.5:  # with results of an earlier call in the folder
+            shutil.copytree(undisturbed.place / "out", one.place / "out")
+        how = r.choice((signal.SIGKILL, signal.SIGTERM))
+        after = r.uniform(0.1, 1.0) * duration
+        alive = one.kill(command, after, how)
+        found = [*one.halves(whole)]
+        status, said, _ = one.call(command)
+        found += [f"exit status {status}: {said.strip().splitlines()[-1:]}"] if status else []
+        found += ["a traceback"] if "Traceback" in said else []
+        found += [*one.litter()]
+        if one.numbers() != whole:
+            found.append("other numbers than undisturbed")
+        counts["held" if not found else "did not hold"] += 1
+        counts[how.name if alive else "had ended before"] += 1
+        notes += [f"{command} {number}, {how.name} after {after:.2f} s: {sentence}" for sentence in found]
+        shutil.rmtree(one.place)
+    return counts, notes
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("commands", nargs="*", default=list(COMMANDS), help="default: all")
+    parser.add_argument("--each", type=int, default=20, help="kills of each command")
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    failed = False
+    print("| command | kills | by SIGKILL | by SIGTERM | had ended before | held |")
+    print("|---|---:|---:|---:|---:|---:|", flush=True)
+    with tempfile.TemporaryDirectory(prefix="kills-") as folder:
+        fmus = Path(folder, "fmus")
+        build_all(fmus, components=UNITS)
+        for command in given.commands:
+            counts, notes = trial(command, given.each, given.seed, Path(folder), fmus)
+            numbers = (given.each, counts["SIGKILL"], counts["SIGTERM"], counts["had ended before"])
+            print(f"| `{command}` | {' | '.join(map(str, numbers))} | {counts['held']} |", flush=True)
+            print("".join(f"{note}\n" for note in notes), end="", file=sys.stderr, flush=True)
+            failed = failed or bool(notes)
+    sys.exit(failed)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,25 @@
+"""Commands killed at random moments, a sample; `python -m tests.trials.kills` kills more."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from fmus.build import build_all
+from tests.orchestrator.test_batch_commands import UNITS
+
+from .kills import trial
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
+@pytest.mark.parametrize("command", ["run", "study", "sweep"])
+def test_a_killed_command_passes_nothing_half_for_whole_and_the_next_call_repairs_all(
+    command: str, tmp_path: Path
+) -> None:
+    build_all(tmp_path / "fmus", components=UNITS)
+    counts, notes = trial(command, 2, 5, tmp_path, tmp_path / "fmus")
+    assert notes == []
+    assert counts["held"] == 2
