@@ -125,9 +125,9 @@ def _has_children() -> bool:
     return True
 
 
-def die_with_parent(number: int = signal.SIGKILL) -> None:
-    """Let this process be killed, or told so by another signal, when the one that forked it ends (Linux)."""
-    _prctl(_PR_SET_PDEATHSIG, number)
+def die_with_parent() -> None:
+    """Let this process be killed when the one that has forked it ends (Linux)."""
+    _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _prctl(option: int, value: int) -> None:

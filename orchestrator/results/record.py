@@ -14,8 +14,8 @@ from ..wording import short
 from .folder import FAILED, settle
 from .formats import FILES, RUN_FILE
 
-LARGEST = 200_000_000
-"""Bytes of a record. Chosen: a thousand times those of the papers' runs."""
+LARGEST = 100_000_000
+"""Bytes of a record. Chosen: a thousand times what one of ours has."""
 
 
 class _Part(BaseModel):

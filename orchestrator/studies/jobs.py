@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import BuildError, ResultsError, ScenarioError, YawbenchError
-from ..master.guardian import die_with_parent
 from ..master.interrupts import StopFlag, interrupts
 from ..plan import Change, Plan
 from ..results.read import Results, load_results
@@ -223,8 +222,7 @@ def pool(workers: int | None = None) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(
         max(1, workers or default_workers()),
         mp_context=_context(),
-        initializer=signal.signal,
-        initargs=(signal.SIGINT, signal.SIG_IGN),  # the caller ends them
+        initializer=_end_with_caller,
     )
 
 
@@ -303,7 +301,7 @@ def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:
     """Do one job in a process of its own and report how it ended."""
     from ..master.master import Interrupted
 
-    die_with_parent(signal.SIGTERM)  # the server ends when the caller is killed, and this run with it
+    _end_with_caller()
     if hasattr(os, "setpgrp"):
         os.setpgrp()  # Ctrl-C on the terminal is for the caller, who ends this process
     try:
@@ -317,6 +315,24 @@ def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:
     with suppress(BrokenPipeError):  # the caller was killed
         pipe.send(report)
     pipe.close()
+
+
+def _end_with_caller() -> None:
+    """Let this process get SIGTERM when the caller has ended, however it did (Linux).
+
+    The pipe that tells of it asks for the signal; a thread that waits for it could not be forked.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C on the terminal is for the caller
+    caller = multiprocessing.parent_process()
+    if sys.platform != "linux" or caller is None:
+        return
+    import fcntl
+
+    fcntl.fcntl(caller.sentinel, fcntl.F_SETOWN, os.getpid())
+    fcntl.fcntl(caller.sentinel, fcntl.F_SETSIG, signal.SIGTERM)
+    fcntl.fcntl(caller.sentinel, fcntl.F_SETFL, os.O_ASYNC | os.O_NONBLOCK)
+    if wait([caller.sentinel], timeout=0):
+        os.kill(os.getpid(), signal.SIGTERM)
 
 
 def _death(code: int | None) -> str:
