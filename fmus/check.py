@@ -17,7 +17,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
-_PROGRAM = "import sys; sys.path[:] = sys.argv[1].split('\\n'); from fmus.check import serve; serve()"
+from orchestrator.processes import python
+
 _checker: subprocess.Popen | None = None
 
 
@@ -29,8 +30,9 @@ def defects(fmu: Path, *modules: str) -> list[str]:
     """
     global _checker
     if _checker is None or _checker.poll() is not None:
-        command = [sys.executable, "-c", _PROGRAM, "\n".join(sys.path)]
-        _checker = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        _checker = subprocess.Popen(
+            python(__name__), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
         atexit.register(_end, _checker)
     try:
         print(json.dumps([str(fmu), *modules]), file=_checker.stdin, flush=True)
@@ -54,7 +56,7 @@ def _death(code: int) -> str:
         return f"its process died of signal {-code}"
 
 
-def serve() -> None:
+def main() -> None:
     """Answer requests until there is nobody to ask; what FMUs print goes to stderr."""
     answers: IO[str] = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)

@@ -15,7 +15,6 @@ import importlib.util
 import os
 import signal
 import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -25,6 +24,7 @@ import numpy as np
 
 from ..errors import WiringError
 from ..plan import Plan
+from ..processes import python
 from .masters.request import Recording, Request
 from .ssp_write import write_ssp
 
@@ -172,12 +172,8 @@ def _run(module: str, request: Request, folder: Path) -> Recording | str:
     asked, answered = folder / "request.json", folder / "recording.npz"
     request.write(asked)
     answered.unlink(missing_ok=True)
-    command = [sys.executable, "-m", "orchestrator.interop.masters", module, str(asked), str(answered)]
-    paths = [str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")]
-    environment = os.environ | {
-        "PYTHONPATH": os.pathsep.join(filter(None, paths)),
-        "TMPDIR": str(folder),  # Ecos leaves what it has unpacked
-    }
+    command = python("orchestrator.interop.masters.drive", module, asked, answered)
+    environment = os.environ | {"TMPDIR": str(folder)}  # Ecos leaves what it has unpacked
     try:
         done = subprocess.run(command, capture_output=True, timeout=LIMIT, env=environment, check=False)
     except subprocess.TimeoutExpired:

@@ -7,11 +7,11 @@ import os
 import select
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from typing import Any
 
+from ..processes import python
 from .exchange import ANSWER, FAILED, LOG, REPLY, Channel, Garbled, shared_memory
 from .interrupts import stop_requested_at
 
@@ -25,11 +25,6 @@ CLOSING = 1.0
 """Time in which a process that has closed its pipe is seen to end [s]."""
 GRACE = 5.0
 """Time that it may take to end once the FMU has been freed [s]; it has nothing left to do."""
-
-_PROGRAM = (
-    "import sys; sys.path[:] = sys.argv[4].split('\\n'); "
-    "from orchestrator.master.worker import main; main(*map(int, sys.argv[1:4]))"
-)
 
 
 class Lost(Exception):
@@ -59,7 +54,7 @@ class UnitProcess:
         theirs = (commands, answers, self.memory)
         try:
             self._popen = subprocess.Popen(
-                [sys.executable, "-c", _PROGRAM, *map(str, theirs), "\n".join(sys.path)],
+                python("orchestrator.master.worker", *theirs),
                 stdin=subprocess.DEVNULL,
                 pass_fds=theirs,
                 start_new_session=True,  # Ctrl-C on the terminal is for the master

@@ -123,8 +123,9 @@ class Worker:
         ctypes.CDLL(None).fflush(None)
 
 
-def main(reading: int, writing: int, memory: int) -> None:
-    """Serve the master at the other ends of two pipes."""
+def main(*descriptors: str) -> None:
+    """Serve the master at the other ends of two pipes, with memory that is shared with it."""
+    reading, writing, memory = map(int, descriptors)
     stand_guard(reading, (writing, memory))
     channel = Channel(reading, writing)
     channel.send(REPLY, "ready")

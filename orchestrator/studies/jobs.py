@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import BuildError, ResultsError, ScenarioError, YawbenchError
 from ..master.interrupts import StopFlag, interrupts
 from ..plan import Change, Plan
+from ..processes import SAFE_PATH, safe_path
 from ..results.read import Results, load_results
 from ..scenario import yaml_lines
 from ..scenario.yaml_lines import Document
@@ -234,12 +235,13 @@ def _context() -> Any:
     context.set_forkserver_preload(["__main__", *NEEDED])
     # Ctrl-C is for the caller, who ends its processes: the server must not get it, nor any that it starts,
     # not even while they import what they need
-    resource_tracker.ensure_running()
-    earlier = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        forkserver.ensure_running()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, earlier)
+    with safe_path():
+        resource_tracker.ensure_running()
+        earlier = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            forkserver.ensure_running()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, earlier)
     return context
 
 
@@ -302,6 +304,7 @@ def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:
     from ..master.master import Interrupted
 
     _end_with_caller()
+    os.environ.pop(SAFE_PATH, None)  # what an FMU starts may need its own folder
     if hasattr(os, "setpgrp"):
         os.setpgrp()  # Ctrl-C on the terminal is for the caller, who ends this process
     try:

@@ -8,7 +8,17 @@ from pathlib import Path
 
 ORCHESTRATOR = Path(__file__).parents[2] / "orchestrator"
 STAGES = (
-    {"errors", "wording", "plan", "sources", "cache", "files", "titles", "writing"},  # what all share
+    {
+        "errors",
+        "wording",
+        "plan",
+        "sources",
+        "cache",
+        "files",
+        "titles",
+        "writing",
+        "processes",
+    },  # what all share
     {"scenario"},
     {"fmu"},
     {"wiring"},

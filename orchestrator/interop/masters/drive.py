@@ -1,4 +1,4 @@
-"""One master in this process: `python -m orchestrator.interop.masters NAME REQUEST RECORDING`."""
+"""One master in this process, by its name."""
 
 from __future__ import annotations
 
@@ -22,7 +22,3 @@ def main(name: str, request_file: str, recording_file: str) -> None:
         print(f"{type(error).__name__}: {error}", file=sys.stderr)
         sys.exit(1)
     os._exit(0)  # some leave threads behind that never end
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])
