@@ -41,7 +41,6 @@ def _application() -> typer.Typer:
     app = typer.Typer(
         name="yawbench",
         no_args_is_help=True,
-        add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
     )

@@ -14,16 +14,13 @@ from orchestrator.fmu.opener import Opener
 from orchestrator.master.opening import open_unit
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.plan import Change, Plan, Value
+from orchestrator.scenario import catalogue
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wording import hint
 
 from .program import Program
 from .run import Run
-
-SHIPPED = Path(__file__).resolve().parent.parent / "scenarios"
-"""Where the scenarios lie that are loaded by name."""
-ENDINGS = (".yaml", ".yml", ".ssp")
 
 
 def load(source: str | Path) -> Scenario:
@@ -34,28 +31,20 @@ def load(source: str | Path) -> Scenario:
         >>> yb.load("from_another_tool.ssp")
 
     Args:
-        source: a name in the folder of scenarios, or the path of a YAML file or an SSP archive.
+        source: a name in the nearest folder `scenarios` or in that of yawbench, or the path of a YAML
+            file or an SSP archive.
 
     Raises:
         ScenarioError: there is no such scenario, or something is wrong with it.
     """
-    path = Path(source)
-    if path.suffix not in ENDINGS and not path.exists():
-        path = SHIPPED / f"{source}.yaml"
-        if not path.is_file():
-            raise ScenarioError(
-                f"there is no scenario {str(source)!r}{hint(str(source), names(), lead='there are')}"
-            )
-    scenario = Scenario(path)
+    scenario = Scenario(catalogue.find(source, "a scenario"))
     scenario.loaded  # noqa: B018 - what is wrong is said now
     return scenario
 
 
 def names() -> list[str]:
     """Return the names of all scenarios that `load` takes by name."""
-    files = sorted(SHIPPED.glob("*/*.yaml"))
-    found = [file for file in files if "\nunits:" in file.read_text(encoding="utf-8")]
-    return [file.relative_to(SHIPPED).with_suffix("").as_posix() for file in found]
+    return catalogue.names("a scenario")
 
 
 @dataclass(frozen=True)

@@ -36,8 +36,10 @@ def check(
     no_build: NoBuild = False,
     no_validate: NoValidate = False,
 ) -> None:
-    """Validate a scenario; show units, values and where they come from, wires and their order."""
+    """Validate a scenario; show units, values, wires.
 
+    With every value stands where it comes from, with the units the reason for their order.
+    """
     plan = plan_of_scenario(scenario, swap, set_, fmus=fmus, build=not no_build, validate=not no_validate)
     show(plan, scenario, defaults=all_)
     for note in plan.notes:

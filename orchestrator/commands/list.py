@@ -41,6 +41,7 @@ def list(what: Wanted, place: Place = None, fmus: Fmus = None) -> None:
     sideslip, yaw rate and lateral acceleration.
     """
     from ..results.runs import found_runs
+    from ..scenario import catalogue
     from ..studies import listing
     from .batch import print_tables
 
@@ -48,13 +49,14 @@ def list(what: Wanted, place: Place = None, fmus: Fmus = None) -> None:
         table = listing.runs_table(found_runs(place or Path("results")))
     elif what is What.scenarios:
         kinds = ("a scenario", "a study file", "a sweep file")
-        table = listing.files_table(place or Path("scenarios"), kinds)
+        table = listing.files_table(place or catalogue.folders()[0], kinds)
     elif what is What.vehicles:
-        table = listing.files_table(place or Path("scenarios"), ("a vehicle file",))
+        table = listing.files_table(place or catalogue.folders()[0], ("a vehicle file",))
     elif what is What.metrics:
         table = listing.metrics_table()
     elif what is What.signals and place is not None:
-        table = listing.recorded_table(plan_of_scenario(place, None, None, fmus=fmus, build=True))
+        scenario = catalogue.find(place, "a scenario")
+        table = listing.recorded_table(plan_of_scenario(scenario, None, None, fmus=fmus, build=True))
     else:
         found, problems = listing.fmus_in(_folder_of_fmus(place or fmus))
         table = listing.fmus_table(found, problems)

@@ -4,12 +4,36 @@ from __future__ import annotations
 
 from fractions import Fraction
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+
+def named(kind: str, **told: Any) -> Any:
+    """Return an argument that is a file of a kind (see `scenario.catalogue`), or the name of one."""
+
+    def find(given: Any) -> Any:
+        from ..scenario import catalogue
+
+        if isinstance(given, (list, tuple)):
+            return [catalogue.find(one, kind) for one in given]
+        return given and catalogue.find(given, kind)
+
+    def complete(incomplete: str) -> list[str]:
+        from ..scenario import catalogue
+
+        return [name for name in catalogue.names(kind) if name.startswith(incomplete)]
+
+    return typer.Argument(callback=find, autocompletion=complete, **told)
+
+
 ScenarioFile = Annotated[
-    Path, typer.Argument(help="Scenario file (YAML), or SSP archive.", metavar="SCENARIO")
+    Path,
+    named(
+        "a scenario",
+        help="Scenario: YAML file, SSP archive, or a name in scenarios/.",
+        metavar="SCENARIO",
+    ),
 ]
 Swap = Annotated[
     list[str] | None,

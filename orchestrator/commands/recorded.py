@@ -15,15 +15,13 @@ if TYPE_CHECKING:
 Sources = Annotated[
     list[Path],
     typer.Argument(
-        help="Folders of results, or scenario files; several are laid over each other.", metavar="RESULTS..."
+        help="Folders of results, or scenarios; several are laid over each other.", metavar="RESULTS..."
     ),
 ]
 Labels = Annotated[
     list[str] | None,
     typer.Option("--label", metavar="TEXT", help="Label of a run in the legend, in the order of RESULTS."),
 ]
-SCENARIOS = (".yaml", ".yml", ".ssp")
-"""Endings of files that are scenarios."""
 
 
 def recorded(
@@ -42,10 +40,12 @@ def recorded(
     from ..errors import ScenarioError
     from ..pages.freshness import staleness
     from ..results.naming import default_folder
+    from ..scenario import catalogue
     from ..studies.jobs import Job, Once, plan_of
     from .batch import run_all
 
-    scenarios = [source for source in sources if source.suffix in SCENARIOS and not source.is_dir()]
+    sources = [one if os.path.exists(one) else catalogue.named(one) or one for one in sources]
+    scenarios = [one for one in sources if one.suffix in catalogue.ENDINGS and not os.path.isdir(one)]
     if changes and not scenarios:
         raise ScenarioError("--swap and --set change a scenario; only folders of results are given")
     jobs, stale, once = {}, [], Once(build=build)

@@ -9,11 +9,11 @@ from typing import Annotated
 import typer
 
 from .batch import Jobs
-from .options import CallLimit, Fmus, Format, Isolate, NoBuild, isolation
+from .options import CallLimit, Fmus, Format, Isolate, NoBuild, isolation, named
 
 Studies = Annotated[
     list[Path] | None,
-    typer.Argument(help="Study files (YAML); default: all in scenarios/*/.", metavar="STUDY"),
+    named("a study file", help="Studies: YAML files, or names; default: all in scenarios/.", metavar="STUDY"),
 ]
 Out = Annotated[
     Path | None,

@@ -13,7 +13,7 @@ Folders = Annotated[
 
 
 def salvage(folders: Folders) -> None:
-    """Make readable results of what runs recorded before they died.
+    """Keep what runs recorded before they died.
 
     Killed processes leave files that end in .part. The whole rows among them become results with the
     status "died"; if results of an earlier run stand in the folder they go to failed/ beside those, which

@@ -8,9 +8,11 @@ from typing import Annotated
 import typer
 
 from .batch import Jobs
-from .options import CallLimit, Fmus, Format, Isolate, NoBuild, Out, isolation
+from .options import CallLimit, Fmus, Format, Isolate, NoBuild, Out, isolation, named
 
-StudyFile = Annotated[Path, typer.Argument(help="Study file (YAML).", metavar="STUDY")]
+StudyFile = Annotated[
+    Path, named("a study file", help="Study: YAML file, or a name in scenarios/.", metavar="STUDY")
+]
 NoRun = Annotated[
     bool, typer.Option("--no-run", help="Run nothing: judge and draw what stands in the results folder.")
 ]

@@ -13,14 +13,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .batch import Jobs
-from .options import CallLimit, Fmus, Format, Isolate, NoBuild, Out, Set, Swap, isolation
+from .options import CallLimit, Fmus, Format, Isolate, NoBuild, Out, Set, Swap, isolation, named
 
 if TYPE_CHECKING:
     from ..studies.jobs import Outcome
     from ..sweeps.planning import Planned
     from ..sweeps.run_sweep import Runner
 
-SweepFile = Annotated[Path, typer.Argument(help="Sweep file (YAML).", metavar="SWEEP")]
+SweepFile = Annotated[
+    Path, named("a sweep file", help="Sweep: YAML file, or a name in scenarios/.", metavar="SWEEP")
+]
 Scheduler = Annotated[
     str | None,
     typer.Option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster: tcp://host:port."),

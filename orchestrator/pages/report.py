@@ -10,7 +10,7 @@ from typing import Any
 from ..errors import ScenarioError
 from ..plan import Plan
 from ..results.formats import RUN_FILE
-from ..scenario import yaml_lines
+from ..scenario import catalogue, yaml_lines
 from ..scenario.load import Scenario
 from ..studies.jobs import Job, Once, planned
 from ..studies.study_file import Study, load_study
@@ -38,7 +38,7 @@ class Wanted:
 
 
 def found_studies(folder: Path = SCENARIOS) -> list[Path]:
-    """Return all study files below a folder: YAML files with `runs` and `metrics`, sorted by title.
+    """Return all study files in the folders of a folder, sorted by title.
 
     The studies of one folder stay together, `study.yaml` first.
 
@@ -46,10 +46,9 @@ def found_studies(folder: Path = SCENARIOS) -> list[Path]:
         ScenarioError: there are none.
     """
     titles: dict[Path, str] = {}
-    for path in sorted(folder.glob("*/*.yaml")):
+    for path, _ in catalogue.files(folder, ["a study file"], below="*/*"):
         data = yaml_lines.read(path, what="study file").data
-        if isinstance(data, dict) and "runs" in data and "metrics" in data:
-            titles[path] = str(data.get("title", ""))
+        titles[path] = str(data.get("title", "")) if isinstance(data, dict) else ""
     if not titles:
         raise ScenarioError(f"no study file was named, and there is none in {folder}/*/")
     first = {path.parent: min(titles[p] for p in titles if p.parent == path.parent) for path in titles}

@@ -12,14 +12,13 @@ import numpy as np
 
 from ..errors import ModelDescriptionError, ScenarioError
 from ..fmu.archive import open_fmu
-from ..metrics.measures import catalogue
+from ..metrics.measures import catalogue as measures
 from ..metrics.run_metrics import STANDARD, Value, columns_of, metric
 from ..metrics.signals import symbol
 from ..plan import Fmu, Plan
 from ..results.read import Results
 from ..results.runs import FoundRun
-from ..scenario import yaml_lines
-from ..scenario.strict import KINDS
+from ..scenario import catalogue, yaml_lines
 from ..titles import changed, changes_in
 from ..wording import WHEELS, star
 from .tables import Cell, Table
@@ -74,22 +73,14 @@ def files_table(folder: Path, kinds: Sequence[str]) -> Table:
     if not folder.is_dir():
         raise ScenarioError(f"{folder}: there is no such folder")
     table = Table("", ["file", "kind", "title"])
-    for path in sorted(folder.rglob("*")):
-        if path.suffix == ".ssp" and "a scenario" in kinds:
-            table.rows.append([str(path), "SSP archive", None])
-        elif path.suffix in (".yaml", ".yml"):
-            data = yaml_lines.read(path, what="file").data
-            kind = _kind(data)
-            if kind in kinds:
-                table.rows.append([str(path), kind.partition(" ")[2], str(data.get("title") or "") or None])
+    for path, kind in catalogue.files(folder, kinds):
+        archive = path.suffix == ".ssp"
+        data = None if archive else yaml_lines.read(path, what="file").data
+        title = str(data.get("title") or "") if isinstance(data, dict) else ""
+        table.rows.append([str(path), "SSP archive" if archive else kind.partition(" ")[2], title or None])
     if not table.rows:
         raise ScenarioError(f"{folder}: holds no file that is {' or '.join(kinds)}")
     return table
-
-
-def _kind(data: Any) -> str:
-    given = data if isinstance(data, dict) else {}
-    return next((kind for key, (kind, form, _) in KINDS.items() if isinstance(given.get(key), form)), "")
 
 
 def fmus_in(folder: Path) -> tuple[list[Fmu], list[str]]:
@@ -146,7 +137,7 @@ def recorded_table(plan: Plan) -> Table:
 def metrics_table() -> Table:
     """Return a table of all measures of a signal x."""
     table = Table("", ["metric", "what it is", "", "unit", "needs"])
-    for one in catalogue():
+    for one in measures():
         table.rows.append([f"{one.name}(x)", one.definition, one.formula, one.unit, one.needs or None])
     table.notes = [f"'standard' stands for {', '.join(STANDARD)}."]
     return table

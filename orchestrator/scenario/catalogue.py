@@ -1,0 +1,112 @@
+"""Scenario, study and sweep files by name: `fnn_sideslip/25mps` is the file in the folder of scenarios."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Collection, Iterator
+from pathlib import Path
+
+from ..errors import ScenarioError
+from ..files import TEXT, read_bytes
+from ..wording import hint, listed
+from .strict import KINDS
+
+FOLDER = "scenarios"
+SHIPPED = Path(__file__).resolve().parents[2] / FOLDER
+"""Where this program's own scenarios lie."""
+YAML = (".yaml", ".yml")
+ENDINGS = (*YAML, ".ssp")
+COMMANDS = {"a scenario": "run", "a study file": "study", "a sweep file": "sweep"}
+"""Kind of file -> the command that is for it."""
+_KEY = re.compile(rf"^[\"']?({'|'.join(KINDS)})[\"']?[ \t]*:", re.MULTILINE)
+
+
+def folders() -> list[Path]:
+    """Return the folders of scenarios: the nearest upward from here, then this program's own."""
+    here = Path.cwd()
+    near = [folder / FOLDER for folder in (here, *here.parents) if (folder / FOLDER).is_dir()]
+    return list(dict.fromkeys([*(_from_here(folder) for folder in near[:1]), _from_here(SHIPPED)]))
+
+
+def kind_of(path: Path) -> str:
+    """Return the kind of a file (`strict.KINDS`) as a glance tells it; "" if it is none of them."""
+    if path.suffix == ".ssp":
+        return "a scenario"
+    try:
+        keys = _KEY.findall(read_bytes(path, largest=TEXT).decode("utf-8-sig"))
+    except (OSError, ValueError):
+        return ""
+    return next((kind for key, (kind, *_) in KINDS.items() if key in keys), "")
+
+
+def files(folder: Path, kinds: Collection[str], *, below: str = "**/*") -> Iterator[tuple[Path, str]]:
+    """Yield every file of some kinds in a folder with its kind, in alphabetical order."""
+    for path in sorted(folder.glob(below)):
+        if path.suffix in ENDINGS and (kind := kind_of(path)) in kinds:
+            yield path, kind
+
+
+def names(kind: str) -> list[str]:
+    """Return the names that `find` takes for a kind of file, each once."""
+    found = (
+        path.relative_to(folder).with_suffix("").as_posix()
+        for folder in folders()
+        for path, _ in files(folder, [kind], below="*/*")
+    )
+    return list(dict.fromkeys(found))
+
+
+def named(name: str | Path) -> Path | None:
+    """Return the file that a name means, None if there is none: here, or in a folder of scenarios."""
+    candidates = (base / f"{name}{ending}" for base in (Path(), *folders()) for ending in ENDINGS)
+    return next((path for path in candidates if os.path.isfile(path)), None)
+
+
+def find(source: str | Path, kind: str) -> Path:
+    """Return the file that a path or a name in a folder of scenarios means.
+
+    A path with the ending of such a file is returned as it stands, though there be no such file.
+
+    Raises:
+        ScenarioError: there is none; names those there are.
+    """
+    path = Path(source)
+    if os.path.isdir(path):
+        raise ScenarioError(f"{source}: {_what_is_in(path, kind)}")
+    if os.path.exists(path):
+        return path
+    known = names(kind)
+    elsewhere = [name for name in known if path.stem == name.rpartition("/")[2]]
+    if path.suffix in ENDINGS and not elsewhere:
+        return path
+    if file := named(source):
+        return file
+    for folder in (base / path for base in folders()):
+        if os.path.isdir(folder):
+            raise ScenarioError(f"{source}: {_what_is_in(folder, kind)}")
+    others = hint(str(source), known, lead="there are")
+    if elsewhere:
+        others = f"; by name there is {listed(elsewhere)}"
+    what = kind.partition(" ")[2]
+    raise ScenarioError(f"there is no {what} {str(source)!r}{others}")
+
+
+def _what_is_in(folder: Path, kind: str) -> str:
+    """Return what a folder is that was given in place of a file, and what could be meant."""
+    if (folder / "run.json").is_file():
+        return f"these are the results of a run, not {kind}; 'yawbench plot {folder}' draws them"
+    for below in ("*", "*/*"):
+        if found := [str(path) for path, _ in files(folder, [kind], below=below)]:
+            return f"a folder, not {kind}; in it there are: {listed(found)}"
+    for other, command in COMMANDS.items():
+        if found := [str(path) for path, _ in files(folder, [other])]:
+            return f"a folder without {kind}; 'yawbench {command}' takes {listed(found, last='or')}"
+    known = names(kind)
+    return f"a folder without {kind}{f'; by name there are: {listed(known)}' if known else ''}"
+
+
+def _from_here(path: Path) -> Path:
+    """Return a path as one would type it."""
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path

@@ -1,0 +1,147 @@
+"""Scenarios, studies and sweeps by name, and folders in their place."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import yawbench as yb
+from orchestrator.cli import main
+from orchestrator.errors import ScenarioError
+from orchestrator.scenario import catalogue
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+NAME = "fuzzy_feedback/single_sine"
+
+
+@pytest.fixture
+def yawbench(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as exit_:
+            main([*map(str, arguments)])
+        captured = capsys.readouterr()
+        return exit_.value.code or 0, captured.out, captured.err
+
+    return run
+
+
+def test_a_scenario_that_comes_along_is_run_by_its_name_from_any_folder(yawbench, tmp_path):
+    status, _, told = yawbench("run", NAME, "--set", "stop_time=0.01")
+    assert (status, told.splitlines()[-1].split(":")[0]) == (0, f"results/{NAME},stop_time=0.01")
+    assert (tmp_path / f"results/{NAME},stop_time=0.01/run.json").is_file()
+
+
+def test_every_command_that_takes_a_scenario_takes_a_name(yawbench):
+    status, text, _ = yawbench("check", NAME)
+    assert (status, text.splitlines()[-1]) == (0, "Nothing is wrong.")
+    assert yawbench("export-ssp", NAME)[0] == 0
+    assert yawbench("list", "signals", NAME)[0] == 0
+    assert yawbench("plot", NAME, "--set", "stop_time=0.01")[0] == 0
+
+
+def test_the_nearest_folder_of_scenarios_comes_before_the_one_that_comes_along(tmp_path, monkeypatch):
+    own = tmp_path / "scenarios" / NAME
+    own.parent.mkdir(parents=True)
+    own.with_suffix(".yaml").write_text("units: {}\n")
+    below = tmp_path / "deep" / "er"
+    below.mkdir(parents=True)
+    monkeypatch.chdir(below)
+    assert catalogue.find(NAME, "a scenario") == own.with_suffix(".yaml")
+    assert catalogue.names("a scenario").count(NAME) == 1
+    monkeypatch.chdir(tmp_path)
+    assert catalogue.find(NAME, "a scenario") == Path("scenarios", f"{NAME}.yaml")
+
+
+def test_the_library_knows_the_names_that_the_commands_know(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert yb.load(NAME).path == SCENARIOS / f"{NAME}.yaml"
+    with pytest.raises(ScenarioError, match="there is no scenario 'fuzy_feedback/single_sine'; did you mean"):
+        yb.load("fuzy_feedback/single_sine")
+
+
+@pytest.mark.parametrize(
+    ("command", "folder", "expected"),
+    [
+        ("run", SCENARIOS / "fnn_sideslip", ["a folder, not a scenario", "15mps.yaml", "25mps.yaml"]),
+        ("check", "fnn_sideslip", ["a folder, not a scenario", "15mps.yaml", "40mps.yaml"]),
+        ("run", SCENARIOS, ["a folder, not a scenario", "fuzzy_pid/sine.yaml"]),
+        ("study", SCENARIOS / "fuzzy_sliding_mode", ["a folder, not a study file", "/distribution.yaml"]),
+        ("sweep", SCENARIOS / "fnn_sideslip", ["a folder, not a sweep file", "/sweep_slip_control.yaml"]),
+        ("sweep", SCENARIOS / "fuzzy_pid", ["a folder without a sweep file", "'yawbench run' takes"]),
+        ("run", SCENARIOS / "vehicles", ["a folder without a scenario; by name", ": fnn_sideslip/15mps"]),
+    ],
+)  # fmt: skip
+def test_a_folder_in_place_of_a_file_names_the_files_in_it(yawbench, command, folder, expected):
+    status, _, told = yawbench(command, folder)
+    assert status == 2
+    assert told.count("\n") == 1
+    assert told.startswith(f"{folder}: ")
+    for words in expected:
+        assert words in told
+    assert ("study.yaml" in told) == (command == "study")
+
+
+def test_the_glance_at_a_file_sees_the_kind_that_its_schema_sees():
+    kinds = {path.name: kind for path, kind in catalogue.files(SCENARIOS / "fnn_sideslip", list(KINDS))}
+    assert kinds == {
+        "15mps.yaml": "a scenario", "25mps.yaml": "a scenario", "40mps.yaml": "a scenario",
+        "study.yaml": "a study file", "sweep.yaml": "a sweep file",
+        "sweep_slip_control.yaml": "a sweep file",
+    }  # fmt: skip
+
+
+KINDS = ("a scenario", "a study file", "a sweep file", "a vehicle file")
+
+
+@pytest.mark.parametrize(
+    ("words", "completed"),
+    [
+        ("run fuzzy_pid/", ["fuzzy_pid/double_lane_change", "fuzzy_pid/ramp", "fuzzy_pid/sine"]),
+        ("study fnn", ["fnn_sideslip/study"]),
+        ("sweep fnn", ["fnn_sideslip/sweep", "fnn_sideslip/sweep_slip_control"]),
+        ("second", ["second-opinion"]),
+    ],
+)
+def test_the_shell_completes_names(tmp_path, words, completed):
+    environment = os.environ | {
+        "_YAWBENCH_COMPLETE": "complete_bash",
+        "COMP_WORDS": f"yawbench {words}",
+        "COMP_CWORD": str(len(words.split())),
+    }
+    program = "import sys; sys.argv[0] = 'yawbench'; from orchestrator.cli import main; main()"
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stdout.split() == completed, done.stderr
+
+
+def test_paths_in_a_scenario_are_relative_to_it_wherever_it_is_run_from(yawbench, tmp_path):
+    place, fmus = tmp_path / "mine" / "cases", tmp_path / "mine" / "units"
+    place.mkdir(parents=True)
+    shutil.copytree(SCENARIOS / "vehicles", tmp_path / "mine" / "cars")
+    assert yawbench("build", "--out", fmus, "controller_off")[0] == 0
+    (place / "measured.csv").write_text("time,delta [deg]\n0,0\n10,5\n")
+    text = (SCENARIOS / f"{NAME}.yaml").read_text()
+    vehicle = next(line for line in text.splitlines() if line.startswith("vehicle:"))
+    text = text.replace(vehicle, f"vehicle: ../cars/{vehicle.rpartition('/')[2]}")
+    changed = text.replace("fmu: controller_fuzzy_feedback", "fmu: ../units/controller_off.fmu")
+    assert changed != text
+    series = "inputs:\n  plant.steer_angle: {file: measured.csv, column: delta}\n"
+    changed = changed.replace("inputs:\n", series)
+    (place / "mine.yaml").write_text(changed)
+    (place / "plain.yaml").write_text(changed.replace(series, "inputs:\n"))
+    (tmp_path / "elsewhere").mkdir()
+    os.chdir(tmp_path / "elsewhere")
+    status, shown, told = yawbench("check", "../mine/cases/mine.yaml")
+    assert (status, told.count("\n")) == (0, 1)  # that the driver does not steer
+    assert "controller_off" in shown
+    assert "measured.csv" in shown
+    assert yawbench("export-ssp", "../mine/cases/plain.yaml")[0] == 0
+    os.chdir(tmp_path)
+    assert yawbench("run", "elsewhere/plain.ssp", "--set", "stop_time=0.01")[0] == 0
