@@ -31,13 +31,20 @@ def build(components: Components = None, out: Target = None, force: Force = Fals
     target = out or writable(HERE)
     if out is None and target != HERE:
         print(f"{HERE} cannot be written; FMUs go to {target}", file=sys.stderr)
+
+    from orchestrator.wording import hint
+
     known = find_recipes()
     named = list(components or ())
     for name in named:
         if name in known:
             continue
         if not name.endswith(".py") and not Path(name).is_dir():
-            raise typer.BadParameter(f"there is no component {name!r}; there are: {', '.join(sorted(known))}")
+            raise typer.BadParameter(
+                f"there is no component {name!r}{hint(name, sorted(known), lead='there are')}"
+            )
+        if not Path(name).exists():
+            raise typer.BadParameter(f"{name}: there is no such file; name a component or its Python file")
         fmu = build_component(Path(name), target, force=force)
         print(f"{fmu.stem}: built from {name}", file=sys.stderr)
     names = [name for name in named if name in known]

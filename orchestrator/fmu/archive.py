@@ -98,6 +98,10 @@ def read_archive(path: Path) -> bytes:
             more = f"; did you mean {likely!r}?"
         else:
             more = f"; {path.parent} holds {listed(names)}" if names else ""
+        if "~" in path.parts:
+            more = "; ~ is a folder's name here: write the path of your home folder"
+        elif "\\" in path.name:
+            more = "; write paths with /, not \\"
         raise ModelDescriptionError(f"{path}: no such FMU{more}") from None
     except NotADirectoryError:
         return _read_member(path)

@@ -66,7 +66,9 @@ class Lock:
             os.ftruncate(self._descriptor, 0)
             os.write(self._descriptor, json.dumps(asdict(Holder.here())).encode())
         except FileExistsError:
-            raise ResultsError(f"{folder}: results cannot be written here: it is no folder.") from None
+            raise ResultsError(
+                f"{folder}: results cannot be written here: it is no folder; name another with --out."
+            ) from None
         except BlockingIOError:
             raise _held(folder, _said(self._path)) from None
         except OSError as error:

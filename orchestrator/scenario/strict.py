@@ -24,7 +24,7 @@ KINDS: dict[str, tuple[str, type, str]] = {
     "axes": ("a sweep file", dict, "; it is for `yawbench sweep`"),
     "units": ("a scenario", dict, "; it is for `yawbench run`"),
     "runs": ("a study file", list, "; it is for `yawbench study` and `report`"),
-    "parameters": ("a vehicle file", dict, ""),
+    "parameters": ("a vehicle file", dict, "; a scenario names it under 'vehicle'"),
 }
 """Key that tells a kind of file from the others -> the kind, what stands at the key, where it belongs."""
 

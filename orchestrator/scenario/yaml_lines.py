@@ -142,7 +142,9 @@ def scalar(text: str) -> Any:
 
 class _NotYamlError(Exception):
     def __init__(self, line: int, sentence: str) -> None:
-        super().__init__(" ".join(sentence.split()))
+        super().__init__(
+            " ".join(sentence.split()) + "; indent with spaces, not tabs" * (r"'\t'" in sentence)
+        )
         self.line = line
 
 

@@ -85,7 +85,7 @@ def make_plan(
         lacking = missing_functions(units.values(), wires, record)
         problems = [f"{scenario.path}: {text}" for text in lacking]
     if problems:
-        raise WiringError(problems)
+        raise WiringError(_misplaced(scenario) + problems)
     notes += [
         f"possible algebraic loop: {loop}; an FMU here does not say which inputs its outputs follow, "
         "so a wire against the evaluation order uses earlier values"
@@ -121,6 +121,17 @@ def _divided(
         for unit, given in values.items()
     }
     return first, series
+
+
+def _misplaced(scenario: Scenario) -> list[str]:
+    """Return a sentence for every swap by an FMU whose name begins with that of another unit."""
+    found = []
+    for change in scenario.changes:
+        name = Path(str(change.value)).stem
+        others = [unit for unit in scenario.units if name.startswith(f"{unit}_")]
+        if change.swaps and others and change.place not in others:
+            found.append(f"{change}: by its name {name} is for the unit {others[0]!r}")
+    return found
 
 
 def _open_all(
