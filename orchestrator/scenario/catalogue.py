@@ -85,9 +85,7 @@ def find(source: str | Path, kind: str) -> Path:
     for folder in (base / path for base in folders()):
         if os.path.isdir(folder):
             raise ScenarioError(f"{source}: {_what_is_in(folder, kind)}")
-    others = hint(str(source), known, lead="there are")
-    if elsewhere:
-        others = f"; by name there is {listed(elsewhere)}"
+    others = hint(str(source), elsewhere or known, lead="by name there are")
     what = kind.partition(" ")[2]
     raise ScenarioError(f"there is no {what} {str(source)!r}{others}")
 

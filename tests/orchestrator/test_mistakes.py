@@ -47,7 +47,7 @@ def in_one_sentence(said, arguments, words):
     ("arguments", "words"),
     [
         (("run", "25mps.yaml"), ["there is no scenario '25mps.yaml'", "by name", "fnn_sideslip/25mps"]),
-        (("run", "25mps"), ["there is no scenario '25mps'", "by name there is fnn_sideslip/25mps"]),
+        (("run", "25mps"), ["there is no scenario '25mps'", "by name there are: fnn_sideslip/25mps"]),
         (("run", "fuzy_pid/sine"), [f"{KNOWN} 'fuzzy_pid/sine'?"]),
         (("run", FILE.replace("single", "singel")), ["no such scenario file", KNOWN, "single_sine.yaml"]),
         (("run", "scenarios/fuzzy_feedback/study.yaml"), ["a study file, not a scenario", "yawbench study"]),
