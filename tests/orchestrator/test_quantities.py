@@ -154,7 +154,7 @@ def test_times_are_the_fractions_that_were_written(value: object, time: Fraction
         (0, "must be a time above 0 s (got 0)"),
         ("1e-999 s", "must be a time of at least 1e-09 s (got '1e-999 s')"),
         ("-1 ms", "must be a time above 0 s (got '-1 ms')"),
-        ("1e400 s", "must be a time above 0 s and at most 1e+09 s (got '1e400 s')"),
+        ("1e400 s", "must be a finite number in s (got '1e400 s')"),
         (True, "must be a time in s (got True)"),
         (math.inf, "must be a time in s (got inf)"),
         ([1], "must be a time in s (got [1])"),
