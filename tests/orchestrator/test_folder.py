@@ -232,5 +232,8 @@ def test_a_folder_that_may_not_be_written_is_one_sentence(tmp_path):
 
 def test_a_link_that_leads_nowhere_is_one_sentence(tmp_path):
     (tmp_path / "out").symlink_to("nowhere")
-    with pytest.raises(ResultsError, match=r"out: results cannot be written here: it is no folder\.$"):
+    with pytest.raises(
+        ResultsError,
+        match=r"out: results cannot be written here: it is no folder; name another with --out\.$",
+    ):
         run(tmp_path / "out")

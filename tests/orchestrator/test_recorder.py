@@ -118,7 +118,10 @@ def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path):
 
 def test_a_file_in_place_of_the_folder_is_one_sentence(tmp_path):
     (tmp_path / "out").write_text("")
-    with pytest.raises(ResultsError, match=r"out: results cannot be written here: it is no folder\.$"):
+    with pytest.raises(
+        ResultsError,
+        match=r"out: results cannot be written here: it is no folder; name another with --out\.$",
+    ):
         Recorder(tmp_path / "out", ["a.x"], [True])
 
 

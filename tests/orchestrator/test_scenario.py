@@ -386,7 +386,7 @@ def test_times_can_be_overridden_exactly(file: Path) -> None:
             "a study file, not a scenario; it is for `yawbench study` and `report`",
         ),
         ("axes: {}\nruns: 3", "a sweep file, not a scenario; it is for `yawbench sweep`"),
-        ("parameters: {mass: 3}", "a vehicle file, not a scenario"),
+        ("parameters: {mass: 3}", "a vehicle file, not a scenario; a scenario names it under 'vehicle'"),
     ],
 )
 def test_a_file_of_another_kind_is_one_sentence(tmp_path: Path, text: str, sentence: str) -> None:
