@@ -218,7 +218,7 @@ def test_all_mistakes_are_said_at_once_from_top_to_bottom(file: Path) -> None:
     [
         ("", "a.yaml: this scenario file is empty"),
         ("null\n", "a.yaml: this scenario file is empty"),
-        ("a: " + 5000 * "[", "a.yaml: cannot read this scenario file: it is nested too deeply"),
+        ("a: " + 5000 * "[", "a.yaml:1: not valid YAML: more than 40 brackets in each other"),
         ("- 1\n", "a.yaml:1: must be a mapping (got [1])"),
         ("a: [1, 2\nb: 3\n", "a.yaml:2: not valid YAML: while parsing a flow sequence expected ',' or ']'"),
         ("a:\n\t- b\n", "a.yaml:2: not valid YAML: while scanning for the next token found character '\\t'"),
