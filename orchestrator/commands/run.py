@@ -114,11 +114,13 @@ def run(
         say(f"note: {finding.says}")
     say(f"{folder}: {info.rows} rows of {info.columns} variables in {info.wall_time:.2f} s")
     if metrics:
+        from ..metrics.run_metrics import columns_for
         from ..results.read import load_results
         from ..studies.tables import metrics_of_run
         from .batch import print_tables
 
-        print_tables([metrics_of_run(load_results(folder), metrics)])
+        needed = load_results(folder, only=lambda recorded: columns_for(recorded, metrics))
+        print_tables([metrics_of_run(needed, metrics)])
 
 
 def _metric_names(given: Sequence[str]) -> list[str]:

@@ -267,6 +267,12 @@ def unit_in(results: Results, chosen: Metric) -> str | None:
     return chosen.unit(si_of(results.units[signals[0][0]])[0]) if signals else None
 
 
+def columns_for(results: Results, names: Iterable[str]) -> list[str]:
+    """Return the columns that metrics are made of; `results` may be without rows."""
+    every = [signals for name in names for signals in _signals(results, metric(name))]
+    return list(dict.fromkeys(column for columns in every for column in columns))
+
+
 def _signals(results: Results, chosen: Metric) -> list[list[str]]:
     """Return the columns that each function call takes, one call per wheel; empty if any is missing."""
     signals = []

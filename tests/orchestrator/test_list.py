@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from orchestrator.cli import main
+from orchestrator.metrics.run_metrics import columns_for, evaluate_all
 from orchestrator.pages.run_differences import differences
+from orchestrator.results.read import load_results
 from orchestrator.results.runs import found_runs
 from orchestrator.studies.listing import runs_table
 
@@ -118,3 +120,11 @@ def test_signals_metrics_and_fmus_of_the_project_are_listed(yawbench):
     fmus = yawbench("list", "fmus")[1]
     assert "controller_fnn" in fmus
     assert "plant_seven_dof" in fmus
+
+
+def test_metrics_need_only_the_columns_that_they_are_made_of(tmp_path):
+    folder = write(car(), tmp_path / "one")
+    names = ["relative_peak_error(sideslip)", "peak(wheel_torque_*)", "stability_index(sideslip)"]
+    some = load_results(folder, only=lambda recorded: columns_for(recorded, names))
+    assert len(some.columns) == 6 < len(load_results(folder).columns)
+    assert evaluate_all(some, names) == evaluate_all(load_results(folder), names)
