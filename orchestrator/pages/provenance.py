@@ -15,6 +15,7 @@ from ..figures.panels import WHEEL_NAMES
 from ..plan import Plan, Unit, Value
 from ..scenario.load import Scenario
 from ..scenario.yaml_lines import Document, Key
+from ..wiring.facts import facts_of
 from ..wording import WHEELS, fold
 
 PAPER, LITERATURE, CHOSEN, ERRATUM, VARIED, NEUTRAL = (
@@ -33,6 +34,9 @@ class Origin:
 
     kind: str
     says: str
+
+
+VARIED_BY_STUDY = Origin(VARIED, "set by the study")
 
 
 @dataclass
@@ -153,13 +157,12 @@ def _constant(
         meaning = meaning.removesuffix(f", {WHEEL_NAMES[WHEELS[0]]}")
     said: Origin | None = None
     given = [pattern for pattern in scenario.inputs if _names(pattern, unit.name, first)]
-    if given:
-        key: Key = ("inputs", max(given, key=lambda pattern: ("*" not in pattern, "." in pattern)))
-        if scenario.document.override(key):
-            said = Origin(VARIED, "set by the study")
-        else:
-            words = comments.beside(scenario.document, key)
-            said = Origin(kind_of(words) or kind_of(scenario.source) or NEUTRAL, words or scenario.source)
+    origin = unit.origins.get(first, "default")
+    if origin == "scenario":
+        by_name: Key = ("inputs", max(given, key=lambda one: ("*" not in one, "." in one))) if given else ()
+        said = _said(scenario, by_name or (_fact(scenario, first),), comments)
+    elif origin != "default":
+        said = VARIED_BY_STUDY
     row = group.parameters.setdefault(
         f"{unit.name}.{name}", Parameter(f"{unit.name}.{name}", meaning, variable.unit or "", default)
     )
@@ -175,23 +178,33 @@ def _names(pattern: str, unit: str, name: str) -> bool:
 
 def _origin(scenario: Scenario, unit: Unit, name: str, comments: _Comments) -> Origin | None:
     """Return where a value comes from if the scenario or the vehicle gives it, None if the FMU does."""
-    if name in scenario.units[unit.name].parameters and name in unit.parameters:
-        key: Key = ("units", unit.name, "parameters", name)
-        if scenario.document.override(key):
-            return Origin(VARIED, "set by the study")
-        words = comments.beside(scenario.document, key) or comments.above(
-            scenario.document, ("units", unit.name)
-        )
-        return Origin(kind_of(words) or kind_of(scenario.source) or NEUTRAL, words or scenario.source)
-    if name in scenario.vehicle_parameters and name in unit.parameters:
-        key = ("parameters", name)
-        if scenario.vehicle_document.override(key):
-            return Origin(VARIED, "set by the study")
+    origin = unit.origins.get(name, "default")
+    if origin == "default":
+        return None
+    if origin == "vehicle":
         measure = unit.fmu.variables[name].unit or "1"
-        words = comments.beside(scenario.vehicle_document, key)
+        words = comments.beside(scenario.vehicle_document, ("parameters", name))
         words = re.sub(rf"^{re.escape(measure)}(?![\w/.])[,;]?\s*", "", words)
         return Origin(kind_of(words) or kind_of(scenario._vehicle.source) or NEUTRAL, words)
-    return None
+    if origin == "scenario":
+        own = name in scenario.units[unit.name].parameters
+        key: Key = ("units", unit.name, "parameters", name) if own else (_fact(scenario, name),)
+        return _said(scenario, key, comments)
+    return VARIED_BY_STUDY
+
+
+def _said(scenario: Scenario, key: Key, comments: _Comments) -> Origin:
+    """Return what the scenario says of a value where it stands, beside it or above its unit."""
+    words = comments.beside(scenario.document, key)
+    if key[0] == "units":
+        words = words or comments.above(scenario.document, key[:2])
+    return Origin(kind_of(words) or kind_of(scenario.source) or NEUTRAL, words or scenario.source)
+
+
+def _fact(scenario: Scenario, name: str) -> str:
+    """Return the fact of the scenario that gives a parameter or an input, "" if none does."""
+    facts = (fact for fact, one, _, _ in facts_of(scenario) if name in (*one.inputs, *one.parameters))
+    return next(facts, "")
 
 
 class _Comments:

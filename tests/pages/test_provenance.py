@@ -216,3 +216,13 @@ def test_missing_failed_and_damaged_results_are_stale(folder, tmp_path):
     assert staleness(plan, tmp_path / "d") == "the last run has died"
     (tmp_path / "b" / "run.json").write_text("{")
     assert staleness(plan, tmp_path / "b") == "the record cannot be read"
+
+
+def test_a_value_given_by_a_fact_has_the_source_that_stands_beside_the_fact(folder):
+    text = SCENARIO.replace("  friction: 0.7\n", "")
+    text = text.replace("inputs:", "friction: 0.7   # chosen: wet\ninputs:")
+    (folder / "fact.yaml").write_text(text)
+    scenario = load_scenario(folder / "fact.yaml")
+    groups = groups_of([(scenario, make_plan(scenario, fmus=folder / "fmus"))])
+    origin = groups[-1].parameters["reference.friction"].origin
+    assert (origin.kind, origin.says) == (CHOSEN, "chosen: wet")
