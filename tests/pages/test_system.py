@@ -32,7 +32,9 @@ def plan(controller: str = "controller_off", *, extra: bool = False) -> Plan:
     }
     units = tuple(Unit(name, fmus[name], 1, {}, {}) for name in reversed(names))  # evaluation order
     scenario = {"units": dict.fromkeys(names)}
-    return Plan(units, tuple(wires), (), Fraction(1, 1000), 1000, "extrapolated", "made up", scenario)
+    return Plan(
+        units, tuple(wires), (), Fraction(1, 1000), 1000, "extrapolated", title="made up", scenario=scenario
+    )
 
 
 def texts(svg: str) -> list[str]:
