@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.metrics.run_metrics import columns_for, evaluate_all
 from orchestrator.pages.run_differences import differences
@@ -114,12 +115,15 @@ def test_files_are_listed_by_their_kind(yawbench, tmp_path, monkeypatch):
     assert "A sine" in yawbench("list", "scenarios", "s")[1]
 
 
-def test_signals_metrics_and_fmus_of_the_project_are_listed(yawbench):
-    assert "wheel_torque_*" in yawbench("list", "signals")[1]
+def test_signals_metrics_and_fmus_are_listed(yawbench, tmp_path):
+    build_all(tmp_path, components=("controller_fnn", "wheel_control_direct"))
     assert "relative_peak_error(x)" in yawbench("list", "metrics")[1]
-    fmus = yawbench("list", "fmus")[1]
+    fmus = yawbench("list", "fmus", tmp_path)[1]
     assert "controller_fnn" in fmus
-    assert "plant_seven_dof" in fmus
+    assert "wheel_control_direct" in fmus
+    signals = yawbench("list", "signals", "--fmus", tmp_path)[1]
+    assert "yaw_moment" in signals
+    assert "wheel_torque_*" in signals or "torque_request_*" in signals
 
 
 def test_metrics_need_only_the_columns_that_they_are_made_of(tmp_path):

@@ -55,10 +55,9 @@ class Trial:
     """A folder with scenario, study and sweep, in which commands are called."""
 
     def __init__(self, place: Path, fmus: Path) -> None:
-        self.place = place
+        self.place = place = place / "half"  # the same name each time: a sweep is known by it
         self._fmus = fmus
-        place.mkdir()
-        (place / "tmp").mkdir()
+        (place / "tmp").mkdir(parents=True)
         (place / "half.yaml").write_text(SCENARIO.replace("stop_time: 0.4", "stop_time: 40"))
         (place / "study.yaml").write_text(STUDY)
         (place / "sweep.yaml").write_text(SWEEP)
@@ -141,7 +140,7 @@ def trial(command: str, each: int, seed: int, folder: Path, fmus: Path) -> tuple
     notes: list[str] = []
     for number in range(each):
         one = Trial(folder / f"{command} {number}", fmus)
-        if r.random() < 0.5:  # with results of an earlier call in the folder
+        if command != "sweep" and r.random() < 0.5:  # with results of an earlier call, which a sweep keeps
             shutil.copytree(undisturbed.place / "out", one.place / "out")
         how = r.choice((signal.SIGKILL, signal.SIGTERM))
         after = r.uniform(0.1, 1.0) * duration
@@ -156,7 +155,7 @@ def trial(command: str, each: int, seed: int, folder: Path, fmus: Path) -> tuple
         counts["held" if not found else "did not hold"] += 1
         counts[how.name if alive else "had ended before"] += 1
         notes += [f"{command} {number}, {how.name} after {after:.2f} s: {sentence}" for sentence in found]
-        shutil.rmtree(one.place)
+        shutil.rmtree(one.place.parent)
     return counts, notes
 
 
