@@ -7,7 +7,6 @@ that its FMU would have: wiring, master and results treat it as they treat an FM
 from __future__ import annotations
 
 import copy
-import ctypes
 import functools
 import hashlib
 import inspect
@@ -30,7 +29,7 @@ from components.fmi.wheels import wheels
 from orchestrator.errors import ScenarioError
 from orchestrator.fmu.description import describe
 from orchestrator.master.log import ERROR, OK, Log
-from orchestrator.master.slave import Calls, Experiment, Status
+from orchestrator.master.slave import Buffers, Calls, Experiment, Status
 from orchestrator.master.unit import nothing_to_do
 from orchestrator.plan import Fmu, Place, Unit, Value
 
@@ -93,15 +92,8 @@ class ProgramSlave:
         """What the program has raised, None if nothing."""
         return getattr(self._component, "error", None)
 
-    def connect(
-        self,
-        inputs: np.ndarray,
-        input_places: Sequence[Place],
-        outputs: np.ndarray,
-        output_places: Sequence[Place],
-        time: ctypes.c_double,
-        step: ctypes.c_double,
-    ) -> Calls:
+    def connect(self, buffers: Buffers) -> Calls:
+        inputs, input_places, outputs, output_places, time, step = buffers
         component, status = self._component, self._status
         into, of = ([place.reference for place in places] for places in (input_places, output_places))
 

@@ -24,7 +24,7 @@ from fmpy.fmi2 import (
 
 from ..plan import Place, Unit
 from .log import ERROR, OK, listen, receive
-from .slave import Calls, Experiment, Status
+from .slave import Buffers, Calls, Experiment, Status
 from .unit import FmuSlave, nothing_to_do
 
 
@@ -55,15 +55,8 @@ class Fmi2Slave(FmuSlave):
             True,  # PythonFMU passes on no message at all without
         )
 
-    def connect(
-        self,
-        inputs: np.ndarray,
-        input_places: Sequence[Place],
-        outputs: np.ndarray,
-        output_places: Sequence[Place],
-        time: ctypes.c_double,
-        step: ctypes.c_double,
-    ) -> Calls:
+    def connect(self, buffers: Buffers) -> Calls:
+        inputs, input_places, outputs, output_places, time, step = buffers
         component = ctypes.c_void_p(self._component)
         return Calls(
             self._fast("SetReal", component, input_places, inputs),

@@ -21,7 +21,7 @@ from fmpy.fmi3 import FMU3Slave, fmi3IntermediateUpdateCallback, fmi3LogMessageC
 from ..fmu.binary import INTEGERS
 from ..plan import Place, Unit
 from .log import DISCARD, ERROR, OK, WARNING, listen, receive
-from .slave import Calls, Experiment, Status
+from .slave import Buffers, Calls, Experiment, Status
 from .unit import FmuSlave, nothing_to_do
 
 
@@ -62,15 +62,8 @@ class Fmi3Slave(FmuSlave):
             fmi3IntermediateUpdateCallback(),
         )
 
-    def connect(
-        self,
-        inputs: np.ndarray,
-        input_places: Sequence[Place],
-        outputs: np.ndarray,
-        output_places: Sequence[Place],
-        time: ctypes.c_double,
-        step: ctypes.c_double,
-    ) -> Calls:
+    def connect(self, buffers: Buffers) -> Calls:
+        inputs, input_places, outputs, output_places, time, step = buffers
         return Calls(
             self._calls("Set", inputs, input_places),
             self._stepping(time, step),

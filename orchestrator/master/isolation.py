@@ -8,7 +8,6 @@ inputs waits for the step and outputs come back with it, so a unit costs one exc
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import functools
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -24,7 +23,7 @@ from .exchange import GET, SET, STEP, Board, Garbled
 from .log import FATAL, OK, PROCESS, WARNING, Log
 from .opening import SLAVES, open_unit
 from .process import Lost, UnitProcess
-from .slave import Calls, Experiment, Slave, Status
+from .slave import Buffers, Calls, Experiment, Slave, Status
 
 CALL_LIMIT = 10.0
 """Time that a call of an FMU may take [s]; chosen: ten thousand times what a step takes, and still
@@ -85,15 +84,8 @@ class IsolatedSlave:
     def _refused(self, sentence: str) -> SimulationError:
         return SimulationError(sentence, unit=self.name, time=0.0)
 
-    def connect(
-        self,
-        inputs: np.ndarray,
-        input_places: Sequence[Place],
-        outputs: np.ndarray,
-        output_places: Sequence[Place],
-        time: ctypes.c_double,
-        step: ctypes.c_double,
-    ) -> Calls:
+    def connect(self, buffers: Buffers) -> Calls:
+        inputs, input_places, outputs, output_places, time, step = buffers
         assert self._process is not None
         board = Board(self._process.memory, len(input_places), len(output_places))
         self._board = board

@@ -28,7 +28,7 @@ from .interrupts import StopFlag
 from .log import DISCARD, MASTER, OK, WARNING, Log
 from .memory import Memory
 from .program import Operation, Programs
-from .slave import Slave, Status
+from .slave import Buffers, Slave, Status
 from .surroundings import Surroundings
 
 ALMOST = 1e-6
@@ -76,14 +76,9 @@ class Master:
         self._clocks = {1: log.time} | {period: ctypes.c_double(0.0) for period in slow}
         for s in memory.stations:
             period = s.unit.period
-            s.calls = s.slave.connect(
-                s.u,
-                [v.place for v in s.inputs],
-                s.y,
-                [v.place for v in s.outputs],
-                self._clocks[period],
-                ctypes.c_double(float(period * plan.step)),
-            )
+            size = ctypes.c_double(float(period * plan.step))
+            into, of = [v.place for v in s.inputs], [v.place for v in s.outputs]
+            s.calls = s.slave.connect(Buffers(s.u, into, s.y, of, self._clocks[period], size))
         self.programs = Programs(memory)
         self._operations: dict[int, list[Operation]] = {}  # of the stretch being stepped, by phase
         real = [memory.index[key] for key in plan.record if key in memory.index]

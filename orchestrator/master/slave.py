@@ -21,6 +21,17 @@ class Calls(NamedTuple):
     get: Callable[[], Status]
 
 
+class Buffers(NamedTuple):
+    """Where master and instance meet in a step: arrays of floating-point values, one item per place."""
+
+    inputs: np.ndarray
+    input_places: Sequence[Place]
+    outputs: np.ndarray
+    output_places: Sequence[Place]
+    time: ctypes.c_double  # at which the step begins [s], read at every call
+    step: ctypes.c_double  # its size [s], likewise
+
+
 class Experiment(NamedTuple):
     """What an instance is told of the run before it is initialized."""
 
@@ -34,19 +45,8 @@ class Slave(Protocol):
 
     name: str
 
-    def connect(
-        self,
-        inputs: np.ndarray,
-        input_places: Sequence[Place],
-        outputs: np.ndarray,
-        output_places: Sequence[Place],
-        time: ctypes.c_double,
-        step: ctypes.c_double,
-    ) -> Calls:
-        """Return the calls that exchange floating-point values through the two arrays.
-
-        `step` takes the instance from `time` [s] to `time` + `step` [s], both read at the call.
-        """
+    def connect(self, buffers: Buffers) -> Calls:
+        """Return the calls of a step, which exchange floating-point values through the buffers."""
 
     def part(self, kind: str) -> str:
         """Return which kind of call (set, step, get) has failed when one of `kind` did not return OK."""

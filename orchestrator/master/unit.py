@@ -16,14 +16,12 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
-import numpy as np
-
 from ..errors import ModelDescriptionError, SimulationError
 from ..fmu.binary import CORE, binary_problem
 from ..plan import Place, Unit, Value
 from ..wording import listed
 from .log import ERROR, FATAL, OK, STATUS, WARNING, Log, known, unlisten
-from .slave import Calls, Experiment, Status
+from .slave import Buffers, Calls, Experiment, Status
 
 
 class FmuSlave(ABC):
@@ -114,15 +112,7 @@ class FmuSlave(ABC):
         return hasattr(self._library, self.prefix + name)
 
     @abstractmethod
-    def connect(
-        self,
-        inputs: np.ndarray,
-        input_places: Sequence[Place],
-        outputs: np.ndarray,
-        output_places: Sequence[Place],
-        time: ctypes.c_double,
-        step: ctypes.c_double,
-    ) -> Calls: ...
+    def connect(self, buffers: Buffers) -> Calls: ...
 
     @abstractmethod
     def setup(self, experiment: Experiment) -> Status: ...

@@ -18,7 +18,7 @@ from .guardian import stand_guard
 from .log import OK, WARNING
 from .opening import open_unit
 from .relay import Relay
-from .slave import Experiment
+from .slave import Buffers, Experiment
 from .surroundings import Surroundings
 from .unit import FmuSlave
 
@@ -85,7 +85,7 @@ class Worker:
     def connect(self, input_places: Sequence[Place], output_places: Sequence[Place]) -> None:
         board = Board(self._memory, len(input_places), len(output_places))
         calls = self._slave.connect(
-            board.inputs, input_places, board.outputs, output_places, board.time, board.step
+            Buffers(board.inputs, input_places, board.outputs, output_places, board.time, board.step)
         )
         self._part = board.part
         self._answer = board.answer

@@ -48,7 +48,8 @@ class FakeSlave:
         self.time = 0.0
         self.started = False
 
-    def connect(self, inputs, input_places, outputs, output_places, time, step) -> Calls:
+    def connect(self, buffers) -> Calls:
+        inputs, input_places, outputs, output_places, time, step = buffers
         input_names = self._named(input_places)
         output_names = self._named(output_places)
 

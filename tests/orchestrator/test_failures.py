@@ -94,8 +94,8 @@ def answering(status, *messages, call="step", at=3):
     """Return a kind of slave that logs and returns a status in its `at`th call of a kind."""
 
     class Slave(FakeSlave):
-        def connect(self, *args):
-            calls = super().connect(*args)
+        def connect(self, buffers):
+            calls = super().connect(buffers)
             count = iter(range(1, 10**9))
 
             def answer():
@@ -131,8 +131,8 @@ def test_the_first_error_that_was_logged_is_the_reason(tmp_path):
 
 def test_an_error_after_which_a_unit_went_on_is_reported_and_not_taken_for_the_reason(tmp_path):
     class Slave(answering(ERROR, at=4)):
-        def connect(self, *args):
-            calls = super().connect(*args)
+        def connect(self, buffers):
+            calls = super().connect(buffers)
 
             def step():
                 if self.time < 0.05:
@@ -253,9 +253,9 @@ def test_a_failure_downstream_of_a_nan_is_blamed_on_its_source(tmp_path):
 
 def test_a_nan_from_a_unit_that_has_logged_an_error_is_explained_by_it(tmp_path):
     class Slave(FakeSlave):
-        def connect(self, *args):
-            calls = super().connect(*args)
-            outputs = args[2]
+        def connect(self, buffers):
+            calls = super().connect(buffers)
+            outputs = buffers.outputs
 
             def get():
                 calls.get()
