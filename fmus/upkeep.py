@@ -5,7 +5,7 @@ now. To find that key takes a tenth of a second; it is kept in the cache with it
 takes a few milliseconds to look at. FMUs are built in their place: those of the project's
 components in its folder `fmus/`, those of somebody's own files where they were built. A copy that
 somebody put elsewhere is never touched, only told of. Where the folder cannot be written, FMUs are
-built into the cache.
+built into the cache, as are those of an installed yawbench: a package's folder is its installer's.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ HERE = Path(__file__).resolve().parent
 KEYS = "keys"
 """Store of keys, with their evidence, in the cache."""
 BUILT = "fmus"
-"""Folder of the cache for FMUs whose own folder cannot be written."""
+"""Folder of the cache for FMUs that are not built in their own folder."""
 _NO_KEY = "none"
 """Of sources that cannot be read or parsed."""
 
@@ -58,7 +58,7 @@ class Upkeep:
         return self._found[archive, build]
 
     def _bring(self, archive: Path, build: bool) -> tuple[Path, Built | None]:
-        places = dict.fromkeys((archive, writable(archive.parent) / archive.name))
+        places = dict.fromkeys((archive, place_of(archive.parent) / archive.name))
         marks = {place: read_mark(place) for place in places if os.path.exists(place)}
         if archive in marks and marks[archive] is None:
             return archive, None
@@ -112,7 +112,7 @@ class Upkeep:
     def _build(self, archive: Path, mark: Mark) -> tuple[Path, Built]:
         from .build import bring_up_to_date, component_mark
 
-        target = writable(archive.parent) / archive.name
+        target = place_of(archive.parent) / archive.name
         recipe = self._recipe(archive, mark)
         assert recipe is not None
         if mark.is_component:
@@ -124,13 +124,14 @@ class Upkeep:
         return target, _built(made, current=True)
 
 
-def writable(folder: Path) -> Path:
-    """Return where FMUs are built that belong into `folder`."""
-    return folder if os.access(folder, os.W_OK) else in_cache(folder)
+def place_of(folder: Path) -> Path:
+    """Return where FMUs are built that belong into `folder`: there, or in the cache."""
+    installed = folder == HERE and not (HERE.parent / "pyproject.toml").exists()
+    return folder if os.access(folder, os.W_OK) and not installed else in_cache(folder)
 
 
 def in_cache(folder: Path) -> Path:
-    """Return where FMUs stand whose own folder cannot be written."""
+    """Return where FMUs stand whose own folder cannot be written, or is not a checkout's."""
     return cache_folder() / BUILT / content_digest(str(folder).encode())
 
 

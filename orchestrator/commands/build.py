@@ -18,7 +18,7 @@ Components = Annotated[
 ]
 Target = Annotated[
     Path | None,
-    typer.Option("--out", metavar="DIR", help="Folder for the FMUs; default: fmus/ beside components/."),
+    typer.Option("--out", metavar="DIR", help="Folder for the FMUs; default: fmus/ of a checkout, else the cache."),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Build also what has not changed.")]
 
@@ -26,11 +26,11 @@ Force = Annotated[bool, typer.Option("--force", help="Build also what has not ch
 def build(components: Components = None, out: Target = None, force: Force = False) -> None:
     """Build the FMUs whose sources have changed."""
     from fmus.build import HERE, build_all, build_component, find_recipes
-    from fmus.upkeep import writable
+    from fmus.upkeep import place_of
 
-    target = out or writable(HERE)
+    target = out or place_of(HERE)
     if out is None and target != HERE:
-        print(f"{HERE} cannot be written; FMUs go to {target}", file=sys.stderr)
+        print(f"FMUs go to {target}", file=sys.stderr)
 
     from orchestrator.wording import hint
 
