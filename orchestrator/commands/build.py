@@ -18,7 +18,9 @@ Components = Annotated[
 ]
 Target = Annotated[
     Path | None,
-    typer.Option("--out", metavar="DIR", help="Folder for the FMUs; default: fmus/ of a checkout, else the cache."),
+    typer.Option(
+        "--out", metavar="DIR", help="Folder for the FMUs; default: fmus/ of a checkout, else the cache."
+    ),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Build also what has not changed.")]
 
@@ -50,7 +52,7 @@ def build(components: Components = None, out: Target = None, force: Force = Fals
     names = [name for name in named if name in known]
     if named and not names:
         return
-    report = build_all(target, components=names or None, force=force, progress=_show)
+    report = build_all(target, components=names or None, force=force, progress=tell_of_build)
     if report.warning:
         why = f"these FMUs load in Python only, they have no launcher: {report.warning}"
         print(f"warning: {why}", file=sys.stderr)
@@ -59,6 +61,7 @@ def build(components: Components = None, out: Target = None, force: Force = Fals
         print(f"{len(report.current)} of {total} FMUs up to date", file=sys.stderr)
 
 
-def _show(name: str, what: str) -> None:
+def tell_of_build(name: str, what: str) -> None:
+    """Say what became of an FMU, unless nothing had to be done."""
     if what != "current":
         print(f"{name}: {what}", file=sys.stderr)

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from .build import tell_of_build
 from .options import Fmus
 from .planning import plan_of_scenario
 
@@ -23,7 +24,12 @@ class What(str, Enum):
     metrics = "metrics"
 
 
-Wanted = Annotated[What, typer.Argument(help="What to list.", metavar="WHAT")]
+Wanted = Annotated[
+    What | None,
+    typer.Argument(help="What to list; default: scenarios and vehicles.", metavar="WHAT"),
+]
+SCENARIOS = ("a scenario", "a study file", "a sweep file")
+VEHICLES = ("a vehicle file",)
 Place = Annotated[
     Path | None,
     typer.Argument(
@@ -34,7 +40,7 @@ Place = Annotated[
 ]
 
 
-def list(what: Wanted, place: Place = None, fmus: Fmus = None) -> None:
+def list(what: Wanted = None, place: Place = None, fmus: Fmus = None) -> None:
     """List runs, scenarios, fmus, vehicles, signals or metrics.
 
     Of runs it says when they began, of which scenario, what was changed, how they ended, and the largest
@@ -45,13 +51,17 @@ def list(what: Wanted, place: Place = None, fmus: Fmus = None) -> None:
     from ..studies import listing
     from .batch import print_tables
 
+    if what is None:
+        tables = [listing.files_table(None, kinds) for kinds in (SCENARIOS, VEHICLES)]
+        tables[-1].notes.append("'yawbench list' also lists runs, fmus, signals and metrics.")
+        print_tables(tables)
+        return
     if what is What.runs:
         table = listing.runs_table(found_runs(place or Path("results")))
     elif what is What.scenarios:
-        kinds = ("a scenario", "a study file", "a sweep file")
-        table = listing.files_table(place or catalogue.folders()[0], kinds)
+        table = listing.files_table(place, SCENARIOS)
     elif what is What.vehicles:
-        table = listing.files_table(place or catalogue.folders()[0], ("a vehicle file",))
+        table = listing.files_table(place, VEHICLES)
     elif what is What.metrics:
         table = listing.metrics_table()
     elif what is What.signals and place is not None:
@@ -66,12 +76,20 @@ def list(what: Wanted, place: Place = None, fmus: Fmus = None) -> None:
 
 
 def _folder_of_fmus(given: Path | None) -> Path:
+    """Return the folder given, or the nearest one; where there is none, the project's FMUs are built."""
+    from fmus.build import build_all
+    from fmus.upkeep import place_of
+
     from ..errors import ModelDescriptionError
-    from ..fmu.opener import Opener
+    from ..fmu.opener import HOME, Opener
     from ..fmu.search import find_folder
 
     if given is None:
-        return find_folder(Path("here"), opener=Opener(build=False))
+        folder = find_folder(Path("here"), opener=Opener(build=True))
+        if folder == HOME:
+            folder = place_of(HOME)
+            build_all(folder, progress=tell_of_build)
+        return folder
     if not any(given.glob("*.fmu")):
         raise ModelDescriptionError(f"{given}: holds no FMUs")
     return given

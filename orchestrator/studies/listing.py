@@ -64,22 +64,30 @@ def _peak(record: dict[str, Any], signal: str) -> Value | None:
     return Value(max(map(abs, numbers)), units[found[0]] or "1")
 
 
-def files_table(folder: Path, kinds: Sequence[str]) -> Table:
-    """Return a table of YAML files of some kinds (`strict.KINDS`) and SSP archives below a folder.
+def files_table(folder: Path | None, kinds: Sequence[str]) -> Table:
+    """Return a table of YAML files of some kinds (`strict.KINDS`) and SSP archives.
+
+    Those below a folder by their paths; without one, those that commands take by name.
 
     Raises:
         ScenarioError: there is no such folder, or no such file in it.
     """
-    if not folder.is_dir():
+    if folder is not None and not folder.is_dir():
         raise ScenarioError(f"{folder}: there is no such folder")
-    table = Table("", ["file", "kind", "title"])
-    for path, kind in catalogue.files(folder, kinds):
-        archive = path.suffix == ".ssp"
-        data = None if archive else yaml_lines.read(path, what="file").data
-        title = str(data.get("title") or "") if isinstance(data, dict) else ""
-        table.rows.append([str(path), "SSP archive" if archive else kind.partition(" ")[2], title or None])
+    table = Table("", ["name" if folder is None else "file", "kind", "title"])
+    rows: dict[str, Sequence[Cell]] = {}
+    for base in catalogue.folders() if folder is None else [folder]:
+        for path, kind in catalogue.files(base, kinds):
+            archive = path.suffix == ".ssp"
+            data = None if archive else yaml_lines.read(path, what="file").data
+            title = str(data.get("title") or "") if isinstance(data, dict) else ""
+            by_name = folder is None and kind in catalogue.COMMANDS
+            name = path.relative_to(base).with_suffix("").as_posix() if by_name else str(path)
+            rows.setdefault(name, [name, "SSP archive" if archive else kind.partition(" ")[2], title or None])
+    table.rows = [*rows.values()]
     if not table.rows:
-        raise ScenarioError(f"{folder}: holds no file that is {' or '.join(kinds)}")
+        where = folder or " and ".join(map(str, catalogue.folders()))
+        raise ScenarioError(f"{where}: holds no file that is {' or '.join(kinds)}")
     return table
 
 

@@ -132,3 +132,17 @@ def test_metrics_need_only_the_columns_that_they_are_made_of(tmp_path):
     some = load_results(folder, only=lambda recorded: columns_for(recorded, names))
     assert len(some.columns) == 6 < len(load_results(folder).columns)
     assert evaluate_all(some, names) == evaluate_all(load_results(folder), names)
+
+
+def test_without_a_word_the_list_shows_scenarios_by_name_then_vehicles(yawbench, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    mine = tmp_path / "scenarios" / "mine" / "turn.yaml"
+    mine.parent.mkdir(parents=True)
+    mine.write_text("title: My turn\nstop_time: 1\nstep_size: 0.01\nunits: {driver: {fmu: driver_sine}}\n")
+    status, out, _ = yawbench("list")
+    assert status == 0
+    rows = [line.split() for line in out.splitlines() if line.strip()]
+    kinds = [row[1] for row in rows if len(row) > 2 and row[1] in ("scenario", "study", "sweep", "vehicle")]
+    assert rows[2][:2] == ["mine/turn", "scenario"]
+    assert ["fnn_sideslip/25mps", "scenario"] in [row[:2] for row in rows]
+    assert kinds.index("vehicle") > kinds.index("sweep") > 0

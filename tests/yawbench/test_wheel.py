@@ -1,0 +1,80 @@
+"""The wheel, installed in an environment without the checkout, used in an empty folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import yawbench as yb
+from tests.checkout import copy_checkout
+
+pytestmark = pytest.mark.exhaustive
+
+
+def run(*command: str | Path, cwd: Path, **environment: str) -> str:
+    """Run a command without this checkout on Python's path; return what it prints."""
+    plain = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    done = subprocess.run(
+        command, cwd=cwd, env=plain | environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An environment with the wheel; its dependencies are those of the environment of the tests."""
+    folder = tmp_path_factory.mktemp("wheel")
+    checkout = copy_checkout(folder / "checkout")
+    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check")
+    build = (*pip, "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--no-index")
+    run(*build, "--wheel-dir", folder, checkout, cwd=folder)
+    (wheel,) = folder.glob("yawbench-*.whl")
+    environment = folder / "environment"
+    run(sys.executable, "-m", "venv", "--without-pip", environment, cwd=folder)
+    (packages,) = environment.glob("lib/python*/site-packages")
+    shared = [path for path in sys.path if path.endswith("site-packages")]
+    (packages / "shared.pth").write_text("\n".join(shared))
+    python = environment / "bin" / "python"
+    run(*pip, "--python", python, "install", "--quiet", "--no-deps", "--no-index", wheel, cwd=folder)
+    return environment
+
+
+@pytest.fixture
+def empty(tmp_path: Path) -> Path:
+    """An empty folder."""
+    folder = tmp_path / "empty"
+    folder.mkdir()
+    return folder
+
+
+def test_the_installed_command_lists_the_scenarios_and_vehicles_shipped(installed, empty):
+    shown = run(installed / "bin" / "yawbench", "list", cwd=empty)
+    assert "fnn_sideslip/25mps" in shown
+    assert "Small electric car with four in-wheel motors" in shown
+    assert not list(empty.iterdir())
+
+
+def test_the_installed_command_runs_a_scenario_with_fmus_built_into_the_cache(installed, empty):
+    cache = empty.parent / "cache"
+    run(installed / "bin" / "yawbench", "run", "fnn_sideslip/25mps", cwd=empty, YAWBENCH_CACHE=str(cache))
+    record = json.loads((empty / "results" / "fnn_sideslip" / "25mps" / "run.json").read_text())
+    (packages,) = installed.glob("lib/python*/site-packages")
+    assert record["status"] == "completed"
+    assert Path(record["scenario"]["file"]).is_relative_to(packages)
+    assert {path.stem for path in cache.rglob("*.fmu")} >= {"plant_seven_dof", "tyre_dugoff"}
+    assert not list(packages.rglob("*.fmu"))
+
+
+def test_the_installed_library_runs_a_scenario_in_memory(installed, empty):
+    program = "import yawbench as yb; print(yb.load('fnn_sideslip/25mps').run().metric('peak(sideslip)'))"
+    printed = run(
+        installed / "bin" / "python", "-c", program, cwd=empty, YAWBENCH_CACHE=str(empty.parent / "cache")
+    )
+    assert float(printed) == yb.load("fnn_sideslip/25mps").run().metric("peak(sideslip)")
+    assert not list(empty.iterdir())
