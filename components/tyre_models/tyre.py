@@ -1,19 +1,20 @@
 """The base of tyres: four wheels by the law of one.
 
-A tyre declares its parameters and overrides up to three functions:
+A tyre declares its parameters and overrides up to four functions:
 
     wheel(kappa, alpha, f_z, mu, axle)    its outputs on one wheel, without `tyre_slip_ratio`: the law
     axle(p, name)                         what the law needs of the parameters for "front" or "rear"
     curve(alpha, f_z, mu, axle)           F_x of kappa alone, for who looks for the slip of a force
+    for_curve(p)                          what `curve` needs of the parameters, per wheel
 
 Slips and axes are those of the interface: forces act at the contact point, in wheel axes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from itertools import chain
-from typing import Any
+from typing import Any, ClassVar
 
 from ..fmi.component import Component
 from ..fmi.variables import Signal, output
@@ -24,9 +25,9 @@ Curve = tuple[Callable[[float], float], float]
 INPUTS = ("slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*")
 
 
-def law_outputs(*names: str) -> tuple[Signal, ...]:
-    """Declare what the law of one wheel gives, in this order, and the slip that it belongs to."""
-    return (*(output(name, *INPUTS) for name in names), output("tyre_slip_ratio_*", "slip_ratio_*"))
+def law_outputs(*names: str, inputs: Iterable[str] = INPUTS) -> tuple[Signal, ...]:
+    """Declare what the law of one wheel gives of `inputs`, in this order, and the slip that it belongs to."""
+    return (*(output(name, *inputs) for name in names), output("tyre_slip_ratio_*", "slip_ratio_*"))
 
 
 def no_force(kappa: float) -> float:
@@ -37,8 +38,15 @@ def no_force(kappa: float) -> float:
 class Tyre(Component):
     """Base: four tyres by the law of one wheel."""
 
-    inputs = INPUTS
+    inputs: ClassVar[Any] = INPUTS
     outputs = law_outputs("tyre_force_x_*", "tyre_force_y_*", "slip_stiffness_*")
+    CurveParameters: ClassVar[type]
+    """The parameters that `curve` needs; left out: all."""
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if "CurveParameters" not in cls.__dict__:
+            cls.CurveParameters = cls.Parameters
 
     @staticmethod
     def wheel(kappa: float, alpha: float, f_z: float, mu: float, axle: Any) -> tuple[float, ...]:
@@ -61,6 +69,12 @@ class Tyre(Component):
         """Return F_x [N] of kappa at fixed slip angle [rad], load [N] and friction [1]."""
         wheel = cls.wheel
         return lambda kappa: wheel(kappa, alpha, f_z, mu, axle)[0], 1.0
+
+    @classmethod
+    def for_curve(cls, p: Any) -> tuple[Any, Any, Any, Any]:
+        """Return what `curve` needs of the parameters `p` as `axle`, for fl, fr, rl, rr."""
+        front, rear = cls.axle(p, "front"), cls.axle(p, "rear")
+        return front, front, rear, rear
 
     def configure(self) -> None:
         self.front, self.rear = self.axle(self.p, "front"), self.axle(self.p, "rear")

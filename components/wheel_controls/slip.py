@@ -19,23 +19,25 @@ from ..tyre_models.tyre import Tyre
 from ..tyres.dugoff import Dugoff
 from ..tyres.linear import LinearTyre
 from ..tyres.magic_formula import MagicFormula
+from ..tyres.magic_formula_62 import MagicFormula62
 from ..tyres.magic_formula_1987 import MagicFormula1987
 
 TYRES: dict[str, type[Tyre]] = {
     "magic_formula": MagicFormula,
     "magic_formula_1987": MagicFormula1987,
+    "magic_formula_62": MagicFormula62,
     "dugoff": Dugoff,
     "linear": LinearTyre,
 }
 """The tyres whose curve can be asked for."""
 
 
-OF_TYRES: Any = tuple(tyre.Parameters for tyre in TYRES.values())
+OF_TYRES: Any = tuple(tyre.CurveParameters for tyre in TYRES.values())
 
 
 @dataclass(frozen=True)
 class SlipParameters(SlipControlParameters, *OF_TYRES):  # type: ignore[misc]  # as many bases as tyres
-    """The slip control's own, and those of all tyres; only those of the chosen tyre are used."""
+    """The slip control's own, and those of all tyres' curves; only those of the chosen tyre are used."""
 
     tyre: str = parameter(
         "magic_formula",
@@ -70,8 +72,7 @@ class Slip(Component):
     sampled = True
 
     def configure(self) -> None:
-        tyre = TYRES[self.p.tyre]
-        self.axles = [tyre.axle(self.p, name) for name in ("front", "front", "rear", "rear")]
+        self.axles = TYRES[self.p.tyre].for_curve(self.p)
 
     def start(self, t: float, u: list[float]) -> None:
         *_, self.velocities, _ = self.by_signal(u)

@@ -78,6 +78,8 @@ ODD = {
     *wheels("tyre_force_y_*"),
     *wheels("slip_angle_*"),
     *wheels("aligning_moment_*"),
+    *wheels("overturning_moment_*"),
+    *wheels("inclination_angle_*"),
 }
 """What changes its sign in a mirror; all else keeps it."""
 LOPSIDED = {("asymmetric_terms", True), ("table_reading", "printed"), ("wheel_choice", "printed")}

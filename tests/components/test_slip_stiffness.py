@@ -10,6 +10,7 @@ import pytest
 from components.tyres.dugoff import Dugoff, dugoff, dugoff_slip_stiffness
 from components.tyres.linear import LinearTyre
 from components.tyres.magic_formula import MagicFormula
+from components.tyres.magic_formula_62 import MagicFormula62
 from components.tyres.magic_formula_1987 import MagicFormula1987
 
 from .stand import Stand
@@ -21,6 +22,7 @@ TYRES = [
     pytest.param(MagicFormula, {}, id="Magic Formula"),
     pytest.param(MagicFormula, {"low_friction": "similarity"}, id="Magic Formula, similarity"),
     pytest.param(MagicFormula, {"asymmetric_terms": True}, id="Magic Formula, asymmetric"),
+    pytest.param(MagicFormula62, {}, id="6.2, asymmetric"),
     pytest.param(MagicFormula1987, {}, id="1987"),
     pytest.param(MagicFormula1987, {"peak_friction": "measured"}, id="1987, measured"),
 ]

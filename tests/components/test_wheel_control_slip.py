@@ -16,6 +16,7 @@ from components.tyre_models.slip_curve import slip_for_force, slip_stiffness
 from components.tyres.dugoff import Dugoff
 from components.tyres.linear import LinearTyre
 from components.tyres.magic_formula import MagicFormula
+from components.tyres.magic_formula_62 import MagicFormula62
 from components.tyres.magic_formula_1987 import MagicFormula1987
 from components.wheel_controls.direct import Direct
 from components.wheel_controls.slip import TYRES as KNOWN
@@ -39,6 +40,7 @@ TYRES = {
         "low_friction": "similarity",
         "asymmetric_terms": True,
     },
+    "magic formula 6.2, asymmetric": {"tyre": "magic_formula_62"},
     "magic formula 1987": {"tyre": "magic_formula_1987"},
     "magic formula 1987, measured": {"tyre": "magic_formula_1987", "peak_friction": "measured"},
     "dugoff": {"tyre": "dugoff"},
@@ -49,7 +51,7 @@ TYRES = {
 
 def curve_of(p, axle, alpha=0.0, f_z=4000.0, mu=1.0):
     tyre = KNOWN[p.tyre]
-    return tyre.curve(alpha, f_z, mu, tyre.axle(p, axle))
+    return tyre.curve(alpha, f_z, mu, tyre.for_curve(p)[0 if axle == "front" else 2])
 
 
 def tyre_curve(alpha, f_z, mu, **given):
@@ -165,6 +167,7 @@ def test_zero_force_of_a_tyre_with_offsets_needs_a_slip():
 def test_the_curve_that_is_inverted_is_that_of_the_tyre_unit(name):
     units = {
         "magic_formula": MagicFormula,
+        "magic_formula_62": MagicFormula62,
         "magic_formula_1987": MagicFormula1987,
         "dugoff": Dugoff,
         "linear": LinearTyre,
@@ -180,6 +183,15 @@ def test_the_curve_that_is_inverted_is_that_of_the_tyre_unit(name):
         slips = {"slip_angle_rl": alpha, "slip_ratio_rl": kappa, "vertical_load_rl": f_z, "friction_rl": mu}
         force, _ = tyre_curve(alpha, f_z, mu, **TYRES[name])
         assert force(kappa) == pytest.approx(stand.step(0.001, **slips)["tyre_force_x_rl"], rel=1e-14)
+
+
+def test_right_wheels_ask_the_mirror_of_a_set_that_tells_left_from_right():
+    p = SlipParameters(tyre="magic_formula_62", rhx1_front=0.03)
+    left, right = KNOWN["magic_formula_62"].for_curve(p)[:2]
+    forces = [
+        MagicFormula62.curve(alpha, 4000.0, 1.0, s)[0](-0.03) for alpha, s in ((0.04, left), (-0.04, right))
+    ]
+    assert forces[0] == forces[1] != MagicFormula62.curve(0.04, 4000.0, 1.0, right)[0](-0.03)
 
 
 def test_each_axle_has_its_own_stiffness():
@@ -465,5 +477,5 @@ def test_the_law_has_no_memory_but_the_acceleration():
 
 
 def test_an_unknown_tyre_is_refused_with_the_known_ones():
-    with pytest.raises(AssertionError, match="magic_formula, magic_formula_1987, dugoff, linear"):
+    with pytest.raises(AssertionError, match="magic_formula, magic_formula_1987, magic_formula_62, dugoff, linear"):
         Stand(Slip, tyre="brush").start()

@@ -21,7 +21,7 @@ CONTROLLERS = (
     "fuzzy_feedback",
 )  # fmt: skip
 PLANTS = ("seven_dof", "eight_dof", "fourteen_dof")
-TYRES = ("dugoff", "linear", "magic_formula", "magic_formula_1987")
+TYRES = ("dugoff", "linear", "magic_formula", "magic_formula_62", "magic_formula_1987")
 UNITS = (
     "driver_sine", "reference_single_track", "allocator_load_proportional", "wheel_control_slip",
     "actuator_lag",

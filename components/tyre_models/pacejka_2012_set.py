@@ -1,0 +1,258 @@
+"""The coefficients of a tyre property file as parameters: each once for the front, once for the rear axle.
+
+Names are those of the file in lower case with the axle behind: PCX1 (p_Cx1 of the book) is pcx1_front and
+pcx1_rear. A coefficient that a file lacks keeps its default, so files are handed over whole.
+
+Defaults: H. B. Pacejka, Tyre and Vehicle Dynamics, 3rd ed. 2012, table A3.1, 205/60R15 91V at 2.2 bar.
+Coefficients that the table does not list are zero, scaling factors one.
+
+Not here: turn slip (PDXP*, PKYP*, PDYP*, PHYP*, PECP*, QDTP1, QCRP*, QBRP1, QDRP*), the moment M_y of rolling
+resistance (QSY*: plants have their own), the decay of friction with speed (LMUV), ranges but FZMAX.
+"""
+
+from __future__ import annotations
+
+from dataclasses import make_dataclass
+from typing import Any, NamedTuple
+
+from ..fmi.variables import parameter
+
+_BOOK = "Pacejka 2012, table A3.1"
+
+
+class _Row(NamedTuple):
+    default: float
+    text: str
+    unit: str = "1"
+    minimum: float | None = None
+    maximum: float | None = None
+
+
+def _scale(of: str) -> _Row:
+    return _Row(1.0, f"Scaling of {of}; chosen: the set as measured")
+
+
+COMMON = {
+    "tyreside": _Row(
+        1.0,
+        "Side of the car that the set belongs to: 1 left, -1 right; wheels of the other side are its mirror; "
+        "chosen: left",
+        minimum=-1.0,
+        maximum=1.0,
+    ),
+    "fnomin": _Row(4000.0, f"Nominal load F_z0; {_BOOK}", "N", 1.0),
+    "fzmax": _Row(
+        12000.0,
+        "Load above which forces are proportional to it, all coefficients held; chosen: three times nominal",
+        "N",
+        1.0,
+    ),
+    "nompres": _Row(220000.0, f"Nominal inflation pressure p_i0; {_BOOK}", "Pa", 1000.0),
+    "inflpres": _Row(220000.0, f"Inflation pressure p_i; {_BOOK}", "Pa", 1000.0),
+    "lfzo": _Row(1.0, "Scaling of the nominal load; chosen: the set as measured", "1", 0.01),
+}
+"""What every part of the law needs."""
+
+LONGITUDINAL = {
+    "lcx": _scale("the shape factor C of F_x"),
+    "lmux": _scale("the friction mu_x"),
+    "lex": _scale("the curvature E of F_x"),
+    "lkx": _scale("the slip stiffness K_x"),
+    "lhx": _scale("the horizontal shift of F_x"),
+    "lvx": _scale("the vertical shift of F_x"),
+    "lgax": _scale("camber in F_x (5.2)"),
+    "lxal": _scale("the reduction of F_x by slip angle"),
+    "pcx1": _Row(1.685, f"Shape factor C of F_x; {_BOOK}", "1", 0.01),
+    "pdx1": _Row(1.210, f"Friction mu_x at nominal load; {_BOOK}"),
+    "pdx2": _Row(-0.037, f"Variation of mu_x with load; {_BOOK}"),
+    "pdx3": _Row(0.0, f"Variation of mu_x with camber squared; {_BOOK}"),
+    "pex1": _Row(0.344, f"Curvature E of F_x at nominal load; {_BOOK}"),
+    "pex2": _Row(0.095, f"Variation of E of F_x with load; {_BOOK}"),
+    "pex3": _Row(-0.020, f"Variation of E of F_x with load squared; {_BOOK}"),
+    "pex4": _Row(0.0, f"Difference of E of F_x between driving and braking; {_BOOK}"),
+    "pkx1": _Row(21.51, f"Slip stiffness K_x / F_z at nominal load; {_BOOK}"),
+    "pkx2": _Row(-0.163, f"Variation of K_x / F_z with load; {_BOOK}"),
+    "pkx3": _Row(0.245, f"Exponent of K_x / F_z with load; {_BOOK}"),
+    "phx1": _Row(-0.002, f"Horizontal shift of F_x at nominal load; {_BOOK}"),
+    "phx2": _Row(0.002, f"Variation of the horizontal shift of F_x with load; {_BOOK}"),
+    "pvx1": _Row(0.0, f"Vertical shift of F_x / F_z at nominal load; {_BOOK}"),
+    "pvx2": _Row(0.0, f"Variation of the vertical shift of F_x / F_z with load; {_BOOK}"),
+    "ppx1": _Row(0.0, "Variation of K_x with pressure; chosen: not known of this tyre"),
+    "ppx2": _Row(0.0, "Variation of K_x with pressure squared; chosen: likewise"),
+    "ppx3": _Row(0.0, "Variation of mu_x with pressure; chosen: likewise"),
+    "ppx4": _Row(0.0, "Variation of mu_x with pressure squared; chosen: likewise"),
+    "rbx1": _Row(12.35, f"Slope of the reduction of F_x by slip angle; {_BOOK}"),
+    "rbx2": _Row(-10.77, f"Variation of that slope with kappa; {_BOOK}"),
+    "rbx3": _Row(0.0, f"Variation of that slope with camber squared; {_BOOK}"),
+    "rcx1": _Row(1.092, f"Shape factor of the reduction of F_x by slip angle; {_BOOK}"),
+    "rex1": _Row(0.0, f"Curvature of the reduction of F_x by slip angle; {_BOOK}"),
+    "rex2": _Row(0.0, f"Variation of that curvature with load; {_BOOK}"),
+    "rhx1": _Row(0.007, f"Shift of the reduction of F_x by slip angle; {_BOOK}"),
+}
+"""What F_x needs beside that."""
+
+REST = {
+    "fittyp": _Row(62.0, "Kind of the set: 5 to 52 MF-Tyre 5.2 (PAC2002), 60 to 62 MF-Tyre 6; chosen: 6.2"),
+    "unloaded_radius": _Row(0.313, f"Unloaded radius R_0; {_BOOK}", "m", 0.01),
+    "lcy": _scale("the shape factor C of F_y"),
+    "lmuy": _scale("the friction mu_y"),
+    "ley": _scale("the curvature E of F_y"),
+    "lky": _scale("the cornering stiffness K_y"),
+    "lhy": _scale("the horizontal shift of F_y"),
+    "lvy": _scale("the vertical shift of F_y"),
+    "lgay": _scale("camber in F_y (5.2)"),
+    "lkyc": _scale("the camber stiffness (6)"),
+    "lyka": _scale("the reduction of F_y by kappa"),
+    "lvyka": _scale("the side force induced by kappa"),
+    "pcy1": _Row(1.193, f"Shape factor C of F_y; {_BOOK}", "1", 0.01),
+    "pdy1": _Row(-0.990, f"Friction mu_y at nominal load; {_BOOK}"),
+    "pdy2": _Row(0.145, f"Variation of mu_y with load; {_BOOK}"),
+    "pdy3": _Row(-11.23, f"Variation of mu_y with camber squared; {_BOOK}"),
+    "pey1": _Row(-1.003, f"Curvature E of F_y at nominal load; {_BOOK}"),
+    "pey2": _Row(-0.537, f"Variation of E of F_y with load; {_BOOK}"),
+    "pey3": _Row(-0.083, f"Difference of E of F_y between left and right; {_BOOK}"),
+    "pey4": _Row(-4.787, f"Variation of that difference with camber; {_BOOK}"),
+    "pey5": _Row(0.0, f"Variation of E of F_y with camber squared; {_BOOK}"),
+    "pky1": _Row(-14.95, f"Largest cornering stiffness K_y / F_z0; {_BOOK}"),
+    "pky2": _Row(2.130, f"Load over nominal load at which K_y is largest; {_BOOK}"),
+    "pky3": _Row(-0.028, f"Variation of K_y with camber; {_BOOK}"),
+    "pky4": _Row(2.0, f"Shape of K_y over load; {_BOOK}"),
+    "pky5": _Row(0.0, f"Variation of pky2 with camber squared; {_BOOK}"),
+    "pky6": _Row(-0.92, f"Camber stiffness / F_z at nominal load; {_BOOK}"),
+    "pky7": _Row(-0.24, f"Variation of the camber stiffness with load; {_BOOK}"),
+    "phy1": _Row(0.003, f"Horizontal shift of F_y at nominal load; {_BOOK}"),
+    "phy2": _Row(-0.001, f"Variation of the horizontal shift of F_y with load; {_BOOK}"),
+    "phy3": _Row(0.0, "Variation of the horizontal shift of F_y with camber (5.2); chosen: a set of 6.2"),
+    "pvy1": _Row(0.045, f"Vertical shift of F_y / F_z at nominal load; {_BOOK}"),
+    "pvy2": _Row(-0.024, f"Variation of the vertical shift of F_y / F_z with load; {_BOOK}"),
+    "pvy3": _Row(-0.532, f"Variation of the vertical shift of F_y / F_z with camber; {_BOOK}"),
+    "pvy4": _Row(0.039, f"Variation of that with load; {_BOOK}"),
+    "ppy1": _Row(0.0, "Variation of K_y with pressure; chosen: not known of this tyre"),
+    "ppy2": _Row(0.0, "Variation of pky2 with pressure; chosen: likewise"),
+    "ppy3": _Row(0.0, "Variation of mu_y with pressure; chosen: likewise"),
+    "ppy4": _Row(0.0, "Variation of mu_y with pressure squared; chosen: likewise"),
+    "ppy5": _Row(0.0, "Variation of the camber stiffness with pressure; chosen: likewise"),
+    "rby1": _Row(6.461, f"Slope of the reduction of F_y by kappa; {_BOOK}"),
+    "rby2": _Row(4.196, f"Variation of that slope with slip angle; {_BOOK}"),
+    "rby3": _Row(-0.015, f"Shift of the slip angle in rby2; {_BOOK}"),
+    "rby4": _Row(0.0, f"Variation of that slope with camber squared; {_BOOK}"),
+    "rcy1": _Row(1.081, f"Shape factor of the reduction of F_y by kappa; {_BOOK}"),
+    "rey1": _Row(0.0, f"Curvature of the reduction of F_y by kappa; {_BOOK}"),
+    "rey2": _Row(0.0, f"Variation of that curvature with load; {_BOOK}"),
+    "rhy1": _Row(0.009, f"Shift of the reduction of F_y by kappa; {_BOOK}"),
+    "rhy2": _Row(0.0, f"Variation of that shift with load; {_BOOK}"),
+    "rvy1": _Row(0.053, f"Side force induced by kappa, over mu_y F_z, at nominal load; {_BOOK}"),
+    "rvy2": _Row(-0.073, f"Variation of the side force induced by kappa with load; {_BOOK}"),
+    "rvy3": _Row(0.517, f"Variation of the side force induced by kappa with camber; {_BOOK}"),
+    "rvy4": _Row(35.44, f"Decay of the side force induced by kappa with slip angle; {_BOOK}"),
+    "rvy5": _Row(1.9, f"Shape of the side force induced by kappa; {_BOOK}"),
+    "rvy6": _Row(-10.71, f"Slope of the side force induced by kappa; {_BOOK}"),
+    "ltr": _scale("the pneumatic trail"),
+    "lres": _scale("the residual moment"),
+    "lgaz": _scale("camber in M_z (5.2)"),
+    "lkzc": _scale("camber in the residual moment (6)"),
+    "ls": _scale("the lever arm of F_x"),
+    "qbz1": _Row(8.964, f"Slope of the trail at nominal load; {_BOOK}"),
+    "qbz2": _Row(-1.106, f"Variation of the slope of the trail with load; {_BOOK}"),
+    "qbz3": _Row(-0.842, f"Variation of the slope of the trail with load squared; {_BOOK}"),
+    "qbz4": _Row(0.0, f"Variation of the slope of the trail with camber; {_BOOK}"),
+    "qbz5": _Row(-0.227, f"Variation of the slope of the trail with the size of camber; {_BOOK}"),
+    "qbz9": _Row(18.47, f"Slope of the residual moment; {_BOOK}"),
+    "qbz10": _Row(0.0, f"Slope of the residual moment with B C of F_y; {_BOOK}"),
+    "qcz1": _Row(1.180, f"Shape factor of the trail; {_BOOK}"),
+    "qdz1": _Row(0.100, f"Largest trail over R_0 at nominal load; {_BOOK}"),
+    "qdz2": _Row(-0.001, f"Variation of the largest trail with load; {_BOOK}"),
+    "qdz3": _Row(0.007, f"Variation of the largest trail with camber; {_BOOK}"),
+    "qdz4": _Row(13.05, f"Variation of the largest trail with camber squared; {_BOOK}"),
+    "qdz6": _Row(-0.008, f"Largest residual moment over F_z R_0; {_BOOK}"),
+    "qdz7": _Row(0.0, f"Variation of the residual moment with load; {_BOOK}"),
+    "qdz8": _Row(-0.296, f"Variation of the residual moment with camber; {_BOOK}"),
+    "qdz9": _Row(-0.009, f"Variation of that with load; {_BOOK}"),
+    "qdz10": _Row(0.0, f"Variation of the residual moment with camber times its size; {_BOOK}"),
+    "qdz11": _Row(0.0, f"Variation of that with load; {_BOOK}"),
+    "qez1": _Row(-1.609, f"Curvature of the trail at nominal load; {_BOOK}"),
+    "qez2": _Row(-0.359, f"Variation of the curvature of the trail with load; {_BOOK}"),
+    "qez3": _Row(0.0, f"Variation of the curvature of the trail with load squared; {_BOOK}"),
+    "qez4": _Row(0.174, f"Difference of the curvature of the trail between left and right; {_BOOK}"),
+    "qez5": _Row(-0.896, f"Variation of that difference with camber; {_BOOK}"),
+    "qhz1": _Row(0.007, f"Horizontal shift of the trail at nominal load; {_BOOK}"),
+    "qhz2": _Row(-0.002, f"Variation of the horizontal shift of the trail with load; {_BOOK}"),
+    "qhz3": _Row(0.147, f"Variation of the horizontal shift of the trail with camber; {_BOOK}"),
+    "qhz4": _Row(0.004, f"Variation of that with load; {_BOOK}"),
+    "ppz1": _Row(0.0, "Variation of the trail with pressure; chosen: not known of this tyre"),
+    "ppz2": _Row(0.0, "Variation of the residual moment with pressure; chosen: likewise"),
+    "ssz1": _Row(0.043, f"Lever arm of F_x over R_0; {_BOOK}"),
+    "ssz2": _Row(0.001, f"Variation of the lever arm of F_x with F_y / F_z0; {_BOOK}"),
+    "ssz3": _Row(0.731, f"Variation of the lever arm of F_x with camber; {_BOOK}"),
+    "ssz4": _Row(-0.238, f"Variation of that with load; {_BOOK}"),
+    "lmx": _scale("the overturning moment"),
+    "lvmx": _scale("its shift"),
+    "qsx1": _Row(0.0, "Shift of the overturning moment over F_z R_0; chosen: not known of this tyre"),
+    "qsx2": _Row(0.0, "Overturning moment by camber; chosen: likewise"),
+    "qsx3": _Row(0.0, "Overturning moment by F_y; chosen: likewise"),
+    "qsx4": _Row(0.0, "Peak of its part with the sine; chosen: likewise"),
+    "qsx5": _Row(0.0, "Shape of that part over load; chosen: likewise"),
+    "qsx6": _Row(0.0, "Slope of that part over load; chosen: likewise"),
+    "qsx7": _Row(0.0, "Camber in that part; chosen: likewise"),
+    "qsx8": _Row(0.0, "Size of F_y in that part; chosen: likewise"),
+    "qsx9": _Row(0.0, "Slope of F_y in that part; chosen: likewise"),
+    "qsx10": _Row(0.0, "Overturning moment by camber and load; chosen: likewise"),
+    "qsx11": _Row(0.0, "Slope over load of that part; chosen: likewise"),
+    "qsx12": _Row(0.0, "Overturning moment by camber times its size; chosen: likewise"),
+    "qsx13": _Row(0.0, "Overturning moment by F_y, without load; chosen: likewise"),
+    "qsx14": _Row(0.0, "Variation of that with the size of camber; chosen: likewise"),
+    "ppmx1": _Row(0.0, "Variation of qsx2 with pressure; chosen: likewise"),
+}
+"""What F_y, M_z and M_x need beside that."""
+
+
+def of_axles(name: str, rows: dict[str, _Row], *more: tuple[str, Any], bases: tuple[type, ...] = ()) -> Any:
+    """Return a dataclass of parameters: every row for the front and for the rear axle.
+
+    Args:
+        name: of the class.
+        rows: of coefficients, by name.
+        more: (name, field) of parameters that are no coefficients.
+        bases: dataclasses to add to.
+    """
+    fields: list[tuple[str, Any, Any]] = [(key, type(value.default), value) for key, value in more]
+    for axle in ("front", "rear"):
+        for key, row in rows.items():
+            made = parameter(
+                row.default,
+                row.unit,
+                f"{row.text}, {axle} tyres",
+                minimum=row.minimum,
+                maximum=row.maximum,
+            )
+            fields.append((f"{key}_{axle}", float, made))
+    return make_dataclass(name, fields, bases=bases, frozen=True, namespace={"__module__": __name__})
+
+
+LongitudinalParameters = of_axles(
+    "LongitudinalParameters",
+    COMMON | LONGITUDINAL,
+    (
+        "reference_friction",
+        parameter(
+            1.0,
+            "1",
+            "Friction coefficient of the road the set was measured on: lambda_mu is friction over it; "
+            "chosen: the papers' mu = 1 is the set as it is",
+            minimum=0.01,
+        ),
+    ),
+    (
+        "slip_angle_as_tangent",
+        parameter(
+            False,
+            None,
+            "Use tan(alpha) and sin(gamma) for alpha and gamma, as the book prints it; chosen: off, as "
+            "programs do that fit and use such sets",
+        ),
+    ),
+)
+"""What F_x of kappa needs."""
+
+Pacejka2012Parameters = of_axles("Pacejka2012Parameters", REST, bases=(LongitudinalParameters,))
+"""What all forces and moments need."""
