@@ -18,7 +18,14 @@ from collections.abc import Iterable
 
 
 class YawbenchError(Exception):
-    """Base of all errors; `problems` are its sentences."""
+    """Base of all errors; `problems` are its sentences.
+
+    >>> try:
+    ...     yb.load("fnn_sideslip/26mps")
+    ... except yb.YawbenchError as error:
+    ...     print(error.problems)
+    ["there is no scenario 'fnn_sideslip/26mps'; did you mean 'fnn_sideslip/25mps'?"]
+    """
 
     exit_status = 2
 
@@ -28,29 +35,64 @@ class YawbenchError(Exception):
 
 
 class ScenarioError(YawbenchError):
-    """The scenario file or a command-line override is wrong."""
+    """The scenario file or a change of it is wrong.
+
+    >>> base.set({"stop_time": -1})
+    Traceback (most recent call last):
+    orchestrator.errors.ScenarioError: set stop_time=-1: must be a time above 0 s (got -1)
+    """
 
 
 class ModelDescriptionError(YawbenchError):
-    """An FMU is missing, corrupt or not supported."""
+    """An FMU is missing, corrupt or not supported.
+
+    >>> base.swap(tyre="tyre_pacejka").run()
+    Traceback (most recent call last):
+    orchestrator.errors.ModelDescriptionError: swap tyre=tyre_pacejka: no FMU 'tyre_pacejka' in ...
+    """
 
 
 class WiringError(YawbenchError):
-    """Units cannot be connected as asked."""
+    """Units cannot be connected as asked.
+
+    >>> base.swap(controller=lambda roll_angle: -1e5 * roll_angle).run()
+    Traceback (most recent call last):
+    orchestrator.errors.WiringError: ...controller.roll_angle ...
+    """
 
 
 class ResultsError(YawbenchError):
-    """Recorded results are missing or unreadable."""
+    """Recorded results are missing or unreadable.
+
+    >>> yb.open("results/nothing")
+    Traceback (most recent call last):
+    orchestrator.errors.ResultsError: results/nothing: no results here, run.json is missing; ...
+    """
 
 
 class BuildError(YawbenchError):
-    """A component cannot be made into an FMU."""
+    """A component cannot be made into an FMU; raised by a run whose FMUs have to be built first.
+
+    >>> try:
+    ...     run = base.run()
+    ... except yb.BuildError as error:
+    ...     print("mend this first:", error)
+    """
 
     exit_status = 1
 
 
 class SimulationError(YawbenchError):
-    """A run failed: `unit` (None if the master itself failed) at `time` [s]."""
+    """A run failed: `unit` (None if the master itself failed) at `time` [s].
+
+    >>> def careless(yaw_rate_ref, yaw_rate):
+    ...     return 20000 * yaw_rate_ref / yaw_rate
+    >>> try:
+    ...     base.swap(controller=careless).run()
+    ... except yb.SimulationError as error:
+    ...     print(error.unit, error.time, repr(error.__cause__))
+    controller 0.0 ZeroDivisionError('float division by zero')
+    """
 
     exit_status = 1
 

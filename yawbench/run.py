@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 def open(folder: str | Path) -> Run:
     """Return the run whose results lie in a folder.
 
-        >>> yb.open("results/fnn_sideslip/25mps").metric("peak(sideslip)")
+        >>> yb.open("results/mine").title
+        'Sideslip tracking at 25 m/s, mu 0.65'
 
     Raises:
         ResultsError: they are missing or unreadable.
@@ -34,9 +35,15 @@ def open(folder: str | Path) -> Run:
 class Run:
     """What one run has recorded.
 
-    >>> run["plant.yaw_rate"], run["yaw_rate"], run.time
-    >>> list(run)                       # names of all columns
-    >>> run.unit_of("plant.yaw_rate")   # "rad/s"
+    >>> run = yb.load("fnn_sideslip/25mps").run()
+    >>> len(run), "plant.yaw_rate" in run, sorted(run)[:2]
+    (8001, True, ['allocator.force_request_fl', 'allocator.force_request_fr'])
+    >>> run["plant.yaw_rate"].shape
+    (8001,)
+    >>> print(run["yaw_rate"].max().round(3), run.time[-1])
+    0.19 8.0
+    >>> run.unit_of("plant.yaw_rate")
+    'rad/s'
     """
 
     def __init__(self, results: Results) -> None:
@@ -80,7 +87,12 @@ class Run:
         return self.results.units[self.results.column(name)]
 
     def to_pandas(self) -> pd.DataFrame:
-        """Return all columns over time; `attrs["units"]` holds their units."""
+        """Return all columns over time; `attrs["units"]` holds their units.
+
+        >>> frame = run.to_pandas()
+        >>> frame.index.name, frame["plant.sideslip"].size, frame.attrs["units"]["plant.sideslip"]
+        ('time', 8001, 'rad')
+        """
         import pandas as pd
 
         frame = pd.DataFrame(self.results.columns, index=pd.Index(self.time, name="time"))
@@ -90,8 +102,10 @@ class Run:
     def metric(self, name: str, window: tuple[float, float] | None = None) -> float:
         """Return a metric in SI units; ratios are plain numbers.
 
-            >>> run.metric("peak(sideslip)")
-            >>> run.metric("mean_error(yaw_rate)", window=(1, 6))
+            >>> round(run.metric("peak(sideslip)"), 4)
+            0.0198
+            >>> run.metric("peak(yaw_rate)", window=(0, 1)) < 1e-9  # before the driver steers
+            True
 
         Args:
             name: `measure(signal)`; the documentation lists all measures.
@@ -107,7 +121,11 @@ class Run:
         return value.number
 
     def metrics(self) -> dict[str, Value]:
-        """Return the usual metrics that the run has the signals for: name -> number and unit."""
+        """Return the usual metrics that the run has the signals for: name -> number and unit.
+
+        >>> run.metrics()["peak(sideslip)"].unit
+        'rad'
+        """
         return evaluate_all(self.results, STANDARD)
 
     def plot(self, *panels: str, title: str | None = None) -> Figure:
@@ -132,6 +150,9 @@ class Run:
 
     def save(self, folder: str | Path, *, format: str = "csv") -> Path:
         """Write results and run.json, as `yawbench run` does, and return the folder.
+
+            >>> sorted(file.name for file in run.save("results/mine").iterdir())
+            ['results.csv', 'run.json']
 
         Raises:
             ResultsError: they cannot be written.

@@ -26,9 +26,8 @@ from .run import Run
 def load(source: str | Path) -> Scenario:
     """Return the scenario of a name or a file.
 
-        >>> yb.load("fnn_sideslip/25mps")
-        >>> yb.load("my_scenarios/lane_change.yaml")
-        >>> yb.load("from_another_tool.ssp")
+        >>> yb.load("fnn_sideslip/25mps").title
+        'Sideslip tracking at 25 m/s, mu 0.65'
 
     Args:
         source: a name in the nearest folder `scenarios` or in that of yawbench, or the path of a YAML
@@ -53,6 +52,8 @@ class Scenario:
 
         >>> base = yb.load("fnn_sideslip/25mps")
         >>> run = base.swap(controller="controller_off").set({"plant.initial_speed": "80 km/h"}).run()
+        >>> [change["place"] for change in run.changes]
+        ['controller', 'plant.initial_speed']
 
     Attributes:
         path: the file.
@@ -67,9 +68,10 @@ class Scenario:
     def swap(self, **units: Any) -> Scenario:
         """Return the scenario with other units.
 
-            >>> base.swap(controller="controller_fnn", tyre="tyre_linear")
-            >>> base.swap(controller="my_controller.fmu")
-            >>> base.swap(controller=lambda yaw_rate_ref, yaw_rate: 2e4 * (yaw_rate_ref - yaw_rate))
+            >>> linear = base.swap(tyre="tyre_linear")
+            >>> follow = base.swap(controller=lambda yaw_rate_ref, yaw_rate: 2e4 * (yaw_rate_ref - yaw_rate))
+            >>> [one.run().metric("rms_error(yaw_rate)") < 0.1 for one in (linear, follow)]
+            [True, True]
 
         Args:
             units: unit of the scenario -> the name of an FMU, the path of one, or plain Python: a
@@ -102,7 +104,9 @@ class Scenario:
     def set(self, values: Mapping[str, Value]) -> Scenario:
         """Return the scenario with other values.
 
-            >>> base.set({"vehicle.mass": 1200, "plant.initial_speed": "80 km/h", "inputs.friction*": 0.3})
+            >>> icy = base.set({"vehicle.mass": 1200, "plant.initial_speed": "80 km/h", "inputs.friction*": 0.3})
+            >>> print(icy.run()["plant.velocity_x"][0].round(2))
+            22.22
 
         Args:
             values: as `--set` takes them: `unit.parameter`, `vehicle.parameter`, `inputs.pattern`,

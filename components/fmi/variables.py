@@ -68,6 +68,11 @@ def signal(
 ) -> Signal:
     """Declare an input or output, from the signal dictionary unless unit and text are given.
 
+        >>> signal("roll_angle", optional=True).unit
+        'rad'
+        >>> signal("tyre_pressure_*", "Pa", "Inflation pressure", start=2.2e5).start
+        220000.0
+
     Args:
         name: spelled-out snake_case; `*` stands for the four wheels.
         unit: one of `units.UNITS`; must agree with the dictionary for a name that is in it.
@@ -107,7 +112,11 @@ def signal(
 
 
 def output(name: str, *depends_on: str, unit: str | None = None, text: str | None = None) -> Signal:
-    """Declare an output and the inputs on which it depends directly (see `signal`)."""
+    """Declare an output and the inputs on which it depends directly (see `signal`).
+
+    >>> output("yaw_moment", "yaw_rate_ref", "yaw_rate").depends_on
+    ('yaw_rate_ref', 'yaw_rate')
+    """
     return signal(name, unit, text, depends_on=depends_on)
 
 
@@ -121,6 +130,12 @@ def parameter(
     choices: Iterable[str] | None = None,
 ) -> Any:
     """Declare a parameter as a dataclass field: default, unit, description and allowed values.
+
+        >>> @dataclass(frozen=True)
+        ... class Parameters:
+        ...     gain: float = parameter(20000.0, "N.m.s/rad", "Moment per yaw-rate error; chosen: an example")
+        >>> Parameters().gain
+        20000.0
 
     The FMI type follows from the default's type. `unit` is None for everything but Real.
     The description says where the default comes from, or "chosen: why".

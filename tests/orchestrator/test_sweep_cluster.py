@@ -131,11 +131,12 @@ def test_a_scheduler_without_workers_is_one_sentence(moods, yawbench, tmp_path):
 def test_workers_of_another_version_are_refused(moods, yawbench, cluster, monkeypatch):  # noqa: F811
     from orchestrator.sweeps import cluster as module
 
-    ours = {**module.versions(), "yawbench": "99.0"}
+    theirs = module.versions()
+    ours = {**theirs, "yawbench": "99.0"}
     monkeypatch.setattr(module, "ours", lambda: ours)
     status, _, err = yawbench(moods(10), "out", "--scheduler", cluster.scheduler_address)
     assert status == 2
-    assert "does not fit: yawbench 0.1.0 there, 99.0 here" in err.splitlines()[-1]
+    assert f"does not fit: yawbench {theirs['yawbench']} there, 99.0 here" in err.splitlines()[-1]
 
 
 def test_without_its_package_the_option_says_how_to_get_it(moods, driver, capsys, tmp_path, monkeypatch):  # noqa: F811

@@ -186,3 +186,9 @@ def test_unknown_units_places_and_scenarios_are_refused_with_a_guess(base):
 def test_an_output_of_the_wrong_length_ends_the_run_with_a_sentence(base):
     with pytest.raises(yb.SimulationError, match="gave 2 values for 1 output"):
         base.swap(controller=lambda yaw_rate: (yaw_rate, 1.0)).run()
+
+
+def test_a_run_can_be_saved_again_into_the_same_folder(run, tmp_path):
+    for format in ("csv", "csv", "parquet"):
+        saved = yb.open(run.save(tmp_path / "mine", format=format))
+    assert equal(saved, run)

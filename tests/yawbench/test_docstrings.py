@@ -1,0 +1,52 @@
+"""Every name of the library shows a use of itself, which is so."""
+
+from __future__ import annotations
+
+import doctest
+
+import matplotlib.pyplot as plt
+import pytest
+
+import components.fmi.variables
+import yawbench as yb
+
+FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+
+
+def examples(name: str) -> list[doctest.DocTest]:
+    """Return the examples of a public name, those of its methods too."""
+    finder = doctest.DocTestFinder(exclude_empty=True)
+    return [found for found in finder.find(getattr(yb, name), name) if found.examples]
+
+
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory):
+    """The names that examples use: the library, a scenario, its run, saved in the working folder."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path_factory.mktemp("examples"))
+        base = yb.load("fnn_sideslip/25mps")
+        run = base.run()
+        run.save("results/mine")
+        yield {"yb": yb, "base": base, "run": run, **vars(components.fmi.variables)}
+
+
+@pytest.mark.parametrize("name", yb.__all__)
+def test_the_use_that_a_docstring_shows_is_so(name, shown):
+    found = examples(name)
+    assert found, f"{name} shows no use"
+    said: list[str] = []
+    for one in found:
+        one.globs = dict(shown)
+        doctest.DocTestRunner(optionflags=FLAGS).run(one, out=said.append)
+    plt.close("all")
+    assert not said, "".join(said)
+
+
+def test_public_methods_without_an_example_are_obvious():
+    for kind in (yb.Run, yb.Scenario):
+        silent = [
+            name
+            for name, value in vars(kind).items()
+            if callable(value) and not name.startswith("_") and ">>>" not in (value.__doc__ or "")
+        ]
+        assert set(silent) <= {"plan", "run", "unit_of"}, silent
