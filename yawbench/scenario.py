@@ -104,8 +104,8 @@ class Scenario:
     def set(self, values: Mapping[str, Value]) -> Scenario:
         """Return the scenario with other values.
 
-            >>> icy = base.set({"vehicle.mass": 1200, "plant.initial_speed": "80 km/h", "inputs.friction*": 0.3})
-            >>> print(icy.run()["plant.velocity_x"][0].round(2))
+            >>> changes = {"vehicle.mass": 1200, "plant.initial_speed": "80 km/h", "inputs.friction*": 0.3}
+            >>> print(base.set(changes).run()["plant.velocity_x"][0].round(2))
             22.22
 
         Args:

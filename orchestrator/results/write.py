@@ -21,19 +21,14 @@ def write_results(results: Results, folder: Path, *, format: str = "csv") -> Non
     names = list(results)
     real = [np.issubdtype(results[name].dtype, np.number) for name in names]
     recorder = recorder_of(format)(folder, names, real, results.units)
+    numbers = np.column_stack([results.time, *(results[n] for n, r in zip(names, real, strict=True) if r)])
+    others = [*zip(*(results[n].tolist() for n, r in zip(names, real, strict=True) if not r), strict=True)]
     try:
-        numbers = np.column_stack(
-            [results.time, *(results[n] for n, r in zip(names, real, strict=True) if r)]
-        )
-        others = [results[n].tolist() for n, r in zip(names, real, strict=True) if not r]
         for first in range(0, len(numbers), BLOCK):
             block = numbers[first : first + BLOCK]
             for row, values in zip(recorder.rows, block, strict=False):
                 row[:] = values
-            last = first + len(block)
-            recorder.others += [
-                list(row) for row in zip(*(column[first:last] for column in others), strict=True)
-            ]
+            recorder.others += [list(row) for row in others[first : first + len(block)]]
             recorder.write(len(block))
         recorder.finish(results.run)
     finally:
