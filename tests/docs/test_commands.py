@@ -86,7 +86,7 @@ def done():
     return set()
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 @pytest.mark.parametrize("page", PAGES)
 def test_every_command_of_a_page_works_as_it_stands(page, checkout, done):

@@ -8,6 +8,8 @@ from tests.checkout import ROOT
 from tests.pages.browser import DESK, PHONE
 from tests.pages.conftest import chromium  # noqa: F401  a fixture
 
+pytestmark = pytest.mark.exhaustive
+
 NAMES = sorted(str(f.relative_to(ROOT / "docs").with_suffix(".html")) for f in (ROOT / "docs").rglob("*.md"))
 MADE = [
     f"reference/{name}.html"

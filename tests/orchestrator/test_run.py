@@ -428,7 +428,7 @@ def repeat_runs(scenario, fmus, out):
     return untouched, early, look(), len(plan.units)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 def test_300_runs_in_one_process_neither_leak_nor_take_more_work(fmus, tmp_path):
     scenario = car(tmp_path, stop=0.004)

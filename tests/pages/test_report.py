@@ -26,7 +26,6 @@ UNITS = (
     "driver_sine", "reference_single_track", "controller_off", "controller_fuzzy_feedback", "plant_two_dof",
     "tyre_magic_formula_1987",
 )  # fmt: skip
-pytestmark = pytest.mark.slow
 
 HALF = """
 title: Half a paper

@@ -26,8 +26,6 @@ UNITS = (
     "plant_fourteen_dof", "tyre_magic_formula",
 )  # fmt: skip
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory):

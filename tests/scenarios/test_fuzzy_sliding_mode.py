@@ -27,8 +27,6 @@ UNITS = (
 LAWS = ("sign", "saturation", "fuzzy")
 ROADS = ("high_friction", "low_friction", "beyond_paper")
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory):

@@ -16,8 +16,6 @@ UNITS = (
     "allocator_load_proportional", "wheel_control_direct", "plant_seven_dof", "tyre_dugoff",
 )  # fmt: skip
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,9 +14,12 @@ from tests.orchestrator.test_batch_commands import UNITS
 from .kills import trial
 
 
-@pytest.mark.slow
+def exhaustive(command: str) -> Any:
+    return pytest.param(command, marks=pytest.mark.exhaustive)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
-@pytest.mark.parametrize("command", ["run", "study", "sweep"])
+@pytest.mark.parametrize("command", ["run", exhaustive("study"), exhaustive("sweep")])
 def test_a_killed_command_passes_nothing_half_for_whole_and_the_next_call_repairs_all(
     command: str, tmp_path: Path
 ) -> None:
