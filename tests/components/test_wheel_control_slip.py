@@ -477,5 +477,6 @@ def test_the_law_has_no_memory_but_the_acceleration():
 
 
 def test_an_unknown_tyre_is_refused_with_the_known_ones():
-    with pytest.raises(AssertionError, match="magic_formula, magic_formula_1987, magic_formula_62, dugoff, linear"):
+    known = "magic_formula, magic_formula_1987, magic_formula_62, dugoff, linear"
+    with pytest.raises(AssertionError, match=known):
         Stand(Slip, tyre="brush").start()
