@@ -1,7 +1,7 @@
 """What this program keeps because it is costly to make again: in the user's cache, or a temporary folder.
 
     <32 digits>-<n>/    FMUs, unpacked (see `fmu.archive`)
-    <store>/            small files that say themselves whether they are whole: <key>-<hash>
+    <store>/<key>       small files that begin with the hash of their content
 
 Nobody has to look after it. Nothing in it is believed unseen: a file that was cut off or changed is
 made anew. Where the user's folder cannot be written (a container, another user's home), or its path
@@ -26,7 +26,7 @@ _PLAIN_PATH = re.compile(r"[A-Za-z0-9_.~/\\: -]+")
 KEEP_DAYS = 60
 """What has not been used, or kept anew, for so long is deleted when something else is kept."""
 _DIGITS = 32
-"""Of a hash in the name of a kept file."""
+"""Of the hash that a kept file begins with."""
 
 
 def cache_folders() -> Iterator[Path]:
@@ -109,10 +109,8 @@ def recall(store: str, key: str) -> bytes | None:
     with contextlib.suppress(ModelDescriptionError):
         for folder in cache_folders():
             with contextlib.suppress(OSError):
-                for file in folder.glob(f"{store}/{key}-*"):
-                    content = file.read_bytes()
-                    if is_whole(file, content):
-                        return content
+                if (content := content_of(folder / store / key)) is not None:
+                    return content
     return None
 
 
@@ -123,27 +121,32 @@ def keep(store: str, key: str, content: bytes) -> None:
     """
     with contextlib.suppress(ModelDescriptionError):
         for folder in cache_folders():
-            file = folder / store / f"{key}-{_hash(content)}"
+            file = folder / store / key
             try:
                 file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-                write_durably(file, content)
+                write_durably(file, _hash(content) + content)
             except OSError:
                 continue
             oldest = time.time() - KEEP_DAYS * 86400.0
             for other in file.parent.iterdir():
                 with contextlib.suppress(OSError):
-                    if other != file and (other.name.startswith(f"{key}-") or other.stat().st_mtime < oldest):
+                    if other.stat().st_mtime < oldest:
                         other.unlink()
             return
 
 
-def is_whole(file: Path, content: bytes) -> bool:
-    """Return whether a kept file's content is that which its name speaks of."""
-    return file.name.rpartition("-")[2] == _hash(content)
+def content_of(file: Path) -> bytes | None:
+    """Return what a kept file holds, None if it is not whole.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    whole = file.read_bytes()
+    return whole[_DIGITS:] if whole[:_DIGITS] == _hash(whole[_DIGITS:]) else None
 
 
-def _hash(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()[:_DIGITS]
+def _hash(content: bytes) -> bytes:
+    return hashlib.sha256(content).hexdigest()[:_DIGITS].encode()
 
 
 def write_durably(file: Path, content: bytes) -> None:

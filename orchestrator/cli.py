@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
 import importlib
 import io
 import os
 import sys
+import threading
 import traceback
-from importlib.metadata import version
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
@@ -37,7 +39,9 @@ COMMANDS = (
 """Each a module of `orchestrator.commands` with a function of the same name, `_` for `-`."""
 
 
-def _application() -> typer.Typer:
+def _application(arguments: Sequence[str]) -> typer.Typer:
+    """Return the program with the command that is called, or with all if none is, as for help."""
+    called = arguments[:1] if arguments and arguments[0] in COMMANDS else COMMANDS
     app = typer.Typer(
         name="yawbench",
         no_args_is_help=True,
@@ -45,7 +49,7 @@ def _application() -> typer.Typer:
         rich_markup_mode=None,
     )
     app.callback()(_options)
-    for name in COMMANDS:
+    for name in called:
         function = name.replace("-", "_")
         module = importlib.import_module(f".commands.{function}", __package__)
         app.command(name)(getattr(module, function))
@@ -54,6 +58,8 @@ def _application() -> typer.Typer:
 
 def _tell_version(wanted: bool) -> None:
     if wanted:
+        from importlib.metadata import version
+
         typer.echo(f"yawbench {version('yawbench')}")
         raise typer.Exit
 
@@ -67,27 +73,50 @@ def _options(
     """A test bench for vehicle yaw-stability control made of FMI units."""
 
 
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command line and exit with 0, 1 (the run failed) or 2 (the input is wrong)."""
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit with 0, 1 (the run failed) or 2 (the input is wrong).
+
+    Without arguments, this is the program: it takes them from its call, and leaves at once.
+    """
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # of others; to look for them takes time
     _make_printable()
     if not os.environ.get(TRACEBACK):  # what a library's objects complain of when they go is for nobody
         sys.unraisablehook = lambda _: None
+    status = _status(sys.argv[1:] if arguments is None else arguments)
+    if arguments is None and threading.active_count() == 1:
+        # To take the interpreter apart takes as long as a short command.
+        atexit._run_exitfuncs()
+        sys.stderr.flush()
+        os._exit(status)
+    sys.exit(status)
+
+
+def _status(arguments: Sequence[str]) -> int:
+    """Run a command, say what is wrong, and return the exit status."""
     try:
-        _application()(arguments)
+        try:
+            _application(arguments)(arguments)
+        except SystemExit as ended:
+            return ended.code if isinstance(ended.code, int) else int(ended.code is not None)
+        finally:
+            sys.stdout.flush()
     except YawbenchError as error:
         _print_traceback(error)
         for problem in error.problems:
             print(cut(printable(problem), SAID), file=sys.stderr)
-        sys.exit(error.exit_status)
+        return error.exit_status
+    except BrokenPipeError:  # whoever read it has seen enough
+        pass
     except OSError as error:  # a figure or table that cannot be written, most likely
         _print_traceback(error)
         where = f"{error.filename}: " if error.filename else ""
         print(printable(f"{where}{error.strerror or error}"), file=sys.stderr)
-        sys.exit(1)
     except Exception as error:
         shown = _print_traceback(error)
         print(_own_error(error, shown), file=sys.stderr)
-        sys.exit(1)
+    else:
+        return 0
+    return 1
 
 
 SAID = 5000
@@ -126,4 +155,4 @@ def _make_printable() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from ..cache import is_whole
+from ..cache import content_of
 from .archive import FORMAT, whole_entry
 
 
@@ -48,7 +48,7 @@ def kept_in(folder: Path) -> dict[str, list[Entry]]:
 
 
 def _file(file: Path) -> Entry:
-    return Entry(file, lambda: is_whole(file, file.read_bytes()))
+    return Entry(file, lambda: content_of(file) is not None)
 
 
 def _entry_is_whole(entry: Path) -> bool:

@@ -42,6 +42,16 @@ def test_what_is_kept_comes_back_until_something_else_is_kept(cache):
     assert recall("store", "other") is None
 
 
+def test_what_is_kept_is_found_without_a_look_at_all_that_is_kept(cache, monkeypatch):
+    def refuse(*_):
+        raise AssertionError("the folder is listed")
+
+    keep("store", "key", b"one")
+    monkeypatch.setattr(os, "listdir", refuse)
+    monkeypatch.setattr(os, "scandir", refuse)
+    assert recall("store", "key") == b"one"
+
+
 @pytest.mark.parametrize("harm", [b"", b"tw", b"twx"])
 def test_what_is_damaged_does_not_come_back(cache, harm):
     keep("store", "key", b"two")

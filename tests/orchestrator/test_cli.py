@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 
@@ -39,7 +43,7 @@ def test_an_error_of_the_program_itself_is_a_sentence_that_says_so(
     def broken(arguments: object) -> None:
         raise ZeroDivisionError("\x1b[31mof all things")
 
-    monkeypatch.setattr(cli, "_application", lambda: broken)
+    monkeypatch.setattr(cli, "_application", lambda _: broken)
     with pytest.raises(SystemExit) as ended:
         cli.main([])
     said = capsys.readouterr().err
@@ -52,3 +56,37 @@ def test_an_error_of_the_program_itself_is_a_sentence_that_says_so(
     with pytest.raises(SystemExit):
         cli.main([])
     assert capsys.readouterr().err.startswith("Traceback (most recent call last):")
+
+
+PROGRAM = Path(sys.executable).with_name("yawbench")
+BUFFERED = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+
+
+def test_a_full_disk_behind_the_output_is_a_sentence_and_no_success():
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [PROGRAM, "list", "scenarios"], stdout=full, stderr=subprocess.PIPE, text=True, env=BUFFERED
+        )
+    assert (done.returncode, done.stderr) == (1, "No space left on device\n")
+
+
+def test_a_reader_who_has_seen_enough_is_told_nothing():
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        [PROGRAM, "list", "scenarios"], stdout=writing, stderr=subprocess.PIPE, text=True, env=BUFFERED
+    )
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (1, "")
+
+
+def test_a_command_imports_what_it_needs_itself():
+    code = (
+        "import sys; from orchestrator.cli import main\n"
+        "try: main(['list', 'metrics'])\n"
+        "except SystemExit: print(*sorted(sys.modules), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stderr.split())
+    assert "orchestrator.commands.list" in loaded
+    assert not {f"orchestrator.commands.{name}" for name in COMMANDS if name != "list"} & loaded
