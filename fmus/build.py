@@ -28,7 +28,6 @@ from .compiler import compile_launcher
 from .mark import Mark, read_mark
 from .presentation import CREDITS, presented
 from .recipe import TOOL, PythonRecipe, Recipe, natural_name
-from .staging import PYTHONFMU
 
 HERE = Path(__file__).resolve().parent
 COMPONENTS = HERE.parent / "components"
@@ -61,7 +60,7 @@ def find_components(root: Path = COMPONENTS) -> dict[str, Parts]:
 
 def find_recipes(root: Path = COMPONENTS) -> dict[str, Recipe]:
     """Return name of FMU -> recipe of every component below `root`."""
-    sources = Sources(root, pythonfmu=PYTHONFMU)
+    sources = Sources(root)
     in_python = {name: PythonRecipe(name, module, sources) for name, module in find_components(root).items()}
     return in_python | {name: CRecipe(folder) for name, folder in find_c_components(root).items()}
 
@@ -182,7 +181,7 @@ def recipe_of(
     if role not in ROLES:
         raise BuildError(f"{source}: which role? Put it into a folder called one of: {', '.join(ROLES)}")
     elsewhere = {} if source.is_relative_to(root) else {role: source.parent}
-    sources = Sources(root, pythonfmu=PYTHONFMU, elsewhere=elsewhere)
+    sources = Sources(root, elsewhere=elsewhere)
     recipe = PythonRecipe(
         name or natural_name((role, stem)), (role, source.stem), sources, dict(defaults or {})
     )

@@ -4,9 +4,9 @@ Only the closure is packed and only the closure is hashed, so touching `mathemat
 FMUs that use it and no other. Imports are read from the syntax tree; nothing is executed. Every
 absolute import must be of the standard library, because the host's Python may have nothing else, or
 of what the component declares as its `host_packages`.
-Two are allowed and made relative: `components.<...>`, as a file outside this project writes it, and
-`pythonfmu.<...>`, of which each FMU carries its own copy, so that another FMU's version of
-PythonFMU in the same process cannot come between.
+Three are allowed and made relative: `components.<...>`, as a file outside this project writes it, and
+`vocabulary.<...>` and `pythonfmu.<...>`, of which each FMU carries its own copy, so that another FMU's
+version of them in the same process cannot come between.
 """
 
 from __future__ import annotations
@@ -19,12 +19,20 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import pythonfmu
+
+import vocabulary
 from orchestrator.errors import BuildError
 
 from .evidence import Looks, content_digest
 
 Parts = tuple[str, ...]
 """A module's dotted name inside the package, split: ("controllers", "fnn")."""
+
+PYTHONFMU = Path(pythonfmu.__file__).resolve().parent
+"""Folder of the installed PythonFMU."""
+BESIDE = {"pythonfmu": PYTHONFMU, "vocabulary": Path(vocabulary.__file__).resolve().parent}
+"""Package that an FMU carries a copy of beside the components -> its folder."""
 
 
 @dataclass(frozen=True)
@@ -45,12 +53,10 @@ class Sources:
     Args:
         root: folder of the package `components`.
         elsewhere: folder of the package -> a folder outside of `root` whose files come first.
-        pythonfmu: folder of the installed package `pythonfmu`.
     """
 
-    def __init__(self, root: Path, *, pythonfmu: Path, elsewhere: Mapping[str, Path] | None = None) -> None:
+    def __init__(self, root: Path, *, elsewhere: Mapping[str, Path] | None = None) -> None:
         self.root = root
-        self.pythonfmu = pythonfmu
         self.elsewhere = dict(elsewhere or {})
         self.evidence: dict[Parts, dict[str, str]] = {}  # of a closure that has been found: see `evidence`
         self._modules: dict[Parts, _Module | None] = {}
@@ -98,8 +104,8 @@ class Sources:
 
     def file(self, parts: Parts) -> Path:
         """Return the file of a module or package, whether or not it exists."""
-        if parts[:1] == ("pythonfmu",):
-            return _module_file(self.pythonfmu, parts[1:])
+        if parts and parts[0] in BESIDE:
+            return _module_file(BESIDE[parts[0]], parts[1:])
         if len(parts) > 1 and parts[0] in self.elsewhere:
             file = _module_file(self.elsewhere[parts[0]], parts[1:])
             if file.exists():
@@ -162,7 +168,7 @@ class Sources:
         if node.level == 0:
             if names[0] == "components":
                 return names[1:]
-            if names[0] == "pythonfmu" and len(names) > 1:
+            if names[0] in BESIDE and len(names) > 1:
                 return names
             return None
         if node.level > len(package) + 1:
@@ -200,7 +206,7 @@ _WAYS_OUT = (
 def _outside(name: str, where: str) -> str | None:
     """Return the package that an absolute import needs beyond the standard library, if it does."""
     top = name.partition(".")[0]
-    if top in ("components", "pythonfmu"):
+    if top in ("components", *BESIDE):
         raise BuildError(f"{where}: write 'from {name}{'.<module>' if name == top else ''} import ...'")
     return None if top in sys.stdlib_module_names else top
 
@@ -222,7 +228,7 @@ def _make_relative(lines: list[str], node: ast.ImportFrom, *, levels: int) -> No
     head, tail = line[: node.col_offset].decode(), line[node.col_offset :].decode()
     dots = "." * levels
     tail = re.sub(r"^from\s+components(\.|\b)", f"from {dots}", tail)
-    tail = re.sub(r"^from\s+pythonfmu\.", f"from {dots}pythonfmu.", tail)
+    tail = re.sub(rf"^from\s+({'|'.join(BESIDE)})\.", rf"from {dots}\1.", tail)
     lines[node.lineno - 1] = head + tail
 
 

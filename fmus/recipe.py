@@ -15,11 +15,11 @@ from components.fmi.roles import ROLES
 from orchestrator.errors import BuildError
 
 from .archive import pack
-from .closure import Parts, Sources
+from .closure import PYTHONFMU, Parts, Sources
 from .compiler import compile_launcher, compiler_tools
 from .evidence import Looks
 from .presentation import icon
-from .staging import PYTHONFMU, missing_signals, staged, variant
+from .staging import missing_signals, staged, variant
 
 TOOL = f"yawbench {version('yawbench')}, pythonfmu {version('pythonfmu')}"
 HERE = Path(__file__).resolve().parent

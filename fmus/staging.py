@@ -16,18 +16,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import pythonfmu
-import pythonfmu.fmi2slave
 from pythonfmu import FmuBuilder
 
 from components.fmi.roles import Role
-from components.fmi.wheels import wheels
 from orchestrator.errors import BuildError
+from vocabulary.wheels import wheels
 
 from .closure import Parts
-
-PYTHONFMU = Path(pythonfmu.__file__).resolve().parent
-"""Folder of the installed PythonFMU."""
 
 ENTRY = '''"""Entry module of the FMU {name}."""
 {needs}

@@ -7,12 +7,11 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
-WHEELS = ("fl", "fr", "rl", "rr")
+from vocabulary.wheels import WHEELS
 
-_WHEEL_SUFFIX = re.compile(r"_(fl|fr|rl|rr)\b")
+_WHEEL_SUFFIX = re.compile(rf"_({'|'.join(WHEELS)})\b")
 
 K = TypeVar("K")
-
 
 LISTED = 100
 """Names in one sentence. Chosen: more than any of our FMUs has parameters."""

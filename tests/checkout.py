@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PARTS = ("components", "docs", "fmus", "orchestrator", "scenarios", "tests", "yawbench")
+PARTS = ("components", "vocabulary", "docs", "fmus", "orchestrator", "scenarios", "tests", "yawbench")
 FILES = ("README.md", "CHANGELOG.md", "LICENSE", "Makefile", "mkdocs.yml", "pyproject.toml")
 
 

@@ -25,13 +25,13 @@ import numpy as np
 from components.fmi.component import Component
 from components.fmi.roles import ROLES
 from components.fmi.variables import output, parameter, signal
-from components.fmi.wheels import wheels
 from orchestrator.errors import ScenarioError
 from orchestrator.fmu.description import describe
 from orchestrator.master.log import ERROR, OK, Log
 from orchestrator.master.slave import Buffers, Calls, Experiment, Status
 from orchestrator.master.unit import nothing_to_do
 from orchestrator.plan import Fmu, Place, Unit, Value
+from vocabulary.wheels import wheels
 
 __all__ = ["Program", "output", "parameter", "signal"]
 

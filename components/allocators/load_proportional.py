@@ -21,13 +21,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from vocabulary.wheels import Four, wheels
+
 from ..cars.published_cars import PaperA
 from ..cars.wheel_kinematics import lever_arms
 from ..control_laws.moment_sharing import NO_FORCE, add_drive_force, share_moment
 from ..control_laws.side_forces import SIDE_FORCES, load_share, share_sides
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
-from ..fmi.wheels import Four, wheels
 
 
 @dataclass(frozen=True)

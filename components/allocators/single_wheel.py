@@ -32,12 +32,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from vocabulary.wheels import Four
+
 from ..cars.published_cars import PaperC
 from ..cars.wheel_kinematics import lever_arms
 from ..control_laws.moment_sharing import NO_FORCE, add_drive_force, share_moment
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
-from ..fmi.wheels import Four
 
 FL, FR, RL, RR = range(4)
 LEFT = (FL, RL)

@@ -25,9 +25,10 @@ from dataclasses import dataclass
 from math import atan2, cos, sin
 from typing import Any
 
+from vocabulary.wheels import Four
+
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter, signal
-from ..fmi.wheels import Four
 from ..mathematics.carry import Carried, Values
 from .plane_body import Motion
 from .wheel_kinematics import Eight, slip_angle, slip_ratio, wheel_velocities

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from ..fmi.wheels import Four
+from vocabulary.wheels import Four
+
 from ..mathematics.constants import G
 from .plane_body import Geometry
 

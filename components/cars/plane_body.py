@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from math import cos, sin
 from typing import Protocol
 
-from ..fmi.wheels import Four
+from vocabulary.wheels import Four
 
 Motion = tuple[float, float, float, float, float, float]
 """v_x, v_y [m/s], r [rad/s], x, y [m], psi [rad]."""

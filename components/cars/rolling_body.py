@@ -8,8 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import sin
 
+from vocabulary.wheels import Four
+
 from ..fmi.variables import parameter
-from ..fmi.wheels import Four
 from ..mathematics.constants import G
 from .car import StartParameters
 from .published_cars import PaperB

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from math import atan2, cos, sin, sqrt
 
-from ..fmi.wheels import Four
+from vocabulary.wheels import Four
 
 Eight = tuple[float, float, float, float, float, float, float, float]
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..fmi.wheels import Four
+from vocabulary.wheels import Four
 
 LEAST_CARRIED = 0.05
 

@@ -17,7 +17,8 @@ Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw mom
 
 from __future__ import annotations
 
-from ..fmi.wheels import Four
+from vocabulary.wheels import Four
+
 from .moment_sharing import share_moment
 
 SIDE_FORCES = ("opposite_halves", "one_side_braked")

@@ -42,6 +42,8 @@ from xml.etree.ElementTree import Element
 from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
+from vocabulary.wheels import wheels
+
 from . import model_description
 from .roles import ROLES
 from .variables import (
@@ -53,7 +55,6 @@ from .variables import (
     output_variables,
     parameter_variables,
 )
-from .wheels import wheels
 
 _CATEGORY = {
     Fmi2Status.ok: "logAll",

@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
-from .units import UNITS
+from vocabulary.units import UNITS
+
 from .variables import Variable
 
 LOG_CATEGORIES = {

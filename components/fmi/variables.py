@@ -12,9 +12,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from .signals import LEAST, SIGNALS
-from .units import UNITS
-from .wheels import WHEEL_NAMES, WHEELS, wheels
+from vocabulary.signals import SIGNALS
+from vocabulary.units import UNITS
+from vocabulary.wheels import WHEEL_NAMES, WHEELS, wheels
 
 _FMI_TYPES = {"float": "Real", "int": "Integer", "bool": "Boolean", "str": "String"}
 
@@ -100,14 +100,14 @@ def signal(
         raise DeclarationError(
             f"signal {name!r} is not in the signal dictionary: give its unit and description"
         )
-    if known is not None and unit is not None and unit != known[0]:
-        raise DeclarationError(f"signal {name!r} has the unit {known[0]}, not {unit}")
-    unit = unit or known[0]  # type: ignore[index]
+    if known is not None and unit is not None and unit != known.unit:
+        raise DeclarationError(f"signal {name!r} has the unit {known.unit}, not {unit}")
+    unit = unit or known.unit  # type: ignore[union-attr]
     if unit not in UNITS:
         raise DeclarationError(f"signal {name!r}: unknown unit {unit!r}; known: {', '.join(UNITS)}")
-    text = description or known[1]  # type: ignore[index]
-    if minimum is None:
-        minimum = LEAST.get(entry)
+    text = description or known.text  # type: ignore[union-attr]
+    if minimum is None and known is not None:
+        minimum = known.minimum
     return Signal(name, unit, text, start, minimum, maximum, tuple(depends_on), optional)
 
 

@@ -1,17 +1,18 @@
-"""The signals that units exchange and the roles they play, from the dictionaries of the components."""
+"""Reference page of the signals that units exchange, and of the roles they play."""
 
 from __future__ import annotations
 
-from components.fmi import roles, signals
+from components.fmi import roles
 from components.fmi.roles import ROLES
-from components.fmi.signals import SIGNALS
+from vocabulary import signals
+from vocabulary.signals import SIGNALS
 
 from .text import NOTE, cell, code, docstring, table
 
 
 def page() -> str:
     """Return the page of the signal dictionary and the roles."""
-    dictionary = [(code(name), code(unit), cell(text)) for name, (unit, text) in SIGNALS.items()]
+    dictionary = [(code(name), one.symbol, code(one.unit), cell(one.text)) for name, one in SIGNALS.items()]
     contract = [
         (code(f"{role.name}_*"), code(f"components/{folder}/"), _names(role.inputs), _names(role.outputs))
         for folder, role in ROLES.items()
@@ -20,7 +21,7 @@ def page() -> str:
         "# Signals and roles",
         NOTE,
         docstring(signals.__doc__ or ""),
-        table(("signal", "unit", "meaning"), dictionary),
+        table(("signal", "symbol", "unit", "meaning"), dictionary),
         "## Roles",
         docstring(roles.__doc__ or ""),
         "An output of one unit feeds every input of the same name. What stands here must be declared by "

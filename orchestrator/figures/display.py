@@ -4,23 +4,9 @@ from __future__ import annotations
 
 import math
 
-from ..metrics.signals import si_of, symbol, variable_of
+from vocabulary.units import SHOWN
 
-_SHOWN: dict[str, tuple[str, float]] = {
-    "rad": ("°", 180 / math.pi),
-    "rad/s": ("°/s", 180 / math.pi),
-    "rad/s2": ("°/s²", 180 / math.pi),
-    "rad/s3": ("°/s³", 180 / math.pi),
-    "m/s": ("km/h", 3.6),
-    "m/s2": ("m/s²", 1.0),
-    "N.m": ("N·m", 1.0),
-    "N.m/s": ("kN·m/s", 1e-3),
-    "N.m.s": ("N·m·s", 1.0),
-    "Pa": ("bar", 1e-5),
-    "Pa/s": ("bar/s", 1e-5),
-    "1": ("", 1.0),
-    "%": ("%", 100.0),
-}
+from ..metrics.signals import si_of, symbol, variable_of
 
 
 def in_formula(signal: str) -> str:
@@ -33,10 +19,10 @@ def in_formula(signal: str) -> str:
 
 def shown_unit(unit: str) -> tuple[str, float]:
     """Return the unit that people read and the factor to it; `%` stands for a ratio in per cent."""
-    if unit in _SHOWN:
-        return _SHOWN[unit]
+    if unit in SHOWN:
+        return SHOWN[unit]
     si, to_si = si_of(unit)
-    text, factor = _SHOWN.get(si, (si.replace(".", "·"), 1.0))
+    text, factor = SHOWN.get(si, (si.replace(".", "·"), 1.0))
     return text, to_si * factor
 
 

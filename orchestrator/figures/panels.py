@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vocabulary.wheels import WHEEL_NAMES
+
 from ..errors import ScenarioError
 from ..metrics.run_metrics import columns_of, reference_of
 from ..metrics.signals import variable_of, words
@@ -27,7 +29,6 @@ from .style import REFERENCE, ROW, WIDTH, line_style, literal, note_above
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-WHEEL_NAMES = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 POINTS = 1500
 """Buckets a line is thinned to; each keeps its smallest and its largest value."""
 

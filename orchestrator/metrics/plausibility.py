@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from vocabulary.wheels import WHEEL_NAMES, wheels
+
 from ..plan import Finding, Plan
-from ..wording import WHEELS
 from .run_metrics import columns_of, results_to_be
 
 G = 9.81
@@ -96,8 +97,6 @@ CHECKS: tuple[Check, ...] = (
 )  # fmt: skip
 """What is looked at after every run."""
 
-WHEEL_WORDS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
-
 
 class Watch:
     """Looks at the rows of a run as they come, and tells what was remarkable in them."""
@@ -158,7 +157,7 @@ class _Seen:
             value=f"{value:.3g}",
             size=f"{abs(value):.3g}",
             time=f"{self._time:.3g}",
-            wheel=WHEEL_WORDS.get(column[-2:], ""),
+            wheel=WHEEL_NAMES.get(column[-2:], ""),
             column=column,
         )
         return Finding(self.check.kind, column, value, self._time, says)
@@ -189,7 +188,7 @@ def _highest_friction(plan: Plan) -> float | None:
         float(value)
         for unit in plan.units
         for name, value in unit.constants.items()
-        if name in ("friction", *(f"friction_{wheel}" for wheel in WHEELS))
+        if name in ("friction", *wheels("friction_*"))
     ]
     driven = [wire.input for wire in plan.wires] + [name for unit in plan.units for name in unit.series]
     varies = any(name.startswith("friction") for name in driven)

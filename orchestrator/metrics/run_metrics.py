@@ -19,9 +19,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vocabulary.wheels import wheels
+
 from ..errors import ResultsError, ScenarioError
 from ..scenario.quantities import convert
-from ..wording import WHEELS, closest, fold, hint, short
+from ..wording import closest, fold, hint, short
 from .measures import MEASURES, Measure
 from .signals import si_of, symbol, variable_of, words
 
@@ -175,7 +177,7 @@ def columns_of(results: Results, signal: str) -> list[str]:
 
     Where units share the name, the plant's is taken.
     """
-    names = [signal.replace("*", wheel) for wheel in WHEELS] if "*" in signal else [signal]
+    names = wheels(signal)
     found = [column for name in names if (column := _column(results, name)) is not None]
     return found if len(found) == len(names) else []
 

@@ -18,11 +18,13 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from vocabulary.wheels import WHEELS
+
 from ..errors import ResultsError
 from ..figures.display import shown_unit
 from ..figures.style import LINES, line_style
 from ..results.read import Results
-from .animation_frames import WHEELS, Frames, frames_of
+from .animation_frames import Frames, frames_of
 from .rendering import render
 
 SCRIPTS = ("frames", "draw", "scene", "close_up", "strip", "player")

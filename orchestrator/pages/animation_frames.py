@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from vocabulary.wheels import WHEELS
+
 from ..errors import ResultsError
 from ..metrics.run_metrics import columns_of
 from ..results.read import Results
-from ..wording import WHEELS, listed
+from ..wording import listed
 from .lanes import Lane, lanes_of
 
 FRAMES = 600

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from vocabulary.wheels import WHEELS
+
 from ..results.read import Results
-from ..wording import WHEELS, star
+from ..wording import star
 
 SAME = 1e-9
 """A difference over the signal's peak that is none; chosen: far above rounding, far below any physics."""

@@ -11,12 +11,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..figures.panels import WHEEL_NAMES
+from vocabulary.wheels import WHEEL_NAMES, WHEELS
+
 from ..plan import Plan, Unit, Value
 from ..scenario.load import Scenario
 from ..scenario.yaml_lines import Document, Key
 from ..wiring.facts import facts_of
-from ..wording import WHEELS, fold
+from ..wording import fold
 
 PAPER, LITERATURE, CHOSEN, ERRATUM, VARIED, NEUTRAL = (
     "paper", "literature", "chosen", "erratum", "varied", "neutral",

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from vocabulary.wheels import WHEELS
+
 from ..errors import ModelDescriptionError, ScenarioError
 from ..fmu.archive import open_fmu
 from ..metrics.measures import catalogue as measures
@@ -20,7 +22,7 @@ from ..results.read import Results
 from ..results.runs import FoundRun
 from ..scenario import catalogue, yaml_lines
 from ..titles import changed, changes_in
-from ..wording import WHEELS, star
+from ..wording import star
 from .tables import Cell, Table
 
 PEAKS = ("sideslip", "yaw_rate", "acceleration_y")

@@ -10,10 +10,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import replace
 
+from vocabulary.wheels import WHEELS
+
 from ..plan import Fmu, Series, Value, Variable, Wire
 from ..scenario.load import Connection, Scenario
 from ..scenario.yaml_lines import PROBLEMS, Key, dotted
-from ..wording import WHEELS, fold, fold_sentences, hint, listed
+from ..wording import fold, fold_sentences, hint, listed
 from .constants import Constant, Input, constants
 from .fitting import contradicts_its_name, conversion_between, difference, fits
 from .patterns import Replaced, had, matching

@@ -13,10 +13,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from vocabulary.wheels import wheels
+
 from ..plan import FACTS as NAMES
 from ..plan import Unit, Value
 from ..scenario.load import Scenario
-from ..wording import WHEELS
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class Fact:
 
 
 FACTS = {
-    "friction": Fact("1", inputs=("friction", *(f"friction_{wheel}" for wheel in WHEELS))),
+    "friction": Fact("1", inputs=("friction", *wheels("friction_*"))),
     "speed": Fact("m/s", parameters={"initial_speed": "", "target_speed": "speed_gain"}),
 }
 assert tuple(FACTS) == NAMES

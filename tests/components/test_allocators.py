@@ -11,7 +11,7 @@ from components.allocators.fixed_share import FixedShare
 from components.allocators.load_proportional import LoadProportional
 from components.cars.wheel_kinematics import lever_arms
 from components.control_laws.moment_sharing import share_moment
-from components.fmi.wheels import WHEELS
+from vocabulary.wheels import WHEELS
 
 from .stand import Stand
 

@@ -13,10 +13,10 @@ import pytest
 from components.drivers.sine import Sine
 from components.fmi.component import Component
 from components.fmi.variables import parameter
-from components.fmi.wheels import WHEELS
 from components.plants.seven_dof import SevenDof, SevenDofParameters
 from components.tyres.dugoff import Dugoff
 from components.tyres.linear import LinearTyre
+from vocabulary.wheels import WHEELS
 
 from . import monolith
 from .loop import Loop

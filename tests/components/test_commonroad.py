@@ -18,8 +18,8 @@ from scipy.integrate import solve_ivp
 
 from components.fmi.component import Component
 from components.fmi.variables import output, parameter
-from components.fmi.wheels import WHEELS
 from components.plants.fourteen_dof import FourteenDof
+from vocabulary.wheels import WHEELS
 
 from .loop import Loop
 

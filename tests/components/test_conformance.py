@@ -10,8 +10,8 @@ from math import isfinite
 import pytest
 
 from components.fmi.component import Component
-from components.fmi.wheels import wheels
 from fmus.build import find_components
+from vocabulary.wheels import wheels
 
 from .stand import Stand
 

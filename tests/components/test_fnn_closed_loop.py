@@ -13,12 +13,12 @@ from components.controllers.fnn import Fnn
 from components.controllers.fuzzy_sideslip import FuzzySideslip
 from components.controllers.off import Off
 from components.drivers.sine import Sine
-from components.fmi.wheels import WHEELS
 from components.plants.seven_dof import SevenDof
 from components.references.steady_state import SteadyState
 from components.tyres.dugoff import Dugoff
 from components.wheel_controls.direct import Direct
 from tests.components.loop import Loop
+from vocabulary.wheels import WHEELS
 
 STEP = 0.001
 AMPLITUDE = {15: 0.05, 25: 0.0325, 40: 0.0165}  # rad; one waveform per speed, the same for every controller

@@ -10,12 +10,12 @@ import pytest
 
 from components.cars.sprung_car import FourteenDofParameters, G, ride_of
 from components.drivers.sine import Sine
-from components.fmi.wheels import WHEELS
 from components.plants.eight_dof import EightDof
 from components.plants.fourteen_dof import FourteenDof
 from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
 from components.tyres.dugoff import Dugoff
 from components.tyres.magic_formula import MagicFormula
+from vocabulary.wheels import WHEELS
 
 from . import monolith, monolith_c
 from .loop import Loop

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from components.fmi.variables import parameter_variables
-from components.fmi.wheels import wheels
 from components.plants.seven_dof import SevenDof
 from components.tyre_models.pacejka_2012_set import COMMON, LONGITUDINAL, REST, Pacejka2012Parameters
 from components.tyres.magic_formula_62 import MagicFormula62
+from vocabulary.wheels import wheels
 
 from . import magic_62
 from .loop import Loop

@@ -15,12 +15,12 @@ from components.controllers.fuzzy_sliding_mode import FuzzySlidingMode
 from components.controllers.off import Off
 from components.controllers.sliding_mode import SlidingMode
 from components.drivers.sine import Sine
-from components.fmi.wheels import WHEELS
 from components.plants.eight_dof import EightDof
 from components.references.single_track import SingleTrack
 from components.tyres.magic_formula import MagicFormula
 from components.wheel_controls.direct import Direct
 from components.wheel_controls.slip import Slip
+from vocabulary.wheels import WHEELS
 
 from .loop import Loop
 

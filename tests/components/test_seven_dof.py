@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from components.cars.load_transfer import quasi_static_loads
-from components.fmi.wheels import WHEELS
 from components.plants.seven_dof import SevenDof, SevenDofParameters
+from vocabulary.wheels import WHEELS
 
 from .stand import Stand
 

@@ -15,7 +15,6 @@ from components.drivers.sine import Sine
 from components.fmi.component import Component
 from components.fmi.roles import ROLES
 from components.fmi.variables import parameter
-from components.fmi.wheels import WHEELS, wheels
 from components.plants.two_dof import TwoDof, TwoDofParameters
 from components.tyre_models.bakker_1987 import (
     MagicFormula1987Parameters,
@@ -24,6 +23,7 @@ from components.tyre_models.bakker_1987 import (
 )
 from components.tyres.linear import LinearTyre
 from components.tyres.magic_formula_1987 import MagicFormula1987
+from vocabulary.wheels import WHEELS, wheels
 
 from .loop import Loop
 from .magic import forces_1987

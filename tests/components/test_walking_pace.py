@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from components.drivers.sine import Sine
-from components.fmi.wheels import WHEELS
 from components.plants.eight_dof import EightDof
 from components.plants.fourteen_dof import FourteenDof
 from components.plants.seven_dof import SevenDof
@@ -17,6 +16,7 @@ from components.tyres.dugoff import Dugoff
 from components.tyres.linear import LinearTyre
 from components.tyres.magic_formula import MagicFormula
 from components.tyres.magic_formula_1987 import MagicFormula1987
+from vocabulary.wheels import WHEELS
 
 from . import monolith, monolith_b
 from .loop import Loop

@@ -10,7 +10,6 @@ from urllib.parse import unquote
 import pytest
 import typer
 
-from components.fmi.signals import SIGNALS
 from docs.generate import schemas
 from docs.generate.formulas import to_mathml
 from docs.generate.text import docstring, table
@@ -23,6 +22,7 @@ from orchestrator.studies.study_schema import StudySpec
 from orchestrator.sweeps.schema import SweepSpec
 from orchestrator.wording import fold
 from tests.checkout import ROOT
+from vocabulary.signals import SIGNALS
 
 
 class Page(HTMLParser):

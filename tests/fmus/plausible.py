@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterable
 
-from components.fmi.wheels import WHEELS
+from vocabulary.wheels import WHEELS
 
 _RANGES = {
     "velocity_x": (15.0, 30.0),

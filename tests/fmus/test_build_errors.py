@@ -304,9 +304,7 @@ def test_a_file_from_anywhere_becomes_an_fmu_with_its_neighbours(tmp_path, unpac
     file.parent.mkdir(parents=True)
     text = GOOD.replace("from components.fmi.c", "from .gains import FACTOR\nfrom components.fmi.c")
     file.write_text(text.replace("-self.p.gain", "-FACTOR * self.p.gain"))
-    (file.parent / "gains.py").write_text(
-        "from components.fmi.wheels import WHEELS\n\nFACTOR = len(WHEELS)\n"
-    )
+    (file.parent / "gains.py").write_text("from vocabulary.wheels import WHEELS\n\nFACTOR = len(WHEELS)\n")
     fmu = build_component(file, tmp_path / "out", defaults={"gain": 10, "mode": "b", "fast": True})
     assert fmu == tmp_path / "out" / "controller_idea.fmu"
     unit = Unit(Fmu(unpack(fmu)), yaw_rate=0.5)

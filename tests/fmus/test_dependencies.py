@@ -15,10 +15,10 @@ import struct
 import pytest
 
 from components.fmi.component import Component
-from components.fmi.wheels import WHEELS
 from fmus.build import find_components
 from tests.components.stand import Stand
 from tests.fmus.plausible import plausible
+from vocabulary.wheels import WHEELS
 
 COMPONENTS = find_components()
 FORCES = {"steer_angle", "yaw_moment"} | {f"tyre_force_{axis}_{wheel}" for axis in "xy" for wheel in WHEELS}

@@ -9,8 +9,7 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from orchestrator.fmu.binary import platform
-
-WHEELS = ("fl", "fr", "rl", "rr")
+from vocabulary.wheels import WHEELS
 
 
 @dataclass(frozen=True)

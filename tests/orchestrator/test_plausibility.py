@@ -12,10 +12,9 @@ import pytest
 from orchestrator.metrics.plausibility import CHECKS, Watch, findings_in, first_of_each
 from orchestrator.plan import Finding, Fmu, Plan, Unit, Variable, Wire
 from orchestrator.studies.tables import MARK, marked, remarks
+from vocabulary.wheels import WHEELS
 
 from .recorded import car
-
-WHEELS = ("fl", "fr", "rl", "rr")
 
 
 def variable(name, causality="output", unit="1", kind="Real", lowest=None, highest=None):

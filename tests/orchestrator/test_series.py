@@ -19,8 +19,9 @@ from orchestrator.plan import Plan, Series
 from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
+from vocabulary.wheels import WHEELS
 
-from .fake_fmus import WHEELS, Var, make_fmu, out
+from .fake_fmus import Var, make_fmu, out
 from .fakes import Behaviour, Stage
 from .fakes import make_plan as fake_plan
 

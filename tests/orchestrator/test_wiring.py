@@ -15,8 +15,9 @@ from orchestrator.plan import Change, Plan, Unit, Wire
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
+from vocabulary.wheels import WHEELS
 
-from .fake_fmus import WHEELS, Var, make_fmu, out
+from .fake_fmus import Var, make_fmu, out
 
 pytestmark = pytest.mark.usefixtures("cache")
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from orchestrator.results.read import Results
 from tests.orchestrator.recorded import car, results
+from vocabulary.wheels import WHEELS
 
-WHEELS = ("fl", "fr", "rl", "rr")
 SIZES = {"cg_to_front_axle": 1.2, "cg_to_rear_axle": 1.5, "track_width": 1.6}
 MU = 0.5
 

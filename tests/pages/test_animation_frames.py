@@ -15,8 +15,9 @@ from orchestrator.pages.animation import data_of, force_scale, page, still_of
 from orchestrator.pages.animation_frames import FRAMES, frames_of, rotated, thinned
 from orchestrator.pages.lanes import lanes_of
 from tests.orchestrator.recorded import car
+from vocabulary.wheels import WHEELS
 
-from .made_up import MU, SIZES, WHEELS, data_in, odd, whole_car, without
+from .made_up import MU, SIZES, data_in, odd, whole_car, without
 
 
 def unpacked(text: str) -> np.ndarray:

@@ -11,8 +11,7 @@ from lxml import etree
 from orchestrator.pages.diagram import diagonal, diagrams, stack
 from orchestrator.pages.system import system_of, systems_of
 from orchestrator.plan import Fmu, Plan, Unit, Wire
-
-WHEELS = ("fl", "fr", "rl", "rr")
+from vocabulary.wheels import WHEELS
 
 
 def plan(controller: str = "controller_off", *, extra: bool = False) -> Plan:

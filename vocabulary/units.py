@@ -1,4 +1,4 @@
-"""The measurement units a variable may carry, with their SI base exponents.
+"""The measurement units a variable may carry, with their SI base exponents, and those that people read.
 
 FMI 2.0.4, section 2.2.2: a unit is a product of powers of kg, m, s, A, K, mol, cd and rad.
 The spellings are those of the interface contract; nothing else is accepted, so a typing
@@ -6,6 +6,8 @@ error in a unit is found when the class is read, not when a wire is checked.
 """
 
 from __future__ import annotations
+
+import math
 
 UNITS: dict[str, dict[str, int]] = {
     "1": {},
@@ -42,3 +44,20 @@ UNITS: dict[str, dict[str, int]] = {
     "Pa": {"kg": 1, "m": -1, "s": -2},
     "Pa/s": {"kg": 1, "m": -1, "s": -3},
 }
+
+SHOWN: dict[str, tuple[str, float]] = {
+    "rad": ("°", 180 / math.pi),
+    "rad/s": ("°/s", 180 / math.pi),
+    "rad/s2": ("°/s²", 180 / math.pi),
+    "rad/s3": ("°/s³", 180 / math.pi),
+    "m/s": ("km/h", 3.6),
+    "m/s2": ("m/s²", 1.0),
+    "N.m": ("N·m", 1.0),
+    "N.m/s": ("kN·m/s", 1e-3),
+    "N.m.s": ("N·m·s", 1.0),
+    "Pa": ("bar", 1e-5),
+    "Pa/s": ("bar/s", 1e-5),
+    "1": ("", 1.0),
+    "%": ("%", 100.0),
+}
+"""What people read instead of a unit, and the factor to it; `%` stands for a ratio in per cent."""

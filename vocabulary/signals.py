@@ -1,0 +1,92 @@
+"""The signal dictionary: the name, unit, meaning and symbol of everything units say to each other.
+
+Axes and signs are those of ISO 8855: x forward, y left, z up; angles and moments positive
+counter-clockwise seen from above. `*` stands for the four wheels fl, fr, rl, rr.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Entry(NamedTuple):
+    """What is known of a signal."""
+
+    unit: str
+    text: str
+    """What it is: the description that a variable of an FMU carries."""
+    symbol: str = ""
+    """The field's, as papers write it; `_` begins a subscript. Of `x_ref` it follows from that of `x`."""
+    words: str = ""
+    """What headings call it, where that is not its name in words."""
+    minimum: float | None = None
+    """A smaller value is a mistake, not a strange road."""
+
+
+SIGNALS: dict[str, Entry] = {
+    "velocity_x": Entry(
+        "m/s", "Longitudinal velocity v_x of the centre of mass, vehicle axes", "v_x", "Longitudinal velocity"
+    ),
+    "velocity_y": Entry(
+        "m/s", "Lateral velocity v_y of the centre of mass, vehicle axes", "v_y", "Lateral velocity"
+    ),
+    "yaw_rate": Entry("rad/s", "Yaw rate r", "r"),
+    "sideslip": Entry(
+        "rad", "Sideslip angle beta = atan2(v_y, v_x) of the centre of mass", "β", "Sideslip angle"
+    ),
+    "sideslip_rate": Entry("rad/s", "Time derivative of the sideslip angle", "dβ/dt"),
+    "acceleration_x": Entry(
+        "m/s2",
+        "Longitudinal acceleration of the centre of mass, vehicle axes",
+        "a_x",
+        "Longitudinal acceleration",
+    ),
+    "acceleration_y": Entry(
+        "m/s2", "Lateral acceleration of the centre of mass, vehicle axes", "a_y", "Lateral acceleration"
+    ),
+    "roll_angle": Entry("rad", "Roll angle, positive with the left side up", "φ"),
+    "roll_rate": Entry("rad/s", "Roll rate"),
+    "pitch_angle": Entry("rad", "Pitch angle, positive with the nose down", "θ"),
+    "position_x": Entry("m", "Position of the centre of mass, earth axes, x", "x", "Longitudinal position"),
+    "position_y": Entry("m", "Position of the centre of mass, earth axes, y", "y", "Lateral position"),
+    "yaw_angle": Entry("rad", "Yaw angle psi", "ψ"),
+    "steer_angle": Entry("rad", "Road-wheel steer angle delta of the front axle", "δ"),
+    "steering_wheel_angle": Entry("rad", "Hand-wheel angle", "δ_H", "Hand-wheel angle"),
+    "drive_force": Entry("N", "Sum of the longitudinal tyre forces the driver asks for"),
+    "friction": Entry(
+        "1", "Friction coefficient mu of the road, as known to reference and controller", minimum=0.0
+    ),
+    "friction_*": Entry("1", "Friction coefficient mu under the wheel", minimum=0.0),
+    "yaw_rate_ref": Entry("rad/s", "Yaw rate the driver asks for"),
+    "sideslip_ref": Entry("rad", "Sideslip angle the driver asks for"),
+    "yaw_acceleration_ref": Entry("rad/s2", "Time derivative of yaw_rate_ref"),
+    "sideslip_rate_ref": Entry("rad/s", "Time derivative of sideslip_ref"),
+    "yaw_moment": Entry("N.m", "Yaw moment M_z asked of the wheels' longitudinal forces", "M_z"),
+    "force_request_*": Entry(
+        "N", "Longitudinal tyre force asked for, wheel axes", "F_x", "Longitudinal force asked for"
+    ),
+    "torque_request_*": Entry(
+        "N.m", "Wheel torque asked for, positive when driving", "T", "Wheel torque asked for"
+    ),
+    "wheel_torque_*": Entry("N.m", "Torque at the wheel, positive when driving", "T"),
+    "tyre_force_x_*": Entry(
+        "N", "Longitudinal tyre force, wheel axes, at the contact point", "F_x", "Longitudinal tyre force"
+    ),
+    "tyre_force_y_*": Entry(
+        "N", "Lateral tyre force, wheel axes, at the contact point", "F_y", "Lateral tyre force"
+    ),
+    "aligning_moment_*": Entry("N.m", "Self-aligning moment of the tyre about its vertical axis"),
+    "overturning_moment_*": Entry("N.m", "Overturning moment of the tyre about its longitudinal axis"),
+    "slip_stiffness_*": Entry("N", "Slope dF_x/dkappa of the tyre's force at tyre_slip_ratio; 0: not told"),
+    "tyre_slip_ratio_*": Entry("1", "Longitudinal slip that the tyre's force and slip_stiffness belong to"),
+    "slip_angle_*": Entry("rad", "Slip angle alpha = atan2(v_y, v_x) in wheel axes", "α"),
+    "inclination_angle_*": Entry(
+        "rad", "Inclination angle gamma of the wheel, positive: top to the right", "γ"
+    ),
+    "slip_ratio_*": Entry(
+        "1", "Longitudinal slip kappa = (w R - v) / max(|w R|, |v|)", "κ", "Longitudinal slip"
+    ),
+    "vertical_load_*": Entry("N", "Vertical load F_z on the tyre, positive upwards", "F_z"),
+    "wheel_speed_*": Entry("rad/s", "Angular velocity w of the wheel", "ω"),
+    "wheel_velocity_*": Entry("m/s", "Longitudinal velocity v of the wheel, wheel axes"),
+}
