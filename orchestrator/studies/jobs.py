@@ -22,10 +22,10 @@ from typing import TYPE_CHECKING, Any
 from ..errors import BuildError, ResultsError, ScenarioError, YawbenchError
 from ..master.interrupts import StopFlag, interrupts
 from ..plan import Change, Plan
-from ..processes import SAFE_PATH, safe_path
 from ..results.read import Results, load_results
 from ..scenario import yaml_lines
 from ..scenario.yaml_lines import Document
+from ..spawning import SAFE_PATH, SafeSpawnContext, safe_path
 from ..wording import hint
 
 if TYPE_CHECKING:
@@ -230,7 +230,7 @@ def pool(workers: int | None = None) -> ProcessPoolExecutor:
 def _context() -> Any:
     """Return how processes start: from a server that has imported once what each needs, or afresh."""
     if "forkserver" not in multiprocessing.get_all_start_methods() or not _has_place_for_sockets():
-        return multiprocessing.get_context("spawn")
+        return SafeSpawnContext()
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["__main__", *NEEDED])
     # Ctrl-C is for the caller, who ends its processes: the server must not get it, nor any that it starts,

@@ -26,6 +26,7 @@ STAGES = (
         "titles",
         "writing",
         "processes",
+        "spawning",
     },  # what all share
     {"scenario"},
     {"fmu"},

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.processes import python, safe_path
+from orchestrator.processes import python
+from orchestrator.spawning import SafeSpawnContext, _off_path, safe_path
 
 SCENARIO = "fuzzy_feedback/single_sine"
 SHADOWED = ("json", "numpy", "socket", "selectors", "struct", "signal", "pickle", "multiprocessing", "random")
@@ -36,16 +37,30 @@ def yawbench(folder, *arguments):
     [
         ("second-opinion", SCENARIO, "--no-one-core", "--master", "fmpy"),
         ("run", SCENARIO, "--isolate"),
-        pytest.param(
-            ("compare", SCENARIO, "--swap", "controller=controller_off"),
-            marks=pytest.mark.skipif(sys.version_info < (3, 11), reason="Python starts such processes"),
-        ),
+        ("compare", SCENARIO, "--swap", "controller=controller_off"),
     ],
 )
 def test_modules_in_the_working_folder_are_left_alone(trap, arguments):
     done = yawbench(trap, *arguments, "--set", "stop_time=0.01")
     assert not (trap / "taken").exists()
     assert done.returncode == 0, done.stderr
+
+
+def test_a_process_that_starts_afresh_leaves_the_working_folder_alone(trap, monkeypatch):
+    monkeypatch.chdir(trap)
+    monkeypatch.setattr(sys, "path", [folder for folder in sys.path if folder])
+    process = SafeSpawnContext().Process(target=os.getpid)
+    process.start()
+    process.join()
+    assert not (trap / "taken").exists()
+    assert process.exitcode == 0
+
+
+def test_a_program_of_one_line_loses_the_working_folder():
+    """As every Python before 3.11 needs it."""
+    command = ["python", "-s", "-c", "from a import main; main(1)", "--multiprocessing-fork"]
+    program = "import sys; del sys.path[0]; from a import main; main(1)"
+    assert _off_path(command) == ["python", "-s", "-c", program, "--multiprocessing-fork"]
 
 
 def test_a_program_finds_what_this_one_finds(tmp_path, monkeypatch):

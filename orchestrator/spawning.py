@@ -1,0 +1,59 @@
+"""Processes of the standard library's multiprocessing that leave modules in the working folder alone."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from multiprocessing import util
+from multiprocessing.context import SpawnContext, SpawnProcess
+from multiprocessing.process import BaseProcess
+from typing import Any
+
+SAFE_PATH = "PYTHONSAFEPATH"
+"""Environment variable that keeps the working folder off a new Python's path; from Python 3.11 on."""
+
+
+@contextlib.contextmanager
+def safe_path() -> Iterator[None]:
+    """Let processes that multiprocessing starts meanwhile leave the working folder alone."""
+    given = os.environ.get(SAFE_PATH)
+    os.environ[SAFE_PATH] = "1"
+    start: Any = getattr(util, "spawnv_passfds", None)
+    if sys.version_info < (3, 11) and start:
+
+        def start_safely(path: bytes, args: Sequence[Any], passfds: Sequence[int]) -> int:
+            return start(path, _off_path(args), passfds)
+
+        util.spawnv_passfds = start_safely
+    try:
+        yield
+    finally:
+        if sys.version_info < (3, 11) and start:
+            util.spawnv_passfds = start
+        if given is None:
+            del os.environ[SAFE_PATH]
+        else:
+            os.environ[SAFE_PATH] = given
+
+
+def _off_path(command: Sequence[str]) -> list[str]:
+    """Return the command of a Python with a one-line program, which takes the working folder off its path."""
+    at = command.index("-c") + 1
+    return [*command[:at], f"import sys; del sys.path[0]; {command[at]}", *command[at + 1 :]]
+
+
+class SafeSpawnProcess(SpawnProcess):
+    """A process that starts afresh."""
+
+    @staticmethod
+    def _Popen(process: BaseProcess) -> Any:
+        with safe_path():
+            return SpawnProcess._Popen(process)  # type: ignore[attr-defined]
+
+
+class SafeSpawnContext(SpawnContext):
+    """What starts such processes."""
+
+    Process = SafeSpawnProcess
