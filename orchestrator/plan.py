@@ -17,6 +17,8 @@ OF_RUN = ("start_time", "stop_time", "step_size", "algorithm")
 """What a change gives without naming a unit."""
 FACTS = ("friction", "speed")
 """What one change tells all units that have to know it (see `wiring.facts`)."""
+TYRES = "tyres"
+"""What names the tyre property files, of both axles or as `tyres.front`, `tyres.rear` of one."""
 Algorithm = Literal["jacobi", "gauss_seidel", "extrapolated"]
 
 
@@ -203,9 +205,14 @@ class Change:
     origin: str  # "--set", "--swap", "study", "sweep", ...
 
     @property
+    def names_file(self) -> bool:
+        """Whether the value is a file."""
+        return self.swaps or self.place.partition(".")[0] == TYRES or self.place == "vehicle"
+
+    @property
     def swaps(self) -> bool:
         """Whether the FMU of a unit was replaced."""
-        return "." not in self.place and self.place not in (*OF_RUN, "vehicle", *FACTS)
+        return "." not in self.place and self.place not in (*OF_RUN, "vehicle", TYRES, *FACTS)
 
     def __str__(self) -> str:
         value = str(self.value).lower() if isinstance(self.value, bool) else str(self.value)

@@ -24,6 +24,8 @@ def in_words(change: Change) -> str:
         return f"{fmu_of(change)} for {change.place}"
     if change.place == "vehicle":
         return f"vehicle file {Path(str(value)).name}"
+    if change.names_file:
+        return f"{change.place} = {Path(str(value)).name}"
     text = str(value).lower() if isinstance(value, bool) else str(value)
     if isinstance(value, float):
         text = f"{value:.10g}"

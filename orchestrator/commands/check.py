@@ -76,7 +76,8 @@ def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None
     values, hidden = _values(plan, defaults)
     _show(console, "Values", ("what", "value", "from", "units"), values)
     if hidden:
-        console.print(f"  {hidden} more are as the FMUs have them: --all shows them", style="dim")
+        also = " or come from tyre files" if plan.scenario.get("tyre_files") else ""
+        console.print(f"  {hidden} more are as the FMUs have them{also}: --all shows them", style="dim")
     _show(console, "Wires", ("from", "to", "variables"), _wire_rows(plan))
     direct = evaluate({unit.name: unit.fmu for unit in plan.units}, plan.wires).direct
     headings = ("unit", "after", "because its outputs follow")
@@ -126,6 +127,16 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
     rows: list[Sequence[str]] = [
         (name, value, given.get(name, in_file[name]), "all") for name, value in run.items()
     ]
+    files = plan.scenario.get("tyre_files", {})
+    for axle, file in files.items():
+        name = Path(file["file"]).name
+        takes = [
+            unit.name
+            for unit in plan.units
+            if any(n.endswith(f"_{axle}") and origin == name for n, origin in unit.origins.items())
+        ]
+        rows.append((f"tyres, {axle}", f"{file['kind']}, {file['side']}", name, ", ".join(takes)))
+    in_files = {Path(file["file"]).name for file in files.values()}
     takers: dict[tuple[str, str, str], list[str]] = {}
     hidden = 0
     for unit in plan.units:
@@ -134,7 +145,7 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
         constants = {name: value for name, value in unit.constants.items() if name not in unit.series}
         for name, value in {**own, **constants}.items():
             origin = unit.origins.get(name, "default")
-            if origin == "default" and not defaults and not _matters(unit, name):
+            if not defaults and (origin in in_files or (origin == "default" and not _matters(unit, name))):
                 hidden += 1
             else:
                 alike.setdefault((_shown(value, unit.fmu.variables[name].unit), origin), []).append(name)

@@ -46,7 +46,7 @@ def _with_changes(stem: str, changes: Iterable[Change]) -> str:
     """Return a name with changes behind it: readable, and with a hash where that does not say all."""
     given = list(changes)
     values = [_text(one.value) for one in given]
-    of_files = [one.swaps or one.place == "vehicle" for one in given]
+    of_files = [one.names_file for one in given]
     names = [re.split(r"[/\\]", v)[-1] if file else v for v, file in zip(values, of_files, strict=True)]
     readable = ",".join([stem, *(f"{one.place}={name}" for one, name in zip(given, names, strict=True))])
     portable = re.sub(r"[^\w.,=+-]", "_", readable, flags=re.ASCII)

@@ -13,6 +13,7 @@ from ..plan import Change
 from ..wording import hint, listed
 from . import overrides, quantities, strict, yaml_lines
 from .schema import Connection, Endpoint, Scenario, UnitSpec, Vehicle, endpoint
+from .tir import TyreFile, read_tir
 from .yaml_lines import Document, Key
 
 __all__ = ["Connection", "Endpoint", "Scenario", "UnitSpec", "Vehicle", "load_scenario"]
@@ -53,12 +54,13 @@ def load_scenario(
     if isinstance(document.data, dict):
         _check_time_grid(document)
         _check_unit_names(document)
+    tyres = _read_tyres(scenario, parameters, document, vehicle_document)
     problems = document.sentences() + vehicle_document.sentences()
     if problems or scenario is None or parameters is None:
         raise ScenarioError(problems)
     scenario._document, scenario._vehicle_document = document, vehicle_document
     scenario._vehicle, scenario._replaced, scenario._changes = parameters, replaced, effective
-    scenario._explicit = archive
+    scenario._explicit, scenario._tyre_files = archive, tyres
     return scenario
 
 
@@ -87,6 +89,26 @@ def _read_vehicle(document: Document, read: Callable[..., Document]) -> Document
         document.report(("vehicle",), missing)
         return Document(vehicle, data={})
     return read(vehicle, what="vehicle file")
+
+
+def _read_tyres(
+    scenario: Scenario | None, vehicle: Vehicle | None, document: Document, vehicle_document: Document
+) -> dict[str, TyreFile]:
+    """Return the tyre property file of each axle; report what is wrong with it, note what is unusual."""
+    if scenario is None or vehicle is None:
+        return {}
+    named, where = (scenario.tyres, document) if scenario.tyres else (vehicle.tyres, vehicle_document)
+    files: dict[str, TyreFile] = {}
+    for name in dict.fromkeys((named or {}).values()):
+        try:
+            file = read_tir(os.path.normpath(where.path.parent / name))
+        except ScenarioError as error:
+            for problem in error.problems:
+                where.report(("tyres",), problem)
+            continue
+        document.notes.extend(file.warnings)
+        files |= {axle: file for axle, given in (named or {}).items() if given == name}
+    return {axle: files[axle] for axle in named or {} if axle in files}
 
 
 def _check_time_grid(document: Document) -> None:

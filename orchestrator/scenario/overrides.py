@@ -4,7 +4,8 @@
 that no unit may have stand for more: `--set vehicle.mass=1200` changes the parameter set that all
 units share, `--set inputs.friction*=0.3` a constant, `--set friction=0.3` and `speed` what every unit that
 has to know it is told. `--set stop_time=2`, `step_size` and `algorithm` change the run,
-`--set unit.step_size=0.01` the step of a unit. Studies and sweeps change the same places, and `vehicle` is
+`--set unit.step_size=0.01` the step of a unit, `--set tyres=my.tir` (or `tyres.front`, `tyres.rear`) the tyre
+property file. Studies and sweeps change the same places, and `vehicle` is
 the vehicle file itself. A value that was changed remembers by what, so that later messages name that in
 place of a line.
 """
@@ -20,14 +21,14 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ScenarioError
-from ..plan import FACTS, OF_RUN, Change, Value
+from ..plan import FACTS, OF_RUN, TYRES, Change, Value
 from ..wording import hint, listed
 from . import yaml_lines
 from .yaml_lines import Document, Key
 
 HOLDERS = ("vehicle", "inputs")
 """Words that `--set` understands in place of a unit."""
-RESERVED = (*HOLDERS, *FACTS)
+RESERVED = (*HOLDERS, *FACTS, TYRES)
 """Names that no unit may have."""
 
 
@@ -57,7 +58,7 @@ def read_changes(swaps: Iterable[str] = (), settings: Iterable[str] = ()) -> tup
     for text in settings:
         place, equals, raw = (part.strip() for part in text.partition("="))
         holder, dot, name = place.partition(".")
-        if equals and ((holder and dot and name) or place in (*OF_RUN, *FACTS)):
+        if equals and ((holder and dot and name) or place in (*OF_RUN, *FACTS, TYRES)):
             changes.append(Change(place, yaml_lines.scalar(raw), "--set"))
         else:
             sentence = f"write --set UNIT.PARAMETER=VALUE, or {listed((*OF_RUN, *FACTS), last='or')}=VALUE"
@@ -71,7 +72,10 @@ def changes_of(
     swaps: Mapping[str, str], settings: Mapping[str, Value], folder: Path, origin: str
 ) -> list[Change]:
     """Return the changes that a file in a folder gives as unit -> FMU (see `swap_of`) and place -> value."""
-    changes = [Change(place, value, origin) for place, value in settings.items()]
+    changes = [
+        Change(place, str(folder / str(value)) if place.split(".")[0] == TYRES else value, origin)
+        for place, value in settings.items()
+    ]
     for unit, text in swaps.items():
         fmu, *brought = swap_of(unit, text, origin)
         path = str(folder / str(fmu.value)) if is_path(str(fmu.value)) else fmu.value
@@ -118,6 +122,8 @@ def apply_changes(
             differs = _put(document, (change.place,), change)
         elif change.place == "vehicle":
             differs = True  # see `apply_vehicle`
+        elif holder == TYRES:
+            differs = _put_tyres(document, vehicle, change)
         elif holder == "vehicle":
             differs = _put(vehicle, ("parameters", name), change)
         elif holder == "inputs":
@@ -144,6 +150,21 @@ def apply_vehicle(document: Document, changes: Iterable[Change]) -> None:
     for change in changes:
         if change.place == "vehicle":
             _put(document, ("vehicle",), change, os.path.abspath(str(change.value)))
+
+
+def _put_tyres(document: Document, vehicle: Document, change: Change) -> bool:
+    """Name other tyre property files, relative to the working directory; return whether they are others."""
+    file = os.path.abspath(str(change.value))
+    axle = change.place.removeprefix(f"{TYRES}.")
+    holder = next(
+        (d for d in (document, vehicle) if isinstance(d.data, dict) and d.data.get(TYRES)), document
+    )
+    before = holder.data.get(TYRES) if isinstance(holder.data, dict) else None
+    named = before if isinstance(before, dict) else {"front": before, "rear": before}
+    named = {key: os.path.abspath(holder.path.parent / str(name)) for key, name in named.items() if name}
+    after = {"front": file, "rear": file} if axle == TYRES else named | {axle: file}
+    _put(document, (TYRES,), change, after)
+    return after != named
 
 
 def leave_unvalidated(document: Document) -> None:

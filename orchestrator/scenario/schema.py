@@ -29,7 +29,10 @@ from ..plan import Algorithm, Change, Value
 from ..wording import short
 from . import overrides, quantities
 from .strict import Strict
-from .yaml_lines import Document
+from .tir import TyreFile
+from .yaml_lines import Document, Key
+
+AXLES = ("front", "rear")
 
 
 class Endpoint(NamedTuple):
@@ -88,6 +91,19 @@ def _source(value: object) -> Endpoint | list[str] | None:
     return None if value is None else _end(value)
 
 
+def _tyres(value: object) -> dict[str, str]:
+    if isinstance(value, str) and value:
+        return dict.fromkeys(AXLES, value)
+    texts = value.values() if isinstance(value, dict) else ()
+    if (
+        isinstance(value, dict)
+        and sorted(value) == sorted(AXLES)
+        and all(t and isinstance(t, str) for t in texts)
+    ):
+        return value
+    raise ValueError(f"must be a tyre property file, or one each for front and rear (got {short(value)})")
+
+
 def _tolerance(value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value < 1:
         raise ValueError(f"must be a number between 0 and 1 (got {short(value)})")
@@ -104,6 +120,11 @@ Time = Annotated[
 ]
 Instant = Annotated[
     Fraction, PlainValidator(quantities.instant), PlainSerializer(float), WithJsonSchema(_TIME_SCHEMA)
+]
+Tyres = Annotated[
+    dict[str, str],
+    PlainValidator(_tyres),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "object"}]}),
 ]
 Variables = Annotated[Endpoint, PlainValidator(endpoint), WithJsonSchema({"type": "string"})]
 UnitName = Annotated[str, AfterValidator(_unit_name)]
@@ -199,6 +220,9 @@ class Vehicle(Strict):
 
     title: str = ""
     source: str = ""
+    tyres: Tyres | None = Field(
+        None, description="Tyre property file (.tir), or front: and rear: of one each, relative to this file"
+    )
     parameters: dict[str, Scalar] = Field({}, description="Parameter name -> value")
 
 
@@ -217,6 +241,7 @@ class Scenario(Strict):
     title: str = ""
     source: str = Field("", description="Where the scenario comes from: paper, section, figure")
     vehicle: str | None = Field(None, description="Path of a vehicle file")
+    tyres: Tyres | None = Field(None, description="As in the vehicle file, in place of what that says")
     start_time: Instant = Field(Fraction(0), description="s")
     stop_time: Time = Field(description="s, an integer multiple of the communication step")
     step_size: Time = Field(description="s, communication step")
@@ -233,6 +258,7 @@ class Scenario(Strict):
     _document: Document = PrivateAttr()
     _vehicle_document: Document = PrivateAttr()
     _vehicle: Vehicle = PrivateAttr()
+    _tyre_files: dict[str, TyreFile] = PrivateAttr(default={})
     _replaced: dict[str, str] = PrivateAttr()
     _changes: tuple[Change, ...] = PrivateAttr(default=())
     _explicit: bool = PrivateAttr(default=False)
@@ -258,6 +284,16 @@ class Scenario(Strict):
         return self._vehicle.parameters
 
     @property
+    def tyre_files(self) -> dict[str, TyreFile]:
+        """Axle -> its tyre property file; every unit takes the parameters it declares. Empty: none."""
+        return self._tyre_files
+
+    @property
+    def tyres_place(self) -> tuple[Document, Key]:
+        """Where the tyre property files are named, for messages."""
+        return (self._vehicle_document if self.tyres is None else self._document), ("tyres",)
+
+    @property
     def replaced(self) -> dict[str, str]:
         """Unit -> the FMU that the file names, for units that are swapped."""
         return self._replaced
@@ -281,4 +317,8 @@ class Scenario(Strict):
         times = {"stop_time": float(self.stop_time), "step_size": float(self.step_size)}
         if self.start_time:
             times["start_time"] = float(self.start_time)
-        return {"file": str(self.path), **data, **times, "vehicle_parameters": self.vehicle_parameters}
+        tyres = {axle: file.record() for axle, file in self._tyre_files.items()}
+        return {
+            **{"file": str(self.path), **data, **times, "vehicle_parameters": self.vehicle_parameters},
+            **({"tyre_files": tyres} if tyres else {}),
+        }

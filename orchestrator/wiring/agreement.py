@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import product
 from typing import NamedTuple
 
 from ..plan import Finding, Unit, Value, Variable
@@ -19,6 +20,8 @@ CAR = (
 """Parameters that describe the car, whichever unit has to know them."""
 SAME = 1e-9
 """Relative difference of values that count as equal: rounding of a conversion."""
+RADIUS = 0.03
+"""Relative difference of a wheel's radius from that of its tyre. Chosen: the load changes it by 1 to 2 %."""
 SLIPS = (
     ("m/s", 70.0, "km/h", 3.6),  # chosen: above the top speed of nearly all cars
     ("rad", 4 * math.pi, "deg", 180 / math.pi),  # chosen: two turns of a hand wheel
@@ -42,7 +45,31 @@ def remarks(scenario: Scenario, units: Mapping[str, Unit]) -> list[Finding]:
         *_two_values(units),
         *_other_cars(scenario, units),
         *_slips(scenario, units),
+        *_of_tyres(scenario, units),
     ]
+
+
+def _of_tyres(scenario: Scenario, units: Mapping[str, Unit]) -> Iterator[Finding]:
+    """Yield a remark for what does not go with the tyre property files."""
+    tyres = [unit for unit in units.values() if "pcy1_front" in unit.parameters]
+    if not tyres or not scenario.tyre_files:
+        return
+    law = tyres[0].fmu.name.removeprefix("tyre_").removesuffix("_transient")
+    for one in _parameters(units.values()):
+        if one.name == "tyre" and "pcx1_front" in units[one.unit].parameters and one.value != law:
+            says = f"{one.unit}.tyre is {one.value}: it does not ask the law of {tyres[0].name}, {law}"
+            yield Finding("another tyre", place=f"{one.unit}.tyre", says=says)
+    radii = {str(f.path.name): f.rolling_radius for f in scenario.tyre_files.values() if f.rolling_radius}
+    told = [one for one in _parameters(units.values()) if one.name == "wheel_radius"]
+    for (file, radius), one in product(radii.items(), told):
+        if isinstance(one.value, float) and radius and abs(one.value / radius - 1.0) > RADIUS:
+            yield Finding(
+                "another radius",
+                place=f"{one.unit}.wheel_radius",
+                value=one.value,
+                says=f"{one.unit}.wheel_radius is {one.value:.4g} m, but the tyres of {file} roll on "
+                f"{radius:.4g} m at nominal load",
+            )
 
 
 def _two_values(units: Mapping[str, Unit]) -> Iterator[Finding]:

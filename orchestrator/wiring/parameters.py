@@ -109,6 +109,7 @@ class Parameters:
         given: dict[str, dict[str, Value]] = {unit: {} for unit in self._fmus}
         for unit, fmu in self._fmus.items():
             self._origins[unit].update((variable.name, "default") for variable in fmu.of("parameter"))
+        self._from_tyre_files(given)
         self._from_vehicle(given)
         by_change = self._from_facts(given)
         for unit, fmu in self._fmus.items():
@@ -142,6 +143,27 @@ class Parameters:
                 sentence = f"no unit has a parameter {listed(fact.parameters, last='or')}"
                 self._scenario.document.report((fact_name,), sentence)
         return by_change
+
+    def _from_tyre_files(self, given: dict[str, dict[str, Value]]) -> None:
+        """Give the coefficients of tyre property files to every unit that declares them."""
+        document, key = self._scenario.tyres_place
+        for axle, file in self._scenario.tyre_files.items():
+            for unit, fmu in self._fmus.items():
+                for name, value in file.values.items():
+                    parameter = f"{name}_{axle}"
+                    if not _is_parameter(fmu, parameter):
+                        continue
+                    try:
+                        given[unit][parameter] = value_for(fmu.variables[parameter], value)
+                    except ValueError as error:
+                        document.report(key, f"{file.path}: {name.upper()}: {error}")
+                    self._origins[unit][parameter] = file.path.name
+        if self._scenario.tyre_files and not any(map(_takes_tyre_files, self._fmus.values())):
+            before = (self._replaced(unit) for unit in self._scenario.replaced)
+            if any(fmu is not None and _takes_tyre_files(fmu) for fmu in before):
+                self._notes.append("tyres are left out: no tyre takes such files after the swap")
+            else:
+                document.report(key, "no unit is a tyre that takes such files; tyre_magic_formula_62 does")
 
     def _from_vehicle(self, given: dict[str, dict[str, Value]]) -> None:
         document = self._scenario.vehicle_document
@@ -186,6 +208,10 @@ class Parameters:
 
 def _is_parameter(fmu: Fmu, name: str) -> bool:
     return name in fmu.variables and fmu.variables[name].causality == "parameter"
+
+
+def _takes_tyre_files(fmu: Fmu) -> bool:
+    return _is_parameter(fmu, "pcy1_front") and "tyre_force_y_fl" in fmu.variables
 
 
 def _unknown(unit: str, fmu: Fmu, name: str) -> str:

@@ -1,0 +1,302 @@
+"""Tyre property files (`.tir`): the coefficients of MF-Tyre 5.2 (PAC2002), 6.1 or 6.2, in SI units.
+
+A file says of itself what kind it is (FITTYP, else PROPERTY_FILE_FORMAT) and in which units it is written.
+What it leaves out is neutral: scalings are one, other coefficients zero, so nothing of another tyre gets in.
+What cannot be used is refused; what is unusual is read, with a warning.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from math import atan, inf, isfinite, nan, pi, prod, sin, tan
+from pathlib import Path
+
+from ..errors import ScenarioError
+from ..files import TEXT, read_bytes, reads, reason
+from ..wording import listed, short
+from .tir_lines import Entry, read_entries
+from .tir_names import (
+    ALIASES,
+    COEFFICIENTS,
+    DIMENSIONS,
+    FORMATS,
+    KINDS,
+    NEEDED,
+    OTHER_MODELS,
+    READ,
+    SCALINGS,
+    UNITS,
+)
+
+
+@dataclass(frozen=True)
+class TyreFile:
+    """A tyre property file as read."""
+
+    path: Path
+    sha256: str
+    kind: str  # "MF-Tyre 6.2"
+    side: str  # "LEFT" or "RIGHT"
+    values: dict[str, float]
+    """Parameter name without axle, such as pcx1 -> its value in SI units."""
+    rolling_radius: float | None
+    """Effective rolling radius at nominal load [m], where the file lets it be known."""
+    warnings: tuple[str, ...] = ()
+
+    def record(self) -> dict[str, object]:
+        """Return what a run's record says about it."""
+        return {
+            "file": str(self.path),
+            "sha256": self.sha256,
+            "kind": self.kind,
+            "side": self.side,
+            "warnings": list(self.warnings),
+        }
+
+
+@reads("tyre property file", ScenarioError)
+def read_tir(path: Path | str) -> TyreFile:
+    """Read a tyre property file.
+
+    Raises:
+        ScenarioError: with everything for which it cannot be used.
+    """
+    path = Path(path)
+    try:
+        raw = read_bytes(path, largest=TEXT)
+    except FileNotFoundError:
+        raise ScenarioError(f"{path}: no such tyre property file") from None
+    except (OSError, ValueError) as error:
+        raise ScenarioError(f"{path}: cannot read this tyre property file: {reason(error)}") from None
+    reading = _Reading(path)
+    reading.take(read_entries(raw))
+    file = reading.finish(hashlib.sha256(raw).hexdigest())
+    if file is None:
+        raise ScenarioError(reading.problems)
+    return file
+
+
+@dataclass
+class _Reading:
+    """A file while it is read."""
+
+    path: Path
+    entries: dict[str, Entry] = field(default_factory=dict)
+    units: dict[str, Entry] = field(default_factory=dict)
+    texts: dict[str, Entry] = field(default_factory=dict)
+    values: dict[str, float] = field(default_factory=dict)
+    problems: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    def take(self, entries: Iterable[Entry]) -> None:
+        """Keep what is understood; of a key that is given twice, the last."""
+        for entry in entries:
+            key = ALIASES.get(entry.key, entry.key)
+            if entry.section == "UNITS":
+                self.units[entry.key] = entry
+            elif key in ("PROPERTY_FILE_FORMAT", "TYRESIDE"):
+                self.texts[key] = entry
+            elif key in READ and (entry.text is not None or key in NEEDED):
+                if (before := self.entries.get(key)) is not None:
+                    self._warn(entry, f"is given twice, first in line {before.line}; this one counts")
+                self.entries[key] = entry
+
+    def finish(self, sha256: str) -> TyreFile | None:
+        """Return the file, None if there are problems."""
+        if not self.entries:
+            self.problems.append(f"{self.path}: this is no tyre property file: it holds no coefficients")
+            return None
+        kind = self._kind()
+        factors = self._factors()
+        for key, entry in self.entries.items():
+            if key != "FITTYP" and (value := self._number(entry)) is not None:
+                self.values[key] = value * factors(DIMENSIONS.get(key, {}))
+        self._check_needed()
+        if self.problems or kind is None:
+            return None
+        self._check_stiffness()
+        side = self._side()
+        self._remark(kind)
+        values = self._complete(kind, side)
+        if self.problems:
+            return None
+        warnings = tuple(self.warnings)
+        return TyreFile(self.path, sha256, KINDS[kind], side, values, self._rolling_radius(), warnings)
+
+    # ---- what the file says of itself -----------------------------------------------------------------
+
+    def _kind(self) -> int | None:
+        form = self.texts.get("PROPERTY_FILE_FORMAT")
+        name = (form.text or "").upper() if form else ""
+        if form and name in OTHER_MODELS:
+            self._refuse(form, f"{form.text} is another tyre model; read are {_known()}")
+            return None
+        entry = self.entries.get("FITTYP")
+        if entry is None or entry.text is None:
+            if name in FORMATS:
+                return FORMATS[name]
+            self.problems.append(f"{self.path}: FITTYP is missing, which says the kind; read are {_known()}")
+            return None
+        value = self._number(entry)
+        if value is None:
+            return None
+        if value in KINDS:
+            return int(value)
+        self._refuse(entry, f"{entry.text} is no kind that is read; read are {_known()}")
+        return None
+
+    def _factors(self) -> Callable[[dict[str, int]], float]:
+        """Return what turns powers of the file's units into a factor to SI."""
+        given = {}
+        for name, known in UNITS.items():
+            entry = self.units.get(name)
+            if entry is None or entry.text is None:
+                continue
+            text = entry.text.lower()
+            factor = known.get(text, known.get(text.removesuffix("s")))
+            if factor is None:
+                self._refuse(entry, f"{entry.text} is no unit of {name.lower()} that is known here")
+            else:
+                given[name] = factor
+        if "ANGLE" in given and given["ANGLE"] != 1.0:
+            self._warn(
+                self.units["ANGLE"], "degrees are taken for ranges only: coefficients are read as in radians"
+            )
+        given.setdefault("PRESSURE", given.get("FORCE", 1.0) / given.get("LENGTH", 1.0) ** 2)
+
+        return lambda powers: prod(given.get(name, 1.0) ** power for name, power in powers.items())
+
+    def _side(self) -> str:
+        entry = self.texts.get("TYRESIDE")
+        side = (entry.text or "").upper() if entry else ""
+        if side in ("LEFT", "RIGHT"):
+            return side
+        if entry is None:
+            self.warnings.append(f"{self.path}: TYRESIDE is missing: read as LEFT")
+        else:
+            self._warn(entry, f"{entry.text or 'no value'}: read as LEFT")
+        return "LEFT"
+
+    # ---- what cannot be, and what is unusual ----------------------------------------------------------
+
+    def _check_needed(self) -> None:
+        for key in NEEDED:
+            if key in self.entries and key not in self.values:
+                continue  # has been reported
+            value = self.values.get(key, 0.0)
+            if value == 0.0 or (key == "FNOMIN" and value < 0.0):
+                must = "must be above 0" if key == "FNOMIN" else "must not be 0"
+                if key in self.entries:
+                    self._refuse(self.entries[key], f"{must} (got {self.entries[key].text})")
+                else:
+                    self.problems.append(f"{self.path}: {key} is missing")
+
+    def _check_stiffness(self) -> None:
+        k_x = self._at("PKX1") * self._at("LKX", 1.0)
+        k_y = (
+            self._at("PKY1")
+            * self._at("LKY", 1.0)
+            * sin(self._at("PKY4", 2.0) * atan(1.0 / self._at("PKY2")))
+        )
+        if k_y >= 0.0:
+            self._refuse(
+                self.entries["PKY1"],
+                "the cornering stiffness, with PKY2, PKY4 and LKY, is not negative at nominal load: "
+                "a positive slip angle must give a negative lateral force",
+            )
+        if k_x <= 0.0:
+            self._refuse(self.entries["PKX1"], "the slip stiffness must be positive at nominal load")
+
+    def _remark(self, kind: int) -> None:
+        say = self.warnings.append
+        if self._at("RBX1") == 0.0 and self._at("RBY1") == 0.0:
+            say(f"{self.path}: no combined slip: RBX1 and RBY1 are missing or zero")
+        for low, high in (("KPUMIN", "KPUMAX"), ("ALPMIN", "ALPMAX")):
+            least, most = self.values.get(low), self.values.get(high)
+            if least is not None and most is not None and least * most >= 0.0 and least != most:
+                self._warn(self.entries[high], f"with {low} = {least:g} a range of one side; no range limits")
+        relaxation = ("LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS") if kind >= 60 else ("PTX1", "PTY1")
+        absent = [key for key in relaxation if self._at(key) == 0.0]
+        if absent:
+            say(f"{self.path}: no relaxation lengths: {listed(absent)} missing or zero")
+        if self._at("LMUV") != 0.0:
+            self._warn(self.entries["LMUV"], "friction that decays with speed is left out")
+        if "UNLOADED_RADIUS" not in self.values:
+            known = self._radius() is not None
+            how = (
+                "taken from RIM_RADIUS, WIDTH and ASPECT_RATIO" if known else "as the tyre has it by default"
+            )
+            say(f"{self.path}: UNLOADED_RADIUS is missing: {how}")
+
+    # ---- values ---------------------------------------------------------------------------------------
+
+    def _complete(self, kind: int, side: str) -> dict[str, float]:
+        """Return all parameters; of what is missing, the neutral value."""
+        values = {key: self._at(key, 1.0) for key in SCALINGS}
+        values |= {key: self._at(key) for key in COEFFICIENTS}
+        values["PKY4"] = self._at("PKY4", 2.0)
+        values |= {"FITTYP": float(kind), "TYRESIDE": 1.0 if side == "LEFT" else -1.0}
+        values["FNOMIN"] = self.values["FNOMIN"]
+        if self._at("LFZO", 1.0) <= 0.0:
+            self._refuse(self.entries["LFZO"], f"must be above 0 (got {self.entries['LFZO'].text})")
+        pressure = self._at("NOMPRES") or self._at("INFLPRES")
+        if pressure > 0.0:
+            values |= {"NOMPRES": pressure, "INFLPRES": self._at("INFLPRES") or pressure}
+        values["FZMAX"] = self._largest_load(values)
+        radius = self._at("UNLOADED_RADIUS") or self._radius()
+        if radius:
+            values["UNLOADED_RADIUS"] = radius
+        values |= {key: self._at(key) for key in ("LONGITUDINAL_STIFFNESS", "LATERAL_STIFFNESS")}
+        return {key.lower(): value for key, value in values.items()}
+
+    def _largest_load(self, values: dict[str, float]) -> float:
+        """Return FZMAX; without one three times the nominal load, or less if a stiffness vanishes below."""
+        load = values["FNOMIN"] * values["LFZO"]
+        turn, bend = abs(values["PKY4"]), abs(values["PKY2"])
+        sound = load * bend * tan(pi / turn) if turn > 2.0 else inf
+        if values["PKX2"] * values["PKX1"] < 0.0:
+            sound = min(sound, load * (1.0 - values["PKX1"] / values["PKX2"]))
+        given = self._at("FZMAX")
+        if given <= 0.0:
+            return min(3.0 * load, 0.9 * sound)
+        if given > sound:
+            self._warn(self.entries["FZMAX"], f"above {sound:.0f} N a stiffness has changed its sign")
+        return given
+
+    def _radius(self) -> float | None:
+        rim, width, ratio = (self._at(key) for key in ("RIM_RADIUS", "WIDTH", "ASPECT_RATIO"))
+        return rim + width * ratio if min(rim, width, ratio) > 0.0 else None
+
+    def _rolling_radius(self) -> float | None:
+        """Return the effective rolling radius at nominal load: R_0 less (D atan(B) + F) F_z0 / C_z."""
+        radius, stiffness = self._at("UNLOADED_RADIUS"), self._at("VERTICAL_STIFFNESS")
+        b, d, f = (self._at(key) for key in ("BREFF", "DREFF", "FREFF"))
+        if not (radius > 0.0 and stiffness > 0.0 and (d or f)):
+            return None
+        return radius * self._at("Q_RE0", 1.0) - self.values["FNOMIN"] / stiffness * (d * atan(b) + f)
+
+    def _at(self, key: str, default: float = 0.0) -> float:
+        return self.values.get(key, default)
+
+    def _number(self, entry: Entry) -> float | None:
+        """Return the number that an entry gives, None if it gives none, which then is a problem."""
+        try:
+            value = float((entry.text or "").upper().replace("D", "E"))
+        except ValueError:
+            value = nan
+        if isfinite(value):
+            return value
+        self._refuse(entry, f"must be a number (got {short(entry.text)})")
+        return None
+
+    def _refuse(self, entry: Entry, sentence: str) -> None:
+        self.problems.append(f"{self.path}:{entry.line}: {entry.key}: {sentence}")
+
+    def _warn(self, entry: Entry, sentence: str) -> None:
+        self.warnings.append(f"{self.path}:{entry.line}: {entry.key}: {sentence}")
+
+
+def _known() -> str:
+    return listed([f"{number} ({name})" for number, name in KINDS.items()])

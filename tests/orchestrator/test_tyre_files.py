@@ -1,0 +1,200 @@
+"""Tyre property files in scenarios: who takes them, how they are changed, what a run remembers of them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import pytest
+
+from fmus.build import build_all
+from orchestrator.cli import main
+from orchestrator.errors import ScenarioError, WiringError
+from orchestrator.interop.ssp_write import write_ssp
+from orchestrator.results.naming import default_folder
+from orchestrator.scenario.load import load_scenario
+from orchestrator.sweeps.planning import run_key
+from orchestrator.wiring.make_plan import make_plan
+from tests.changed import changed
+
+from .tir_files import write
+
+COMPONENTS = (
+    "driver_force_pulse",
+    "tyre_magic_formula_62",
+    "tyre_linear",
+    "plant_seven_dof",
+    "wheel_control_slip",
+)
+SCENARIO = """\
+title: Straight on
+{tyres}vehicle: car.yaml
+stop_time: 0.05
+step_size: 0.001
+inputs: {{"friction*": 0.9, "steer_angle": 0.0, "force_request*": -500}}
+units:
+  wheel_control: {{fmu: wheel_control_slip, parameters: {{tyre: magic_formula_62}}}}
+  plant: {{fmu: plant_seven_dof}}
+  tyre: {{fmu: tyre_magic_formula_62{more}}}
+connections: [{{from: wheel_control.torque_request_*, to: plant.wheel_torque_*}}]
+"""
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory):
+    """A folder with the FMUs of the scenario."""
+    folder = tmp_path_factory.mktemp("fmus")
+    build_all(folder, components=COMPONENTS)
+    return folder
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with two tyre property files and the file of a car."""
+    write(tmp_path / "soft.tir", {"PKY1": "-12.0", "PKX1": "18.0"})
+    write(tmp_path / "stiff.tir", {"PKY1": "-17.0", "PKX1": "25.0", "FITTYP": "61"})
+    (tmp_path / "car.yaml").write_text("parameters: {wheel_radius: 0.305}\n")
+    return tmp_path
+
+
+def scenario(folder, tyres="tyres: soft.tir", more=""):
+    path = folder / "straight.yaml"
+    path.write_text(SCENARIO.format(tyres=f"{tyres}\n" if tyres else "", more=more))
+    return path
+
+
+def plan(path, fmus, *swaps, **settings):
+    return make_plan(load_scenario(path, changes=changed(swaps, **settings)), fmus=fmus)
+
+
+def yawbench(arguments):
+    """Return the exit status of the command."""
+    with pytest.raises(SystemExit) as done:
+        main(arguments)
+    return done.value.code
+
+
+def parameters(planned, unit="tyre"):
+    return {u.name: u.parameters for u in planned.units}[unit]
+
+
+def test_every_unit_takes_what_it_declares_for_both_axles(folder, fmus):
+    planned = plan(scenario(folder, "tyres: {front: soft.tir, rear: stiff.tir}"), fmus)
+    tyre, control = parameters(planned), parameters(planned, "wheel_control")
+    assert (tyre["pky1_front"], tyre["pky1_rear"]) == (-12.0, -17.0)
+    assert (control["pkx1_front"], control["pkx1_rear"]) == (18.0, 25.0)
+    assert "pky1_front" not in control
+    assert not set(parameters(planned, "plant")) & set(tyre)
+    origins = {u.name: u.origins for u in planned.units}
+    assert (origins["tyre"]["pky1_front"], origins["tyre"]["pky1_rear"]) == ("soft.tir", "stiff.tir")
+    assert not any("tyre" in note or "radius" in note for note in planned.notes)
+
+
+def test_the_vehicle_file_may_name_them_and_the_scenario_has_the_last_word(folder, fmus):
+    (folder / "car.yaml").write_text("tyres: stiff.tir\nparameters: {wheel_radius: 0.305, lmuy_rear: 0.7}\n")
+    of_vehicle = parameters(plan(scenario(folder, ""), fmus))
+    assert (of_vehicle["pky1_front"], of_vehicle["lmuy_front"], of_vehicle["lmuy_rear"]) == (-17.0, 0.98, 0.7)
+    of_scenario = parameters(plan(scenario(folder, more=", parameters: {lmuy_front: 0.5}"), fmus))
+    assert (of_scenario["pky1_front"], of_scenario["lmuy_front"]) == (-12.0, 0.5)
+
+
+def test_another_file_is_another_run(folder, fmus, monkeypatch):
+    path = scenario(folder)
+    monkeypatch.chdir(folder)
+    plain = plan(path, fmus)
+    other = plan(path, fmus, **{"tyres": "stiff.tir"})
+    rear = plan(path, fmus, **{"tyres.rear": "stiff.tir"})
+    assert plain.changes == ()
+    assert [(c.place, Path(str(c.value)).name) for c in rear.changes] == [("tyres.rear", "stiff.tir")]
+    assert (parameters(rear)["pky1_front"], parameters(rear)["pky1_rear"]) == (-12.0, -17.0)
+    assert len({run_key(p, {}) for p in (plain, other, rear)}) == 3
+    assert len({default_folder(path, p.changes) for p in (plain, other, rear)}) == 3
+    assert "stiff.tir" in default_folder(path, other.changes).name
+    write(folder / "soft.tir", {"PKY1": "-12.5", "PKX1": "18.0"})
+    assert run_key(plan(path, fmus), {}) != run_key(plain, {})
+    assert plan(path, fmus, **{"tyres": "soft.tir"}).changes == ()  # as it stands
+
+
+def test_a_run_remembers_the_files_with_their_hash_kind_and_warnings(folder, fmus, tmp_path):
+    write(folder / "soft.tir", {"TYRESIDE": "UNKNOWN"})
+    out = tmp_path / "out"
+    assert not yawbench(["run", str(scenario(folder)), "--fmus", str(fmus), "--out", str(out)])
+    record = json.loads((out / "run.json").read_text())
+    front = record["scenario"]["tyre_files"]["front"]
+    assert front["sha256"] == hashlib.sha256((folder / "soft.tir").read_bytes()).hexdigest()
+    assert (front["kind"], front["side"]) == ("MF-Tyre 6.2", "LEFT")
+    assert "UNKNOWN: read as LEFT" in front["warnings"][0]
+    assert any("UNKNOWN: read as LEFT" in note for note in record["notes"])
+    assert record["fmus"]["tyre"]["origins"]["pcx1_front"] == "soft.tir"
+
+
+def test_check_shows_the_files_and_with_all_their_coefficients(folder, fmus, capsys):
+    path = scenario(folder, "tyres: {front: soft.tir, rear: stiff.tir}")
+    assert not yawbench(["check", str(path), "--fmus", str(fmus)])
+    text = " ".join(capsys.readouterr().out.split())
+    assert "tyres, front MF-Tyre 6.2, LEFT soft.tir wheel_control, tyre" in text
+    assert "tyres, rear MF-Tyre 6.1, LEFT stiff.tir wheel_control, tyre" in text
+    assert "pky1" not in text
+    assert not yawbench(["check", str(path), "--fmus", str(fmus), "--all"])
+    assert "pky1_rear -17 stiff.tir tyre" in " ".join(capsys.readouterr().out.split())
+
+
+def test_an_ssp_archive_carries_the_coefficients(folder, fmus, tmp_path):
+    planned = plan(scenario(folder), fmus)
+    archive = tmp_path / "straight.ssp"
+    write_ssp(planned, archive)
+    again = plan(archive, fmus)
+    assert parameters(again)["pky1_front"] == -12.0
+    assert parameters(again, "wheel_control")["pkx1_rear"] == 18.0
+
+
+@pytest.mark.parametrize(
+    ("tyres", "says"),
+    [
+        ("tyres: none.tir", "straight.yaml:2: tyres: "),
+        ("tyres: none.tir", "none.tir: no such tyre property file"),
+        ("tyres: {front: soft.tir}", "must be a tyre property file, or one each for front and rear"),
+        ("tyres: 3", "must be a tyre property file, or one each for front and rear (got 3)"),
+        ("tyres: bad.tir", "bad.tir:32: PKX1: the slip stiffness must be positive"),
+    ],
+)
+def test_files_that_cannot_be_used_are_refused_with_their_place(folder, tyres, says):
+    write(folder / "bad.tir", {"PKX1": "-3"})
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(scenario(folder, tyres))
+    assert len(caught.value.problems) == 1
+    assert says in caught.value.problems[0]
+
+
+def test_a_value_beyond_what_the_tyre_allows_is_refused_with_file_and_key(folder, fmus):
+    write(folder / "soft.tir", {"PCX1": "0.001"})
+    with pytest.raises(WiringError, match=r"soft.tir: PCX1: must be at least 0.01 \(got 0.001\)"):
+        plan(scenario(folder), fmus)
+
+
+def test_without_a_tyre_that_takes_them_they_are_refused_and_after_a_swap_left_out(folder, fmus):
+    path = scenario(folder)
+    swapped = plan(path, fmus, "tyre=tyre_linear")
+    assert "tyres are left out: no tyre takes such files after the swap" in swapped.notes
+    path.write_text(path.read_text().replace("tyre_magic_formula_62", "tyre_linear"))
+    with pytest.raises(WiringError, match="tyres: no unit is a tyre that takes such files"):
+        plan(path, fmus)
+
+
+def test_a_slip_control_that_asks_another_law_and_another_radius_are_told(folder, fmus):
+    (folder / "car.yaml").write_text("parameters: {wheel_radius: 0.33}\n")
+    planned = plan(scenario(folder), fmus, **{"wheel_control.tyre": "dugoff"})
+    kinds = [found.kind for found in planned.findings]
+    assert kinds.count("another tyre") == 1
+    assert kinds.count("another radius") == 2  # of plant and wheel control
+    assert any(
+        "wheel_radius is 0.33 m, but the tyres of soft.tir roll on 0.3042 m" in n for n in planned.notes
+    )
+
+
+def test_a_unit_cannot_be_called_like_the_files(folder):
+    path = scenario(folder)
+    path.write_text(path.read_text().replace("  tyre: ", "  tyres: "))
+    with pytest.raises(ScenarioError, match="a unit cannot be named 'tyres'"):
+        load_scenario(path)
