@@ -99,7 +99,7 @@ def test_the_schema_can_be_printed() -> None:
             [
                 "a.yaml:1: 'stop_time' is missing",
                 "a.yaml:2: stop_tim: unknown key; did you mean 'stop_time'? allowed here: title, source, "
-                "vehicle, start_time, stop_time, step_size, algorithm, friction, speed, inputs, units, "
+                "vehicle, tyres, start_time, stop_time, step_size, algorithm, friction, speed, inputs, units, "
                 "connections and record",
             ],
         ),
@@ -261,7 +261,7 @@ def test_mistakes_in_the_vehicle_file_name_that_file(file: Path) -> None:
     found = problems(edited(("title:", "vehicle: cars/car.yaml\ntitle:"), ("0.65", ".nan")))
     assert found == [
         "a.yaml:5: inputs.friction*: must be a finite number (got nan)",
-        f"{Path('cars/car.yaml')}:1: mass: unknown key; allowed here: title, source and parameters",
+        f"{Path('cars/car.yaml')}:1: mass: unknown key; allowed here: title, source, tyres and parameters",
         f"{Path('cars/car.yaml')}:2: parameters.mass: must be a finite number (got inf)",
     ]
 
