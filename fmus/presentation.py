@@ -141,7 +141,9 @@ def _variables(
     variables: Iterable[tuple[Element, Element]],
     follows: Mapping[str, str] | None = None,
 ) -> str:
+    of_parameters = causality == "parameter"
     head = ["name", "unit", *columns, *(["follows at once"] if follows is not None else []), "meaning"]
+    head += ["source"] * of_parameters
     rows = [
         [
             v.get("name"),
@@ -149,11 +151,17 @@ def _variables(
             *(typed.get(column) for column in columns),
             *([follows.get(v.get("name") or "")] if follows is not None else []),
             v.get("description"),
+            *([_source(v)] if of_parameters else []),
         ]
         for v, typed in variables
         if v.get("causality") == causality
     ]
     return f"<h2>{title}</h2>\n{_table(head, rows)}" if rows else ""
+
+
+def _source(variable: Element) -> str | None:
+    said = variable.find("Annotations/Tool[@name='yawbench']/variable")
+    return None if said is None else said.get("source")
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str | None]]) -> str:

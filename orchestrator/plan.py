@@ -58,6 +58,7 @@ class Variable:
     choices: tuple[str, ...] | None = None  # of a String: allowed values, if the description lists them
     items: dict[str, int] | None = None  # of an Enumeration: name -> value
     optional: bool = False  # of an input: its start value is meant for when nothing drives it
+    source: str = ""  # of a parameter: where its start value comes from, if the FMU says so
     definition: UnitDefinition | None = None  # of `unit`, if the description gives one
     encoding: str | None = None  # FMI 3.0: the type that the FMU keeps it in, such as "Float32"
     element: int = 0  # of an array, counted row by row

@@ -1,1 +1,1 @@
-"""What units and the bench call things: plain data, part of every FMU, importing nothing."""
+"""What units and the bench have to agree on: plain data, part of the FMUs that use it, importing nothing."""

@@ -26,21 +26,21 @@ from ..mathematics.first_order_lag import Stage
 class LagParameters:
     """Of one wheel's motor and brake; all four are equal."""
 
-    motor_time_constant: float = parameter(0.015, "s", "Lag of the motor; chosen", minimum=0.0)
-    motor_delay: float = parameter(0.003, "s", "Pure delay of the motor; chosen", minimum=0.0)
+    motor_time_constant: float = parameter(0.015, "s", "Lag of the motor", "chosen", minimum=0.0)
+    motor_delay: float = parameter(0.003, "s", "Pure delay of the motor", "chosen", minimum=0.0)
     motor_torque_limit: float = parameter(
-        800.0, "N.m", "Largest motor torque at the wheel, driving or braking; chosen", minimum=0.0
+        800.0, "N.m", "Largest motor torque at the wheel, driving or braking", "chosen", minimum=0.0
     )
     motor_rate_limit: float = parameter(
-        1e6, "N.m/s", "Fastest change of the motor torque; chosen: no limit in the paper", minimum=1.0
+        1e6, "N.m/s", "Fastest change of the motor torque", "chosen: no limit in the paper", minimum=1.0
     )
-    brake_time_constant: float = parameter(0.08, "s", "Lag of the friction brake; chosen", minimum=0.0)
-    brake_delay: float = parameter(0.015, "s", "Pure delay of the friction brake; chosen", minimum=0.0)
+    brake_time_constant: float = parameter(0.08, "s", "Lag of the friction brake", "chosen", minimum=0.0)
+    brake_delay: float = parameter(0.015, "s", "Pure delay of the friction brake", "chosen", minimum=0.0)
     friction_brake_torque_limit: float = parameter(
-        2500.0, "N.m", "Largest friction brake torque at the wheel; chosen", minimum=0.0
+        2500.0, "N.m", "Largest friction brake torque at the wheel", "chosen", minimum=0.0
     )
     brake_rate_limit: float = parameter(
-        1e6, "N.m/s", "Fastest change of the brake torque; chosen: no limit in the paper", minimum=1.0
+        1e6, "N.m/s", "Fastest change of the brake torque", "chosen: no limit in the paper", minimum=1.0
     )
 
 

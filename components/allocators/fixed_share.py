@@ -28,16 +28,16 @@ class FixedShareParameters:
     cg_to_front_axle: float = like(PaperA, "cg_to_front_axle")
     track_width: float = like(PaperA, "track_width")
     left_share: float = parameter(
-        0.5, "1", "Share s_l of the moment on the left side; paper A: half", minimum=0.0, maximum=1.0
+        0.5, "1", "Share s_l of the moment on the left side", "paper A: half", minimum=0.0, maximum=1.0
     )
     front_share_left: float = parameter(
-        0.5, "1", "Share n_l of the left side's moment in front; paper A: half", minimum=0.0, maximum=1.0
+        0.5, "1", "Share n_l of the left side's moment in front", "paper A: half", minimum=0.0, maximum=1.0
     )
     front_share_right: float = parameter(
-        0.5, "1", "Share n_r of the right side's moment in front; paper A: half", minimum=0.0, maximum=1.0
+        0.5, "1", "Share n_r of the right side's moment in front", "paper A: half", minimum=0.0, maximum=1.0
     )
     drive_front_share: float = parameter(
-        0.5, "1", "Share of the driver's force in front; chosen: equal motors", minimum=0.0, maximum=1.0
+        0.5, "1", "Share of the driver's force in front", "chosen: equal motors", minimum=0.0, maximum=1.0
     )
 
 

@@ -41,6 +41,7 @@ class LoadProportionalParameters:
         "all_wheels",
         None,
         "All four wheels share the moment, as in paper A, or each side has one force, as in paper B",
+        "paper A",
         choices=("all_wheels", *SIDE_FORCES),
     )
 

@@ -29,22 +29,28 @@ class SideShareParameters:
     front_share_left: float = parameter(
         0.5,
         "1",
-        "Front share of the left side's force; paper B: 0 to 1 in quarters",
+        "Front share of the left side's force",
+        "paper B: 0 to 1 in quarters",
         minimum=0.0,
         maximum=1.0,
     )
     front_share_right: float = parameter(
         0.5,
         "1",
-        "Front share of the right side's force; paper B: 0 to 1 in quarters",
+        "Front share of the right side's force",
+        "paper B: 0 to 1 in quarters",
         minimum=0.0,
         maximum=1.0,
     )
     side_forces: str = parameter(
-        "one_side_braked", None, "How M becomes side forces; chosen: what fits table 3", choices=SIDE_FORCES
+        "one_side_braked",
+        None,
+        "All four wheels share the moment, as in paper A, or each side has one force, as in paper B",
+        "paper A",
+        choices=SIDE_FORCES,
     )
     drive_front_share: float = parameter(
-        0.5, "1", "Share of the driver's force in front; chosen: equal motors", minimum=0.0, maximum=1.0
+        0.5, "1", "Share of the driver's force in front", "chosen: equal motors", minimum=0.0, maximum=1.0
     )
 
 

@@ -56,20 +56,21 @@ class SingleWheelParameters:
     wheel_choice: str = parameter(
         "guarded",
         None,
-        "How the rule is read; chosen: guarded, brake only a wheel that turns the car the way M asks for",
+        "How the rule is read",
+        "chosen: guarded, brake only a wheel that turns the car the way M asks for",
         choices=("printed", "guarded", "moment"),
     )
     moment_threshold: float = parameter(
-        200.0, "N.m", "Moment from which a wheel is braked; chosen", minimum=0.0
+        200.0, "N.m", "Moment from which a wheel is braked", "chosen", minimum=0.0
     )
     yaw_rate_threshold: float = parameter(
-        0.005, "rad/s", "Yaw-rate error from which a wheel is braked; chosen: a sensor's noise", minimum=0.0
+        0.005, "rad/s", "Yaw-rate error from which a wheel is braked", "chosen: a sensor's noise", minimum=0.0
     )
     release_share: float = parameter(
-        0.5, "1", "Part of a threshold below which braking ends; chosen: half", minimum=0.0, maximum=1.0
+        0.5, "1", "Part of a threshold below which braking ends", "chosen: half", minimum=0.0, maximum=1.0
     )
     drive_front_share: float = parameter(
-        0.0, "1", "Share of the driver's force in front; chosen: rear drive", minimum=0.0, maximum=1.0
+        0.0, "1", "Share of the driver's force in front", "chosen: rear drive", minimum=0.0, maximum=1.0
     )
 
 

@@ -66,12 +66,13 @@ DRIVEN_WHEELS = (*WHEEL_SLIPS, "wheel_speed_*", *of_steered_wheels("wheel_veloci
 class StartParameters:
     """How a car begins, and what slip means when it hardly moves."""
 
-    initial_sideslip: float = parameter(0.0, "rad", "Sideslip angle at the start; chosen: none")
-    initial_yaw_rate: float = parameter(0.0, "rad/s", "Yaw rate at the start; chosen: none")
+    initial_sideslip: float = parameter(0.0, "rad", "Sideslip angle at the start", "chosen: none")
+    initial_yaw_rate: float = parameter(0.0, "rad/s", "Yaw rate at the start", "chosen: none")
     low_speed: float = parameter(
         0.5,
         "m/s",
-        "Slips refer to this speed when the wheel is slower; chosen: keeps a parked car quiet at 1 ms",
+        "Slips refer to this speed when the wheel is slower",
+        "chosen: keeps a parked car quiet at 1 ms",
         minimum=0.001,
     )
 

@@ -18,14 +18,14 @@ from ..mathematics.constants import G
 class ResistanceParameters:
     """Those of paper B, table 1."""
 
-    drag_coefficient: float = parameter(0.3, "1", "Drag coefficient C_D; paper B, table 1", minimum=0.0)
-    frontal_area: float = parameter(1.8, "m2", "Frontal area A; paper B, table 1", minimum=0.0)
+    drag_coefficient: float = parameter(0.3, "1", "Drag coefficient C_D", "paper B, table 1", minimum=0.0)
+    frontal_area: float = parameter(1.8, "m2", "Frontal area A", "paper B, table 1", minimum=0.0)
     air_density: float = parameter(
-        1.2258, "kg/m3", "Air density rho; what paper B's 1 / 21.15 stands for", minimum=0.0
+        1.2258, "kg/m3", "Air density rho", "paper B: what its 1 / 21.15 stands for", minimum=0.0
     )
-    rolling_resistance: float = parameter(0.008, "1", "Rolling resistance f; paper B, table 1", minimum=0.0)
+    rolling_resistance: float = parameter(0.008, "1", "Rolling resistance f", "paper B, table 1", minimum=0.0)
     rolling_fade_speed: float = parameter(
-        0.1, "m/s", "Rolling resistance fades below this speed; chosen: hardly moving", minimum=0.001
+        0.1, "m/s", "Rolling resistance fades below this speed", "chosen: hardly moving", minimum=0.001
     )
 
 

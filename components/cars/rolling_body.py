@@ -21,34 +21,36 @@ from .resistance import Resistance, ResistanceParameters
 class RollingCarParameters(StartParameters, ResistanceParameters, PaperB):
     """The car of paper B, table 1."""
 
-    sprung_mass: float = parameter(1110.0, "kg", "Sprung mass m_s; paper B, table 1", minimum=0.0)
+    sprung_mass: float = parameter(1110.0, "kg", "Sprung mass m_s", "paper B, table 1", minimum=0.0)
     roll_inertia: float = parameter(
-        440.6, "kg.m2", "Roll inertia I_x about the roll axis; paper B, table 1", minimum=1.0
+        440.6, "kg.m2", "Roll inertia I_x about the roll axis", "paper B, table 1", minimum=1.0
     )
     roll_arm: float = parameter(
-        0.4, "m", "Height h_s of the sprung mass above the roll axis; paper B, table 1", minimum=0.0
+        0.4, "m", "Height h_s of the sprung mass above the roll axis", "paper B, table 1", minimum=0.0
     )
     roll_stiffness: float = parameter(
-        56000.0, "N.m/rad", "Roll stiffness K; paper B, table 1, erratum: printed as 5600", minimum=0.0
+        56000.0, "N.m/rad", "Roll stiffness K", "erratum: paper B, table 1, prints 5600", minimum=0.0
     )
-    roll_damping: float = parameter(2600.0, "N.m.s/rad", "Roll damping C; paper B, table 1", minimum=0.0)
+    roll_damping: float = parameter(2600.0, "N.m.s/rad", "Roll damping C", "paper B, table 1", minimum=0.0)
     front_roll_share: float = parameter(
         0.55,
         "1",
-        "Front part of roll stiffness and damping; chosen: mild understeer",
+        "Front part of roll stiffness and damping",
+        "chosen: mild understeer",
         minimum=0.0,
         maximum=1.0,
     )
-    roll_centre_height_front: float = parameter(0.14, "m", "Front roll centre h_f; chosen: h - h_s")
-    roll_centre_height_rear: float = parameter(0.14, "m", "Rear roll centre h_r; chosen: h - h_s")
+    roll_centre_height_front: float = parameter(0.14, "m", "Front roll centre h_f", "chosen: h - h_s")
+    roll_centre_height_rear: float = parameter(0.14, "m", "Rear roll centre h_r", "chosen: h - h_s")
     rotating_mass_excess: float = parameter(
-        0.0, "1", "Part xi of m that is added to resist dv_x; chosen: none, see the erratum", minimum=0.0
+        0.0, "1", "Part xi of m that is added to resist dv_x", "chosen: none, see the erratum", minimum=0.0
     )
-    initial_speed: float = parameter(27.7777778, "m/s", "Speed at the start; paper B: 100 km/h")
+    initial_speed: float = parameter(27.7777778, "m/s", "Speed at the start", "paper B: 100 km/h")
     slip_stiffness_per_load: float = parameter(
         22.0,
         "1",
-        "Slip stiffness over load for slow wheels, see cars.wheel_spin; chosen: tyre set 1",
+        "Slip stiffness over load for slow wheels, see cars.wheel_spin",
+        "chosen: tyre set 1",
         minimum=0.0,
     )
 

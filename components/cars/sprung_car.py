@@ -16,80 +16,86 @@ from .ride import Ride
 class FourteenDofParameters(StartParameters, ResistanceParameters, PaperC):
     """A large saloon: paper C, table 1, where it says anything."""
 
-    sprung_mass: float = parameter(1650.0, "kg", "Sprung mass m_s; paper C, table 1", minimum=1.0)
+    sprung_mass: float = parameter(1650.0, "kg", "Sprung mass m_s", "paper C, table 1", minimum=1.0)
     front_unsprung_share: float = parameter(
-        0.5, "1", "Front part of the unsprung mass; chosen: equal wheels", minimum=0.01, maximum=0.99
+        0.5, "1", "Front part of the unsprung mass", "chosen: equal wheels", minimum=0.01, maximum=0.99
     )
-    yaw_inertia: float = parameter(3234.0, "kg.m2", "Yaw inertia I_z; paper C, table 1", minimum=1.0)
+    yaw_inertia: float = parameter(3234.0, "kg.m2", "Yaw inertia I_z", "paper C, table 1", minimum=1.0)
     sprung_roll_inertia: float = parameter(
         928.0,
         "kg.m2",
-        "Roll inertia of the sprung mass about its own centre; chosen: a large saloon",
+        "Roll inertia of the sprung mass about its own centre",
+        "chosen: a large saloon",
         minimum=1.0,
     )
     sprung_pitch_inertia: float = parameter(
         2790.0,
         "kg.m2",
-        "Pitch inertia of the sprung mass about its own centre; chosen: a large saloon",
+        "Pitch inertia of the sprung mass about its own centre",
+        "chosen: a large saloon",
         minimum=1.0,
     )
     sprung_roll_yaw_product: float = parameter(
         0.0,
         "kg.m2",
-        "Product of inertia I_xz of the sprung mass about its own centre, positive where its front is heavy "
-        "on top; chosen: principal axes along the car",
+        "Product of inertia I_xz of the sprung mass about its own centre, positive where its front is"
+        " heavy on top",
+        "chosen: principal axes along the car",
     )
     cg_height: float = parameter(
-        0.5093, "m", "Height h of the centre of mass; chosen: that of the sprung mass 0.53", minimum=0.0
+        0.5093, "m", "Height h of the centre of mass", "chosen: that of the sprung mass 0.53", minimum=0.0
     )
     unsprung_height: float = parameter(
-        0.32, "m", "Height of the wheels' centres; chosen: tyre of 0.34, loaded", minimum=0.0
+        0.32, "m", "Height of the wheels' centres", "chosen: tyre of 0.34, loaded", minimum=0.0
     )
     spring_stiffness_front: float = parameter(
-        34000.0, "N/m", "Front spring, at the wheel; chosen: body modes at 1.3 to 1.7 Hz", minimum=0.0
+        34000.0, "N/m", "Front spring, at the wheel", "chosen: body modes at 1.3 to 1.7 Hz", minimum=0.0
     )
     spring_stiffness_rear: float = parameter(
-        32000.0, "N/m", "Rear spring, at the wheel; chosen: body modes at 1.3 to 1.7 Hz", minimum=0.0
+        32000.0, "N/m", "Rear spring, at the wheel", "chosen: body modes at 1.3 to 1.7 Hz", minimum=0.0
     )
     damping_front: float = parameter(
-        3000.0, "N.s/m", "Front damper, at the wheel; chosen: 0.3 to 0.4 of critical", minimum=0.0
+        3000.0, "N.s/m", "Front damper, at the wheel", "chosen: 0.3 to 0.4 of critical", minimum=0.0
     )
     damping_rear: float = parameter(
-        2800.0, "N.s/m", "Rear damper, at the wheel; chosen: 0.3 to 0.4 of critical", minimum=0.0
+        2800.0, "N.s/m", "Rear damper, at the wheel", "chosen: 0.3 to 0.4 of critical", minimum=0.0
     )
     anti_roll_stiffness_front: float = parameter(
         14000.0,
         "N/m",
-        "Front anti-roll bar, force at each wheel per difference of travel, negative for a bar that stiffens "
-        "heave; chosen: 4.5 deg/g",
+        "Front anti-roll bar, force at each wheel per difference of travel, negative for a bar that "
+        "stiffens heave",
+        "chosen: 4.5 deg/g",
     )
     anti_roll_stiffness_rear: float = parameter(
         6000.0,
         "N/m",
-        "Rear anti-roll bar, force at each wheel per difference of travel, negative for a bar that stiffens "
-        "heave; chosen: 4.5 deg/g",
+        "Rear anti-roll bar, force at each wheel per difference of travel, negative for a bar that "
+        "stiffens heave",
+        "chosen: 4.5 deg/g",
     )
-    roll_centre_height_front: float = parameter(0.06, "m", "Front roll centre; chosen: a strut axle")
-    roll_centre_height_rear: float = parameter(0.11, "m", "Rear roll centre; chosen: a multi-link axle")
+    roll_centre_height_front: float = parameter(0.06, "m", "Front roll centre", "chosen: a strut axle")
+    roll_centre_height_rear: float = parameter(0.11, "m", "Rear roll centre", "chosen: a multi-link axle")
     tyre_vertical_stiffness: float = parameter(
-        230000.0, "N/m", "Tyre spring k_t; chosen: a passenger car's, wheel hop at 12 Hz", minimum=1.0
+        230000.0, "N/m", "Tyre spring k_t", "chosen: a passenger car's, wheel hop at 12 Hz", minimum=1.0
     )
     wheel_inertia: float = parameter(
-        1.5, "kg.m2", "Inertia J of one wheel; chosen: a passenger car's", minimum=0.01
+        1.5, "kg.m2", "Inertia J of one wheel", "chosen: a passenger car's", minimum=0.01
     )
-    drag_coefficient: float = parameter(0.3, "1", "Drag coefficient C_D; chosen: a saloon's", minimum=0.0)
-    frontal_area: float = parameter(2.2, "m2", "Frontal area A; chosen: a saloon's", minimum=0.0)
+    drag_coefficient: float = parameter(0.3, "1", "Drag coefficient C_D", "chosen: a saloon's", minimum=0.0)
+    frontal_area: float = parameter(2.2, "m2", "Frontal area A", "chosen: a saloon's", minimum=0.0)
     rolling_resistance: float = parameter(
-        0.012, "1", "Rolling resistance f; chosen: a passenger car tyre's", minimum=0.0
+        0.012, "1", "Rolling resistance f", "chosen: a passenger car tyre's", minimum=0.0
     )
-    initial_speed: float = parameter(25.0, "m/s", "Speed at the start; paper C: 90 km/h")
+    initial_speed: float = parameter(25.0, "m/s", "Speed at the start", "paper C: 90 km/h")
     initial_heave: float = parameter(
-        0.0, "m", "Height of body and wheels above rest at the start; chosen: on the road"
+        0.0, "m", "Height of body and wheels above rest at the start", "chosen: on the road"
     )
     slip_stiffness_per_load: float = parameter(
         22.0,
         "1",
-        "Slip stiffness over load for slow wheels, see cars.wheel_spin; chosen: tyre set 1",
+        "Slip stiffness over load for slow wheels, see cars.wheel_spin",
+        "chosen: tyre set 1",
         minimum=0.0,
     )
 

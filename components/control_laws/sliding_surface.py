@@ -39,17 +39,17 @@ class SurfaceParameters:
     """Of the surface, of its boundary layer and of the moment's limits; the paper names none but I_z."""
 
     boundary_layer: float = parameter(
-        0.1, "rad/s", "Half width Delta of the boundary layer; chosen: about 6 deg/s", minimum=0.0
+        0.1, "rad/s", "Half width Delta of the boundary layer", "chosen: about 6 deg/s", minimum=0.0
     )
     sideslip_weight: float = parameter(
-        -0.25, "1/s", "Weight w of the sideslip error; negative, see control_laws.sliding_surface; chosen"
+        -0.25, "1/s", "Weight w of the sideslip error, negative: see control_laws.sliding_surface", "chosen"
     )
     yaw_inertia: float = like(PaperB, "yaw_inertia")
     moment_limit: float = parameter(
-        10000.0, "N.m", "Largest yaw moment; chosen: m g d / 2, what the road can give at mu 1", minimum=0.0
+        10000.0, "N.m", "Largest yaw moment", "chosen: m g d / 2, what the road can give at mu 1", minimum=0.0
     )
     fade_speed: float = parameter(
-        2.0, "m/s", "Below it the moment fades out; chosen: walking pace", minimum=0.001
+        2.0, "m/s", "Below it the moment fades out", "chosen: walking pace", minimum=0.001
     )
 
 

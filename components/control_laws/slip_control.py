@@ -43,50 +43,55 @@ class SlipControlParameters:
     wheel_radius: float = like(PaperB, "wheel_radius")
     wheel_inertia: float = like(PaperB, "wheel_inertia")
     optimum_share: float = parameter(
-        0.95, "1", "Largest slip over the optimum; paper B", minimum=0.1, maximum=0.99
+        0.95, "1", "Largest slip over the optimum", "paper B", minimum=0.1, maximum=0.99
     )
     slip_cap: float = parameter(
         0.25,
         "1",
-        "Largest slip; chosen: at 0.15, tried first, paper B's sliding car is not caught again; braking and "
-        "driving beyond the grip, straight and steered, stay below 0.16 all the same",
+        "Largest slip",
+        "chosen: at 0.15, tried first, paper B's sliding car is not caught again; braking and driving"
+        " beyond the grip, straight and steered, stay below 0.16 all the same",
         minimum=0.001,
         maximum=0.99,
     )
     boundary_layer: float = parameter(
-        0.02, "1", "Boundary layer Delta of the slip error; chosen: calm at 1 to 5 ms", minimum=1e-4
+        0.02, "1", "Boundary layer Delta of the slip error", "chosen: calm at 1 to 5 ms", minimum=1e-4
     )
     switching_gain: float = parameter(
-        1.0, "1/s", "Gain eps of the saturated slip error; chosen: calm at 1 to 5 ms", minimum=0.0
+        1.0, "1/s", "Gain eps of the saturated slip error", "chosen: calm at 1 to 5 ms", minimum=0.0
     )
     slip_gain: float = parameter(
         60.0,
         "1/s",
-        "Gain k_d of the slip error; chosen: 30, tried first, lets slip lag behind the yaw-moment control",
+        "Gain k_d of the slip error",
+        "chosen: 30, tried first, lets slip lag behind the yaw-moment control",
         minimum=0.0,
     )
     acceleration_filter: float = parameter(
-        0.02, "s", "Time constant of the wheel's acceleration dv; chosen: an ABS sensor's", minimum=0.0
+        0.02, "s", "Time constant of the wheel's acceleration dv", "chosen: an ABS sensor's", minimum=0.0
     )
     slip_control_force: float = parameter(
         50.0,
         "N",
-        "Request below which torque is direct, fading until twice that; chosen: 1 % of load",
+        "Request below which torque is direct, fading until twice that",
+        "chosen: 1 % of load",
         minimum=0.1,
     )
     slip_control_speed: float = parameter(
         3.0,
         "m/s",
-        "Wheel velocity above which slip is controlled fully, below a third of it not; chosen: walking pace",
+        "Wheel velocity above which slip is controlled fully, below a third of it not",
+        "chosen: walking pace",
         minimum=0.1,
     )
     drive_torque_limit: float = parameter(
-        800.0, "N.m", "Largest driving torque; chosen: the motor tried for paper B", minimum=0.0
+        800.0, "N.m", "Largest driving torque", "chosen: the motor tried for paper B", minimum=0.0
     )
     brake_torque_limit: float = parameter(
         3300.0,
         "N.m",
-        "Largest braking torque, motor and friction brake together; chosen: those tried for paper B",
+        "Largest braking torque, motor and friction brake together",
+        "chosen: those tried for paper B",
         minimum=0.0,
     )
 

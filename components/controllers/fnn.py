@@ -56,54 +56,55 @@ class FnnParameters:
     """Of the network, of its learning and of the moment it may ask for."""
 
     error_gain: float = parameter(
-        400.0, "1/rad", "Scale theta_1 of e; chosen: at 0.16 degrees x_1 is 1/2", minimum=0.0
+        400.0, "1/rad", "Scale theta_1 of e", "chosen: at 0.16 degrees x_1 is 1/2", minimum=0.0
     )
     error_rate_gain: float = parameter(
-        50.0, "s/rad", "Scale theta_2 of de/dt; chosen: damps the loop up to 5 ms sample time", minimum=0.0
+        50.0, "s/rad", "Scale theta_2 of de/dt", "chosen: damps the loop up to 5 ms sample time", minimum=0.0
     )
     set_width: float = parameter(
-        0.24, "1", "Width s of the sets before learning; chosen: sets cross at 0.6", minimum=NARROWEST
+        0.24, "1", "Width s of the sets before learning", "chosen: sets cross at 0.6", minimum=NARROWEST
     )
     moment_gain: float = parameter(
-        5000.0, "N.m", "Moment K_u per unit of the network's output; chosen: the moment limit", minimum=0.0
+        5000.0, "N.m", "Moment K_u per unit of the network's output", "chosen: the moment limit", minimum=0.0
     )
     moment_limit: float = parameter(
-        5000.0, "N.m", "Largest moment; chosen: somewhat more than the motors can give", minimum=0.0
+        5000.0, "N.m", "Largest moment", "chosen: somewhat more than the motors can give", minimum=0.0
     )
-    learning: bool = parameter(True, None, "Learn on line; false freezes the weights")
-    learning_rate: float = parameter(2.0, "1", "Learning rate alpha; paper A, equation (35)", minimum=0.0)
+    learning: bool = parameter(True, None, "Learn on line; false freezes the weights", "paper A")
+    learning_rate: float = parameter(2.0, "1", "Learning rate alpha", "paper A, equation (35)", minimum=0.0)
     plant_jacobian: float = parameter(
-        5.5e-4, "1", "Constant J in place of de/dM_z; paper A, equation (32), positive constant"
+        5.5e-4, "1", "Constant J in place of de/dM_z", "paper A, equation (32), positive constant"
     )
     error_scale: float = parameter(
         11000.0,
         "1/rad",
-        "Scale k_e of the error that is learnt from; chosen: halves the error at 15 m/s with a factor "
-        "4 left to the step that chatters at 40 m/s",
+        "Scale k_e of the error that is learnt from",
+        "chosen: halves the error at 15 m/s with a factor 4 left to the step that chatters at 40 m/s",
         minimum=0.0,
     )
     weight_limit: float = parameter(
-        1.5, "1", "Largest weight; chosen: 1.5 times the initial ones", minimum=0.0
+        1.5, "1", "Largest weight", "chosen: 1.5 times the initial ones", minimum=0.0
     )
     learning_limit: float = parameter(
         4250.0,
         "N.m",
-        "No learning above this moment; chosen: what four motors of 400 N.m give at equal wheel loads, "
-        "since the controller does not see torques",
+        "No learning above this moment",
+        "chosen: what four motors of 400 N.m give at equal wheel loads, since the controller does not"
+        " see torques",
         minimum=0.0,
     )
     recall: float = parameter(
         0.0,
         "1",
-        "Pull of the weights to their initial values, relative to learning; the paper has none, "
-        "0.1 holds the car under harsh excitation",
+        "Pull of the weights to their initial values, relative to learning",
+        "chosen: none, as in the paper; 0.1 holds the car under harsh excitation",
         minimum=0.0,
     )
     set_learning_rate: float = parameter(
         0.0,
         "1",
-        "Learning rate alpha_s of centres and widths, for which paper A takes alpha; chosen: 0, they stay, "
-        "since 0.1 gains little and 0.2 shakes the car at 40 m/s",
+        "Learning rate alpha_s of centres and widths, for which paper A takes alpha",
+        "chosen: 0, they stay, since 0.1 gains little and 0.2 shakes the car at 40 m/s",
         minimum=0.0,
     )
 

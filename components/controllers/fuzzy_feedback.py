@@ -36,36 +36,38 @@ class FuzzyFeedbackParameters:
     rule_table: str = parameter(
         "standard",
         None,
-        "Rule table of both systems; chosen: the standard one, since the paper's were lost",
+        "Rule table of both systems",
+        "chosen: the standard one, since the paper's were lost",
         choices=tuple(FIVE_BY_FIVE),
     )
     yaw_rate_error_factor: float = parameter(
-        40.0, "s/rad", "k_e of the yaw-rate system; chosen: saturates at 0.025 rad/s", minimum=0.0
+        40.0, "s/rad", "k_e of the yaw-rate system", "chosen: saturates at 0.025 rad/s", minimum=0.0
     )
     yaw_rate_error_rate_factor: float = parameter(
-        0.02, "s2/rad", "k_c of the yaw-rate system; chosen: saturates at 50 rad/s2", minimum=0.0
+        0.02, "s2/rad", "k_c of the yaw-rate system", "chosen: saturates at 50 rad/s2", minimum=0.0
     )
-    yaw_rate_moment: float = parameter(8000.0, "N.m", "k_u of the yaw-rate system; chosen", minimum=0.0)
-    yaw_rate_weight: float = parameter(1.0, "1", "Weight W_1 of the yaw-rate system; chosen", minimum=0.0)
+    yaw_rate_moment: float = parameter(8000.0, "N.m", "k_u of the yaw-rate system", "chosen", minimum=0.0)
+    yaw_rate_weight: float = parameter(1.0, "1", "Weight W_1 of the yaw-rate system", "chosen", minimum=0.0)
     sideslip_error_factor: float = parameter(
-        10.0, "1/rad", "k_e of the sideslip system; chosen: saturates at 0.1 rad", minimum=0.0
+        10.0, "1/rad", "k_e of the sideslip system", "chosen: saturates at 0.1 rad", minimum=0.0
     )
     sideslip_error_rate_factor: float = parameter(
-        0.5, "s/rad", "k_c of the sideslip system; chosen: saturates at 2 rad/s", minimum=0.0
+        0.5, "s/rad", "k_c of the sideslip system", "chosen: saturates at 2 rad/s", minimum=0.0
     )
-    sideslip_moment: float = parameter(4000.0, "N.m", "k_u of the sideslip system; chosen", minimum=0.0)
-    sideslip_weight: float = parameter(1.0, "1", "Weight W_2 of the sideslip system; chosen", minimum=0.0)
+    sideslip_moment: float = parameter(4000.0, "N.m", "k_u of the sideslip system", "chosen", minimum=0.0)
+    sideslip_weight: float = parameter(1.0, "1", "Weight W_2 of the sideslip system", "chosen", minimum=0.0)
     rate_filter: float = parameter(
-        0.0, "s", "Time constant smoothing the rate of the yaw-rate error; chosen: none", minimum=0.0
+        0.0, "s", "Time constant smoothing the rate of the yaw-rate error", "chosen: none", minimum=0.0
     )
     moment_limit: float = parameter(
         6700.0,
         "N.m",
-        "Largest yaw moment; chosen: mu m g d / 2 at mu 0.5, the most that longitudinal forces could give",
+        "Largest yaw moment",
+        "chosen: mu m g d / 2 at mu 0.5, the most that longitudinal forces could give",
         minimum=0.0,
     )
     fade_speed: float = parameter(
-        2.0, "m/s", "Below it the moment fades out; chosen: walking pace", minimum=0.001
+        2.0, "m/s", "Below it the moment fades out", "chosen: walking pace", minimum=0.001
     )
 
 

@@ -34,54 +34,59 @@ class FuzzyPidParameters(PidParameters):
     table_reading: str = parameter(
         "mirrored",
         None,
-        "How the rule table is read: mirrored at (-|e|, -sign(e) de/dt), printed at (e, de/dt); chosen: left "
-        "and right turns alike",
+        "How the rule table is read: mirrored at (-|e|, -sign(e) de/dt), printed at (e, de/dt)",
+        "chosen: left and right turns alike",
         choices=("mirrored", "printed"),
     )
     yaw_rate_error_range: float = parameter(
         0.05,
         "rad/s",
-        "Yaw-rate error beyond which the outer sets saturate; chosen: twice that of paper C's runs",
+        "Yaw-rate error beyond which the outer sets saturate",
+        "chosen: twice that of paper C's runs",
         minimum=1e-6,
     )
     yaw_rate_error_rate_range: float = parameter(
         1.0,
         "rad/s2",
-        "Rate of the yaw-rate error beyond which the outer sets saturate; chosen: twice the runs'",
+        "Rate of the yaw-rate error beyond which the outer sets saturate",
+        "chosen: twice the runs'",
         minimum=1e-6,
     )
     sideslip_error_range: float = parameter(
         0.02,
         "rad",
-        "Sideslip error beyond which the outer sets saturate; chosen: that of paper C's runs",
+        "Sideslip error beyond which the outer sets saturate",
+        "chosen: that of paper C's runs",
         minimum=1e-6,
     )
     sideslip_error_rate_range: float = parameter(
         1.0,
         "rad/s",
-        "Rate of the sideslip error beyond which the outer sets saturate; chosen: far beyond the runs'",
+        "Rate of the sideslip error beyond which the outer sets saturate",
+        "chosen: far beyond the runs'",
         minimum=1e-6,
     )
     yaw_rate_proportional_range: float = parameter(
         40000.0,
         "N.m.s/rad",
-        "Range of dK_p of the yaw rate; chosen: with the sideslip's, a quarter off paper C's peaks",
+        "Range of dK_p of the yaw rate",
+        "chosen: with the sideslip's, a quarter off paper C's peaks",
         minimum=0.0,
     )
     yaw_rate_integral_range: float = parameter(
-        0.0, "N.m/rad", "Range of dK_i of the yaw rate; chosen: none", minimum=0.0
+        0.0, "N.m/rad", "Range of dK_i of the yaw rate", "chosen: none", minimum=0.0
     )
     yaw_rate_derivative_range: float = parameter(
-        100.0, "N.m.s2/rad", "Range of dK_d of the yaw rate; chosen: as K_d", minimum=0.0
+        100.0, "N.m.s2/rad", "Range of dK_d of the yaw rate", "chosen: as K_d", minimum=0.0
     )
     sideslip_proportional_range: float = parameter(
-        30000.0, "N.m/rad", "Range of dK_p of the sideslip; chosen: see the yaw rate's", minimum=0.0
+        30000.0, "N.m/rad", "Range of dK_p of the sideslip", "chosen: see the yaw rate's", minimum=0.0
     )
     sideslip_integral_range: float = parameter(
-        0.0, "N.m/(rad.s)", "Range of dK_i of the sideslip; chosen: none", minimum=0.0
+        0.0, "N.m/(rad.s)", "Range of dK_i of the sideslip", "chosen: none", minimum=0.0
     )
     sideslip_derivative_range: float = parameter(
-        100.0, "N.m.s/rad", "Range of dK_d of the sideslip; chosen: as K_d", minimum=0.0
+        100.0, "N.m.s/rad", "Range of dK_d of the sideslip", "chosen: as K_d", minimum=0.0
     )
 
 

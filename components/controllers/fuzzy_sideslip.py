@@ -43,13 +43,13 @@ class FuzzySideslipParameters:
     """Ranges of the three variables; the paper names none."""
 
     error_range: float = parameter(
-        0.005, "rad", "e beyond this saturates; chosen: best of a grid, see the source", minimum=1e-6
+        0.005, "rad", "e beyond this saturates", "chosen: best of a grid, see the source", minimum=1e-6
     )
     error_rate_range: float = parameter(
-        0.05, "rad/s", "de/dt beyond this saturates; chosen: best of a grid, see the source", minimum=1e-6
+        0.05, "rad/s", "de/dt beyond this saturates", "chosen: best of a grid, see the source", minimum=1e-6
     )
     moment_range: float = parameter(
-        5000.0, "N.m", "Peak of the outermost sets of M_z; chosen: as controller_fnn", minimum=0.0
+        5000.0, "N.m", "Peak of the outermost sets of M_z", "chosen: as controller_fnn", minimum=0.0
     )
 
 

@@ -35,16 +35,16 @@ class FuzzySlidingModeParameters(SurfaceParameters):
     """Of the law and of the ranges that the paper leaves open."""
 
     largest_reaching_rate: float = parameter(
-        3.0, "rad/s2", "Range of eps, from 0; chosen: its middle exceeds the constant law's", minimum=1e-6
+        3.0, "rad/s2", "Range of eps, from 0", "chosen: its middle exceeds the constant law's", minimum=1e-6
     )
     largest_reaching_gain: float = parameter(
-        10.0, "1/s", "Range of k_d, from 0; chosen: up to that of the constant law", minimum=1e-6
+        10.0, "1/s", "Range of k_d, from 0", "chosen: up to that of the constant law", minimum=1e-6
     )
     largest_steer_angle: float = parameter(
-        0.09, "rad", "Steer angle from which |delta| is BB; chosen: the amplitude of the runs", minimum=1e-6
+        0.09, "rad", "Steer angle from which |delta| is BB", "chosen: the amplitude of the runs", minimum=1e-6
     )
     largest_friction: float = parameter(
-        1.0, "1", "Friction from which mu is BB; chosen: dry asphalt", minimum=1e-6
+        1.0, "1", "Friction from which mu is BB", "chosen: dry asphalt", minimum=1e-6
     )
 
 

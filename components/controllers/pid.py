@@ -27,35 +27,37 @@ class PidParameters:
     yaw_rate_proportional_gain: float = parameter(
         8000.0,
         "N.m.s/rad",
-        "K_p of the yaw rate; chosen: calm, a sixth or more off paper C's sideslip peaks",
+        "K_p of the yaw rate",
+        "chosen: calm, a sixth or more off paper C's sideslip peaks",
         minimum=0.0,
     )
     yaw_rate_integral_gain: float = parameter(
         2000.0,
         "N.m/rad",
-        "K_i of the yaw rate; chosen: integral time of 4 s, slower than the runs",
+        "K_i of the yaw rate",
+        "chosen: integral time of 4 s, slower than the runs",
         minimum=0.0,
     )
     yaw_rate_derivative_gain: float = parameter(
-        100.0, "N.m.s2/rad", "K_d of the yaw rate; chosen: little, cars damp their yaw", minimum=0.0
+        100.0, "N.m.s2/rad", "K_d of the yaw rate", "chosen: little, cars damp their yaw", minimum=0.0
     )
     sideslip_proportional_gain: float = parameter(
-        4000.0, "N.m/rad", "K_p of the sideslip; chosen: half of the yaw rate's", minimum=0.0
+        4000.0, "N.m/rad", "K_p of the sideslip", "chosen: half of the yaw rate's", minimum=0.0
     )
     sideslip_integral_gain: float = parameter(
-        200.0, "N.m/(rad.s)", "K_i of the sideslip; chosen: nearly none", minimum=0.0
+        200.0, "N.m/(rad.s)", "K_i of the sideslip", "chosen: nearly none", minimum=0.0
     )
     sideslip_derivative_gain: float = parameter(
-        100.0, "N.m.s/rad", "K_d of the sideslip; chosen: as the yaw rate's", minimum=0.0
+        100.0, "N.m.s/rad", "K_d of the sideslip", "chosen: as the yaw rate's", minimum=0.0
     )
     derivative_filter: float = parameter(
-        0.02, "s", "Time constant of the derivatives' filter; chosen: a tenth of the car's own", minimum=0.0
+        0.02, "s", "Time constant of the derivatives' filter", "chosen: a tenth of the car's own", minimum=0.0
     )
     moment_limit: float = parameter(
-        5000.0, "N.m", "Largest yaw moment; chosen: beyond what one wheel gives at mu 0.4", minimum=0.0
+        5000.0, "N.m", "Largest yaw moment", "chosen: beyond what one wheel gives at mu 0.4", minimum=0.0
     )
     fade_speed: float = parameter(
-        2.0, "m/s", "Below it the moment fades out; chosen: walking pace", minimum=0.001
+        2.0, "m/s", "Below it the moment fades out", "chosen: walking pace", minimum=0.001
     )
 
 

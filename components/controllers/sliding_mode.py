@@ -21,13 +21,21 @@ class SlidingModeParameters(SurfaceParameters):
     """Of the law; the paper names none of its gains."""
 
     switching: str = parameter(
-        "sign", None, "Switching function; the paper's baseline uses the sign", choices=("sign", "saturation")
+        "sign",
+        None,
+        "Switching function",
+        "paper B: its baseline uses the sign",
+        choices=("sign", "saturation"),
     )
     reaching_rate: float = parameter(
-        1.0, "rad/s2", "Gain eps of the switching function; chosen: clear chatter with the sign", minimum=0.0
+        1.0,
+        "rad/s2",
+        "Gain eps of the switching function",
+        "chosen: clear chatter with the sign",
+        minimum=0.0,
     )
     reaching_gain: float = parameter(
-        10.0, "1/s", "Gain k_d of the sliding surface; chosen: 0.1 s time constant", minimum=0.0
+        10.0, "1/s", "Gain k_d of the sliding surface", "chosen: 0.1 s time constant", minimum=0.0
     )
 
 

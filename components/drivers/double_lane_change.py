@@ -36,34 +36,34 @@ class DoubleLaneChangeParameters(HeldSpeedParameters, LaneChangeParameters):
     """Of the driver, of the car as the driver knows it, and of the track."""
 
     preview_time: float = parameter(
-        0.78, "s", "Preview T_p; chosen: through the cones at 70 km/h on mu 0.4", minimum=0.05
+        0.78, "s", "Preview T_p", "chosen: through the cones at 70 km/h on mu 0.4", minimum=0.05
     )
     least_preview: float = parameter(
-        4.0, "m", "Shortest preview distance L; chosen: just before the bumper", minimum=0.1
+        4.0, "m", "Shortest preview distance L", "chosen: just before the bumper", minimum=0.1
     )
     reaction_delay: float = parameter(
-        0.0, "s", "Pure delay of the driver; chosen: none, the lag stands for it", minimum=0.0
+        0.0, "s", "Pure delay of the driver", "chosen: none, the lag stands for it", minimum=0.0
     )
     steering_lag: float = parameter(
-        0.1, "s", "Lag tau of arms and steering; chosen: a practised driver", minimum=0.0
+        0.1, "s", "Lag tau of arms and steering", "chosen: a practised driver", minimum=0.0
     )
     steering_wheel_limit: float = parameter(
-        6.0, "rad", "Largest hand-wheel angle; chosen: nearly one turn", minimum=0.0
+        6.0, "rad", "Largest hand-wheel angle", "chosen: nearly one turn", minimum=0.0
     )
     steering_wheel_rate_limit: float = parameter(
-        12.0, "rad/s", "Fastest turn of the hand wheel; chosen: a skilled driver", minimum=0.01
+        12.0, "rad/s", "Fastest turn of the hand wheel", "chosen: a skilled driver", minimum=0.01
     )
     steering_ratio: float = parameter(
-        17.0, "1", "Hand-wheel angle over road-wheel angle; chosen: large saloon", minimum=0.1
+        17.0, "1", "Hand-wheel angle over road-wheel angle", "chosen: large saloon", minimum=0.1
     )
     mass: float = like(PaperC, "mass")
     cg_to_front_axle: float = like(PaperC, "cg_to_front_axle")
     cg_to_rear_axle: float = like(PaperC, "cg_to_rear_axle")
     cornering_stiffness_front: float = parameter(
-        62618.0, "N/rad", "Stiffness C_f of the front axle; paper C, table 1", minimum=1.0
+        62618.0, "N/rad", "Stiffness C_f of the front axle", "paper C, table 1", minimum=1.0
     )
     cornering_stiffness_rear: float = parameter(
-        110185.0, "N/rad", "Stiffness C_r of the rear axle; paper C, table 1", minimum=1.0
+        110185.0, "N/rad", "Stiffness C_r of the rear axle", "paper C, table 1", minimum=1.0
     )
 
 

@@ -24,19 +24,19 @@ class ForcePulseParameters:
     force: float = parameter(
         -6000.0,
         "N",
-        "Sum of the longitudinal tyre forces asked for, negative when braking; "
+        "Sum of the longitudinal tyre forces asked for, negative when braking",
         "chosen: half again what paper B's car can have at mu 0.3",
     )
-    start_time: float = parameter(0.5, "s", "Time at which the pulse begins; chosen: time to see it begin")
-    duration: float = parameter(1.5, "s", "Duration of the pulse; chosen: long enough to lock", minimum=0.0)
+    start_time: float = parameter(0.5, "s", "Time at which the pulse begins", "chosen: time to see it begin")
+    duration: float = parameter(1.5, "s", "Duration of the pulse", "chosen: long enough to lock", minimum=0.0)
     final_steer_angle: float = parameter(
-        0.0, "rad", "Final steer angle at the road wheels; chosen: straight on"
+        0.0, "rad", "Final steer angle at the road wheels", "chosen: straight on"
     )
     steer_start_time: float = parameter(
-        0.5, "s", "Time at which the wheel begins to turn; chosen: that of the pulse"
+        0.5, "s", "Time at which the wheel begins to turn", "chosen: that of the pulse"
     )
     steer_time: float = parameter(
-        0.1, "s", "Time it takes to turn the wheel; chosen: a quick evasive turn", minimum=0.0
+        0.1, "s", "Time it takes to turn the wheel", "chosen: a quick evasive turn", minimum=0.0
     )
 
 

@@ -21,17 +21,18 @@ from ..fmi.variables import parameter
 class SineParameters(SteeringParameters, SpeedHoldingParameters):
     """Of the steering input; papers A and B name a sine but neither amplitude nor period."""
 
-    amplitude: float = parameter(0.05, "rad", "Amplitude at the hand wheel; chosen: paper A at 15 m/s")
+    amplitude: float = parameter(0.05, "rad", "Amplitude at the hand wheel", "chosen: paper A at 15 m/s")
     steering_ratio: float = parameter(
         1.0,
         "1",
-        "Hand-wheel angle over road-wheel angle; chosen: 1, the amplitude is that of the road wheels",
+        "Hand-wheel angle over road-wheel angle",
+        "chosen: 1, the amplitude is that of the road wheels",
         minimum=0.1,
     )
     frequency: float = parameter(
-        0.2, "Hz", "Frequency; chosen: one period of 5 s, as in paper A's figure 6", minimum=0.0
+        0.2, "Hz", "Frequency", "chosen: one period of 5 s, as in paper A's figure 6", minimum=0.0
     )
-    periods: float = parameter(1.0, "1", "Number of periods, then straight ahead; chosen: one", minimum=0.0)
+    periods: float = parameter(1.0, "1", "Number of periods, then straight ahead", "chosen: one", minimum=0.0)
 
 
 def sine_steer(t: float, p: SineParameters) -> float:

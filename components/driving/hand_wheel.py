@@ -20,9 +20,9 @@ class SteeringParameters:
     """Of the steering and of when it begins."""
 
     steering_ratio: float = parameter(
-        17.0, "1", "Hand-wheel angle over road-wheel angle; chosen: large saloon", minimum=0.1
+        17.0, "1", "Hand-wheel angle over road-wheel angle", "chosen: large saloon", minimum=0.1
     )
-    start_time: float = parameter(1.0, "s", "Time at which steering begins; chosen: 1 s straight ahead")
+    start_time: float = parameter(1.0, "s", "Time at which steering begins", "chosen: 1 s straight ahead")
 
 
 def ramp(late: float, duration: float, final: float) -> float:

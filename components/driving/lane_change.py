@@ -1,44 +1,20 @@
-"""The track of ISO 3888-1, a double lane change between cones: its lanes, a path through them, overruns.
+"""The track of a double lane change as its driver knows it: a path through the lanes, overruns of cones.
 
-    section      1      2       3      4       5, 6
-    length      15 m   30 m    25 m   25 m    15 + 15 m
-    lane width  1.1 w + 1/4    1.2 w + 1/4    1.3 w + 1/4      w vehicle width [m]
-
-The lane offset, 3.5 m, is measured between the right borders of lanes 1 and 3; lane 5 begins again at
-the right border of lane 1. y = 0 is the middle of lane 1, x = 0 the start of the car. The path
-runs along the middles of lanes 1 and 5 and, in lane 3, at the lane offset from lane 1's: right of the
-middle by 5 % of the vehicle width, since cars run wide to the left there. In the transitions 2 and 4 it is
-a half cosine. A negative offset mirrors the track.
-
-Source: ISO 3888-1, Passenger cars - Test track for a severe lane-change manoeuvre - Part 1: Double
-lane-change. Paper C names neither path nor lanes. Ours adds: transitions of another length, for speeds
-that a slippery road does not bear on the standard's.
+The lanes are those of ISO 3888-1 (`vocabulary.lane_change`); x = 0 is the start of the car. The path runs
+along the middles of lanes 1 and 5 and, in lane 3, at the lane offset from lane 1's: right of the middle by
+5 % of the vehicle width, since cars run wide to the left there. In the transitions 2 and 4 it is a half
+cosine. Paper C names neither path nor lanes.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import copysign, cos, hypot, pi, sin
+from math import cos, hypot, pi, sin
 from typing import NamedTuple
 
+from vocabulary.lane_change import lanes
+
 from ..fmi.variables import parameter
-
-LENGTHS = (15.0, 30.0, 25.0, 25.0, 30.0)
-"""Of lane 1, transition 2, lane 3, transition 4 and lanes 5 and 6 together [m]."""
-
-
-class Lane(NamedTuple):
-    """A lane between two rows of cones, from x = start to end, y = right to left [m]."""
-
-    start: float
-    end: float
-    right: float
-    left: float
-
-    @property
-    def middle(self) -> float:
-        """The y of its middle [m]."""
-        return 0.5 * (self.right + self.left)
 
 
 class Outline(NamedTuple):
@@ -54,26 +30,22 @@ class LaneChangeParameters:
     """Of the track and of the car that has to fit in."""
 
     vehicle_width: float = parameter(
-        1.85, "m", "Vehicle width, from which lane widths follow; chosen: large saloon", minimum=0.5
+        1.85, "m", "Vehicle width, from which lane widths follow", "chosen: large saloon", minimum=0.5
     )
     cg_to_front_end: float = parameter(
-        2.25, "m", "Front end from the centre of mass; chosen: large saloon of 4.9 m", minimum=0.1
+        2.25, "m", "Front end from the centre of mass", "chosen: large saloon of 4.9 m", minimum=0.1
     )
     cg_to_rear_end: float = parameter(
-        2.65, "m", "Rear end from the centre of mass; chosen: large saloon of 4.9 m", minimum=0.1
+        2.65, "m", "Rear end from the centre of mass", "chosen: large saloon of 4.9 m", minimum=0.1
     )
     track_start: float = parameter(
-        25.0, "m", "Position x of the first cones; chosen: 1 s at 90 km/h straight ahead"
+        25.0, "m", "Position x of the first cones", "chosen: 1 s at 90 km/h straight ahead"
     )
     lane_offset: float = parameter(
-        3.5,
-        "m",
-        "Offset of lane 3, to the right if negative; ISO 3888-1",
-        minimum=-20.0,
-        maximum=20.0,
+        3.5, "m", "Offset of lane 3, to the right if negative", "ISO 3888-1", minimum=-20.0, maximum=20.0
     )
     transition_scale: float = parameter(
-        1.0, "1", "Length of the transitions over that of ISO 3888-1", minimum=0.1
+        1.0, "1", "Length of the transitions over that of the standard", "ISO 3888-1", minimum=0.1
     )
 
 
@@ -81,23 +53,12 @@ class Track:
     """The three lanes between cones and the path through them."""
 
     def __init__(self, p: LaneChangeParameters) -> None:
-        one, two, three, four, five = LENGTHS
-        two *= p.transition_scale
-        four *= p.transition_scale
-        side = copysign(1.0, p.lane_offset)
-        right = -0.5 * (1.1 * p.vehicle_width + 0.25)
-        lanes = []
-        x = p.track_start
-        for length, gap, factor, offset in (
-            (one, two, 1.1, 0.0),
-            (three, four, 1.2, abs(p.lane_offset)),
-            (five, 0.0, 1.3, 0.0),
-        ):
-            border = right + offset
-            borders = (side * border, side * (border + factor * p.vehicle_width + 0.25))
-            lanes.append(Lane(x, x + length, min(borders), max(borders)))
-            x += length + gap
-        self.lanes = tuple(lanes)
+        self.lanes = lanes(
+            vehicle_width=p.vehicle_width,
+            track_start=p.track_start,
+            lane_offset=p.lane_offset,
+            transition_scale=p.transition_scale,
+        )
         self.offset = p.lane_offset
         self.outline = Outline(p.cg_to_front_end, p.cg_to_rear_end, 0.5 * p.vehicle_width)
 

@@ -23,23 +23,20 @@ class SpeedHoldingParameters:
     """Of the driver's right foot and the engine. By default the speed is not held."""
 
     constant_drive_force: float = parameter(
-        0.0, "N", "Sum of the longitudinal tyre forces asked for, always; paper A: no driving"
+        0.0, "N", "Sum of the longitudinal tyre forces asked for, always", "paper A: no driving"
     )
     speed_gain: float = parameter(
-        0.0,
-        "N.s/m",
-        "Gain K of speed holding, 0 for none; chosen: none in papers A, B, D",
-        minimum=0.0,
+        0.0, "N.s/m", "Gain K of speed holding, 0 for none", "chosen: none in papers A, B, D", minimum=0.0
     )
     speed_integral_time: float = parameter(
-        2.0, "s", "Integral time T_i of speed holding; chosen: slower than the car follows", minimum=0.01
+        2.0, "s", "Integral time T_i of speed holding", "chosen: slower than the car follows", minimum=0.01
     )
-    target_speed: float = parameter(25.0, "m/s", "Speed held, if it is held; paper C: 90 km/h", minimum=0.0)
+    target_speed: float = parameter(25.0, "m/s", "Speed held, if it is held", "paper C: 90 km/h", minimum=0.0)
     drive_force_limit: float = parameter(
-        3000.0, "N", "Largest force F_max for holding the speed; chosen: 75 kW at 25 m/s", minimum=0.0
+        3000.0, "N", "Largest force F_max for holding the speed", "chosen: 75 kW at 25 m/s", minimum=0.0
     )
     drive_time_constant: float = parameter(
-        0.2, "s", "Lag tau of pedal and engine; chosen: naturally aspirated engine", minimum=0.0
+        0.2, "s", "Lag tau of pedal and engine", "chosen: naturally aspirated engine", minimum=0.0
     )
 
 
@@ -48,7 +45,7 @@ class HeldSpeedParameters(SpeedHoldingParameters):
     """The same for a driver who holds the speed unless told otherwise."""
 
     speed_gain: float = parameter(
-        4000.0, "N.s/m", "Gain K of speed holding, 0 for none; chosen: 1000 N at 0.25 m/s", minimum=0.0
+        4000.0, "N.s/m", "Gain K of speed holding, 0 for none", "chosen: 1000 N at 0.25 m/s", minimum=0.0
     )
 
 

@@ -39,6 +39,7 @@ class Variable:
     choices: tuple[str, ...] | None = None
     depends_on: tuple[str, ...] = ()
     optional: bool = False
+    source: str = ""
 
 
 @dataclass(frozen=True)
@@ -124,21 +125,23 @@ def parameter(
     default: float | int | bool | str,
     unit: str | None,
     description: str,
+    source: str = "",
     *,
     minimum: float | None = None,
     maximum: float | None = None,
     choices: Iterable[str] | None = None,
 ) -> Any:
-    """Declare a parameter as a dataclass field: default, unit, description and allowed values.
+    """Declare a parameter as a dataclass field: default, unit, description, source and allowed values.
 
         >>> @dataclass(frozen=True)
         ... class Parameters:
-        ...     gain: float = parameter(20000.0, "N.m.s/rad", "Moment per yaw-rate error; chosen: an example")
+        ...     gain: float = parameter(20000.0, "N.m.s/rad", "Moment per yaw-rate error", "chosen: example")
         >>> Parameters().gain
         20000.0
 
     The FMI type follows from the default's type. `unit` is None for everything but Real.
-    The description says where the default comes from, or "chosen: why".
+    `source` says where the default comes from, and its first word of what kind that is: "paper A, table 1",
+    "chosen: why", "erratum: what is printed", or anything else for other literature.
     """
     options = None if choices is None else tuple(choices)
     metadata = {
@@ -148,6 +151,7 @@ def parameter(
         "minimum": minimum,
         "maximum": maximum,
         "choices": options,
+        "source": source,
     }
     return field(default=default, metadata=metadata)
 
@@ -155,7 +159,9 @@ def parameter(
 def like(parameters: type, name: str, default: float | int | bool | str | None = None) -> Any:
     """Declare anew a field that a dataclass of parameters has, with another default value if given."""
     (original,) = (f for f in dataclasses.fields(parameters) if f.name == name)
-    return field(default=original.default if default is None else default, metadata=original.metadata)
+    if default is None or default == original.default:
+        return field(default=original.default, metadata=original.metadata)
+    return field(default=default, metadata={**original.metadata, "source": "chosen: for this FMU"})
 
 
 @dataclass(frozen=True)
@@ -190,6 +196,7 @@ def parameter_variables(parameters: type) -> list[Variable]:
                 m["minimum"],
                 m["maximum"],
                 m["choices"],
+                source=m["source"],
             )
         )
     return variables

@@ -46,11 +46,12 @@ from ..mathematics.carry import Values
 class SevenDofParameters(StartParameters, PaperA):
     """The car of paper A, table 1."""
 
-    initial_speed: float = parameter(25.0, "m/s", "Speed at the start; paper A drives 15, 25, 40 m/s")
+    initial_speed: float = parameter(25.0, "m/s", "Speed at the start", "paper A drives 15, 25, 40 m/s")
     slip_stiffness_per_load: float = parameter(
         15.0,
         "1",
-        "Slip stiffness over load for slow wheels, see cars.wheel_spin; chosen: paper A's tyre at rest",
+        "Slip stiffness over load for slow wheels, see cars.wheel_spin",
+        "chosen: paper A's tyre at rest",
         minimum=0.0,
     )
 

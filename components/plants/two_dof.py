@@ -43,17 +43,17 @@ _GAUSS = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
 class TwoDofParameters(StartParameters):
     """The car of paper D."""
 
-    mass: float = parameter(1820.0, "kg", "Vehicle mass m; paper D", minimum=1.0)
-    yaw_inertia: float = parameter(3800.0, "kg.m2", "Yaw inertia I_z; paper D", minimum=1.0)
+    mass: float = parameter(1820.0, "kg", "Vehicle mass m", "paper D", minimum=1.0)
+    yaw_inertia: float = parameter(3800.0, "kg.m2", "Yaw inertia I_z", "paper D", minimum=1.0)
     cg_to_front_axle: float = parameter(
-        1.463, "m", "Distance a of the centre of mass from the front axle; paper D", minimum=0.1
+        1.463, "m", "Distance a of the centre of mass from the front axle", "paper D", minimum=0.1
     )
     cg_to_rear_axle: float = parameter(
-        1.585, "m", "Distance b of the centre of mass from the rear axle; paper D", minimum=0.1
+        1.585, "m", "Distance b of the centre of mass from the rear axle", "paper D", minimum=0.1
     )
-    track_width: float = parameter(1.5, "m", "Track width d; paper D", minimum=0.1)
-    cg_height: float = parameter(0.5, "m", "Height h of the centre of mass; paper D", minimum=0.0)
-    initial_speed: float = parameter(25.0, "m/s", "Speed at the start; its part along x is kept; paper D")
+    track_width: float = parameter(1.5, "m", "Track width d", "paper D", minimum=0.1)
+    cg_height: float = parameter(0.5, "m", "Height h of the centre of mass", "paper D", minimum=0.0)
+    initial_speed: float = parameter(25.0, "m/s", "Speed at the start, its part along x is kept", "paper D")
 
 
 def lateral_resultants(delta: float, f_y: Sequence[float], p: Geometry) -> tuple[float, float]:

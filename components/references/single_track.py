@@ -46,29 +46,31 @@ class SingleTrackParameters:
     cg_to_front_axle: float = like(PaperB, "cg_to_front_axle")
     cg_to_rear_axle: float = like(PaperB, "cg_to_rear_axle")
     cornering_stiffness_front: float = parameter(
-        91600.0, "N/rad", "Stiffness C_f of the front axle; chosen: that of the tyres of set 1", minimum=1.0
+        91600.0, "N/rad", "Stiffness C_f of the front axle", "chosen: that of the tyres of set 1", minimum=1.0
     )
     cornering_stiffness_rear: float = parameter(
-        67800.0, "N/rad", "Stiffness C_r of the rear axle; chosen: that of the tyres of set 1", minimum=1.0
+        67800.0, "N/rad", "Stiffness C_r of the rear axle", "chosen: that of the tyres of set 1", minimum=1.0
     )
     mode: str = parameter(
-        "steady_state", None, "Steady state or dynamic model; chosen", choices=("steady_state", "dynamic")
+        "steady_state", None, "Steady state or dynamic model", "chosen", choices=("steady_state", "dynamic")
     )
     limit_steer_angle: bool = parameter(
-        False, None, "Limit the steer angle that feeds the model to the road's friction; paper B does not"
+        False, None, "Limit the steer angle that feeds the model to the road's friction", "paper B does not"
     )
-    limit_yaw_rate: bool = parameter(True, None, "Limit the yaw rate; paper B, equation (17)")
-    limit_sideslip: bool = parameter(True, None, "Limit the sideslip; paper B, equation (18)")
+    limit_yaw_rate: bool = parameter(True, None, "Limit the yaw rate", "paper B, equation (17)")
+    limit_sideslip: bool = parameter(True, None, "Limit the sideslip", "paper B, equation (18)")
     friction_share: float = parameter(
-        1.0, "1", "Share of mu that steer and yaw-rate limits use; paper B: all of it", minimum=0.0
+        1.0, "1", "Share of mu that steer and yaw-rate limits use", "paper B: all of it", minimum=0.0
     )
     sideslip_per_friction: float = parameter(
-        0.1962, "1", "c in |beta_ref| <= atan(c mu); paper B, equation (18): 0.02 s2/m times g", minimum=0.0
+        0.1962, "1", "c in |beta_ref| <= atan(c mu)", "paper B, equation (18): 0.02 s2/m times g", minimum=0.0
     )
     rate_time_constant: float = parameter(
-        0.005, "s", "Lag tau of the rates; chosen: one sample of the controllers", minimum=0.0
+        0.005, "s", "Lag tau of the rates", "chosen: one sample of the controllers", minimum=0.0
     )
-    low_speed: float = parameter(2.0, "m/s", "Slowest speed of the model; chosen: walking pace", minimum=0.1)
+    low_speed: float = parameter(
+        2.0, "m/s", "Slowest speed of the model", "chosen: walking pace", minimum=0.1
+    )
 
 
 def limited_steer(delta: float, v: float, *, mu: float, car: SingleTrackCar, share: float) -> float:

@@ -42,27 +42,32 @@ class SteadyStateParameters:
     cornering_stiffness_front: float = parameter(
         100000.0,
         "N/rad",
-        "Cornering stiffness C_f of the front axle; paper A, table 1, two tyres",
+        "Cornering stiffness C_f of the front axle",
+        "paper A, table 1, two tyres",
         minimum=1.0,
     )
     cornering_stiffness_rear: float = parameter(
         100000.0,
         "N/rad",
-        "Cornering stiffness C_r of the rear axle; paper A, table 1, two tyres",
+        "Cornering stiffness C_r of the rear axle",
+        "paper A, table 1, two tyres",
         minimum=1.0,
     )
-    limited: bool = parameter(True, None, "Limit the references to what the road's friction allows; paper A")
+    limited: bool = parameter(
+        True, None, "Limit the references to what the road's friction allows", "paper A"
+    )
     friction_share: float = parameter(
-        1.0, "1", "Share of the friction that the limits use; paper A: all of it", minimum=0.0
+        1.0, "1", "Share of the friction that the limits use", "paper A: all of it", minimum=0.0
     )
     sideslip_limit: float = parameter(
         0.1,
         "rad",
-        "Largest reference sideslip beta_max; chosen: 6 degrees, the paper names none",
+        "Largest reference sideslip beta_max",
+        "chosen: 6 degrees, the paper names none",
         minimum=0.0,
     )
     rate_time_constant: float = parameter(
-        0.005, "s", "Lag tau of the rates; chosen: one sample of the controllers", minimum=0.0
+        0.005, "s", "Lag tau of the rates", "chosen: one sample of the controllers", minimum=0.0
     )
 
 

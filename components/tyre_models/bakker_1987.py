@@ -37,7 +37,7 @@ SMALLEST_SLIP = 1e-150
 
 
 def _c(default: float, description: str) -> Any:
-    return parameter(default, "1", f"{description} (F_z in kN, F in N, degrees, percent); SAE 870421")
+    return parameter(default, "1", f"{description} (F_z in kN, F in N, degrees, percent)", "SAE 870421")
 
 
 @dataclass(frozen=True)
@@ -47,20 +47,23 @@ class MagicFormula1987Parameters:
     peak_friction: str = parameter(
         "road",
         None,
-        "Peak D of a force: road is mu F_z, measured is mu over reference_friction times the set's own; the "
-        "slip stiffness is the set's in both; chosen: paper D",
+        "Peak D of a force: road is mu F_z, measured is mu over reference_friction times the set's "
+        "own; the slip stiffness is the set's in both",
+        "chosen: paper D",
         choices=("road", "measured"),
     )
     reference_friction: float = parameter(
         1.0,
         "1",
-        "Friction coefficient of the road the set was measured on, for a measured peak; chosen: 1",
+        "Friction coefficient of the road the set was measured on, for a measured peak",
+        "chosen: 1",
         minimum=0.01,
     )
     maximum_load: float = parameter(
         12000.0,
         "N",
-        "Load above which forces are proportional to it, all coefficients held; chosen: beyond any test",
+        "Load above which forces are proportional to it, all coefficients held",
+        "chosen: beyond any test",
         minimum=1.0,
     )
     a0: float = _c(1.30, "Shape factor C of F_y")

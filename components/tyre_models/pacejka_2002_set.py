@@ -23,45 +23,47 @@ _BOOK = "Pacejka 2006, table A3.1"
 
 
 def _c(default: float, description: str) -> Any:
-    return parameter(default, "1", f"{description}; {_BOOK}")
+    return parameter(default, "1", description, _BOOK)
 
 
 def _odd(default: float, description: str) -> Any:
-    return parameter(default, "1", f"{description}, used with asymmetric_terms; {_BOOK}")
+    return parameter(default, "1", f"{description}, used with asymmetric_terms", _BOOK)
 
 
 def _one(description: str) -> Any:
-    return parameter(1.0, "1", f"{description}; chosen: the set as measured", minimum=0.01)
+    return parameter(1.0, "1", description, "chosen: the set as measured", minimum=0.01)
 
 
 @dataclass(frozen=True)
 class MagicFormulaParameters:
     """One set for all four tyres, with stiffness scalings per axle."""
 
-    nominal_load: float = parameter(4000.0, "N", f"Nominal load F_z0; {_BOOK}", minimum=1.0)
-    unloaded_radius: float = parameter(0.313, "m", f"Unloaded radius R_0; {_BOOK}", minimum=0.01)
+    nominal_load: float = parameter(4000.0, "N", "Nominal load F_z0", _BOOK, minimum=1.0)
+    unloaded_radius: float = parameter(0.313, "m", "Unloaded radius R_0", _BOOK, minimum=0.01)
     maximum_load: float = parameter(
         12000.0,
         "N",
-        "Load above which forces are proportional to it, all coefficients held; chosen: three times nominal",
+        "Load above which forces are proportional to it, all coefficients held",
+        "chosen: three times nominal",
         minimum=1.0,
     )
     reference_friction: float = parameter(
         1.0,
         "1",
-        "Friction coefficient of the road the set was measured on: lambda_mu is friction over it; "
+        "Friction coefficient of the road the set was measured on: lambda_mu is friction over it",
         "chosen: the papers' mu = 1 is the set as it is",
         minimum=0.01,
     )
     low_friction: str = parameter(
         "scale",
         None,
-        "Combined slip where lambda_mu is not 1: scale keeps the weights of the dry tyre, similarity scales "
-        "the slips in them too; chosen: the book's lambda_mu",
+        "Combined slip where lambda_mu is not 1: scale keeps the weights of the dry tyre, similarity "
+        "scales the slips in them too",
+        "chosen: the book's lambda_mu",
         choices=("scale", "similarity"),
     )
     asymmetric_terms: bool = parameter(
-        False, None, "Use the terms that break mirror symmetry or give force at zero slip; chosen: off"
+        False, None, "Use the terms that break mirror symmetry or give force at zero slip", "chosen: off"
     )
     friction_scale_x: float = _one("Scaling lambda_mux of longitudinal friction")
     friction_scale_y: float = _one("Scaling lambda_muy of lateral friction")
@@ -70,7 +72,7 @@ class MagicFormulaParameters:
     cornering_stiffness_scale_front: float = _one("Scaling lambda_Ky of front cornering stiffness")
     cornering_stiffness_scale_rear: float = _one("Scaling lambda_Ky of rear cornering stiffness")
 
-    PCX1: float = parameter(1.685, "1", f"Shape factor C of F_x; {_BOOK}", minimum=0.01)
+    PCX1: float = parameter(1.685, "1", "Shape factor C of F_x", _BOOK, minimum=0.01)
     PDX1: float = _c(1.210, "Friction mu_x at nominal load")
     PDX2: float = _c(-0.037, "Variation of mu_x with load")
     PEX1: float = _c(0.344, "Curvature E of F_x at nominal load")
@@ -91,16 +93,14 @@ class MagicFormulaParameters:
     REX2: float = _c(0.0, "Variation of that curvature with load")
     RHX1: float = _odd(0.007, "Shift of the reduction of F_x by slip angle")
 
-    PCY1: float = parameter(1.193, "1", f"Shape factor C of F_y; {_BOOK}", minimum=0.01)
+    PCY1: float = parameter(1.193, "1", "Shape factor C of F_y", _BOOK, minimum=0.01)
     PDY1: float = _c(-0.990, "Friction mu_y at nominal load")
     PDY2: float = _c(0.145, "Variation of mu_y with load")
     PEY1: float = _c(-1.003, "Curvature E of F_y at nominal load")
     PEY2: float = _c(-0.537, "Variation of E of F_y with load")
     PEY3: float = _odd(-0.083, "Difference of E of F_y between left and right")
     PKY1: float = _c(-14.95, "Largest cornering stiffness K_y / F_z0")
-    PKY2: float = parameter(
-        2.130, "1", f"Load over nominal load at which K_y is largest; {_BOOK}", minimum=0.01
-    )
+    PKY2: float = parameter(2.130, "1", "Load over nominal load at which K_y is largest", _BOOK, minimum=0.01)
     PKY4: float = _c(2.0, "Shape of K_y over load")
     PHY1: float = _odd(0.003, "Horizontal shift of F_y at nominal load")
     PHY2: float = _odd(-0.001, "Variation of the horizontal shift of F_y with load")

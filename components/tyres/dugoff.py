@@ -32,10 +32,10 @@ class DugoffParameters:
     """Of one tyre; all four are equal."""
 
     longitudinal_stiffness: float = parameter(
-        40000.0, "N", "Longitudinal stiffness C_x of one tyre per unit slip; paper A, table 1", minimum=1.0
+        40000.0, "N", "Longitudinal stiffness C_x of one tyre per unit slip", "paper A, table 1", minimum=1.0
     )
     cornering_stiffness: float = parameter(
-        50000.0, "N/rad", "Cornering stiffness C_y of one tyre; paper A, table 1", minimum=1.0
+        50000.0, "N/rad", "Cornering stiffness C_y of one tyre", "paper A, table 1", minimum=1.0
     )
 
 

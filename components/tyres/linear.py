@@ -21,12 +21,12 @@ class LinearTyreParameters:
     """Of one tyre; all four are equal."""
 
     longitudinal_stiffness: float = parameter(
-        40000.0, "N", "Longitudinal stiffness C_x of one tyre per unit slip; paper A, table 1", minimum=0.0
+        40000.0, "N", "Longitudinal stiffness C_x of one tyre per unit slip", "paper A, table 1", minimum=0.0
     )
     cornering_stiffness: float = parameter(
-        50000.0, "N/rad", "Cornering stiffness C_y of one tyre; paper A, table 1", minimum=0.0
+        50000.0, "N/rad", "Cornering stiffness C_y of one tyre", "paper A, table 1", minimum=0.0
     )
-    limited: bool = parameter(False, None, "Limit the force to mu F_z; chosen: off, a truly linear tyre")
+    limited: bool = parameter(False, None, "Limit the force to mu F_z", "chosen: off, a truly linear tyre")
 
 
 class LinearTyre(Tyre):

@@ -21,7 +21,7 @@ class DirectParameters:
 
     wheel_radius: float = like(PaperA, "wheel_radius")
     torque_limit: float = parameter(
-        400.0, "N.m", "Largest torque T_max of a wheel; chosen: in-wheel motor of this class", minimum=0.0
+        400.0, "N.m", "Largest torque T_max of a wheel", "chosen: in-wheel motor of this class", minimum=0.0
     )
 
 

@@ -31,35 +31,40 @@ class HydraulicParameters:
 
     wheel_radius: float = like(PaperC, "wheel_radius")
     brake_factor_front: float = parameter(
-        2.2e-4, "m3", "Torque per pressure C of a front brake; chosen: large saloon", minimum=1e-7
+        2.2e-4, "m3", "Torque per pressure C of a front brake", "chosen: large saloon", minimum=1e-7
     )
     brake_factor_rear: float = parameter(
-        1.1e-4, "m3", "Torque per pressure C of a rear brake; chosen: half of the front's", minimum=1e-7
+        1.1e-4, "m3", "Torque per pressure C of a rear brake", "chosen: half of the front's", minimum=1e-7
     )
     pressure_limit: float = parameter(
-        1e7, "Pa", "Largest cylinder pressure P_max; chosen: 100 bar", minimum=0.0
+        1e7, "Pa", "Largest cylinder pressure P_max", "chosen: 100 bar", minimum=0.0
     )
     pressure_rise_limit: float = parameter(
-        2e7, "Pa/s", "Fastest rise of the pressure; chosen: an ESP pump", minimum=1.0
+        2e7, "Pa/s", "Fastest rise of the pressure", "chosen: an ESP pump", minimum=1.0
     )
     pressure_fall_limit: float = parameter(
-        4e7, "Pa/s", "Fastest fall of the pressure; chosen: open valves", minimum=1.0
+        4e7, "Pa/s", "Fastest fall of the pressure", "chosen: open valves", minimum=1.0
     )
-    pressure_lag: float = parameter(0.08, "s", "Lag tau of the pressure; chosen", minimum=0.0)
+    pressure_lag: float = parameter(0.08, "s", "Lag tau of the pressure", "chosen", minimum=0.0)
     release_slip: float = parameter(
-        0.05, "1", "Braking slip from which pressure is released; chosen: before the optimum", minimum=0.0
+        0.05, "1", "Braking slip from which pressure is released", "chosen: before the optimum", minimum=0.0
     )
     full_release_slip: float = parameter(
-        0.1, "1", "Braking slip from which no pressure is asked for; chosen: about the optimum", minimum=0.001
+        0.1,
+        "1",
+        "Braking slip from which no pressure is asked for",
+        "chosen: about the optimum",
+        minimum=0.001,
     )
     release_speed: float = parameter(
         3.0,
         "m/s",
-        "Wheel velocity above which slip releases fully, below a third of it not; chosen: walking pace",
+        "Wheel velocity above which slip releases fully, below a third of it not",
+        "chosen: walking pace",
         minimum=0.1,
     )
     drive_torque_limit: float = parameter(
-        2500.0, "N.m", "Largest driving torque of a wheel; chosen: an engine in a low gear", minimum=0.0
+        2500.0, "N.m", "Largest driving torque of a wheel", "chosen: an engine in a low gear", minimum=0.0
     )
 
 

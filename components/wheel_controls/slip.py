@@ -42,7 +42,8 @@ class SlipParameters(SlipControlParameters, *OF_TYRES):  # type: ignore[misc]  #
     tyre: str = parameter(
         "magic_formula",
         None,
-        "Tyre model whose curve is inverted; chosen: the tyre of paper B",
+        "Tyre model whose curve is inverted",
+        "chosen: the tyre of paper B",
         choices=tuple(TYRES),
     )
 

@@ -6,6 +6,7 @@ import ast
 import io
 import zipfile
 from typing import Any
+from xml.etree import ElementTree
 
 from components.fmi.roles import ROLES
 from fmus.build import HERE, find_components
@@ -48,12 +49,19 @@ def _unit(name: str, folder: str, file: str) -> str:
     parts = [f"### {name}", cell(description.description or "")]
     with zipfile.ZipFile(path) as archive:
         source = _source(archive, folder, file)
+        root = ElementTree.fromstring(archive.read("modelDescription.xml"))
+    sources = {
+        v.get("name", ""): said.get("source", "")
+        for v in root.iterfind("ModelVariables/*")
+        if (said := v.find("Annotations/Tool[@name='yawbench']/variable")) is not None
+    }
     if source:
         parts.append(f'??? note "The model"\n\n{_indented(docstring(source))}')
     follows = {u.variable.name: [d.name for d in u.dependencies or ()] for u in description.outputs}
     parts.append(_signals("input", variables, {}))
     parts.append(_signals("output", variables, follows))
-    parts.append(_parameters([v for v in description.modelVariables if v.causality == "parameter"]))
+    parameters = [v for v in description.modelVariables if v.causality == "parameter"]
+    parts.append(_parameters(parameters, sources))
     return "\n\n".join(part for part in parts if part)
 
 
@@ -82,16 +90,15 @@ def _signals(causality: str, variables: dict[str, Any], follows: dict[str, list[
     return table(head, rows)
 
 
-def _parameters(parameters: list[Any]) -> str:
+def _parameters(parameters: list[Any], sources: dict[str, str]) -> str:
     rows = []
     for v in parameters:
         limits = [f"≥ {_number(v.min)}"] if v.min is not None else []
         limits += [f"≤ {_number(v.max)}"] if v.max is not None else []
         value = _number(v.start) if v.type == "Real" else str(v.start)
-        rows.append(
-            (code(v.name), code(value), code(v.unit or ""), ", ".join(limits), cell(v.description or ""))
-        )
-    return table(("parameter", "default", "unit", "allowed", "meaning and origin"), rows)
+        meaning, source = cell(v.description or ""), cell(sources.get(v.name, ""))
+        rows.append((code(v.name), code(value), code(v.unit or ""), ", ".join(limits), meaning, source))
+    return table(("parameter", "default", "unit", "allowed", "meaning", "source"), rows)
 
 
 def _number(text: str) -> str:

@@ -74,7 +74,8 @@ def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None
     )
     _show(console, "Units in evaluation order", ("unit", "FMU", "step"), _unit_rows(plan))
     values, hidden = _values(plan, defaults)
-    _show(console, "Values", ("what", "value", "from", "units"), values)
+    columns = ("what", "value", "from", "units", *(["source of the default"] if defaults else []))
+    _show(console, "Values", columns, values)
     if hidden:
         also = " or come from tyre files" if plan.scenario.get("tyre_files") else ""
         console.print(f"  {hidden} more are as the FMUs have them{also}: --all shows them", style="dim")
@@ -138,6 +139,7 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
         rows.append((f"tyres, {axle}", f"{file['kind']}, {file['side']}", name, ", ".join(takes)))
     in_files = {Path(file["file"]).name for file in files.values()}
     takers: dict[tuple[str, str, str], list[str]] = {}
+    sources: dict[tuple[str, str, str], str] = {}
     hidden = 0
     for unit in plan.units:
         own = {v.name: unit.parameters.get(v.name, v.start) for v in unit.fmu.of("parameter")}
@@ -152,7 +154,9 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
         for (value_text, origin), names in alike.items():
             for name in fold(names):
                 takers.setdefault((name, value_text, origin), []).append(unit.name)
-    rows += [(*key, ", ".join(units)) for key, units in takers.items()]
+                if defaults and origin == "default" and name in own:
+                    sources.setdefault((name, value_text, origin), unit.fmu.variables[name].source)
+    rows += [(*key, ", ".join(units), *filter(None, [sources.get(key)])) for key, units in takers.items()]
     for unit in plan.units:
         for name, series in unit.series.items():
             how = "held" if series.held else "linear"

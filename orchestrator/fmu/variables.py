@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 from xml.etree import ElementTree
@@ -12,7 +11,6 @@ from xml.etree import ElementTree
 from ..plan import UnitDefinition, Value, Variable
 from .binary import INTEGERS
 
-_CHOICES = re.compile(r"\(one of: ([^()]*)\)$")
 _KINDS = {"Float32": "Real", "Float64": "Real"} | dict.fromkeys(INTEGERS, "Integer")
 """Type of FMI 3.0 -> what it is to a scenario; others are called alike."""
 _REFUSED = {
@@ -43,8 +41,8 @@ def scalars(description: Any, root: ElementTree.Element) -> tuple[dict[str, Vari
         declared = v.declaredType
         kind = _KINDS.get(v.type, v.type)
         unit = v.unit or (declared.unit if declared else None)
-        text = v.description or ""
-        listed = _CHOICES.search(text) if kind == "String" else None
+        said = _said(element)
+        choices = tuple(said["choices"].split(", ")) if "choices" in said else ()
         items = (
             {i.name: int(i.value) for i in declared.items} if v.type == "Enumeration" and declared else None
         )
@@ -64,11 +62,12 @@ def scalars(description: Any, root: ElementTree.Element) -> tuple[dict[str, Vari
                     start=starts[i],
                     minimum=_limit(limits, declared, "min"),
                     maximum=_limit(limits, declared, "max"),
-                    description=text,
+                    description=(v.description or "").removesuffix(f" (one of: {', '.join(choices)})"),
                     depends_on=follows.get(id(v.alias or v)) if v.causality == "output" else None,
-                    choices=tuple(listed[1].split(", ")) if listed else None,
+                    choices=choices or None,
                     items=items,
-                    optional=_optional(v, element),
+                    optional=v.causality == "input" and "optional" in said,
+                    source=said.get("source", ""),
                     definition=definitions.get(unit),
                     encoding=("Int64" if kind == "Enumeration" else v.type) if modern else None,
                     element=i,
@@ -124,9 +123,10 @@ def _definitions(description: Any) -> dict[str | None, UnitDefinition]:
     }
 
 
-def _optional(v: Any, element: ElementTree.Element) -> bool:
-    """Return whether an input needs no source: `<Annotations><Tool name="yawbench"><optional/>`."""
-    return v.causality == "input" and element.find("Annotations/Tool[@name='yawbench']/optional") is not None
+def _said(element: ElementTree.Element) -> dict[str, str]:
+    """Return what our own units say of a variable beyond the standard: optional, choices, source."""
+    said = element.find("Annotations/Tool[@name='yawbench']/variable")
+    return {} if said is None else said.attrib
 
 
 def _starts(v: Any, kind: str, element: ElementTree.Element, count: int) -> list[Value | None]:

@@ -1,7 +1,8 @@
 """Where every parameter's value comes from: a paper, a choice, an erratum, or the study itself.
 
-What a value stands for is said where it stands: at the end of its description in the FMU, in the comment
-beside it in the scenario or vehicle file, or in that file's `source`.
+That is said where the value stands: as the source of the parameter in its FMU, in the comment beside it in
+the scenario or vehicle file, or in that file's `source`. The first word of a source tells what it is:
+`paper`, `erratum`, `chosen`; any other is literature.
 """
 
 from __future__ import annotations
@@ -22,10 +23,6 @@ from ..wording import fold
 PAPER, LITERATURE, CHOSEN, ERRATUM, VARIED, NEUTRAL = (
     "paper", "literature", "chosen", "erratum", "varied", "neutral",
 )  # fmt: skip
-_ERRATUM = re.compile(r"printed as|cannot be right|implausible|erratum|as printed", re.IGNORECASE)
-_CHOSEN = re.compile(r"\bchosen\b|\bpaper (has|names|gives) none\b", re.IGNORECASE)
-_PAPER = re.compile(r"\bpapers?\b", re.IGNORECASE)
-_LITERATURE = re.compile(r"\b(ISO|SAE|Pacejka|table|equation)\b")
 _COMMENT = re.compile(r"#\s*(.*?)\s*$")
 
 
@@ -75,24 +72,21 @@ class Group:
     parameters: dict[str, Parameter] = field(default_factory=dict)
 
 
-def kind_of(words: str) -> str:
-    """Return what kind of source the words name; "" if they name none."""
-    for kind, pattern in (
-        (ERRATUM, _ERRATUM), (CHOSEN, _CHOSEN), (PAPER, _PAPER), (LITERATURE, _LITERATURE),
-    ):  # fmt: skip
-        if pattern.search(words):
-            return kind
-    return ""
+def origin_of(source: str, otherwise: str = "") -> Origin:
+    """Return what a source says as an origin; one that names no kind is of the kind that is given."""
+    return Origin(_first_word(source) or otherwise or (LITERATURE if source else NEUTRAL), source)
 
 
-def meaning_and_origin(description: str) -> tuple[str, Origin]:
-    """Return the two parts of a parameter's description in an FMU, `meaning; where it comes from`."""
-    meaning, _, rest = description.partition("; ")
-    words = re.sub(r"\s*\(one of: .*\)$", "", rest)
-    kind = kind_of(words)
-    if not kind and (kind := kind_of(meaning)):
-        words = ""
-    return (meaning if kind or not rest else description), Origin(kind or NEUTRAL, words)
+def _first_word(source: str) -> str:
+    word = re.match(r"[a-z]*", source)
+    return word[0] if word and word[0] in (PAPER, ERRATUM, CHOSEN) else ""
+
+
+def said_in(comment: str, file: str) -> Origin:
+    """Return what a comment says of a value, "its unit, remarks; source", in a file with a source."""
+    parts = comment.split("; ")
+    begin = next((i for i, part in enumerate(parts) if _first_word(part)), 0)
+    return origin_of("; ".join(parts[begin:]), _first_word(file) or NEUTRAL)
 
 
 def groups_of(runs: Sequence[tuple[Scenario, Plan]]) -> list[Group]:
@@ -120,9 +114,11 @@ def groups_of(runs: Sequence[tuple[Scenario, Plan]]) -> list[Group]:
                 if from_vehicle:
                     file = scenario.vehicle_document.path
                     group = vehicles.setdefault(str(file), _vehicle_group(scenario, file))
-                meaning, default = meaning_and_origin(variable.description)
                 row = group.parameters.setdefault(
-                    variable.name, Parameter(variable.name, meaning, variable.unit or "", default)
+                    variable.name,
+                    Parameter(
+                        variable.name, variable.description, variable.unit or "", origin_of(variable.source)
+                    ),
                 )
                 row.note(origin)
                 row.values[text_of(value)] = None
@@ -153,7 +149,7 @@ def _constant(
     """Note a constant, or one of four wheels that are alike: their name ends with `*`."""
     first = name.removesuffix("*") + WHEELS[0] if name.endswith("*") else name
     variable = unit.fmu.variables[first]
-    meaning, default = meaning_and_origin(variable.description)
+    meaning, default = variable.description, origin_of(variable.source)
     if first != name:
         meaning = meaning.removesuffix(f", {WHEEL_NAMES[WHEELS[0]]}")
     said: Origin | None = None
@@ -186,7 +182,7 @@ def _origin(scenario: Scenario, unit: Unit, name: str, comments: _Comments) -> O
         measure = unit.fmu.variables[name].unit or "1"
         words = comments.beside(scenario.vehicle_document, ("parameters", name))
         words = re.sub(rf"^{re.escape(measure)}(?![\w/.])[,;]?\s*", "", words)
-        return Origin(kind_of(words) or kind_of(scenario._vehicle.source) or NEUTRAL, words)
+        return said_in(words, scenario._vehicle.source)
     if origin == "scenario":
         own = name in scenario.units[unit.name].parameters
         key: Key = ("units", unit.name, "parameters", name) if own else (_fact(scenario, name),)
@@ -199,7 +195,7 @@ def _said(scenario: Scenario, key: Key, comments: _Comments) -> Origin:
     words = comments.beside(scenario.document, key)
     if key[0] == "units":
         words = words or comments.above(scenario.document, key[:2])
-    return Origin(kind_of(words) or kind_of(scenario.source) or NEUTRAL, words or scenario.source)
+    return said_in(words or scenario.source, scenario.source)
 
 
 def _fact(scenario: Scenario, name: str) -> str:

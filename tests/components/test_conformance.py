@@ -234,6 +234,13 @@ def test_outputs_are_finite_and_within_what_is_declared_whatever_comes_in(compon
 
 
 @every
+def test_every_default_says_where_it_comes_from(component):
+    parameters = [v for v in component.variables if v.causality == "parameter"]
+    assert [v.name for v in parameters if not v.source] == []
+    assert [v.name for v in parameters if "; chosen" in v.description or "; paper" in v.description] == []
+
+
+@every
 def test_parameters_arrive_after_the_instance_is_made(component):
     declared = parameters_of(component)
     stand = Stand(component)

@@ -26,7 +26,7 @@ from components.fmi.variables import parameter
 
 @dataclass(frozen=True)
 class Parameters:
-    gain: float = parameter(100.0, "N.m.s/rad", "Gain; chosen: for the test", minimum=0.0)
+    gain: float = parameter(100.0, "N.m.s/rad", "Gain", "chosen: for the test", minimum=0.0)
     steps: int = parameter(2, None, "A number")
     fast: bool = parameter(False, None, "A switch")
     mode: str = parameter("a", None, "A choice", choices=("a", "b"))

@@ -148,7 +148,9 @@ def _scalar_variable(causality: str, var: Var, reference: int) -> str:
     if causality != "output":
         attributes["start"] = str(var.start).lower() if var.type == "Boolean" else str(var.start)
     inner = " ".join(f"{k}={quoteattr(v)}" for k, v in attributes.items())
-    mark = '<Annotations><Tool name="yawbench"><optional/></Tool></Annotations>' if var.optional else ""
+    said = ' optional="true"' * var.optional
+    said += f" choices={quoteattr(', '.join(var.choices))}" if var.choices else ""
+    mark = f'<Annotations><Tool name="yawbench"><variable{said}/></Tool></Annotations>' if said else ""
     return (
         f'<ScalarVariable name={quoteattr(var.name)} valueReference="{reference}" causality="{causality}"'
         f' variability="{variability}" description={quoteattr(text)}>'

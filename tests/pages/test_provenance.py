@@ -16,9 +16,10 @@ from orchestrator.pages.provenance import (
     LITERATURE,
     NEUTRAL,
     PAPER,
+    Origin,
     groups_of,
-    kind_of,
-    meaning_and_origin,
+    origin_of,
+    said_in,
 )
 from orchestrator.results.digest import checksum
 from orchestrator.results.run_record import run_record
@@ -49,32 +50,37 @@ title: A car
 source: "paper A, table 1, unless a line says otherwise"
 parameters:
   mass: 1100                     # kg
-  cg_to_front_axle: 1.2          # m; printed as 12
+  cg_to_front_axle: 1.2          # m; erratum: printed as 12
   cg_to_rear_axle: 1.4           # m; chosen: a guess
 """
 
 
 @pytest.mark.parametrize(
-    ("words", "kind"),
+    ("source", "kind"),
     [
         ("paper B, table 1", PAPER),
         ("chosen: the paper names none", CHOSEN),
-        ("the paper has none, 0.1 holds the car", CHOSEN),
-        ("chosen: the 1.36 m of paper C's table 1 cannot be right", ERRATUM),
-        ("printed as 5600, which barely exceeds 4356", ERRATUM),
-        ("Pacejka 2006, table A3.1", LITERATURE),
-        ("false freezes the weights", ""),
+        ("chosen", CHOSEN),
+        ("erratum: the 1.36 m of paper C's table 1 cannot be right", ERRATUM),
+        ("Pacejka 2006, table A3.1, the paper's", LITERATURE),
+        ("", NEUTRAL),
     ],
 )
-def test_a_source_is_told_by_its_words(words, kind):
-    assert kind_of(words) == kind
+def test_the_first_word_of_a_source_says_what_it_is(source, kind):
+    assert origin_of(source) == Origin(kind, source)
 
 
-def test_a_description_is_split_into_meaning_and_source():
-    meaning, origin = meaning_and_origin("Rule table; chosen: the standard one (one of: standard, gentle)")
-    assert (meaning, origin.kind, origin.says) == ("Rule table", CHOSEN, "chosen: the standard one")
-    meaning, origin = meaning_and_origin("Learn on line; false freezes the weights")
-    assert (meaning, origin.kind) == ("Learn on line; false freezes the weights", NEUTRAL)
+@pytest.mark.parametrize(
+    ("comment", "origin"),
+    [
+        ("axle; chosen: that of the tyres; rounded", Origin(CHOSEN, "chosen: that of the tyres; rounded")),
+        ("erratum: printed as 12", Origin(ERRATUM, "erratum: printed as 12")),
+        ("wheelbase 3.05 m, chosen by nobody", Origin(PAPER, "wheelbase 3.05 m, chosen by nobody")),
+        ("", Origin(PAPER, "")),
+    ],
+)
+def test_a_comment_says_where_a_value_comes_from_or_else_its_file_does(comment, origin):
+    assert said_in(comment, "paper A, table 1, unless a line says otherwise") == origin
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +109,7 @@ def test_the_car_s_parameters_come_from_its_file_line_by_line(groups):
     assert car["mass"].origin.kind == PAPER
     assert (car["cg_to_front_axle"].origin.kind, car["cg_to_front_axle"].origin.says) == (
         ERRATUM,
-        "printed as 12",
+        "erratum: printed as 12",
     )
     assert (car["cg_to_rear_axle"].origin.kind, car["cg_to_rear_axle"].origin.says) == (
         CHOSEN,
@@ -114,11 +120,12 @@ def test_the_car_s_parameters_come_from_its_file_line_by_line(groups):
 
 def test_a_unit_s_parameters_come_from_the_scenario_or_else_from_the_fmu(groups):
     driver, reference = groups["driver: driver_sine"], groups["reference: reference_steady_state"]
-    assert driver["frequency"].origin.says == "One period of 5 s; chosen: slow."
+    assert driver["frequency"].origin.says == "chosen: slow."
     assert reference["sideslip_limit"].origin.says == "chosen: wide"
     assert "mass" not in reference
     learning = groups["controller: controller_fnn"]["learning_rate"]
-    assert (learning.origin.kind, list(learning.values)) == (PAPER, ["2"])
+    assert (learning.origin, list(learning.values)) == (Origin(PAPER, "paper A, equation (35)"), ["2"])
+    assert learning.meaning == "Learning rate alpha"
 
 
 def test_what_a_study_varies_keeps_its_source_and_shows_all_values(groups):
