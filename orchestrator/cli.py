@@ -39,7 +39,7 @@ COMMANDS = (
 """Each a module of `orchestrator.commands` with a function of the same name, `_` for `-`."""
 
 
-def _application(arguments: Sequence[str]) -> typer.Typer:
+def _application(arguments: Sequence[str] = ()) -> typer.Typer:
     """Return the program with the command that is called, or with all if none is, as for help."""
     called = arguments[:1] if arguments and arguments[0] in COMMANDS else COMMANDS
     app = typer.Typer(
