@@ -80,6 +80,7 @@ ODD = {
     *wheels("aligning_moment_*"),
     *wheels("overturning_moment_*"),
     *wheels("inclination_angle_*"),
+    *wheels("patch_slip_angle_*"),
 }
 """What changes its sign in a mirror; all else keeps it."""
 LOPSIDED = {("asymmetric_terms", True), ("table_reading", "printed"), ("wheel_choice", "printed")}
@@ -99,6 +100,10 @@ SPLIT = {
 
 Plants are of second order in the step, their loads and accelerations carried; the rates of references
 belong to the step they are taken over."""
+
+
+OF_A_STEP = {("tyre_magic_formula_62_transient", "slip_stiffness")}
+"""Outputs that say what a step of that size does."""
 
 
 def middle(name: str) -> float:
@@ -183,6 +188,8 @@ def test_a_step_with_held_inputs_may_be_split(component):
     two = halves.step(0.001, **held)
     tolerance = SPLIT.get(component.fmu_name, 1e-9)
     for name, value in one.items():
+        if (component.fmu_name, name[:-3]) in OF_A_STEP:
+            continue
         size = max(abs(value), abs(two[name]), 1e-3)
         assert abs(value - two[name]) <= tolerance * size, name
 
@@ -216,7 +223,10 @@ def test_without_any_input_nothing_stirs(component):
             assert abs(value) <= 1e-9, name
 
 
-FREE = ("yaw_rate_proportional_gain", "sideslip_proportional_gain", "reaching", "path_offset")
+FREE = (
+    *("yaw_rate_proportional_gain", "sideslip_proportional_gain", "reaching", "path_offset"),
+    "relaxation_length",
+)
 """Outputs that are settings, not answers."""
 
 

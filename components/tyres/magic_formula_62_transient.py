@@ -1,0 +1,167 @@
+"""Magic Formula tyre of MF-Tyre 6.1, 6.2 and 5.2 whose forces lag behind slip.
+
+Forces and moments are those of `tyres/magic_formula_62.py`, at the slips of the contact patch in place of
+those of the wheel. These follow over the relaxation lengths sigma_x and sigma_y of F_x and F_y
+(`tyre_models/relaxation.py`):
+
+    du_x/dt = s_x - V_x u_x / sigma_x    s_x = w R - v,      V_x = max(|w R|, |v|),    kappa' = u_x / sigma_x
+    du_y/dt = s_y - V_y u_y / sigma_y    s_y lateral speed,  V_y = sqrt(v^2 + s_y^2),
+                                                                               sin(alpha') = u_y / sigma_y
+
+solved exactly over a step. In steady motion kappa' and alpha' are the wheel's own slips. At rest both
+deflections are springs, so the car stands, and would rock on them without end: below `damping_speed` a
+damper beside the spring fades in, kappa' + k s_x / K_x, sin(alpha') - k s_y / K_y.
+
+Slip speeds are told from wheel_speed, wheel_velocity and slip_angle; the latter refers to `low_speed` where a
+wheel is slower. So wheel_radius and low_speed have to be those of the plant, as a vehicle file gives them.
+
+slip_stiffness is the slope of the force at the end of a step over the slip held in it, dF_x/dkappa'
+(1 - exp(-V_x h / sigma_x)) and the damper's part: what the plant needs to solve the wheel's spin with it.
+
+Source: H. B. Pacejka, Tyre and Vehicle Dynamics, 3rd ed. 2012, sections 7.2 and 8.6; I. J. M. Besselink,
+A. J. C. Schmeitz, H. B. Pacejka, Vehicle System Dynamics 48 (2010), for the relaxation lengths. Ours differs:
+V_x and V_y bound the deflections when a wheel spins or slides sideways, where |v| would not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import asin, cos, hypot, pi, sin, tan
+
+from ..cars.car import StartParameters
+from ..cars.published_cars import PaperB
+from ..fmi.variables import like, output, parameter, signal
+from ..tyre_models.pacejka_2002 import SMALLEST_LOAD
+from ..tyre_models.pacejka_2012 import longitudinal_curve, side_force, wheel_forces, whole_set
+from ..tyre_models.pacejka_2012_set import RELAXATION, Pacejka2012Parameters, of_axles
+from ..tyre_models.relaxation import deflected, part, relaxation_lengths, relaxation_set
+from ..tyre_models.tyre import INPUTS, Tyre
+from .magic_formula_62 import WHEELS
+
+AT_ONCE = ("vertical_load_*", "friction_*", "inclination_angle_*")
+FIRST_STEP = 0.001
+"""Step [s] for the slip stiffness until one is known; chosen: the usual one."""
+
+_Relaxation = of_axles("_Relaxation", RELAXATION, bases=(Pacejka2012Parameters,))
+
+
+@dataclass(frozen=True)
+class TransientParameters(_Relaxation):  # type: ignore[misc, valid-type]  # made by make_dataclass
+    """Coefficients of both axles, and what slip speeds and standstill need."""
+
+    relaxation_length: float = parameter(
+        0.5, "m", "Relaxation length where a set tells none; chosen: a passenger car tyre's", minimum=0.02
+    )
+    damping: float = parameter(
+        3000.0,
+        "N.s/m",
+        "Damping k beside the deflection at rest; chosen: a car that has stopped rocks for less than a second",
+        minimum=0.0,
+    )
+    damping_speed: float = parameter(
+        2.5, "m/s", "Speed from which there is no such damping; chosen: walking pace", minimum=0.001
+    )
+    wheel_radius: float = like(PaperB, "wheel_radius")
+    low_speed: float = like(StartParameters, "low_speed")
+
+
+class MagicFormula62Transient(Tyre):
+    """Magic Formula tyres (MF-Tyre 6.2, 6.1, 5.2) whose forces lag behind slip by relaxation lengths."""
+
+    Parameters = TransientParameters
+    inputs = (
+        *INPUTS,
+        signal("inclination_angle_*", optional=True),
+        "wheel_velocity_*",
+        "wheel_speed_*",
+    )
+    outputs = (
+        output("tyre_force_x_*", *AT_ONCE),
+        output("tyre_force_y_*", *AT_ONCE),
+        output("aligning_moment_*", *AT_ONCE),
+        output("overturning_moment_*", *AT_ONCE),
+        output("slip_stiffness_*", *AT_ONCE),
+        output("tyre_slip_ratio_*"),
+        output("patch_slip_ratio_*", *AT_ONCE, unit="1", text="Slip kappa' of the contact patch"),
+        output("patch_slip_angle_*", *AT_ONCE, unit="rad", text="Slip angle alpha' of the contact patch"),
+        output("relaxation_length_x_*", *AT_ONCE, unit="m", text="Relaxation length of F_x"),
+        output("relaxation_length_y_*", *AT_ONCE, unit="m", text="Relaxation length of F_y"),
+    )
+
+    def configure(self) -> None:
+        self.sets = [whole_set(self.p, axle, left=left) for axle, left in WHEELS]
+        self.lags = [relaxation_set(self.p, axle) for axle, _ in WHEELS]
+
+    def start(self, t: float, u: list[float]) -> None:
+        self.step_size = FIRST_STEP
+        self.deflections = [(0.0, 0.0)] * 4
+        self._see(u)
+        self.deflections = [
+            (s_x * sigma_x / v_x if v_x else 0.0, s_y * sigma_y / v_y if v_y else 0.0)
+            for (s_x, v_x, s_y, v_y, _), (sigma_x, sigma_y, *_) in zip(
+                self.speeds, self._stiffness(u), strict=True
+            )
+        ]
+
+    def advance(self, t: float, h: float, u: list[float]) -> None:
+        if h <= 0.0:
+            return
+        self.step_size = h
+        self._see(u)
+        self.deflections = [
+            (deflected(x, s_x, v_x, sigma_x, h), deflected(y, s_y, v_y, sigma_y, h))
+            for (x, y), (s_x, v_x, s_y, v_y, _), (sigma_x, sigma_y, *_) in zip(
+                self.deflections, self.speeds, self._stiffness(u), strict=True
+            )
+        ]
+
+    def output(self, t: float, u: list[float]) -> list[float]:
+        p, h = self.p, self.step_size
+        _, _, loads, frictions, cambers, _, _ = self.by_signal(u)
+        found = []
+        lengths = self._stiffness(u)
+        for i, ((x, y), (s_x, v_x, s_y, v_y, forward)) in enumerate(
+            zip(self.deflections, self.speeds, strict=True)
+        ):
+            sigma_x, sigma_y, k_x, k_y = lengths[i]
+            damper_x = self._damping(v_x) / k_x if k_x > 0.0 else 0.0
+            damper_y = self._damping(v_y) / -k_y if k_y < 0.0 else 0.0
+            kappa = min(max(x / sigma_x + damper_x * s_x, -2.0), 2.0)
+            alpha = asin(min(max(y / sigma_y + damper_y * s_y, -1.0), 1.0))
+            if not forward:
+                alpha = pi - alpha if alpha >= 0.0 else -pi - alpha
+            *forces, slope = wheel_forces(kappa, alpha, cambers[i], loads[i], frictions[i], self.sets[i])
+            passed = max(v_x, p.low_speed) * (h * part(v_x * h / sigma_x) / sigma_x + damper_x)
+            found.append((*forces, slope * min(passed, 1.0), self.slips[i], kappa, alpha, sigma_x, sigma_y))
+        return [value for of_wheels in zip(*found, strict=True) for value in of_wheels]
+
+    def _see(self, u: list[float]) -> None:
+        """Keep slip speeds, speeds of rolling and direction from the inputs."""
+        angles, self.slips, _, _, _, velocities, spins = self.by_signal(u)
+        radius, low = self.p.wheel_radius, self.p.low_speed
+        self.speeds = []
+        for alpha, v, w in zip(angles, velocities, spins, strict=True):
+            rolling, along = w * radius, cos(alpha)
+            s_y = v * tan(alpha) if abs(v) >= low * abs(along) else low * sin(alpha)
+            forward = along >= 0.0
+            self.speeds.append((rolling - v, max(abs(rolling), abs(v)), s_y, hypot(v, s_y), forward))
+
+    def _stiffness(self, u: list[float]) -> list[tuple[float, float, float, float]]:
+        """Return per wheel sigma_x, sigma_y [m], K_x [N] and K_y [N/rad] at the load of the inputs."""
+        _, _, loads, _, cambers, _, _ = self.by_signal(u)
+        found = []
+        for load, gamma, (common, longitudinal, lateral, *_), lag in zip(
+            loads, cambers, self.sets, self.lags, strict=True
+        ):
+            mirror, _, top, load_scale, _ = common
+            load = min(max(load, SMALLEST_LOAD), top)
+            df, gamma = load * load_scale - 1.0, mirror * gamma
+            k_x = longitudinal_curve(0.0, gamma, load, df, 1.0, longitudinal)[7]
+            k_y = side_force(0.0, gamma, load, df, 1.0, lateral)[2]
+            found.append((*relaxation_lengths(load, gamma, k_x, k_y, lag), k_x, k_y))
+        return found
+
+    def _damping(self, v: float) -> float:
+        """Return k [N.s/m] at a speed of rolling."""
+        p = self.p
+        return p.damping * 0.5 * (1.0 + cos(pi * v / p.damping_speed)) if v < p.damping_speed else 0.0
