@@ -55,7 +55,7 @@ class TransientParameters(_Relaxation):  # type: ignore[misc, valid-type]  # mad
     damping: float = parameter(
         3000.0,
         "N.s/m",
-        "Damping k beside the deflection at rest; chosen: a car that has stopped rocks for less than a second",
+        "Damping k beside the deflection at rest; chosen: a car that stops rocks for less than a second",
         minimum=0.0,
     )
     damping_speed: float = parameter(
