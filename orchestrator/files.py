@@ -1,8 +1,8 @@
 """Users' files: opened without waiting, bounded in size, and every mistake in them a sentence.
 
-Every reader of a user's file (scenario, vehicle, study, sweep, SSP archive, FMU, results) gets its bytes
-from `read_bytes` and works inside `reading`. Mistakes that a reader foresees it reports itself, with the
-line; `reading` is for those that nobody foresaw.
+Every reader of a user's file (scenario, vehicle, study, sweep, SSP archive, FMU, results, time series)
+gets its bytes from `read_bytes` or `open_regular` and works inside `reading`. Mistakes that a reader
+foresees it reports itself, with the line; `reading` is for those that nobody foresaw.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import stat
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Concatenate, ParamSpec, TypeVar
+from typing import BinaryIO, Concatenate, ParamSpec, TypeVar
 
 from .errors import YawbenchError
 
@@ -50,6 +50,22 @@ def check_regular(path: Path) -> None:
         raise ValueError("it is a pipe, a socket or a device, not a file")
 
 
+def open_regular(path: Path) -> BinaryIO:
+    """Open a regular file for reading, without waiting for anything.
+
+    Raises:
+        OSError: it cannot be opened.
+        ValueError: it is no regular file, or no path can be called so.
+    """
+    check_regular(path)
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    stream = open(os.open(path, flags), "rb")  # noqa: SIM115
+    if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):  # exchanged since
+        stream.close()
+        raise ValueError("it is a pipe, a socket or a device, not a file")
+    return stream
+
+
 def read_bytes(path: Path, *, largest: int) -> bytes:
     """Return the content of a regular file.
 
@@ -58,15 +74,11 @@ def read_bytes(path: Path, *, largest: int) -> bytes:
         ValueError: it is no regular file, or no path can be called so.
         TooLargeError: it is larger than `largest`.
     """
-    check_regular(path)
-    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-    with open(os.open(path, flags), "rb") as stream:
-        if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):  # exchanged since
-            raise ValueError("it is a pipe, a socket or a device, not a file")
-        content = stream.read(largest + 1)
-    if len(content) > largest:
-        raise TooLargeError(f"it is larger than {_in_words(largest)}")
-    return content
+    with open_regular(path) as stream:
+        size = os.fstat(stream.fileno()).st_size
+        if size > largest:
+            raise TooLargeError(f"it is larger than {_in_words(largest)}")
+        return stream.read(size)  # room for as much is made, however little there is
 
 
 def check_archive(archive: zipfile.ZipFile) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..files import open_regular
 from ..wording import short
 
 BLOCK = 8_000_000
@@ -28,8 +29,8 @@ class CsvFile:
     def __init__(self, path: Path, texts: Sequence[str] | None = None) -> None:
         self._path = path
         try:
-            with path.open("rb") as stream:
-                lines = (line.decode() for line in iter(stream.readline, b""))
+            with open_regular(path) as stream:
+                lines = (_line(raw) for raw in iter(lambda: stream.readline(BLOCK), b""))
                 self.names = [name.lstrip("\ufeff") for name in next(csv.reader(lines), [])]
                 self._begin = stream.tell()  # a name may go over lines
                 first = next(csv.reader(lines), [])
@@ -45,7 +46,7 @@ class CsvFile:
         from pyarrow import csv as arrow
 
         types = {name: pa.string() if name in self._texts else pa.float64() for name in columns}
-        with self._path.open("rb") as stream:
+        with open_regular(self._path) as stream:
             stream.seek(self._begin)
             if not stream.read(1):
                 return
@@ -76,6 +77,12 @@ class CsvFile:
             except csv.Error as error:
                 return f"line {reader.line_num}: {error}"
         return None
+
+
+def _line(raw: bytes) -> str:
+    if len(raw) == BLOCK:
+        raise ValueError(f"a line is longer than {BLOCK} bytes")
+    return raw.decode()
 
 
 def _is_number(text: str) -> bool:

@@ -19,10 +19,13 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ResultsError
+from ..files import read_bytes
 from ..writing import NEW, reason
 from .formats import FILES, PART, RESULTS_FILE, RUN_FILE
 from .lock import Lock, holder_of
 
+LARGEST = 100_000_000
+"""Bytes of a record. Chosen: a thousand times what one of ours has."""
 FAILED = "failed"
 """Folder of a failed run's results below those of one that reached its end."""
 RUNNING, COMPLETED, DIED = "running", "completed", "died"
@@ -43,7 +46,7 @@ def put_in_place(folder: Path) -> Path:
         OSError: they cannot be renamed.
     """
     part = folder / f"{RUN_FILE}{PART}"
-    run = json.loads(part.read_text(encoding="utf-8"))
+    run = _record(part)
     place = place_of(folder, run.get("status", ""))
     file = str(run.get("results", RESULTS_FILE))
     if (results := folder / f"{file}{PART}").exists():
@@ -136,7 +139,7 @@ def _status(path: Path) -> str:
 def _record(path: Path) -> dict[str, Any]:
     """Return a record without looking into it; an empty one if there is none."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        found = json.loads(read_bytes(path, largest=LARGEST))
+    except (OSError, ValueError, RecursionError, MemoryError):
         return {}
     return found if isinstance(found, dict) else {}

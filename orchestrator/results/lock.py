@@ -19,6 +19,7 @@ from datetime import datetime
 from pathlib import Path
 
 from ..errors import ResultsError
+from ..files import TEXT, read_bytes
 from ..writing import claim, fcntl, reason
 
 LOCK_FILE = ".yawbench-lock"
@@ -131,7 +132,7 @@ def holder_of(folder: Path) -> Holder | None:
     """Return who writes into a folder, None if nobody does."""
     path = folder / LOCK_FILE
     try:
-        descriptor = os.open(path, os.O_RDONLY)
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
     except OSError:
         return None
     try:
@@ -148,7 +149,7 @@ def holder_of(folder: Path) -> Holder | None:
 def _said(path: Path) -> Holder:
     """Return what a lock file says of its holder, who may not have come to say it."""
     try:
-        return Holder(**json.loads(path.read_text(encoding="utf-8")))
+        return Holder(**json.loads(read_bytes(path, largest=TEXT)))
     except (OSError, ValueError, TypeError):
         return Holder("another run", 0, "this computer", "")
 

@@ -11,11 +11,8 @@ from pydantic import BaseModel, ConfigDict, NonNegativeInt, ValidationError
 from ..errors import ResultsError
 from ..files import read_bytes, reading, reason
 from ..wording import short
-from .folder import FAILED, settle
+from .folder import FAILED, LARGEST, settle
 from .formats import FILES, RUN_FILE
-
-LARGEST = 100_000_000
-"""Bytes of a record. Chosen: a thousand times what one of ours has."""
 
 
 class _Part(BaseModel):

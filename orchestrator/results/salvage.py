@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 
 from ..errors import ResultsError
+from ..files import open_regular
 from ..writing import reason, write_whole
 from .csv_file import CsvFile
 from .digest import checksum
@@ -54,7 +55,7 @@ def salvage(folder: Path) -> tuple[Path, int]:
 def _keep_whole_rows(path: Path) -> int:
     """Cut off what stands behind the last whole row; return the number of rows."""
     end = 0
-    with path.open("rb") as stream:
+    with open_regular(path) as stream:
         position = 0
         while block := stream.read(1 << 20):
             if b"\n" in block:

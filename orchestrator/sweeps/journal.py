@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ResultsError
+from ..files import check_regular
 from ..writing import reason
 from .measuring import Measured
 
@@ -51,9 +52,13 @@ class Journal:
         path = folder / FILE
         try:
             folder.mkdir(parents=True, exist_ok=True)
+            if path.exists():
+                check_regular(path)
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
         except OSError as error:
             raise ResultsError(f"{folder}: results cannot be written here: {reason(error)}.") from None
+        except ValueError as error:
+            raise ResultsError(f"{path}: cannot be read: {error}.") from None
         try:
             if fresh:
                 os.ftruncate(self._file, 0)

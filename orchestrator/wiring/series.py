@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..files import reason
+from ..errors import ScenarioError
+from ..files import reading
 from ..plan import Series, Value, Variable
 from ..scenario.load import Scenario
 from ..scenario.measurement_units import Measure, conversion, measure_of
@@ -34,27 +36,34 @@ def series_reader(scenario: Scenario) -> Reader:
     @cache
     def opened(file: str) -> SeriesFile:
         path = Path(os.path.normpath(scenario.path.parent / file))
-        try:
+        with _reading(path):
             return SeriesFile(path)
-        except OSError as error:
-            raise ValueError(f"{path}: {reason(error)}") from None
-        except ValueError as error:
-            raise ValueError(f"{path}: {error}") from None
 
     def read(spec: SeriesSpec, part: str, variable: Variable) -> Series:
         file = opened(spec.file)
         name = (spec.column or variable.name).replace("*", part)
-        try:
+        with _reading(spec.file):
             column = file.column(name, spec.time)
             times = _numbers(column.times, f"time {spec.time!r}") * _gain(column.time_unit, _SECOND)[0]
             values = _values(column.values, column.unit, name, variable)
             _check_times(times, scenario, spec)
-        except ValueError as error:
-            raise ValueError(f"{spec.file}: {error}") from None
         held = spec.interpolation == "held" or variable.type != "Real"
         return Series(spec.file, name, file.sha256, held, times, values)
 
     return read
+
+
+@contextlib.contextmanager
+def _reading(path: Path | str) -> Iterator[None]:
+    """As `files.reading`, with ValueError for every sentence."""
+    try:
+        with reading("file of time series", path, ScenarioError):
+            try:
+                yield
+            except ValueError as error:
+                raise ScenarioError(f"{path}: {error}") from None
+    except ScenarioError as error:
+        raise ValueError(error.problems[0]) from error.__cause__
 
 
 def _gain(unit: str | None, target: Measure | None) -> tuple[float, float]:

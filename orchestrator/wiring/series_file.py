@@ -9,9 +9,10 @@ from __future__ import annotations
 import csv
 import hashlib
 import io
+import itertools
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -92,26 +93,31 @@ class _Table:
 
 
 def _csv(raw: bytes) -> _Table:
+    """Return the table of a file whose rows are read again for every column: as text, all would be large."""
+    first = raw.partition(b"\n")[0].decode("utf-8-sig", "replace")
+    delimiter = max(",;\t", key=first.count)
+
+    def rows() -> Iterator[list[str]]:
+        text = io.TextIOWrapper(io.BytesIO(raw), encoding="utf-8-sig", newline="")
+        return (row for row in csv.reader(text, delimiter=delimiter) if row)
+
+    def values(at: int) -> np.ndarray:
+        try:
+            return np.fromiter((float(row[at]) for row in itertools.islice(rows(), 1, None)), float)
+        except ValueError:
+            return np.array([row[at] for row in itertools.islice(rows(), 1, None)], dtype=object)
+
     try:
-        text = raw.decode("utf-8-sig")
+        headers = next(rows(), [])
+        number = 0
+        for number, row in enumerate(rows(), start=1):
+            if len(row) != len(headers):
+                raise ValueError(f"row {number} has {len(row)} values for {len(headers)} columns")
     except UnicodeDecodeError:
         raise ValueError("is not UTF-8") from None
-    first = text.partition("\n")[0]
-    delimiter = max(",;\t", key=first.count)
-    rows = [row for row in csv.reader(io.StringIO(text, newline=""), delimiter=delimiter) if row]
-    if len(rows) < 2:
+    if number < 2:
         raise ValueError("has no rows")
-    for number, row in enumerate(rows, start=1):
-        if len(row) != len(rows[0]):
-            raise ValueError(f"row {number} has {len(row)} values for {len(rows[0])} columns")
-    return _Table(rows[0], lambda at: _numbers([row[at] for row in rows[1:]]))
-
-
-def _numbers(cells: list[str]) -> np.ndarray:
-    try:
-        return np.array([float(cell) for cell in cells])
-    except ValueError:
-        return np.array(cells, dtype=object)
+    return _Table(headers, values)
 
 
 def _parquet(raw: bytes) -> _Table:
@@ -164,5 +170,5 @@ def _units_beside(path: Path) -> Mapping[str, str]:
         record = json.loads(read_bytes(path.parent / BESIDE, largest=LARGEST))
         units = record["units"] if record.get("results", "results.csv") == path.name else {}
         return {str(name): str(unit) for name, unit in units.items() if unit}
-    except (OSError, ValueError, KeyError, AttributeError):
+    except (OSError, ValueError, KeyError, AttributeError, RecursionError):
         return {}

@@ -237,3 +237,14 @@ def test_a_link_that_leads_nowhere_is_one_sentence(tmp_path):
         match=r"out: results cannot be written here: it is no folder; name another with --out\.$",
     ):
         run(tmp_path / "out")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
+@pytest.mark.parametrize("name", ["run.json.part", ".yawbench-lock"])
+def test_a_pipe_in_place_of_a_file_of_ours_keeps_nobody_waiting(name, tmp_path):
+    run(tmp_path)
+    os.mkfifo(tmp_path / "run.json.part")
+    if name != "run.json.part":
+        os.mkfifo(tmp_path / name)
+    with pytest.raises(ResultsError, match="the run ended without a word"):
+        load_results(tmp_path)

@@ -6,6 +6,7 @@ import pytest
 
 from orchestrator.errors import ResultsError
 from orchestrator.results import thinning
+from orchestrator.results.csv_file import BLOCK, CsvFile
 from orchestrator.results.read import load_results
 
 RUN = {
@@ -204,3 +205,11 @@ def test_a_long_run_is_thinned_to_rows_that_hold_every_peak(folder, monkeypatch)
     for name, values in (("a.x", signal), ("b.x_ref", reference), ("a.gap", gap)):
         np.testing.assert_array_equal(thin[name], values[kept])
     assert np.max(np.abs(thin["a.x"] - thin["b.x_ref"])) == np.max(np.abs(signal - reference))
+
+
+def test_a_line_without_end_is_not_read_to_its_end(tmp_path):
+    file = tmp_path / "results.csv"
+    with file.open("wb") as stream:
+        stream.truncate(10 * BLOCK)
+    with pytest.raises(ValueError, match="a line is longer than 8000000 bytes"):
+        CsvFile(file)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -320,3 +322,48 @@ def test_an_archive_for_other_programs_has_no_place_for_a_series(folder: Path) -
         ResultsError, match=r"no place for the time series of plant\.steer_angle, plant\.torque_"
     ):
         write_ssp(plan_of(scenario()), folder / "a.ssp")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
+@pytest.mark.parametrize("form", ["csv", "parquet", "mf4"])
+def test_a_series_from_a_pipe_or_a_device_is_refused_without_a_wait(form: str, folder: Path) -> None:
+    os.mkfifo(f"runs/pipe.{form}")
+    os.symlink("/dev/zero", f"runs/zero.{form}")
+    for name in ("pipe", "zero"):
+        said = problem(scenario(plant_steer_angle=f"{{file: {name}.{form}, column: delta}}"))
+        assert f"runs/{name}.{form}: it is a pipe, a socket or a device, not a file" in said
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "expected"),
+    [
+        (
+            "x.csv",
+            b"time,delta\n0," + b"1" * 200_000 + b"\n",
+            "cannot read this file of time series: something in it is not understood (Error: field larger",
+        ),
+        ("run.json", b"[" * 200_000, ""),
+    ],
+)
+def test_what_nobody_foresaw_in_a_series_is_a_sentence(
+    name: str, content: bytes, expected: str, folder: Path
+) -> None:
+    Path("runs/x.csv").write_text("time,delta\n0,1\n1,2\n")
+    (folder / "runs" / name).write_bytes(content)
+    path = scenario(plant_steer_angle="{file: x.csv, column: delta}")
+    if expected:
+        assert expected in problem(path)
+    else:
+        plan_of(path)
+
+
+def test_a_long_series_takes_little_more_memory_than_its_file(folder: Path) -> None:
+    rows = (f"{i / 1e4},{i % 90},1,2,3,4,1,0,{'x' * 20},a,b,c,d,e,f\n" for i in range(20_000))
+    heading = "time,delta,t_fl,t_fr,t_rl,t_rr,gear,on,note,a,b,c,d,e,f\n"
+    Path("runs/data.csv").write_text(heading + "".join(rows))
+    path = scenario()
+    tracemalloc.start()
+    plan_of(path)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 6 * Path("runs/data.csv").stat().st_size
