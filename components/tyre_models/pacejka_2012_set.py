@@ -207,31 +207,32 @@ REST = {
 }
 """What F_y, M_z and M_x need beside that."""
 
-
 RELAXATION = {
     "longitudinal_stiffness": _Row(
         358000.0,
-        "Longitudinal stiffness C_x of the standing tyre (6); chosen: relaxation over 0.24 m at nominal load",
+        "Longitudinal stiffness C_x of the standing tyre (6)",
+        "chosen: relaxation over 0.24 m at nominal load",
         "N/m",
         0.0,
     ),
     "lateral_stiffness": _Row(
         102700.0,
-        "Lateral stiffness C_y of the standing tyre (6); chosen: relaxation over 0.45 m at nominal load",
+        "Lateral stiffness C_y of the standing tyre (6)",
+        "chosen: relaxation over 0.45 m at nominal load",
         "N/m",
         0.0,
     ),
-    "pcfx1": _Row(0.0, "Variation of C_x with load; chosen: not known of this tyre"),
-    "pcfx2": _Row(0.0, "Variation of C_x with load squared; chosen: likewise"),
-    "pcfx3": _Row(0.0, "Variation of C_x with pressure; chosen: likewise"),
-    "pcfy1": _Row(0.0, "Variation of C_y with load; chosen: likewise"),
-    "pcfy2": _Row(0.0, "Variation of C_y with load squared; chosen: likewise"),
-    "pcfy3": _Row(0.0, "Variation of C_y with pressure; chosen: likewise"),
-    "ptx1": _Row(0.0, "Relaxation length of F_x over R_0 F_z / F_z0 (5.2); chosen: a set of 6.2"),
-    "ptx2": _Row(0.0, "Variation of that with load (5.2); chosen: likewise"),
-    "ptx3": _Row(0.0, "Exponent of that with load (5.2); chosen: likewise"),
-    "pty1": _Row(0.0, "Largest relaxation length of F_y over R_0 (5.2); chosen: likewise"),
-    "pty2": _Row(1.0, "Load over nominal load at which that is (5.2); chosen: likewise"),
+    "pcfx1": _Row(0.0, "Variation of C_x with load", "chosen: not known of this tyre"),
+    "pcfx2": _Row(0.0, "Variation of C_x with load squared", "chosen: likewise"),
+    "pcfx3": _Row(0.0, "Variation of C_x with pressure", "chosen: likewise"),
+    "pcfy1": _Row(0.0, "Variation of C_y with load", "chosen: likewise"),
+    "pcfy2": _Row(0.0, "Variation of C_y with load squared", "chosen: likewise"),
+    "pcfy3": _Row(0.0, "Variation of C_y with pressure", "chosen: likewise"),
+    "ptx1": _Row(0.0, "Relaxation length of F_x over R_0 F_z / F_z0 (5.2)", "chosen: a set of 6.2"),
+    "ptx2": _Row(0.0, "Variation of that with load (5.2)", "chosen: likewise"),
+    "ptx3": _Row(0.0, "Exponent of that with load (5.2)", "chosen: likewise"),
+    "pty1": _Row(0.0, "Largest relaxation length of F_y over R_0 (5.2)", "chosen: likewise"),
+    "pty2": _Row(1.0, "Load over nominal load at which that is (5.2)", "chosen: likewise"),
     "lsgkp": _scale("the relaxation length of F_x (5.2)"),
     "lsgal": _scale("the relaxation length of F_y (5.2)"),
 }

@@ -50,16 +50,17 @@ class TransientParameters(_Relaxation):  # type: ignore[misc, valid-type]  # mad
     """Coefficients of both axles, and what slip speeds and standstill need."""
 
     relaxation_length: float = parameter(
-        0.5, "m", "Relaxation length where a set tells none; chosen: a passenger car tyre's", minimum=0.02
+        0.5, "m", "Relaxation length where a set tells none", "chosen: a passenger car tyre's", minimum=0.02
     )
     damping: float = parameter(
         3000.0,
         "N.s/m",
-        "Damping k beside the deflection at rest; chosen: a car that stops rocks for less than a second",
+        "Damping k beside the deflection at rest",
+        "chosen: a car that stops rocks for less than a second",
         minimum=0.0,
     )
     damping_speed: float = parameter(
-        2.5, "m/s", "Speed from which there is no such damping; chosen: walking pace", minimum=0.001
+        2.5, "m/s", "Speed from which there is no such damping", "chosen: walking pace", minimum=0.001
     )
     wheel_radius: float = like(PaperB, "wheel_radius")
     low_speed: float = like(StartParameters, "low_speed")
