@@ -1,4 +1,4 @@
-"""Every command in the README and the docs, run as it stands in a copy of the checkout."""
+"""Every command and program in the README and the docs, run as it stands in a copy of the checkout."""
 
 from __future__ import annotations
 
@@ -31,13 +31,16 @@ NOT_RUN = {
 }
 """Commands that this test does not run -> why, or the test that runs the same at length."""
 
+PROGRAM = "<program>"
+"""Path of blocks of Python that are no file: those of a page are one program, run at its end."""
+
 _FENCE = re.compile(r'```(\w+)(?: title="([^"]+)")?\n(.*?)```', re.DOTALL)
 _INDENTED = re.compile(r"^    ((?:\.venv/bin/|make ).*)$", re.MULTILINE)
 _NAMED_BEFORE = re.compile(r"Put this into `([^`]+)`:\s*$")
 
 
 class Block(NamedTuple):
-    """A file to be written (with a path), or commands to be run."""
+    """A file to be written (with a path), a program in Python (`PROGRAM`), or commands to be run."""
 
     place: int
     path: str
@@ -53,6 +56,8 @@ def blocks(page: str) -> list[Block]:
         named = _NAMED_BEFORE.search(text[: match.start()])
         if title or named:
             found.append(Block(match.start(), title or (named[1] if named else ""), content))
+        elif language == "python":
+            found.append(Block(match.start(), PROGRAM, content))
         elif language in ("sh", "console", "bash", "shell"):
             found.append(Block(match.start(), "", content))
     outside = _FENCE.sub(lambda match: " " * len(match[0]), text)
@@ -90,8 +95,9 @@ def done():
 @pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 @pytest.mark.parametrize("page", PAGES)
 def test_every_command_of_a_page_works_as_it_stands(page, checkout, done):
+    program = "".join(block.text for block in blocks(page) if block.path == PROGRAM)
     for block in blocks(page):
-        if block.path:
+        if block.path and block.path != PROGRAM:
             file = checkout / block.path
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(block.text, encoding="utf-8")
@@ -103,6 +109,9 @@ def test_every_command_of_a_page_works_as_it_stands(page, checkout, done):
             ended = run_in(checkout, *shlex.split(command))
             assert ended.returncode == 0, f"{command}\n{ended.stdout[-2000:]}\n{ended.stderr[-2000:]}"
             assert "Traceback" not in ended.stderr, command
+    if program:
+        ended = run_in(checkout, "python", "-c", program, MPLBACKEND="agg")
+        assert ended.returncode == 0, f"{program}\n{ended.stderr[-2000:]}"
 
 
 def test_commands_are_found_in_fences_and_in_indented_lines():
@@ -123,6 +132,6 @@ def test_what_is_not_run_is_in_the_docs_and_run_elsewhere():
 
 
 def test_a_python_file_that_a_page_shows_is_the_one_that_its_commands_use():
-    shown = {block.path for page in PAGES for block in blocks(page) if block.path}
+    shown = {block.path for page in PAGES for block in blocks(page) if block.path} - {PROGRAM}
     assert {"components/controllers/yaw_follow.py", "components/controllers/yaw_rate.py"} <= shown
     assert all(not (ROOT / Path(path)).exists() for path in shown)

@@ -19,8 +19,27 @@ UNITS = (
 )  # fmt: skip
 
 
+def python_after(words: str) -> str:
+    """Return the first block of Python behind some words."""
+    return re.findall(r"```python\n(.*?)```", README.partition(words)[2], re.DOTALL)[0]
+
+
+def test_the_first_screen_has_python_that_prints_what_it_says_beside_the_command_line(
+    tmp_path, monkeypatch, capsys
+):
+    first_screen = "".join(README.splitlines(keepends=True)[:30])
+    code = python_after("In Python:")
+    assert code in first_screen
+    assert ".venv/bin/yawbench compare" in first_screen
+    monkeypatch.chdir(tmp_path)
+    exec(code, {})
+    said = re.findall(r"# ([\d.]+) and ([\d.]+) rad", code)[0]
+    assert [f"{float(number):.4f}" for number in capsys.readouterr().out.split()] == [*said]
+    assert (tmp_path / "held.svg").stat().st_size > 10_000
+
+
 def test_the_controller_of_the_readme_runs_and_follows_the_yaw_rate(tmp_path, capsys):
-    (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    code = python_after("Put this into `components/controllers/yaw_rate.py`")
     file = tmp_path / "yaw_rate.py"
     file.write_text(code.replace("from ..fmi", "from components.fmi"), encoding="utf-8")
     build_all(tmp_path, components=UNITS)

@@ -1,0 +1,82 @@
+"""The notebooks run from the first cell to the last, each in a working folder of its own."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+import yawbench as yb
+from tests.checkout import ROOT
+
+FOLDER = ROOT / "notebooks"
+NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
+FIRST = "first_steps"
+
+
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_a_notebook_is_kept_without_outputs(file):
+    cells = nbformat.read(file, as_version=4).cells
+    assert not any(cell.get("outputs") or cell.get("execution_count") for cell in cells)
+
+
+@pytest.mark.parametrize(
+    "file",
+    [pytest.param(f, id=f.stem, marks=[pytest.mark.exhaustive] * (f.stem != FIRST)) for f in NOTEBOOKS],
+)
+def test_a_notebook_runs_to_its_end_and_shows_what_it_draws(file, tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    notebook = nbformat.read(file, as_version=4)
+    NotebookClient(notebook, timeout=600, kernel_name="python3").execute(cwd=str(tmp_path))
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]
+    drawn = [output for output in outputs if "image/png" in output.get("data", {})]
+    source = "".join(cell.source for cell in notebook.cells)
+    assert len(drawn) == len(re.findall(r'subplots\(|\.plot\("', source))
+    assert not [output for output in outputs if output.get("name") == "stderr"]
+
+
+def sliders() -> Any:
+    """Return the notebook with sliders, imported as a module."""
+    spec = importlib.util.spec_from_file_location("sliders", FOLDER / "sliders.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.exhaustive
+def test_the_notebook_with_sliders_runs_as_a_program(tmp_path):
+    done = subprocess.run(
+        [sys.executable, FOLDER / "sliders.py"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "agg"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.exhaustive
+def test_what_the_sliders_say_is_what_is_run():
+    _, names = sliders().app.run()
+    runs = names["runs"]
+    assert runs["no control"].metric("peak(sideslip)") > 2 * runs["controller_fnn"].metric("peak(sideslip)")
+    assert runs["no control"]["plant.velocity_x"][0] == names["speed"].value
+    assert len(names["figure"].axes) == 2
+
+
+def test_every_controller_that_the_sliders_offer_can_be_connected():
+    offered = re.findall(r'"(controller_\w+)"', Path(FOLDER / "sliders.py").read_text(encoding="utf-8"))
+    base = yb.load("fnn_sideslip/25mps")
+    assert len(set(offered)) >= 4
+    for name in set(offered):
+        assert base.swap(controller=name).plan().units
