@@ -4,10 +4,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 READY_TO_TEST := $(VENV)/.ready-to-test
+# By file, since a study runs once for all tests of its file; in the order of tests/conftest.py.
+PYTEST = $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 SCENARIO ?= scenarios/fnn_sideslip/25mps.yaml
 unexport PYTHONDONTWRITEBYTECODE  # runs are processes: modules are compiled once, not in each of them
 
-.PHONY: setup fmus demo report run test bench lint docs clean
+.PHONY: setup fmus demo report run test test-all bench lint format docs clean
 
 setup: $(READY)
 
@@ -33,8 +35,11 @@ report: fmus
 run: fmus
 	$(BIN)/yawbench run $(SCENARIO)
 
-test: $(READY_TO_TEST) fmus
-	$(BIN)/python -m pytest -n auto --dist loadfile  # a study runs once for all tests of its file
+test: $(READY_TO_TEST) fmus  # what checks everything once; test-all adds what is exhaustive
+	$(PYTEST) -m "not exhaustive"
+
+test-all: $(READY_TO_TEST) fmus
+	$(PYTEST)
 
 bench: $(READY_TO_TEST) fmus
 	$(BIN)/python -m tests.bench
@@ -43,6 +48,10 @@ lint: $(READY_TO_TEST)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+format: $(READY_TO_TEST)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
 
 docs: $(READY_TO_TEST) fmus
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict

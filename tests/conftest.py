@@ -6,22 +6,32 @@ every parametrized test in the first tier, evenly spread; the others are marked 
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+TESTS = Path(__file__).parent
 LONGEST_FIRST = ("scenarios", "trials", "pages", "docs", "orchestrator", "yawbench", "fmus", "components")
 """Folders: files with long runs begin first, so that no worker is left alone with one at the end."""
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items.sort(key=lambda item: LONGEST_FIRST.index(item.path.relative_to(__file__.rpartition("/")[0]).parts[0]))
+    items.sort(
+        key=lambda item: LONGEST_FIRST.index(item.path.relative_to(__file__.rpartition("/")[0]).parts[0])
+    )
     sampled: dict[tuple[str, str], list[pytest.Item]] = {}
     for item in items:
         if item.get_closest_marker("sampled"):
             sampled.setdefault((str(item.path), getattr(item, "originalname", item.name)), []).append(item)
     for cases in sampled.values():
         (number,) = cases[0].get_closest_marker("sampled").args  # type: ignore[union-attr]
-        kept = {round(k * (len(cases) - 1) / max(number - 1, 1)) for k in range(number)}
+        kept = evenly(number, len(cases))
         for k, item in enumerate(cases):
             if k not in kept:
                 item.add_marker(pytest.mark.exhaustive)
+
+
+def evenly(number: int, total: int) -> set[int]:
+    """Return `number` indices, the first and the last among them, of `total`."""
+    return {k * (total - 1) // max(number - 1, 1) for k in range(number)}

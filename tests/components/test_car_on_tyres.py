@@ -21,6 +21,8 @@ from vocabulary.wheels import WHEELS
 from . import monolith
 from .loop import Loop
 
+pytestmark = pytest.mark.sampled(1)
+
 P = SevenDofParameters()
 A, B, M, I_Z = P.cg_to_front_axle, P.cg_to_rear_axle, P.mass, P.yaw_inertia
 C_F = C_R = 100000.0

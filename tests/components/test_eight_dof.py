@@ -193,6 +193,7 @@ RUNS = [
 
 
 @pytest.mark.parametrize("component, tyre, speed, steer, mu", RUNS)
+@pytest.mark.sampled(1)
 def test_the_extrapolated_loop_agrees_with_an_independent_solution(component, tyre, speed, steer, mu):
     names = ["velocity_x", "velocity_y", "yaw_rate", "position_x", "position_y", "yaw_angle"]
     names += ["roll_angle", "roll_rate", *four("wheel_speed", 0.0)]

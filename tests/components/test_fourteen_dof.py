@@ -341,17 +341,20 @@ def sine_errors(h, **options):
     return np.abs(found - exact_sine()).max(axis=1) / np.abs(exact_sine()).max(axis=1)
 
 
+@pytest.mark.exhaustive
 def test_the_hand_wheel_sine_is_within_a_ten_thousandth_of_an_independent_solution_at_1_ms():
     errors = sine_errors(1e-3)
     assert errors[NAMES.index("yaw_rate")] < 1e-4
     assert np.all(errors < 1e-4), dict(zip(NAMES, errors, strict=True))
 
 
+@pytest.mark.exhaustive
 def test_the_coupled_car_is_of_second_order():
     coarse, fine = (sine_errors(h)[NAMES.index("yaw_rate")] for h in (2e-3, 1e-3))
     assert 1.8 < log2(coarse / fine) < 2.4
 
 
+@pytest.mark.exhaustive
 def test_braking_in_the_turn_is_within_two_thousandths_of_an_independent_solution():
     torque = (-250.0, -250.0, -100.0, -100.0)
     times = np.linspace(0.0, 3.0, 751)
@@ -469,6 +472,7 @@ def test_a_car_at_rest_stays_at_rest(torque):
 
 @pytest.mark.parametrize("tyre", [Dugoff, MagicFormula])
 @pytest.mark.parametrize("front, rear", [(-1000.0, -400.0), (-4000.0, -4000.0)], ids=["rolling", "locked"])
+@pytest.mark.sampled(1)
 def test_braking_to_standstill_has_no_limit_cycle(tyre, front, rear):
     names = ["velocity_x", "velocity_y", "yaw_rate", "pitch_angle", *four("wheel_speed", 0.0)]
     run = drive(tyre, mu=0.8, steer=0.0, until=8.0, record=names, torque=(front, front, rear, rear))

@@ -127,6 +127,7 @@ def sample(system: Mamdani, n: int, *, beyond: float = 0.0, seed: int = 1) -> li
 
 @pytest.mark.filterwarnings("ignore:Passing more than 2 positional:DeprecationWarning")  # in scikit-fuzzy
 @pytest.mark.parametrize("make", SYSTEMS)
+@pytest.mark.sampled(1)
 def test_surface_agrees_with_scikit_fuzzy(make):
     system = make()
     peaks = [(x, y) for x in system.rows.peaks[::2] for y in system.columns.peaks[::2]]

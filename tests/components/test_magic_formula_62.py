@@ -103,6 +103,7 @@ def test_forces_moments_and_slip_stiffness_are_those_of_the_second_implementatio
         assert np.all(np.abs(a - b) <= allowed), (name, a[worst], b[worst])
 
 
+@pytest.mark.exhaustive
 def test_every_coefficient_counts():
     """None of a file's numbers is read and then forgotten."""
     rng = np.random.default_rng(3)

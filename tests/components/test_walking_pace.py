@@ -22,6 +22,8 @@ from . import monolith, monolith_b
 from .loop import Loop
 from .magic import forces_and_moment
 
+pytestmark = pytest.mark.sampled(2)
+
 
 def four(name, *values):
     values = values * 4 if len(values) == 1 else values

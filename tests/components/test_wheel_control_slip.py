@@ -82,6 +82,7 @@ def slip_limits(force, sign):
 
 
 @pytest.mark.parametrize("name", TYRES)
+@pytest.mark.sampled(2)
 def test_the_inverse_curve_returns_the_force_asked_for_and_clamps_outside(name):
     for f_z, alpha, mu in product(LOADS, ANGLES, FRICTIONS):
         force, first = tyre_curve(alpha, f_z, mu, **TYRES[name])

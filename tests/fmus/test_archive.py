@@ -158,6 +158,7 @@ def test_the_launcher_compiles_to_the_same_bytes_again(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("harm", [lambda c: c[: len(c) // 2], lambda c: b"", lambda c: c[:-1] + b"x"])
+@pytest.mark.sampled(1)
 def test_a_damaged_launcher_in_the_cache_is_compiled_anew(harm, tmp_path, monkeypatch):
     """Believed, it would end the build with SIGBUS, or have every FMU fail."""
     monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path))

@@ -34,6 +34,7 @@ def test_it_builds_nothing_twice_unless_forced(tmp_path):
     assert run("driver_sine", "--out", tmp_path, "--force").stderr == "driver_sine: built\n"
 
 
+@pytest.mark.exhaustive
 def test_it_builds_everything_by_default(tmp_path):
     done = run("--out", tmp_path)
     assert done.exit_code == 0

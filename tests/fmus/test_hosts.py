@@ -31,6 +31,7 @@ ALL = bool(os.environ.get("YAWBENCH_TEST_ALL_FMUS"))
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.sampled(3)
 def test_each_fmu_runs_in_a_c_host_with_nothing_preloaded(host, archive, unpack, tmp_path, name):
     folder = unpack(archive(name))
     done = run(host_command(host, folder), tmp_path)
@@ -41,6 +42,7 @@ def test_each_fmu_runs_in_a_c_host_with_nothing_preloaded(host, archive, unpack,
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.sampled(3)
 def test_each_fmu_is_complete(archive, unpack, tmp_path, name):
     folder = unpack(archive(name))
     inputs = [f"{key}={value!r}" for key, value in unpacked_inputs(folder).items()]
@@ -57,6 +59,7 @@ def test_each_fmu_is_complete(archive, unpack, tmp_path, name):
 
 @pytest.mark.parametrize("interpreter", interpreters())
 @pytest.mark.parametrize("name", NAMES if ALL else [NAMES[0], NAMES[-1]])
+@pytest.mark.sampled(1)
 def test_fmus_run_in_any_other_python_that_has_nothing_installed(
     archive, unpack, tmp_path, interpreter, name
 ):
@@ -69,6 +72,7 @@ def test_fmus_run_in_any_other_python_that_has_nothing_installed(
 
 
 @pytest.mark.parametrize("library", python_libraries().values())
+@pytest.mark.sampled(1)
 def test_fmus_run_with_any_libpython_that_the_environment_names(host, archive, unpack, tmp_path, library):
     folder = unpack(archive(NAMES[-1]))
     done = run(host_command(host, folder), tmp_path, YAWBENCH_LIBPYTHON=library)
@@ -89,6 +93,7 @@ def test_this_machine_has_a_libpython_to_test_with():
         ("libm.so.6", "the Python in this process is not usable: Py_IsInitialized is missing"),
     ],
 )
+@pytest.mark.sampled(1)
 def test_without_libpython_the_host_is_told_and_gets_no_instance(
     host, archive, unpack, tmp_path, file, message
 ):
@@ -116,6 +121,7 @@ def test_python_is_found_beside_an_interpreter_on_path(host, archive, unpack, tm
 
 
 @pytest.mark.parametrize("name", NAMES if ALL else ["driver_sine"])
+@pytest.mark.exhaustive
 def test_valgrind_finds_nothing_on_our_side(host, archive, unpack, tmp_path, name):
     valgrind = shutil.which("valgrind")
     if valgrind is None:

@@ -114,6 +114,7 @@ def test_a_broken_component_ends_the_run_before_it_begins_and_keeps_the_good_fmu
         "report scenarios/fnn_sideslip/study.yaml",
     ],
 )
+@pytest.mark.sampled(2)
 def test_every_command_that_opens_fmus_builds_what_is_stale_first(project, command):
     (project / "sweep.yaml").write_text(
         "title: Two\nscenario: driver.yaml\n"
@@ -255,6 +256,7 @@ def _python_of_others() -> str | None:
 
 @pytest.mark.skipif(_python_of_others() is None, reason="needs root, and a Python that others may start")
 @pytest.mark.parametrize("home", [{}, {"HOME": "/"}, {"HOME": "/root"}])
+@pytest.mark.sampled(1)
 def test_any_user_runs_a_project_that_he_cannot_write(built, home):
     """As in a container: a user id that nobody knows, no home, everything installed by root."""
     with tempfile.TemporaryDirectory() as folder:  # pytest's own is closed to others

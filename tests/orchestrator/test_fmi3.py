@@ -126,6 +126,7 @@ def test_a_value_on_a_wire_that_a_type_cannot_hold_ends_the_run(run, isolate):
 
 @together_and_apart
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
+@pytest.mark.sampled(2)
 def test_arrays_are_wired_set_and_recorded_element_by_element(run, library, tmp_path, isolate, algorithm):
     matrix = {"A[1,1]": 1.0, "A[1,2]": 2.0, "A[2,1]": 3.0}  # A[2,2] keeps its start value, 1
     units = {"d": ("Dahlquist", {}), "m": ("Matrix", {"parameters": matrix}), "n": ("Matrix", {})}

@@ -196,6 +196,7 @@ def test_a_parameter_that_cannot_be_read_back_is_a_warning(run, isolate):
 
 @together_and_apart
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
+@pytest.mark.sampled(2)
 def test_gain_and_offset_reach_units_that_declare_no_units_of_measurement(run, isolate, algorithm):
     """Both units double what they get."""
     status, said, results = run(
@@ -215,6 +216,7 @@ def test_gain_and_offset_reach_units_that_declare_no_units_of_measurement(run, i
 
 @together_and_apart
 @pytest.mark.parametrize("form", ["csv", "parquet", "mf4"])
+@pytest.mark.sampled(2)
 def test_text_parameters_and_inputs_are_recorded_by_name(run, isolate, form):
     status, said, results = run(
         *isolate,

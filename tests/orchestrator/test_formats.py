@@ -211,6 +211,7 @@ def test_a_record_that_names_another_file_is_refused(tmp_path):
         load_results(folder)
 
 
+@pytest.mark.exhaustive
 def test_plot_draws_results_of_every_format(tmp_path):
     recorded = car(n=801)
     for name in FILES:

@@ -85,6 +85,7 @@ def beginnings(project):
         ("plant", "plant_seven_dof"),
     ],
 )
+@pytest.mark.exhaustive
 def test_a_unit_of_any_role_is_built_tested_and_run(beginnings, role, other):
     folder, made = beginnings
     run = load_results(folder / "results" / f"my_{role}" / "25mps")
@@ -94,6 +95,7 @@ def test_a_unit_of_any_role_is_built_tested_and_run(beginnings, role, other):
     assert last[1:2] + last[-1:] == ["compare", f"{role}={other},{role}_my_{role}"]
 
 
+@pytest.mark.exhaustive
 def test_a_new_plant_moves_much_as_the_shipped_one_whose_loads_change(beginnings):
     folder, _ = beginnings
     runs = [load_results(folder / "results" / name / "25mps") for name in ("my_plant", "my_scenario")]
@@ -101,6 +103,7 @@ def test_a_new_plant_moves_much_as_the_shipped_one_whose_loads_change(beginnings
     assert 0.0 < np.abs(yaw_rates[0] - yaw_rates[1]).max() < 0.2 * np.abs(yaw_rates[1]).max()
 
 
+@pytest.mark.exhaustive
 def test_a_new_vehicle_is_the_one_that_its_scenario_drives(beginnings):
     folder, _ = beginnings
     run = load_results(folder / "results" / "my_vehicle" / "25mps")
@@ -108,6 +111,7 @@ def test_a_new_vehicle_is_the_one_that_its_scenario_drives(beginnings):
     assert run.run["fmus"]["plant"]["parameters"]["mass"] == 1100
 
 
+@pytest.mark.exhaustive
 def test_a_new_study_judges_its_claim_and_a_new_sweep_finds_its_limits(beginnings):
     _, made = beginnings
     assert "holds" in made["study"][0]
@@ -130,6 +134,7 @@ def test_in_c_the_source_is_a_folder_with_the_model_description(tmp_path, new):
     assert files(tmp_path) == expected | {"tests/test_idea.py", "scenarios/idea/25mps.yaml"}
 
 
+@pytest.mark.exhaustive
 def test_it_prints_how_to_build_test_run_and_compare(project):
     _, printed = project
     build, test, run, compare = (" ".join(command[1:]) for command in printed["follow_c"][1:])
@@ -139,6 +144,7 @@ def test_it_prints_how_to_build_test_run_and_compare(project):
     assert compare == f"compare {run[4:]} --swap controller=controller_off,controller_follow_c"
 
 
+@pytest.mark.exhaustive
 def test_python_and_c_agree_in_the_closed_loop(project):
     folder, _ = project
     runs = [load_results(folder / "results" / name / "25mps") for name in ("follow", "follow_c")]

@@ -40,6 +40,7 @@ def yawbench(folder, *arguments):
         ("compare", SCENARIO, "--swap", "controller=controller_off"),
     ],
 )
+@pytest.mark.sampled(1)
 def test_modules_in_the_working_folder_are_left_alone(trap, arguments):
     done = yawbench(trap, *arguments, "--set", "stop_time=0.01")
     assert not (trap / "taken").exists()

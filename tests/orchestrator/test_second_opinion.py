@@ -52,6 +52,7 @@ def plan_of(fmus, scenario="fuzzy_feedback/single_sine.yaml", stop_time=0.1, set
 
 
 @pytest.mark.parametrize("scenario", PAPERS)
+@pytest.mark.sampled(1)
 def test_libcosim_and_ecos_agree_with_jacobi_to_a_billionth_of_every_signals_range(scenario, fmus, tmp_path):
     plan = plan_of(fmus, scenario, PAPERS[scenario])
     opinions = second_opinion(plan, tmp_path, masters=MASTERS[:2], pinned=False)
@@ -61,6 +62,7 @@ def test_libcosim_and_ecos_agree_with_jacobi_to_a_billionth_of_every_signals_ran
         assert one.largest <= AGREEMENT
 
 
+@pytest.mark.exhaustive
 def test_a_unit_half_asleep_in_ecos_would_be_noticed(fmus, tmp_path, monkeypatch):
     as_is = OtherMaster("Ecos", "ecos", "ecospy", one_step=False)
     (one,) = second_opinion(plan_of(fmus, stop_time=1.0), tmp_path, masters=[as_is], pinned=False)
@@ -76,6 +78,7 @@ def test_fmpy_runs_the_archive_from_another_start(fmus, tmp_path):
 
 
 @pytest.mark.parametrize("scenario", PAPERS)
+@pytest.mark.sampled(1)
 def test_fmpy_differs_by_its_start_and_by_texts_and_by_nothing_else(scenario, fmus, tmp_path):
     without_texts = ["reference.mode=steady_state"] if "fuzzy_feedback" in scenario else []
     plan = plan_of(fmus, scenario, 0.6, without_texts)
@@ -136,6 +139,7 @@ def test_a_master_that_fails_costs_a_sentence(fmus, tmp_path):
     assert one.problem.startswith("ModuleNotFoundError: ")
 
 
+@pytest.mark.exhaustive
 def test_a_master_that_never_ends_costs_a_sentence(fmus, tmp_path, monkeypatch):
     plan = plan_of(fmus)
     request = module._request(plan, False, tmp_path)

@@ -119,6 +119,7 @@ def problem(archive, fmus, **options):
 
 
 @pytest.mark.parametrize("scenario", PAPERS)
+@pytest.mark.sampled(1)
 def test_a_round_trip_gives_the_same_numbers_to_the_last_bit(scenario, fmus, tmp_path):
     plan = plan_of(SCENARIOS / scenario, fmus)
     write_ssp(plan, tmp_path / "system.ssp")
@@ -133,6 +134,7 @@ def test_a_round_trip_gives_the_same_numbers_to_the_last_bit(scenario, fmus, tmp
 @pytest.mark.parametrize("scenario", PAPERS)
 @pytest.mark.parametrize("standard", ["1.0", "2.0"])
 @pytest.mark.parametrize("adapted", [False, True], ids=["all", "omsimulator"])
+@pytest.mark.sampled(2)
 def test_an_archive_is_valid_against_the_schemas_of_ssp(scenario, standard, adapted, fmus, tmp_path):
     """Of 2.0 all that matters here is that of 1.0 but for the number."""
     plan = plan_of(SCENARIOS / scenario, fmus)
@@ -175,6 +177,7 @@ def test_the_command_exports_and_run_runs_what_it_exports(fmus, tmp_path, monkey
     assert numbers[0] == numbers[1]
 
 
+@pytest.mark.exhaustive
 def test_runs_of_an_archive_are_compared(feedback, fmus, tmp_path):
     short, swap = ["--set", "stop_time=0.1"], ["--swap", "controller=controller_off"]
     with pytest.raises(SystemExit) as exit_:

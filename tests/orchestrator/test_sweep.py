@@ -212,6 +212,7 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_is_not_made_again(moods, 
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="--isolate needs Linux or macOS")
+@pytest.mark.exhaustive
 def test_isolated_runs_that_hang_or_crash_are_rows_that_name_the_unit(moods, yawbench, tmp_path):
     file = moods(10, 30, 35)
     status, _, err = yawbench(file, "out", "--isolate", "--call-limit", "3 s")
@@ -226,6 +227,7 @@ def test_isolated_runs_that_hang_or_crash_are_rows_that_name_the_unit(moods, yaw
 
 
 @pytest.mark.parametrize("level", [40, 50])
+@pytest.mark.sampled(1)
 def test_a_run_whose_process_is_killed_is_made_again(level, moods, yawbench, tmp_path):
     status, _, err = yawbench(moods(10, level, count=2), "out", "--jobs", "1")
     assert status == 0, err
@@ -233,6 +235,7 @@ def test_a_run_whose_process_is_killed_is_made_again(level, moods, yawbench, tmp
     assert [row["moment"] for row in rows(tmp_path / "out")] == pytest.approx([1, 1, level / 10, level / 10])
 
 
+@pytest.mark.exhaustive
 def test_a_run_that_kills_its_process_every_time_is_named_and_tried_again_next_time(
     moods, yawbench, tmp_path
 ):
@@ -291,6 +294,7 @@ def interrupted(file, out, driver, tmp_path, number):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.sampled(1)
 def test_a_sweep_that_was_stopped_goes_on_where_it_was(number, moods, yawbench, driver, tmp_path):
     file = moods(5, 10, 60, 70)
     status, told = interrupted(file, "out", driver, tmp_path, number)

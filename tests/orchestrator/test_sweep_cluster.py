@@ -42,6 +42,7 @@ def test_a_cluster_gives_the_table_of_this_machine_to_the_byte(moods, yawbench, 
     assert "all finished before" in yawbench(file, "there", "--scheduler", cluster.scheduler_address)[2]
 
 
+@pytest.mark.exhaustive
 def test_a_run_that_kills_its_process_leaves_the_workers_alone(moods, yawbench, cluster, tmp_path):  # noqa: F811
     client = distributed.Client(cluster)
     before = client.run(os.getpid)
@@ -55,6 +56,7 @@ def test_a_run_that_kills_its_process_leaves_the_workers_alone(moods, yawbench, 
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
+@pytest.mark.exhaustive
 def test_a_worker_that_is_killed_costs_no_run(moods, driver, cluster, tmp_path):  # noqa: F811
     from orchestrator.sweeps.cluster import run_on_cluster
 
@@ -74,6 +76,7 @@ def test_a_worker_that_is_killed_costs_no_run(moods, driver, cluster, tmp_path):
     assert all(outcome.ok for outcome in told)
 
 
+@pytest.mark.exhaustive
 def test_a_cluster_that_dies_is_one_sentence_and_keeps_what_is_finished(moods, driver, capfd, tmp_path):  # noqa: F811
     from orchestrator.errors import ResultsError
     from orchestrator.sweeps.cluster import run_on_cluster
@@ -121,6 +124,7 @@ def test_a_scheduler_that_does_not_answer_is_one_sentence(address, moods, yawben
     assert "Traceback" not in err
 
 
+@pytest.mark.exhaustive
 def test_a_scheduler_without_workers_is_one_sentence(moods, yawbench, tmp_path):  # noqa: F811
     with distributed.LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=50) as empty:
         status, _, err = yawbench(moods(10), "out", "--scheduler", empty.scheduler_address)

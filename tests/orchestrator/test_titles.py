@@ -76,6 +76,7 @@ def texts(figure):
     return flat(" ".join(text.get_text() for text in figure.texts))
 
 
+@pytest.mark.exhaustive
 def test_everything_made_of_a_run_names_all_that_was_changed(yawbench, tmp_path, monkeypatch):
     out, said = yawbench("run", SCENARIO, *SET, "--swap", "controller=controller_off", "--out", "r",
                          "--metric", "peak(sideslip)")  # fmt: skip
@@ -117,6 +118,7 @@ def test_everything_made_of_a_run_names_all_that_was_changed(yawbench, tmp_path,
         assert [words for words in WORDS if words not in text] == [], name
 
 
+@pytest.mark.exhaustive
 def test_the_figure_of_a_sweep_names_what_options_changed(yawbench, fmus, tmp_path):
     from orchestrator.sweeps.journal import Record
     from orchestrator.sweeps.planning import plan_sweep

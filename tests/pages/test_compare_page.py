@@ -79,6 +79,7 @@ def test_it_shows_the_system_its_parameters_and_how_to_repeat_it(tree):
 
 
 @pytest.mark.parametrize("width", [PHONE, 768, DESK])
+@pytest.mark.sampled(2)
 def test_nothing_is_cut_overlapping_or_empty_at_any_width(chromium, page, width):
     chromium.open(page, width=width)
     assert flaws(chromium) == []

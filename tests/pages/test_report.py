@@ -161,6 +161,7 @@ def test_the_page_needs_nothing_from_elsewhere(paper):
 
 
 @pytest.mark.parametrize("width", [PHONE, 768, 900, DESK])
+@pytest.mark.sampled(2)
 def test_nothing_is_cut_overlapping_or_empty_at_any_width(chromium, paper, width):
     chromium.open(paper.page, width=width)
     assert flaws(chromium) == []

@@ -152,6 +152,7 @@ def test_the_brakes_stay_within_their_limits(study):
         assert 3e5 < pressures.max() < 1e7  # braked, but not to the limit
 
 
+@pytest.mark.exhaustive
 def test_the_coupling_error_of_the_sine_at_1_ms_is_small(fmus, tmp_path):
     jobs = [
         Job(
@@ -172,6 +173,7 @@ def test_the_coupling_error_of_the_sine_at_1_ms_is_small(fmus, tmp_path):
 @pytest.mark.parametrize(
     ("run", "setting"), [("sine", "driver.amplitude=-1.5"), ("double_lane_change", "driver.lane_offset=-3.5")]
 )
+@pytest.mark.sampled(1)
 def test_the_mirrored_manoeuvre_gives_the_mirrored_motion(study, fmus, tmp_path, run, setting):
     out = tmp_path / run
     (outcome,) = execute([Job(run, FOLDER / f"{run}.yaml", out, changed(settings=[setting]), fmus)])
@@ -186,6 +188,7 @@ def test_the_mirrored_manoeuvre_gives_the_mirrored_motion(study, fmus, tmp_path,
         assert np.max(np.abs(there[left] - mirrored[right])) <= 1e-9 * there[left].max()
 
 
+@pytest.mark.exhaustive
 def test_with_combined_slip_by_similarity_the_sine_loses_the_car_without_control_alone(fmus, tmp_path):
     jobs = [
         Job(

@@ -156,6 +156,7 @@ def test_driving_and_turning_at_the_same_instant_slip_stays_below_what_the_param
     assert metric("at_once/slip", "slip") < 0.16
 
 
+@pytest.mark.exhaustive
 def test_the_distribution_table_is_the_papers_in_order_and_best_in_proportion_to_load(tmp_path, fmus):
     found = judged("distribution", tmp_path, fmus)
 
@@ -197,6 +198,7 @@ def test_figures_and_tables_are_written(study):
             assert (study["folder"] / "figures" / f"{name}.{kind}").stat().st_size > 10_000
 
 
+@pytest.mark.exhaustive
 def test_compare_shows_the_four_controllers(fmus, tmp_path):
     with pytest.raises(SystemExit) as exit_:
         main([

@@ -14,6 +14,7 @@ from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
+from tests.conftest import evenly
 
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "fuzzy_sliding_mode" / "high_friction.yaml"
 CONTROLLERS = (
@@ -41,19 +42,27 @@ def fmus(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize(("plant", "tyre"), list(product(PLANTS, TYRES)))
-def test_every_controller_runs_on_this_car_and_tyre(fmus, tmp_path, plant, tyre):
-    for controller in CONTROLLERS:
-        swaps = (f"controller=controller_{controller}", f"plant=plant_{plant}", f"tyre=tyre_{tyre}")
-        plan = make_plan(load_scenario(SCENARIO, changes=changed(swaps, stop_time=2.0)), fmus=fmus)
-        simulate(plan, tmp_path / controller)
-        results = load_results(tmp_path / controller)
-        assert results.run["status"] == "completed", (controller, results.run["error"])
-        assert results.time[-1] == 2.0
-        for name, column in results.columns.items():
-            assert np.all(np.isfinite(column)), (controller, name)
-        moment = np.max(np.abs(results["controller.yaw_moment"]))
-        assert (moment == 0.0) if controller == "off" else (100.0 < moment < 1e5), (controller, moment)
-        if controller != "off":
-            for name, limit in ON_THE_ROAD.items():
-                assert np.max(np.abs(results[name])) < limit, (controller, name)
+CASES = list(product(PLANTS, TYRES, CONTROLLERS))
+
+
+@pytest.mark.sampled(12)  # every controller, car and tyre: see the test below
+@pytest.mark.parametrize(("plant", "tyre", "controller"), CASES)
+def test_every_controller_runs_on_every_car_and_tyre(fmus, tmp_path, plant, tyre, controller):
+    swaps = (f"controller=controller_{controller}", f"plant=plant_{plant}", f"tyre=tyre_{tyre}")
+    plan = make_plan(load_scenario(SCENARIO, changes=changed(swaps, stop_time=2.0)), fmus=fmus)
+    simulate(plan, tmp_path)
+    results = load_results(tmp_path)
+    assert results.run["status"] == "completed", results.run["error"]
+    assert results.time[-1] == 2.0
+    for name, column in results.columns.items():
+        assert np.all(np.isfinite(column)), name
+    moment = np.max(np.abs(results["controller.yaw_moment"]))
+    assert (moment == 0.0) if controller == "off" else (100.0 < moment < 1e5), moment
+    if controller != "off":
+        for name, limit in ON_THE_ROAD.items():
+            assert np.max(np.abs(results[name])) < limit, name
+
+
+def test_the_sample_of_the_first_tier_holds_every_controller_car_and_tyre():
+    sample = [CASES[k] for k in evenly(12, len(CASES))]
+    assert [set(names) for names in zip(*sample, strict=True)] == [{*PLANTS}, {*TYRES}, {*CONTROLLERS}]

@@ -38,6 +38,7 @@ def test_the_first_screen_has_python_that_prints_what_it_says_beside_the_command
     assert (tmp_path / "held.svg").stat().st_size > 10_000
 
 
+@pytest.mark.exhaustive
 def test_the_controller_of_the_readme_runs_and_follows_the_yaw_rate(tmp_path, capsys):
     code = python_after("Put this into `components/controllers/yaw_rate.py`")
     file = tmp_path / "yaw_rate.py"
