@@ -20,6 +20,8 @@ from components.wheel_controls.direct import Direct
 from tests.components.loop import Loop
 from vocabulary.wheels import WHEELS
 
+pytestmark = pytest.mark.exhaustive  # the papers' studies check the same on FMUs
+
 STEP = 0.001
 AMPLITUDE = {15: 0.05, 25: 0.0325, 40: 0.0165}  # rad; one waveform per speed, the same for every controller
 SPEEDS = tuple(AMPLITUDE)

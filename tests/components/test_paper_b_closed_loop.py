@@ -24,6 +24,8 @@ from vocabulary.wheels import WHEELS
 
 from .loop import Loop
 
+pytestmark = pytest.mark.exhaustive  # the papers' studies check the same on FMUs
+
 STEP = 0.001
 START = 0.5  # s, of the steering sine
 PERIODS = {"controller": 5, "allocator": 5}  # communication steps; all else steps at each

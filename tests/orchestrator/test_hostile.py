@@ -34,6 +34,7 @@ APART = (
 
 
 @pytest.mark.parametrize(("isolated", "harm"), [(False, TOGETHER), (True, APART)], ids=["together", "apart"])
+@pytest.mark.sampled(1)
 def test_a_unit_that_does_harm_ends_its_run_with_a_sentence_and_the_results_so_far(isolated, harm, tmp_path):
     cases = [Case(does, isolated) for does in harm]
     assert attack(cases, tmp_path) == {case: [] for case in cases}

@@ -154,6 +154,7 @@ def test_python_and_c_agree_in_the_closed_loop(project):
         assert np.abs(runs[1].columns[column] - values).max() <= 1e-12 * scale, column
 
 
+@pytest.mark.exhaustive
 def test_in_a_checkout_the_files_stand_among_its_own_and_build_finds_them(tmp_path):
     checkout = copy_checkout(tmp_path / "checkout")
     inside = checkout / "scenarios"
