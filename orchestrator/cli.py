@@ -34,6 +34,7 @@ COMMANDS = (
     "salvage",
     "export-ssp",
     "second-opinion",
+    "tyre",
     "cache",
 )
 """Each a module of `orchestrator.commands` with a function of the same name, `_` for `-`."""

@@ -36,7 +36,7 @@ STAGES = (
     {"master"},  # hands rows to a recorder of `results`, has `metrics` look at them
     {"figures"},
     {"studies"},
-    {"interop", "sweeps", "scaffold"},
+    {"interop", "sweeps", "scaffold", "tyres"},
     {"pages"},
     {"commands"},
     {"cli"},

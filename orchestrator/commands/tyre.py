@@ -1,0 +1,65 @@
+"""`yawbench tyre`: what a tyre property file or a tyre FMU is like."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import Fmus, NoBuild
+
+
+class Action(str, Enum):
+    """What to do with a tyre."""
+
+    show = "show"
+
+
+What = Annotated[Action, typer.Argument(help="show: draw its forces, moments, stiffnesses, relaxation.")]
+Source = Annotated[
+    str,
+    typer.Argument(metavar="FILE|FMU", help="Tyre property file (.tir), or a tyre FMU: its name or path."),
+]
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="The figure, written as .svg and .png; default: results/tyres/<name>.",
+    ),
+]
+Friction = Annotated[float, typer.Option(min=0.0, help="Coefficient of the road.")]
+
+
+def tyre(
+    action: What,
+    source: Source,
+    output: Output = None,
+    friction: Friction = 1.0,
+    fmus: Fmus = None,
+    no_build: NoBuild = False,
+) -> None:
+    """Show what a tyre is like, by stepping its FMU.
+
+    Lateral force and aligning moment over slip angle and longitudinal force over slip at four loads, forces
+    in combined slip at five slip angles, stiffnesses and relaxation lengths over load; in one figure.
+    """
+    from ..figures.style import save
+    from ..tyres.drawing import draw_tyre
+    from ..tyres.stand import put_on_stand
+    from .batch import say
+
+    stand = put_on_stand(source, friction=friction, fmus=fmus, build=not no_build)
+    name, fmu = Path(source).name, stand.unit.fmu
+    kind, side = "", ""
+    if file := stand.plan.scenario.get("tyre_files", {}).get("front"):
+        kind, side = f", {file['kind']}", f", {file['side'].lower()} side"
+        for warning in file["warnings"]:
+            say(f"warning: {warning}")
+    note = f"front left wheel, friction {friction:g}, no camber · {fmu.name} ({fmu.sha256[:8]})"
+    stem = output or Path("results") / "tyres" / Path(source).stem
+    if stem.suffix.lower() in (".svg", ".png"):
+        stem = stem.with_suffix("")
+    paths = save(draw_tyre(stand, f"{name}{kind}{side}", note), stem)
+    say(f"{paths[0]}, {paths[1].name}")

@@ -1,0 +1,1 @@
+"""Tyres by themselves: an FMU stepped on a stand, and what it gives drawn."""

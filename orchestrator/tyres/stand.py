@@ -1,0 +1,132 @@
+"""A tyre FMU by itself: its forces at slips, slip angles and loads that are given."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import ScenarioError
+from ..fmu.opener import Opener
+from ..fmu.search import find_fmu, find_folder
+from ..master.simulate import simulate_in_memory
+from ..plan import Plan, Series, Unit, Value
+from ..scenario.load import load_scenario
+from ..scenario.overrides import is_path
+from ..scenario.yaml_lines import Document
+from ..wiring.make_plan import make_plan
+
+FOR_FILES = "tyre_magic_formula_62_transient"
+"""The FMU on which a tyre property file is looked at: it tells relaxation lengths, too."""
+SPEED = 20.0
+"""At which the wheel travels [m/s]."""
+WHEEL = "fl"
+RADIUS = 0.3
+"""Of the wheel [m], for tyres that want its speed and have none of their own."""
+
+
+class State(NamedTuple):
+    """How a wheel stands and rolls: slip angle [rad], longitudinal slip [1] of the interface, load [N]."""
+
+    alpha: float = 0.0
+    kappa: float = 0.0
+    load: float = 4000.0
+
+
+@dataclass(frozen=True)
+class Stand:
+    """A tyre, front left, on a stand."""
+
+    plan: Plan
+
+    @property
+    def unit(self) -> Unit:
+        """The tyre."""
+        return self.plan.units[0]
+
+    def parameter(self, name: str) -> Value | None:
+        """Return the value of a parameter, None if there is none of the name."""
+        variable = self.unit.fmu.variables.get(name)
+        return None if variable is None else self.unit.parameters.get(name, variable.start)
+
+    @property
+    def nominal_load(self) -> float:
+        """The tyre's own [N], or that of a passenger car's."""
+        given = self.parameter("fnomin_front") or self.parameter("nominal_load")
+        return float(given) if given else 4000.0
+
+    def measure(self, states: Sequence[State]) -> dict[str, np.ndarray]:
+        """Return every output of the wheel, by its name without the wheel; shape (n,), SI.
+
+        The wheel rolls on in every state until forces that lag have settled.
+
+        Raises:
+            SimulationError: the FMU failed.
+        """
+        alpha, kappa, load = (np.array(column, float) for column in zip(*states, strict=True))
+        v = SPEED * np.cos(alpha)
+        radius = self.parameter("wheel_radius")
+        rolling = np.where(kappa > 0.0, v / (1.0 - np.minimum(kappa, 0.999)), v * (1.0 + kappa))
+        given = {
+            "slip_angle": alpha,
+            "slip_ratio": kappa,
+            "vertical_load": load,
+            "wheel_velocity": v,
+            "wheel_speed": rolling / (float(radius) if isinstance(radius, float) else RADIUS),
+        }
+        times = 2.0 * np.arange(len(states))
+        series = {
+            f"{name}_{WHEEL}": Series("stand", name, "", True, times, values)
+            for name, values in given.items()
+            if f"{name}_{WHEEL}" in self.unit.constants
+        }
+        unit = replace(self.unit, series=series)
+        results = simulate_in_memory(replace(self.plan, units=(unit,), n_steps=2 * len(states)))
+        columns = [f"{unit.name}.{v.name}" for v in unit.fmu.of("output") if v.name.endswith(f"_{WHEEL}")]
+        at_end = slice(2, None, 2)  # the second of two steps in each state
+        return {c.partition(".")[2].removesuffix(f"_{WHEEL}"): results[c][at_end] for c in columns}
+
+
+def put_on_stand(source: str, *, friction: float, fmus: Path | None, build: bool) -> Stand:
+    """Return a tyre on a stand.
+
+    Args:
+        source: a tyre property file, a tyre FMU's path or its name in the folder of FMUs.
+        friction: coefficient of the road [1].
+        fmus: folder of FMUs given by name; None: the nearest.
+        build: build the FMU first if it is stale.
+
+    Raises:
+        YawbenchError: there is no such tyre, or something is wrong with it.
+    """
+    file = source.lower().endswith(".tir")
+    place = Path(source).parent / "stand"
+    opener = Opener(build=build)
+    name = FOR_FILES if file else os.path.abspath(source) if is_path(source) else source
+    folder = Path() if is_path(name) else fmus or find_folder(place, opener=opener)
+    path = find_fmu(name, scenario=place, fmus=folder, opener=opener)
+    inputs = [variable.name for variable in opener.open(path).of("input")]
+    data = {
+        "title": Path(source).name,
+        "step_size": 1.0,  # s: far beyond any relaxation length
+        "stop_time": 1.0,
+        "algorithm": "jacobi",
+        "units": {"tyre": {"fmu": str(path.absolute())}},
+        "inputs": {name: friction if name.startswith("friction") else 0.0 for name in inputs},
+        **({"tyres": os.path.abspath(source)} if file else {}),
+    }
+    plan = make_plan(load_scenario(place, read=lambda path, what: Document(path, data=data)), opener=opener)
+    variables = plan.units[0].fmu.variables
+    wanted = (
+        f"tyre_force_x_{WHEEL}",
+        f"tyre_force_y_{WHEEL}",
+        f"slip_angle_{WHEEL}",
+        f"vertical_load_{WHEEL}",
+    )
+    if missing := [name for name in wanted if name not in variables]:
+        raise ScenarioError(f"{source}: this is no tyre: it has no {', '.join(missing)}")
+    return Stand(plan)
