@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import select
+import signal
+import subprocess
 import sys
 import tempfile
 
@@ -13,6 +17,7 @@ from fmus.check import defects
 from orchestrator.errors import BuildError, ModelDescriptionError
 from orchestrator.fmu.opener import Opener, host_needs
 from tests.fmus.bare import Fmu, Unit
+from tests.orchestrator.fake_fmus import make_fmu
 
 GOOD = '''"""A controller."""
 
@@ -331,3 +336,31 @@ def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path, monkeypatch):
     assert caught.value.problems == [
         f"tyre_linear: cannot be read or written: [Errno 13] Permission denied: '{tmp_path}'"
     ]
+
+
+DIES = """
+import os, signal, sys, time
+from fmus import check
+check.defects(sys.argv[1])
+print(check._checker.pid, flush=True)
+if os.fork() == 0:
+    time.sleep(60)  # with the pipe to the checker
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="needs Linux")
+def test_the_process_that_looks_at_fmus_ends_with_a_build_that_was_killed(tmp_path):
+    make_fmu(tmp_path / "a.fmu")
+    with subprocess.Popen(
+        [sys.executable, "-c", DIES, str(tmp_path / "a.fmu")],
+        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, start_new_session=True,
+    ) as build:  # fmt: skip
+        assert build.stdout is not None
+        checker = int(build.stdout.readline())
+        try:
+            ended = select.poll()
+            ended.register(os.pidfd_open(checker), select.POLLIN)
+            assert ended.poll(30_000)
+        finally:
+            os.killpg(build.pid, signal.SIGKILL)

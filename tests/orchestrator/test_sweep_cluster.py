@@ -143,6 +143,23 @@ def test_workers_of_another_version_are_refused(moods, yawbench, cluster, monkey
     assert f"does not fit: yawbench {theirs['yawbench']} there, 99.0 here" in err.splitlines()[-1]
 
 
+class _Restarting:
+    """A client of a scheduler one of whose workers has just been killed."""
+
+    def nthreads(self):
+        return {"tcp://a": 1, "tcp://b": 1}
+
+    def run(self, function, *, on_error):
+        assert on_error == "return"
+        return {"tcp://a": distributed.comm.CommClosedError("in <TCP>"), "tcp://b": function()}
+
+
+def test_a_worker_that_begins_anew_is_not_taken_for_one_without_this_program():
+    from orchestrator.sweeps.cluster import _check_workers
+
+    assert _check_workers(_Restarting(), "tcp://c") == 2
+
+
 def test_without_its_package_the_option_says_how_to_get_it(moods, driver, capsys, tmp_path, monkeypatch):  # noqa: F811
     monkeypatch.setitem(sys.modules, "distributed", None)
     monkeypatch.delitem(sys.modules, "orchestrator.sweeps.cluster", raising=False)
