@@ -20,7 +20,9 @@ Out = Annotated[
     typer.Option("--out", metavar="DIR", help="Folder for the page, with results and figures below it."),
 ]
 Again = Annotated[bool, typer.Option("--again", help="Make all runs again, also those with good results.")]
-NoRun = Annotated[bool, typer.Option("--no-run", help="Run nothing: report what stands in the results.")]
+NoRun = Annotated[
+    bool, typer.Option("--no-run", help="Run and build nothing: report what stands in the results.")
+]
 
 
 def report(
@@ -44,6 +46,7 @@ def report(
     lies in its folder below results/, that of several in results/.
     """
     from ..errors import ScenarioError
+    from ..fmu.opener import stale_fmus
     from ..pages.chapter import chapter
     from ..pages.report import PAGE, found_studies, report_page, still_stale, wanted
     from ..results.formats import check_format
@@ -67,9 +70,12 @@ def report(
         folders = [out] if len(paths) == 1 else below
     hold(context, *folders)
     every = [
-        wanted(path, folder, fmus=fmus, format=format_, call_limit=limit, build=not no_build)
+        wanted(path, folder, fmus=fmus, format=format_, call_limit=limit, build=not (no_build or no_run))
         for path, folder in zip(paths, folders, strict=True)
     ]
+    if no_run:
+        for note in stale_fmus(u.fmu for one in every for _, plan in one.plans.values() for u in plan.units):
+            say(f"note: {note}")
     chapters, failed = [], False
     for one in every:
         work = [job for name, job in one.jobs.items() if again or name in one.stale]

@@ -14,7 +14,8 @@ StudyFile = Annotated[
     Path, named("a study file", help="Study: YAML file, or a name in scenarios/.", metavar="STUDY")
 ]
 NoRun = Annotated[
-    bool, typer.Option("--no-run", help="Run nothing: judge and draw what stands in the results folder.")
+    bool,
+    typer.Option("--no-run", help="Run and build nothing: judge and draw what stands in the results folder."),
 ]
 
 
@@ -62,19 +63,25 @@ def study(
         say(problem)
     print_tables(all_tables(findings))
     if no_run:
-        for name, why in _stale(file, folder, fmus, build=not no_build).items():
-            say(f"{name}: not what a run would give now: {why}")
+        for sentence in _stale(file, folder, fmus):
+            say(sentence)
     say(f"Results, figures and tables: {folder} (begin with {folder / REPORT})")
     if findings.failed:
         raise typer.Exit(1)
 
 
-def _stale(file: Path, folder: Path, fmus: Path | None, *, build: bool) -> dict[str, str]:
-    """Return run -> why its results are not those of a run made now, as far as that can be told."""
+def _stale(file: Path, folder: Path, fmus: Path | None) -> list[str]:
+    """Return sentences on what would be other if it were run now, as far as that can be told."""
     from ..errors import YawbenchError
+    from ..fmu.opener import stale_fmus
     from ..pages.report import still_stale, wanted
 
     try:
-        return still_stale(wanted(file, folder, fmus=fmus, format="csv", build=build))
+        found = wanted(file, folder, fmus=fmus, format="csv")
     except YawbenchError:  # scenarios or FMUs are not here: results can be judged without them
-        return {}
+        return []
+    stale = stale_fmus(unit.fmu for _, plan in found.plans.values() for unit in plan.units)
+    return [
+        *(f"{name}: not what a run would give now: {why}" for name, why in still_stale(found).items()),
+        *(f"note: {sentence}" for sentence in stale),
+    ]

@@ -100,6 +100,21 @@ def test_a_broken_component_ends_the_run_before_it_begins_and_keeps_the_good_fmu
     assert (done.returncode, "built" in done.stderr) == (0, False)  # the FMU is the one of these sources
 
 
+@pytest.mark.parametrize("command", ["study", "report"])
+def test_a_command_that_runs_nothing_builds_nothing_and_names_what_is_stale(project, command):
+    (project / "study.yaml").write_text(
+        "title: One\nruns:\n  - {name: one, scenario: driver.yaml}\n"
+        "metrics: {m: {metric: peak(driver.steer_angle)}}\n"
+    )
+    assert yawbench(project, command, "study.yaml", "--out", "out").returncode == 0
+    old = (project / "fmus/driver_sine.fmu").read_bytes()
+    double(project)
+    done = yawbench(project, command, "study.yaml", "--out", "out", "--no-run")
+    assert (done.returncode, "built" in done.stderr) == (0, False)
+    assert "note: driver_sine.fmu is not made of components/drivers/sine.py as it is now" in done.stderr
+    assert (project / "fmus/driver_sine.fmu").read_bytes() == old
+
+
 @pytest.mark.parametrize(
     "command",
     [
