@@ -15,10 +15,35 @@ and what is allowed.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
+
+
+class Problem(str):
+    """What is wrong: a sentence that begins with its place, and knows that place.
+
+    Attributes:
+        text: the sentence without its place.
+        file: in which it is; None: in none.
+        line: of the file; None: in no line of it.
+        place: the value, such as "units.plant.fmu", or the change that gave it; "" if it is no value.
+    """
+
+    text: str
+    file: Path | None
+    line: int | None
+    place: str
+
+    def __new__(
+        cls, text: str, *, file: Path | None = None, line: int | None = None, place: str = ""
+    ) -> Problem:
+        where = f"{file}:{line}" if file and line else f"{file or ''}"
+        made = super().__new__(cls, ": ".join(filter(None, (where, place, text))))
+        made.text, made.file, made.line, made.place = text, file, line, place
+        return made
 
 
 class YawbenchError(Exception):
-    """Base of all errors; `problems` are its sentences.
+    """Base of all errors; `problems` are its sentences, each with its file and line if it has any.
 
     >>> try:
     ...     yb.load("fnn_sideslip/26mps")
@@ -30,7 +55,8 @@ class YawbenchError(Exception):
     exit_status = 2
 
     def __init__(self, problems: str | Iterable[str]) -> None:
-        self.problems = [problems] if isinstance(problems, str) else list(problems)
+        given = [problems] if isinstance(problems, str) else problems
+        self.problems = [one if isinstance(one, Problem) else Problem(one) for one in given]
         super().__init__("\n".join(self.problems))
 
 

@@ -11,7 +11,7 @@ from dataclasses import asdict
 from datetime import datetime, timezone
 from typing import Any
 
-from ..errors import ResultsError, SimulationError, YawbenchError
+from ..errors import Problem, ResultsError, SimulationError, YawbenchError
 from ..metrics.plausibility import Watch
 from ..plan import Plan
 from ..results.columnar import MemoryRecorder
@@ -93,7 +93,7 @@ class Run:
             problems += lost.problems
         else:
             if self.recorder.place is not None:
-                problems.append(f"{KEPT}: {self.recorder.place}")
+                problems.append(Problem(f"{KEPT}: {self.recorder.place}"))
 
     def _abandon(self) -> None:
         """Leave at once: somebody insists, perhaps because a unit never comes back."""

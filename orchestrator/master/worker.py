@@ -79,7 +79,7 @@ class Worker:
         try:
             self._slave = open_unit(unit, self._log, set())
         except (ModelDescriptionError, SimulationError) as error:
-            return type(error).__name__, error.problems
+            return type(error).__name__, [*error.problems]
         return None
 
     def connect(self, input_places: Sequence[Place], output_places: Sequence[Place]) -> None:

@@ -85,7 +85,7 @@ def _read_vehicle(document: Document, read: Callable[..., Document]) -> Document
         return Document(document.path, data={})
     vehicle = Path(os.path.normpath(document.path.parent / name))
     if not os.path.exists(vehicle):
-        missing = next(iter(read(vehicle, what="vehicle file").problems))[1]
+        (missing,) = read(vehicle, what="vehicle file").problems
         document.report(("vehicle",), missing)
         return Document(vehicle, data={})
     return read(vehicle, what="vehicle file")

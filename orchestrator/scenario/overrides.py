@@ -20,7 +20,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from ..errors import ScenarioError
+from ..errors import Problem, ScenarioError
 from ..plan import FACTS, OF_RUN, TYRES, Change, Value
 from ..wording import hint, listed
 from . import yaml_lines
@@ -130,8 +130,8 @@ def apply_changes(
             differs = _put(document, ("inputs", name), change)
         elif not isinstance(spec, dict):
             known = (*units, *HOLDERS) if name else units
-            sentence = f"{change}: the scenario has no unit {holder!r}"
-            document.problem(0, sentence + hint(holder, known, lead="it has"))
+            sentence = f"the scenario has no unit {holder!r}{hint(holder, known, lead='it has')}"
+            document.note(Problem(sentence, place=str(change)))
             continue
         elif not name:
             if isinstance(spec.get("fmu"), str):

@@ -18,6 +18,7 @@ from urllib.parse import unquote, urlsplit
 from lxml import etree
 from lxml.etree import _Element
 
+from ..errors import Problem
 from ..files import PACKED, TooLargeError, check_archive, read_bytes, reason
 from ..plan import UnitDefinition
 from ..wording import short
@@ -37,10 +38,11 @@ class Refused(Exception):
         self.line = 0 if element is None else element.sourceline or 0
         self.member = "" if element is None else element.getroottree().docinfo.URL or ""
 
-    def sentence(self, path: Path) -> str:
-        """Return the sentence behind the place in the archive `path` that it speaks of."""
-        place = f"{path}/{self.member}:{self.line}" if self.line and self.member else str(path)
-        return f"{place}: {self}"
+    def problem(self, path: Path) -> Problem:
+        """Return it as a problem of the archive `path`, with the place in it that it speaks of."""
+        if self.line and self.member:
+            return Problem(str(self), file=path / self.member, line=self.line)
+        return Problem(str(self), file=path)
 
 
 class Declared(NamedTuple):

@@ -38,7 +38,7 @@ def read(path: Path, *, what: str = "SSP archive") -> Document:
     try:
         document.data = _scenario(Archive(path, what=what), document)
     except Refused as refused:
-        document.problem(refused.line, refused.sentence(path))
+        document.note(refused.problem(path))
     return document
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from math import atan, inf, isfinite, nan, pi, prod, sin, tan
 from pathlib import Path
 
-from ..errors import ScenarioError
+from ..errors import Problem, ScenarioError
 from ..files import TEXT, read_bytes, reads, reason
 from ..wording import listed, short
 from .tir_lines import Entry, read_entries
@@ -292,7 +292,7 @@ class _Reading:
         return None
 
     def _refuse(self, entry: Entry, sentence: str) -> None:
-        self.problems.append(f"{self.path}:{entry.line}: {entry.key}: {sentence}")
+        self.problems.append(Problem(sentence, file=self.path, line=entry.line, place=entry.key))
 
     def _warn(self, entry: Entry, sentence: str) -> None:
         self.warnings.append(f"{self.path}:{entry.line}: {entry.key}: {sentence}")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import ScenarioError
+from ..errors import Problem, ScenarioError
 from ..files import TEXT, read_bytes, reason
 from ..plan import Change
 from ..wording import closest, listed, short, unprintable
@@ -35,30 +35,33 @@ class Document:
     lines: dict[Key, int] = field(default_factory=dict)
     overrides: dict[Key, Change] = field(default_factory=dict)
     """Values that do not come from the file -> what gave them."""
-    problems: dict[tuple[int, str], None] = field(default_factory=dict)
-    """(line, sentence), each once; line 0: of no line."""
+    problems: dict[Problem, None] = field(default_factory=dict)
+    """Each once."""
     notes: list[str] = field(default_factory=list)
     """Remarks on what is no mistake, for the plan."""
 
     def report(self, key: Key, sentence: str) -> None:
         """Note a problem with the value (or the missing value) at `key`."""
-        line, place = self._place(key)
-        self.problem(line, f"{place}: {sentence}")
+        self.note(self.problem(key, sentence))
 
-    def problem(self, line: int, sentence: str) -> None:
-        """Note a problem that says its place itself.
+    def note(self, problem: Problem) -> None:
+        """Note a problem.
 
         Raises:
             ScenarioError: with all problems, if they have become very many.
         """
-        self.problems[line, sentence] = None
+        self.problems[problem] = None
         if len(self.problems) >= PROBLEMS:
-            more = f"{self.path}: there may be more; these are the first {PROBLEMS} problems"
-            raise ScenarioError([*self.sentences(), more])
+            more = f"there may be more; these are the first {PROBLEMS} problems"
+            raise ScenarioError([*self.sentences(), Problem(more, file=self.path)])
 
-    def place(self, key: Key) -> str:
-        """Return 'file:line: dotted.key', or the change that the value came from."""
-        return self._place(key)[1]
+    def problem(self, key: Key, sentence: str) -> Problem:
+        """Return a problem with the value at `key`: of its line, or of the change that it came from."""
+        change = self.override(key)
+        if change is not None:
+            return Problem(sentence, place=str(change))
+        line = next((self.lines[key[:n]] for n in range(len(key), -1, -1) if key[:n] in self.lines), 1)
+        return Problem(sentence, file=self.path, line=line, place=dotted(key))
 
     def override(self, key: Key) -> Change | None:
         """Return the change that gave the value at `key`, None if the file did."""
@@ -67,17 +70,13 @@ class Document:
                 return self.overrides[key[:n]]
         return None
 
-    def _place(self, key: Key) -> tuple[int, str]:
-        change = self.override(key)
-        if change is not None:
-            return 0, str(change)
-        line = next((self.lines[key[:n]] for n in range(len(key), -1, -1) if key[:n] in self.lines), 1)
-        name = dotted(key)
-        return line, f"{self.path}:{line}: {name}" if name else f"{self.path}:{line}"
-
-    def sentences(self) -> list[str]:
+    def sentences(self) -> list[Problem]:
         """Return all problems, first those of changes, then the file's from top to bottom."""
-        return [sentence for _, sentence in sorted(self.problems, key=lambda p: p[0])]
+        return sorted(self.problems, key=lambda problem: problem.line or 0)
+
+    def afresh(self) -> Document:
+        """Return the document without problems, and with notes of its own."""
+        return replace(self, problems={}, notes=[*self.notes])
 
 
 def dotted(key: Key) -> str:
@@ -97,24 +96,24 @@ def read(path: Path, *, what: str) -> Document:
     """
     document = Document(path)
 
-    def fail(line: int, sentence: str) -> Document:
-        document.problem(line, f"{path}:{line}: {sentence}" if line else f"{path}: {sentence}")
+    def fail(line: int | None, sentence: str) -> Document:
+        document.note(Problem(sentence, file=path, line=line))
         return document
 
     try:
         text = read_bytes(path, largest=TEXT).decode("utf-8-sig")
     except FileNotFoundError:
-        return fail(0, f"no such {what}{_neighbours(path)}")
+        return fail(None, f"no such {what}{_neighbours(path)}")
     except UnicodeDecodeError:
-        return fail(0, f"this {what} is not UTF-8 text")
+        return fail(None, f"this {what} is not UTF-8 text")
     except (OSError, ValueError) as error:
-        return fail(0, f"cannot read this {what}: {reason(error)}")
+        return fail(None, f"cannot read this {what}: {reason(error)}")
     try:
         node, constructor = _composed(text)
     except _NotYamlError as error:
         return fail(error.line, f"not valid YAML: {error}")
     except RecursionError:
-        return fail(0, f"cannot read this {what}: it is nested too deeply")
+        return fail(None, f"cannot read this {what}: it is nested too deeply")
     document.lines[()] = 1
     if node is not None:
         try:
@@ -123,7 +122,7 @@ def read(path: Path, *, what: str) -> Document:
             document.report(error.key[:1], str(error))
             return document
     if document.data is None and not document.problems:
-        return fail(0, f"this {what} is empty")
+        return fail(None, f"this {what} is empty")
     return document
 
 
@@ -260,7 +259,7 @@ class _Reader:
         return items
 
     def _mapping(self, node: Any, key: Key, above: tuple[int, ...]) -> dict[str, Any]:
-        path, lines = self.document.path, self.document.lines
+        path, lines, note = self.document.path, self.document.lines, self.document.note
         mapping: dict[str, Any] = {}
         for name, item in node.value:
             if name.tag.endswith(":merge"):
@@ -270,15 +269,14 @@ class _Reader:
         for name, item in node.value:
             line = name.start_mark.line + 1
             if not isinstance(name.value, str):
-                self.document.problem(line, f"{path}:{line}: a key must be text, not a collection")
+                note(Problem("a key must be text, not a collection", file=path, line=line))
                 continue
             if name.tag.endswith(":merge"):
                 continue
             below = (*key, name.value)
             if name.value in own:
-                first = own[name.value]
-                sentence = f"{path}:{line}: {dotted(below)} is given twice, first in line {first}"
-                self.document.problem(line, sentence)
+                sentence = f"{dotted(below)} is given twice, first in line {own[name.value]}"
+                note(Problem(sentence, file=path, line=line))
                 continue
             own[name.value] = lines[below] = line
             self._check_text(name.value, below)
@@ -290,9 +288,8 @@ class _Reader:
         nodes = item.value if item.id == "sequence" else [item]
         if all(one.id == "mapping" for one in nodes):
             return list(nodes)
-        line = name.start_mark.line + 1
         sentence = "<<: write an alias of a mapping, or a list of such aliases"
-        self.document.problem(line, f"{self.document.path}:{line}: {sentence}")
+        self.document.note(Problem(sentence, file=self.document.path, line=name.start_mark.line + 1))
         return []
 
 

@@ -147,7 +147,7 @@ def _plan_or_problems(job: Job, once: Once) -> Plan | list[str]:
     except BuildError:
         raise
     except YawbenchError as error:
-        return error.problems
+        return [*error.problems]
 
 
 def run_job(job: Job) -> str:
@@ -311,7 +311,7 @@ def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:
         report: tuple[int, list[str], Any, bool] = (0, [], run(job), False)
     except YawbenchError as error:
         told = isinstance(error, Interrupted)
-        report = (error.exit_status, error.problems or [type(error).__name__], None, told)
+        report = (error.exit_status, [*error.problems] or [type(error).__name__], None, told)
     except BaseException as error:
         sys.excepthook(type(error), error, error.__traceback__)
         report = (1, [f"{type(error).__name__}: {error}"], None, False)

@@ -95,7 +95,8 @@ def files_table(folder: Path | None, kinds: Sequence[str]) -> Table:
 
 def fmus_in(folder: Path) -> tuple[list[Fmu], list[str]]:
     """Return the FMUs in a folder, and what is wrong with those that cannot be used."""
-    found, problems = [], []
+    found: list[Fmu] = []
+    problems: list[str] = []
     for path in sorted(folder.glob("*.fmu")):
         try:
             found.append(open_fmu(path))

@@ -17,7 +17,7 @@ from ..scenario.load import Connection, Scenario
 from ..scenario.yaml_lines import PROBLEMS, Key, dotted
 from ..wording import fold, fold_sentences, hint, listed
 from .constants import Constant, Input, constants
-from .fitting import contradicts_its_name, conversion_between, difference, fits
+from .fitting import alike, contradicts_its_name, conversion_between, difference, fits
 from .patterns import Replaced, had, matching
 
 
@@ -222,6 +222,7 @@ class Connector:
             for source, names in self._fitting_outputs(variable).items()
             if source != unit
             for name in names
+            if alike(name, variable.name)
         ]
         connect = f"connect {listed(choices, last='or')}, or give" if 0 < len(choices) <= 8 else "give"
         measure = f" [{variable.unit}]" if variable.unit else ""

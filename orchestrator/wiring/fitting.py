@@ -42,6 +42,15 @@ def difference(
     return None
 
 
+def alike(output: str, name: str) -> bool:
+    """Return whether an output may be what an input of another name means: names share a word.
+
+    A unit of measurement alone says nothing, and a reference is not the value that should follow it.
+    """
+    words = [{word for word in one.split("_") if len(word) > 2} for one in (output, name)]
+    return bool(words[0] & words[1]) and ("ref" in words[0]) == ("ref" in words[1])
+
+
 def fits(source: Variable, target: Variable) -> bool:
     alike = source.type == target.type and (source.unit is None) == (target.unit is None)
     return alike and conversion_between(source, target) is not None

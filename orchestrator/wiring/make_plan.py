@@ -18,7 +18,7 @@ from fractions import Fraction
 from functools import cache
 from pathlib import Path
 
-from ..errors import BuildError, ModelDescriptionError, WiringError
+from ..errors import BuildError, ModelDescriptionError, Problem, WiringError
 from ..fmu.opener import Opener, host_needs, stale_fmus
 from ..fmu.search import find_fmu, find_folder
 from ..fmu.shadowing import shadowed_modules
@@ -53,6 +53,7 @@ def make_plan(
         BuildError: FMUs that are stale and cannot be built.
         WiringError: everything that is wrong with parameters and connections.
     """
+    scenario = scenario.afresh()
     opened, replaced = _open_all(scenario, fmus, opener or Opener())
     notes: list[str] = [*scenario.document.notes, *stale_fmus(opened.values()), *host_needs(opened.values())]
     origins: dict[str, dict[str, str]] = {name: {} for name in opened}
@@ -65,11 +66,10 @@ def make_plan(
         _check_instances(scenario, opened)
     evaluation = evaluate(opened, wires)
     problems = scenario.document.sentences()
-    if scenario.vehicle_document is not scenario.document:
-        problems += scenario.vehicle_document.sentences()
-    problems += [f"{scenario.path}: {text}" for text in shadowed_modules(opened, isolated=isolated)]
-    problems += [
-        f"{scenario.path}: algebraic loop: {loop}; these values would define each other at one instant, so "
+    problems += scenario.vehicle_document.sentences()
+    of_all = shadowed_modules(opened, isolated=isolated)
+    of_all += [
+        f"algebraic loop: {loop}; these values would define each other at one instant, so "
         "one of these units has to give an output that does not follow its input directly"
         for loop in evaluation.loops
     ]
@@ -81,11 +81,11 @@ def make_plan(
         )
         for name, fmu in opened.items()
     }  # fmt: skip
-    if not problems:  # all variables are known
-        lacking = missing_functions(units.values(), wires, record)
-        problems = [f"{scenario.path}: {text}" for text in lacking]
+    if not problems and not of_all:  # all variables are known
+        of_all = missing_functions(units.values(), wires, record)
+    problems += [Problem(text, file=scenario.path) for text in of_all]
     if problems:
-        raise WiringError(_misplaced(scenario) + problems)
+        raise WiringError([*_misplaced(scenario), *problems])
     notes += [
         f"possible algebraic loop: {loop}; an FMU here does not say which inputs its outputs follow, "
         "so a wire against the evaluation order uses earlier values"
@@ -139,7 +139,7 @@ def _open_all(
 ) -> tuple[dict[str, Fmu], Callable[[str], Fmu | None]]:
     """Return the FMU of each unit, and a function that gives the one a swap has replaced, if it is there."""
     document = scenario.document
-    problems: dict[str, None] = {}
+    problems: dict[Problem, None] = {}
     folder = fmus or Path()
     if fmus is not None and not fmus.is_dir():
         raise ModelDescriptionError(f"--fmus {fmus}: no such folder")
@@ -165,8 +165,7 @@ def _open_all(
         except BuildError as error:  # noqa: PERF203 - all problems are collected
             not_built.update(dict.fromkeys(error.problems))
         except ModelDescriptionError as error:
-            place = document.place(("units", name, "fmu"))
-            problems.update({f"{place}: {problem}": None for problem in error.problems})
+            problems.update({document.problem(("units", name, "fmu"), one): None for one in error.problems})
     if not_built:
         raise BuildError(not_built)
     if problems:
