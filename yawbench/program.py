@@ -232,7 +232,9 @@ def _passing_on(method: str) -> Callable[..., Any]:
     return call
 
 
-def _class(given: Any, inputs: Sequence[Any], outputs: Sequence[Any], members: dict[str, Any]) -> Any:
+def _class(
+    given: Any, inputs: Sequence[Any], outputs: Sequence[Any], members: dict[str, Any]
+) -> type[Component]:
     """Return a component class; outputs that do not say what they follow follow all inputs."""
     if isinstance(inputs, str) or isinstance(outputs, str):
         raise ScenarioError(f"{_name(given)}: inputs and outputs are tuples of names, ('yaw_rate',)")

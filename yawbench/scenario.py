@@ -14,7 +14,7 @@ from orchestrator.fmu.opener import Opener
 from orchestrator.master.opening import open_unit
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.plan import Change, Plan, Value
-from orchestrator.scenario import catalogue
+from orchestrator.scenario import catalogue, schema
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wording import hint
@@ -121,7 +121,7 @@ class Scenario:
         return scenario
 
     @cached_property
-    def loaded(self) -> Any:
+    def loaded(self) -> schema.Scenario:
         """The scenario as its schema has it, all changes applied; the file is read once."""
         return load_scenario(self.path, changes=self.changes)
 

@@ -1,0 +1,62 @@
+"""What the project says of itself: one version, one date, lists of files that exist, hooks that can run."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+from tests.checkout import ROOT
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    tomllib = pytest.importorskip("tomllib")
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+CITATION = YAML(typ="safe").load(ROOT / "CITATION.cff")
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+
+
+def test_project_changelog_and_citation_name_one_version_and_its_date():
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    released = re.findall(r"^## (\d+\.\d+\.\d+) \((\d{4}-\d\d-\d\d)\)$", changelog, re.MULTILINE)
+    assert released[0] == (CITATION["version"], str(CITATION["date-released"]))
+    assert PROJECT["project"]["version"] == CITATION["version"]
+
+
+def test_the_citation_has_what_its_format_requires():
+    assert {"cff-version", "message", "title", "authors"} <= CITATION.keys()
+    assert CITATION["cff-version"] == "1.2.0"
+    assert CITATION["license"] == PROJECT["project"]["license"]
+
+
+def test_files_that_the_contributing_guide_names_exist():
+    named = re.findall(
+        r"`((?:components|vocabulary|orchestrator|scenarios|tests|docs)/[\w/]+\.?\w*)", CONTRIBUTING
+    )
+    named += re.findall(r"\]\(([\w/.]+\.md)", CONTRIBUTING)
+    written = [path for path in named if "NAME" not in path]
+    assert len(written) > 8
+    assert [path for path in written if not (ROOT / path).exists()] == []
+
+
+def test_make_has_every_target_that_the_contributing_guide_and_the_readme_name():
+    text = CONTRIBUTING + (ROOT / "README.md").read_text(encoding="utf-8")
+    targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    assert set(re.findall(r"^    make ([\w-]+)", text, re.MULTILINE)) <= targets
+
+
+def test_hooks_before_a_commit_call_programs_that_make_lint_installs():
+    hooks = YAML(typ="safe").load(ROOT / ".pre-commit-config.yaml")["repos"][0]["hooks"]
+    installed = {
+        re.split(r"[><=]", wanted)[0] for wanted in PROJECT["project"]["optional-dependencies"]["lint"]
+    }
+    called = {Path(hook["entry"].split()[0]).name for hook in hooks if hook["language"] == "system"}
+    assert called == {"ruff", "mypy"} <= installed
+    for hook in hooks:
+        if hook["language"] == "pygrep":
+            re.compile(hook["entry"])
