@@ -76,6 +76,7 @@ SIGNALS: dict[str, Entry] = {
         "N", "Lateral tyre force, wheel axes, at the contact point", "F_y", "Lateral tyre force"
     ),
     "aligning_moment_*": Entry("N.m", "Self-aligning moment of the tyre about its vertical axis"),
+    "tyre_moment_z_*": Entry("N.m", "Moment of the tyre about its vertical axis that turns the car"),
     "overturning_moment_*": Entry("N.m", "Overturning moment of the tyre about its longitudinal axis"),
     "slip_stiffness_*": Entry("N", "Slope dF_x/dkappa of the tyre's force at tyre_slip_ratio; 0: not told"),
     "tyre_slip_ratio_*": Entry("1", "Longitudinal slip that the tyre's force and slip_stiffness belong to"),

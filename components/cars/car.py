@@ -192,6 +192,7 @@ class DrivenCar(Car):
         "wheel_torque_*",
         signal("slip_stiffness_*", optional=True),
         signal("tyre_slip_ratio_*", optional=True),
+        signal("tyre_moment_z_*", optional=True),
     )
 
     spins: Four
@@ -203,7 +204,7 @@ class DrivenCar(Car):
 
     def turn_wheels(self, h: float, v: Eight, signals: Sequence[Any]) -> None:
         p = self.p
-        _, f_x, _, torque, slip_stiffness, tyre_slip = signals
+        _, f_x, _, torque, slip_stiffness, tyre_slip, _ = signals
         radius, inertia, v_low = p.wheel_radius, p.wheel_inertia, p.low_speed
         per_load = p.slip_stiffness_per_load
         # Of eight velocities the first four, the longitudinal ones.

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from math import cos, sin
 from typing import TYPE_CHECKING, NamedTuple
 
-from .plane_body import Geometry
+from .plane_body import NO_MOMENTS, Geometry, sum_of
 from .wheel_kinematics import Eight
 
 if TYPE_CHECKING:
@@ -38,13 +38,16 @@ class Contact(NamedTuple):
     moment: float  # about the vertical axis at rest [N.m]
 
 
-def contact(delta: float, f_x: Sequence[float], f_y: Sequence[float], p: Geometry) -> Contact:
+def contact(
+    delta: float, f_x: Sequence[float], f_y: Sequence[float], p: Geometry, m_z: Sequence[float] = NO_MOMENTS
+) -> Contact:
     """Return the tyre forces in vehicle axes.
 
     Args:
         delta: steer angle of both front wheels [rad].
         f_x, f_y: forces of fl, fr, rl, rr, wheel axes [N].
         p: geometry of the car.
+        m_z: moments of the tyres about their vertical axes [N.m].
     """
     f_fl, f_fr, x_rl, x_rr = f_x
     g_fl, g_fr, y_rl, y_rr = f_y
@@ -57,7 +60,7 @@ def contact(delta: float, f_x: Sequence[float], f_y: Sequence[float], p: Geometr
     front = y_fl + y_fr
     rear = y_rl + y_rr
     moment = p.cg_to_front_axle * front - p.cg_to_rear_axle * rear
-    moment += 0.5 * p.track_width * ((x_fr - x_fl) + (x_rr - x_rl))
+    moment += 0.5 * p.track_width * ((x_fr - x_fl) + (x_rr - x_rl)) + sum_of(m_z)
     x = (x_fl + x_fr) + (x_rl + x_rr)
     return Contact(x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr, x, front + rear, moment)
 

@@ -5,6 +5,7 @@ Resultants of the tyre forces, left and right treated by the same operations:
     X   = (F_xfl + F_xfr) cos(delta) - (F_yfl + F_yfr) sin(delta) + F_xrl + F_xrr
     Y_f = (F_xfl + F_xfr) sin(delta) + (F_yfl + F_yfr) cos(delta)        Y_r = F_yrl + F_yrr
     M   = a Y_f - b Y_r + d/2 [(F_yfl - F_yfr) sin(delta) + (F_xfr - F_xfl) cos(delta) + F_xrr - F_xrl]
+          + M_zfl + M_zfr + M_zrl + M_zrr     where the tyres' own moments are connected
 
 Motion under accelerations held in vehicle axes, a_x = dv_x/dt - v_y r, a_y = dv_y/dt + v_x r, dr/dt:
 the yaw angle is a parabola, and the velocity in earth axes is the integral of the turning
@@ -37,13 +38,26 @@ class Geometry(Protocol):
     def track_width(self) -> float: ...
 
 
-def resultants(delta: float, f_x: Sequence[float], f_y: Sequence[float], p: Geometry) -> Four:
+NO_MOMENTS: Four = (0.0, 0.0, 0.0, 0.0)
+"""Of four tyres about their vertical axes [N.m]."""
+
+
+def sum_of(moments: Sequence[float]) -> float:
+    """Return the sum over four wheels, left and right treated alike."""
+    fl, fr, rl, rr = moments
+    return (fl + fr) + (rl + rr)
+
+
+def resultants(
+    delta: float, f_x: Sequence[float], f_y: Sequence[float], p: Geometry, m_z: Sequence[float] = NO_MOMENTS
+) -> Four:
     """Return X, Y_f, Y_r [N] and M [N.m] of the tyre forces, vehicle axes.
 
     Args:
         delta: steer angle of both front wheels [rad].
         f_x, f_y: forces of fl, fr, rl, rr, wheel axes [N].
         p: geometry of the car.
+        m_z: moments of the tyres about their vertical axes [N.m].
     """
     x_fl, x_fr, x_rl, x_rr = f_x
     y_fl, y_fr, y_rl, y_rr = f_y
@@ -58,7 +72,7 @@ def resultants(delta: float, f_x: Sequence[float], f_y: Sequence[float], p: Geom
         x * c - y * s + (x_rl + x_rr),
         front,
         rear,
-        p.cg_to_front_axle * front - p.cg_to_rear_axle * rear + 0.5 * p.track_width * turn,
+        p.cg_to_front_axle * front - p.cg_to_rear_axle * rear + 0.5 * p.track_width * turn + sum_of(m_z),
     )
 
 

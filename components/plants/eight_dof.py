@@ -52,7 +52,7 @@ class EightDof(DrivenCar):
         self.step_size = 0.0
 
     def rest(self, signals: Sequence[Any]) -> Values:
-        held = resultants(signals[0], signals[1], signals[2], self.p)
+        held = resultants(signals[0], signals[1], signals[2], self.p, signals[6])
         phi = 0.0
         for _ in range(20):  # the body hangs in its springs; sin(phi) - phi is tiny
             phi = self.body.forcing(held[1] + held[2], phi) / self.body.stiffness
@@ -61,7 +61,7 @@ class EightDof(DrivenCar):
 
     def move(self, h: float, delta: float, signals: Sequence[Any]) -> Values:
         p, body = self.p, self.body
-        x, y_f, y_r, moment = held = resultants(delta, signals[1], signals[2], self.p)
+        x, y_f, y_r, moment = held = resultants(delta, signals[1], signals[2], self.p, signals[6])
         y = y_f + y_r
         if h != self.step_size:
             self.step_size = h

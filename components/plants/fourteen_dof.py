@@ -62,11 +62,11 @@ class FourteenDof(DrivenCar):
     def rest(self, signals: Sequence[Any]) -> Values:
         high = self.p.initial_heave
         self.body: tuple[float, ...] = (high, 0.0, 0.0, high, high, high, high, *AT_REST[7:])
-        held = contact(signals[0], signals[1], signals[2], self.p)
+        held = contact(signals[0], signals[1], signals[2], self.p, signals[6])
         return held.x, held.y
 
     def move(self, h: float, delta: float, signals: Sequence[Any]) -> Values:
-        held = contact(delta, signals[1], signals[2], self.p)
+        held = contact(delta, signals[1], signals[2], self.p, signals[6])
         v_x, v_y, r = self.motion[:3]
         r_end, *body = move_ride(r, self.body, h, held=held, ride=self.ride, longest=self.longest)
         _, roll, pitch = body[:3]

@@ -78,5 +78,5 @@ class SevenDof(DrivenCar):
     def _accelerations(self, delta: float, signals: Sequence[Any]) -> tuple[float, float, float]:
         """Return (a_x, a_y [m/s2], dr/dt [rad/s2]) of the centre of mass; equations (5)-(7)."""
         p = self.p
-        x, front, rear, moment = resultants(delta, signals[1], signals[2], p)
+        x, front, rear, moment = resultants(delta, signals[1], signals[2], p, signals[6])
         return x / p.mass, (front + rear) / p.mass, moment / p.yaw_inertia

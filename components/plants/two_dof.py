@@ -31,9 +31,9 @@ from typing import Any
 
 from ..cars.car import MOTION, Car, StartParameters, of_steered_wheels
 from ..cars.load_transfer import quasi_static_loads
-from ..cars.plane_body import Geometry, Motion
+from ..cars.plane_body import Geometry, Motion, sum_of
 from ..cars.wheel_kinematics import earth_velocity
-from ..fmi.variables import parameter
+from ..fmi.variables import parameter, signal
 from ..mathematics.carry import Values
 
 _GAUSS = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
@@ -88,7 +88,10 @@ class TwoDof(Car):
     """Car with two degrees of freedom (lateral, yaw) at constant speed on four tyres, quasi-static loads."""
 
     Parameters = TwoDofParameters
-    inputs = ("steer_angle", "tyre_force_x_*", "tyre_force_y_*", "yaw_moment")
+    inputs = (
+        *("steer_angle", "tyre_force_x_*", "tyre_force_y_*", "yaw_moment"),
+        signal("tyre_moment_z_*", optional=True),
+    )
     outputs = (
         *MOTION,
         *of_steered_wheels("slip_angle"),
@@ -101,7 +104,7 @@ class TwoDof(Car):
         return (lateral_resultants(signals[0], signals[2], self.p)[0] / self.p.mass,)
 
     def move(self, h: float, delta: float, signals: Sequence[Any]) -> Values:
-        yaw_moment = signals[3]
+        yaw_moment = signals[3] + sum_of(signals[4])
         force, moment = lateral_resultants(delta, signals[2], self.p)
         a_y = force / self.p.mass
         self.motion = drift(self.motion, h, a_y=a_y, dr=(moment + yaw_moment) / self.p.yaw_inertia)

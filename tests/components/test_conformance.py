@@ -79,6 +79,7 @@ ODD = {
     *wheels("slip_angle_*"),
     *wheels("aligning_moment_*"),
     *wheels("overturning_moment_*"),
+    *wheels("tyre_moment_z_*"),
     *wheels("inclination_angle_*"),
     *wheels("patch_slip_angle_*"),
 }

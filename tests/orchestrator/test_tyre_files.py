@@ -6,6 +6,7 @@ import hashlib
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fmus.build import build_all
@@ -13,6 +14,7 @@ from orchestrator.cli import main
 from orchestrator.errors import ScenarioError, WiringError
 from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.results.naming import default_folder
+from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.sweeps.planning import run_key
 from orchestrator.wiring.make_plan import make_plan
@@ -198,3 +200,19 @@ def test_a_unit_cannot_be_called_like_the_files(folder):
     path.write_text(path.read_text().replace("  tyre: ", "  tyres: "))
     with pytest.raises(ScenarioError, match="a unit cannot be named 'tyres'"):
         load_scenario(path)
+
+
+def test_aligning_moments_and_camber_come_by_connections(tmp_path):
+    """The scenario that shows them: without these connections the car moves otherwise, by a little."""
+    shown = Path(__file__).parents[2] / "scenarios" / "tyre_file" / "lane_change.yaml"
+    text = shown.read_text().replace("../vehicles", str(shown.parents[1] / "vehicles"))
+    (tmp_path / "both.yaml").write_text(text)
+    (tmp_path / "none.yaml").write_text(text[: text.index("connections:")])
+    peaks = {}
+    for name in ("both", "none"):
+        out = tmp_path / name
+        assert not yawbench(
+            ["run", str(tmp_path / f"{name}.yaml"), "--out", str(out), "--set", "stop_time=1.2"]
+        )
+        peaks[name] = np.max(np.abs(load_results(out)["plant.yaw_rate"]))
+    assert 0.002 < abs(peaks["both"] / peaks["none"] - 1.0) < 0.2
