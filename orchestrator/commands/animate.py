@@ -22,7 +22,7 @@ def animate(
     fmus: Fmus = None,
     no_build: NoBuild = False,
 ) -> None:
-    """Write a page that plays runs seen from above.
+    """Write a page that animates runs seen from above.
 
     Cars, paths, lanes, steer angles, tyre forces and their friction circles; of at most seven runs.
     A scenario is run first if its results are missing or were made from another scenario or FMU.

@@ -22,7 +22,7 @@ Target = Annotated[
         "--out", metavar="DIR", help="Folder for the FMUs; default: fmus/ of a checkout, else the cache."
     ),
 ]
-Force = Annotated[bool, typer.Option("--force", help="Build also what has not changed.")]
+Force = Annotated[bool, typer.Option("--force", help="Build even what has not changed.")]
 
 
 def build(components: Components = None, out: Target = None, force: Force = False) -> None:

@@ -31,10 +31,10 @@ What = Annotated[
 
 
 def cache(action: What = Action.show) -> None:
-    """Show, verify or clear what is kept to save time.
+    """Show, verify or clear the cache.
 
     Unpacked FMUs, the compiled launcher, keys of sources, and FMUs whose own folder cannot be
-    written. All of it is made anew when it is needed. A run that goes on may miss what is cleared.
+    written. All of it is made again when it is needed. A run in progress may miss what is cleared.
     """
     from ..cache import cache_folders
     from ..fmu.kept import kept_in, remove

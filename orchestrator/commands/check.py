@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..plan import Plan, Unit, Value, Wire
 
 All = Annotated[
-    bool, typer.Option("--all", help="Show every value, those too that are as the FMUs have them.")
+    bool, typer.Option("--all", help="Show every value, including those left at the defaults of the FMUs.")
 ]
 PIPE_WIDTH = 140
 """Columns of what goes into a pipe or a file."""
@@ -38,7 +38,7 @@ def check(
 ) -> None:
     """Validate a scenario; show units, values, wires.
 
-    With every value stands where it comes from, with the units the reason for their order.
+    Every value is shown with its origin, the units with the reason for their order.
     """
     plan = plan_of_scenario(scenario, swap, set_, fmus=fmus, build=not no_build, validate=not no_validate)
     show(plan, scenario, defaults=all_)
@@ -78,7 +78,7 @@ def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None
     _show(console, "Values", columns, values)
     if hidden:
         also = " or come from tyre files" if plan.scenario.get("tyre_files") else ""
-        console.print(f"  {hidden} more are as the FMUs have them{also}: --all shows them", style="dim")
+        console.print(f"  {hidden} more are left at the FMUs' defaults{also}: --all shows them", style="dim")
     _show(console, "Wires", ("from", "to", "variables"), _wire_rows(plan))
     direct = evaluate({unit.name: unit.fmu for unit in plan.units}, plan.wires).direct
     headings = ("unit", "after", "because its outputs follow")

@@ -12,7 +12,7 @@ Other = Annotated[Path, typer.Argument(help="Folder of the results to compare it
 
 
 def diff(one: One, other: Other) -> None:
-    """Tell what differs between two runs.
+    """Show what differs between two runs.
 
     First what they were made of: scenario, parameters, FMUs, connections, versions of programs. Then
     their results, signal by signal: from when on they differ, from when on a curve shows it (1 % of the

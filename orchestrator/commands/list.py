@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from .build import tell_of_build
 from .options import Fmus
 from .planning import plan_of_scenario
 
@@ -43,7 +42,7 @@ Place = Annotated[
 def list(what: Wanted = None, place: Place = None, fmus: Fmus = None) -> None:
     """List runs, scenarios, fmus, vehicles, signals or metrics.
 
-    Of runs it says when they began, of which scenario, what was changed, how they ended, and the largest
+    Runs are shown with when they began, their scenario, what was changed, how they ended, and the largest
     sideslip, yaw rate and lateral acceleration.
     """
     from ..results.runs import found_runs
@@ -83,6 +82,7 @@ def _folder_of_fmus(given: Path | None) -> Path:
     from ..errors import ModelDescriptionError
     from ..fmu.opener import HOME, Opener
     from ..fmu.search import find_folder
+    from .build import tell_of_build
 
     if given is None:
         folder = find_folder(Path("here"), opener=Opener(build=True))

@@ -38,9 +38,9 @@ class Language(str, Enum):
     c = "c"
 
 
-What = Annotated[Kind, typer.Argument(help="What to begin.", metavar="KIND")]
+What = Annotated[Kind, typer.Argument(help="What to write.", metavar="KIND")]
 Name = Annotated[str, typer.Argument(help="Its name: lower-case letters, digits and _.", metavar="NAME")]
-Written = Annotated[Language, typer.Option("--language", help="What it is written in.")]
+Written = Annotated[Language, typer.Option("--language", help="Language of a controller.")]
 Project = Annotated[
     Path | None,
     typer.Option(
@@ -52,12 +52,12 @@ Project = Annotated[
 
 
 def new(kind: What, name: Name, language: Written = Language.python, out: Project = None) -> None:
-    """Write something to begin with that works as it stands.
+    """Write a starting point that works as it stands.
 
     KIND is a unit (controller, driver, reference, tyre, plant), written with its test and a scenario that
-    uses it; a vehicle with a scenario; a scenario; or a study or sweep of one. What to do next is
-    printed. In a checkout of yawbench the files stand among its own, so `yawbench build` finds
-    them; elsewhere in folders controllers, tests, scenarios and so on. Nothing is ever overwritten.
+    uses it; a vehicle with a scenario; a scenario; or a study or sweep of one. The next steps are
+    printed. In a checkout of yawbench the files are put among its own, where `yawbench build` finds them;
+    elsewhere into folders controllers, tests, scenarios and so on. Nothing is ever overwritten.
     """
     from fmus.build import COMPONENTS, find_recipes
 

@@ -58,14 +58,14 @@ NoBuild = Annotated[
     typer.Option(
         "--no-build",
         envvar="YAWBENCH_NO_BUILD",
-        help="Take FMUs as they are, also those whose sources have changed; they are built anew otherwise.",
+        help="Use FMUs as they are, even if their sources have changed; by default they are rebuilt.",
     ),
 ]
 NoValidate = Annotated[
     bool,
     typer.Option(
         "--no-validate",
-        help="Use FMUs whose model descriptions are formally wrong, and warn of what is wrong.",
+        help="Accept FMUs whose model descriptions are formally wrong, with a warning that says what is.",
     ),
 ]
 Format = Annotated[
@@ -73,14 +73,14 @@ Format = Annotated[
     typer.Option(
         "--format",
         metavar="FORMAT",
-        help="Of the results: csv; parquet or mf4 (ASAM MDF 4), smaller and with units.",
+        help="Format of the results: csv; parquet or mf4 (ASAM MDF 4), which are smaller and hold units.",
     ),
 ]
 Isolate = Annotated[
     bool,
     typer.Option(
         "--isolate",
-        help="Give each unit a process of its own: if its FMU crashes or hangs, the run ends with "
+        help="Run each unit in a process of its own: if its FMU crashes or hangs, the run ends with "
         "an error and the results so far. Same numbers; 30 to 70 µs more per unit and step.",
     ),
 ]
@@ -89,7 +89,7 @@ CallLimit = Annotated[
     typer.Option(
         "--call-limit",
         metavar="TIME",
-        help="With --isolate: how long a call of an FMU may take, such as '500 ms'; default: 10 s.",
+        help="With --isolate: the longest that a call of an FMU may take, such as '500 ms'; default: 10 s.",
     ),
 ]
 

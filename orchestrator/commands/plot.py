@@ -33,7 +33,7 @@ def plot(
     isolate: Isolate = False,
     call_limit: CallLimit = None,
 ) -> None:
-    """Draw runs, one or several laid over each other.
+    """Draw runs, one or several overlaid.
 
     Figures are written as SVG and PNG. A scenario is run first if its results (those of `yawbench
     run` without --out) are missing or were made from another scenario or FMU. Without --out, the

@@ -14,9 +14,7 @@ if TYPE_CHECKING:
 
 Sources = Annotated[
     list[Path],
-    typer.Argument(
-        help="Folders of results, or scenarios; several are laid over each other.", metavar="RESULTS..."
-    ),
+    typer.Argument(help="Folders of results, or scenarios; several are overlaid.", metavar="RESULTS..."),
 ]
 Labels = Annotated[
     list[str] | None,

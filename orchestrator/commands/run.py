@@ -65,9 +65,9 @@ def run(
 ) -> None:
     """Run a scenario and write results.csv and run.json.
 
-    Without --out, results go to results/<folder of the scenario>/<its name>, with what --swap and --set
-    change behind the name, or to NAME in its place. Those of an earlier run there are replaced; by a run
-    that fails only if that failed too, else its own go to failed/ beside them.
+    Without --out, results go to results/<folder of the scenario>/<its name>, followed by what --swap
+    and --set change, or to results/NAME. They replace those of an earlier run there, except that a
+    failed run never replaces a good one: its results go to a folder failed/ below.
     """
     from ..errors import ScenarioError
     from ..master.isolation import opener_of

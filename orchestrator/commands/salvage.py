@@ -7,13 +7,11 @@ from typing import Annotated
 
 import typer
 
-Folders = Annotated[
-    list[Path], typer.Argument(help="Folders of runs that ended without a word.", metavar="FOLDER...")
-]
+Folders = Annotated[list[Path], typer.Argument(help="Folders of runs that died.", metavar="FOLDER...")]
 
 
 def salvage(folders: Folders) -> None:
-    """Keep what runs recorded before they died.
+    """Recover what runs recorded before they died.
 
     Killed processes leave files that end in .part. The whole rows among them become results with the
     status "died"; if results of an earlier run stand in the folder they go to failed/ beside those, which

@@ -146,7 +146,7 @@ def test_defaults_that_do_not_matter_are_shown_on_request(capsys: pytest.Capture
     assert check("Läufe 2/a.yaml") == 0
     shown = capsys.readouterr().out
     assert " gain " not in shown
-    assert "1 more are as the FMUs have them: --all shows them" in shown
+    assert "1 more are left at the FMUs' defaults: --all shows them" in shown
     assert check("Läufe 2/a.yaml", "--all") == 0
     rows = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert ["gain", "3", "default", "driver"] in rows
