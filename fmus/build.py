@@ -20,12 +20,12 @@ from components.fmi.roles import ROLES
 from orchestrator.cache import draft_of
 from orchestrator.errors import BuildError
 
-from .archive import to_bytes
-from .c.recipe import CRecipe, find_c_components
+from .c.c_recipe import CRecipe, find_c_components
 from .check import defects
 from .closure import Parts, Sources
 from .compiler import compile_launcher
 from .mark import Mark, read_mark
+from .packing import to_bytes
 from .presentation import CREDITS, presented
 from .recipe import TOOL, PythonRecipe, Recipe, natural_name
 

@@ -14,10 +14,10 @@ from typing import Any, Protocol
 from components.fmi.roles import ROLES
 from orchestrator.errors import BuildError
 
-from .archive import pack
 from .closure import PYTHONFMU, Parts, Sources
 from .compiler import compile_launcher, compiler_tools
 from .evidence import Looks
+from .packing import pack
 from .presentation import icon
 from .staging import missing_signals, staged, variant
 

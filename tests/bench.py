@@ -24,7 +24,7 @@ from orchestrator.master.interrupts import StopFlag
 from orchestrator.master.log import Log
 from orchestrator.master.master import Master
 from orchestrator.master.opening import open_unit
-from orchestrator.master.program import Operation
+from orchestrator.master.operations import Operation
 from orchestrator.plan import Plan
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan

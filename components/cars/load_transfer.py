@@ -13,7 +13,7 @@ from typing import Protocol
 
 from vocabulary.wheels import Four
 
-from ..mathematics.constants import G
+from ..mathematics.gravity import G
 from .plane_body import Geometry
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ..fmi.variables import parameter
-from ..mathematics.constants import G
+from ..mathematics.gravity import G
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from math import sin
 from vocabulary.wheels import Four
 
 from ..fmi.variables import parameter
-from ..mathematics.constants import G
+from ..mathematics.gravity import G
 from .car import StartParameters
 from .published_cars import PaperB
 from .resistance import Resistance, ResistanceParameters

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..fmi.variables import parameter
-from ..mathematics.constants import G
+from ..mathematics.gravity import G
 from .car import StartParameters
 from .published_cars import PaperC
 from .resistance import ResistanceParameters

@@ -8,7 +8,7 @@
 
 l wheelbase, K stability factor: the driver knows how the car steers while its tyres are linear. With a
 car that followed at once, the path would be approached as by an oscillator of
-sqrt(2) / T_p and damping ratio 0.7. The path and the cones: `driving.lane_change`. The speed:
+sqrt(2) / T_p and damping ratio 0.7. The path and the cones: `driving.track`. The speed:
 `driving.speed_holding`.
 
 `path_offset` is the car's own distance from the path, `cone_overrun` how far the body is beyond the cones.
@@ -24,8 +24,8 @@ from math import cos, sin
 
 from ..cars.published_cars import PaperC
 from ..cars.single_track_car import SingleTrackCar
-from ..driving.lane_change import LaneChangeParameters, Track
 from ..driving.speed_holding import HeldSpeedParameters, SpeedHold
+from ..driving.track import LaneChangeParameters, Track
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter
 from ..mathematics.first_order_lag import Stage

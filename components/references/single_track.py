@@ -32,7 +32,7 @@ from ..cars.published_cars import PaperB
 from ..cars.single_track_car import SingleTrackCar
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
-from ..mathematics.constants import G
+from ..mathematics.gravity import G
 from ..mathematics.integrators import rk4
 from ..mathematics.slope import Slope
 

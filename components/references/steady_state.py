@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from ..cars.published_cars import PaperA
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
-from ..mathematics.constants import G
+from ..mathematics.gravity import G
 from ..mathematics.slope import Slope
 
 SMALLEST = 1e-3

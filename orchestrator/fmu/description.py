@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 from ..errors import ModelDescriptionError
 from ..plan import Fmu, UnitDefinition, Variable
 from .binary import binary_of, lacking
-from .variables import scalars
+from .scalars import scalars
 
 SUPPORTED = "supported are FMI 2.0 and 3.0 for co-simulation"
 

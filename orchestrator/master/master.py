@@ -27,7 +27,7 @@ from .initialization import initialize
 from .interrupts import StopFlag
 from .log import DISCARD, MASTER, OK, WARNING, Log
 from .memory import Memory
-from .program import Operation, Programs
+from .operations import Operation, Programs
 from .slave import Buffers, Slave, Status
 from .surroundings import Surroundings
 

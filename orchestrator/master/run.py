@@ -14,8 +14,8 @@ from typing import Any
 from ..errors import Problem, ResultsError, SimulationError, YawbenchError
 from ..metrics.plausibility import Watch
 from ..plan import Plan
-from ..results.columnar import MemoryRecorder
 from ..results.folder import COMPLETED, RUNNING
+from ..results.in_memory import MemoryRecorder
 from ..results.recorder import Recorder
 from ..results.run_record import run_record
 from .apart import CourseApart

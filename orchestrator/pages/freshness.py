@@ -11,8 +11,7 @@ from typing import Any
 from ..errors import ResultsError
 from ..plan import Plan
 from ..results.digest import checksum
-from ..results.folder import COMPLETED, is_dead
-from ..results.formats import RESULTS_FILE, RUN_FILE
+from ..results.folder import COMPLETED, RESULTS_FILE, RUN_FILE, is_dead
 from ..results.read import load_results
 from ..results.record import load_record
 from ..results.run_record import run_record

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..errors import ScenarioError
 from ..plan import Plan
-from ..results.formats import RUN_FILE
+from ..results.folder import RUN_FILE
 from ..scenario import catalogue, yaml_lines
 from ..scenario.load import Scenario
 from ..studies.jobs import Job, Once, planned

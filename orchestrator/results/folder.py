@@ -21,9 +21,16 @@ from typing import Any
 from ..errors import ResultsError
 from ..files import read_bytes
 from ..writing import NEW, reason
-from .formats import FILES, PART, RESULTS_FILE, RUN_FILE
 from .lock import Lock, holder_of
 
+RESULTS_FILE = "results.csv"
+RUN_FILE = "run.json"
+
+FILES = {"csv": RESULTS_FILE, "parquet": "results.parquet", "mf4": "results.mf4"}
+"""Format -> name of its file. CSV is the default: every program reads it, and it survives a kill."""
+
+PART = ".part"
+"""What the names of a run's files end in while it goes on."""
 LARGEST = 100_000_000
 """Bytes of a record. Chosen: a thousand times what one of ours has."""
 FAILED = "failed"

@@ -11,18 +11,10 @@ import numpy as np
 
 from ..errors import ScenarioError
 from ..wording import hint
+from .folder import FILES
 
 if TYPE_CHECKING:
     from .recorder import Recorder
-
-RESULTS_FILE = "results.csv"
-RUN_FILE = "run.json"
-
-FILES = {"csv": RESULTS_FILE, "parquet": "results.parquet", "mf4": "results.mf4"}
-"""Format -> name of its file. CSV is the default: every program reads it, and it survives a kill."""
-
-PART = ".part"
-"""What the names of a run's files end in while it goes on."""
 
 _RECORDERS = {"csv": "recorder.Recorder", "parquet": "parquet.ParquetRecorder", "mf4": "mdf.MdfRecorder"}
 

@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import ResultsError
 from ..titles import changes_in, with_changes
 from .columnar import ColumnRecorder, plain
-from .formats import FILES
+from .folder import FILES
 
 
 def asammdf() -> ModuleType:

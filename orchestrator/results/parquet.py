@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import ResultsError
 from .columnar import ColumnRecorder, plain
-from .formats import FILES
+from .folder import FILES
 
 if TYPE_CHECKING:
     import pyarrow as pa

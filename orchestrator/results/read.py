@@ -16,8 +16,8 @@ from ..files import check_regular, reads, reason
 from ..scenario.measurement_units import conversion, measure_of
 from ..wording import listed, short
 from .digest import checksum
-from .folder import COMPLETED
-from .formats import FILES, RESULTS_FILE, RUN_FILE, source_of
+from .folder import COMPLETED, FILES, RESULTS_FILE, RUN_FILE
+from .formats import source_of
 from .record import load_record
 from .thinning import thinned
 

@@ -11,8 +11,7 @@ from pydantic import BaseModel, ConfigDict, NonNegativeInt, ValidationError
 from ..errors import ResultsError
 from ..files import read_bytes, reading, reason
 from ..wording import short
-from .folder import FAILED, LARGEST, settle
-from .formats import FILES, RUN_FILE
+from .folder import FAILED, FILES, LARGEST, RUN_FILE, settle
 
 
 class _Part(BaseModel):

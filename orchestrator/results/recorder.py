@@ -26,8 +26,7 @@ from ..errors import ResultsError
 from ..plan import Value
 from ..writing import reason, write_whole
 from .digest import checksum, shown
-from .folder import RUNNING, put_in_place, tidy
-from .formats import PART, RESULTS_FILE, RUN_FILE
+from .folder import PART, RESULTS_FILE, RUN_FILE, RUNNING, put_in_place, tidy
 from .lock import Lock
 
 BLOCK = 512

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ResultsError
-from .folder import DIED, RUNNING, is_dead, unfinished
-from .formats import PART, RUN_FILE
+from .folder import DIED, PART, RUN_FILE, RUNNING, is_dead, unfinished
 from .record import load_record
 
 

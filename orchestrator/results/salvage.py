@@ -11,8 +11,7 @@ from ..files import open_regular
 from ..writing import reason, write_whole
 from .csv_file import CsvFile
 from .digest import checksum
-from .folder import DIED, is_dead, put_in_place, tidy, unfinished
-from .formats import FILES, PART, RESULTS_FILE, RUN_FILE
+from .folder import DIED, FILES, PART, RESULTS_FILE, RUN_FILE, is_dead, put_in_place, tidy, unfinished
 from .lock import Lock
 
 WHY = "the process of this run ended without a word"

@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 from ..plan import Plan
-from .formats import FILES
+from .folder import FILES
 
 BYTES = {"csv": 17, "parquet": 7, "mf4": 5}
 """Bytes per value, measured on one run of each of the papers A to D and rounded."""

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from components.drivers.double_lane_change import DoubleLaneChange
-from components.driving.lane_change import LaneChangeParameters, Track
+from components.driving.track import LaneChangeParameters, Track
 
 from .stand import Stand
 

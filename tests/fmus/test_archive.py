@@ -15,11 +15,11 @@ from lxml import html
 
 from components.fmi.roles import ROLES
 from fmus import compiler
-from fmus.archive import to_bytes
 from fmus.build import COMPONENTS, build_all, build_component, find_components, put
 from fmus.build import HERE as FMUS
 from fmus.compiler import compile_launcher
 from fmus.mark import read_mark
+from fmus.packing import to_bytes
 from orchestrator.cache import content_of
 from orchestrator.errors import BuildError
 

@@ -13,7 +13,7 @@ import pytest
 
 from fmus.build import HERE as FMUS
 from fmus.build import build_all, build_component
-from fmus.c.recipe import TO_WINDOWS
+from fmus.c.c_recipe import TO_WINDOWS
 from fmus.mark import read_mark
 from orchestrator.errors import BuildError
 from orchestrator.scaffold.beginnings import begin

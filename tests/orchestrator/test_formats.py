@@ -16,8 +16,9 @@ from orchestrator.cli import main
 from orchestrator.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
 from orchestrator.master.simulate import simulate, simulate_in_memory
 from orchestrator.results import parquet
-from orchestrator.results.columnar import MemoryRecorder
-from orchestrator.results.formats import FILES, recorder_of
+from orchestrator.results.folder import FILES
+from orchestrator.results.formats import recorder_of
+from orchestrator.results.in_memory import MemoryRecorder
 from orchestrator.results.read import load_results
 from orchestrator.results.recorder import BLOCK
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import sys
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -128,3 +129,39 @@ def words_of(names: set[str]) -> dict[str, set[str]]:
 def test_wheels_and_symbols_are_listed_in_the_vocabulary_alone(words):
     lists = [file for file, found in words_of(words).items() if len(found) > 2]
     assert len(lists) == 1 and lists[0].startswith("vocabulary/")
+
+
+def modules() -> dict[str, Path]:
+    """Return every module of the product by its dotted name."""
+    found = {}
+    for folder in PRODUCT:
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            parts = path.relative_to(ROOT).with_suffix("").parts
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def needs(name: str, files: dict[str, Path]) -> set[str]:
+    """Return the modules that a module imports, also inside functions, but not for its types alone."""
+    path = files[name]
+    package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
+    found = set()
+    waiting: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
+    while waiting:
+        for node in ast.iter_child_nodes(waiting.pop()):
+            if isinstance(node, ast.ImportFrom):
+                base = package[: len(package) - node.level + 1] if node.level else []
+                module = ".".join([*base, *([node.module] if node.module else [])])
+                names = [f"{module}.{alias.name}" for alias in node.names]
+                found |= {one if one in files else module for one in names}
+            elif isinstance(node, ast.Import):
+                found |= {alias.name for alias in node.names}
+            elif not (isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")):
+                waiting.append(node)
+    return (found & files.keys()) - {name}
+
+
+def test_no_module_imports_itself_by_way_of_others():
+    files = modules()
+    sorter = TopologicalSorter({name: needs(name, files) for name in files})
+    sorter.prepare()  # a CycleError names the circle

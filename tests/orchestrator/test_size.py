@@ -10,7 +10,7 @@ import pytest
 from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.results import size
-from orchestrator.results.formats import FILES
+from orchestrator.results.folder import FILES
 from orchestrator.results.size import BYTES, expected_size, size_note
 
 from .fakes import Clock, make_plan

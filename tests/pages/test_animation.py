@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components.driving.lane_change import LaneChangeParameters
+from components.driving.track import LaneChangeParameters
 from orchestrator.cli import main
 from orchestrator.pages.animation import assets, fragment, page
 from orchestrator.pages.animation_frames import FRAMES

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from components.driving.lane_change import LaneChangeParameters, Track
+from components.driving.track import LaneChangeParameters, Track
 from orchestrator.errors import ResultsError
 from orchestrator.pages.animation import data_of, force_scale, page, still_of
 from orchestrator.pages.animation_frames import FRAMES, frames_of, rotated, thinned

@@ -16,9 +16,9 @@ import numpy as np
 
 from ..plan import Place
 from .coupling import Weights, weights
+from .feeding import feeding
 from .log import OK
 from .memory import Memory, Station
-from .series import feeding
 from .slave import Status
 
 KEPT = 1024

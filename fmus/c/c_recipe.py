@@ -29,11 +29,11 @@ from .declaration import DESCRIPTION, header, read_declaration
 
 HERE = Path(__file__).resolve().parent
 SHARED = (
-    HERE / "recipe.py",
+    Path(__file__),
     HERE / "declaration.py",
     HERE / "unit.h",
     HERE.parent / "fmi2.h",
-    HERE.parent / "archive.py",
+    HERE.parent / "packing.py",
     HERE.parent / "presentation.py",
 )
 """What has a say in the FMU of every unit in C."""
