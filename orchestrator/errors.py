@@ -16,6 +16,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .plan import Finding
 
 
 class Problem(str):
@@ -126,3 +130,4 @@ class SimulationError(YawbenchError):
         super().__init__(problem)
         self.unit = unit
         self.time = time
+        self.findings: tuple[Finding, ...] = ()  # on the run's course until then

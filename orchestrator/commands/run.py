@@ -6,8 +6,8 @@ import contextlib
 import os
 import sys
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
-from typing import Annotated
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -26,6 +26,9 @@ from .options import (
     isolation,
 )
 from .planning import plan_of_scenario
+
+if TYPE_CHECKING:
+    from ..plan import Finding
 
 Metrics = Annotated[
     list[str] | None,
@@ -69,11 +72,10 @@ def run(
     and --set change, or to results/NAME. They replace those of an earlier run there, except that a
     failed run never replaces a good one: its results go to a folder failed/ below.
     """
-    from ..errors import ScenarioError
+    from ..errors import ScenarioError, SimulationError
     from ..master.isolation import opener_of
     from ..master.log import STATUS, WARNING
     from ..master.simulate import simulate
-    from ..metrics.plausibility import first_of_each
     from ..results.formats import check_format
     from ..results.lock import refuse_below_others
     from ..results.naming import default_folder
@@ -100,8 +102,12 @@ def run(
     if plan.changes:
         say(f"changed: {changed(plan.changes)}")
     title = with_changes(plan.title or scenario.stem, plan.changes)
-    with _bar(title) as progress, opener_of(plan, limit) as opener:
-        info = simulate(plan, folder, progress=progress, opener=opener, format=format_, apart=True)
+    try:
+        with _bar(title) as progress, opener_of(plan, limit) as opener:
+            info = simulate(plan, folder, progress=progress, opener=opener, format=format_, apart=True)
+    except SimulationError as error:
+        _say_findings(error.findings)
+        raise
     for message in info.warnings[:SHOWN]:
         grade = "" if message.status == WARNING else f"{STATUS[message.status]}: "
         text = " ".join(message.text.split())
@@ -110,8 +116,7 @@ def run(
         say(f"warning: {len(info.warnings) - SHOWN} more, see {folder / 'run.json'}")
     if info.ended:
         say(f"ended: {info.ended}")
-    for finding in first_of_each(info.findings):
-        say(f"note: {finding.says}")
+    _say_findings(info.findings)
     say(f"{folder}: {info.rows} rows of {info.columns} variables in {info.wall_time:.2f} s")
     if metrics:
         from ..metrics.run_metrics import columns_for
@@ -121,6 +126,13 @@ def run(
 
         needed = load_results(folder, only=lambda recorded: columns_for(recorded, metrics))
         print_tables([metrics_of_run(needed, metrics)])
+
+
+def _say_findings(findings: Iterable[Finding]) -> None:
+    from ..metrics.plausibility import first_of_each
+
+    for finding in first_of_each(findings):
+        say(f"note: {finding.says}")
 
 
 def _metric_names(given: Sequence[str]) -> list[str]:

@@ -87,6 +87,8 @@ class Run:
         with contextlib.suppress(SimulationError):  # the disk may be why; what fits has been kept
             self._course.flush()
         problems = error.problems if isinstance(error, YawbenchError) else []
+        if isinstance(error, SimulationError):
+            error.findings = self.watch.findings()
         try:
             self._save("interrupted" if isinstance(error, Interrupted) else "failed", error)
         except ResultsError as lost:

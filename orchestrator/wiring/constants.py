@@ -57,7 +57,7 @@ def constants(
 
         read = series_reader(scenario)
     inputs = {unit: {v.name: v for v in fmu.of("input")} for unit, fmu in fmus.items()}
-    found = dict(_of_facts(scenario, inputs, problems))
+    found = dict(_of_facts(scenario, inputs, replaced, notes, problems))
     fact_changed = any(one.level == CHANGED_FACT for one in found.values())
     for pattern, raw in scenario.inputs.items():
         key: Key = ("inputs", pattern)
@@ -96,14 +96,21 @@ def constants(
 
 
 def _of_facts(
-    scenario: Scenario, known: Mapping[str, Mapping[str, Variable]], problems: list[tuple[Key, str]]
+    scenario: Scenario,
+    known: Mapping[str, Mapping[str, Variable]],
+    replaced: Replaced,
+    notes: list[str],
+    problems: list[tuple[Key, str]],
 ) -> Iterator[tuple[Input, Constant]]:
     """Yield what facts give to inputs."""
     for name, fact, raw, changed in facts_of(scenario):
         key: Key = (name,)
         takers = [(unit, one) for unit, inputs in known.items() for one in fact.inputs if one in inputs]
         if fact.inputs and not takers:
-            problems.append((key, f"no unit has an input {name}"))
+            if not changed and any(had(scenario, replaced, known, one, "input") for one in fact.inputs):
+                notes.append(f"{name} is left out: no unit has such an input after the swap")
+            else:
+                problems.append((key, f"no unit has an input {name}"))
         for unit, one in takers:
             value = raw
             try:

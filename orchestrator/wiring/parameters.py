@@ -12,6 +12,7 @@ from ..scenario.load import Scenario
 from ..scenario.yaml_lines import Document, Key
 from ..wording import closest, fold, hint, listed, short
 from .facts import facts_of
+from .patterns import had
 
 LARGEST, LARGEST_SINGLE = sys.float_info.max, (2 - 2**-23) * 2.0**127
 """Numbers of double and single precision."""
@@ -139,7 +140,14 @@ class Parameters:
             for unit, name in takers:
                 self._put(given, unit, name, raw, self._scenario.document, (fact_name,))
             by_change.update(takers if changed else ())
-            if fact.parameters and not takers:
+            if not fact.parameters or takers:
+                continue
+            before = [
+                had(self._scenario, self._replaced, self._fmus, name, "parameter") for name in fact.parameters
+            ]
+            if any(before) and not changed:
+                self._notes.append(f"{fact_name} is left out: no unit has such a parameter after the swap")
+            else:
                 sentence = f"no unit has a parameter {listed(fact.parameters, last='or')}"
                 self._scenario.document.report((fact_name,), sentence)
         return by_change

@@ -445,3 +445,12 @@ def test_300_runs_in_one_process_neither_leak_nor_take_more_work(fmus, tmp_path)
     assert late[1] <= early[1]
     # PythonFMU's library itself loses 1.3 kB per instance, measured over 500 runs.
     assert late[2] - early[2] < 2.6e3 * 250 * units
+
+
+def test_what_was_remarkable_in_a_run_that_failed_is_said_before_why_it_failed(faulty, yawbench, tmp_path):
+    scenario = faulty(act="raise ValueError('no')")
+    status, said = yawbench(scenario, "--out", tmp_path / "o", "--set", "driver.amplitude=3")
+    lines = [line for line in said.splitlines() if not line.startswith(("changed:", "note: driver"))]
+    assert status == 1
+    assert lines[0].startswith("note: the front wheels are steered by ")
+    assert lines[1].startswith("controller: step failed at t = 0.05 s: ValueError: no")

@@ -396,6 +396,25 @@ def test_a_constant_and_a_connection_of_the_replaced_fmu_are_left_out_with_a_not
     assert made.record == ()
 
 
+def test_friction_and_speed_that_nobody_takes_after_a_swap_are_left_out_with_a_note(folder: Path) -> None:
+    speed = [Var("initial_speed", "m/s")]
+    make_fmu(folder / "plant_one.fmu", inputs=[Var("friction_fl", "1")], outputs=["x"], parameters=speed)
+    make_fmu(folder / "plant_two.fmu", outputs=["x"])
+    units = "  plant: {fmu: plant_one}\n"
+    path = scenario(units, "", head="friction: 0.4\nspeed: 20\n")
+    assert plan(path, swaps=["plant=plant_two"]).notes[:2] == (
+        "speed is left out: no unit has such a parameter after the swap",
+        "friction is left out: no unit has such an input after the swap",
+    )
+    for setting in ("friction=0.3", "speed=30"):
+        assert len(problems(path, swaps=["plant=plant_two"], settings=[setting])) == 1
+    alone = scenario(units.replace("one", "two"), "", head="friction: 0.4\nspeed: 20\n")
+    assert [said.partition(": ")[2] for said in problems(alone)] == [
+        "friction: no unit has an input friction",
+        "speed: no unit has a parameter initial_speed or target_speed",
+    ]
+
+
 def test_a_swap_works_though_the_replaced_fmu_is_not_there(folder: Path) -> None:
     units = UNITS.replace("controller_fnn, step_size: 2 ms", "gone, parameters: {secret: 1}")
     made = plan(scenario(units), swaps=["controller=controller_off"])

@@ -48,6 +48,18 @@ def test_animate_writes_one_page_of_one_run_or_two(yawbench, tmp_path, monkeypat
     assert "<p>Sine at 25 m/s</p>" in html
 
 
+def test_animate_makes_the_run_of_a_scenario_once_and_lays_another_beside_it(yawbench, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    scenario, short = "fuzzy_feedback/single_sine", ("--set", "stop_time=0.05 s")
+    status, said = yawbench("animate", scenario, *short)
+    assert (status, "[1/1]" in said) == (0, True)
+    (made,) = Path("results").rglob("animation.html")
+    assert "stop_time" in made.parent.name
+    assert "changed: stop_time = 0.05 s" in made.read_text(encoding="utf-8")
+    status, said = yawbench("animate", scenario, str(made.parent), *short, "--out", "two.html")
+    assert (status, said.split(":")[0]) == (0, "two.html")  # nothing is run again
+
+
 def test_animate_refuses_what_it_cannot_show(yawbench, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write(without(whole_car(), "position"), tmp_path / "still")
