@@ -181,15 +181,17 @@ def _tell_where(channel: Channel, asking: int) -> None:
     stepping, process = threading.get_ident(), os.getpid()
 
     def answer() -> None:
-        while os.read(asking, 1):
-            channel.send(WHERE, _whereabouts(stepping))
+        with contextlib.suppress(OSError):  # the other side is gone
+            while os.read(asking, 1):
+                channel.send(WHERE, _whereabouts(stepping))
 
     threading.Thread(target=answer, daemon=True).start()
 
     @ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.c_void_p)
     def at_exit(status: int, _: int | None) -> None:
         if os.getpid() == process:
-            channel.send(WHERE, _whereabouts(stepping))
+            with contextlib.suppress(OSError):
+                channel.send(WHERE, _whereabouts(stepping))
         os._exit(status)
 
     _kept.append(at_exit)

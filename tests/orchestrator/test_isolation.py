@@ -208,3 +208,24 @@ def test_a_limit_that_is_no_time_is_refused(option, says, capsys):
         main(["run", str(CAR), "--isolate", "--call-limit", option])
     assert exit_.value.code == 2
     assert says in capsys.readouterr().err
+
+
+NOBODY = """
+import os, threading
+from orchestrator.master.exchange import Channel
+from orchestrator.master.stepping import _tell_where
+nobody, writing = os.pipe()
+os.close(nobody)
+asking, ask = os.pipe()
+_tell_where(Channel(asking, writing), asking)
+(thread,) = set(threading.enumerate()) - {threading.main_thread()}
+os.write(ask, b"?")
+thread.join(10)
+os._exit(0)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="runs are made apart on Linux")
+def test_an_answer_that_nobody_waits_for_any_more_is_no_traceback():
+    done = subprocess.run([sys.executable, "-c", NOBODY], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
