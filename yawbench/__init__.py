@@ -4,7 +4,7 @@
 
     run = yb.load("fnn_sideslip/25mps").swap(controller="controller_off").run()
     run["plant.sideslip"], run.time      # numpy arrays, in SI units
-    run.metric("peak(sideslip)")         # 0.0526...
+    run.metric("peak(sideslip)")         # 0.0548 rad
     run.plot("sideslip", "yaw_rate")     # a matplotlib figure
 
 A controller may be plain Python, run in this process; `yawbench build` makes an FMU of one that has

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import doctest
+import re
+import textwrap
 
 import matplotlib.pyplot as plt
 import pytest
@@ -40,6 +42,20 @@ def test_the_use_that_a_docstring_shows_is_so(name, shown):
         doctest.DocTestRunner(optionflags=FLAGS).run(one, out=said.append)
     plt.close("all")
     assert not said, "".join(said)
+
+
+def test_the_programs_in_the_docstring_of_the_package_run_and_say_the_truth(shown):
+    blocks = re.findall(r"\n\n((?:    .*\n|\n)+)", (yb.__doc__ or "").partition("YawbenchError\n")[0])
+    program = textwrap.dedent("".join(blocks))
+    names: dict[str, object] = {}
+    exec(program, names)
+    plt.close("all")
+    told = re.search(r"# ([\d.]+) rad", program)
+    run = names["run"]
+    assert isinstance(run, yb.Run)
+    assert told is not None
+    assert f"{run.metric('peak(sideslip)'):.4f}" == told[1]
+    assert "def " in program
 
 
 def test_public_methods_without_an_example_are_obvious():
