@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from .plan import Finding
 
 
+KEPT = "kept"
+"""Kind of the problem that names the results of a run that failed."""
+
+
 class Problem(str):
     """What is wrong: a sentence that begins with its place, and knows that place.
 
@@ -30,19 +34,21 @@ class Problem(str):
         file: in which it is; None: in none.
         line: of the file; None: in no line of it.
         place: the value, such as "units.plant.fmu", or the change that gave it; "" if it is no value.
+        kind: KEPT, or "" of most.
     """
 
     text: str
     file: Path | None
     line: int | None
     place: str
+    kind: str
 
     def __new__(
-        cls, text: str, *, file: Path | None = None, line: int | None = None, place: str = ""
+        cls, text: str, *, file: Path | None = None, line: int | None = None, place: str = "", kind: str = ""
     ) -> Problem:
         where = f"{file}:{line}" if file and line else f"{file or ''}"
         made = super().__new__(cls, ": ".join(filter(None, (where, place, text))))
-        made.text, made.file, made.line, made.place = text, file, line, place
+        made.text, made.file, made.line, made.place, made.kind = text, file, line, place, kind
         return made
 
 

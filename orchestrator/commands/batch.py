@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import time
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,8 +15,8 @@ import typer
 from ..wording import printable
 
 if TYPE_CHECKING:
-    from ..studies.jobs import Job, Outcome
-    from ..studies.tables import Table
+    from ..experiments.jobs import Outcome
+    from ..experiments.tables import Table
 
 Jobs = Annotated[
     int | None,
@@ -27,22 +29,6 @@ WIDTH = 140
 def say(text: str) -> None:
     """Write a message for the user, apart from what the command gives out."""
     print(printable(text), file=sys.stderr, flush=True)
-
-
-def run_all(jobs: Sequence[Job], folder: Path, *, workers: int | None, build: bool) -> list[Outcome]:
-    """Run all jobs, after making sure that every one can start, and report each as it ends.
-
-    `build`: build first what is stale of the FMUs that they use.
-
-    Raises:
-        BuildError, ScenarioError: a job cannot start; none has been.
-    """
-    from ..studies.jobs import check, execute
-
-    for note in check(jobs, build=build):
-        say(f"note: {note}")
-    with stoppable(folder):
-        return execute(jobs, workers=workers, done=_progress(len(jobs)))
 
 
 def hold(context: typer.Context, *folders: Path) -> None:
@@ -66,23 +52,78 @@ def stoppable(folder: Path) -> Iterator[None]:
         raise typer.Exit(1) from None
 
 
-def _progress(total: int) -> Callable[[Outcome], None]:
-    width, count = len(str(total)), 0
+@contextlib.contextmanager
+def reported(
+    title: str, total: int, done: int = 0, *, each: bool = True
+) -> Iterator[Callable[[Outcome], None]]:
+    """Tell of runs as they end: a bar on a terminal, elsewhere a line each or a line now and then.
 
-    def done(outcome: Outcome) -> None:
-        nonlocal count
-        count += 1
-        ended = f"{outcome.seconds:.1f} s" if outcome.ok else f"failed: {outcome.reason}"
-        say(f"[{count:{width}}/{total}] {outcome.job.label}: {ended}")
+    Args:
+        title: of the bar.
+        total: runs in all.
+        done: how many of them are finished already.
+        each: whether to write a line for each run; else for every tenth of those that are left.
+    """
+    width, count = len(str(total)), done
+    with bar(title, total, done, quiet=each) as progress:
 
-    return done
+        def told(outcome: Outcome) -> None:
+            nonlocal count
+            count += 1
+            progress(count)
+            if each:
+                ended = f"{outcome.seconds:.1f} s" if outcome.ok else f"failed: {outcome.reason}"
+                say(f"[{count:{width}}/{total}] {outcome.job.label}: {ended}")
+
+        yield told
+
+
+@contextlib.contextmanager
+def bar(title: str, total: int, done: int = 0, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
+    """Show progress and the time left: a bar on a terminal, elsewhere a line now and then, or none."""
+    if not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
+        yield (lambda count: None) if quiet else _lines(total, done)
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("left"),
+        TimeRemainingColumn(), TextColumn("so far"), TimeElapsedColumn(),
+    )  # fmt: skip
+    # time left from the pace of the last runs; they differ less than their number
+    with Progress(*columns, console=Console(stderr=True), transient=True, speed_estimate_period=120) as shown:
+        task = shown.add_task(title.replace("[", r"\["), total=total, completed=done)
+        yield lambda count: shown.update(task, completed=count)
+
+
+def _lines(total: int, done: int) -> Callable[[int], None]:
+    """Return what writes a line for every tenth of the runs that are left."""
+    began, last = time.monotonic(), done
+
+    def told(count: int) -> None:
+        nonlocal last
+        if count < total and 10 * (count - last) < total - done:
+            return
+        last = count
+        left = (time.monotonic() - began) / (count - done) * (total - count)
+        say(f"[{count:{len(str(total))}}/{total}]" + (f" {left:.0f} s left" if count < total else ""))
+
+    return told
 
 
 def print_tables(tables: Iterable[Table]) -> None:
     """Print tables on the standard output, as wide as the terminal."""
     from rich.console import Console
 
-    from ..studies.tables import for_terminal
+    from ..experiments.tables import for_terminal
 
     console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else WIDTH)
     for table in tables:

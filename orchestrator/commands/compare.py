@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from .batch import Jobs
-from .options import CallLimit, Fmus, Format, Isolate, NoBuild, Out, ScenarioFile, Set, isolation
+from .batch import Jobs, hold, print_tables
+from .experiment import Wishes, chapter_of, conduct, write_page
+from .options import CallLimit, Fmus, Format, Fresh, Isolate, NoBuild, Out, ScenarioFile, Set, isolation
 
 Swaps = Annotated[
     list[str],
@@ -31,53 +32,36 @@ def compare(
     no_build: NoBuild = False,
     jobs: Jobs = None,
     format_: Format = "csv",
+    fresh: Fresh = False,
     isolate: Isolate = False,
     call_limit: CallLimit = None,
 ) -> None:
     """Run a scenario with several FMUs for a unit.
 
-    Overlays, metrics side by side and where the runs part stand in one page, compare.html, that
-    needs no server.
+    report.html, which needs no server, begins with what the runs come to, side by side, and the signals
+    that differ most; then where the runs part, overlays, the system.
 
     Without --out, results go to results/<folder of the scenario>/<its name>-compare. A run that
     fails is named and takes no other with it.
     """
     import shlex
-    from dataclasses import replace
 
-    from ..pages.compare_page import write_page
+    from ..experiments.compare import comparison, comparison_table
+    from ..pages.comparison import comparison_facts
     from ..results.formats import check_format
     from ..results.naming import default_folder
     from ..scenario.overrides import read_changes
-    from ..studies.compare import judge_comparison, metric_table, variants, write_comparison
-    from ..titles import changed, changes_in, changes_of_all
-    from .batch import hold, print_tables, run_all, say
 
     for_each = read_changes(settings=set_ or ())
     folder: Path = out or default_folder(scenario, for_each, suffix="-compare")
     check_format(format_)
     hold(context, folder)
-    limit = isolation(isolate, call_limit)
-    made = variants(scenario, swap, for_each, folder, fmus)
-    work = [replace(job, format=format_, call_limit=limit) for job in made]
-    outcomes = run_all(work, folder, workers=jobs, build=not no_build)
-    comparison = judge_comparison(outcomes)
-    for_all = changes_of_all([changes_in(run.results.run) for run in comparison.runs])
-    title = str(comparison.runs[0].results.run.get("title") or "") if comparison.runs else ""
-    exchanged = " and ".join(dict.fromkeys(text.partition("=")[0].strip() for text in swap))
-    said = changed(for_all)
-    table = metric_table(comparison, f"{title or scenario.stem} ({exchanged} exchanged)", said)
-    files = write_comparison(comparison, table, folder, said)
-    print_tables([table])
-    given = [
-        part
-        for option, values in (("--swap", swap), ("--set", set_ or ()))
-        for v in values
-        for part in (option, v)
-    ]
-    command = shlex.join(["yawbench", "compare", str(scenario), *given])
-    page = write_page(comparison, work, folder, title=table.title, changed=said, command=command)
-    say(f"{folder}: {', '.join(files)}")
-    say(f"The page: {page}")
-    if comparison.failed:
-        raise typer.Exit(max(outcome.exit_status for outcome in outcomes) or 1)
+    wishes = Wishes(fmus, not no_build, jobs, None, format_, isolation(isolate, call_limit), fresh=fresh)
+    findings = conduct(comparison(scenario, swap, for_each), folder, wishes)
+    print_tables([comparison_table(findings)])
+    options = [*(("--swap", one) for one in swap), *(("--set", one) for one in set_ or ())]
+    command = shlex.join(["yawbench", "compare", str(scenario), *(part for one in options for part in one)])
+    facts = {"comparison": comparison_facts(findings)}
+    write_page([chapter_of(findings, folder, command, shown_in=folder, **facts)], folder)
+    if findings.failed:
+        raise typer.Exit(1)

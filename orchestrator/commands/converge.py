@@ -7,6 +7,8 @@ from typing import Annotated
 import typer
 
 from ..plan import Algorithm
+from .batch import hold, print_tables
+from .experiment import Wishes, chapter_of, conduct, write_page
 from .options import CallLimit, Fmus, Isolate, NoBuild, Out, ScenarioFile, Set, Swap, isolation
 
 Halvings = Annotated[
@@ -44,50 +46,47 @@ def converge(
     follow each other, so that their wall times can be compared. Without --out, results go to
     results/<folder of the scenario>/<its name>-converge.
     """
-    from dataclasses import replace
+    import shlex
     from typing import get_args
 
     from ..errors import ScenarioError
+    from ..experiments.converge import columns_of, convergence_figure, convergence_table, measure, refinements
+    from ..experiments.table import to_csv
     from ..figures.style import save
+    from ..pages.panel_images import image_of
     from ..results.naming import default_folder
     from ..scenario.overrides import read_changes
-    from ..studies.converge import convergence_figure, convergence_table, measure, refinements, write_rows
-    from ..studies.tables import for_markdown, harmless
-    from ..titles import with_changes
     from ..wording import hint
     from ..writing import write_whole
-    from .batch import hold, print_tables, run_all, say
 
     for name in algorithm or ():
         if name not in get_args(Algorithm):
             guess = hint(name, get_args(Algorithm), lead="there are")
             raise ScenarioError(f"--algorithm {name}: no such algorithm{guess}")
-    limit = isolation(isolate, call_limit)
     given = read_changes(swap or (), set_ or ())
     folder = out or default_folder(scenario, given, suffix="-converge")
     hold(context, folder)
-    work = refinements(
+    experiment = refinements(
         scenario,
         halvings=halvings,
         signal=signal,
         algorithms=algorithm or (),  # type: ignore[arg-type]
-        out=folder,
         changes=given,
-        fmus=fmus,
     )
-    isolated = [replace(job, call_limit=limit) for job in work]
-    outcomes = run_all(isolated, folder, workers=1, build=not no_build)
-    rows = measure(outcomes, signal)
-    title = with_changes(f"Convergence of {signal}, {scenario.stem}", given)
-    table = convergence_table(rows, title)
-    write_rows(rows, folder / "converge.csv")
-    write_whole(folder / "converge.md", harmless(for_markdown(table)))
+    wishes = Wishes(fmus, not no_build, 1, call_limit=isolation(isolate, call_limit), fresh=True)
+    findings = conduct(experiment, folder, wishes, record=(signal,))
+    rows = measure(findings, signal)
+    table = convergence_table(rows, experiment.spec.title)
+    write_whole(folder / "converge.csv", to_csv(columns_of(rows)))
     print_tables([table])
-    files = ["converge.csv", "converge.md"]
+    command = ["yawbench", "converge", str(scenario), "--halvings", str(halvings), "--signal", signal]
+    charts = []
     if any(row.error for row in rows):
         note = f"yawbench converge {scenario} · units with a step size of their own keep it"
-        figure = convergence_figure(rows, signal, title, note)
-        files += [path.name for path in save(figure, folder / "converge")]
-    say(f"{folder}: {', '.join(files)}")
+        figure = convergence_figure(rows, signal, experiment.spec.title, note)
+        save(figure, folder / "converge")
+        charts = [image_of(folder / "converge.svg", experiment.spec.title)]
+    facts = {"results": [table], "charts": charts}
+    write_page([chapter_of(findings, folder, shlex.join(command), shown_in=folder, **facts)], folder)
     if any(row.failed for row in rows):
         raise typer.Exit(1)

@@ -45,9 +45,9 @@ def list(what: Wanted = None, place: Place = None, fmus: Fmus = None) -> None:
     Runs are shown with when they began, their scenario, what was changed, how they ended, and the largest
     sideslip, yaw rate and lateral acceleration.
     """
+    from ..experiments import listing
     from ..results.runs import found_runs
     from ..scenario import catalogue
-    from ..studies import listing
     from .batch import print_tables
 
     if what is None:

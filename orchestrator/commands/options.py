@@ -48,6 +48,17 @@ Set = Annotated[
         "stop_time, step_size, algorithm. Repeatable.",
     ),
 ]
+Fresh = Annotated[
+    bool,
+    typer.Option("--fresh", "--again", help="Make all runs anew, those too that have been made already."),
+]
+NoRun = Annotated[
+    bool, typer.Option("--no-run", help="Run nothing: judge and draw what stands in the results folder.")
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster: tcp://host:port."),
+]
 Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results.")]
 Fmus = Annotated[
     Path | None,

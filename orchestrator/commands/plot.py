@@ -39,12 +39,12 @@ def plot(
     run` without --out) are missing or were made from another scenario or FMU. Without --out, the
     figure of one run goes into its folder, that of several into the folder that holds them all.
     """
+    from ..experiments.compare import FIGURES
     from ..figures.panels import Run, check_panels, shown_by
     from ..figures.plots import OVERVIEW, draw
     from ..figures.style import save
     from ..results.read import load_results
     from ..scenario.overrides import read_changes
-    from ..studies.compare import FIGURES
     from .batch import say
     from .recorded import folder_of_all, labels_of, recorded
 

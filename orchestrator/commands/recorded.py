@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -36,23 +37,28 @@ def recorded(
         ScenarioError: a scenario or an option is wrong.
     """
     from ..errors import ScenarioError
-    from ..pages.freshness import staleness
+    from ..experiments.jobs import Job, ready
+    from ..experiments.workers import execute
+    from ..fmu.opener import stale_fmus
+    from ..results.freshness import staleness
     from ..results.naming import default_folder
     from ..scenario import catalogue
-    from ..studies.jobs import Job, Once, plan_of
-    from .batch import run_all
+    from .batch import reported, say, stoppable
 
     sources = [one if os.path.exists(one) else catalogue.named(one) or one for one in sources]
     scenarios = [one for one in sources if one.suffix in catalogue.ENDINGS and not os.path.isdir(one)]
     if changes and not scenarios:
         raise ScenarioError("--swap and --set change a scenario; only folders of results are given")
-    jobs, stale, once = {}, [], Once(build=build)
-    for source in scenarios:
-        plan = plan_of(Job(source.stem, source, Path(), changes, fmus), once)
-        job = Job(source.stem, source, default_folder(source, plan.changes), changes, fmus, call_limit=limit)
-        jobs[source] = job
-        stale += [job] if staleness(plan, job.out) else []
-    outcomes = run_all(stale, Path("results"), workers=None, build=build) if stale else []
+    given = [Job(one.stem, one, Path(), changes, fmus, call_limit=limit) for one in scenarios]
+    jobs = {}
+    for job in ready(given, build=build):
+        assert job.plan is not None
+        jobs[job.scenario] = replace(job, out=default_folder(job.scenario, job.plan.changes))
+    for note in stale_fmus(unit.fmu for job in jobs.values() if job.plan for unit in job.plan.units):
+        say(f"note: {note}")
+    stale = [job for job in jobs.values() if job.plan and staleness(job.plan, job.out)]
+    with stoppable(Path("results")), reported("", len(stale)) as told:
+        outcomes = execute(stale, done=told)
     for outcome in outcomes:
         if not outcome.ok:
             raise typer.Exit(outcome.exit_status)

@@ -119,9 +119,9 @@ def run(
     _say_findings(info.findings)
     say(f"{folder}: {info.rows} rows of {info.columns} variables in {info.wall_time:.2f} s")
     if metrics:
+        from ..experiments.tables import metrics_of_run
         from ..metrics.run_metrics import columns_for
         from ..results.read import load_results
-        from ..studies.tables import metrics_of_run
         from .batch import print_tables
 
         needed = load_results(folder, only=lambda recorded: columns_for(recorded, metrics))

@@ -33,7 +33,7 @@ POINTS = 1500
 """Buckets a line is thinned to; each keeps its smallest and its largest value."""
 
 OFF_SCALE = 8.0
-"""A line that exceeds what must be seen by this factor may leave the axes if another one stays."""
+"""A line that exceeds what must be seen by this factor may leave the axes if no more lines do than stay."""
 
 PATH_ROOM = (ROW - 0.75) / (WIDTH - 1.0)
 """Height over width of a path's axes in a figure."""
@@ -66,8 +66,11 @@ class Panel:
     rows: int = 1
 
 
-def panels_of(runs: Sequence[Run], name: str) -> list[Panel]:
-    """Return the panels that a name stands for: none if no run has the signals, four for wheels."""
+def panels_of(runs: Sequence[Run], name: str, *, whole: bool = False) -> list[Panel]:
+    """Return the panels that a name stands for: none if no run has the signals, four for wheels.
+
+    `whole`: no run leaves the axes, however far it goes.
+    """
     if name == "path":
         drawn = [run for run in runs if _path_columns(run)]
         return [Panel(name, True, lambda axes: draw_path(axes, runs), over_time=False)] if drawn else []
@@ -82,12 +85,12 @@ def panels_of(runs: Sequence[Run], name: str) -> list[Panel]:
         signal = name.removesuffix("_error")
         if all(_error(run, signal) is None for run in runs):
             return []
-        return [Panel(name, False, lambda axes: _draw_error(axes, runs, signal))]
+        return [Panel(name, False, lambda axes: _draw_error(axes, runs, signal, whole))]
     columns = [columns_of(run.results, name) for run in runs]
     if not any(columns):
         return []
     if "*" not in name:
-        return [Panel(name, False, lambda axes: _draw_signal(axes, runs, name))]
+        return [Panel(name, False, lambda axes: _draw_signal(axes, runs, name, whole))]
     if len(runs) == 1:
         return [Panel(name, False, lambda axes: _draw_wheels(axes, runs[0], name))]
     four = []
@@ -97,9 +100,9 @@ def panels_of(runs: Sequence[Run], name: str) -> list[Panel]:
     return four
 
 
-def shown_by(runs: Sequence[Run], names: Sequence[str]) -> list[Panel]:
-    """Return all panels that the names stand for, in order."""
-    return [panel for name in names for panel in panels_of(runs, name)]
+def shown_by(runs: Sequence[Run], names: Sequence[str], *, whole: bool = False) -> list[Panel]:
+    """Return all panels that the names stand for, in order (see `panels_of`)."""
+    return [panel for name in names for panel in panels_of(runs, name, whole=whole)]
 
 
 def check_panels(runs: Sequence[Run], names: Sequence[str]) -> None:
@@ -133,7 +136,7 @@ def _one_wheel(runs: Sequence[Run], name: str, k: int, heading: str) -> Callable
     return fill
 
 
-def _draw_signal(axes: Axes, runs: Sequence[Run], name: str) -> None:
+def _draw_signal(axes: Axes, runs: Sequence[Run], name: str, whole: bool) -> None:
     """Draw a signal of all runs over its reference, and limit the axes to what can be read."""
     lines = []
     for number, run in enumerate(runs):
@@ -155,7 +158,7 @@ def _draw_signal(axes: Axes, runs: Sequence[Run], name: str) -> None:
         unit = run.results.units[column]
         _line(axes, run.results.time, run.results[column], unit, line_style(number))
     _finish(axes, f"{literal(words(name))} {in_formula(name)}", unit)
-    if references:
+    if references and not whole:
         peaks = [(run.label, _peak(run.results[column])) for _, run, column, _ in lines]
         wanted = max(_peak(reference) for reference in references)
         _limit(axes, max(wanted, min(peak for _, peak in peaks)), peaks, unit)
@@ -168,7 +171,7 @@ def _limit(axes: Axes, scale: float, lines: list[tuple[str, float]], unit: str) 
     """
     text, factor = shown_unit(unit)
     lost = [line for line in lines if line[1] > OFF_SCALE * scale]
-    if not lost or len(lost) == len(lines) or scale == 0:
+    if not lost or 2 * len(lost) > len(lines) or scale == 0:
         return
     largest = 1.5 * factor * max(scale, *(peak for _, peak in lines if peak <= OFF_SCALE * scale))
     axes.set_ylim(-largest, largest)
@@ -176,7 +179,7 @@ def _limit(axes: Axes, scale: float, lines: list[tuple[str, float]], unit: str) 
     note_above(axes, f"beyond the axes: {note}")
 
 
-def _draw_error(axes: Axes, runs: Sequence[Run], signal: str) -> None:
+def _draw_error(axes: Axes, runs: Sequence[Run], signal: str, whole: bool) -> None:
     """Draw the tracking error in per cent of the reference's peak."""
     peaks = []
     for number, run in enumerate(runs):
@@ -185,7 +188,8 @@ def _draw_error(axes: Axes, runs: Sequence[Run], signal: str) -> None:
             _line(axes, run.results.time, error, "%", line_style(number))
             peaks.append((run.label, _peak(error)))
     _finish(axes, f"{literal(words(signal))}, error in % of max|{in_formula(signal + '_ref')}|", "")
-    _limit(axes, max(SEEN_ERROR, min(peak for _, peak in peaks)), peaks, "%")
+    if not whole:
+        _limit(axes, max(SEEN_ERROR, min(peak for _, peak in peaks)), peaks, "%")
 
 
 def _error(run: Run, signal: str) -> np.ndarray | None:

@@ -11,11 +11,12 @@ from dataclasses import asdict
 from datetime import datetime, timezone
 from typing import Any
 
-from ..errors import Problem, ResultsError, SimulationError, YawbenchError
+from ..errors import KEPT, Problem, ResultsError, SimulationError, YawbenchError
 from ..metrics.plausibility import Watch
 from ..plan import Plan
 from ..results.folder import COMPLETED, RUNNING
 from ..results.in_memory import MemoryRecorder
+from ..results.key import key_of
 from ..results.recorder import Recorder
 from ..results.run_record import run_record
 from .apart import CourseApart
@@ -23,9 +24,6 @@ from .course import Course, Opener, Progress
 from .interrupts import StopFlag, interrupts
 from .log import Log
 from .master import Ended, Interrupted
-
-KEPT = "What was recorded until then"
-"""How the sentence begins that names the results of a run that failed."""
 
 
 class Run:
@@ -44,6 +42,7 @@ class Run:
         recorder.looks.append(self.watch.look)
         self.log = Log()
         self.id = uuid.uuid4().hex[:12]
+        self._key = key_of(plan)
         self._apart = apart
         self._stop = StopFlag()
         course = CourseApart if apart else Course
@@ -95,7 +94,8 @@ class Run:
             problems += lost.problems
         else:
             if self.recorder.place is not None:
-                problems.append(Problem(f"{KEPT}: {self.recorder.place}"))
+                sentence = f"What was recorded until then: {self.recorder.place}"
+                problems.append(Problem(sentence, kind=KEPT))
 
     def _abandon(self) -> None:
         """Leave at once: somebody insists, perhaps because a unit never comes back."""
@@ -138,7 +138,11 @@ class Run:
             self.recorder.close(freed if self._saved else None)
 
     def _recorded(self, status: str) -> dict[str, Any]:
-        return {"id": self.id, **run_record(self.plan, status=status, started=self._started)}
+        return {
+            "id": self.id,
+            "key": self._key,
+            **run_record(self.plan, status=status, started=self._started),
+        }
 
     def _explained(self, error: BaseException | None) -> dict[str, Any] | None:
         if error is None:

@@ -1,36 +1,28 @@
-"""A study as a chapter of the report: verdicts, system, figures, tables, parameters, how to repeat it."""
+"""An experiment as a chapter of a page: verdicts, system, figures, tables, parameters, how to repeat it."""
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..figures.panels import Run
-from ..figures.plots import title_of
+from ..experiments.experiment import FIGURES
+from ..experiments.figures import runs_of, title_of
+from ..experiments.findings import Each, Findings
+from ..experiments.jobs import Job, Once
+from ..experiments.judging import Judgement
+from ..experiments.tables import Cell, Table
+from ..experiments.verdicts import counts_of, derived_tables, heading, limit_tables, run_tables, verdict
+from ..figures import plots
 from ..metrics.run_metrics import metric
 from ..plan import Plan
 from ..results.read import Results
-from ..scenario.load import Scenario
-from ..studies.claims import Judgement, condition_text
-from ..studies.study import (
-    FAILS,
-    HOLDS,
-    NOT_JUDGED,
-    Each,
-    Findings,
-    derived_tables,
-    heading,
-    run_tables,
-    verdict,
-)
-from ..studies.study_file import FIGURES
-from ..studies.tables import Cell, Table
+from ..scenario.load import Scenario, load_scenario
 from ..titles import changed
 from ..wording import counted
 from .diagram import diagrams
 from .facts import anchor, animation_of, figure_of, fmus_of, programs_of
+from .panel_images import Image, image_of
 from .provenance import count_kinds, groups_of
 from .system import systems_of
 
@@ -40,111 +32,133 @@ PAPER = "the paper:"
 
 def chapter(
     findings: Findings,
-    plans: dict[str, tuple[Scenario, Plan]],
-    stale: dict[str, str],
     *,
+    command: str,
+    stale: dict[str, str],
     folder: Path,
     shown_in: Path,
     each: Each = map,
 ) -> dict[str, Any]:
-    """Return what a study's chapter says.
+    """Return what an experiment's chapter says.
 
     Args:
-        findings: the study and what it comes to.
-        plans: run -> its scenario and plan.
+        findings: the experiment and what it comes to.
+        command: that makes it.
         stale: run -> why its results are not those of its plan.
-        folder: of the study's results and figures.
+        folder: of its results and figures.
         shown_in: folder of the page.
         each: how to draw many panels.
     """
-    study = findings.study
-    name = anchor(f"{study.path.absolute().parent.name} {study.path.stem}")
-    groups = groups_of(list(plans.values()))
+    experiment, spec = findings.experiment, findings.spec
+    name = anchor(f"{experiment.path.absolute().parent.name} {experiment.path.stem}")
+    plans = plans_of(findings)
+    groups = groups_of([plan for _, plan in plans])
+    results = findings.results.values()
+    failed = findings.failed
     return {
         "id": name,
-        "title": study.spec.title,
-        "source": study.spec.source,
-        "counts": counts(findings.claims, "claims"),
+        "title": spec.title,
+        "source": spec.source,
+        "changed": changed(experiment.by_options),
+        "counts": counts_of(findings.claims, "claims"),
+        "conclusions": conclusions(findings),
         "claims": [judged(one, "claims") for one in findings.claims],
         "checks": [judged(one, "checks") for one in findings.checks],
-        "systems": systems(findings, plans),
+        "limits": limit_tables(findings),
+        "systems": systems(plans, spec.title),
         "animation": animation(findings),
         "figures": figures(findings, name, _beside(folder / FIGURES, shown_in), each),
+        "charts": charts(findings, folder / FIGURES),
         "tables": [*run_tables(findings), *_apart(derived_tables(findings))],
         "definitions": definitions(findings),
         "groups": groups,
         "kinds": count_kinds(groups),
-        "failed": findings.failed,
+        "failed": failed,
         "stale": stale,
-        "command": f"yawbench study {shlex.quote(str(study.path))}",
+        "remarkable": findings.remarkable() if spec.axes else "",
+        "command": command,
         "folder": str(folder),
         "settings": settings(findings),
-        "grid": grid_of_times(findings.results.values()),
-        "fmus": fmus_of(findings.results.values()),
-        "programs": programs_of(findings.results.values()),
+        "grid": grid_of_times([plan for _, (_, plan) in plans] if spec.axes else results),
+        "fmus": fmus_of(results),
+        "programs": programs_of(results),
     }
 
 
-def counts(judgements: Sequence[Judgement], group: str) -> dict[str, int]:
-    """Return how many judgements have each verdict, those that occur."""
-    words = [verdict(one, group) for one in judgements]
-    return {word: words.count(word) for word in (HOLDS, FAILS[group], NOT_JUDGED) if word in words}
+def plans_of(findings: Findings) -> list[tuple[Job, tuple[Scenario, Plan]]]:
+    """Return jobs with scenario and plan: of all named runs; along axes the first with each set of FMUs."""
+    jobs: dict[Any, Job] = {}
+    for job in findings.planned.jobs if findings.planned else ():
+        fmus = tuple(unit.fmu.sha256 for unit in job.plan.units) if job.plan else ()
+        jobs.setdefault((job.scenario, fmus) if findings.spec.axes else job.label, job)
+    once = Once()
+    return [
+        (job, (load_scenario(job.scenario, changes=job.changes, read=once.read), job.plan))
+        for job in jobs.values()
+        if job.plan is not None
+    ]
+
+
+def conclusions(findings: Findings) -> list[dict[str, Any]]:
+    """Return the claims and checks that do not hold, what was measured instead in words."""
+    every = [(one, "claims") for one in findings.claims] + [(one, "checks") for one in findings.checks]
+    return [judged(one, group) for one, group in every if not one.holds]
 
 
 def judged(one: Judgement, group: str) -> dict[str, Any]:
     """Return a claim with what was measured and its verdict."""
     return {
-        "says": one.claim.says,
-        "source": one.claim.source,
+        "says": one.said.says,
+        "source": one.said.source,
         "measured": one.measured,
-        "conditions": [condition_text(condition) for condition in one.claim.holds_if],
+        "conditions": [str(condition) for condition in one.said.holds_if],
         "verdict": verdict(one, group),
-        "note": one.claim.note,
+        "note": one.said.note,
     }
 
 
-def systems(findings: Findings, plans: dict[str, tuple[Scenario, Plan]]) -> list[dict[str, Any]]:
+def systems(plans: Sequence[tuple[Job, tuple[Scenario, Plan]]], title: str) -> list[dict[str, Any]]:
     """Return a drawing for each set of units, and of which scenarios it is."""
-    names = list(plans)
     drawn = []
-    for system, numbers in systems_of([plan for _, plan in plans.values()]):
-        files = dict.fromkeys(findings.study.runs[names[k]].scenario.name for k in numbers)
-        drawn.append({"drawing": diagrams(system, findings.study.spec.title), "runs": ", ".join(files)})
+    for system, numbers in systems_of([plan for _, (_, plan) in plans]):
+        files = dict.fromkeys(plans[k][0].scenario.name for k in numbers)
+        drawn.append({"drawing": diagrams(system, title), "runs": ", ".join(files)})
     return drawn
 
 
 def animation(findings: Findings) -> dict[str, Any] | None:
     """Return the animation of the first figure with a path: its first run and its last."""
-    study = findings.study
-    for figure in study.spec.figures:
-        runs = [run for run in study.matching(figure.runs) if run.name in findings.results]
+    for figure in findings.spec.figures:
+        runs = runs_of(findings, figure)
         if "path" in figure.panels and runs:
             ends = [runs[0], *runs[-1:]] if len(runs) > 1 else runs
-            pair = [(run.label, findings.results[run.name]) for run in ends]
+            pair = [(run.label, run.results) for run in ends]
             seen = animation_of(pair, " and ".join(label for label, _ in pair))
             if seen is not None:
-                return {"title": figure.title or title_of(_runs(pair)), "drawing": seen}
+                return {"title": figure.title or plots.title_of(ends), "drawing": seen}
     return None
 
 
-def _runs(pairs: Sequence[tuple[str, Results]]) -> list[Run]:
-    return [Run(label, results) for label, results in pairs]
-
-
 def figures(findings: Findings, chapter: str, files: str, each: Each = map) -> list[Any]:
-    """Return the study's figures, those that its runs have results for."""
-    study = findings.study
+    """Return the overlays, those that runs have results for."""
     wanted = []
-    for spec in study.spec.figures:
-        matching = study.matching(spec.runs)
-        runs = [
-            Run(run.label, findings.results[run.name]) for run in matching if run.name in findings.results
-        ]
-        title = spec.title or f"{study.spec.title}: {spec.name}"
+    for spec in findings.spec.figures:
+        runs = runs_of(findings, spec)
         paths = tuple(f"{files}/{spec.name}.{kind}" for kind in ("svg", "png"))
         if runs:
+            title = title_of(findings, spec)
             wanted.append((f"{chapter}-{anchor(spec.name)}", title, runs, spec.panels, paths))
     return [figure for figure in each(figure_of, wanted) if figure is not None]
+
+
+def charts(findings: Findings, folder: Path) -> list[Image]:
+    """Return the figures over axes, those that have been drawn, as images."""
+    found = []
+    for spec in findings.spec.figures:
+        file = folder / f"{spec.name}.svg"
+        if spec.kind != "overlay" and file.is_file():
+            found.append(image_of(file, title_of(findings, spec)))
+    return found
 
 
 def _apart(tables: Sequence[Table]) -> list[Table]:
@@ -169,7 +183,7 @@ def _apart(tables: Sequence[Table]) -> list[Table]:
 def definitions(findings: Findings) -> list[dict[str, str]]:
     """Return how every metric of the study is defined."""
     found = []
-    for spec in findings.study.spec.metrics.values():
+    for spec in findings.spec.metrics.values():
         chosen = metric(spec.metric)
         found.append(
             {
@@ -189,21 +203,22 @@ def settings(findings: Findings) -> Table:
             run.scenario.name,
             changed(run.changes) or None,
         ]
-        for run in findings.study.runs.values()
+        for run in findings.experiment.runs.values()
     ]
     kept = [k for k in range(3) if any(row[k] is not None for row in rows)]
     headings = ["run", "scenario", "changed"]
     return Table("", [headings[k] for k in kept], [[row[k] for k in kept] for row in rows])
 
 
-def grid_of_times(recorded: Any) -> list[str]:
-    """Return algorithm, step and end of the runs, each combination once, as their records say."""
+def grid_of_times(runs: Iterable[Plan | Results]) -> list[str]:
+    """Return algorithm, step and end of the runs, each combination once, as plans or records say."""
     found: dict[str, int] = {}
-    for results in recorded:
-        run = results.run
-        text = (
-            f"{run.get('algorithm')}, {1000 * run.get('step_size', 0):g} ms, until {run.get('stop_time'):g} s"
-        )
+    for one in runs:
+        if isinstance(one, Plan):
+            algorithm, step, end = one.algorithm, float(one.step), one.time(one.n_steps)
+        else:
+            algorithm, step, end = (one.run.get(key, 0) for key in ("algorithm", "step_size", "stop_time"))
+        text = f"{algorithm}, {1000 * step:g} ms, until {end:g} s"
         found[text] = found.get(text, 0) + 1
     return [f"{text} ({counted(count, 'run')})" for text, count in found.items()]
 

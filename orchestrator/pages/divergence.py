@@ -30,6 +30,7 @@ class Parting:
     largest: float  # in the signal's unit
     largest_at: float  # s
     unit: str
+    relative: float = 1.0  # the largest difference over the signal's peak
 
 
 @dataclass(frozen=True)
@@ -106,6 +107,7 @@ def _parting(name: str, time: np.ndarray, a: np.ndarray, b: np.ndarray, run: Res
         largest=float(apart[largest]),
         largest_at=float(time[largest]),
         unit=run.units[name],
+        relative=float(apart[largest]) / peak,
     )
 
 
@@ -115,7 +117,7 @@ def _together(one: Parting, other: Parting) -> Parting:
     seen = [parting.seen for parting in (one, other) if parting.seen is not None]
     return Parting(
         one.signal, one.targets, min(one.first, other.first), min(seen, default=None),
-        widest.largest, widest.largest_at, one.unit,
+        widest.largest, widest.largest_at, one.unit, widest.relative,
     )  # fmt: skip
 
 

@@ -37,10 +37,15 @@ class FmuFact:
     units: dict[str, None]  # it stood for
 
 
-def figure_of(wanted: tuple[str, str, Sequence[Run], Sequence[str], tuple[str, ...]]) -> Figure | None:
-    """Return a figure of (id, title, runs, panels, files); None if the runs recorded nothing of it."""
+def figure_of(
+    wanted: tuple[str, str, Sequence[Run], Sequence[str], tuple[str, ...]], *, whole: bool = False
+) -> Figure | None:
+    """Return a figure of (id, title, runs, panels, files); None if the runs recorded nothing of it.
+
+    `whole`: no run leaves the axes, however far it goes.
+    """
     name, title, runs, panels, files = wanted
-    images, legend = panel_images(runs, panels)
+    images, legend = panel_images(runs, panels, whole=whole)
     return Figure(name, title, images, legend, files) if images else None
 
 

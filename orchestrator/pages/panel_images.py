@@ -10,6 +10,7 @@ import io
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
@@ -52,11 +53,16 @@ class LegendEntry:
     dashes: str
 
 
-def panel_images(runs: Sequence[Run], names: Sequence[str]) -> tuple[list[PanelImage], list[LegendEntry]]:
-    """Return the panels that the runs have the signals for, and the legend that they share."""
+def panel_images(
+    runs: Sequence[Run], names: Sequence[str], *, whole: bool = False
+) -> tuple[list[PanelImage], list[LegendEntry]]:
+    """Return the panels that the runs have the signals for, and the legend that they share.
+
+    `whole`: no run leaves the axes, however far it goes.
+    """
     import matplotlib
 
-    panels = [_path_beside(panel, runs) for panel in shown_by(runs, names)]
+    panels = [_path_beside(panel, runs) for panel in shown_by(runs, names, whole=whole)]
     with matplotlib.rc_context(LOOK):
         drawn = [_draw(panel) for panel in panels]
         for scale in {panel.scale for panel in panels if panel.scale}:
@@ -152,6 +158,19 @@ def address_of(svg: str) -> Markup:
     svg = re.sub(r"(\.\d\d)\d+", r"\1", svg)
     svg = re.sub(r"\s*\n\s*", "\n", svg)
     return Markup("data:image/svg+xml," + quote(svg, safe=" =:/'(),;.-+*!?@$[]{}|^`~"))
+
+
+@dataclass(frozen=True)
+class Image:
+    """A whole figure: what it is called, and its image as the address of an `<img>`."""
+
+    title: str
+    address: Markup
+
+
+def image_of(file: Path, title: str) -> Image:
+    """Return an SVG file as an image."""
+    return Image(title, address_of(file.read_text(encoding="utf-8")))
 
 
 def in_html(title: str) -> Markup:

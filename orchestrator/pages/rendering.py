@@ -8,7 +8,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from ..studies.study import FAILS, HOLDS, NOT_JUDGED
+from ..experiments.verdicts import FAILS, HOLDS, NOT_JUDGED
 from ..wording import printable
 
 SIGNS = {HOLDS: ("good", "✓"), NOT_JUDGED: ("open", "–"), **{word: ("bad", "✗") for word in FAILS.values()}}

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
+from ..experiments.tables import Cell, Table
 from ..metrics.run_metrics import Value
 from ..results.read import Results
-from ..studies.tables import Cell, Table
 from ..titles import changed, changes_in
 from ..wording import counted
 from .divergence import Divergence

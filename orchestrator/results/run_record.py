@@ -13,6 +13,9 @@ from typing import Any
 from ..plan import Plan, Series, Unit, Wire
 from ..sources import OF_RESULTS, sources_hash
 
+PROGRAMS = ("yawbench", "fmpy", "pythonfmu", "numpy")
+"""Packages that have a say in the numbers."""
+
 
 def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
     """Return the record of a run without what comes later: wall time, error, rows and warnings.
@@ -88,10 +91,9 @@ def _series(series: Series) -> dict[str, Any]:
 
 def versions() -> dict[str, str]:
     """Return the versions of all that has a say in the numbers."""
-    packages = ("yawbench", "fmpy", "pythonfmu", "numpy")
     return {
         "python": platform.python_version(),
-        **{package: version_of(package) for package in packages},
+        **{package: version_of(package) for package in PROGRAMS},
         "orchestrator": f"sources {sources_hash(OF_RESULTS)}",
         "platform": f"{platform.system()} {platform.release()} {platform.machine()}",
     }

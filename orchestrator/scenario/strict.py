@@ -46,11 +46,12 @@ def validate(model: type[Model], document: Document) -> Model | None:
 
 def _another_kind(model: type[BaseModel], data: Any) -> str | None:
     """Return a sentence if a file is plainly of another kind than its place asks for."""
-    own = next((key for key in KINDS if key in model.model_fields), None)
-    if own is None or not isinstance(data, dict) or own in data:
+    own = [key for key in KINDS if key in model.model_fields]
+    if not own or not isinstance(data, dict) or any(key in data for key in own):
         return None
     found = next((key for key, (_, form, _) in KINDS.items() if isinstance(data.get(key), form)), None)
-    return f"{KINDS[found][0]}, not {KINDS[own][0]}{KINDS[found][2]}" if found else None
+    wanted = listed((KINDS[key][0] for key in own), last="or")
+    return f"{KINDS[found][0]}, not {wanted}{KINDS[found][2]}" if found else None
 
 
 def _place(data: Any, location: Key) -> Key:

@@ -36,8 +36,8 @@ STAGES = (
     {"metrics"},
     {"master"},  # hands rows to a recorder of `results`, has `metrics` look at them
     {"figures"},
-    {"studies"},
-    {"interop", "sweeps", "scaffold", "tyres"},
+    {"experiments"},
+    {"interop", "scaffold", "tyres"},
     {"pages"},
     {"commands"},
     {"cli"},

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..figures.display import digits_of
-from .claims import Values
 from .derived import rank_correlation
-from .study_schema import GridSpec
+from .judged_schema import GridSpec
+from .judging import Values
 from .tables import Cell, Table
 
 

@@ -1,4 +1,4 @@
-"""What all figures of a sweep share: which runs a panel holds, what axes and levels are called."""
+"""What all figures over axes share: which runs a panel holds, what axes and levels are called."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from ..figures.style import QUIET, literal
 from ..metrics.signals import variable_of, words
-from ..studies.study_schema import text_of
 from .design import Level
-from .planning import PlannedRun
+from .experiment import RUN, Case
+from .findings import Findings
+from .numbers import text_of
 from .schema import FigureSpec
-from .table import Swept, axis_unit
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -27,23 +27,25 @@ GUIDE: dict[str, Any] = {"color": QUIET, "linewidth": 0.9, "linestyle": (0, (4, 
 
 
 class Drawing:
-    """A figure of a sweep: `fill` draws a panel, `finish` what panels share, `handles` explain."""
+    """A figure over axes: `fill` draws a panel, `finish` what panels share, `handles` explain."""
 
-    def __init__(self, swept: Swept, spec: FigureSpec) -> None:
-        self.swept = swept
+    def __init__(self, findings: Findings, spec: FigureSpec) -> None:
+        self.findings = findings
         self.spec = spec
-        self.sweep = swept.planned.sweep.spec
-        self.names = list(self.sweep.axes)
+        assert findings.planned is not None
+        self.planned = findings.planned
+        self.axes = findings.spec.axes
+        self.names = list(self.axes)
         only = {axis: set(map(text_of, values)) for axis, values in spec.only.items()}
         self.runs = [
             run
-            for run in swept.planned.runs
+            for run in findings.experiment.cases
             if all(text_of(self.at(run, axis).value) in values for axis, values in only.items())
         ]
         self.what = ""  # what is drawn, without its unit
         self.failed = False  # whether a cross has been drawn
 
-    def fill(self, axes: Axes, runs: Sequence[PlannedRun]) -> None:
+    def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
         """Draw the runs of a panel."""
         raise NotImplementedError
 
@@ -57,21 +59,23 @@ class Drawing:
 
         return [Line2D([], [], label="no number: failed, or never", **FAILED)] if self.failed else []
 
-    def panels(self) -> list[tuple[str, list[PlannedRun]]]:
+    def panels(self) -> list[tuple[str, list[Case]]]:
         """Return the heading and the runs of each panel."""
-        runs = self.swept.planned.runs
-        if not self.spec.panels:
+        runs = self.findings.experiment.cases
+        if not self.spec.panel_axis:
             return [("", runs)]
         return [
             (
-                self.name_of(self.spec.panels, level),
-                [r for r in runs if self.at(r, self.spec.panels) == level],
+                self.name_of(self.spec.panel_axis, level),
+                [r for r in runs if self.at(r, self.spec.panel_axis) == level],
             )
-            for level in self.levels(self.spec.panels)
+            for level in self.levels(self.spec.panel_axis)
         ]
 
-    def at(self, run: PlannedRun, axis: str) -> Level:
-        """Return where a run stands on an axis."""
+    def at(self, run: Case, axis: str) -> Level:
+        """Return where a run stands on an axis; "run" is that of its names."""
+        if axis == RUN:
+            return Level(run.run.name, run.run.label)
         return run.point[self.names.index(axis)]
 
     def levels(self, axis: str) -> list[Level]:
@@ -80,27 +84,32 @@ class Drawing:
 
     def place(self, level: Level, axis: str) -> float:
         """Return where a level is drawn: numbers as they are, names at 0, 1, 2."""
-        if self.sweep.axes[axis].numeric:
+        if self.numeric(axis):
             return float(level.value)
         return float(self.levels(axis).index(level))
 
+    def numeric(self, axis: str) -> bool:
+        """Return whether an axis is one of numbers."""
+        return axis != RUN and self.axes[axis].numeric
+
     def label(self, axis: str) -> str:
         """Return an axis in words, with its unit."""
-        spec = self.sweep.axes[axis]
+        if axis == RUN:
+            return "Run"
+        spec = self.axes[axis]
         said = spec.says or (words(variable_of(spec.vary[0]).replace("*", "")) if spec.vary else axis)
         unit = self.unit_of(axis)
         return f"{said.strip()} in {unit}" if unit else said.strip()
 
     def unit_of(self, axis: str) -> str:
         """Return the unit that an axis counts in, as people write it."""
-        return axis_unit(self.swept.planned, axis).strip(" []").replace(".", "·")
+        return self.planned.axis_unit(axis).strip(" []").replace(".", "·")
 
     def name_of(self, axis: str, level: Level) -> str:
         """Return a level of an axis in words."""
-        spec = self.sweep.axes[axis]
-        return (
-            f"{spec.says or axis} {level.words} {self.unit_of(axis)}".strip() if spec.numeric else level.words
-        )
+        if not self.numeric(axis):
+            return level.words
+        return f"{self.axes[axis].says or axis} {level.words} {self.unit_of(axis)}".strip()
 
     def name_y(self, left: Sequence[Axes], text: str) -> None:
         """Write what stands upwards beside the panels on the left, broken to their height."""
@@ -109,10 +118,10 @@ class Drawing:
 
     def scale_x(self, axes: Axes) -> None:
         """Set the scale and, for an axis of names, the ticks of x."""
-        if not self.sweep.axes[self.spec.x].numeric:
+        if not self.numeric(self.spec.x):
             every = self.levels(self.spec.x)
             axes.set_xticks(range(len(every)), [literal(level.words) for level in every])
             axes.set_xlim(-0.5, len(every) - 0.5)
-        elif self.sweep.axes[self.spec.x].spacing == "log":
+        elif self.axes[self.spec.x].spacing == "log":
             axes.set_xscale("log")
             axes.xaxis.set_major_formatter(PLAIN)

@@ -1,4 +1,4 @@
-"""Runs of a sweep on a Dask cluster; needs the package distributed.
+"""Runs on a Dask cluster; needs the package distributed.
 
 The workers need this program, in this version, and nothing else: plans travel with their tasks, the
 FMUs once to every worker, which unpacks them into its own cache. As on this machine every run has a
@@ -29,10 +29,10 @@ from ..errors import ResultsError, ScenarioError
 from ..fmu.archive import open_fmu, read_archive
 from ..plan import Fmu, Plan
 from ..sources import OF_METRICS, sources_hash
-from ..studies.jobs import Outcome, execute
 from ..wording import listed
-from .local import TRIES, Done
-from .measuring import Measurement, measure
+from .execution import Told
+from .jobs import Job, Outcome
+from .workers import execute
 
 TIMEOUT = 10.0
 """Time that a scheduler has to answer [s]."""
@@ -43,9 +43,7 @@ _LOCAL: dict[str, Path] = {}
 """On a worker: hash of an FMU -> where it is unpacked."""
 
 
-def run_on_cluster(
-    jobs: Sequence[Measurement], done: Done, *, scheduler: str, fmus: Mapping[str, Fmu]
-) -> None:
+def run_on_cluster(jobs: Sequence[Job], done: Told, *, scheduler: str, fmus: Mapping[str, Fmu]) -> None:
     """Make all runs on the workers of a Dask scheduler.
 
     Args:
@@ -65,11 +63,11 @@ def run_on_cluster(
         _submit_all(client, jobs, done, scheduler, AHEAD * threads)
 
 
-def _submit_all(client: Any, jobs: Sequence[Measurement], done: Done, scheduler: str, ahead: int) -> None:
+def _submit_all(client: Any, jobs: Sequence[Job], done: Told, scheduler: str, ahead: int) -> None:
     waiting = iter(jobs)
-    named: dict[str, Measurement] = {}
+    named: dict[str, Job] = {}
 
-    def submit(job: Measurement) -> Any:
+    def submit(job: Job) -> Any:
         future = client.submit(_make, job, key=f"yawbench-{os.getpid()}-{job.key}", pure=False, retries=0)
         named[future.key] = job
         return future
@@ -87,7 +85,7 @@ def _submit_all(client: Any, jobs: Sequence[Measurement], done: Done, scheduler:
         raise
 
 
-def _outcome(future: Any, job: Measurement, scheduler: str) -> Outcome:
+def _outcome(future: Any, job: Job, scheduler: str) -> Outcome:
     """Return what a worker handed back, or why it handed back nothing."""
     if future.status == "cancelled" or future.status == "lost":
         raise ResultsError(f"{scheduler}: the cluster was lost; what it had finished is kept.")
@@ -100,15 +98,12 @@ def _outcome(future: Any, job: Measurement, scheduler: str) -> Outcome:
     return replace(future.result(), job=job)
 
 
-def _make(job: Measurement) -> Outcome:
+def _make(job: Job) -> Outcome:
     """Make a run on a worker, in a process of its own."""
     assert job.plan is not None
     here = replace(job, plan=_unpacked_here(job.plan))
     multiprocessing.current_process().daemon = False  # daemons may have no children
-    for _ in range(TRIES):
-        (outcome,) = execute([here], workers=1, run=measure)
-        if not outcome.died:
-            break
+    (outcome,) = execute([here], workers=1)
     return replace(outcome, job=replace(job, plan=None))  # the plan is known where it came from
 
 

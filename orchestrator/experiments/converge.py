@@ -24,9 +24,14 @@ from ..metrics.run_metrics import Value
 from ..metrics.signals import words
 from ..plan import Algorithm, Change
 from ..plan import Value as Plain
+from ..results.read import Results
 from ..scenario.load import load_scenario
-from .jobs import Job, Outcome, read_back
-from .tables import Cell, Table, write_csv
+from ..titles import with_changes
+from .compare import of_runs
+from .experiment import Experiment, NamedRun
+from .findings import Findings
+from .table import Column
+from .tables import Cell, Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,10 +61,8 @@ def refinements(
     halvings: int,
     signal: str,
     algorithms: Sequence[Algorithm],
-    out: Path,
     changes: Sequence[Change] = (),
-    fmus: Path | None = None,
-) -> list[Job]:
+) -> Experiment:
     """Return the runs of a convergence study: all steps of the first algorithm, then the next.
 
     Raises:
@@ -68,66 +71,69 @@ def refinements(
     loaded = load_scenario(scenario, changes=changes)
     if signal.count(".") != 1:
         raise ScenarioError(f"--signal {signal}: write UNIT.VARIABLE, for example plant.yaw_rate")
-    jobs = []
+    runs = []
     for algorithm in algorithms or [loaded.algorithm]:
         for k in range(halvings + 1):
             step: Fraction = loaded.step_size / 2**k
-            label = f"{algorithm}, {_milliseconds(float(step))}"
-            folder = out / algorithm / _milliseconds(float(step)).replace(" ", "")
             refined = (
-                *changes,
                 Change("algorithm", algorithm, "converge"),
                 Change("step_size", float(step), "converge"),
             )
-            jobs.append(Job(label, scenario, folder, refined, fmus, record=(signal,)))
-    return jobs
+            name = f"{algorithm}/{_milliseconds(float(step)).replace(' ', '')}"
+            label = f"{algorithm}, {_milliseconds(float(step))}"
+            runs.append(NamedRun(name, label, label, scenario, refined))
+    title = with_changes(f"Convergence of {signal}, {scenario.stem}", changes)
+    return of_runs(runs, title, scenario, changes, {})
 
 
 def _milliseconds(step: float) -> str:
     return f"{1000 * step:.10g} ms"
 
 
-def measure(outcomes: Sequence[Outcome], signal: str) -> list[Row]:
-    """Return a row for every run, computed from the results on disk.
+def measure(findings: Findings, signal: str) -> list[Row]:
+    """Return a row for every run, computed from its results.
 
     Raises:
         ResultsError: the signal is zero throughout.
     """
-    by_algorithm: dict[str, list[Outcome]] = {}
-    for outcome in outcomes:
-        by_algorithm.setdefault(str(_given(outcome, "algorithm")), []).append(outcome)
+    by_algorithm: dict[str, list[NamedRun]] = {}
+    for run in findings.experiment.runs.values():
+        by_algorithm.setdefault(str(_given(run, "algorithm")), []).append(run)
     finest = next(iter(by_algorithm.values()))[-1]
-    samples = {id(outcome): _samples(outcome, signal) for outcome in outcomes}
-    reference = samples[id(finest)][0]
+    failed = {case.run.name: findings.record(case).problems for case in findings.experiment.cases}
+    samples = {
+        run.name: _samples(findings.results.get(run.name), signal, "; ".join(failed[run.name]))
+        for run in findings.experiment.runs.values()
+    }
+    reference = samples[finest.name][0]
     peak = math.nan if reference is None else float(np.max(np.abs(reference)))
     if peak == 0:
         raise ResultsError(f"{signal} is zero throughout: choose another --signal.")
     rows = []
     for algorithm, runs in by_algorithm.items():
-        coarse = [_common(samples[id(run)][0], k) for k, run in enumerate(runs)]
+        coarse = [_common(samples[run.name][0], k) for k, run in enumerate(runs)]
         target = _common(reference, len(runs) - 1)
         steps = [_distance(a, b) for a, b in zip(coarse, [*coarse[1:], None], strict=True)]
         for k, run in enumerate(runs):
             after = steps[k + 1] if k + 1 < len(steps) else None
             order = math.log2(first / after) if (first := steps[k]) and after else None
             distance = None if run is finest else _distance(coarse[k], target)
-            _, wall_time, failed = samples[id(run)]
+            _, wall_time, why = samples[run.name]
             error = None if distance is None else distance / peak
             step = float(_given(run, "step_size"))
-            rows.append(Row(algorithm, step, error, order, wall_time, failed, run is finest))
+            rows.append(Row(algorithm, step, error, order, wall_time, why, run is finest))
     return rows
 
 
-def _given(outcome: Outcome, place: str) -> Plain:
-    """Return what a run's job gives at a place."""
-    return next(change.value for change in reversed(outcome.job.changes) if change.place == place)
+def _given(run: NamedRun, place: str) -> Plain:
+    """Return what a run gives at a place."""
+    return next(change.value for change in reversed(run.changes) if change.place == place)
 
 
-def _samples(outcome: Outcome, signal: str) -> tuple[np.ndarray | None, float | None, str]:
+def _samples(found: Results | None, signal: str, why: str) -> tuple[np.ndarray | None, float | None, str]:
     """Return the signal, the wall time [s] and why there is neither."""
-    found = outcome.reason or read_back(outcome.job.out, outcome.value)
-    if isinstance(found, str):
-        return None, None, found
+    if found is None:
+        return None, None, why
     if not np.issubdtype(found[signal].dtype, np.number):
         return None, None, f"{signal} is no number"
     return found[signal], float(found.run["wall_time"]), ""
@@ -159,18 +165,15 @@ def convergence_table(rows: Sequence[Row], title: str) -> Table:
     return table
 
 
-def write_rows(rows: Sequence[Row], path: Path) -> None:
-    """Write all runs as CSV, in SI."""
-    headings = ["algorithm", "step_size [s]", "error [1]", "order [1]", "wall_time [s]", "failed"]
-    cells: list[list[Cell]] = [
-        [
-            row.algorithm,
-            *(None if x is None else Value(x, "") for x in (row.step, row.error, row.order, row.wall_time)),
-            row.failed,
-        ]
-        for row in rows
+def columns_of(rows: Sequence[Row]) -> list[Column]:
+    """Return all runs as columns, in SI."""
+    numbers = (("step_size", "s", "step"), ("error", "1", "error"), ("order", "1", "order"),
+               ("wall_time", "s", "wall_time"))  # fmt: skip
+    return [
+        Column("algorithm", "string", [row.algorithm for row in rows]),
+        *(Column(n, "float64", [getattr(row, part) for row in rows], {"unit": u}) for n, u, part in numbers),
+        Column("failed", "string", [row.failed for row in rows]),
     ]
-    write_csv(path, headings, cells)
 
 
 def convergence_figure(rows: Sequence[Row], signal: str, title: str, note: str) -> Figure:

@@ -1,49 +1,35 @@
-"""Which runs of a sweep are finished, and what they came to: one line per run, written as it ends.
+"""Which runs are finished that keep no results, and what they came to: a line per run, written as it ends.
 
 The file is only ever appended to, each line is on the disk before the next run is counted, and a
-line that a kill has cut off is dropped when the sweep goes on. The folder is held by its writer.
+line that a kill has cut off is dropped when the experiment goes on. The folder is held by its writer.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..errors import ResultsError
 from ..files import check_regular
 from ..writing import reason
-from .measuring import Measured
+from .jobs import Record
 
 FILE = "runs.jsonl"
 FORMAT = 1
 
 
-@dataclass(frozen=True)
-class Record:
-    """What became of a run: its metrics, or why there are none."""
-
-    values: Measured
-    problems: tuple[str, ...] = ()
-    findings: tuple[str, ...] = ()  # kinds of what was remarkable in it
-
-    @property
-    def ok(self) -> bool:
-        return not self.problems
-
-
 class Journal:
-    """The finished runs of the sweep whose results go to a folder.
+    """The finished runs of the experiment whose results go to a folder.
 
     Args:
         folder: made if it does not exist.
-        identity: of the sweep; a folder that holds another one is refused.
-        fresh: forget all runs that are finished, whichever sweep they are of.
+        identity: of the experiment; a folder that holds another one is refused.
+        fresh: forget all runs that are finished, whichever experiment they are of.
 
     Raises:
-        ResultsError: the folder holds another sweep, or it cannot be written.
+        ResultsError: the folder holds another one, or it cannot be written.
     """
 
     def __init__(self, folder: Path, identity: str, *, fresh: bool = False) -> None:
@@ -81,15 +67,13 @@ class Journal:
                 key, record = _record(json.loads(lines[entry]))
                 self.records[key] = record
         except (ValueError, KeyError, TypeError, AttributeError, IndexError):
-            raise ResultsError(
-                f"{path}: line {entry + 1} is damaged; --fresh begins the sweep anew."
-            ) from None
+            raise ResultsError(f"{path}: line {entry + 1} is damaged; --fresh begins anew.") from None
 
     def _check(self, entry: dict[str, Any], identity: str) -> None:
         if entry["sweep"] != identity or entry["format"] != FORMAT:
             other = entry["sweep"] if entry["sweep"] != identity else "an earlier version of this program"
             raise ResultsError(
-                f"{self.folder}: holds the sweep of {other}; give another folder with --out, "
+                f"{self.folder}: holds the runs of {other}; give another folder with --out, "
                 "or --fresh to begin anew."
             )
 
@@ -99,7 +83,7 @@ class Journal:
         Args:
             key: of the run.
             record: what became of it.
-            last: False if the run is to be made again when the sweep goes on; nothing is written then.
+            last: False if the run is to be made again when the experiment goes on; nothing is written then.
 
         Raises:
             ResultsError: the journal cannot be written.

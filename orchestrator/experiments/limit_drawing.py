@@ -10,11 +10,11 @@ import numpy as np
 
 from ..figures.style import QUIET, line_style
 from .drawing import Drawing
+from .experiment import Case
+from .findings import Findings
 from .limits import Limit, limits_of
 from .metric_drawing import MARKERS
-from .planning import PlannedRun
 from .schema import FigureSpec
-from .table import Swept
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -28,21 +28,21 @@ ALL_HOLD: dict[str, Any] = {"marker": "^", "mfc": "white", "markersize": 8, "lin
 
 
 class Limits(Drawing):
-    """A limit of a sweep."""
+    """A limit over an axis."""
 
-    def __init__(self, swept: Swept, spec: FigureSpec) -> None:
-        super().__init__(swept, spec)
-        self.limit = self.sweep.limits[spec.limit]
+    def __init__(self, findings: Findings, spec: FigureSpec) -> None:
+        super().__init__(findings, spec)
+        self.limit = findings.spec.limits[spec.limit]
         self.what = self.limit.says
-        self._found = limits_of(swept, self.limit)
+        self._found = limits_of(findings, self.limit)
+        self._others = list(self._found[0].others)
         tried = [float(level.value) for level in self.levels(self.limit.of)]
         self._smallest, self._largest = min(tried), max(tried)
         self._none = self._all = False  # whether such marks have been drawn
 
-    def fill(self, axes: Axes, runs: Sequence[PlannedRun]) -> None:
-        of = self.names.index(self.limit.of)
-        settings = {run.point[:of] + run.point[of + 1 :] for run in runs}
-        mine = [limit for limit in self._found if tuple(limit.others.values()) in settings]
+    def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
+        settings = [{axis: self.at(run, axis) for axis in self._others} for run in runs]
+        mine = [limit for limit in self._found if limit.others in settings]
         for number, level in enumerate(self.levels(self.spec.lines) if self.spec.lines else [None]):
             self._line(
                 axes, [one for one in mine if level is None or one.others[self.spec.lines] == level], number

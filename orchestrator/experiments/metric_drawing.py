@@ -1,4 +1,4 @@
-"""A metric of a sweep as curves over an axis, or as a map over two.
+"""A metric as curves over an axis, or as a map over two.
 
 The colours of maps get lighter all the way, lines differ in colour, dash and marker: both survive
 grey print and every eye.
@@ -18,9 +18,10 @@ from ..figures.display import shown, shown_unit
 from ..figures.style import line_style, literal
 from ..metrics.run_metrics import metric
 from .drawing import FAILED, GUIDE, PLAIN, Drawing
-from .planning import PlannedRun
+from .experiment import Case
+from .findings import Findings
+from .numbers import si_number
 from .schema import FigureSpec
-from .table import Swept
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -35,11 +36,11 @@ COLOURS = "cividis"
 class MetricDrawing(Drawing):
     """What curves and maps share: the metric, its scale, a value to mark."""
 
-    def __init__(self, swept: Swept, spec: FigureSpec) -> None:
-        super().__init__(swept, spec)
-        chosen = self.sweep.metrics[spec.metric]
+    def __init__(self, findings: Findings, spec: FigureSpec) -> None:
+        super().__init__(findings, spec)
+        chosen = findings.spec.metrics[spec.metric]
         self.what = chosen.heading or metric(chosen.metric).title
-        self.unit, self.factor = shown_unit(swept.unit(spec.metric))
+        self.unit, self.factor = shown_unit(findings.unit(spec.metric))
         numbers = [number for run in self.runs if math.isfinite(number := self.number(run))]
         if spec.scale == "log":
             numbers = [number for number in numbers if number > 0]
@@ -47,13 +48,15 @@ class MetricDrawing(Drawing):
             raise ResultsError("nothing to draw: no run gives this metric a number that can be drawn.")
         self.low, self.high = min(numbers), max(numbers)
         if spec.largest is not None:
-            self.high = self.factor * swept.bound(spec.metric, spec.largest)
+            self.high = self.factor * si_number(spec.largest, findings.unit(spec.metric))
             self.low = min(self.low, self.high)
-        self.mark = None if spec.mark is None else self.factor * swept.bound(spec.metric, spec.mark)
+        self.mark = None
+        if spec.mark is not None:
+            self.mark = self.factor * si_number(spec.mark, findings.unit(spec.metric))
 
-    def number(self, run: PlannedRun) -> float:
+    def number(self, run: Case) -> float:
         """Return the metric of a run in the unit shown, NaN if there is none that can be drawn."""
-        value = self.swept.value(run, self.spec.metric)
+        value = self.findings.value(run, self.spec.metric)
         if value is None or not math.isfinite(value.number):
             return math.nan
         return self.factor * value.number
@@ -66,13 +69,14 @@ class MetricDrawing(Drawing):
     def mark_text(self) -> str:
         """Return the marked value as people read it."""
         assert self.spec.mark is not None
-        return shown(self.swept.bound(self.spec.metric, self.spec.mark), self.swept.unit(self.spec.metric))
+        unit = self.findings.unit(self.spec.metric)
+        return shown(si_number(self.spec.mark, unit), unit)
 
 
 class Curves(MetricDrawing):
     """A line, or for a Latin hypercube points, for each level of `lines`."""
 
-    def fill(self, axes: Axes, runs: Sequence[PlannedRun]) -> None:
+    def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
         for number, level in enumerate(self.levels(self.spec.lines) if self.spec.lines else [None]):
             mine = [run for run in runs if level is None or self.at(run, self.spec.lines) == level]
             points = sorted(
@@ -91,7 +95,7 @@ class Curves(MetricDrawing):
 
     def _style(self, number: int) -> dict[str, Any]:
         style = {**line_style(number), "marker": MARKERS[number % len(MARKERS)], "markersize": 4.5}
-        return {**style, "linestyle": ""} if self.sweep.design == "latin_hypercube" else style
+        return {**style, "linestyle": ""} if self.findings.spec.design == "latin_hypercube" else style
 
     def finish(self, figure: Figure, drawn: Sequence[Axes], left: Sequence[Axes]) -> None:
         self.name_y(left, self.measured)
@@ -119,16 +123,16 @@ class Curves(MetricDrawing):
 class Map(MetricDrawing):
     """A grid as coloured cells, other designs as coloured points."""
 
-    def fill(self, axes: Axes, runs: Sequence[PlannedRun]) -> None:
+    def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
         x = [float(self.at(run, self.spec.x).value) for run in runs]
         y = [float(self.at(run, self.spec.y).value) for run in runs]
         values = [self.number(run) for run in runs]
-        if self.sweep.design == "grid":
+        if self.findings.spec.design == "grid":
             self._cells(axes, x, y, values)
         else:
             axes.scatter(x, y, c=values, s=60, edgecolors="#444444", linewidths=0.4, **self._scale())
         self.scale_x(axes)
-        if self.sweep.axes[self.spec.y].spacing == "log":
+        if self.axes[self.spec.y].spacing == "log":
             axes.set_yscale("log")
             axes.yaxis.set_major_formatter(PLAIN)
         lost = [(a, b) for a, b, value in zip(x, y, values, strict=True) if math.isnan(value)]
@@ -142,8 +146,8 @@ class Map(MetricDrawing):
         table = np.full((len(rows), len(columns)), math.nan)
         for a, b, value in zip(x, y, values, strict=True):
             table[rows.index(b), columns.index(a)] = value
-        right = edges(columns, log=self.sweep.axes[self.spec.x].spacing == "log")
-        up = edges(rows, log=self.sweep.axes[self.spec.y].spacing == "log")
+        right = edges(columns, log=self.axes[self.spec.x].spacing == "log")
+        up = edges(rows, log=self.axes[self.spec.y].spacing == "log")
         axes.pcolormesh(right, up, table, edgecolors="face", linewidth=0.1, **self._scale())
         if self.mark is not None:
             for ends in boundary(table > self.mark, right, up):

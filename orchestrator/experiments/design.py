@@ -7,11 +7,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..plan import Value
-from .schema import AxisSpec, SweepSpec
+from .axis_schema import AxisSpec
+
+if TYPE_CHECKING:
+    from .schema import ExperimentSpec
 
 Point = tuple["Level", ...]
 """One level per axis, in the order of the axes."""
@@ -50,13 +54,13 @@ def _level(number: float) -> Level:
     return Level(number, f"{number:.6g}")
 
 
-def points(spec: SweepSpec) -> list[Point]:
-    """Return the points of a sweep, always in the same order; the last axis of a grid changes first."""
+def points(spec: ExperimentSpec) -> list[Point]:
+    """Return the points of the axes, always in the same order; the last axis of a grid changes first."""
     axes = list(spec.axes.values())
     if spec.design == "latin_hypercube":
-        assert spec.runs is not None
+        assert spec.points is not None
         assert spec.seed is not None
-        return latin_hypercube(axes, spec.runs, spec.seed)
+        return latin_hypercube(axes, spec.points, spec.seed)
     levels = [levels_of(axis) for axis in axes]
     return list(itertools.product(*levels) if spec.design == "grid" else zip(*levels, strict=True))
 

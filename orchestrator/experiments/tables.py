@@ -1,15 +1,10 @@
-"""Tables for people (terminal, Markdown) and for programs (CSV), from one description."""
+"""Tables for people, on the terminal or in a page, from one description."""
 
 from __future__ import annotations
 
-import csv
-import io
-import math
-import re
 import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from ..figures.display import shown
@@ -17,7 +12,6 @@ from ..metrics.plausibility import findings_in, first_of_each
 from ..metrics.run_metrics import Value, evaluate_all, metric
 from ..titles import changes_in, with_changes
 from ..wording import printable
-from ..writing import write_whole
 
 if TYPE_CHECKING:
     import rich.console
@@ -58,11 +52,6 @@ def _shown(cell: Cell) -> str:
     return shown(cell.number, cell.unit) if isinstance(cell, Value) else printable(cell)
 
 
-def harmless(text: str) -> str:
-    """Return Markdown in which no HTML of a user's text is left but line breaks."""
-    return re.sub(r"<(?!br>)", "&lt;", printable(text))
-
-
 def for_terminal(table: Table) -> rich.console.Group:
     """Return the table for a rich console; title and notes may be wider than the columns."""
     import rich.table
@@ -83,18 +72,6 @@ def for_terminal(table: Table) -> rich.console.Group:
         shape.add_row(*(Text(cell) for cell in row))
     notes = [Text(printable(note)) for note in table.notes]
     return Group(*([Text(printable(table.title), "bold")] if table.title else []), shape, *notes)
-
-
-def for_markdown(table: Table) -> str:
-    """Return the table as GitHub Markdown, with its title in bold."""
-
-    def line(cells: Sequence[str]) -> str:
-        return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", "<br>") for cell in cells) + " |"
-
-    rule = ["---:" if table.is_number(i) else "---" for i in range(len(table.headings))]
-    head = [f"**{table.title}**", ""] if table.title else []
-    notes = ["", *(f"{note}  " for note in table.notes)] if table.notes else []
-    return "\n".join([*head, line(table.headings), line(rule), *map(line, table.text()), *notes]) + "\n"
 
 
 def marked(label: str, results: Results) -> str:
@@ -122,23 +99,3 @@ def metrics_of_run(results: Results, names: Sequence[str]) -> Table:
     missing = [name for name in names if name not in values]
     notes = [f"No number for {', '.join(missing)}."] if missing else []
     return Table(title, ["metric", "", "value"], rows, notes)
-
-
-def write_csv(path: Path, headings: Sequence[str], rows: Sequence[Sequence[Cell]]) -> None:
-    """Write rows for programs: numbers in SI with all their digits, ratios as such, nothing for nothing."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(headings)
-    writer.writerows([_plain(cell) for cell in row] for row in rows)
-    write_whole(path, text.getvalue())
-
-
-def _plain(cell: Cell) -> str:
-    if isinstance(cell, Value):
-        return "inf" if math.isinf(cell.number) else repr(cell.number)
-    return cell or ""
-
-
-def si(unit: str) -> str:
-    """Return a metric's unit as it stands in a CSV file: ratios are not in per cent there."""
-    return "1" if unit == "%" else unit

@@ -1,8 +1,7 @@
-"""Runs of scenarios in processes of their own, so that one that crashes takes no other with it."""
+"""Runs in processes of their own, so that one that crashes takes no other with it."""
 
 from __future__ import annotations
 
-import copy
 import multiprocessing
 import multiprocessing.util
 import os
@@ -10,26 +9,19 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ..errors import BuildError, ResultsError, ScenarioError, YawbenchError
+from ..errors import YawbenchError
 from ..master.interrupts import StopFlag, interrupts
-from ..plan import Change, Plan
-from ..results.read import Results, load_results
-from ..scenario import yaml_lines
-from ..scenario.yaml_lines import Document
 from ..spawning import SAFE_PATH, SafeSpawnContext, safe_path
-from ..wording import hint
-
-if TYPE_CHECKING:
-    from ..scenario.schema import Scenario
+from .jobs import Job, Outcome, run_job
 
 GRACE = 5.0
 """Time that a process has to end, and a run to write what it has recorded [s]."""
@@ -39,129 +31,10 @@ SHORT_FOLDER = "/tmp"
 """Where they go if the folder for temporary files has a longer path."""
 LOOK_EVERY = 0.2
 """Time between two looks whether to stop [s]."""
-
-
-@dataclass(frozen=True)
-class Job:
-    """One run to be made: a scenario, what is changed in it, and the folder its results go to."""
-
-    label: str
-    scenario: Path
-    out: Path
-    changes: tuple[Change, ...] = ()
-    fmus: Path | None = None
-    record: tuple[str, ...] = ()  # unit.variable; default: what the scenario records
-    format: str = "csv"  # of the results
-    call_limit: float | None = None  # of a call of an FMU [s], in a process per unit; None: units share one
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What became of a job: `problems` is empty if it ran to the end."""
-
-    job: Job
-    problems: tuple[str, ...] = ()
-    exit_status: int = 0
-    seconds: float = 0.0  # of the process, start to end
-    value: Any = None  # what the process returned
-    died: bool = False  # the process ended without a word, or because it was told to
-
-    @property
-    def ok(self) -> bool:
-        return not self.problems
-
-    @property
-    def reason(self) -> str:
-        """Why it failed, in one sentence."""
-        return "; ".join(self.problems)
-
-
+TRIES = 2
+"""Times that a run is begun whose process dies; chosen: a kill from outside strikes seldom twice."""
 NEEDED = ("orchestrator.wiring.make_plan", "orchestrator.master.simulate", "matplotlib.backends.backend_agg")
 """Modules that take long to import."""
-
-
-class Once:
-    """Files read and FMUs opened once for many plans; `build`: see `Opener`."""
-
-    def __init__(self, *, build: bool = False) -> None:
-        from ..fmu.opener import Opener
-
-        self._documents: dict[Path, Document] = {}
-        self.opener = Opener(build=build)
-
-    def read(self, path: Path, *, what: str) -> Document:
-        """Return what `yaml_lines.read` does, a copy each time."""
-        if path not in self._documents:
-            self._documents[path] = yaml_lines.read(path, what=what)
-        return copy.deepcopy(self._documents[path])
-
-
-def plan_of(job: Job, once: Once | None = None) -> Plan:
-    """Return the plan of a job's run; `once` for many plans of the same files.
-
-    Raises:
-        YawbenchError: the scenario, an option or an FMU is wrong.
-    """
-    return planned(job, once)[1]
-
-
-def planned(job: Job, once: Once | None = None) -> tuple[Scenario, Plan]:
-    """Return a job's scenario with all that is changed in it, and its plan (see `plan_of`)."""
-    from ..scenario.load import load_scenario
-    from ..wiring.make_plan import make_plan
-
-    once = once or Once()
-    scenario = load_scenario(job.scenario, changes=job.changes, read=once.read)
-    isolated = job.call_limit is not None
-    plan = make_plan(scenario, fmus=job.fmus, opener=once.opener, isolated=isolated)
-    if not job.record:
-        return scenario, plan
-    recorded = {f"{unit}.{variable}": (unit, variable) for unit, variable in plan.record}
-    unknown = [name for name in job.record if name not in recorded]
-    if unknown:
-        guess = hint(unknown[0], recorded, lead="recorded are")
-        raise ScenarioError(f"{job.scenario}: {unknown[0]!r} is not recorded{guess}")
-    return scenario, replace(plan, record=tuple(recorded[name] for name in job.record))
-
-
-def check(jobs: Sequence[Job], *, build: bool = False) -> list[str]:
-    """Make sure that every job can start; return a sentence per FMU that is stale (see `Opener`).
-
-    Raises:
-        BuildError: FMUs that are stale and cannot be built.
-        ScenarioError: with everything that is wrong with any of them, each problem once.
-    """
-    from ..fmu.opener import stale_fmus
-
-    once = Once(build=build)
-    found = [_plan_or_problems(job, once) for job in jobs]
-    problems = dict.fromkeys(problem for one in found if isinstance(one, list) for problem in one)
-    if problems:
-        raise ScenarioError(problems)
-    return stale_fmus(unit.fmu for one in found if isinstance(one, Plan) for unit in one.units)
-
-
-def _plan_or_problems(job: Job, once: Once) -> Plan | list[str]:
-    try:
-        return plan_of(job, once)
-    except BuildError:
-        raise
-    except YawbenchError as error:
-        return [*error.problems]
-
-
-def run_job(job: Job) -> str:
-    """Make one run in this process; return its id, for the results are on disk.
-
-    Raises:
-        YawbenchError: the scenario is wrong or the run failed.
-    """
-    from ..master.isolation import opener_of
-    from ..master.simulate import simulate
-
-    plan = plan_of(job)
-    with opener_of(plan, job.call_limit) as opener:
-        return simulate(plan, job.out, opener=opener, format=job.format, apart=True).id
 
 
 def default_workers() -> int:
@@ -179,13 +52,16 @@ def execute(
 ) -> list[Outcome]:
     """Run all jobs, so many at a time, each in a fresh process; return their outcomes in order.
 
+    A run whose process died is made again when the others are through: perhaps the process was killed, and
+    the run is not to blame.
+
     Ctrl-C is looked at between two runs' ends, never while a process is being started, which would
     leave one that nobody knows.
 
     Args:
         jobs: what to run.
         workers: processes at a time; default: one per core.
-        done: called with every outcome as it comes.
+        done: called with every outcome as it comes, one for each job.
         run: what a process does with its job; importable by name. What it returns becomes the
             outcome's value.
 
@@ -195,21 +71,25 @@ def execute(
     context = _context()
     limit = max(1, workers or default_workers())
     outcomes: dict[int, Outcome] = {}
-    waiting: Iterator[tuple[int, Job]] = iter(enumerate(jobs))
+    waiting = deque((number, job, TRIES) for number, job in enumerate(jobs))
     running: list[_Running] = []
     stop = StopFlag()
     with interrupts(stop, lambda: None):
         try:
             while not stop.requested:
-                while len(running) < limit and (following := next(waiting, None)) is not None:
-                    running.append(_Running.start(*following, context, run))
+                while len(running) < limit and waiting:
+                    running.append(_Running.start(*waiting.popleft(), context, run))
                 if not running:
                     return [outcomes[i] for i in range(len(jobs))]
                 reported = wait([one.pipe for one in running], timeout=LOOK_EVERY)
                 for one in [one for one in running if one.pipe in reported]:
                     running.remove(one)
-                    outcomes[one.number] = one.outcome()
-                    done(outcomes[one.number])
+                    outcome = one.outcome()
+                    if outcome.died and one.tries > 1:
+                        waiting.append((one.number, one.job, one.tries - 1))
+                        continue
+                    outcomes[one.number] = outcome
+                    done(outcome)
             raise KeyboardInterrupt
         finally:
             for one in running:
@@ -268,17 +148,18 @@ class _Running:
 
     number: int
     job: Job
+    tries: int  # this one and those left
     process: Any
     pipe: Connection
     began: float = field(default_factory=time.monotonic)
 
     @classmethod
-    def start(cls, number: int, job: Job, context: Any, run: Callable[[Job], Any]) -> _Running:
+    def start(cls, number: int, job: Job, tries: int, context: Any, run: Callable[[Job], Any]) -> _Running:
         ours, theirs = context.Pipe(duplex=False)
         process = context.Process(target=_work, args=(job, run, theirs), daemon=True)
         process.start()
         theirs.close()
-        return cls(number, job, process, ours)
+        return cls(number, job, tries, process, ours)
 
     def outcome(self) -> Outcome:
         """Return what the process reported, or how it died if it did not."""
@@ -343,22 +224,3 @@ def _death(code: int | None) -> str:
         with suppress(ValueError):
             return f"the process of this run died of signal {signal.Signals(-code).name}"
     return f"the process of this run ended without a word, exit status {code}"
-
-
-def read_back(folder: Path, run: str | None = None) -> Results | str:
-    """Return the results of a run that reached its end, or a sentence that says why there are none.
-
-    Args:
-        folder: of the results.
-        run: the id of the run that they must be of; None: whichever was the last.
-    """
-    try:
-        results = load_results(folder)
-    except ResultsError as error:
-        return str(error)
-    if run is not None and results.run.get("id") != run:
-        return f"{folder}: holds the results of another run than the one just made"
-    if results.run.get("status") == "completed":
-        return results
-    message = (results.run.get("error") or {}).get("message", "no reason recorded")
-    return f"{folder}: this run ended early: {message}"

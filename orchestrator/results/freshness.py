@@ -10,15 +10,17 @@ from typing import Any
 
 from ..errors import ResultsError
 from ..plan import Plan
-from ..results.digest import checksum
-from ..results.folder import COMPLETED, RESULTS_FILE, RUN_FILE, is_dead
-from ..results.read import load_results
-from ..results.record import load_record
-from ..results.run_record import run_record
+from .digest import checksum
+from .folder import COMPLETED, RESULTS_FILE, RUN_FILE, is_dead
+from .key import key_of
+from .read import load_results
+from .record import load_record
+from .run_record import PROGRAMS, run_record
 
 COMPARED = {
     "algorithm": "the algorithm has changed",
     "step_size": "the communication step has changed",
+    "start_time": "the start time has changed",
     "stop_time": "the stop time has changed",
     "evaluation_order": "the order of the units has changed",
     "connections": "the wires have changed",
@@ -31,13 +33,12 @@ _OF_UNIT = {
     "constants": "constants",
     "series": "time series",
     "step_size": "step",
+    "tolerance": "tolerance",
 }
-PROGRAMS = ("yawbench", "orchestrator", "fmpy", "pythonfmu", "numpy")
-"""Programs whose version, or sources, have a say in the numbers."""
 
 
 def staleness(plan: Plan, folder: Path) -> str | None:
-    """Return why the results in a folder are not those of the plan, None if they are."""
+    """Return why the results in a folder are not those of the plan, None if they are: their keys are one."""
     if not (folder / RUN_FILE).is_file():
         return "no results yet"
     try:
@@ -51,13 +52,20 @@ def staleness(plan: Plan, folder: Path) -> str | None:
         return "the results are missing"
     if not _whole(results, recorded):
         return "the results were changed or cut off"
+    return None if recorded.get("key") == key_of(plan) else _reason(plan, recorded)
+
+
+def _reason(plan: Plan, recorded: Mapping[str, Any]) -> str:
+    """Return in words why the key of a record is not that of a plan."""
     planned = run_record(plan, status="completed", started=datetime.now(timezone.utc))
     wanted = json.loads(json.dumps(planned, default=str))
     for key, sentence in COMPARED.items():
         if recorded.get(key) != wanted[key]:
             return sentence
-    return _changed_fmu(recorded.get("fmus", {}), wanted["fmus"]) or _changed_program(
-        recorded.get("versions", {}), wanted["versions"]
+    return (
+        _changed_fmu(recorded.get("fmus", {}), wanted["fmus"])
+        or _changed_program(recorded.get("versions", {}), wanted["versions"])
+        or "its record is of an earlier kind"
     )
 
 
@@ -83,7 +91,7 @@ def _changed_fmu(recorded: Mapping[str, Any], wanted: Mapping[str, Any]) -> str 
 
 
 def _changed_program(recorded: Mapping[str, str], wanted: Mapping[str, str]) -> str | None:
-    for program in PROGRAMS:
+    for program in (*PROGRAMS, "orchestrator"):
         if recorded.get(program) != wanted[program]:
             return f"{program} {wanted[program]} in place of {recorded.get(program, 'an unknown one')}"
     return None

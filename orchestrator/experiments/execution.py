@@ -1,0 +1,91 @@
+"""The course of an experiment's runs: which are left to be made, made, and noted as they end."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from ..errors import KEPT, ResultsError
+from ..results.freshness import staleness
+from .jobs import Job, Outcome, Record, read_back
+from .journal import Journal
+from .planning import Planned
+from .workers import execute
+
+Told = Callable[[Outcome], None]
+"""Told of every run that is finished, once for each job."""
+Runner = Callable[[Sequence[Job], Told], object]
+"""Makes runs: `here`, or on a cluster."""
+
+
+def here(workers: int | None = None) -> Runner:
+    """Return what makes runs in processes of this machine (see `execute`)."""
+    return lambda jobs, told: execute(jobs, workers=workers, done=told)
+
+
+def stale(jobs: Sequence[Job]) -> dict[str, str]:
+    """Return label -> why its results on disk are not those of its plan, of jobs that keep results."""
+    found = {job.label: staleness(job.plan, job.out) for job in jobs if job.plan is not None}
+    return {label: why for label, why in found.items() if why}
+
+
+def left_to_do(jobs: Sequence[Job], records: Mapping[str, Record]) -> list[Job]:
+    """Return the runs that have not been made already, each key once, in their order.
+
+    Runs that are measured are those whose key is in `records`, and that have kept results if they are to;
+    of others the key stands in the results.
+    """
+    left: dict[tuple[str, Path], Job] = {}
+    for job in jobs:
+        if (job.key, job.out) in left:
+            continue
+        if not job.metrics:
+            made = job.plan is not None and staleness(job.plan, job.out) is None
+        else:
+            record = records.get(job.key)
+            made = record is not None and not (job.keep and record.ok and isinstance(read_back(job.out), str))
+        if not made:
+            left[job.key, job.out] = job
+    return list(left.values())
+
+
+def finish(left: Sequence[Job], journal: Journal, *, runner: Runner, told: Told = lambda _: None) -> None:
+    """Make runs and note each in the journal as it ends.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C; what is finished is in the journal.
+        ResultsError: the journal cannot be written, or a cluster was lost.
+    """
+
+    def done(outcome: Outcome) -> None:
+        final = outcome.ok or (outcome.exit_status == 1 and not outcome.died)  # else it may go well next time
+        journal.add(outcome.job.key, record_of(outcome), last=final)
+        told(outcome)
+
+    runner(left, done)
+    if any(job.key not in journal.records for job in left):
+        raise ResultsError(f"{journal.folder}: not all runs were made; start it again.")
+
+
+def record_of(outcome: Outcome) -> Record:
+    """Return what became of a run, as its process says."""
+    problems = tuple(text for text in outcome.problems if getattr(text, "kind", "") != KEPT)
+    return Record({}, problems) if problems else outcome.value.record
+
+
+def on_cluster(planned: Planned, scheduler: str) -> Runner:
+    """Return what makes runs on a Dask cluster.
+
+    Raises:
+        ScenarioError: the package that a cluster needs is missing.
+    """
+    from ..errors import ScenarioError
+
+    try:
+        from .cluster import run_on_cluster
+    except ImportError:
+        raise ScenarioError(
+            "--scheduler needs the package distributed: pip install 'yawbench[cluster]'"
+        ) from None
+    return functools.partial(run_on_cluster, scheduler=scheduler, fmus=planned.fmus)

@@ -1,0 +1,118 @@
+"""Figures of an experiment: runs laid over each other, a metric or a limit over axes."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ResultsError
+from ..figures.panels import Run
+from ..figures.plots import draw
+from ..figures.style import RC, ROW, frame, literal, save
+from ..titles import changed
+from .drawing import Drawing
+from .experiment import FIGURES
+from .findings import Each, Findings
+from .limit_drawing import Limits
+from .metric_drawing import Curves, Map
+from .schema import FigureSpec
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+KINDS: dict[str, type[Drawing]] = {"curve": Curves, "map": Map, "limit": Limits}
+PANELS_IN_A_ROW = 3
+
+
+def draw_all(findings: Findings, out: Path, each: Each = map) -> tuple[dict[str, str], list[str]]:
+    """Draw all figures as SVG and PNG into a folder below `out`; return name -> title, and problems.
+
+    Args:
+        findings: what is drawn.
+        out: the experiment's folder.
+        each: how to draw all figures.
+    """
+    wanted: list[tuple[Any, FigureSpec, str, Path]] = []
+    light = findings.light()
+    for spec in findings.spec.figures:
+        stem = out / FIGURES / spec.name
+        if spec.kind == "overlay":
+            wanted.append((runs_of(findings, spec), spec, title_of(findings, spec), stem))
+        else:
+            wanted.append((light, spec, title_of(findings, spec), stem))
+    drawn, problems = {}, []
+    for (_, spec, title, _), problem in zip(wanted, each(_draw, wanted), strict=True):
+        if problem:
+            problems.append(f"figure {spec.name}: {problem}")
+        else:
+            drawn[spec.name] = title
+    return drawn, problems
+
+
+def title_of(findings: Findings, spec: FigureSpec) -> str:
+    """Return what a figure is called."""
+    return spec.title or f"{findings.spec.title}: {spec.name}"
+
+
+def runs_of(findings: Findings, spec: FigureSpec) -> list[Run]:
+    """Return the runs of an overlay that have results."""
+    named = findings.experiment.matching(spec.runs)
+    return [Run(run.label, findings.results[run.name]) for run in named if run.name in findings.results]
+
+
+def _draw(wanted: tuple[Any, FigureSpec, str, Path]) -> str | None:
+    shown, spec, title, stem = wanted
+    if not shown:
+        return "none of its runs has results"
+    try:
+        overlay = spec.kind == "overlay"
+        save(draw(shown, spec.panels, title=title) if overlay else draw_over_axes(shown, spec), stem)
+    except ResultsError as error:
+        return str(error)
+    return None
+
+
+def draw_over_axes(findings: Findings, spec: FigureSpec) -> Figure:
+    """Return a figure over axes.
+
+    Raises:
+        ResultsError: there is nothing to draw.
+    """
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    drawing = KINDS[spec.kind](findings, spec)
+    panels = drawing.panels()
+    columns = min(len(panels), PANELS_IN_A_ROW)
+    rows = math.ceil(len(panels) / columns)
+    height = rows * (1.7 if columns == 1 else 1.4) * ROW
+    with matplotlib.rc_context(RC):
+        figure = Figure(layout="constrained")
+        FigureCanvasAgg(figure)
+        grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+        drawn = list(grid.flat[: len(panels)])
+        for axes in grid.flat[len(panels) :]:
+            axes.remove()
+        for axes, (heading, runs) in zip(drawn, panels, strict=True):
+            drawing.fill(axes, runs)
+            axes.set_title(literal(heading))
+        for k, axes in enumerate(drawn):
+            if k + columns >= len(drawn):  # none stands below
+                axes.set_xlabel(literal(drawing.label(spec.x)))
+                axes.tick_params(labelbottom=True)
+        drawing.finish(figure, drawn, drawn[::columns])
+        options = changed(findings.experiment.by_options)
+        frame(figure, height, drawing.handles(), spec.title or drawing.what, _provenance(findings), options)
+    return figure
+
+
+def _provenance(findings: Findings) -> str:
+    planned, spec = findings.planned, findings.spec
+    assert planned is not None
+    fmus = sorted(f"{fmu.name} {digest[:8]}" for digest, fmu in planned.fmus.items())
+    scenarios = dict.fromkeys(run.scenario.name for run in findings.experiment.runs.values())
+    parts = [f"{len(findings.records)} runs of {', '.join(scenarios)}", f"FMUs: {', '.join(fmus)}"]
+    parts += [f"changed in all runs: {words}"] if (words := changed(findings.experiment.changed)) else []
+    return " · ".join([spec.source, *parts] if spec.source else parts)

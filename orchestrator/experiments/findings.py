@@ -1,0 +1,183 @@
+"""What an experiment comes to: metrics of every case, numbers derived from several, claims and checks."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from ..metrics.run_metrics import Value
+from ..results.read import Results
+from ..wording import counted
+from .derived import calculate
+from .design import Point
+from .experiment import Case, Experiment
+from .grids import correlation
+from .jobs import Outcome, Record, measured, read_back
+from .judged_schema import Claim
+from .judging import Judgement, Values, judge
+from .planning import Planned, metrics_of
+from .schema import ExperimentSpec
+
+Each = Callable[..., Iterable[Any]]
+"""`map`, or the `map` of an executor."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What an experiment comes to."""
+
+    experiment: Experiment
+    records: list[Record]  # of all cases, in their order
+    results: dict[str, Results]  # of named runs that reached their end
+    planned: Planned | None = None  # None: judged by what stands on disk alone
+
+    @property
+    def spec(self) -> ExperimentSpec:
+        """The file of the experiment."""
+        return self.experiment.spec
+
+    @property
+    def failed(self) -> dict[str, str]:
+        """Words for each case that failed -> why."""
+        return {
+            self.words(case): "; ".join(record.problems)
+            for case, record in zip(self.experiment.cases, self.records, strict=True)
+            if not record.ok
+        }
+
+    def words(self, case: Case) -> str:
+        """Return what a case is called in messages."""
+        return self.planned.words(case) if self.planned and case.point else case.label
+
+    def record(self, case: Case) -> Record:
+        """Return what became of a case."""
+        return self.records[case.number]
+
+    def value(self, case: Case, key: str) -> Value | None:
+        """Return a metric of a case, None if it failed or gives none."""
+        found = self.record(case).values.get(key)
+        return None if found is None else Value(*found)
+
+    def unit(self, key: str) -> str:
+        """Return the unit of a metric."""
+        if self.planned:
+            return self.planned.metric_units[key]
+        found = (self.value(case, key) for case in self.experiment.cases)
+        return next((value.unit for value in found if value), "1")
+
+    @cached_property
+    def at(self) -> dict[Point, dict[tuple[str, str], Value]]:
+        """Point -> (run, metric) -> value, of those that exist."""
+        found: dict[Point, dict[tuple[str, str], Value]] = {}
+        for case in self.experiment.cases:
+            here = found.setdefault(case.point, {})
+            for key in self.spec.metrics:
+                if (value := self.value(case, key)) is not None:
+                    here[case.run.name, key] = value
+        return found
+
+    @property
+    def values(self) -> Values:
+        """(run, metric) -> value, at the first point of the axes, which is all there is without axes."""
+        return next(iter(self.at.values()))
+
+    @cached_property
+    def derived(self) -> dict[str, Value]:
+        """Numbers derived from several runs, as `values`."""
+        return derive(self.spec, self.values)
+
+    @cached_property
+    def claims(self) -> list[Judgement]:
+        """What the paper says, judged."""
+        return [self.judged(claim) for claim in self.spec.claims]
+
+    @cached_property
+    def checks(self) -> list[Judgement]:
+        """What this project asks, judged."""
+        return [self.judged(claim) for claim in self.spec.checks]
+
+    def judged(self, claim: Claim) -> Judgement:
+        """Return whether a claim holds; along axes, whether it does at every point."""
+        words = {run.name: run.row for run in self.experiment.runs.values()}
+        every = [judge(claim, values, words, derive(self.spec, values)) for values in self.at.values()]
+        if len(every) == 1:
+            return every[0]
+        verdicts = [one.holds for one in every]
+        holds = False if False in verdicts else None if None in verdicts else True
+        text = f"holds at {verdicts.count(True)} of {counted(len(every), 'point')}"
+        return Judgement(claim, holds, (text,))
+
+    def light(self) -> Findings:
+        """Return what figures over axes need, to be handed to other processes."""
+        planned = self.planned and replace(self.planned, jobs=[], fmus={
+            digest: replace(fmu, variables={}) for digest, fmu in self.planned.fmus.items()
+        })  # fmt: skip
+        return Findings(self.experiment, self.records, {}, planned)
+
+    def remarkable(self) -> str:
+        """Return in how many runs something was remarkable, `spin in 3 of 20 runs`; "" for none."""
+        kinds = Counter(kind for record in self.records for kind in record.findings)
+        total = counted(len(self.records), "run")
+        return ", ".join(f"{kind} in {count} of {total}" for kind, count in kinds.items())
+
+
+def judge_records(planned: Planned, records: Mapping[str, Record]) -> Findings:
+    """Return what an experiment along axes comes to; `records`: key -> what became of a run."""
+    missing = Record({}, ("no results yet",))
+    found = [records.get(job.key, missing) for job in planned.jobs]
+    return Findings(planned.experiment, found, {}, planned)
+
+
+def judge_results(
+    experiment: Experiment,
+    out: Path,
+    outcomes: Iterable[Outcome] = (),
+    *,
+    planned: Planned | None = None,
+    each: Each = map,
+) -> Findings:
+    """Read the results of all named runs below `out` and judge the experiment by them.
+
+    Args:
+        experiment: without axes.
+        out: its folder of results.
+        outcomes: of the runs that have just been made; they know best why one has no results.
+        planned: the experiment with its plans, where they can be made.
+        each: how to read the results of all runs.
+
+    Raises:
+        ScenarioError: a claim's bound is in a unit that its metric does not have.
+    """
+    made = {outcome.job.label: outcome for outcome in outcomes}
+    results: dict[str, Results] = {}
+    records: list[Record] = []
+    ids = [made[name].value.id if name in made and made[name].ok else None for name in experiment.runs]
+    recorded = each(read_back, [out / name for name in experiment.runs], ids)
+    for name, read in zip(experiment.runs, recorded, strict=True):
+        found = (made[name].reason if name in made else "") or read
+        if isinstance(found, str):
+            records.append(Record({}, (found,)))
+        else:
+            results[name] = found
+            records.append(measured(found, metrics_of(experiment)))
+    return Findings(experiment, records, results, planned)
+
+
+def derive(spec: ExperimentSpec, values: Values) -> dict[str, Value]:
+    """Return the numbers derived from several runs, without those that lack one."""
+    found: dict[str, Value] = {}
+    for key, one in spec.derived.items():
+        number = None
+        if one.rank_correlation is not None:
+            number = correlation(spec.grids[one.rank_correlation], values)
+        elif one.expression is not None:
+            known = {word: values.get((source.run, source.metric)) for word, source in one.of.items()}
+            numbers = {word: value.number for word, value in known.items() if value is not None}
+            number = calculate(one.expression, numbers) if len(numbers) == len(known) else None
+        if number is not None:
+            found[key] = Value(number, one.unit)
+    return found

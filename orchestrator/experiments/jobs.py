@@ -1,0 +1,226 @@
+"""One run to be made: planned before the first of them starts, made in whatever process it is given to."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from ..errors import BuildError, ResultsError, ScenarioError, YawbenchError
+from ..metrics.plausibility import findings_in
+from ..metrics.run_metrics import evaluate, metric
+from ..plan import Change, Plan
+from ..results.key import key_of
+from ..results.read import Results, load_results
+from ..scenario import yaml_lines
+from ..scenario.yaml_lines import Document
+from ..sources import OF_METRICS, sources_hash
+from ..wording import hint
+
+if TYPE_CHECKING:
+    from ..scenario.schema import Scenario
+
+MANY = 10
+"""Problems shown; more are only counted."""
+
+Metrics = tuple[tuple[str, str, tuple[float, float] | None], ...]
+"""(key, metric, window) of each metric."""
+Measured = dict[str, tuple[float, str] | None]
+"""Key of a metric -> its value and unit, None where the run gives none."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run to be made: a scenario, what is changed in it, and the folder its results go to."""
+
+    label: str
+    scenario: Path
+    out: Path
+    changes: tuple[Change, ...] = ()
+    fmus: Path | None = None
+    record: tuple[str, ...] = ()  # unit.variable; default: what the scenario records
+    format: str = "csv"  # of the results
+    call_limit: float | None = None  # of a call of an FMU [s], in a process per unit; None: units share one
+    metrics: Metrics = ()  # handed back when the run ends
+    keep: bool = True  # whether results are written
+    plan: Plan | None = None  # once it is made
+    key: str = ""  # see `keyed`
+
+
+@dataclass(frozen=True)
+class Record:
+    """What became of a run: its metrics, or why there are none."""
+
+    values: Measured
+    problems: tuple[str, ...] = ()
+    findings: tuple[str, ...] = ()  # kinds of what was remarkable in its course
+
+    @property
+    def ok(self) -> bool:
+        return not self.problems
+
+
+class Made(NamedTuple):
+    """What a process hands back that has made a run."""
+
+    id: str | None  # of the results on disk
+    record: Record
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a job: `problems` is empty if it ran to the end."""
+
+    job: Job
+    problems: tuple[str, ...] = ()
+    exit_status: int = 0
+    seconds: float = 0.0  # of the process, start to end
+    value: Any = None  # what the process returned
+    died: bool = False  # the process ended without a word, or because it was told to
+
+    @property
+    def ok(self) -> bool:
+        return not self.problems
+
+    @property
+    def reason(self) -> str:
+        """Why it failed, in one sentence."""
+        return "; ".join(self.problems)
+
+    @property
+    def results(self) -> Results | str:
+        """The results on disk, or why there are none."""
+        return self.reason or read_back(self.job.out, self.value.id if isinstance(self.value, Made) else None)
+
+
+class Once:
+    """Files read and FMUs opened once for many plans; `build`: see `Opener`."""
+
+    def __init__(self, *, build: bool = False) -> None:
+        from ..fmu.opener import Opener
+
+        self._documents: dict[Path, Document] = {}
+        self.opener = Opener(build=build)
+
+    def read(self, path: Path, *, what: str) -> Document:
+        """Return what `yaml_lines.read` does, a copy each time."""
+        if path not in self._documents:
+            self._documents[path] = yaml_lines.read(path, what=what)
+        return copy.deepcopy(self._documents[path])
+
+
+def planned(job: Job, once: Once | None = None) -> tuple[Scenario, Plan]:
+    """Return a job's scenario with all that is changed in it, and its plan; `once` for many jobs.
+
+    Raises:
+        YawbenchError: the scenario, an option or an FMU is wrong.
+    """
+    from ..scenario.load import load_scenario
+    from ..wiring.make_plan import make_plan
+
+    once = once or Once()
+    scenario = load_scenario(job.scenario, changes=job.changes, read=once.read)
+    isolated = job.call_limit is not None
+    plan = make_plan(scenario, fmus=job.fmus, opener=once.opener, isolated=isolated)
+    if not job.record:
+        return scenario, plan
+    recorded = {f"{unit}.{variable}": (unit, variable) for unit, variable in plan.record}
+    unknown = [name for name in job.record if name not in recorded]
+    if unknown:
+        guess = hint(unknown[0], recorded, lead="recorded are")
+        raise ScenarioError(f"{job.scenario}: {unknown[0]!r} is not recorded{guess}")
+    return scenario, replace(plan, record=tuple(recorded[name] for name in job.record))
+
+
+def ready(
+    jobs: Sequence[Job],
+    *,
+    build: bool = False,
+    progress: Callable[[int], None] = lambda done: None,
+    place: Callable[[str], tuple[Hashable, str]] = lambda problem: (problem, problem),
+) -> list[Job]:
+    """Return the jobs with their plans, after making sure that every one can start.
+
+    Args:
+        jobs: what is to be run.
+        build: build first what is stale of the FMUs (see `Opener`).
+        progress: told how many are planned.
+        place: what a problem is about, and its sentence; of several about one thing the first is told.
+
+    Raises:
+        BuildError: FMUs that are stale and cannot be built.
+        ScenarioError: with everything that is wrong with any of them, each problem once.
+    """
+    once, found = Once(build=build), []
+    problems: dict[Hashable, str] = {}
+    for number, job in enumerate(jobs, start=1):
+        try:
+            found.append(replace(job, plan=planned(job, once)[1]))
+        except BuildError:
+            raise
+        except YawbenchError as error:
+            for problem in error.problems:
+                problems.setdefault(*place(problem))
+        progress(number)
+    if problems:
+        told = list(problems.values())
+        more = [f"and {len(told) - MANY} more problems"] if len(told) > MANY else []
+        raise ScenarioError(told[:MANY] + more)
+    return found
+
+
+def keyed(job: Job, metrics: Metrics = ()) -> Job:
+    """Return a job that hands back metrics, with its key: jobs of one key are one run."""
+    assert job.plan is not None
+    also = [metrics, sources_hash(OF_METRICS)] if metrics else None
+    return replace(job, metrics=metrics, key=key_of(job.plan, also))
+
+
+def run_job(job: Job) -> Made:
+    """Make one run in this process.
+
+    Raises:
+        YawbenchError: the scenario is wrong or the run failed.
+    """
+    from ..master.isolation import opener_of
+    from ..master.simulate import simulate, simulate_in_memory
+
+    plan = job.plan or planned(job)[1]
+    with opener_of(plan, job.call_limit) as opener:
+        if not job.keep:
+            results = simulate_in_memory(plan, opener=opener)
+            return Made(None, measured(results, job.metrics))
+        run = simulate(plan, job.out, opener=opener, format=job.format, apart=True).id
+    return Made(run, measured(load_results(job.out), job.metrics) if job.metrics else Record({}))
+
+
+def measured(results: Results, metrics: Metrics) -> Record:
+    """Return what a run that has ended comes to."""
+    values: Measured = {}
+    for key, name, window in metrics:
+        value = evaluate(results, metric(name), window)
+        short = results.ended and not window  # of a run that a unit has ended early it is another metric
+        values[key] = None if value is None or short else (value.number, value.unit)
+    kinds = dict.fromkeys(one.kind for one in findings_in(results.run) if one.time is not None)
+    return Record(values, findings=tuple(kinds))
+
+
+def read_back(folder: Path, run: str | None = None) -> Results | str:
+    """Return the results of a run that reached its end, or a sentence that says why there are none.
+
+    Args:
+        folder: of the results.
+        run: the id of the run that they must be of; None: whichever was the last.
+    """
+    try:
+        results = load_results(folder)
+    except ResultsError as error:
+        return str(error)
+    if run is not None and results.run.get("id") != run:
+        return f"{folder}: holds the results of another run than the one just made"
+    if results.run.get("status") == "completed":
+        return results
+    message = (results.run.get("error") or {}).get("message", "no reason recorded")
+    return f"{folder}: this run ended early: {message}"

@@ -1,0 +1,48 @@
+"""Numbers in files of experiments: plain ones in SI, or with their unit as text."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Annotated
+
+from pydantic import PlainValidator
+
+from ..scenario.quantities import convert
+from ..wording import short
+
+
+def text_of(value: object) -> str:
+    """Return a plain value as a YAML file would have it."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def is_finite(value: object) -> bool:
+    """Return whether a value is a finite number."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def si_number(given: float | str, unit: str) -> float:
+    """Return a number in SI, given as such or as text with its unit; `%` stands for a ratio.
+
+    Raises:
+        ValueError: a sentence that says what the text should have been.
+    """
+    return float(convert(given, "1" if unit == "%" else unit) if isinstance(given, str) else given)
+
+
+def _number(value: object) -> float | int:
+    if not is_finite(value):
+        raise ValueError(f"must be a number (got {short(value)})")
+    return value  # type: ignore[return-value]
+
+
+def _quantity(value: object) -> float | str:
+    if not is_finite(value) and not (isinstance(value, str) and re.match(r"\s*[+-]?\.?\d", value)):
+        raise ValueError(f"must be a number, or a number with its unit ('5 %') (got {short(value)})")
+    return value  # type: ignore[return-value]
+
+
+Number = Annotated[float | int, PlainValidator(_number)]
+Quantity = Annotated[float | str, PlainValidator(_quantity)]
+"""A number in SI, or text that begins with one and ends with its unit."""

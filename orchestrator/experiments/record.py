@@ -1,0 +1,113 @@
+"""What an experiment leaves on disk beside its runs and its page: the table, and all it comes to as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from ..metrics.run_metrics import Value, metric
+from ..results.read import Results
+from ..writing import write_whole
+from .findings import Findings
+from .judging import Judgement
+from .limits import limits_of
+from .numbers import si_number
+from .table import si, write_table
+from .verdicts import heading, verdict
+
+RECORD = "experiment.json"
+
+
+def write_findings(findings: Findings, drawn: dict[str, str], out: Path) -> None:
+    """Write table and record into a folder; `drawn`: name -> title of the figures in it.
+
+    Raises:
+        ResultsError: they cannot be written.
+    """
+    write_table(findings, out)
+    record = json.dumps(_record(findings, drawn), indent=1, ensure_ascii=False, allow_nan=False)
+    write_whole(out / RECORD, record + "\n")
+
+
+def _record(findings: Findings, drawn: dict[str, str]) -> dict[str, Any]:
+    spec, failed = findings.spec, findings.failed
+    return {
+        "title": spec.title,
+        "source": spec.source,
+        "file": str(findings.experiment.path),
+        "runs": {
+            run.name: {
+                "label": run.label,
+                "scenario": str(run.scenario),
+                "changes": [asdict(change) for change in run.changes],
+                "failed": failed.get(run.name),
+                "fmus": _hashes(findings.results.get(run.name)),
+                "metrics": {
+                    key: _value(findings.values[run.name, key])
+                    for key in spec.metrics
+                    if not spec.axes and (run.name, key) in findings.values
+                },
+            }
+            for run in findings.experiment.runs.values()
+        },
+        "metrics": {
+            key: {
+                "metric": item.metric,
+                "heading": heading(item),
+                "formula": metric(item.metric).formula,
+                "definition": metric(item.metric).definition,
+                "window": item.window,
+            }
+            for key, item in spec.metrics.items()
+        },
+        "derived": {
+            key: {
+                "says": one.says,
+                "expression": one.expression,
+                "of": {word: [source.run, source.metric] for word, source in one.of.items()},
+                "rank_correlation": one.rank_correlation,
+                "published": None if one.published is None else si_number(one.published, one.unit),
+                **(_value(findings.derived[key]) if key in findings.derived else {"value": None}),
+            }
+            for key, one in spec.derived.items()
+        },
+        "claims": [_judgement(one, "claims") for one in findings.claims],
+        "checks": [_judgement(one, "checks") for one in findings.checks],
+        "limits": {
+            key: [
+                {
+                    "at": {axis: level.value for axis, level in one.others.items()},
+                    "up_to": one.largest,
+                    "not_at": one.beyond,
+                }
+                for one in limits_of(findings, limit)
+            ]
+            for key, limit in spec.limits.items()
+        },
+        "figures": drawn,
+    }
+
+
+def _hashes(results: Results | None) -> dict[str, str]:
+    fmus = results.run.get("fmus", {}) if results else {}
+    return {fmu["name"]: fmu["sha256"] for fmu in fmus.values() if "name" in fmu and "sha256" in fmu}
+
+
+def _value(value: Value) -> dict[str, Any]:
+    number = value.number if math.isfinite(value.number) else "inf"
+    return {"value": number, "unit": si(value.unit)}
+
+
+def _judgement(one: Judgement, group: str) -> dict[str, Any]:
+    return {
+        "says": one.said.says,
+        "source": one.said.source,
+        "holds_if": [str(condition) for condition in one.said.holds_if],
+        "measured": list(one.measured),
+        "holds": one.holds,
+        "verdict": verdict(one, group),
+        "note": one.said.note,
+    }

@@ -1,0 +1,222 @@
+"""The schema of experiment files: runs, axes, metrics, judgements, figures; every key, strictly.
+
+An experiment is a list of runs (a study: a paper's, say), or one scenario whose conditions vary along axes
+(a sweep), or both. A run entry with `for` stands for one run per combination; `{name}` in its texts is then
+the value.
+
+    title: What a paper says
+    runs:
+      - for: {speed: [15, 25], controller: {off: no control, fnn: neural network}}
+        name: "{speed}mps/{controller}"
+        label: "{controller}"              # in legends and tables the words: "no control"
+        row: "{speed} m/s, {controller}"
+        scenario: "{speed}mps.yaml"        # relative to this file
+        swap: {controller: "controller_{controller}"}
+    metrics:
+      error: {metric: relative_peak_error(sideslip), window: [1, 6]}
+    claims:
+      - says: Without control the error exceeds 100 %.
+        source: section 3.1
+        holds_if:
+          - {run: 15mps/off, metric: error, above: 100 %}
+          - {run: 15mps/fnn, metric: error, below: {run: 15mps/off, metric: error, times: 0.5}}
+    figures:
+      - {name: overlay, runs: ["15mps/*"], panels: [sideslip, path]}
+
+Grids put one metric of many runs into rows and columns, beside what the paper prints; `derived` are
+numbers computed from several runs, which claims may speak of (`{derived: gain, at_least: 50 %}`).
+
+    grids:
+      shares:
+        title: Mean error, rows front share left, columns front share right
+        metric: error
+        run: "shares/{left}_{right}"
+        rows: {left: [0, 0.5]}
+        columns: {right: [0, 0.5]}
+        published: [[0.3966, 0.1576], [0.1312, 0.0069]]
+    derived:
+      order: {says: Rank correlation with table 3, rank_correlation: shares}
+      gain:
+        says: Share of the error that learning removes
+        expression: (frozen - learning) / frozen
+        of: {frozen: {run: frozen, metric: error}, learning: {run: learning, metric: error}}
+        unit: "%"
+        published: 30 %                    # what the paper prints, in SI or with a unit
+
+Along axes, a limit is how far one of them may go; curves and maps show a metric over one or two.
+
+    title: How fast may the car enter the manoeuvre?
+    scenario: 25mps.yaml
+    set: {driver.amplitude: 0.05}          # for all runs; swap, stop_time, ... likewise
+    design: grid                           # every combination; list: first with first, second with
+    axes:                                  #   second; latin_hypercube: so many `points` by `seed`
+      friction: {vary: inputs.friction*, from: 0.1, to: 1.0, count: 10}
+      speed: {vary: plant.initial_speed, from: 36, to: 144, count: 10, unit: km/h, says: Entry speed}
+      control: {vary: controller, values: {controller_off: no control, controller_fnn: neural network}}
+      car: {vary: vehicle, values: [../vehicles/small.yaml, ../vehicles/large.yaml]}
+    metrics:
+      sideslip: {metric: peak(sideslip)}
+    limits:
+      stable: {says: Largest stable entry speed, of: speed, holds_if: [{metric: sideslip, at_most: 10 deg}]}
+    figures:
+      - {name: stable, kind: limit, limit: stable, x: friction, lines: control, panels: car}
+
+What an axis varies is written as on the command line: `unit.parameter`, `vehicle.parameter` and
+`inputs.pattern` take values, as do `stop_time`, `step_size` and `algorithm`; a unit alone takes FMUs
+(`fmu:parameter=value` brings parameters along), `vehicle` takes vehicle files. Several places may
+share an axis. In place of `vary` and `values`, `variants` change several things at once.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from ..figures.plots import OVERVIEW
+from ..scenario.schema import Scalar
+from ..scenario.strict import Strict
+from .axis_schema import MOST, AxisSpec, Changes
+from .judged_schema import Alternatives, Claim, DerivedSpec, GridSpec, LimitSpec, MetricSpec
+from .numbers import Quantity
+
+Patterns = Annotated[list[str], Field(min_length=1)]
+"""Names of runs, with `*` and `?` for many."""
+
+
+class RunSpec(Changes):
+    """One run, or with `for` one per combination."""
+
+    name: str = Field(description="Name of the run and of its folder, e.g. 25mps/fnn", min_length=1)
+    scenario: str = Field(description="Scenario file, relative to this file", min_length=1)
+    for_each: dict[str, Alternatives] = Field({}, alias="for", description="Key -> values")
+    label: str = Field("", description="What legends call it; default: the name")
+    row: str = Field("", description="What tables call it; default: the label")
+
+
+class TableSpec(Strict):
+    """A table of metrics, one row per run."""
+
+    title: str = ""
+    runs: Patterns
+    metrics: list[str] = Field(description="Keys of `metrics`, one column each", min_length=1)
+
+
+class FigureSpec(Strict):
+    """A figure: several runs laid over each other, or a metric or a limit over one or two axes."""
+
+    name: str = Field(description="Name of its files", pattern=r"^[\w.+-]+$")
+    title: str = ""
+    kind: Literal["overlay", "curve", "map", "limit"] = "overlay"
+    runs: list[str] = Field([], description="Of an overlay: names of runs, with `*` and `?` for many")
+    panels: list[str] | str = Field(
+        list(OVERVIEW),
+        description="Of an overlay, in order: a signal, its error (`x_error`), one over another (`y(x)`) or "
+        "`path`; of others: axis with a panel per value",
+    )
+    metric: str = Field("", description="Key of `metrics`, for curves and maps")
+    limit: str = Field("", description="Key of `limits`, for a limit")
+    x: str = Field("", description="Axis to the right")
+    y: str = Field("", description="Axis upwards, of a map")
+    lines: str = Field("", description="Axis with a line per value, of curves and limits")
+    only: dict[str, list[Scalar]] = Field({}, description="Axis -> those of its values that are drawn")
+    scale: Literal["linear", "log"] = Field("linear", description="Of the metric")
+    largest: Quantity | None = Field(None, description="Where the metric's scale ends")
+    mark: Quantity | None = Field(None, description="A value of the metric to draw a line at")
+
+    @property
+    def panel_axis(self) -> str:
+        """The axis with a panel per value, "" if there is none."""
+        return self.panels if isinstance(self.panels, str) else ""
+
+    @model_validator(mode="after")
+    def _complete(self) -> FigureSpec:
+        if self.kind == "overlay":
+            given = self.model_fields_set - {"name", "title", "kind", "runs", "panels"}
+            if not self.runs or not isinstance(self.panels, list) or not self.panels or given:
+                also = f", no {min(given)}" if given else ""
+                raise ValueError(f"an overlay needs runs and a list of panels{also}; else give its kind")
+            return self
+        if self.runs or ("panels" in self.model_fields_set and not self.panel_axis):
+            raise ValueError(f"a {self.kind} has no runs; its panels are those of one axis")
+        wanted, other = ("limit", "metric") if self.kind == "limit" else ("metric", "limit")
+        if not getattr(self, wanted) or getattr(self, other):
+            raise ValueError(f"a {self.kind} needs {wanted} and no {other}")
+        if not self.x:
+            raise ValueError(f"a {self.kind} needs x")
+        if (self.kind == "map") != bool(self.y):
+            raise ValueError("a map needs y" if self.kind == "map" else f"a {self.kind} has no y")
+        if self.kind == "map" and self.lines:
+            raise ValueError("a map has no lines; use panels")
+        used = [axis for axis in (self.x, self.y, self.lines, self.panel_axis) if axis]
+        if len(set(used)) < len(used):
+            raise ValueError("x, y, lines and panels must be different axes")
+        if self.mark is not None and self.kind == "limit":
+            raise ValueError("a limit has no mark")
+        return self
+
+
+def _list_of_runs(value: object) -> Any:
+    if isinstance(value, int):  # as Latin hypercubes had it
+        raise ValueError(f"is a list of runs; a latin_hypercube has points: {value}")
+    return value
+
+
+class ExperimentSpec(Changes):
+    """A file of an experiment."""
+
+    title: str = Field(min_length=1)
+    source: str = Field(
+        "", description="The paper, with all that is needed to find it, or whose question it is"
+    )
+    scenario: str = Field("", description="Scenario of the only run, relative to this file")
+    runs: Annotated[list[RunSpec], BeforeValidator(_list_of_runs)] = Field(
+        [], description="In place of a scenario"
+    )
+    axes: dict[str, AxisSpec] = Field({}, description="Name -> what varies")
+    design: Literal["grid", "list", "latin_hypercube"] = Field("grid", description="Which points of the axes")
+    points: int | None = Field(None, ge=1, description="Of a Latin hypercube")
+    seed: int | None = Field(None, ge=0, description="Of a Latin hypercube")
+    metrics: dict[str, MetricSpec] = {}
+    tables: list[TableSpec] = []
+    grids: dict[str, GridSpec] = {}
+    derived: dict[str, DerivedSpec] = {}
+    claims: list[Claim] = Field([], description="What the paper says")
+    checks: list[Claim] = Field([], description="What this project asks of its own results")
+    limits: dict[str, LimitSpec] = {}
+    figures: list[FigureSpec] = []
+
+    @model_validator(mode="after")
+    def _consistent(self) -> ExperimentSpec:
+        if bool(self.scenario) == bool(self.runs):
+            raise ValueError("needs either a scenario or runs")
+        if self.scenario and not self.axes:
+            raise ValueError("a single run needs axes")
+        if self.design == "latin_hypercube":
+            if self.points is None or self.seed is None:
+                raise ValueError("a latin_hypercube needs points and seed")
+        elif self.points is not None or self.seed is not None:
+            raise ValueError(f"points and seed belong to a latin_hypercube; the design is {self.design}")
+        else:
+            self._check_lengths()
+        number = self.number_of_points() * max(1, len(self.runs))
+        if number > MOST:
+            raise ValueError(f"{number} runs; at most {MOST} are taken")
+        return self
+
+    def number_of_points(self) -> int:
+        """Return how many points the design has."""
+        if self.design == "latin_hypercube":
+            return self.points or 0
+        lengths = [axis.length or 0 for axis in self.axes.values()]
+        return max(lengths, default=1) if self.design == "list" else math.prod(lengths)
+
+    def _check_lengths(self) -> None:
+        lengths = {name: axis.length for name, axis in self.axes.items()}
+        for name, length in lengths.items():
+            if length is None:
+                raise ValueError(f"axes.{name}: needs count")
+        if self.design == "list" and len(set(lengths.values())) > 1:
+            counted = ", ".join(f"{name} has {n}" for name, n in lengths.items())
+            raise ValueError(f"axes of a list must have equally many values ({counted})")

@@ -1,0 +1,134 @@
+"""The table of an experiment: one row per case, in the order of the design; equal runs, equal bytes."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from ..errors import ResultsError
+from ..metrics.run_metrics import metric
+from ..writing import reason, write_whole
+from .findings import Findings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TABLE = "table.csv", "table.parquet"
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the table; numbers are in SI, with their unit in `about`."""
+
+    name: str
+    kind: Literal["int64", "float64", "string"]
+    values: Sequence[Any]
+    about: dict[str, str] = field(default_factory=dict)
+
+
+def columns_of(findings: Findings) -> list[Column]:
+    """Return run, axes, how each case ended, what was remarkable, metrics, key."""
+    cases, spec, planned = findings.experiment.cases, findings.spec, findings.planned
+    records = findings.records
+    if spec.runs:
+        columns = [Column("run", "string", [case.run.name for case in cases], {"description": "its name"})]
+    else:
+        numbers = [case.number + 1 for case in cases]
+        columns = [Column("run", "int64", numbers, {"description": "number of the run, from 1"})]
+    for i, (name, axis) in enumerate(spec.axes.items()):
+        about = {"description": axis.says or ", ".join(axis.places), "varies": ", ".join(axis.places)}
+        if axis.numeric and planned:
+            levels = [planned.number(name, case.point[i]) for case in cases]
+            columns.append(Column(name, "float64", levels, about | {"unit": planned.units[name]}))
+        else:
+            columns.append(Column(name, "string", [case.point[i].words for case in cases], about))
+    early = [findings.results[c.run.name].ended if c.run.name in findings.results else None for c in cases]
+    kinds = {"description": "what was remarkable in the run's course, by its kind"}
+    columns += [
+        Column("status", "string", ["completed" if one.ok else "failed" for one in records]),
+        Column("reason", "string", ["; ".join(r.problems) or e for r, e in zip(records, early, strict=True)]),
+        Column("findings", "string", [", ".join(one.findings) or None for one in records], kinds),
+    ]
+    for key, one in spec.metrics.items():
+        chosen, unit = metric(one.metric), findings.unit(key)
+        about = {"metric": chosen.name, "description": f"{chosen.definition}{one.during()}", "unit": si(unit)}
+        values = [findings.value(case, key) for case in cases]
+        columns.append(Column(key, "float64", [value.number if value else None for value in values], about))
+    keys = [job.key for job in planned.jobs] if planned else [None] * len(cases)
+    return [*columns, Column("key", "string", keys)]
+
+
+def si(unit: str) -> str:
+    """Return a metric's unit as it stands in a table for programs: ratios are not in per cent there."""
+    return "1" if unit == "%" else unit
+
+
+def to_pandas(columns: Sequence[Column]) -> pd.DataFrame:
+    """Return the table; `attrs["units"]` holds the units of its numbers."""
+    import pandas as pd
+
+    frame = pd.DataFrame({one.name: pd.Series(one.values, dtype=_dtype(one)) for one in columns})
+    frame.attrs["units"] = {one.name: one.about["unit"] for one in columns if "unit" in one.about}
+    return frame
+
+
+def _dtype(column: Column) -> str:
+    return "object" if column.kind == "string" else column.kind
+
+
+def write_table(findings: Findings, out: Path) -> None:
+    """Write the table into a folder, as CSV and as Parquet with units in the fields' metadata.
+
+    Raises:
+        ResultsError: it cannot be written.
+    """
+    columns = columns_of(findings)
+    contents: dict[str, str | bytes] = {TABLE[0]: to_csv(columns), TABLE[1]: _parquet(findings, columns)}
+    for name, content in contents.items():
+        try:
+            write_whole(out / name, content)
+        except OSError as error:  # noqa: PERF203 - two files
+            raise ResultsError(f"{out / name}: cannot be written: {reason(error)}.") from None
+
+
+def to_csv(columns: Sequence[Column]) -> str:
+    """Return columns as CSV, their units in the headings."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(f"{c.name} [{c.about['unit']}]" if "unit" in c.about else c.name for c in columns)
+    writer.writerows(map(_plain, zip(*(c.values for c in columns), strict=True)))
+    return text.getvalue()
+
+
+def _plain(row: Sequence[Any]) -> list[str]:
+    """Return numbers with all their digits, nothing for nothing."""
+    return [
+        "" if x is None else repr(x) if isinstance(x, float) and math.isfinite(x) else str(x) for x in row
+    ]
+
+
+def _parquet(findings: Findings, columns: Sequence[Column]) -> bytes:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    fields = [pa.field(c.name, getattr(pa, c.kind)(), metadata=c.about or None) for c in columns]
+    schema = pa.schema(fields, metadata={"experiment": _description(findings)})
+    arrays = [pa.array(c.values, type=one.type) for c, one in zip(columns, fields, strict=True)]
+    content = pa.BufferOutputStream()
+    pq.write_table(pa.Table.from_arrays(arrays, schema=schema), content, compression="zstd")
+    return content.getvalue().to_pybytes()
+
+
+def _description(findings: Findings) -> str:
+    """Return what the experiment was, as JSON: the file's content, the FMUs with their hashes."""
+    content = findings.spec.model_dump(by_alias=True, exclude_defaults=True)
+    used = findings.planned.fmus if findings.planned else {}
+    fmus = {fmu.name: digest for digest, fmu in used.items()}
+    about = {"experiment": content, "fmus": dict(sorted(fmus.items()))}
+    return json.dumps(about, ensure_ascii=False, default=str)

@@ -1,0 +1,152 @@
+"""The tables of an experiment as people read them: runs, grids, derived numbers, verdicts, limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..metrics.run_metrics import Value, metric
+from ..titles import changed
+from .experiment import NamedRun
+from .findings import Findings
+from .grids import grid_table
+from .judged_schema import Claim, MetricSpec, Reference
+from .judging import Judgement
+from .limits import limit_table
+from .numbers import si_number
+from .schema import TableSpec
+from .tables import Cell, Table, marked, remarks
+
+HOLDS, NOT_JUDGED = "holds", "not judged"
+FAILS = {"claims": "does not reproduce", "checks": "does not hold"}
+
+
+def all_tables(findings: Findings) -> list[Table]:
+    """Return all tables of an experiment, in the order in which they are read."""
+    return [
+        *run_tables(findings),
+        *derived_tables(findings),
+        *claim_tables(findings),
+        *limit_tables(findings),
+    ]
+
+
+def limit_tables(findings: Findings) -> list[Table]:
+    """Return the tables of all limits."""
+    tables = [limit_table(findings, name) for name in findings.spec.limits]
+    if words := changed(findings.experiment.by_options):
+        for table in tables:
+            table.notes.append(f"changed: {words}")
+    return tables
+
+
+def derived_tables(findings: Findings) -> list[Table]:
+    """Return the grids, and a table of the derived numbers if there are any."""
+    spec = findings.spec
+    tables = [grid_table(grid, findings.values) for grid in spec.grids.values()]
+    if spec.derived:
+        rows: list[list[Cell]] = [[one.says, findings.derived.get(key)] for key, one in spec.derived.items()]
+        headings = ["what", "value"]
+        if any(one.published is not None for one in spec.derived.values()):
+            headings.append("the paper says")
+            for row, one in zip(rows, spec.derived.values(), strict=True):
+                printed = one.published
+                row.append(None if printed is None else Value(si_number(printed, one.unit), one.unit))
+        tables.append(Table("Computed from several runs", headings, [*rows]))
+    return tables
+
+
+def heading(spec: MetricSpec) -> str:
+    """Return the heading of a metric's column."""
+    if spec.heading:
+        return spec.heading
+    return f"{metric(spec.metric).formula}{spec.during()}"
+
+
+def verdict(judgement: Judgement, group: str) -> str:
+    """Return the verdict in plain words; `group` is "claims" (a paper's) or "checks" (our own)."""
+    if judgement.holds is None:
+        return NOT_JUDGED
+    return HOLDS if judgement.holds else FAILS[group]
+
+
+def counts_of(judgements: Sequence[Judgement], group: str) -> dict[str, int]:
+    """Return how many judgements have each verdict, those that occur."""
+    words = [verdict(one, group) for one in judgements]
+    return {word: words.count(word) for word in (HOLDS, FAILS[group], NOT_JUDGED) if word in words}
+
+
+def run_tables(findings: Findings) -> list[Table]:
+    """Return the tables of metrics: one row per run, beside it what the paper says of that run alone."""
+    return [_run_table(findings, table) for table in findings.spec.tables]
+
+
+def _run_table(findings: Findings, spec: TableSpec) -> Table:
+    study = findings.experiment
+    runs, failed = study.matching(spec.runs), findings.failed
+    said = {run.name: _said_of(findings, run, spec) for run in runs}
+    columns = [study.spec.metrics[key] for key in spec.metrics]
+    table = Table(spec.title, ["run", *map(heading, columns)])
+    formulas: dict[str, list[str]] = {}
+    for column in columns:
+        if column.heading:
+            formulas.setdefault(metric(column.metric).formula, []).append(column.heading)
+    table.notes = [f"{', '.join(named)}: {formula}" for formula, named in formulas.items()]
+    some = any(said.values())
+    if some:  # beside the first metric, which the claims are about
+        table.headings[2:2] = ["the paper says", "verdict"]
+    for run in runs:
+        if run.name in failed:
+            cells: list[Cell] = ["failed", *[None] * (len(table.headings) - 2)]
+            table.notes.append(f"{run.row}: {failed[run.name]}")
+        else:
+            cells = [findings.values.get((run.name, key)) for key in spec.metrics]
+            if early := findings.results[run.name].ended:
+                table.notes.append(f"{run.row}: {early}; what is of the whole run, or later, has no result")
+            if some:
+                judged = said[run.name]
+                words = "; ".join(f"{j.said.short} ({j.said.source})" for j in judged)
+                cells[1:1] = [words or None, "; ".join(verdict(j, "claims") for j in judged) or None]
+                table.notes += [f"{run.row}: {j.said.note}" for j in judged if j.said.note]
+        results = findings.results.get(run.name)
+        table.rows.append([marked(run.row, results) if results else run.row, *cells])
+        table.notes += remarks([(run.row, results)]) if results else []
+    return table
+
+
+def _said_of(findings: Findings, run: NamedRun, table: TableSpec) -> list[Judgement]:
+    """Return the claims with a short form that speak of the table's first metric of this run alone."""
+    return [
+        judgement
+        for judgement in findings.claims
+        if isinstance(judgement.said, Claim)
+        and judgement.said.short
+        and all(
+            (condition.run, condition.metric) == (run.name, table.metrics[0])
+            and not isinstance(condition.bound, Reference)
+            for condition in judgement.said.holds_if
+        )
+    ]
+
+
+def claim_tables(findings: Findings) -> list[Table]:
+    """Return the paper's claims that stand beside no run, and the project's own checks."""
+    shown = {
+        id(judgement)
+        for table in findings.spec.tables
+        for run in findings.experiment.matching(table.runs)
+        for judgement in _said_of(findings, run, table)
+    }
+    tables = []
+    for title, group, judged in (
+        ("What the paper says beyond single runs", "claims", findings.claims),
+        ("What this project asks of it", "checks", findings.checks),
+    ):
+        rows: list[list[Cell]] = []
+        for one in judged:
+            if id(one) not in shown:
+                says = f"{one.said.says} ({one.said.source})" if one.said.source else one.said.says
+                note = f"\n{one.said.note}" if one.said.note else ""
+                rows.append([f"{says}{note}", "\n".join(one.measured), verdict(one, group)])
+        if rows:
+            tables.append(Table(title, ["claim", "measured", "verdict"], [*rows]))
+    return tables

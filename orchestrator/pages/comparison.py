@@ -1,0 +1,167 @@
+"""What a comparison's page begins with: metrics with their differences, the signals that differ most."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..experiments.findings import Findings
+from ..experiments.tables import Cell, Table, marked, remarks
+from ..figures.display import digits_of, shown, shown_unit
+from ..figures.panels import Run
+from ..metrics.run_metrics import Value, metric
+from ..metrics.signals import variable_of
+from .divergence import SAME, SEEN, Divergence, Parting, divergence
+from .facts import Figure, figure_of
+
+MOST_DIFFERENT = 6
+"""Signals drawn that differ most; chosen: three rows of two panels are one screen."""
+AT_ONCE = 8
+"""Partings that are shown; the others unfold. Chosen: more than the wires around one unit."""
+RULE = (
+    f"A difference counts from {SAME * 1e9:g} billionth of the signal's largest value; curves can be seen to "
+    f"part from {100 * SEEN:g} %."
+)
+LESS_IS_BETTER = (
+    "relative_peak_error", "mean_error", "rms_error", "stability_index", "overshoot", "settling_time",
+    "slope_variation_rate", "effort", "total_variation_rate",
+)  # fmt: skip
+"""Measures of which the least is the best; of others, such as a path's displacement, that depends."""
+
+
+@dataclass(frozen=True)
+class MetricCell:
+    """A value and its difference from the first run's, as text, empty if there is none."""
+
+    value: str
+    difference: str
+    best: bool
+
+
+@dataclass(frozen=True)
+class MetricRow:
+    """A metric of all runs."""
+
+    title: str
+    formula: str
+    cells: list[MetricCell]
+
+
+def comparison_facts(findings: Findings) -> dict[str, Any] | None:
+    """Return what a page says that compares the runs with the first one; None if none has results."""
+    runs = [
+        Run(run.label, findings.results[name])
+        for name, run in findings.experiment.runs.items()
+        if name in findings.results
+    ]
+    if not runs:
+        return None
+    first, *others = runs
+    found = [divergence(first.results, other.results) for other in others]
+    return {
+        "labels": [marked(run.label, run.results) for run in runs],
+        "rows": metric_rows(findings),
+        "remarks": remarks((run.label, run.results) for run in runs),
+        "most": _most_different(runs, found),
+        "partings": [_parted(run.label, first.label, one) for run, one in zip(others, found, strict=True)],
+        "rule": RULE,
+    }
+
+
+def metric_rows(findings: Findings) -> list[MetricRow]:
+    """Return the metrics of all runs with results, each with its difference from the first."""
+    rows = []
+    for key, spec in findings.spec.metrics.items():
+        chosen = metric(spec.metric)
+        values = [findings.values.get((name, key)) for name in findings.results]
+        known = [value.number for value in values if value is not None]
+        least = (
+            min(known) if chosen.name.partition("(")[0] in LESS_IS_BETTER and len(set(known)) > 1 else None
+        )
+        cells = [
+            MetricCell(
+                shown(value.number, value.unit) if value else "",
+                difference(values[0], value) if k else "",
+                value is not None and value.number == least,
+            )
+            for k, value in enumerate(values)
+        ]
+        rows.append(MetricRow(chosen.title, chosen.formula, cells))
+    return rows
+
+
+def _most_different(runs: Sequence[Run], found: Sequence[Divergence]) -> Figure | None:
+    """Return the signals in which any run differs most from the first, relative to their peaks."""
+    apart: dict[str, float] = {}
+    for parting in (parting for one in found for parting in one.partings):
+        name = variable_of(parting.signal)
+        if "*" not in name and not name.startswith("position_"):  # one line per run in each panel
+            apart[name] = max(apart.get(name, 0.0), parting.relative)
+    names = sorted(apart, key=lambda name: -apart[name])[:MOST_DIFFERENT]
+    return figure_of(("most", "", runs, names, ()), whole=True)
+
+
+def difference(first: Value | None, other: Value | None) -> str:
+    """Return how a value differs from the first, with its sign; per cents differ by points."""
+    if first is None or other is None:
+        return ""
+    apart = other.number - first.number
+    if apart != apart or abs(apart) == float("inf"):
+        return ""
+    unit, factor = shown_unit(other.unit)
+    if apart == 0:
+        return "the same"
+    size = digits_of(abs(apart) * factor)
+    return f"{'+' if apart > 0 else '−'}{size} {'points' if unit == '%' else unit}".rstrip()
+
+
+def _parted(label: str, first: str, found: Divergence) -> dict[str, Any]:
+    return {
+        "title": f"{label} against {first}",
+        "summary": parting_summary(found),
+        "table": parting_table(found.partings[:AT_ONCE]),
+        "rest": parting_table(found.partings[AT_ONCE:]),
+        "notes": found.notes,
+    }
+
+
+def parting_summary(found: Divergence) -> str:
+    """Return in a sentence which signals part first."""
+    if not found.compared:
+        return "The runs have no signal in common."
+    if not found.partings:
+        which = (
+            "The only signal they share is" if found.compared == 1 else f"All {found.compared} signals are"
+        )
+        return f"{which} the same throughout."
+    first = found.partings[0]
+    together = [one.signal for one in found.partings if one.first == first.first]
+    others = f", then {', '.join(together[1:4])}{' and others' if len(together) > 4 else ''} in the same step"
+    seen = [one for one in found.partings if one.seen is not None]
+    visible = min(seen, key=lambda one: one.seen or 0.0, default=None)
+    told = (
+        f" Curves can be told apart from {visible.seen:g} s on, first {visible.signal}."
+        if visible is not None
+        else " In no curve can it be seen."
+    )
+    others = others if len(together) > 1 else ""
+    return f"The first to differ is {first.signal}, at {first.first:g} s{others}.{told}"
+
+
+def parting_table(partings: Sequence[Parting]) -> Table:
+    """Return a table of signals that differ, in the order in which they part."""
+    headings = ["signal", "goes to", "differs from", "seen from", "largest difference", "at"]
+    rows: list[Sequence[Cell]] = [_parting_row(one) for one in partings]
+    return Table("", headings, rows, numbers={2, 3, 4, 5} if rows else set())
+
+
+def _parting_row(one: Parting) -> list[Cell]:
+    return [
+        one.signal,
+        ", ".join(one.targets) or "recorded only",
+        f"{one.first:g} s",
+        None if one.seen is None else f"{one.seen:g} s",
+        None if one.largest != one.largest else shown(one.largest, one.unit),
+        f"{one.largest_at:g} s",
+    ]

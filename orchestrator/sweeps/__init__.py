@@ -1,1 +1,0 @@
-"""One scenario over many conditions: planned, run on all cores or a cluster, tabled, drawn."""
