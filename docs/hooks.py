@@ -11,8 +11,7 @@ from mkdocs.structure.files import File, Files
 PAGES = {
     "reference/commands.md": commands.page,
     "reference/scenario.md": schemas.scenario_page,
-    "reference/study.md": schemas.study_page,
-    "reference/sweep.md": schemas.sweep_page,
+    "reference/experiment.md": schemas.experiment_page,
     "reference/signals.md": signals.page,
     "reference/units.md": units.page,
     "reference/metrics.md": metrics.page,

@@ -1,4 +1,4 @@
-"""The references of scenario, study and sweep files, from the schemas that read them."""
+"""The references of scenario and experiment files, from the schemas that read them."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ from typing import Any, Literal
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from orchestrator.experiments import schema as experiment
 from orchestrator.scenario import schema as scenario
-from orchestrator.studies import study_schema
-from orchestrator.sweeps import schema as sweep
 
 from .text import NOTE, cell, code, docstring, table
 
@@ -29,14 +28,9 @@ def scenario_page() -> str:
     return _page("Scenario files", scenario, [scenario.Scenario, scenario.Vehicle], example)
 
 
-def study_page() -> str:
-    """Return the page of study files."""
-    return _page("Study files", study_schema, [study_schema.StudySpec])
-
-
-def sweep_page() -> str:
-    """Return the page of sweep files."""
-    return _page("Sweep files", sweep, [sweep.SweepSpec])
+def experiment_page() -> str:
+    """Return the page of studies and sweeps."""
+    return _page("Study and sweep files", experiment, [experiment.ExperimentSpec])
 
 
 def _page(heading: str, module: Any, roots: list[type[BaseModel]], more: str = "") -> str:

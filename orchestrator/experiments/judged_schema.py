@@ -11,7 +11,7 @@ from ..metrics.run_metrics import during, metric, window_of
 from ..scenario.strict import Strict
 from ..wording import listed, short
 from . import derived
-from .numbers import Quantity, is_finite, si_number, text_of
+from .numbers import Quantity, is_finite, is_quantity, si_number, text_of
 
 CELLS = 10_000
 """Of a grid. Chosen: a hundred times the largest of ours."""
@@ -151,8 +151,15 @@ class Reference(Strict):
     times: float = 1.0
 
 
+def _bound(value: object) -> Any:
+    if not is_quantity(value):
+        raise ValueError("must be a number, a number with its unit ('5 %'), or {run: ..., metric: ...}")
+    return value
+
+
 Bound = Annotated[
-    Annotated[Quantity, Tag("number")] | Annotated[Reference, Tag("reference")],
+    Annotated[float | int | str, PlainValidator(_bound), Tag("number")]
+    | Annotated[Reference, Tag("reference")],
     Discriminator(lambda value: "reference" if isinstance(value, (dict, Reference)) else "number"),
 ]
 """A number in SI, a number with its unit ('5 %'), or another run's metric."""

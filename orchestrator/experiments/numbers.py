@@ -37,12 +37,17 @@ def _number(value: object) -> float | int:
     return value  # type: ignore[return-value]
 
 
+def is_quantity(value: object) -> bool:
+    """Return whether a value is a number, or text that begins with one."""
+    return is_finite(value) or (isinstance(value, str) and re.match(r"\s*[+-]?\.?\d", value) is not None)
+
+
 def _quantity(value: object) -> float | str:
-    if not is_finite(value) and not (isinstance(value, str) and re.match(r"\s*[+-]?\.?\d", value)):
+    if not is_quantity(value):
         raise ValueError(f"must be a number, or a number with its unit ('5 %') (got {short(value)})")
     return value  # type: ignore[return-value]
 
 
 Number = Annotated[float | int, PlainValidator(_number)]
-Quantity = Annotated[float | str, PlainValidator(_quantity)]
+Quantity = Annotated[float | int | str, PlainValidator(_quantity)]
 """A number in SI, or text that begins with one and ends with its unit."""

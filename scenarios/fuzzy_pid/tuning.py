@@ -22,10 +22,11 @@ from pathlib import Path
 
 import numpy as np
 
+from orchestrator.experiments.jobs import Job
+from orchestrator.experiments.workers import execute
 from orchestrator.metrics.measures import peak, total_variation_rate
 from orchestrator.plan import Change
 from orchestrator.results.read import load_results
-from orchestrator.studies.jobs import Job, execute
 
 FOLDER = Path(__file__).parent
 RUNS = ("double_lane_change", "sine", "ramp")

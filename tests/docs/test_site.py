@@ -15,11 +15,10 @@ from docs.generate.formulas import to_mathml
 from docs.generate.text import docstring, table
 from fmus.build import find_components
 from orchestrator.cli import _application
+from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.fmu.archive import open_fmu
 from orchestrator.metrics.measures import MEASURES
 from orchestrator.scenario.schema import Scenario
-from orchestrator.studies.study_schema import StudySpec
-from orchestrator.sweeps.schema import SweepSpec
 from orchestrator.wording import fold
 from tests.checkout import ROOT
 from vocabulary.signals import SIGNALS
@@ -116,9 +115,7 @@ def test_the_reference_of_commands_tells_every_option(site):
                 assert parameter.opts[0] in section, f"{name} {parameter.opts[0]}"
 
 
-@pytest.mark.parametrize(
-    ("page", "root"), [("scenario", Scenario), ("study", StudySpec), ("sweep", SweepSpec)]
-)
+@pytest.mark.parametrize(("page", "root"), [("scenario", Scenario), ("experiment", ExperimentSpec)])
 def test_the_references_of_files_tell_every_key(site, page, root):
     html = text_of(site, f"reference/{page}.html")
     models = schemas.reachable([root])

@@ -86,10 +86,9 @@ def test_compare_puts_the_runs_side_by_side(yawbench, folder):
     assert "Half a car (controller exchanged)" in out
     heading = next(line for line in out.splitlines() if "metric" in line)
     assert heading.split()[1:] == ["controller_off", "controller_fuzzy_sideslip"]
-    *_, files, page = said.splitlines()
-    assert files.startswith("o: overview.svg, overview.png, metrics.csv, compare.md")
-    assert page.startswith("The page: o/compare.html")
-    rows = {row["run"]: row for row in csv.DictReader((folder / "o/metrics.csv").open())}
+    assert said.splitlines()[-1].startswith("The page: o/report.html")
+    assert (folder / "o/figures/overview.svg").is_file()
+    rows = {row["run"]: row for row in csv.DictReader((folder / "o/table.csv").open())}
     assert float(rows["controller_off"]["peak(yaw_moment) [N.m]"]) == 0.0
     assert float(rows["controller_fuzzy_sideslip"]["peak(yaw_moment) [N.m]"]) > 1.0
     for run in rows:
@@ -110,20 +109,20 @@ def test_compare_reports_a_failed_run_and_keeps_the_others(yawbench, folder):
     status, out, said = yawbench(
         "compare", "half.yaml", "--swap", "controller=controller_off", "--out", "o", "--jobs", "1"
     )
-    assert status == 2
+    assert status == 1
     assert "controller_off: failed: o/controller_off: results cannot be written here" in said
     assert "failed" in out
-    rows = {row["run"]: row for row in csv.DictReader((folder / "o/metrics.csv").open())}
+    rows = {row["run"]: row for row in csv.DictReader((folder / "o/table.csv").open())}
     assert rows["controller_fuzzy_sideslip"]["status"] == "completed"
 
 
 def test_results_go_beside_those_of_run_if_nothing_is_said(yawbench, folder):
     yawbench("compare", "half.yaml", "--swap", "controller=controller_off")
-    assert (folder / "results" / folder.name / "half-compare" / "overview.png").is_file()
+    assert (folder / "results" / folder.name / "half-compare" / "figures" / "overview.png").is_file()
 
 
 def test_converge_halves_the_step_and_reports_order_and_cost(yawbench, folder):
-    status, out, said = yawbench(
+    status, out, _ = yawbench(
         "converge", "half.yaml", "--signal", "reference.yaw_rate_ref", "--halvings", "2", "--out", "o",
         "--algorithm", "jacobi", "--algorithm", "gauss_seidel",
     )  # fmt: skip
@@ -131,7 +130,7 @@ def test_converge_halves_the_step_and_reports_order_and_cost(yawbench, folder):
     assert [line.split()[:2] for line in out.splitlines() if line.startswith((" jacobi", " gauss"))] == [
         [name, step] for name in ("jacobi", "gauss_seidel") for step in ("10", "5", "2.5")
     ]
-    assert said.splitlines()[-1] == "o: converge.csv, converge.md, converge.svg, converge.png"
+    assert {"converge.csv", "converge.svg", "report.html"} <= {path.name for path in (folder / "o").iterdir()}
     rows = list(csv.DictReader((folder / "o/converge.csv").open()))
     assert float(rows[0]["order [1]"]) == pytest.approx(1.0, abs=0.1)  # jacobi is one step late
     assert float(rows[0]["wall_time [s]"]) > 0
@@ -156,11 +155,12 @@ def test_converge_names_a_wrong_signal_or_algorithm(yawbench):
 
 
 def test_converge_of_what_does_not_depend_on_the_step_has_no_figure(yawbench, folder):
-    status, out, said = yawbench("converge", "half.yaml", "--signal", "driver.steer_angle", "--halvings", "2",
-                                 "--out", "o")  # fmt: skip
+    status, out, _ = yawbench("converge", "half.yaml", "--signal", "driver.steer_angle", "--halvings", "2",
+                              "--out", "o")  # fmt: skip
     assert status == 0
     assert "the finest" in out
-    assert said.splitlines()[-1] == "o: converge.csv, converge.md"
+    assert (folder / "o/converge.csv").is_file()
+    assert not (folder / "o/converge.svg").exists()
 
 
 def test_study_runs_judges_and_draws(yawbench, folder):
@@ -168,18 +168,41 @@ def test_study_runs_judges_and_draws(yawbench, folder):
     assert status == 0
     assert "Without control there is no moment." in out
     assert "does not reproduce" in out
-    assert said.splitlines()[-1] == "Results, figures and tables: o (begin with o/study.md)"
-    for name in ("study.md", "study.json", "metrics.csv", "figures/moments.svg", "figures/moments.png"):
+    assert said.splitlines()[-1].startswith("The page: o/report.html")
+    for name in ("report.html", "experiment.json", "table.csv", "figures/moments.svg", "figures/moments.png"):
         assert (folder / "o" / name).stat().st_size > 0
+
+
+def test_study_makes_again_only_what_has_not_been_made_of_the_same_scenario(yawbench, folder):
+    yawbench("study", "study.yaml", "--out", "o")
+    records = [folder / "o" / run / "run.json" for run in ("off", "fuzzy_sideslip")]
+    ids = [json.loads(file.read_text())["id"] for file in records]
+    assert ", all finished before" in yawbench("study", "study.yaml", "--out", "o")[2]
+    (folder / "o/off/results.csv").write_text("time\n")
+    assert ": 2 runs, 1 finished before" in yawbench("study", "study.yaml", "--out", "o")[2]
+    again = [
+        json.loads((folder / f"o/{run}/run.json").read_text())["id"] for run in ("off", "fuzzy_sideslip")
+    ]
+    assert (ids[0] == again[0], ids[1] == again[1]) == (False, True)
+    assert "finished before" not in yawbench("study", "study.yaml", "--out", "o", "--fresh")[2]
+
+
+def test_options_change_all_runs_of_a_study_and_are_named(yawbench, folder):
+    status, _, said = yawbench("study", "study.yaml", "--set", "driver.amplitude=0.01", "--out", "o")
+    assert status == 0
+    assert "changed: driver.amplitude = 0.01" in said
+    record = json.loads((folder / "o/off/run.json").read_text())
+    assert record["fmus"]["driver"]["parameters"]["amplitude"] == 0.01
+    assert "changed: driver.amplitude = 0.01" in (folder / "o/report.html").read_text()
 
 
 def test_study_judges_what_is_there_without_running(yawbench, folder):
     yawbench("study", "study.yaml", "--out", "o")
     before = (folder / "o/off/run.json").read_bytes()
-    (folder / "o/study.md").unlink()
+    (folder / "o/report.html").unlink()
     status, out, _ = yawbench("study", "study.yaml", "--out", "o", "--no-run")
     assert status == 0
-    assert (folder / "o/study.md").is_file()
+    assert (folder / "o/report.html").is_file()
     assert (folder / "o/off/run.json").read_bytes() == before
     (folder / "o/off/run.json").unlink()
     status, out, _ = yawbench("study", "study.yaml", "--out", "o", "--no-run")
@@ -330,11 +353,12 @@ def test_plot_says_what_is_wrong(yawbench, folder):
 def test_every_command_that_makes_runs_isolates_units_if_told(command, folder, fmus, monkeypatch):
     limits = []
 
-    def run_all(jobs, folder, **options):
+    def ready(jobs, **options):
         limits.extend(job.call_limit for job in jobs)
         raise SystemExit(7)
 
-    monkeypatch.setattr("orchestrator.commands.batch.run_all", run_all)
+    monkeypatch.setattr("orchestrator.experiments.jobs.ready", ready)
+    monkeypatch.setattr("orchestrator.experiments.planning.ready", ready)
     with pytest.raises(SystemExit) as exit_:
         main([*command, "--fmus", str(fmus), "--isolate", "--call-limit", "3 s"])
     assert exit_.value.code == 7

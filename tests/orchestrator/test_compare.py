@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
 from orchestrator.commands.recorded import distinct
 from orchestrator.errors import ScenarioError
-from orchestrator.studies.compare import judge_comparison, metric_table, variants, write_comparison
-from orchestrator.studies.jobs import Job, Outcome
+from orchestrator.experiments.compare import FIGURES, comparison_table, of_runs, variants
+from orchestrator.experiments.experiment import NamedRun
+from orchestrator.experiments.figures import draw_all
+from orchestrator.experiments.findings import judge_results
+from orchestrator.experiments.jobs import Job, Outcome
+from orchestrator.experiments.record import write_findings
+from orchestrator.experiments.schema import ExperimentSpec
+from orchestrator.figures.panels import Run, shown_by
+from orchestrator.pages.comparison import comparison_facts
 from tests.changed import changed
 
 from .recorded import car, write
@@ -37,14 +46,14 @@ def given(job):
 
 
 def labels(scenario, *swaps):
-    return [job.label for job in variants(scenario, swaps, (), Path("out"), None)]
+    return [job.label for job in variants(scenario, swaps, ())]
 
 
 def test_one_run_per_fmu_of_a_list(scenario):
-    jobs = variants(scenario, ["controller=a,b, c"], changed(settings=["plant.mass=2"]), Path("out"), None)
+    jobs = variants(scenario, ["controller=a,b, c"], changed(settings=["plant.mass=2"]))
     assert [job.label for job in jobs] == ["a", "b", "c"]
-    assert [given(job) for job in jobs] == [{"plant.mass": 2, "controller": fmu} for fmu in ("a", "b", "c")]
-    assert [job.out for job in jobs] == [Path("out/a"), Path("out/b"), Path("out/c")]
+    assert [given(job) for job in jobs] == [{"controller": fmu} for fmu in ("a", "b", "c")]
+    assert [job.name for job in jobs] == ["a", "b", "c"]
 
 
 def test_a_repeated_option_adds_to_the_list(scenario):
@@ -60,7 +69,7 @@ def test_an_fmu_named_twice_runs_once(scenario):
 
 def test_one_fmu_alone_is_compared_with_the_scenarios_own(scenario):
     assert labels(scenario, "controller=controller_off") == ["controller_fnn", "controller_off"]
-    jobs = variants(scenario, ["tyre=tyre_linear"], (), Path("out"), None)
+    jobs = variants(scenario, ["tyre=tyre_linear"], ())
     assert [job.label for job in jobs] == ["tyre_own", "tyre_linear"]
     assert given(jobs[0]) == {"tyre": str(scenario.parent / "parts/tyre_own.fmu")}
 
@@ -71,9 +80,9 @@ def test_lists_for_two_units_are_combined(scenario):
 
 
 def test_equal_names_of_different_files_stay_apart(scenario):
-    jobs = variants(scenario, ["controller=old/c.fmu,new/c.fmu"], (), Path("out"), None)
+    jobs = variants(scenario, ["controller=old/c.fmu,new/c.fmu"], ())
     assert [job.label for job in jobs] == ["c", "c (2)"]
-    assert len({job.out for job in jobs}) == 2
+    assert len({job.name for job in jobs}) == 2
 
 
 def test_a_file_whose_name_holds_a_comma_is_one_fmu(scenario, tmp_path):
@@ -84,29 +93,29 @@ def test_a_file_whose_name_holds_a_comma_is_one_fmu(scenario, tmp_path):
 
 def test_an_fmu_may_bring_parameters_and_so_be_compared_with_itself(scenario):
     heavier = changed(settings=["plant.mass=2"])
-    jobs = variants(scenario, ["controller=a,a:law=sign:gain=2,b"], heavier, Path("out"), None)
+    jobs = variants(scenario, ["controller=a,a:law=sign:gain=2,b"], heavier)
     assert [job.label for job in jobs] == ["a", "a law=sign gain=2", "b"]
     assert [given(job) for job in jobs] == [
-        {"plant.mass": 2, "controller": "a"},
-        {"plant.mass": 2, "controller": "a", "controller.law": "sign", "controller.gain": 2},
-        {"plant.mass": 2, "controller": "b"},
+        {"controller": "a"},
+        {"controller": "a", "controller.law": "sign", "controller.gain": 2},
+        {"controller": "b"},
     ]
-    assert len({job.out for job in jobs}) == 3
+    assert len({job.name for job in jobs}) == 3
 
 
 def test_labels_say_the_values_that_differ_and_folders_can_be_read(scenario):
-    jobs = variants(scenario, ["controller=a:gain=20000:law=sign,a:gain=40000:law=sign"], (), Path("o"), None)
+    jobs = variants(scenario, ["controller=a:gain=20000:law=sign,a:gain=40000:law=sign"], ())
     assert [job.label for job in jobs] == ["gain=20000", "gain=40000"]
-    assert [job.out for job in jobs] == [Path("o/gain=20000"), Path("o/gain=40000")]
-    jobs = variants(scenario, ["controller=a:law=x y:gain=2,b", "tyre=t,u"], (), Path("o"), None)
+    assert [job.name for job in jobs] == ["gain=20000", "gain=40000"]
+    jobs = variants(scenario, ["controller=a:law=x y:gain=2,b", "tyre=t,u"], ())
     assert [job.label for job in jobs][:2] == ["a law=x y gain=2 + t", "a law=x y gain=2 + u"]
-    assert jobs[0].out == Path("o/a_law=x_y_gain=2+t")
-    alike = variants(scenario, ["controller=a:law=x y,a:law=x_y"], (), Path("o"), None)
-    assert len({job.out for job in alike}) == 2
+    assert jobs[0].name == "a_law=x_y_gain=2+t"
+    alike = variants(scenario, ["controller=a:law=x y,a:law=x_y"], ())
+    assert len({job.name for job in alike}) == 2
 
 
 def test_parameters_alone_set_the_scenarios_own_fmu_against_itself(scenario):
-    jobs = variants(scenario, ["controller=controller_fnn:learning=false"], (), Path("out"), None)
+    jobs = variants(scenario, ["controller=controller_fnn:learning=false"], ())
     own = {"controller": "controller_fnn"}
     assert [given(job) for job in jobs] == [own, {**own, "controller.learning": False}]
 
@@ -128,41 +137,73 @@ def test_an_option_without_an_fmu_is_an_error(scenario):
         labels(scenario, "controller")
 
 
+METRICS = {
+    "metrics": {name: {"metric": name} for name in ("relative_peak_error(sideslip)", "final(velocity_x)")}
+}
+
+
 @pytest.fixture
-def outcomes(tmp_path):
-    runs = {"off": car(2.4), "fnn": car(1.02)}
-    made = [Outcome(Job(k, Path("s.yaml"), write(run, tmp_path / k))) for k, run in runs.items()]
-    broken = Outcome(Job("broken", Path("s.yaml"), tmp_path / "broken"), ("unit died",), 1)
-    return [made[0], broken, made[1]]
+def findings(tmp_path):
+    """What a comparison of three made-up runs comes to, of which one failed."""
+    runs = [NamedRun(name, name, name, Path("s.yaml"), ()) for name in ("off", "broken", "fnn")]
+    experiment = of_runs(runs, "title", Path("s.yaml"), (), FIGURES)
+    spec = ExperimentSpec.model_validate(
+        experiment.spec.model_dump(exclude_defaults=True, by_alias=True) | METRICS
+    )
+    write(car(2.4), tmp_path / "off")
+    write(car(1.02), tmp_path / "fnn")
+    lost = Outcome(Job("broken", Path("s.yaml"), tmp_path / "broken"), ("unit died",), 1)
+    return judge_results(replace(experiment, spec=spec), tmp_path, [lost])
 
 
-def test_the_table_has_a_row_per_metric_and_a_column_per_run(outcomes):
-    table = metric_table(judge_comparison(outcomes), "title")
+def test_the_table_has_a_row_per_metric_and_a_column_per_run(findings):
+    table = comparison_table(findings)
     assert table.headings == ["metric", "", "off", "fnn", "broken"]
     assert table.text()[0] == [
         "Sideslip angle: relative peak error", "max|β - β_ref| / max|β_ref|", "140 %", "2.00 %", "failed",
     ]  # fmt: skip
 
 
-def test_a_run_that_failed_is_named_and_the_others_are_drawn(outcomes, tmp_path):
-    comparison = judge_comparison(outcomes)
-    files = write_comparison(comparison, metric_table(comparison, "title"), tmp_path)
-    assert files == [
-        "overview.svg", "overview.png", "wheel_torques.svg", "wheel_torques.png", "metrics.csv", "compare.md",
-    ]  # fmt: skip
-    assert all((tmp_path / name).stat().st_size > 0 for name in files)
-    assert "broken failed: unit died" in (tmp_path / "compare.md").read_text()
-    rows = {row["run"]: row for row in csv.DictReader((tmp_path / "metrics.csv").open())}
-    assert rows["broken"]["status"] == "failed: unit died"
+def test_a_run_that_failed_is_named_and_the_others_are_drawn(findings, tmp_path):
+    drawn, problems = draw_all(findings, tmp_path)
+    assert (list(drawn), problems) == (["overview", "wheel_torques"], [])
+    write_findings(findings, drawn, tmp_path)
+    rows = {row["run"]: row for row in csv.DictReader((tmp_path / "table.csv").open())}
+    assert (rows["broken"]["status"], rows["broken"]["reason"]) == ("failed", "unit died")
     assert float(rows["fnn"]["relative_peak_error(sideslip) [1]"]) == pytest.approx(0.02, rel=1e-9)
     assert float(rows["off"]["final(velocity_x) [m/s]"]) == pytest.approx(24.6, rel=1e-9)
 
 
-def test_a_comparison_without_any_result_still_writes_its_tables(outcomes, tmp_path):
-    comparison = judge_comparison(outcomes[1:2])
-    assert write_comparison(comparison, metric_table(comparison, "title"), tmp_path) == [
-        "metrics.csv", "compare.md",
-    ]  # fmt: skip
+def test_the_page_marks_the_best_and_tells_differences_from_the_first(findings):
+    facts = comparison_facts(findings)
+    error = facts["rows"][0].cells
+    assert [cell.value for cell in error] == ["140 %", "2.00 %"]
+    assert [cell.best for cell in error] == [False, True]
+    assert [cell.difference for cell in error] == ["", "−138 points"]
+    assert not any(cell.best for cell in facts["rows"][1].cells)  # less speed is not better as such
+
+
+def test_no_run_leaves_the_axes_of_the_signals_that_differ_most(tmp_path):
+    lost = [Run(name, car(gain)) for name, gain in (("a", 1.0), ("b", 40.0), ("c", 50.0), ("d", 60.0))]
+    for whole in (True, False):
+        (panel,) = shown_by(lost, ["sideslip"], whole=whole)
+        axes = Figure().add_subplot()
+        panel.draw(axes)
+        _, high = axes.get_ylim()
+        assert high >= max(line.get_ydata().max() for line in axes.get_lines()), whole
+    (panel,) = shown_by(lost[:2] + lost[:1], ["sideslip"])
+    axes = Figure().add_subplot()
+    panel.draw(axes)
+    assert axes.get_ylim()[1] < max(line.get_ydata().max() for line in axes.get_lines())  # one of three may
+
+
+def test_a_comparison_without_any_result_still_writes_its_tables(findings, tmp_path):
+    empty = judge_results(findings.experiment, tmp_path / "none")
+    drawn, problems = draw_all(empty, tmp_path / "none")
+    write_findings(empty, drawn, tmp_path / "none")
+    assert len(problems) == 2
+    assert comparison_facts(empty) is None
+    assert (tmp_path / "none/table.csv").is_file()
 
 
 def test_folders_are_told_apart_by_the_shortest_ends_of_their_paths():

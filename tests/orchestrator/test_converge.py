@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import csv
+import io
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from orchestrator.errors import ResultsError, ScenarioError
-from orchestrator.studies.converge import (
+from orchestrator.experiments.compare import of_runs
+from orchestrator.experiments.converge import (
+    columns_of,
     convergence_figure,
     convergence_table,
     measure,
     refinements,
-    write_rows,
 )
-from orchestrator.studies.jobs import Job, Outcome
+from orchestrator.experiments.experiment import NamedRun
+from orchestrator.experiments.findings import judge_results
+from orchestrator.experiments.jobs import Job, Outcome
+from orchestrator.experiments.table import to_csv
 from tests.changed import changed
 
 from .recorded import results, write
@@ -25,9 +30,9 @@ H = 0.04
 SIGNAL = "plant.yaw_rate"
 
 
-def outcomes(folder: Path, orders: dict[str, int], halvings: int = 3, scale: float = 0.5) -> list[Outcome]:
-    """Return finished runs of sin(t) whose error is scale * sin(2 t) h^order."""
-    made = []
+def made(folder: Path, orders: dict[str, int], halvings: int = 3, scale: float = 0.5, lost=()):
+    """Return what runs of sin(t) come to whose error is scale * sin(2 t) h^order; `lost`: (run, why)."""
+    runs = []
     for name, order in orders.items():
         for k in range(halvings + 1):
             step = H / 2**k
@@ -35,13 +40,14 @@ def outcomes(folder: Path, orders: dict[str, int], halvings: int = 3, scale: flo
             recorded = results({SIGNAL: np.sin(t) + scale * step**order * np.sin(2 * t)}, t)
             write(recorded, folder / name / str(k), wall_time=float(2**k))
             given = changed(step_size=step, algorithm=name)
-            job = Job(f"{name} {k}", Path("x.yaml"), folder / name / str(k), given)
-            made.append(Outcome(job))
-    return made
+            runs.append(NamedRun(f"{name}/{k}", f"{name} {k}", "", Path("x.yaml"), given))
+    experiment = of_runs(runs, "title", Path("x.yaml"), (), {})
+    failed = [Outcome(Job(name, Path(), folder), (why,), 1) for name, why in lost]
+    return judge_results(experiment, folder, failed)
 
 
 def test_observed_orders_are_those_of_the_methods(tmp_path):
-    rows = measure(outcomes(tmp_path, {"extrapolated": 2, "gauss_seidel": 1}), SIGNAL)
+    rows = measure(made(tmp_path, {"extrapolated": 2, "gauss_seidel": 1}), SIGNAL)
     orders = {(row.algorithm, row.step): row.order for row in rows}
     assert orders["extrapolated", H] == pytest.approx(2.0, abs=1e-9)
     assert orders["extrapolated", H / 2] == pytest.approx(2.0, abs=1e-9)
@@ -51,7 +57,7 @@ def test_observed_orders_are_those_of_the_methods(tmp_path):
 
 
 def test_errors_are_relative_to_the_peak_and_against_the_finest_run_of_the_first_algorithm(tmp_path):
-    rows = measure(outcomes(tmp_path, {"extrapolated": 2, "jacobi": 1}), SIGNAL)
+    rows = measure(made(tmp_path, {"extrapolated": 2, "jacobi": 1}), SIGNAL)
     errors = {(row.algorithm, row.step): row.error for row in rows}
     finest = 0.5 * (H / 8) ** 2
     largest = np.max(np.abs(np.sin(2 * np.linspace(0, 2, 51))))
@@ -62,9 +68,8 @@ def test_errors_are_relative_to_the_peak_and_against_the_finest_run_of_the_first
 
 
 def test_a_failed_run_leaves_the_others_their_errors(tmp_path):
-    made = outcomes(tmp_path, {"extrapolated": 2, "jacobi": 1})
-    made[4] = Outcome(made[4].job, ("plant: not finite",), 1)
-    rows = measure(made, SIGNAL)
+    lost = [("jacobi/0", "plant: not finite")]
+    rows = measure(made(tmp_path, {"extrapolated": 2, "jacobi": 1}, lost=lost), SIGNAL)
     failed = rows[4]
     assert (failed.error, failed.order, failed.wall_time) == (None, None, None)
     assert failed.failed == "plant: not finite"
@@ -74,9 +79,8 @@ def test_a_failed_run_leaves_the_others_their_errors(tmp_path):
 
 
 def test_without_the_finest_run_orders_are_left(tmp_path):
-    made = outcomes(tmp_path, {"extrapolated": 2})
-    made[-1] = Outcome(made[-1].job, ("the process of this run died",), 1)
-    rows = measure(made, SIGNAL)
+    lost = [("extrapolated/3", "the process of this run died")]
+    rows = measure(made(tmp_path, {"extrapolated": 2}, lost=lost), SIGNAL)
     assert [row.error for row in rows] == [None] * 4
     assert rows[0].order == pytest.approx(2.0)
     assert [row[2] for row in convergence_table(rows, "title").text()] == [
@@ -85,15 +89,15 @@ def test_without_the_finest_run_orders_are_left(tmp_path):
 
 
 def test_a_signal_that_is_zero_throughout_is_an_error(tmp_path):
-    made = outcomes(tmp_path, {"extrapolated": 2})
+    experiment = made(tmp_path, {"extrapolated": 2}).experiment
     for k in range(4):
         write(results({SIGNAL: np.zeros(3)}), tmp_path / "extrapolated" / str(k))
     with pytest.raises(ResultsError, match=r"plant\.yaw_rate is zero throughout: choose another --signal"):
-        measure(made, SIGNAL)
+        measure(judge_results(experiment, tmp_path), SIGNAL)
 
 
 def test_the_table_says_step_error_order_and_cost(tmp_path):
-    table = convergence_table(measure(outcomes(tmp_path, {"extrapolated": 2}), SIGNAL), "title")
+    table = convergence_table(measure(made(tmp_path, {"extrapolated": 2}), SIGNAL), "title")
     assert [row[:2] for row in table.text()] == [
         ["extrapolated", step] for step in ("40 ms", "20 ms", "10 ms", "5 ms")
     ]
@@ -103,15 +107,15 @@ def test_the_table_says_step_error_order_and_cost(tmp_path):
 
 
 def test_the_csv_has_plain_numbers_in_si(tmp_path):
-    write_rows(measure(outcomes(tmp_path, {"extrapolated": 2}), SIGNAL), tmp_path / "rows.csv")
-    rows = list(csv.DictReader((tmp_path / "rows.csv").open()))
+    text = to_csv(columns_of(measure(made(tmp_path, {"extrapolated": 2}), SIGNAL)))
+    rows = list(csv.DictReader(io.StringIO(text)))
     assert [float(row["step_size [s]"]) for row in rows] == [H, H / 2, H / 4, H / 8]
     assert rows[-1]["error [1]"] == ""
     assert float(rows[0]["order [1]"]) == pytest.approx(2.0)
 
 
 def test_the_figure_shows_error_over_step_and_over_cost(tmp_path):
-    rows = measure(outcomes(tmp_path, {"extrapolated": 2, "jacobi": 1}), SIGNAL)
+    rows = measure(made(tmp_path, {"extrapolated": 2, "jacobi": 1}), SIGNAL)
     figure = convergence_figure(rows, SIGNAL, "title", "note")
     by_step, by_cost = figure.axes
     assert [axes.get_xscale() + axes.get_yscale() for axes in figure.axes] == ["loglog", "loglog"]
@@ -122,7 +126,7 @@ def test_the_figure_shows_error_over_step_and_over_cost(tmp_path):
 
 
 def test_runs_that_do_not_differ_cannot_be_drawn(tmp_path):
-    rows = measure(outcomes(tmp_path, {"extrapolated": 2}, scale=0.0), SIGNAL)
+    rows = measure(made(tmp_path, {"extrapolated": 2}, scale=0.0), SIGNAL)
     with pytest.raises(ResultsError, match="no two runs differ"):
         convergence_figure(rows, SIGNAL, "title", "note")
 
@@ -139,22 +143,22 @@ units:
 
 def test_steps_are_halved_exactly_and_units_keep_their_own(tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO)
-    jobs = refinements(
-        tmp_path / "s.yaml", halvings=3, signal=SIGNAL, algorithms=["extrapolated", "jacobi"], out=tmp_path
+    experiment = refinements(
+        tmp_path / "s.yaml", halvings=3, signal=SIGNAL, algorithms=["extrapolated", "jacobi"]
     )
+    jobs = list(experiment.runs.values())
     assert [job.changes[-1].value for job in jobs] == [0.004, 0.002, 0.001, 0.0005] * 2
     assert [job.changes[-2].value for job in jobs] == ["extrapolated"] * 4 + ["jacobi"] * 4
-    assert len({job.out for job in jobs}) == 8
-    assert all(job.record == (SIGNAL,) for job in jobs)
+    assert len(jobs) == 8
 
 
 def test_the_scenarios_own_algorithm_is_the_default(tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO)
-    jobs = refinements(tmp_path / "s.yaml", halvings=2, signal=SIGNAL, algorithms=[], out=tmp_path)
-    assert [job.changes[-2].value for job in jobs] == ["jacobi"] * 3
+    experiment = refinements(tmp_path / "s.yaml", halvings=2, signal=SIGNAL, algorithms=[])
+    assert [job.changes[-2].value for job in experiment.runs.values()] == ["jacobi"] * 3
 
 
 def test_a_signal_without_its_unit_is_an_error(tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO)
     with pytest.raises(ScenarioError, match=r"--signal yaw_rate: write UNIT\.VARIABLE"):
-        refinements(tmp_path / "s.yaml", halvings=2, signal="yaw_rate", algorithms=[], out=tmp_path)
+        refinements(tmp_path / "s.yaml", halvings=2, signal="yaw_rate", algorithms=[])

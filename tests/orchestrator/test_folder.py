@@ -9,13 +9,13 @@ import sys
 import pytest
 
 from orchestrator.errors import ResultsError, SimulationError
+from orchestrator.experiments.listing import runs_table
 from orchestrator.master.simulate import simulate
 from orchestrator.results import folder as module
 from orchestrator.results.lock import LOCK_FILE, Lock, holder_of, writing
 from orchestrator.results.read import load_results
 from orchestrator.results.runs import found_runs
 from orchestrator.results.salvage import lost_format, salvage
-from orchestrator.studies.listing import runs_table
 
 from .fakes import Clock, Function, Stage, make_plan
 

@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.metrics.run_metrics import evaluate, metric
-from orchestrator.pages.freshness import staleness
+from orchestrator.results.freshness import staleness
 from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan

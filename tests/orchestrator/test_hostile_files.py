@@ -15,14 +15,17 @@ from orchestrator.cli import main
 from orchestrator.commands.batch import print_tables, say
 from orchestrator.commands.check import show
 from orchestrator.errors import ScenarioError, YawbenchError
+from orchestrator.experiments.derived import parse
+from orchestrator.experiments.experiment import Experiment, load_experiment
+from orchestrator.experiments.findings import judge_results
+from orchestrator.experiments.schema import ExperimentSpec
+from orchestrator.experiments.tables import Table
 from orchestrator.files import reading
+from orchestrator.pages.chapter import chapter
+from orchestrator.pages.report import report_page
 from orchestrator.scenario import yaml_lines
 from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import read_changes
-from orchestrator.studies.derived import parse
-from orchestrator.studies.study_file import load_study
-from orchestrator.studies.tables import Table, for_markdown, harmless
-from orchestrator.sweeps.sweep_file import load_sweep
 from orchestrator.wiring.make_plan import make_plan
 
 from .fake_fmus import Var, make_fmu
@@ -169,28 +172,28 @@ def said_of(load: object, text: str) -> list[str]:
             "b.yaml:1: 1000000000 runs; at most 100000 are taken",
         ),
         (
-            f"{SWEEP}design: latin_hypercube\nseed: 1\nruns: 1000000000\n"
+            f"{SWEEP}design: latin_hypercube\nseed: 1\npoints: 1000000000\n"
             "axes: {a: {vary: plant.mass, from: 1, to: 2}}\n",
             "b.yaml:1: 1000000000 runs; at most 100000 are taken",
         ),
     ],
 )
 def test_a_sweep_of_too_many_runs_is_refused_before_they_are_listed(text: str, expected: str) -> None:
-    assert said_of(load_sweep, text)[0].startswith(expected)
+    assert said_of(load_experiment, text)[0].startswith(expected)
 
 
 def test_a_study_of_too_many_runs_is_refused_before_they_are_listed() -> None:
     hundred = list(range(100))
     for_each = f"{{a: {hundred}, b: {hundred}, c: {hundred}}}"
     text = f'{STUDY}  - {{name: "{{a}}{{b}}{{c}}", scenario: a.yaml, for: {for_each}}}\n'
-    assert said_of(load_study, text) == [
+    assert said_of(load_experiment, text) == [
         "b.yaml:4: runs[0].for: stands for 1000000 runs; at most 10000 are taken"
     ]
     text = STUDY + "".join(
         f'  - {{name: "{i}/{{a}}/{{b}}", scenario: a.yaml, for: {{a: {hundred}, b: {hundred}}}}}\n'
         for i in range(2)
     )
-    assert said_of(load_study, text) == ["b.yaml:3: runs: more than 10000 runs; no more are taken"]
+    assert said_of(load_experiment, text) == ["b.yaml:3: runs: more than 10000 runs; no more are taken"]
 
 
 def test_a_grid_of_too_many_cells_is_refused() -> None:
@@ -200,7 +203,7 @@ def test_a_grid_of_too_many_cells_is_refused() -> None:
         f'grids: {{g: {{title: t, metric: m, run: "{{a}}{{b}}", rows: {{a: {many}}}, '
         f"columns: {{b: {many}}}}}}}\n"
     )
-    assert said_of(load_study, text) == ["b.yaml:5: grids.g: 40000 runs; at most 10000 are taken"]
+    assert said_of(load_experiment, text) == ["b.yaml:5: grids.g: 40000 runs; at most 10000 are taken"]
 
 
 @pytest.mark.parametrize("text", ["a + " * 5000 + "a", "(" * 300 + "a" + ")" * 300, "-" * 390 + "a", "a\0"])
@@ -263,9 +266,12 @@ def test_what_an_escape_sequence_would_do_never_reaches_the_terminal(
     assert not set("\x1b\u202e") & set(out + err)
 
 
-def test_pages_and_markdown_hold_no_escape_sequences_and_no_html_of_users() -> None:
-    table = Table(ESCAPES, [ESCAPES], [[ESCAPES, ESCAPES]], [ESCAPES])
-    text = harmless(f"# {ESCAPES}\n{for_markdown(table)}")
-    assert text.count("&lt;script>") == 6
+def test_pages_hold_no_escape_sequences_and_no_html_of_users() -> None:
+    table = Table(ESCAPES, [ESCAPES], [[ESCAPES]], [ESCAPES])
+    spec = ExperimentSpec.model_validate({"title": ESCAPES, "runs": [{"name": "a", "scenario": "a.yaml"}]})
+    findings = judge_results(Experiment(Path("a.yaml"), spec, {}), Path("none"))
+    facts = chapter(findings, command=ESCAPES, stale={}, folder=Path("none"), shown_in=Path("none"))
+    text = report_page([facts | {"comparison": None, "results": [table]}])
+    assert text.count("&lt;script&gt;") >= 6
     assert not set("\x1b\u202e") & set(text)
-    assert "<script" not in text
+    assert "<script>alert" not in text

@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 from orchestrator.errors import ScenarioError, SimulationError
+from orchestrator.experiments.jobs import Job, read_back, ready
+from orchestrator.experiments.workers import execute, pool
 from orchestrator.results.read import load_results
-from orchestrator.studies.jobs import Job, check, execute, pool, read_back
 
 from .recorded import car, write
 
@@ -96,7 +97,7 @@ def test_when_the_caller_stops_all_runs_end(tmp_path, monkeypatch, why):
     def stop(outcome):
         raise why
 
-    monkeypatch.setattr("orchestrator.studies.jobs.GRACE", 0.0)
+    monkeypatch.setattr("orchestrator.experiments.workers.GRACE", 0.0)
     os.mkfifo(tmp_path / "fifo")
     with pytest.raises(why):
         execute(jobs(tmp_path, "hangs", "waits"), workers=2, run=obey, done=stop)
@@ -119,7 +120,7 @@ def test_ctrl_c_does_not_reach_a_run_even_while_its_process_starts(tmp_path):
 CALLER = """
 import sys
 from pathlib import Path
-from orchestrator.studies.jobs import execute
+from orchestrator.experiments.workers import execute
 from tests.orchestrator.test_jobs import jobs, tell_and_wait
 execute(jobs(Path(sys.argv[1]), "waits"), run=tell_and_wait)
 """
@@ -152,7 +153,7 @@ def test_all_problems_of_all_jobs_are_found_before_any_runs(tmp_path):
     first, second = tmp_path / "first.yaml", tmp_path / "second.yaml"
     twice = [Job("a", first, tmp_path), Job("b", second, tmp_path), Job("c", first, tmp_path)]
     with pytest.raises(ScenarioError) as error:
-        check(twice)
+        ready(twice)
     assert error.value.problems == [f"{path}: no such scenario file" for path in (first, second)]
 
 
@@ -169,11 +170,11 @@ def test_runs_start_where_the_path_of_temporary_files_is_too_long_for_sockets(fa
     folder.mkdir()
     script = (
         "from pathlib import Path\n"
-        "from orchestrator.studies import jobs\n"
-        f"jobs.SHORT_FOLDER = {fallback!r}\n"
+        "from orchestrator.experiments import jobs, workers\n"
+        f"workers.SHORT_FOLDER = {fallback!r}\n"
         "if __name__ == '__main__':\n"
         "    job = jobs.Job('a', Path('a.yaml'), Path('out'))\n"
-        "    (outcome,) = jobs.execute([job], run=print)\n"
+        "    (outcome,) = workers.execute([job], run=print)\n"
         "    print(outcome.problems)\n"
     )
     done = subprocess.run(

@@ -5,11 +5,11 @@ import pytest
 
 from fmus.build import build_all
 from orchestrator.cli import main
+from orchestrator.experiments.listing import runs_table
 from orchestrator.metrics.run_metrics import columns_for, evaluate_all
 from orchestrator.pages.run_differences import differences
 from orchestrator.results.read import load_results
 from orchestrator.results.runs import found_runs
-from orchestrator.studies.listing import runs_table
 
 from .recorded import car, write
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orchestrator.experiments.tables import MARK, marked, remarks
 from orchestrator.metrics.plausibility import CHECKS, Watch, findings_in, first_of_each
 from orchestrator.plan import Finding, Fmu, Plan, Unit, Variable, Wire
-from orchestrator.studies.tables import MARK, marked, remarks
 from vocabulary.wheels import WHEELS
 
 from .recorded import car

@@ -16,8 +16,8 @@ from orchestrator.cli import main
 from orchestrator.errors import ResultsError, YawbenchError
 from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.master.simulate import simulate
-from orchestrator.pages.freshness import staleness
 from orchestrator.plan import Plan, Series
+from orchestrator.results.freshness import staleness
 from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan

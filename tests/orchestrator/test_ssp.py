@@ -183,7 +183,7 @@ def test_runs_of_an_archive_are_compared(feedback, fmus, tmp_path):
     with pytest.raises(SystemExit) as exit_:
         main(["compare", str(feedback), *swap, *short, "--fmus", str(fmus), "--out", str(tmp_path / "c")])
     assert not exit_.value.code
-    assert "controller_off" in (tmp_path / "c" / "compare.md").read_text()
+    assert "controller_off" in (tmp_path / "c" / "report.html").read_text()
 
 
 def test_units_of_an_archive_are_swapped_and_set_as_those_of_a_scenario(feedback, fmus, tmp_path):

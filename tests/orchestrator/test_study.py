@@ -7,20 +7,27 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
+from lxml import html
 from rich.console import Console
 
 from orchestrator.errors import ScenarioError
+from orchestrator.experiments.derived import calculate, rank_correlation
+from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.figures import draw_all
+from orchestrator.experiments.findings import judge_results
+from orchestrator.experiments.jobs import Job, Outcome
+from orchestrator.experiments.judged_schema import Claim
+from orchestrator.experiments.judging import judge
+from orchestrator.experiments.planning import jobs_of
+from orchestrator.experiments.record import write_findings
+from orchestrator.experiments.tables import Table, for_terminal
+from orchestrator.experiments.verdicts import claim_tables, derived_tables, run_tables
 from orchestrator.metrics.run_metrics import Value
+from orchestrator.pages.chapter import chapter
+from orchestrator.pages.report import report_page
 from orchestrator.plan import Change
-from orchestrator.studies.claims import condition_text, judge
-from orchestrator.studies.derived import calculate, rank_correlation
-from orchestrator.studies.jobs import Job, Outcome
-from orchestrator.studies.study import claim_tables, derived_tables, judge_study, run_tables
-from orchestrator.studies.study_file import load_study
-from orchestrator.studies.study_report import write_study
-from orchestrator.studies.study_schema import Claim
-from orchestrator.studies.tables import Table, for_terminal
 
 from .recorded import car, write
 
@@ -79,7 +86,7 @@ def study(tmp_path):
             text = text.replace(old, new)
         path = tmp_path / "study.yaml"
         path.write_text(text)
-        return load_study(path)
+        return load_experiment(path)
 
     return load
 
@@ -88,6 +95,13 @@ def problems(study, *changes):
     with pytest.raises(ScenarioError) as error:
         study(*changes)
     return [problem.partition(": ")[2] for problem in error.value.problems]
+
+
+def page(findings, out) -> str:
+    """Return what a reader of the experiment's page sees."""
+    facts = chapter(findings, command="yawbench study", stale={}, folder=out, shown_in=out)
+    text = report_page([facts | {"comparison": None, "results": []}])
+    return " ".join(" ".join(html.fromstring(text).itertext()).split())
 
 
 GAINS = {"15mps/off": 2.4, "15mps/fnn": 1.02, "25mps/off": 3.0, "25mps/fnn": 1.04, "slow": 1.0}
@@ -116,7 +130,7 @@ def test_for_stands_for_one_run_per_combination(study, tmp_path):
 
 
 def test_a_run_becomes_a_job_with_a_folder_of_its_own(study, tmp_path):
-    job = study().runs["slow"].job(tmp_path / "out", None)
+    *_, job = jobs_of(study(), tmp_path / "out")
     assert job.out == tmp_path / "out" / "slow"
     assert job.changes == (Change("stop_time", 2.0, "study"), Change("algorithm", "jacobi", "study"))
 
@@ -136,14 +150,15 @@ def test_all_problems_of_a_study_are_reported_at_once(study):
         ("above: 100 %", "above: [1]"),
     )
     assert found == [
-        "runs[1].stop_tim: unknown key; did you mean 'stop_time'? allowed here: name, scenario, for, label, "
-        "row, swap, set, stop_time, step_size and algorithm",
+        "runs[1].stop_tim: unknown key; did you mean 'stop_time'? allowed here: swap, set, vehicle, "
+        "stop_time, step_size, algorithm, name, scenario, for, label and row",
         "metrics.error.metric: 'relative_peek_error(sideslip)': there is no measure 'relative_peek_error'"
         "; did you mean 'relative_peak_error'?",
         "metrics.late.window: must be [from, to] in s, from before to, or 1 s to 3 s (got [6.5])",
         "claims[0].holds_if[0].above: must be a number, a number with its unit ('5 %'), "
         "or {run: ..., metric: ...}",
-        "figures[0].titel: unknown key; did you mean 'title'? allowed here: name, title, runs and panels",
+        "figures[0].titel: unknown key; did you mean 'title'? allowed here: name, title, kind, runs, panels, "
+        "metric, limit, x, y, lines, only, scale, largest and mark",
     ]
 
 
@@ -190,8 +205,8 @@ def test_a_condition_has_exactly_one_bound(study):
 
 def test_a_missing_study_file_is_one_sentence(tmp_path):
     with pytest.raises(ScenarioError) as error:
-        load_study(tmp_path / "none.yaml")
-    assert error.value.problems == [f"{tmp_path / 'none.yaml'}: no such study file"]
+        load_experiment(tmp_path / "none.yaml")
+    assert error.value.problems == [f"{tmp_path / 'none.yaml'}: no such experiment file"]
 
 
 def verdicts(judgements):
@@ -199,28 +214,31 @@ def verdicts(judgements):
 
 
 def test_claims_are_judged_by_the_results_on_disk(study, out):
-    findings = judge_study(study(), out)
+    findings = judge_results(study(), out)
     assert verdicts(findings.claims) == [True, False, True]
     assert verdicts(findings.checks) == [True, False]
-    assert findings.claims[0].measured == ("140 %",)
-    assert findings.claims[2].measured == ("2.00 % against 140 %", "4.00 % against 200 %")
-    assert findings.checks[1].measured == ("2000 N·m",)
+    assert findings.claims[0].measured == ("140 % (15 m/s, no control)",)
+    assert findings.claims[2].measured == (
+        "2.00 % (15 m/s, neural network) against 140 % (15 m/s, no control)",
+        "4.00 % (25 m/s, neural network) against 200 % (25 m/s, no control)",
+    )
+    assert findings.checks[1].measured == ("2000 N·m (15 m/s, neural network)",)
     write(car(1.001), out / "15mps/fnn")
-    assert verdicts(judge_study(study(), out).claims) == [True, True, True]
+    assert verdicts(judge_results(study(), out).claims) == [True, True, True]
 
 
 def test_a_claim_about_a_run_without_results_is_not_judged(study, out):
     lost = Outcome(Job("15mps/off", Path("x"), out / "15mps/off"), ("plant: lost",), 1)
-    findings = judge_study(study(), out, [lost])
+    findings = judge_results(study(), out, [lost])
     assert findings.failed == {"15mps/off": "plant: lost"}
     assert verdicts(findings.claims) == [None, False, None]
-    assert findings.claims[2].measured == ("2.00 % against no result", "4.00 % against 200 %")
+    assert findings.claims[2].measured[0] == "2.00 % (15 m/s, neural network) against no result"
     assert verdicts(findings.checks) == [None, False]
 
 
 def test_a_run_that_ended_early_counts_as_failed(study, out):
     write(car(1.0), out / "slow", status="interrupted", error={"message": "the run was interrupted"})
-    findings = judge_study(study(), out)
+    findings = judge_results(study(), out)
     assert findings.failed == {"slow": f"{out / 'slow'}: this run ended early: the run was interrupted"}
 
 
@@ -229,7 +247,7 @@ def test_operators_and_factors_compare_as_they_say():
 
     def holds(**condition):
         claim = Claim(says="x", holds_if=[{"run": "a", "metric": "m", **condition}])
-        return judge(claim, values, ["a", "b"]).holds
+        return judge(claim, values, {"a": "", "b": ""}).holds
 
     assert [holds(above=1.0), holds(at_least=1.0), holds(below=1.0), holds(at_most=1.0)] == [
         False, True, False, True,
@@ -251,7 +269,7 @@ def test_conditions_can_be_read():
             {"run": "a", "metric": "m", "below": {"run": "b", "metric": "n", "times": 0.5}},
         ],
     )
-    assert [condition_text(c) for c in claim.holds_if] == ["a: m ≤ 5 %", "a: m < 0.5 × n of b"]
+    assert [str(c) for c in claim.holds_if] == ["a: m ≤ 5 %", "a: m < 0.5 × n of b"]
 
 
 @pytest.fixture
@@ -296,7 +314,7 @@ checks:
 
 
 def test_a_grid_stands_beside_the_published_numbers_with_its_rank_correlation(with_grid, out):
-    findings = judge_study(with_grid(), out)
+    findings = judge_results(with_grid(), out)
     grid, numbers = derived_tables(findings)
     assert grid.headings == [
         "speed", "no control", "neural network", "the paper:", "no control", "neural network",
@@ -315,33 +333,34 @@ def test_a_grid_stands_beside_the_published_numbers_with_its_rank_correlation(wi
 
 
 def test_a_grid_and_its_derived_numbers_are_written_down(with_grid, out):
-    findings = judge_study(with_grid(), out)
-    write_study(findings, out)
-    report = (out / "study.md").read_text()
-    assert "| 15 | 1.40 | 0.0200 | 15 | 3.00 | 0.0100 |" in report
-    record = json.loads((out / "study.json").read_text())
+    findings = judge_results(with_grid(), out)
+    said = page(findings, out)
+    assert "15 1.40 0.0200" in said
+    assert "15 3.00 0.0100" in said
+    write_findings(findings, {}, out)
+    record = json.loads((out / "experiment.json").read_text())
     assert record["derived"]["drop"]["value"] == pytest.approx(1.38 / 1.4)
     assert record["derived"]["drop"]["of"]["off"] == ["15mps/off", "error"]
     assert record["checks"][0]["holds_if"] == ["order ≥ 0.9"]
 
 
 def test_a_derived_number_stands_beside_the_published_one(with_grid, out):
-    findings = judge_study(with_grid(('    unit: "%"\n', '    unit: "%"\n    published: 95 %\n')), out)
+    findings = judge_results(with_grid(('    unit: "%"\n', '    unit: "%"\n    published: 95 %\n')), out)
     _, numbers = derived_tables(findings)
     assert numbers.headings == ["what", "value", "the paper says"]
     assert numbers.text() == [
         ["Rank correlation", "0.900", "-"],
         ["Share of the error removed", "98.6 %", "95.0 %"],
     ]
-    write_study(findings, out)
-    record = json.loads((out / "study.json").read_text())
+    write_findings(findings, {}, out)
+    record = json.loads((out / "experiment.json").read_text())
     assert record["derived"]["drop"]["published"] == pytest.approx(0.95)
     assert record["derived"]["order"]["published"] is None
 
 
 def test_without_a_run_there_is_neither_correlation_nor_verdict(with_grid, out):
     lost = Outcome(Job("15mps/off", Path("x"), out / "15mps/off"), ("plant: lost",), 1)
-    findings = judge_study(with_grid(), out, [lost])
+    findings = judge_results(with_grid(), out, [lost])
     assert findings.derived == {}
     assert findings.checks[0].holds is None
     grid, numbers = derived_tables(findings)
@@ -357,7 +376,7 @@ def test_a_grid_without_published_numbers_is_a_plain_table(with_grid, out):
         ("  order: {says: Rank correlation, rank_correlation: errors}\n", ""),
         ("{derived: order, at_least: 0.9}", "{derived: drop, at_least: 90 %}"),
     )
-    findings = judge_study(study, out)
+    findings = judge_results(study, out)
     grid, _ = derived_tables(findings)
     assert grid.text() == [["15", "1.40", "0.0200"], ["25", "2.00", "0.0400"]]
     assert len(grid.notes) == 1
@@ -447,7 +466,7 @@ def test_rank_correlation_agrees_with_scipy():
 
 
 def test_what_the_paper_says_of_a_run_stands_beside_it(study, out):
-    (table,) = run_tables(judge_study(study(), out))
+    (table,) = run_tables(judge_results(study(), out))
     assert table.headings == ["run", "largest error", "the paper says", "verdict", "max|M_z|"]
     assert table.text()[:3] == [
         ["15 m/s, no control", "140 %", "> 100 % (section 3)", "holds", "2000 N·m"],
@@ -461,34 +480,36 @@ def test_what_the_paper_says_of_a_run_stands_beside_it(study, out):
 
 
 def test_claims_about_several_runs_and_checks_have_tables_of_their_own(study, out):
-    paper, project = claim_tables(judge_study(study(), out))
-    assert paper.text() == [
-        ["The network is better. (section 4)", "2.00 % against 140 %\n4.00 % against 200 %", "holds"]
-    ]
+    paper, project = claim_tables(judge_results(study(), out))
+    (row,) = paper.text()
+    assert (row[0], row[2]) == ("The network is better. (section 4)", "holds")
+    assert row[1].splitlines()[1] == "4.00 % (25 m/s, neural network) against 200 % (25 m/s, no control)"
     assert [row[2] for row in project.text()] == ["holds", "does not hold"]
 
 
 def test_a_failed_run_is_named_in_the_table_with_its_reason(study, out):
     lost = Outcome(Job("slow", Path("x"), out / "slow"), ("plant: lost",), 1)
-    (table,) = run_tables(judge_study(study(), out, [lost]))
+    (table,) = run_tables(judge_results(study(), out, [lost]))
     assert table.text()[-1] == ["slow", "failed", "-", "-", "-"]
     assert table.notes[-1] == "slow: plant: lost"
 
 
 def test_a_study_leaves_figures_tables_and_a_record(study, out):
-    findings = judge_study(study(), out)
-    said = write_study(findings, out)
+    findings = judge_results(study(), out)
+    drawn, said = draw_all(findings, out)
+    write_findings(findings, drawn, out)
     assert len(said) == 1
     assert said[0].startswith("figure roll: ")
     assert "no run recorded any of roll_angle" in said[0]
     assert sorted(path.name for path in (out / "figures").iterdir()) == ["both.png", "both.svg"]
-    report = (out / "study.md").read_text()
-    assert "| 15 m/s, no control | 140 % | > 100 % (section 3) | holds | 2000 N·m |" in report
-    assert "![Both at 15 m/s](figures/both.png)" in report
-    assert "- late: largest absolute value, from 6.5 to 8 s: `max|β|`" in report
-    rows = {row["run"]: row for row in csv.DictReader((out / "metrics.csv").open())}
+    report = page(findings, out)
+    assert "15 m/s, no control 140 % > 100 % (section 3) ✓ holds 2000 N·m" in report
+    assert "figures/both.png" in report
+    assert "largest absolute value, from 6.5 to 8 s: max|β|" in report
+    assert pq.read_table(out / "table.parquet").num_rows == 5
+    rows = {row["run"]: row for row in csv.DictReader((out / "table.csv").open())}
     assert float(rows["15mps/fnn"]["error [1]"]) == pytest.approx(0.02, rel=1e-9)
-    record = json.loads((out / "study.json").read_text())
+    record = json.loads((out / "experiment.json").read_text())
     assert record["claims"][1]["verdict"] == "does not reproduce"
     assert record["claims"][1]["holds_if"] == ["15mps/fnn: error ≤ 1 %"]
     assert record["runs"]["25mps/off"]["metrics"]["error"] == {"value": pytest.approx(2.0), "unit": "1"}
@@ -496,21 +517,24 @@ def test_a_study_leaves_figures_tables_and_a_record(study, out):
 
 
 def test_a_study_without_any_result_still_says_so(study, tmp_path):
-    findings = judge_study(study(), tmp_path / "empty")
-    said = write_study(findings, tmp_path / "empty")
+    findings = judge_results(study(), tmp_path / "empty")
+    _, said = draw_all(findings, tmp_path / "empty")
     assert said == [f"figure {name}: none of its runs has results" for name in ("both", "roll")]
-    assert "no results here" in (tmp_path / "empty" / "study.md").read_text()
+    assert "no results here" in page(findings, tmp_path / "empty")
 
 
 def test_the_studies_of_paper_b_are_right_in_themselves():
     folder = Path(__file__).parents[2] / "scenarios" / "fuzzy_sliding_mode"
-    study, distribution = load_study(folder / "study.yaml"), load_study(folder / "distribution.yaml")
+    study, distribution = (
+        load_experiment(folder / "study.yaml"),
+        load_experiment(folder / "distribution.yaml"),
+    )
     assert len(distribution.runs) == 3 * 26
     for run in (*study.runs.values(), *distribution.runs.values()):
         assert run.scenario.is_file()
 
 
 def test_the_study_of_paper_a_is_right_in_itself():
-    study = load_study(Path(__file__).parents[2] / "scenarios" / "fnn_sideslip" / "study.yaml")
+    study = load_experiment(Path(__file__).parents[2] / "scenarios" / "fnn_sideslip" / "study.yaml")
     assert {f"{v}mps/{c}" for v in (15, 25, 40) for c in ("off", "fuzzy_sideslip", "fnn")} <= set(study.runs)
     assert all(run.scenario.is_file() for run in study.runs.values())

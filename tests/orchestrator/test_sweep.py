@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import signal
@@ -10,12 +11,14 @@ import sys
 
 import pyarrow.parquet as pq
 import pytest
+from lxml import html
 
 from fmus.build import build_all, build_component
 from orchestrator.cli import main
 from orchestrator.errors import ResultsError
+from orchestrator.experiments.jobs import Record
+from orchestrator.experiments.journal import Journal
 from orchestrator.results.read import load_results
-from orchestrator.sweeps.journal import Journal, Record
 
 UNIT = '''
 import os
@@ -133,7 +136,7 @@ def yawbench(driver, capfd, tmp_path):
 
 
 def rows(folder):
-    return pq.read_table(folder / "sweep.parquet").to_pylist()
+    return pq.read_table(folder / "table.parquet").to_pylist()
 
 
 def journal(folder):
@@ -145,7 +148,7 @@ def test_one_row_per_run_with_units_and_figures_and_a_page(moods, yawbench, tmp_
     file.write_text(file.read_text() + FIGURES)
     status, out, err = yawbench(file, "out")
     assert status == 0, err
-    table = pq.read_table(tmp_path / "out" / "sweep.parquet")
+    table = pq.read_table(tmp_path / "out" / "table.parquet")
     assert table.column_names == [
         "run", "level", "amplitude", "status", "reason", "findings", "moment", "steer", "key",
     ]  # fmt: skip
@@ -157,16 +160,19 @@ def test_one_row_per_run_with_units_and_figures_and_a_page(moods, yawbench, tmp_
     assert [row["moment"] for row in found] == pytest.approx([1, 1, 4, 4, 6, 6])
     assert [row["steer"] for row in found] == pytest.approx([row["amplitude"] for row in found], rel=1e-9)
     assert {row["status"] for row in found} == {"completed"}
-    about = json.loads(table.schema.metadata[b"sweep"])
-    assert about["sweep"]["title"] == "Moods"
+    about = json.loads(table.schema.metadata[b"experiment"])
+    assert about["experiment"]["title"] == "Moods"
     assert len(about["fmus"]) == 2
     assert "Calm up to [N.m]" in out
     figures = {path.name for path in (tmp_path / "out" / "figures").iterdir()}
     assert figures == {f"{name}.{kind}" for name in ("curve", "map", "limit") for kind in ("png", "svg")}
-    page = (tmp_path / "out" / "sweep.md").read_text()
-    assert "# Moods" in page
-    assert "6 runs of `pair.yaml`" in page
-    assert "![curve](figures/curve.png)" in page
+    page = html.fromstring((tmp_path / "out" / "report.html").read_text())
+    assert page.cssselect("h1")[0].text_content() == "Moods"
+    assert [image.get("alt") for image in page.cssselect("figure.chart img")] == [
+        "Moods: curve", "Moods: map", "Moods: limit",
+    ]  # fmt: skip
+    assert "Calm up to [N.m]" in page.text_content()
+    assert len(list(csv.DictReader((tmp_path / "out" / "table.csv").open()))) == 6
 
 
 @pytest.mark.filterwarnings("error")
@@ -178,15 +184,15 @@ def test_a_sweep_with_a_stop_time_of_its_own_tells_it_in_the_table_and_warns_of_
     status, _, err = yawbench(file, "out")
     assert status == 0, err
     assert "Warning" not in err
-    about = json.loads(pq.read_schema(tmp_path / "out" / "sweep.parquet").metadata[b"sweep"])
-    assert about["sweep"]["stop_time"] == 0.05
+    about = json.loads(pq.read_schema(tmp_path / "out" / "table.parquet").metadata[b"experiment"])
+    assert about["experiment"]["stop_time"] == 0.05
 
 
 def test_the_table_is_the_same_to_the_byte_however_many_workers(moods, yawbench, tmp_path):
     file = moods(5, 10, 20, 60, count=3)
     for workers in ("1", "2", "3"):
         assert yawbench(file, workers, "--jobs", workers)[0] == 1  # level 20 fails
-    tables = {(tmp_path / workers / "sweep.parquet").read_bytes() for workers in "123"}
+    tables = {(tmp_path / workers / "table.parquet").read_bytes() for workers in "123"}
     assert len(tables) == 1
 
 
@@ -201,14 +207,14 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_is_not_made_again(moods, 
         "controller: step failed at t = 0.05 s: ValueError: twenty is too much"
     )
     assert "level 20 N.m, amplitude 1 deg failed: controller: step failed" in err
-    assert "Runs that failed" in (tmp_path / "out" / "sweep.md").read_text()
+    assert "level 20 N.m, amplitude 1 deg failed" in (tmp_path / "out" / "report.html").read_text()
     before = (tmp_path / "out" / "runs.jsonl").read_bytes()
-    table = (tmp_path / "out" / "sweep.parquet").read_bytes()
+    table = (tmp_path / "out" / "table.parquet").read_bytes()
     status, _, err = yawbench(file, "out")
     assert status == 1
     assert "all finished before" in err
     assert (tmp_path / "out" / "runs.jsonl").read_bytes() == before
-    assert (tmp_path / "out" / "sweep.parquet").read_bytes() == table
+    assert (tmp_path / "out" / "table.parquet").read_bytes() == table
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="--isolate needs Linux or macOS")
@@ -310,8 +316,8 @@ def test_a_sweep_that_was_stopped_goes_on_where_it_was(number, moods, yawbench, 
     assert after[:4] == before
     assert len({entry["key"] for entry in after}) == len(after) == 8
     yawbench(file, "whole")
-    assert (tmp_path / "out" / "sweep.parquet").read_bytes() == (
-        tmp_path / "whole" / "sweep.parquet"
+    assert (tmp_path / "out" / "table.parquet").read_bytes() == (
+        tmp_path / "whole" / "table.parquet"
     ).read_bytes()
 
 
@@ -322,7 +328,7 @@ def test_a_folder_of_another_sweep_is_refused(moods, yawbench, tmp_path):
     other.write_text(file.read_text())
     status, _, err = yawbench(other, "out")
     assert status == 2
-    assert f"{tmp_path / 'out'}: holds the sweep of {tmp_path.name}/moods.yaml; give another folder" in err
+    assert f"{tmp_path / 'out'}: holds the runs of {tmp_path.name}/moods.yaml; give another folder" in err
     assert yawbench(other, "out", "--fresh")[0] == 0
 
 
@@ -346,9 +352,7 @@ def test_a_damaged_journal_is_one_sentence(tmp_path):
     Journal(tmp_path, "a/b.yaml").close()
     with (tmp_path / "runs.jsonl").open("ab") as stream:
         stream.write(b"nonsense\n")
-    with pytest.raises(
-        ResultsError, match=r"runs\.jsonl: line 2 is damaged; --fresh begins the sweep anew\.$"
-    ):
+    with pytest.raises(ResultsError, match=r"runs\.jsonl: line 2 is damaged; --fresh begins anew\.$"):
         Journal(tmp_path, "a/b.yaml")
 
 

@@ -12,9 +12,9 @@ import sys
 import pytest
 
 from orchestrator.cli import main
-from orchestrator.sweeps.planning import plan_sweep
-from orchestrator.sweeps.run_sweep import left_to_do
-from orchestrator.sweeps.sweep_file import load_sweep
+from orchestrator.experiments.execution import left_to_do
+from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.planning import jobs_of, plan_experiment
 
 from .test_sweep import driver, moods, rows, yawbench  # noqa: F401
 
@@ -35,9 +35,9 @@ def test_a_cluster_gives_the_table_of_this_machine_to_the_byte(moods, yawbench, 
     yawbench(file, "here")
     status, _, err = yawbench(file, "there", "--scheduler", cluster.scheduler_address)
     assert status == 1, err  # level 20 fails
-    assert "16 runs\n" in err
-    assert (tmp_path / "here" / "sweep.parquet").read_bytes() == (
-        tmp_path / "there" / "sweep.parquet"
+    assert ": 16 runs\n" in err
+    assert (tmp_path / "here" / "table.parquet").read_bytes() == (
+        tmp_path / "there" / "table.parquet"
     ).read_bytes()
     assert "all finished before" in yawbench(file, "there", "--scheduler", cluster.scheduler_address)[2]
 
@@ -58,9 +58,10 @@ def test_a_run_that_kills_its_process_leaves_the_workers_alone(moods, yawbench, 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
 @pytest.mark.exhaustive
 def test_a_worker_that_is_killed_costs_no_run(moods, driver, cluster, tmp_path):  # noqa: F811
-    from orchestrator.sweeps.cluster import run_on_cluster
+    from orchestrator.experiments.cluster import run_on_cluster
 
-    planned = plan_sweep(load_sweep(moods(1, 2, 3, 4, 5, 6)), tmp_path / "runs", driver)
+    experiment = load_experiment(moods(1, 2, 3, 4, 5, 6))
+    planned = plan_experiment(experiment, jobs_of(experiment, tmp_path, driver, keep=False))
     told = []
 
     def done(outcome):
@@ -70,7 +71,7 @@ def test_a_worker_that_is_killed_costs_no_run(moods, driver, cluster, tmp_path):
             client.close()
         told.append(outcome)
 
-    left = left_to_do(planned, {})
+    left = left_to_do(planned.jobs, {})
     run_on_cluster(left, done, scheduler=cluster.scheduler_address, fmus=planned.fmus)
     assert sorted(outcome.job.key for outcome in told) == sorted(job.key for job in left)
     assert all(outcome.ok for outcome in told)
@@ -79,9 +80,10 @@ def test_a_worker_that_is_killed_costs_no_run(moods, driver, cluster, tmp_path):
 @pytest.mark.exhaustive
 def test_a_cluster_that_dies_is_one_sentence_and_keeps_what_is_finished(moods, driver, capfd, tmp_path):  # noqa: F811
     from orchestrator.errors import ResultsError
-    from orchestrator.sweeps.cluster import run_on_cluster
+    from orchestrator.experiments.cluster import run_on_cluster
 
-    planned = plan_sweep(load_sweep(moods(1, 2, 3, 4, 5, 6)), tmp_path / "runs", driver)
+    experiment = load_experiment(moods(1, 2, 3, 4, 5, 6))
+    planned = plan_experiment(experiment, jobs_of(experiment, tmp_path, driver, keep=False))
     told, file = [], str(tmp_path / "scheduler.json")
     with _dask("scheduler", file, "--host", "127.0.0.1", "--port", "0") as scheduler, _dask("worker", file):
         with distributed.Client(scheduler_file=file, set_as_default=False) as client:
@@ -93,8 +95,8 @@ def test_a_cluster_that_dies_is_one_sentence_and_keeps_what_is_finished(moods, d
             told.append(logging.getLogger("distributed.client").isEnabledFor(logging.ERROR))
 
         with pytest.raises(ResultsError, match="the cluster was lost; what it had finished is kept"):
-            run_on_cluster(left_to_do(planned, {}), done, scheduler=address, fmus=planned.fmus)
-    assert 1 <= len(told) < len(planned.runs)
+            run_on_cluster(left_to_do(planned.jobs, {}), done, scheduler=address, fmus=planned.fmus)
+    assert 1 <= len(told) < len(planned.jobs)
     assert not any(told)  # Dask would log tracebacks
     assert "Traceback" not in capfd.readouterr().err
 
@@ -117,7 +119,7 @@ def _dask(what, file, *options):
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense"])
 def test_a_scheduler_that_does_not_answer_is_one_sentence(address, moods, yawbench, tmp_path, monkeypatch):  # noqa: F811
-    monkeypatch.setattr("orchestrator.sweeps.cluster.TIMEOUT", 0.5)
+    monkeypatch.setattr("orchestrator.experiments.cluster.TIMEOUT", 0.5)
     status, _, err = yawbench(moods(10), "out", "--scheduler", address)
     assert status == 2
     assert f"--scheduler {address}: no Dask scheduler answers there within 0.5 s" in err.splitlines()[-1]
@@ -133,7 +135,7 @@ def test_a_scheduler_without_workers_is_one_sentence(moods, yawbench, tmp_path):
 
 
 def test_workers_of_another_version_are_refused(moods, yawbench, cluster, monkeypatch):  # noqa: F811
-    from orchestrator.sweeps import cluster as module
+    from orchestrator.experiments import cluster as module
 
     theirs = module.versions()
     ours = {**theirs, "yawbench": "99.0"}
@@ -162,7 +164,7 @@ def test_a_worker_that_begins_anew_is_not_taken_for_one_without_this_program():
 
 def test_without_its_package_the_option_says_how_to_get_it(moods, driver, capsys, tmp_path, monkeypatch):  # noqa: F811
     monkeypatch.setitem(sys.modules, "distributed", None)
-    monkeypatch.delitem(sys.modules, "orchestrator.sweeps.cluster", raising=False)
+    monkeypatch.delitem(sys.modules, "orchestrator.experiments.cluster", raising=False)
     arguments = ["--fmus", str(driver), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:9"]
     with pytest.raises(SystemExit) as end:
         main(["sweep", str(moods(10)), *arguments])

@@ -9,14 +9,14 @@ import pyarrow.parquet as pq
 import pytest
 
 from orchestrator.errors import ResultsError
-from orchestrator.studies.jobs import Job
-from orchestrator.sweeps.figures import draw
-from orchestrator.sweeps.journal import Record
-from orchestrator.sweeps.limits import limit_table, limits_of
-from orchestrator.sweeps.metric_drawing import boundary, edges
-from orchestrator.sweeps.planning import Planned, PlannedRun
-from orchestrator.sweeps.sweep_file import load_sweep
-from orchestrator.sweeps.table import Swept, write_table
+from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.figures import draw_over_axes
+from orchestrator.experiments.findings import Findings
+from orchestrator.experiments.jobs import Job, Record
+from orchestrator.experiments.limits import limit_table, limits_of
+from orchestrator.experiments.metric_drawing import boundary, edges
+from orchestrator.experiments.planning import Planned
+from orchestrator.experiments.table import write_table
 
 from .fakes import Clock, make_plan
 
@@ -59,24 +59,23 @@ def swept(tmp_path):
 
     def make(value=degrees):
         (tmp_path / "sweep.yaml").write_text(SWEEP)
-        sweep = load_sweep(tmp_path / "sweep.yaml")
+        sweep = load_experiment(tmp_path / "sweep.yaml")
         plan = make_plan({"plant": Clock(sideslip=math.sin)})
-        runs, records = [], {}
+        jobs, records = [], []
         for number, point in enumerate(sweep.points):
-            key = f"{number:032}"
-            runs.append(PlannedRun(number, point, Job("", tmp_path, tmp_path), plan, key))
+            jobs.append(Job("", tmp_path, tmp_path, plan=plan, key=f"{number:032}"))
             found = value(*(level.value for level in point))
             values = {} if found is None else {"sideslip": (math.radians(found), "rad")}
-            records[key] = Record(values, () if values else ("plant: it failed",))
+            records.append(Record(values, () if values else ("plant: it failed",)))
         units = {"friction": "1", "speed": "m/s"}
-        return Swept(Planned(sweep, runs, units, {"sideslip": "rad"}, {}), records)
+        return Findings(sweep, records, {}, Planned(sweep, jobs, units, {"sideslip": "rad"}, {}))
 
     return make
 
 
 def figure(swept, name):
-    specs = {spec.name: spec for spec in swept.planned.sweep.spec.figures}
-    return draw(swept, specs[name])
+    specs = {spec.name: spec for spec in swept.spec.figures}
+    return draw_over_axes(swept, specs[name])
 
 
 def legend(drawn):
@@ -86,7 +85,7 @@ def legend(drawn):
 def test_a_limit_is_the_largest_value_that_holds_with_all_below_it(swept):
     found = {
         (limit.others["friction"].value, limit.others["control"].value): (limit.largest, limit.beyond)
-        for limit in limits_of(swept(), swept().planned.sweep.spec.limits["stable"])
+        for limit in limits_of(swept(), swept().spec.limits["stable"])
     }
     assert found == {
         (0.2, "a"): (36.0, 72.0),
@@ -100,7 +99,7 @@ def test_a_limit_is_the_largest_value_that_holds_with_all_below_it(swept):
 
 def test_a_value_that_holds_again_further_up_does_not_count(swept):
     again = swept(lambda friction, speed, control: 50.0 if speed == 72.0 else 1.0)
-    assert {limit.largest for limit in limits_of(again, again.planned.sweep.spec.limits["stable"])} == {36.0}
+    assert {limit.largest for limit in limits_of(again, again.spec.limits["stable"])} == {36.0}
 
 
 def test_the_table_of_a_limit_says_where_a_run_failed_and_where_nothing_ends(swept):
@@ -166,8 +165,8 @@ def test_a_metric_that_no_run_gives_cannot_be_drawn(swept):
 def test_equal_sweeps_give_equal_tables_to_the_byte(swept, tmp_path):
     for name in ("one", "other"):
         write_table(swept(), tmp_path / name)
-    assert (tmp_path / "one").read_bytes() == (tmp_path / "other").read_bytes()
-    table = pq.read_table(tmp_path / "one")
+    assert (tmp_path / "one/table.parquet").read_bytes() == (tmp_path / "other/table.parquet").read_bytes()
+    table = pq.read_table(tmp_path / "one/table.parquet")
     assert table["speed"].to_pylist()[:4] == [10.0, 10.0, 20.0, 20.0]
     assert table["sideslip"].null_count == 1
     assert [why for why in table["reason"].to_pylist() if why] == ["plant: it failed"]

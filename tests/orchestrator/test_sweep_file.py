@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.stats import qmc
 
 from fmus.build import build_all
 from orchestrator.errors import ScenarioError
-from orchestrator.sweeps.planning import plan_sweep
-from orchestrator.sweeps.sweep_file import load_sweep
+from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.planning import jobs_of, plan_experiment
 from tests.changed import changed
+
+
+def planned_of(experiment, fmus):
+    """Return an experiment with all cases planned."""
+    return plan_experiment(experiment, jobs_of(experiment, Path("runs"), fmus))
+
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
 
@@ -59,7 +67,7 @@ def sweep(tmp_path):
             assert old in text
             text = text.replace(old, new)
         (tmp_path / "sweep.yaml").write_text(text)
-        return load_sweep(tmp_path / "sweep.yaml")
+        return load_experiment(tmp_path / "sweep.yaml")
 
     return make
 
@@ -98,7 +106,7 @@ HYPERCUBE = """
 title: A cube
 scenario: half.yaml
 design: latin_hypercube
-runs: 12
+points: 12
 seed: {seed}
 axes:
   amplitude: {{vary: driver.amplitude, from: 0, to: 0.06}}
@@ -135,9 +143,9 @@ def test_plans_hold_what_the_axes_say(sweep, fmus, tmp_path):
         "  both: {vary: [driver.amplitude, driver.start_time], values: [0.01, 0.05]}\n"
         "  fmu: {vary: controller, values: ['controller_off', 'controller_fuzzy_sideslip:moment_range=500']}",
     )
-    planned = plan_sweep(sweep(text=text), tmp_path / "runs", fmus)
-    assert len(planned.runs) == 16
-    units = [{unit.name: unit for unit in run.plan.units} for run in planned.runs]
+    planned = planned_of(sweep(text=text), fmus)
+    assert len(planned.jobs) == 16
+    units = [{unit.name: unit for unit in run.plan.units} for run in planned.jobs]
     assert [unit["reference"].constants["velocity_x"] for unit in units] == [10.0] * 8 + [20.0] * 8
     assert {(u["driver"].parameters["amplitude"], u["driver"].parameters["start_time"]) for u in units} == {
         (0.01, 0.01), (0.05, 0.05),
@@ -145,8 +153,8 @@ def test_plans_hold_what_the_axes_say(sweep, fmus, tmp_path):
     assert [unit["reference"].parameters["mass"] for unit in units[:2]] == [1100, 1500]
     assert [unit["controller"].parameters.get("moment_range") for unit in units[:4]] == [None, None, 500, 500]
     assert planned.units == {"amplitude": "m/s", "both": "rad"}
-    assert planned.number("amplitude", planned.runs[0].point[0]) == 10.0
-    assert len({run.key for run in planned.runs}) == 16
+    assert planned.number("amplitude", planned.experiment.points[0][0]) == 10.0
+    assert len({run.key for run in planned.jobs}) == 16
 
 
 def test_steps_and_algorithms_can_be_varied(sweep, fmus, tmp_path):
@@ -154,12 +162,12 @@ def test_steps_and_algorithms_can_be_varied(sweep, fmus, tmp_path):
         (AMPLITUDE, "{vary: step_size, values: [10, 5], unit: ms}"),
         (CONTROL, "{vary: algorithm, values: [jacobi, extrapolated]}"),
     )
-    planned = plan_sweep(loaded, tmp_path / "runs", fmus)
-    assert [(float(run.plan.step), run.plan.algorithm) for run in planned.runs] == [
+    planned = planned_of(loaded, fmus)
+    assert [(float(run.plan.step), run.plan.algorithm) for run in planned.jobs] == [
         (0.01, "jacobi"), (0.01, "extrapolated"), (0.005, "jacobi"), (0.005, "extrapolated"),
     ]  # fmt: skip
     assert planned.units == {"amplitude": "s"}
-    assert planned.number("amplitude", planned.runs[-1].point[0]) == 0.005
+    assert planned.number("amplitude", planned.experiment.points[-1][0]) == 0.005
 
 
 def test_a_variant_changes_several_things_at_once(sweep, fmus, tmp_path):
@@ -169,8 +177,7 @@ def test_a_variant_changes_several_things_at_once(sweep, fmus, tmp_path):
     )
     loaded = sweep((AMPLITUDE, "{vary: driver.frequency, values: [1, 2]}"), (CONTROL, variants))
     first, second = (
-        {unit.name: unit for unit in run.plan.units}
-        for run in plan_sweep(loaded, tmp_path / "runs", fmus).runs[:2]
+        {unit.name: unit for unit in run.plan.units} for run in planned_of(loaded, fmus).jobs[:2]
     )
     assert first["controller"].fmu.name == "controller_fuzzy_sideslip"
     assert "amplitude" not in first["driver"].parameters
@@ -181,7 +188,7 @@ def test_a_variant_changes_several_things_at_once(sweep, fmus, tmp_path):
 
 def test_the_key_of_a_run_changes_with_whatever_its_metrics_follow_from(sweep, fmus, tmp_path):
     def key(*changes):
-        return plan_sweep(sweep(*changes), tmp_path / "runs", fmus).runs[0].key
+        return planned_of(sweep(*changes), fmus).jobs[0].key
 
     same = key()
     assert key(("title: Half a sweep", "title: Another")) == same
@@ -217,8 +224,8 @@ REFUSED = [
     ("axes:", "set: {driver.amplitude: 1}\naxes:", "driver.amplitude is given by set or swap already"),
     ("  control:", "  moment:", "'moment' is the name of another column of the table"),
     ("  control:", "  status:", "'status' is the name of another column of the table"),
-    ("axes:", "seed: 3\naxes:", "runs and seed belong to a latin_hypercube; the design is grid"),
-    ("axes:", "design: latin_hypercube\naxes:", "a latin_hypercube needs runs and seed"),
+    ("axes:", "seed: 3\naxes:", "points and seed belong to a latin_hypercube; the design is grid"),
+    ("axes:", "design: latin_hypercube\naxes:", "a latin_hypercube needs points and seed"),
     ("axes:", "design: list\naxes:", "must have equally many values (amplitude has 3, control has 2)"),
     ("axes:", "desing: list\naxes:", "desing: unknown key; did you mean 'design'?"),
     ("peak(yaw_moment)", "peek(yaw_moment)", "there is no measure 'peek'"),
@@ -254,7 +261,7 @@ FIGURES_REFUSED = [
     ("x: control}", "x: amplitude}", "'amplitude' is what the limit 'gentle' is of"),
     ("of: amplitude", "of: control", "the values of 'control' are no numbers"),
     ("at_most: 100 N.m", "at_most: 100 N.m, above: 1", "needs exactly one of above, at_least, below"),
-    ("at_most: 100 N.m", "at_most: many", "must be a number, or a number with its unit"),
+    ("at_most: 100 N.m", "at_most: many", "must be a number, a number with its unit"),
     ("kind: limit, limit: gentle", "kind: limit, limit: gentle, metric: moment", "needs limit and no metric"),
     ("lines: control}", "lines: control, only: {amplitude: [0.07]}}", "has no value 0.07; did you"),
 ]  # fmt: skip
@@ -291,7 +298,7 @@ def test_what_no_run_could_start_with_is_said_once_and_not_once_per_run(
 ):
     loaded = sweep((old, new))
     with pytest.raises(ScenarioError) as error:
-        plan_sweep(loaded, tmp_path / "runs", fmus)
+        planned_of(loaded, fmus)
     assert sentence in error.value.problems[0]
     assert len(error.value.problems) == 1
 
@@ -301,26 +308,24 @@ def test_a_bound_in_a_unit_that_its_metric_does_not_have_is_refused_before_any_r
     with pytest.raises(
         ScenarioError, match=r"limits\.gentle\.holds_if\[0\]: '100 km/h' is not a value in N\.m"
     ):
-        plan_sweep(loaded, tmp_path / "runs", fmus)
+        planned_of(loaded, fmus)
 
 
 def test_options_change_all_runs_as_the_file_would(sweep, tmp_path, fmus):
     path = sweep(("axes:\n", "set: {driver.frequency: 1}\naxes:\n")).path
     settings = ["driver.frequency=3 Hz", "stop_time=0.2", "vehicle.mass=1300", "driver.start_time=0.1"]
-    planned = plan_sweep(load_sweep(path, changes=changed(settings=settings)), tmp_path / "runs", fmus)
+    planned = planned_of(load_experiment(path, changes=changed(settings=settings)), fmus)
     written = sweep(
         ("axes:\n", "set: {driver.frequency: 3 Hz, vehicle.mass: 1300, driver.start_time: 0.1}\naxes:\n"),
         ("axes:\n", "stop_time: 0.2\naxes:\n"),
     )
-    assert [run.key for run in planned.runs] == [
-        run.key for run in plan_sweep(written, tmp_path / "runs", fmus).runs
-    ]
-    swapped = load_sweep(
+    assert [run.key for run in planned.jobs] == [run.key for run in planned_of(written, fmus).jobs]
+    swapped = load_experiment(
         sweep(("  control: {vary: controller, values: {controller_off: no control, "
                "controller_fuzzy_sideslip: fuzzy}}\n", "")).path,
         changes=changed([f"controller={fmus / 'controller_off.fmu'}"]),
     )  # fmt: skip
-    for run in plan_sweep(swapped, tmp_path / "runs", fmus).runs:
+    for run in planned_of(swapped, fmus).jobs:
         assert {unit.name: unit.fmu.name for unit in run.plan.units}["controller"] == "controller_off"
 
 
@@ -337,5 +342,5 @@ def test_options_change_all_runs_as_the_file_would(sweep, tmp_path, fmus):
 def test_options_that_are_wrong_are_said(options, sentence, sweep):
     path = sweep().path
     with pytest.raises(ScenarioError) as error:
-        load_sweep(path, changes=changed(**options))
+        load_experiment(path, changes=changed(**options))
     assert sentence in str(error.value)

@@ -10,13 +10,13 @@ import pytest
 
 from fmus.build import build_all
 from orchestrator.cli import main
+from orchestrator.experiments import figures as sweep_figures
 from orchestrator.figures import plots
 from orchestrator.figures.panels import Run
 from orchestrator.figures.plots import draw
 from orchestrator.figures.style import save
 from orchestrator.plan import Change
 from orchestrator.results.read import load_results
-from orchestrator.sweeps import figures as sweep_figures
 from orchestrator.titles import changed, changed_each, changes_in, with_changes
 
 from .recorded import car
@@ -107,11 +107,11 @@ def test_everything_made_of_a_run_names_all_that_was_changed(yawbench, tmp_path,
     swaps = ("--swap", "controller=controller_off,controller_fuzzy_feedback", "--jobs", "1")
     shown["comparison"] = flat(yawbench("compare", SCENARIO, *SET, *swaps, "--out", "c")[0])
     shown["overlay"] = drawn[plots.__name__]
-    shown["page"] = unescape((tmp_path / "c/compare.html").read_text())
-    shown["table"] = (tmp_path / "c/compare.md").read_text()
+    shown["page"] = unescape((tmp_path / "c/report.html").read_text())
     (tmp_path / "sweep.yaml").write_text(SWEEP)
     out, said = yawbench("sweep", "sweep.yaml", *SET, "--jobs", "1", "--out", "s")
-    shown |= {"limits": flat(out), "messages": flat(said), "sweep": (tmp_path / "s/sweep.md").read_text()}
+    shown |= {"limits": flat(out), "messages": flat(said)}
+    shown["sweep"] = unescape((tmp_path / "s/report.html").read_text())
     steps = ("--halvings", "2", "--signal", "plant.velocity_x", "--out", "h")
     shown["convergence"] = flat(yawbench("converge", SCENARIO, *SET, *steps)[0])
     for name, text in shown.items():
@@ -120,17 +120,18 @@ def test_everything_made_of_a_run_names_all_that_was_changed(yawbench, tmp_path,
 
 @pytest.mark.exhaustive
 def test_the_figure_of_a_sweep_names_what_options_changed(yawbench, fmus, tmp_path):
-    from orchestrator.sweeps.journal import Record
-    from orchestrator.sweeps.planning import plan_sweep
-    from orchestrator.sweeps.sweep_file import load_sweep
-    from orchestrator.sweeps.table import Swept
+
+    from orchestrator.experiments.experiment import load_experiment
+    from orchestrator.experiments.findings import judge_records
+    from orchestrator.experiments.jobs import Record
+    from orchestrator.experiments.planning import jobs_of, plan_experiment
     from tests.changed import changed as given
 
     (tmp_path / "sweep.yaml").write_text(SWEEP)
-    sweep = load_sweep(tmp_path / "sweep.yaml", changes=given(settings=["inputs.friction*=0.3"]))
-    planned = plan_sweep(sweep, tmp_path / "runs", fmus)
-    records = {run.key: Record({"sideslip": (0.1, "rad")}, ()) for run in planned.runs}
-    figure = sweep_figures.draw(Swept(planned, records), sweep.spec.figures[0])
+    sweep = load_experiment(tmp_path / "sweep.yaml", changes=given(settings=["inputs.friction*=0.3"]))
+    planned = plan_experiment(sweep, jobs_of(sweep, tmp_path, fmus))
+    records = {job.key: Record({"sideslip": (0.1, "rad")}) for job in planned.jobs}
+    figure = sweep_figures.draw_over_axes(judge_records(planned, records), sweep.spec.figures[0])
     assert "changed: inputs.friction* = 0.3" in texts(figure)
 
 

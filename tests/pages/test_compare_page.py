@@ -33,7 +33,7 @@ def page(tmp_path_factory) -> Path:
             "--fmus", str(folder / "fmus"), "--out", str(folder / "out"), "--format", "parquet",
         ])  # fmt: skip
     assert not ended.value.code
-    return folder / "out" / "compare.html"
+    return folder / "out" / "report.html"
 
 
 @pytest.fixture(scope="module")
@@ -58,16 +58,16 @@ def test_metrics_stand_side_by_side_with_their_difference_from_the_first(tree):
 
 
 def test_it_tells_where_the_runs_part(tree):
-    headings = [text for text in texts(tree, "h3") if " against " in text]
+    headings = [text for text in texts(tree, "h4") if " against " in text]
     assert len(headings) == 2
     said = tree.text_content()
     assert "The first to differ is controller.yaw_moment, at 0.505 s" in " ".join(said.split())
 
 
 def test_it_shows_the_system_its_parameters_and_how_to_repeat_it(tree):
-    assert texts(tree, "h2") == [
-        "Overlays", "Seen from above", "What the runs come to", "Where the runs part", "The system",
-        "To repeat this",
+    assert [text.partition(":")[0] for text in texts(tree, "h3")] == [
+        "What the runs come to", "Where the runs part", "The system", "Figures", "Seen from above",
+        "Parameters, and where they come from", "To repeat this",
     ]  # fmt: skip
     assert len(tree.cssselect("svg.diagonal, svg.stack")) == 2
     assert "controller_fuzzy_feedback" in texts(tree, "svg.diagonal text")

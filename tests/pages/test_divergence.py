@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from orchestrator.metrics.run_metrics import Value
-from orchestrator.pages.compare_page import difference, parting_summary
+from orchestrator.pages.comparison import difference, parting_summary
 from orchestrator.pages.divergence import SAME, divergence, targets_of
 from tests.orchestrator.recorded import car, results
 

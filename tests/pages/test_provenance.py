@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from fmus.build import build_all
-from orchestrator.pages.freshness import staleness
 from orchestrator.pages.provenance import (
     CHOSEN,
     ERRATUM,
@@ -22,6 +21,7 @@ from orchestrator.pages.provenance import (
     said_in,
 )
 from orchestrator.results.digest import checksum
+from orchestrator.results.freshness import staleness
 from orchestrator.results.run_record import run_record
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan

@@ -15,8 +15,8 @@ from lxml import html
 from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError
+from orchestrator.experiments.experiment import load_experiment
 from orchestrator.pages.report import found_studies
-from orchestrator.studies.study_file import load_study
 
 from .browser import DESK, PHONE
 from .flaws import flaws, open_all
@@ -100,7 +100,7 @@ def paper(tmp_path_factory, fmus):
         folder=folder,
         page=page,
         tree=html.fromstring(page.read_text(encoding="utf-8")),
-        record=json.loads((folder / "study.json").read_text(encoding="utf-8")),
+        record=json.loads((folder / "experiment.json").read_text(encoding="utf-8")),
     )
 
 
@@ -139,7 +139,7 @@ def test_every_figure_of_the_study_is_in_the_page_and_beside_it(paper):
 
 
 def test_the_panels_stand_in_the_order_of_the_study(paper):
-    study = load_study(ROOT / "scenarios" / "fuzzy_feedback" / "study.yaml")
+    study = load_experiment(ROOT / "scenarios" / "fuzzy_feedback" / "study.yaml")
     alts = [image.get("alt") for image in paper.tree.cssselect("figure .panel img")]
     assert len(alts) == sum(len(figure.panels) for figure in study.spec.figures)
     assert [alt.split(" ")[0] for alt in alts[:6]] == ["Steer", "Yaw", "Sideslip", "Yaw", "Lateral", "Path"]
@@ -195,15 +195,15 @@ def test_only_missing_or_stale_runs_are_made(report, half):
     page = Path("results/half/study/report.html")
     status, said = report()
     assert status == 0
-    assert "2 runs to make, 0 with good results" in said
-    assert said.splitlines()[-1].startswith(f"The report: {page}")
-    assert "0 runs to make, 2 with good results" in report()[1]
+    assert ": 2 runs\n" in said
+    assert said.splitlines()[-1].startswith(f"The page: {page}")
+    assert ": 2 runs, all finished before" in report()[1]
     text = (half / "study.yaml").read_text()
     (half / "study.yaml").write_text(text.replace("amplitude: [0.02, 0.05]", "amplitude: [0.02, 0.05, 0.1]"))
-    assert "1 run to make, 2 with good results" in report()[1]
+    assert ": 3 runs, 2 finished before" in report()[1]
     (half / "half.yaml").write_text(SCENARIO.replace("velocity_x: 20", "velocity_x: 25"))
-    assert "3 runs to make, 0 with good results" in report()[1]
-    assert "3 runs to make" in report("--again")[1]
+    assert ": 3 runs\n" in report()[1]
+    assert ": 3 runs\n" in report("--again")[1]
 
 
 def test_stale_results_are_shown_as_such_where_nothing_may_run(report, half):
@@ -233,7 +233,7 @@ def test_several_studies_make_one_page_with_an_overview(report, half):
     (other / "study.yaml").write_text(HALF.replace("Half a paper", "A paper before"))
     (other / "extra.yaml").write_text(HALF.replace("Half a paper", "A paper before, more"))
     status, said = report()
-    assert (status, said.splitlines()[-1].partition(" (")[0]) == (0, "The report: results/report.html")
+    assert (status, said.splitlines()[-1].partition(" (")[0]) == (0, "The page: results/report.html")
     tree = html.fromstring(Path("results/report.html").read_text(encoding="utf-8"))
     titles = ["A paper before", "A paper before, more", "Half a paper"]
     assert texts(tree, ".chapter > h2") == titles
@@ -261,4 +261,4 @@ def test_without_any_study_it_says_where_it_looked(tmp_path):
 
 
 def test_two_wishes_that_exclude_each_other_are_refused(report, half):
-    assert report("--again", "--no-run") == (2, "--again and --no-run contradict each other\n")
+    assert report("--again", "--no-run") == (2, "--fresh and --no-run contradict each other\n")

@@ -20,13 +20,13 @@ DEGREE = 0.017453292519943295
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    """What study.json says."""
+    """What experiment.json says."""
     folder = tmp_path_factory.mktemp("paper_d")
     build_all(folder / "fmus", components=UNITS)
     with pytest.raises(SystemExit) as exit_:
         main(["study", str(STUDY), "--out", str(folder / "out"), "--fmus", str(folder / "fmus")])
     assert not exit_.value.code
-    return json.loads((folder / "out" / "study.json").read_text())
+    return json.loads((folder / "out" / "experiment.json").read_text())
 
 
 @pytest.fixture

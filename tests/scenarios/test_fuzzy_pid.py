@@ -11,9 +11,10 @@ import pytest
 
 from fmus.build import build_all
 from orchestrator.cli import main
+from orchestrator.experiments.jobs import Job
+from orchestrator.experiments.workers import execute
 from orchestrator.figures.display import shown
 from orchestrator.results.read import load_results
-from orchestrator.studies.jobs import Job, execute
 from tests.changed import changed
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "fuzzy_pid"
@@ -43,10 +44,10 @@ def yawbench(*arguments):
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory, fmus):
-    """What study.json says, and where it stands."""
+    """What experiment.json says, and where it stands."""
     folder = tmp_path_factory.mktemp("study")
     assert not yawbench("study", FOLDER / "study.yaml", "--out", folder, "--fmus", fmus)
-    return json.loads((folder / "study.json").read_text()) | {"folder": folder}
+    return json.loads((folder / "experiment.json").read_text()) | {"folder": folder}
 
 
 @pytest.fixture

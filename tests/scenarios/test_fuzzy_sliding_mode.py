@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -10,9 +11,10 @@ import pytest
 
 from fmus.build import build_all
 from orchestrator.cli import main
+from orchestrator.experiments.jobs import Job
+from orchestrator.experiments.workers import execute
 from orchestrator.figures.display import shown
 from orchestrator.results.read import load_results
-from orchestrator.studies.jobs import Job, execute
 from tests.changed import changed
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "fuzzy_sliding_mode"
@@ -36,11 +38,11 @@ def fmus(tmp_path_factory):
 
 
 def judged(name, folder, fmus):
-    """Run a study and return what its study.json says, with its folder."""
+    """Run a study and return what its experiment.json says, with its folder."""
     with pytest.raises(SystemExit) as exit_:
         main(["study", str(FOLDER / f"{name}.yaml"), "--out", str(folder), "--fmus", str(fmus)])
     assert not exit_.value.code
-    return json.loads((folder / "study.json").read_text()) | {"folder": folder}
+    return json.loads((folder / "experiment.json").read_text()) | {"folder": folder}
 
 
 @pytest.fixture(scope="module")
@@ -208,10 +210,8 @@ def test_compare_shows_the_four_controllers(fmus, tmp_path):
             "controller_fuzzy_sliding_mode",
         ])  # fmt: skip
     assert not exit_.value.code
-    head = next(
-        line for line in (tmp_path / "compare.md").read_text().splitlines() if line.startswith("| metric")
-    )
-    assert [cell.strip() for cell in head.strip("|").split("|")][2:] == [
-        "controller_off", "controller_sliding_mode", "controller_sliding_mode switching=saturation",
+    rows = csv.DictReader((tmp_path / "table.csv").open())
+    assert [row["run"] for row in rows] == [
+        "controller_off", "controller_sliding_mode", "controller_sliding_mode_switching=saturation",
         "controller_fuzzy_sliding_mode",
     ]  # fmt: skip

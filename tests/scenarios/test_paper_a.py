@@ -9,6 +9,9 @@ import pytest
 
 from fmus.build import build_all
 from orchestrator.cli import main
+from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.findings import judge_results
+from orchestrator.experiments.verdicts import run_tables
 
 STUDY = Path(__file__).parents[2] / "scenarios" / "fnn_sideslip" / "study.yaml"
 UNITS = (
@@ -19,13 +22,13 @@ UNITS = (
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    """What study.json says, with the folder of the study."""
+    """What experiment.json says, with the folder of the study."""
     folder = tmp_path_factory.mktemp("paper_a")
     build_all(folder / "fmus", components=UNITS)
     with pytest.raises(SystemExit) as exit_:
         main(["study", str(STUDY), "--out", str(folder / "out"), "--fmus", str(folder / "fmus")])
     assert not exit_.value.code
-    return json.loads((folder / "out" / "study.json").read_text()) | {"folder": folder / "out"}
+    return json.loads((folder / "out" / "experiment.json").read_text()) | {"folder": folder / "out"}
 
 
 @pytest.fixture
@@ -85,9 +88,11 @@ def rows(text):
 
 def test_the_readme_tells_what_the_study_found(study, metric):
     readme = (STUDY.parents[2] / "README.md").read_text(encoding="utf-8")
-    found = rows((study["folder"] / "study.md").read_text(encoding="utf-8"))
+    experiment = load_experiment(STUDY)
+    first, *_ = run_tables(judge_results(experiment, study["folder"]))
     told = rows(readme)
     assert len(told) == 9
+    found = [[cell.removesuffix(" †") for cell in row] for row in first.text()]
     assert told == [[row[0], row[1], row[2].partition(" (")[0], row[3], row[-1]] for row in found]
     prose = " ".join(readme.partition("What comes out")[2].partition("###")[0].split())
     learning, frozen = (

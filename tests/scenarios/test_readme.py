@@ -52,7 +52,7 @@ def test_the_controller_of_the_readme_runs_and_follows_the_yaw_rate(tmp_path, ca
             "--fmus", str(tmp_path), "--out", str(tmp_path / "out"),
         ])  # fmt: skip
     assert not exit_.value.code
-    runs = {row["run"]: row for row in csv.DictReader((tmp_path / "out" / "metrics.csv").open())}
+    runs = {row["run"]: row for row in csv.DictReader((tmp_path / "out" / "table.csv").open())}
     errors = [float(runs[f"controller_{n}"]["rms_error(yaw_rate) [rad/s]"]) for n in ("yaw_rate", "off")]
     assert errors[0] < 0.5 * errors[1]
 

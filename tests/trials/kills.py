@@ -43,7 +43,7 @@ COMMANDS = {
     "sweep": ("sweep", "sweep.yaml", "--out", "out"),
     "build": ("build", "--out", "out", *UNITS),
 }
-SAME = ("*.csv", "*.parquet", "*.fmu", "study.json")
+SAME = ("*.csv", "*.parquet", "*.fmu", "experiment.json")
 """Files that are the same to the last byte, whatever happened before; others hold times and versions."""
 LITTER = (PART, NEW, LOCK_FILE, ".tmp")
 """What the names of files end in that a command which has ended may not leave."""

@@ -134,19 +134,18 @@ def case_of(group: str, number: int, seed: int, box: Sandbox) -> tuple[Path, str
 
 def load(file: Path, kind: str, once: Any) -> None:
     """Read a file as the commands do, up to where runs would begin."""
+    from orchestrator.experiments.experiment import load_experiment
     from orchestrator.metrics.run_metrics import evaluate_all
     from orchestrator.plan import Change
     from orchestrator.results.read import load_results
     from orchestrator.scenario.load import load_scenario
-    from orchestrator.studies.study_file import load_study
-    from orchestrator.sweeps.sweep_file import load_sweep
     from orchestrator.wiring.make_plan import make_plan
 
     fmus, opener = ROOT / "fmus", once.opener
     if kind == "study":
-        load_study(file)
+        load_experiment(file)
     elif kind == "sweep":
-        assert load_sweep(file).points
+        assert load_experiment(file).points
     elif kind == "results":
         evaluate_all(load_results(file))
     elif kind == "ssp":
@@ -194,7 +193,7 @@ def work(pipe: Connection, group: str, numbers: list[int], seed: int, folder: Pa
     os.environ.update(box.environment())
     tempfile.tempdir = None
     os.chdir(box.work)
-    from orchestrator.studies.jobs import Once
+    from orchestrator.experiments.jobs import Once
 
     once = Once()
     sys.unraisablehook = lambda _: None  # as in the command line
@@ -268,9 +267,8 @@ def through_loaders(
 
 def command_of(number: int, seed: int, box: Sandbox) -> tuple[list[str], Path]:
     """Return a command line for a case, and its file."""
+    from orchestrator.experiments.experiment import load_experiment
     from orchestrator.scenario.load import load_scenario
-    from orchestrator.studies.study_file import load_study
-    from orchestrator.sweeps.sweep_file import load_sweep
 
     r = random.Random(f"{seed}/command/{number}")
     file, kind = case_of("commands", number, seed, box)
@@ -304,12 +302,12 @@ def command_of(number: int, seed: int, box: Sandbox) -> tuple[list[str], Path]:
         elif kind == "study":
             few = False
         else:
-            few = len(load_sweep(file).points) <= 2
+            few = len(load_experiment(file).points) <= 2
     except Exception:
         few = True  # what is refused takes no time
     with contextlib.suppress(Exception):
         if kind == "study":
-            load_study(file)
+            load_experiment(file)
     if kind == "study":
         return ["study", str(file), "--no-run", *fmus], file
     if kind == "sweep":
