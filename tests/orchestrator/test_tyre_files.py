@@ -13,10 +13,10 @@ from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError, WiringError
 from orchestrator.interop.ssp_write import write_ssp
+from orchestrator.results.key import key_of
 from orchestrator.results.naming import default_folder
 from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
-from orchestrator.sweeps.planning import run_key
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 
@@ -110,11 +110,11 @@ def test_another_file_is_another_run(folder, fmus, monkeypatch):
     assert plain.changes == ()
     assert [(c.place, Path(str(c.value)).name) for c in rear.changes] == [("tyres.rear", "stiff.tir")]
     assert (parameters(rear)["pky1_front"], parameters(rear)["pky1_rear"]) == (-12.0, -17.0)
-    assert len({run_key(p, {}) for p in (plain, other, rear)}) == 3
+    assert len({key_of(p, {}) for p in (plain, other, rear)}) == 3
     assert len({default_folder(path, p.changes) for p in (plain, other, rear)}) == 3
     assert "stiff.tir" in default_folder(path, other.changes).name
     write(folder / "soft.tir", {"PKY1": "-12.5", "PKX1": "18.0"})
-    assert run_key(plan(path, fmus), {}) != run_key(plain, {})
+    assert key_of(plan(path, fmus), {}) != key_of(plain, {})
     assert plan(path, fmus, **{"tyres": "soft.tir"}).changes == ()  # as it stands
 
 
