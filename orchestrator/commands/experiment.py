@@ -67,10 +67,11 @@ def conduct(experiment: Experiment, folder: Path, wishes: Wishes, **of_jobs: Any
     )
     jobs = [replace(job, **of_jobs) for job in jobs]
     planned: Planned | None = None
+    build = wishes.build and not wishes.no_run
     with stoppable(folder):
         try:
             with bar("planning", len(jobs), quiet=True) as planning:
-                planned = plan_experiment(experiment, jobs, build=wishes.build, progress=planning)
+                planned = plan_experiment(experiment, jobs, build=build, progress=planning)
         except YawbenchError:
             if not wishes.no_run or experiment.spec.axes:
                 raise  # else scenarios or FMUs are not here: results can be judged without them

@@ -53,7 +53,8 @@ Fresh = Annotated[
     typer.Option("--fresh", "--again", help="Make all runs anew, those too that have been made already."),
 ]
 NoRun = Annotated[
-    bool, typer.Option("--no-run", help="Run nothing: judge and draw what stands in the results folder.")
+    bool,
+    typer.Option("--no-run", help="Run and build nothing: judge and draw what stands in the results folder."),
 ]
 Scheduler = Annotated[
     str | None,

@@ -157,7 +157,7 @@ class _Restarting:
 
 
 def test_a_worker_that_begins_anew_is_not_taken_for_one_without_this_program():
-    from orchestrator.sweeps.cluster import _check_workers
+    from orchestrator.experiments.cluster import _check_workers
 
     assert _check_workers(_Restarting(), "tcp://c") == 2
 

@@ -22,6 +22,7 @@ from orchestrator.pages.provenance import (
 )
 from orchestrator.results.digest import checksum
 from orchestrator.results.freshness import staleness
+from orchestrator.results.key import key_of
 from orchestrator.results.run_record import run_record
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
@@ -178,7 +179,7 @@ def recorded(plan, folder: Path, **changes) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "results.csv").write_text("time,x\n0.0,1.0\n0.1,2.0\n")
     record = run_record(plan, status="completed", started=datetime.now(timezone.utc))
-    record |= {"rows": 2, "checksum": checksum(folder / "results.csv")} | changes
+    record |= {"key": key_of(plan), "rows": 2, "checksum": checksum(folder / "results.csv")} | changes
     (folder / "run.json").write_text(json.dumps(record))
     return folder
 
@@ -201,11 +202,14 @@ def test_results_of_another_fmu_or_program_are_stale(folder, tmp_path):
     _, plan = planned(folder)
     record = json.loads((recorded(plan, tmp_path) / "run.json").read_text())
     record["fmus"]["driver"]["sha256"] = "0" * 64
-    assert staleness(plan, recorded(plan, tmp_path, fmus=record["fmus"])) == "driver: another driver_sine.fmu"
+    assert (
+        staleness(plan, recorded(plan, tmp_path, key="of it", fmus=record["fmus"]))
+        == "driver: another driver_sine.fmu"
+    )
     old = {**record["versions"], "numpy": "1.0"}
-    assert staleness(plan, recorded(plan, tmp_path, versions=old)).endswith("in place of 1.0")
+    assert staleness(plan, recorded(plan, tmp_path, key="of it", versions=old)).endswith("in place of 1.0")
     old = {**record["versions"], "orchestrator": "sources 0123456789ab"}
-    assert staleness(plan, recorded(plan, tmp_path, versions=old)) == (
+    assert staleness(plan, recorded(plan, tmp_path, key="of it", versions=old)) == (
         f"orchestrator {record['versions']['orchestrator']} in place of sources 0123456789ab"
     )
 
