@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .plan import Finding
 
-
 KEPT = "kept"
 """Kind of the problem that names the results of a run that failed."""
 

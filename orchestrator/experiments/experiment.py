@@ -104,7 +104,7 @@ class Experiment:
         return [self.runs[name] for name in dict.fromkeys(names)]
 
     def axis_of(self, place: str) -> tuple[str, str] | None:
-        """Return the axis and its place that a problem is about, by the change that it names; None: no axis."""
+        """Return the axis and its place that a problem is about, by the change that it names; None: none."""
         changes = itertools.chain.from_iterable(map(self._at, self.points))
         change = next((one for one in changes if str(one) == place), None)
         axes = self.spec.axes.items()
