@@ -151,7 +151,7 @@ def chapter_of(
     from ..experiments.execution import stale
     from ..experiments.workers import pool
     from ..pages.chapter import chapter
-    from ..results.formats import RUN_FILE
+    from ..results.folder import RUN_FILE
 
     jobs = findings.planned.jobs if findings.planned and not findings.spec.axes else []
     out_of_date = stale([job for job in jobs if (job.out / RUN_FILE).is_file()])

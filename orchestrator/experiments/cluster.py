@@ -30,8 +30,7 @@ from ..fmu.archive import open_fmu, read_archive
 from ..plan import Fmu, Plan
 from ..sources import OF_METRICS, sources_hash
 from ..wording import listed
-from .execution import Told
-from .jobs import Job, Outcome
+from .jobs import Job, Outcome, Told
 from .workers import execute
 
 TIMEOUT = 10.0

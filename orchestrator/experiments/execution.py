@@ -8,13 +8,11 @@ from pathlib import Path
 
 from ..errors import KEPT, ResultsError
 from ..results.freshness import staleness
-from .jobs import Job, Outcome, Record, read_back
+from .jobs import Job, Outcome, Record, Told, read_back
 from .journal import Journal
 from .planning import Planned
 from .workers import execute
 
-Told = Callable[[Outcome], None]
-"""Told of every run that is finished, once for each job."""
 Runner = Callable[[Sequence[Job], Told], object]
 """Makes runs: `here`, or on a cluster."""
 

@@ -95,6 +95,10 @@ class Outcome:
         return self.reason or read_back(self.job.out, self.value.id if isinstance(self.value, Made) else None)
 
 
+Told = Callable[[Outcome], None]
+"""Told of every run that is finished, once for each job."""
+
+
 class Once:
     """Files read and FMUs opened once for many plans; `build`: see `Opener`."""
 
