@@ -187,6 +187,8 @@ def _origin(scenario: Scenario, unit: Unit, name: str, comments: _Comments) -> O
         own = name in scenario.units[unit.name].parameters
         key: Key = ("units", unit.name, "parameters", name) if own else (_fact(scenario, name),)
         return _said(scenario, key, comments)
+    if any(origin == file.path.name for file in scenario.tyre_files.values()):
+        return Origin(LITERATURE, f"tyre property file {origin}")
     return VARIED_BY_STUDY
 
 

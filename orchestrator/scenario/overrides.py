@@ -59,7 +59,8 @@ def read_changes(swaps: Iterable[str] = (), settings: Iterable[str] = ()) -> tup
         place, equals, raw = (part.strip() for part in text.partition("="))
         holder, dot, name = place.partition(".")
         if equals and ((holder and dot and name) or place in (*OF_RUN, *FACTS, TYRES)):
-            changes.append(Change(place, yaml_lines.scalar(raw), "--set"))
+            value = os.path.abspath(raw) if holder == TYRES else yaml_lines.scalar(raw)
+            changes.append(Change(place, value, "--set"))
         else:
             sentence = f"write --set UNIT.PARAMETER=VALUE, or {listed((*OF_RUN, *FACTS), last='or')}=VALUE"
             problems.append(f"--set {text}: {sentence}")

@@ -17,6 +17,7 @@ from orchestrator.results.key import key_of
 from orchestrator.results.naming import default_folder
 from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
+from orchestrator.scenario.overrides import changes_of, read_changes
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 
@@ -118,6 +119,15 @@ def test_another_file_is_another_run(folder, fmus, monkeypatch):
     assert plan(path, fmus, **{"tyres": "soft.tir"}).changes == ()  # as it stands
 
 
+def test_files_of_options_are_found_from_here_and_those_of_studies_from_there(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    (option,) = read_changes(settings=["tyres.front=stiff.tir"])
+    assert option.value == str(folder / "stiff.tir")
+    (of_study,) = changes_of({}, {"tyres": "stiff.tir"}, Path("/studies"), "study")
+    assert of_study.value == str(Path("/studies/stiff.tir"))
+    assert changes_of({}, {"tyres": option.value}, Path("/studies"), "study")[0].value == option.value
+
+
 def test_a_run_remembers_the_files_with_their_hash_kind_and_warnings(folder, fmus, tmp_path):
     write(folder / "soft.tir", {"TYRESIDE": "UNKNOWN"})
     out = tmp_path / "out"
@@ -216,3 +226,15 @@ def test_aligning_moments_and_camber_come_by_connections(tmp_path):
         )
         peaks[name] = np.max(np.abs(load_results(out)["plant.yaw_rate"]))
     assert 0.002 < abs(peaks["both"] / peaks["none"] - 1.0) < 0.2
+
+
+def test_the_origin_of_a_coefficient_on_a_page_is_its_file(folder, fmus):
+    from orchestrator.pages.provenance import groups_of
+
+    loaded = load_scenario(scenario(folder))
+    groups = groups_of([(loaded, make_plan(loaded, fmus=fmus))])
+    (of_tyre,) = (group for group in groups if group.title.startswith("tyre:"))
+    row = of_tyre.parameters["pky1_front"]
+    assert row.given is not None
+    assert row.given.says == "tyre property file soft.tir"
+    assert not row.set_by_study
