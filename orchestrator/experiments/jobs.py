@@ -56,10 +56,21 @@ class Record:
     values: Measured
     problems: tuple[str, ...] = ()
     findings: tuple[str, ...] = ()  # kinds of what was remarkable in its course
+    ended: str | None = None  # why a unit has ended it early
 
     @property
     def ok(self) -> bool:
         return not self.problems
+
+    @property
+    def status(self) -> str:
+        """How the run ended, in one word or two."""
+        return ("ended early" if self.ended else "completed") if self.ok else "failed"
+
+    @property
+    def reason(self) -> str | None:
+        """Why it failed or ended early."""
+        return "; ".join(self.problems) or self.ended
 
 
 class Made(NamedTuple):
@@ -208,7 +219,7 @@ def measured(results: Results, metrics: Metrics) -> Record:
         short = results.ended and not window  # of a run that a unit has ended early it is another metric
         values[key] = None if value is None or short else (value.number, value.unit)
     kinds = dict.fromkeys(one.kind for one in findings_in(results.run) if one.time is not None)
-    return Record(values, findings=tuple(kinds))
+    return Record(values, findings=tuple(kinds), ended=results.ended)
 
 
 def read_back(folder: Path, run: str | None = None) -> Results | str:

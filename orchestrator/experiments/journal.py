@@ -90,7 +90,8 @@ class Journal:
         """
         if last:
             entry = {"key": key, "values": record.values, "problems": record.problems}
-            self._append(entry | ({"findings": record.findings} if record.findings else {}))
+            more = {"findings": record.findings, "ended": record.ended}
+            self._append(entry | {name: value for name, value in more.items() if value})
         self.records[key] = record
 
     def _append(self, entry: dict[str, Any]) -> None:
@@ -111,7 +112,8 @@ class Journal:
 
 def _record(entry: dict[str, Any]) -> tuple[str, Record]:
     values = {key: value and (float(value[0]), str(value[1])) for key, value in entry["values"].items()}
-    return str(entry["key"]), Record(values, tuple(entry["problems"]), tuple(entry.get("findings", ())))
+    problems, findings = tuple(entry["problems"]), tuple(entry.get("findings", ()))
+    return str(entry["key"]), Record(values, problems, findings, entry.get("ended"))
 
 
 def _whole_lines(data: bytes) -> tuple[list[bytes], int]:

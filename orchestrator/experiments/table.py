@@ -48,11 +48,10 @@ def columns_of(findings: Findings) -> list[Column]:
             columns.append(Column(name, "float64", levels, about | {"unit": planned.units[name]}))
         else:
             columns.append(Column(name, "string", [case.point[i].words for case in cases], about))
-    early = [findings.results[c.run.name].ended if c.run.name in findings.results else None for c in cases]
     kinds = {"description": "what was remarkable in the run's course, by its kind"}
     columns += [
-        Column("status", "string", ["completed" if one.ok else "failed" for one in records]),
-        Column("reason", "string", ["; ".join(r.problems) or e for r, e in zip(records, early, strict=True)]),
+        Column("status", "string", [one.status for one in records]),
+        Column("reason", "string", [one.reason for one in records]),
         Column("findings", "string", [", ".join(one.findings) or None for one in records], kinds),
     ]
     for key, one in spec.metrics.items():

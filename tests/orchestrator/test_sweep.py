@@ -336,6 +336,7 @@ def test_a_line_that_a_kill_has_cut_off_is_dropped(tmp_path):
     first = Journal(tmp_path, "a/b.yaml")
     first.add("one", Record({"x": (float("inf"), "s"), "y": None, "z": (0.1, "m")}))
     first.add("two", Record({}, ("plant: step failed", "and more")))
+    first.add("four", Record({"x": None}, findings=("spin",), ended="plant: ended the run at t = 1 s"))
     first.close()
     with (tmp_path / "runs.jsonl").open("ab") as stream:
         stream.write(b'{"key": "three", "val')
@@ -344,7 +345,7 @@ def test_a_line_that_a_kill_has_cut_off_is_dropped(tmp_path):
     again.add("three", Record({"x": (1.0, "s")}))
     again.close()
     last = Journal(tmp_path, "a/b.yaml")
-    assert list(last.records) == ["one", "two", "three"]
+    assert list(last.records) == ["one", "two", "four", "three"]
     last.close()
 
 

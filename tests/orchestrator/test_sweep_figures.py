@@ -12,13 +12,14 @@ from orchestrator.errors import ResultsError
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.figures import draw_over_axes
 from orchestrator.experiments.findings import Findings
-from orchestrator.experiments.jobs import Job, Record
+from orchestrator.experiments.jobs import Job, Record, measured
 from orchestrator.experiments.limits import limit_table, limits_of
 from orchestrator.experiments.metric_drawing import boundary, edges
 from orchestrator.experiments.planning import Planned
-from orchestrator.experiments.table import write_table
+from orchestrator.experiments.table import columns_of, to_pandas, write_table
 
 from .fakes import Clock, make_plan
+from .recorded import car
 
 SWEEP = """
 title: Made up
@@ -95,6 +96,21 @@ def test_a_limit_is_the_largest_value_that_holds_with_all_below_it(swept):
         (1.0, "a"): (108.0, 144.0),
         (1.0, "b"): (144.0, None),
     }
+
+
+def test_the_table_says_of_every_run_how_it_ended_and_why(swept):
+    made = swept()
+    run = car()
+    run.run["ended"] = {"unit": "plant", "time": 0.5, "message": "plant: ended the run at t = 0.5 s"}
+    made.records[0] = measured(run, (("sideslip", "peak(sideslip)", None),))
+    table = to_pandas(columns_of(made))
+    ends = dict(zip(table["status"], table["reason"].fillna(""), strict=True))
+    assert ends == {
+        "ended early": "plant: ended the run at t = 0.5 s",
+        "completed": "",
+        "failed": "plant: it failed",
+    }
+    assert made.records[0].values == {"sideslip": None}
 
 
 def test_a_value_that_holds_again_further_up_does_not_count(swept):
