@@ -9,7 +9,6 @@ from __future__ import annotations
 import atexit
 import json
 import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -17,7 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
-from orchestrator.processes import python
+from orchestrator.processes import how_it_ended, python
 
 _checker: subprocess.Popen | None = None
 
@@ -39,21 +38,14 @@ def defects(fmu: Path, *modules: str) -> list[str]:
         answer = _checker.stdout.readline()  # type: ignore[union-attr]
     except BrokenPipeError:
         answer = ""
-    return json.loads(answer) if answer else [f"does not load: {_death(_checker.wait())}"]
+    if answer:
+        return json.loads(answer)
+    return [f"does not load: its process {how_it_ended(_checker.wait()).rstrip(',')}"]
 
 
 def _end(checker: subprocess.Popen) -> None:
     checker.kill()
     checker.communicate()
-
-
-def _death(code: int) -> str:
-    if code >= 0:
-        return f"it ended its process with exit status {code}"
-    try:
-        return f"its process died of {signal.Signals(-code).name}"
-    except ValueError:
-        return f"its process died of signal {-code}"
 
 
 def main() -> None:

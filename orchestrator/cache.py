@@ -21,6 +21,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import ModelDescriptionError
+from .writing import write_whole
 
 _PLAIN_PATH = re.compile(r"[A-Za-z0-9_.~/\\: -]+")
 KEEP_DAYS = 60
@@ -124,7 +125,7 @@ def keep(store: str, key: str, content: bytes) -> None:
             file = folder / store / key
             try:
                 file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-                write_durably(file, _hash(content) + content)
+                write_whole(file, _hash(content) + content)
             except OSError:
                 continue
             oldest = time.time() - KEEP_DAYS * 86400.0
@@ -147,16 +148,6 @@ def content_of(file: Path) -> bytes | None:
 
 def _hash(content: bytes) -> bytes:
     return hashlib.sha256(content).hexdigest()[:_DIGITS].encode()
-
-
-def write_durably(file: Path, content: bytes) -> None:
-    """Write a file that appears under its name complete, or not at all, also if the computer stops.
-
-    Raises:
-        OSError: it cannot be written; what stood there stands.
-    """
-    with draft_of(file, content) as draft:
-        os.replace(draft, file)
 
 
 @contextlib.contextmanager

@@ -142,6 +142,8 @@ def reads(
 
 
 def reason(error: Exception) -> str:
-    """Return why a file cannot be read, in one line."""
+    """Return why a file cannot be read or written, in one line."""
+    if isinstance(error, OSError) and error.errno == errno.ENOSPC:
+        return "the disk is full"
     text = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return " ".join(str(text).split())

@@ -101,7 +101,6 @@ class Fmu:
     guid: str
     model_identifier: str
     generation_tool: str
-    can_save_state: bool
     variables: dict[str, Variable]
     description: str = ""
     once_per_process: bool = False

@@ -1,7 +1,8 @@
-"""Python in another process, which finds the modules that this one does and none in the working folder."""
+"""Processes of Python that find the modules that this one does, and how they ended."""
 
 from __future__ import annotations
 
+import signal
 import sys
 
 _PROGRAM = (
@@ -13,3 +14,15 @@ _PROGRAM = (
 def python(module: str, *arguments: object) -> list[str]:
     """Return the command that calls `main` of a module with arguments, all of them text."""
     return [sys.executable, "-c", _PROGRAM, module, "\n".join(sys.path), *map(str, arguments)]
+
+
+def how_it_ended(code: int) -> str:
+    """Return what a process did that has ended with this code, as `subprocess` gives it."""
+    if code >= 0:
+        return f"ended itself with exit status {code}"
+    try:
+        name = signal.Signals(-code).name
+    except ValueError:
+        name = f"signal {-code}"
+    cause = ", sent from outside or for want of memory," if name == "SIGKILL" else ""
+    return f"died of {name}{cause}"

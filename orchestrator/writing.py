@@ -80,10 +80,3 @@ def claim(path: Path, *, wait: bool = False) -> int:
             if os.path.samestat(os.fstat(descriptor), os.stat(path)):
                 return descriptor
         os.close(descriptor)  # the one who held it has renamed or removed it
-
-
-def reason(error: OSError) -> str:
-    """Return why something cannot be written, in words."""
-    if error.errno == errno.ENOSPC:
-        return "the disk is full"
-    return f"{error.strerror or error}"

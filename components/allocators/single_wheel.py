@@ -41,7 +41,6 @@ from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
 
 FL, FR, RL, RR = range(4)
-LEFT = (FL, RL)
 ONE_WHEEL: tuple[Four, ...] = (
     (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0),
 )  # fmt: skip

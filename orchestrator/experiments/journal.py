@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ResultsError
-from ..files import check_regular
-from ..writing import reason
+from ..files import check_regular, reason
 from .jobs import Record
 
 FILE = "runs.jsonl"

@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from ..errors import ResultsError
+from ..files import reason
 from ..metrics.run_metrics import metric
-from ..writing import reason, write_whole
+from ..writing import write_whole
 from .findings import Findings
 
 if TYPE_CHECKING:

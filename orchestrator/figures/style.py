@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ResultsError
-from ..writing import reason, write_whole
+from ..files import reason
+from ..writing import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -35,7 +35,7 @@ from ..wording import closest, listed
 from . import description as fmu_description
 from .binary import binary_problem
 
-FORMAT = 5
+FORMAT = 6
 """Of the cache's entries; part of their names, so versions of this program do not quarrel."""
 
 _FILE_TIME = 946_684_800

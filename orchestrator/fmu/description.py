@@ -57,7 +57,6 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
         guid=description.guid or "",
         model_identifier=identifier,
         generation_tool=description.generationTool or "",
-        can_save_state=kind.canGetAndSetFMUstate,
         variables=variables,
         description=description.description or "",
         once_per_process=kind.canBeInstantiatedOnlyOncePerProcess,

@@ -13,10 +13,8 @@ from __future__ import annotations
 
 import importlib.util
 import os
-import signal
 import subprocess
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -24,7 +22,7 @@ import numpy as np
 
 from ..errors import WiringError
 from ..plan import Plan
-from ..processes import python
+from ..processes import how_it_ended, python
 from .masters.request import Recording, Request
 from .ssp_write import write_ssp
 
@@ -182,9 +180,8 @@ def _run(module: str, request: Request, folder: Path) -> Recording | str:
         return Recording.read(answered)
     lines = done.stderr.decode(errors="replace").strip().splitlines()
     if done.returncode < 0:
-        with suppress(ValueError):
-            name = signal.Signals(-done.returncode).name
-            return f"it died of {name}{'; before that it said: ' if lines else ''}{' '.join(lines[-2:])}"
+        before = f"; before that it said: {' '.join(lines[-2:])}" if lines else ""
+        return f"it {how_it_ended(done.returncode).rstrip(',')}{before}"
     return lines[-1] if lines else f"it ended without a word, exit status {done.returncode}"
 
 

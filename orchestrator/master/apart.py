@@ -26,6 +26,7 @@ from typing import Any
 from .. import errors
 from ..errors import SimulationError
 from ..plan import Plan, Value
+from ..processes import how_it_ended
 from ..results.recorder import BLOCK, Block
 from ..wording import listed
 from .course import Opener, Progress, hand_over
@@ -34,7 +35,7 @@ from .interrupts import StopFlag, stop_requested_at
 from .log import MASTER, WARNING, Log
 from .master import Ended, Interrupted
 from .opening import open_unit
-from .process import CLOSING, how_it_ended
+from .process import CLOSING
 from .stepping import ENDED, FREE, PROGRESS, ROWS, TAKEN, WHERE, Shared, step_units
 
 LOOK_EVERY = 100

@@ -5,13 +5,12 @@ from __future__ import annotations
 import contextlib
 import os
 import select
-import signal
 import subprocess
 import time
 from collections.abc import Callable
 from typing import Any
 
-from ..processes import python
+from ..processes import how_it_ended, python
 from .exchange import ANSWER, FAILED, LOG, REPLY, Channel, Garbled, shared_memory
 from .interrupts import stop_requested_at
 
@@ -160,15 +159,3 @@ class UnitProcess:
         if self._wait(GRACE) is None:
             self._popen.kill()
             self._popen.wait()
-
-
-def how_it_ended(code: int) -> str:
-    """Return what a process did that has ended with this code, as `subprocess` gives it."""
-    if code >= 0:
-        return f"ended itself with exit status {code}"
-    try:
-        name = signal.Signals(-code).name
-    except ValueError:
-        name = f"signal {-code}"
-    cause = ", sent from outside or for want of memory," if -code == signal.SIGKILL else ""
-    return f"died of {name}{cause}"

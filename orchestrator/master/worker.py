@@ -9,7 +9,6 @@ import contextlib
 import ctypes
 import os
 from collections.abc import Sequence
-from typing import Any
 
 from ..errors import ModelDescriptionError, SimulationError
 from ..plan import Place, Unit
@@ -18,7 +17,7 @@ from .guardian import stand_guard
 from .log import OK, WARNING
 from .opening import open_unit
 from .relay import Relay
-from .slave import Buffers, Experiment
+from .slave import Buffers
 from .surroundings import Surroundings
 from .unit import FmuSlave
 
@@ -43,7 +42,7 @@ class Worker:
                 answer, count = self.exchange(parts), count + 256
             else:
                 name, arguments = self._channel.ordered()
-                reply = getattr(self, name)(*arguments)
+                reply = getattr(self if hasattr(self, name) else self._slave, name)(*arguments)
                 if self._surroundings is not None:
                     self._surroundings.restore("", self._log)
             if os.getpid() != process:
@@ -91,30 +90,9 @@ class Worker:
         self._answer = board.answer
         self._calls = ((SET, calls.set), (STEP, calls.step), (GET, calls.get))
 
-    def put(self, *arguments: Any) -> int:
-        return self._slave.put(*arguments)
-
-    def fetch(self, *arguments: Any) -> Any:
-        return self._slave.fetch(*arguments)
-
-    def look(self, *arguments: Any) -> Any:
-        return self._slave.look(*arguments)
-
-    def setup(self, experiment: Experiment) -> int:
-        return self._slave.setup(experiment)
-
-    def enter(self) -> int:
-        return self._slave.enter()
-
     def exit(self) -> int:
         self._surroundings = None
         return self._slave.exit()
-
-    def ended(self) -> float | None:
-        return self._slave.ended()
-
-    def note(self, status: int) -> int:
-        return self._slave.note(status)
 
     def free(self) -> None:
         """End the instance, and what its library has still to print."""

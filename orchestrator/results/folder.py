@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ResultsError
-from ..files import read_bytes
-from ..writing import NEW, reason
+from ..files import read_bytes, reason
+from ..writing import NEW
 from .lock import Lock, holder_of
 
 RESULTS_FILE = "results.csv"

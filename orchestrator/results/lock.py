@@ -19,8 +19,8 @@ from datetime import datetime
 from pathlib import Path
 
 from ..errors import ResultsError
-from ..files import TEXT, read_bytes
-from ..writing import claim, fcntl, reason
+from ..files import TEXT, read_bytes, reason
+from ..writing import claim, fcntl
 
 LOCK_FILE = ".yawbench-lock"
 LOOKS = 100

@@ -23,8 +23,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import ResultsError
+from ..files import reason
 from ..plan import Value
-from ..writing import reason, write_whole
+from ..writing import write_whole
 from .digest import checksum, shown
 from .folder import PART, RESULTS_FILE, RUN_FILE, RUNNING, put_in_place, tidy
 from .lock import Lock

@@ -7,8 +7,8 @@ import os
 from pathlib import Path
 
 from ..errors import ResultsError
-from ..files import open_regular
-from ..writing import reason, write_whole
+from ..files import open_regular, reason
+from ..writing import write_whole
 from .csv_file import CsvFile
 from .digest import checksum
 from .folder import DIED, FILES, PART, RESULTS_FILE, RUN_FILE, is_dead, put_in_place, tidy, unfinished

@@ -142,7 +142,7 @@ def make_fmu(name: str, behaviour: Behaviour) -> Fmu:
             behaviour.parameters.get(variable), None, None, "", depends_on,
         )  # fmt: skip
     path = Path(f"{name}.fmu")
-    return Fmu(name, path, path, "0" * 64, "{0}", name, "fake", False, variables)
+    return Fmu(name, path, path, "0" * 64, "{0}", name, "fake", variables)
 
 
 def make_plan(

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cache import cache_folder, keep, recall, write_durably
+from orchestrator.cache import cache_folder, keep, recall
 from orchestrator.cli import main
 from orchestrator.fmu.archive import open_fmu
+from orchestrator.writing import write_whole
 
 from .fake_fmus import make_fmu
 
@@ -62,14 +63,14 @@ def test_what_is_damaged_does_not_come_back(cache, harm):
 
 def test_a_file_that_cannot_be_put_in_place_leaves_what_stood_there(tmp_path, monkeypatch):
     file = tmp_path / "a"
-    write_durably(file, b"old")
+    write_whole(file, b"old")
 
     def refuse(*_):
         raise OSError(5, "Input/output error")
 
     monkeypatch.setattr(os, "fsync", refuse)
     with pytest.raises(OSError, match="Input/output error"):
-        write_durably(file, b"new")
+        write_whole(file, b"new")
     assert file.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [file]
 

@@ -56,7 +56,6 @@ def test_an_fmu_is_described_completely(fmu: Path) -> None:
     opened = open_fmu(fmu)
     assert (opened.name, opened.path, opened.guid) == ("tyre_a", fmu, "tyre_a")
     assert (opened.model_identifier, opened.generation_tool) == ("tyre_a", "fake")
-    assert opened.can_save_state
     assert not opened.once_per_process
     assert [v.name for v in opened.of("input")][:2] == ["friction_fl", "friction_fr"]
     friction, force = opened.variables["friction_fl"], opened.variables["force_fl"]

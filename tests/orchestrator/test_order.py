@@ -19,7 +19,7 @@ def fmu(inputs: str = "", **outputs: str | None) -> Fmu:
         for name, follows in outputs.items()
     ]
     named = {v.name: v for v in variables}
-    return Fmu("x", Path("x"), Path("x"), "", "", "", "", False, named)
+    return Fmu("x", Path("x"), Path("x"), "", "", "", "", named)
 
 
 def variable(name: str, causality: str, follows: tuple[str, ...] | None) -> Variable:

@@ -24,7 +24,7 @@ def variable(name, causality="output", unit="1", kind="Real", lowest=None, highe
 def plan(**outputs):
     """Return a plan whose plant records outputs: name -> their Variable's limits."""
     variables = {name: variable(name, **about) for name, about in outputs.items()}
-    fmu = Fmu("plant_x", Path("x.fmu"), Path("x"), "", "", "x", "", False, variables)
+    fmu = Fmu("plant_x", Path("x.fmu"), Path("x"), "", "", "x", "", variables)
     tyre = replace(fmu, name="tyre_x", variables={"friction_fl": variable("friction_fl", "input")})
     units = (Unit("plant", fmu, 1, {}, {}), Unit("tyre", tyre, 1, {}, {"friction_fl": 0.5}))
     record = tuple(("plant", name) for name in outputs)

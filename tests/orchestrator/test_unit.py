@@ -36,7 +36,7 @@ def fmu(library, tmp_path):
         variables.append(variable(f"{kind}_in", 1000001, kind, "input"))
         variables.append(variable(f"{kind}_out", 4000000000, kind, "output", (f"{kind}_in",)))
     return Fmu(
-        "foreign", tmp_path / "foreign.fmu", tmp_path / "fmu", "", "{good}", "foreign", "hand", False,
+        "foreign", tmp_path / "foreign.fmu", tmp_path / "fmu", "", "{good}", "foreign", "hand",
         {v.name: v for v in variables},
     )  # fmt: skip
 

@@ -26,9 +26,7 @@ def plan(controller: str = "controller_off", *, extra: bool = False) -> Plan:
     wires += [Wire("controller", f"torque_request_{w}", "plant", f"wheel_torque_{w}") for w in WHEELS]
     if extra:
         wires.append(Wire("road", "friction", "controller", "friction"))
-    fmus = {
-        name: Fmu(fmu, Path(fmu), Path(fmu), "0" * 64, "", fmu, "", False, {}) for name, fmu in names.items()
-    }
+    fmus = {name: Fmu(fmu, Path(fmu), Path(fmu), "0" * 64, "", fmu, "", {}) for name, fmu in names.items()}
     units = tuple(Unit(name, fmus[name], 1, {}, {}) for name in reversed(names))  # evaluation order
     scenario = {"units": dict.fromkeys(names)}
     return Plan(
