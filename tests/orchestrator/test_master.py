@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import SimulationError
-from orchestrator.master import master, program
+from orchestrator.master import master, operations
 from orchestrator.master.simulate import simulate
 from orchestrator.results.read import load_results
 
@@ -93,7 +93,7 @@ def test_periods_without_a_common_factor_keep_few_programs_and_change_no_number(
     made = []
 
     def programs(memory):
-        made.append(program.Programs(memory))
+        made.append(operations.Programs(memory))
         return made[-1]
 
     def positions():
@@ -107,7 +107,7 @@ def test_periods_without_a_common_factor_keep_few_programs_and_change_no_number(
 
     monkeypatch.setattr(master, "Programs", programs)
     usual = positions()
-    monkeypatch.setattr(program, "KEPT", 5)
+    monkeypatch.setattr(operations, "KEPT", 5)
     few = positions()
     assert (made[0].cycle, len(made[0]._made), len(made[1]._made)) == (1001, 1001, 5)
     assert len(made[1]._gathers) <= 5
