@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import yawbench as yb
-from tests.checkout import copy_checkout
+from tests.checkout import ROOT, copy_checkout
 
 pytestmark = pytest.mark.exhaustive
 
@@ -51,6 +51,19 @@ def empty(tmp_path: Path) -> Path:
     folder = tmp_path / "empty"
     folder.mkdir()
     return folder
+
+
+def test_the_wheel_holds_every_file_of_the_packages(installed):
+    (packages,) = installed.glob("lib/python*/site-packages")
+    names = {path.name for path in packages.iterdir() if path.is_dir() and (ROOT / path.name).is_dir()}
+    assert names >= {"components", "fmus", "orchestrator", "scenarios", "vocabulary", "yawbench"}
+    ours = {
+        file.relative_to(ROOT)
+        for name in names
+        for file in (ROOT / name).rglob("*.*")
+        if file.is_file() and file.suffix not in (".fmu", ".pyc") and not file.name.startswith(".")
+    }
+    assert {str(file) for file in ours if not (packages / file).exists()} == set()
 
 
 def test_the_installed_command_lists_the_scenarios_and_vehicles_shipped(installed, empty):
