@@ -44,8 +44,8 @@ Set = Annotated[
     typer.Option(
         "--set",
         metavar="UNIT.PARAMETER=VALUE",
-        help="Set a parameter of a unit; also vehicle.NAME, inputs.NAME, UNIT.step_size, start_time, "
-        "stop_time, step_size, algorithm. Repeatable.",
+        help="Set a parameter of a unit; also vehicle.NAME, inputs.NAME, UNIT.step_size, UNIT.validate, "
+        "start_time, stop_time, step_size, algorithm. Repeatable.",
     ),
 ]
 Fresh = Annotated[

@@ -67,7 +67,7 @@ def open_fmu(path: Path | str, *, validate: bool = True) -> Fmu:
             continue
         if validate and fmu.flaws:
             more = f" (and {len(fmu.flaws) - 1} more)" if len(fmu.flaws) > 1 else ""
-            way = "; 'validate: false' for the unit, or --no-validate, makes it a warning"
+            way = "; 'validate: false' for the unit (--set UNIT.validate=false) makes it a warning"
             raise ModelDescriptionError(f"{fmu.path}: {fmu.doubts()[0].rstrip('.')}{more}{way}")
         if wrong := binary_problem(fmu):
             raise ModelDescriptionError(f"{fmu.path}: {wrong}")

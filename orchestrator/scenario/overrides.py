@@ -4,10 +4,10 @@
 that no unit may have stand for more: `--set vehicle.mass=1200` changes the parameter set that all
 units share, `--set inputs.friction*=0.3` a constant, `--set friction=0.3` and `speed` what every unit that
 has to know it is told. `--set stop_time=2`, `step_size` and `algorithm` change the run,
-`--set unit.step_size=0.01` the step of a unit, `--set tyres=my.tir` (or `tyres.front`, `tyres.rear`) the tyre
-property file. Studies and sweeps change the same places, and `vehicle` is
-the vehicle file itself. A value that was changed remembers by what, so that later messages name that in
-place of a line.
+`--set unit.step_size=0.01` the step of a unit, `--set unit.validate=false` whether its FMU has to be
+formally right, `--set tyres=my.tir` (or `tyres.front`, `tyres.rear`) the tyre property file. Studies and
+sweeps change the same places, and `vehicle` is the vehicle file itself. A value that was changed remembers
+by what, so that later messages name that in place of a line.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ from .yaml_lines import Document, Key
 
 HOLDERS = ("vehicle", "inputs")
 """Words that `--set` understands in place of a unit."""
+OF_UNIT = ("step_size", "validate")
+"""What `--set` changes of a unit that is no parameter of its FMU."""
 RESERVED = (*HOLDERS, *FACTS, TYRES)
 """Names that no unit may have."""
 
@@ -138,7 +140,7 @@ def apply_changes(
             if isinstance(spec.get("fmu"), str):
                 replaced[holder] = spec["fmu"]
             differs = _swap(document, holder, change)
-        elif name == "step_size":
+        elif name in OF_UNIT:
             differs = _put(document, ("units", holder, name), change)
         else:
             differs = _put(document, ("units", holder, "parameters", name), change)

@@ -282,12 +282,12 @@ def test_an_archive_that_reaches_out_of_its_folder_is_refused(name: str, tmp_pat
             model_description("a").replace('guid="a"', ""),
             "the model description is not valid FMI 2.0: ERROR (line 2, column 0): Element "
             "'fmiModelDescription': The attribute 'guid' is required but missing"
-            "; 'validate: false' for the unit, or --no-validate, makes it a warning",
+            "; 'validate: false' for the unit (--set UNIT.validate=false) makes it a warning",
         ),
         (
             model_description("a", outputs=["x", "x"]),
             'the model description is not valid FMI 2.0: The variable name "x" (line 7) is not unique; '
-            "'validate: false' for the unit, or --no-validate, makes it a warning",
+            "'validate: false' for the unit (--set UNIT.validate=false) makes it a warning",
         ),
         (
             model_description("a", outputs=["x"]).replace('index="1"', 'index="7"'),

@@ -300,7 +300,7 @@ def test_a_description_that_is_formally_wrong_runs_with_a_warning_if_asked_to(ru
     assert status == 2
     assert "a: " in said or "two.yaml" in said
     assert "not valid FMI 2.0: The unit" in said
-    assert "--no-validate, makes it a warning" in said
+    assert "'validate: false' for the unit (--set UNIT.validate=false) makes it a warning" in said
     status, said, results = run("--no-validate", **WRONG)
     assert status == 0, said
     assert 'warning: a at t = 0 s: the model description is not valid FMI 2.0: The unit "bar"' in said
@@ -313,6 +313,24 @@ def test_one_unit_may_be_left_unvalidated_by_the_scenario(run):
     assert status == 2
     assert "two.yaml:7: units.a.fmu" in said
     assert "units.b" not in said
+
+
+def test_every_command_that_runs_a_scenario_takes_fmus_that_are_formally_wrong_if_asked_to(
+    run, tmp_path, monkeypatch
+):
+    """By `--set`, which they all have, as by the keys of files that make runs."""
+    both = ("--set", "a.validate=false", "--set", "b.validate=false")
+    status, said, results = run(*both, **WRONG)
+    assert (status, results["b.Real_out"][-1]) == (0, 3.0), said
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sweep.yaml").write_text(
+        "title: Wrong\nscenario: two.yaml\nset: {a.validate: false, b.validate: false}\n"
+        "axes: {start: {vary: inputs.a.Real_in, values: [0.25, 0.5]}}\nmetrics: {m: {metric: peak(b.Real_out)}}\n"
+    )
+    for command in (["sweep", "sweep.yaml"], ["converge", "two.yaml", "--signal", "b.Real_out", *both]):
+        with pytest.raises(SystemExit) as ended:
+            main([*command, "--out", command[0]])
+        assert ended.value.code == 0, command
 
 
 @together_and_apart
