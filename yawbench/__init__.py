@@ -37,20 +37,24 @@ from orchestrator.errors import (
     YawbenchError,
 )
 
+from .experiment import Experiment, Runs, experiment
 from .program import output, parameter, signal
 from .run import Run, open
 from .scenario import Scenario, load
 
 __all__ = [
     "BuildError",
+    "Experiment",
     "ModelDescriptionError",
     "ResultsError",
     "Run",
+    "Runs",
     "Scenario",
     "ScenarioError",
     "SimulationError",
     "WiringError",
     "YawbenchError",
+    "experiment",
     "load",
     "open",
     "output",

@@ -14,6 +14,7 @@ from orchestrator.fmu.opener import Opener
 from orchestrator.master.opening import open_unit
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.plan import Change, Plan, Value
+from orchestrator.results.read import Results
 from orchestrator.scenario import catalogue, schema
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
@@ -151,7 +152,10 @@ class Scenario:
         Raises:
             SimulationError: a unit failed; what Python code raised is its `__cause__`.
         """
-        plan = self.plan()
+        return Run(self._simulate(self.plan(), progress=progress))
+
+    def _simulate(self, plan: Plan, *, progress: Callable[[int, int], None] | None = None) -> Results:
+        """Return the results of a plan of this scenario, whose plain Python runs here; see `run`."""
         opened: list[Any] = []
 
         def opener(unit: Any, log: Any, corrupted: set[Path]) -> Any:
@@ -161,7 +165,7 @@ class Scenario:
             return slave
 
         try:
-            return Run(simulate_in_memory(plan, opener=opener, progress=progress))
+            return simulate_in_memory(plan, opener=opener, progress=progress)
         except SimulationError as error:
             causes = [getattr(slave, "error", None) for slave in opened if slave.name == error.unit]
             raise error from next(iter(causes), None)

@@ -56,6 +56,7 @@ def conduct(experiment: Experiment, folder: Path, wishes: Wishes, **of_jobs: Any
     from ..errors import YawbenchError
     from ..experiments.figures import draw_all
     from ..experiments.findings import judge_results
+    from ..experiments.jobs import Once
     from ..experiments.planning import jobs_of, plan_experiment
     from ..experiments.record import write_findings
     from ..experiments.workers import pool
@@ -67,11 +68,11 @@ def conduct(experiment: Experiment, folder: Path, wishes: Wishes, **of_jobs: Any
     )
     jobs = [replace(job, **of_jobs) for job in jobs]
     planned: Planned | None = None
-    build = wishes.build and not wishes.no_run
+    once = Once(build=wishes.build and not wishes.no_run)
     with stoppable(folder):
         try:
             with bar("planning", len(jobs), quiet=True) as planning:
-                planned = plan_experiment(experiment, jobs, build=build, progress=planning)
+                planned = plan_experiment(experiment, jobs, once=once, progress=planning)
         except YawbenchError:
             if not wishes.no_run or experiment.spec.axes:
                 raise  # else scenarios or FMUs are not here: results can be judged without them

@@ -37,7 +37,7 @@ def recorded(
         ScenarioError: a scenario or an option is wrong.
     """
     from ..errors import ScenarioError
-    from ..experiments.jobs import Job, ready
+    from ..experiments.jobs import Job, Once, ready
     from ..experiments.workers import execute
     from ..fmu.opener import stale_fmus
     from ..results.freshness import staleness
@@ -51,7 +51,7 @@ def recorded(
         raise ScenarioError("--swap and --set change a scenario; only folders of results are given")
     given = [Job(one.stem, one, Path(), changes, fmus, call_limit=limit) for one in scenarios]
     jobs = {}
-    for job in ready(given, build=build):
+    for job in ready(given, once=Once(build=build)):
         assert job.plan is not None
         jobs[job.scenario] = replace(job, out=default_folder(job.scenario, job.plan.changes))
     for note in stale_fmus(unit.fmu for job in jobs.values() if job.plan for unit in job.plan.units):

@@ -111,13 +111,13 @@ Told = Callable[[Outcome], None]
 
 
 class Once:
-    """Files read and FMUs opened once for many plans; `build`: see `Opener`."""
+    """Files read and FMUs opened once for many plans; `options`: of the `Opener`."""
 
-    def __init__(self, *, build: bool = False) -> None:
+    def __init__(self, **options: Any) -> None:
         from ..fmu.opener import Opener
 
         self._documents: dict[Path, Document] = {}
-        self.opener = Opener(build=build)
+        self.opener = Opener(**options)
 
     def read(self, path: Path, *, what: str) -> Document:
         """Return what `yaml_lines.read` does, a copy each time."""
@@ -152,7 +152,7 @@ def planned(job: Job, once: Once | None = None) -> tuple[Scenario, Plan]:
 def ready(
     jobs: Sequence[Job],
     *,
-    build: bool = False,
+    once: Once | None = None,
     progress: Callable[[int], None] = lambda done: None,
     place: Callable[[str], tuple[Hashable, str]] = lambda problem: (problem, problem),
 ) -> list[Job]:
@@ -160,7 +160,7 @@ def ready(
 
     Args:
         jobs: what is to be run.
-        build: build first what is stale of the FMUs (see `Opener`).
+        once: reads files and opens FMUs; one that builds what is stale of them does so first.
         progress: told how many are planned.
         place: what a problem is about, and its sentence; of several about one thing the first is told.
 
@@ -168,7 +168,7 @@ def ready(
         BuildError: FMUs that are stale and cannot be built.
         ScenarioError: with everything that is wrong with any of them, each problem once.
     """
-    once, found = Once(build=build), []
+    once, found = once or Once(), []
     problems: dict[Hashable, str] = {}
     for number, job in enumerate(jobs, start=1):
         try:

@@ -16,7 +16,7 @@ from ..wiring.facts import FACTS
 from .axis_schema import AxisSpec
 from .design import Level
 from .experiment import RUNS, Case, Experiment
-from .jobs import Job, Metrics, keyed, ready
+from .jobs import Job, Metrics, Once, keyed, ready
 from .judged_schema import MetricSpec, Reference
 from .numbers import si_number
 
@@ -90,7 +90,7 @@ def plan_experiment(
     experiment: Experiment,
     jobs: list[Job],
     *,
-    build: bool = False,
+    once: Once | None = None,
     progress: Callable[[int], None] = lambda done: None,
 ) -> Planned:
     """Plan all cases (see `ready`); without metrics the experiment gets the standard ones that runs record.
@@ -105,7 +105,7 @@ def plan_experiment(
         axis = experiment.axis_of(getattr(problem, "place", ""))
         return (axis, f"{experiment.path}: axes.{axis[0]}: {problem}") if axis else (problem, problem)
 
-    jobs = ready(jobs, build=build, progress=progress, place=place)
+    jobs = ready(jobs, once=once, progress=progress, place=place)
     plans = [job.plan for job in jobs if job.plan]
     made_up = [*{tuple(plan.record): results_to_be(plan) for plan in plans}.values()]
     if not experiment.spec.metrics:

@@ -1,0 +1,83 @@
+"""Many runs of a scenario from Python: the design, the table, figures, what is refused."""
+
+from __future__ import annotations
+
+import pytest
+
+import yawbench as yb
+
+
+class Proportional:
+    """A controller whose runs are made in this process."""
+
+    inputs = ("yaw_rate_ref", "yaw_rate")
+    outputs = ("yaw_moment",)
+    step_size = 0.005
+
+    def output(self, t, u):
+        return 20000.0 * (u.yaw_rate_ref - u.yaw_rate)
+
+
+@pytest.fixture(scope="module")
+def base():
+    return yb.load("fnn_sideslip/25mps").set({"stop_time": 1.6})
+
+
+@pytest.fixture(scope="module")
+def runs(base):
+    """Two controllers at two speeds, one of them in plain Python."""
+    axes = {"controller": ["controller_off", Proportional()], "plant.initial_speed": ["54 km/h", "90 km/h"]}
+    return yb.experiment(base, axes, metrics=["peak(sideslip)", "peak(yaw_moment)"]).run(workers=1)
+
+
+def test_the_table_has_a_row_per_combination_in_si_with_units(runs):
+    table = runs.table
+    assert table["controller"].tolist() == ["controller_off"] * 2 + ["Proportional"] * 2
+    assert table["plant.initial_speed"].tolist() == [15.0, 25.0, 15.0, 25.0]
+    assert set(table["status"]) == {"completed"}
+    assert table.attrs["units"]["plant.initial_speed"] == "m/s"
+    assert table.attrs["units"]["peak(sideslip)"] == "rad"
+    assert table["key"].nunique() == 4
+
+
+def test_every_row_is_what_the_run_alone_comes_to(base, runs):
+    for number, change in ((1, "controller_off"), (3, Proportional())):
+        alone = base.swap(controller=change).set({"plant.initial_speed": 25.0}).run()
+        assert runs.table["peak(sideslip)"][number] == alone.metric("peak(sideslip)")
+        assert runs.runs[number].metric("peak(yaw_moment)") == alone.metric("peak(yaw_moment)")
+
+
+def test_a_metric_is_drawn_over_an_axis_with_a_line_per_level(runs):
+    (axes,) = runs.plot("peak(sideslip)", x="plant.initial_speed", lines="controller").axes
+    assert [line.get_xdata().tolist() for line in axes.get_lines()] == [[54.0, 90.0], [54.0, 90.0]]
+    with pytest.raises(yb.ScenarioError, match="the axis 'controller' has no place in this figure"):
+        runs.plot("peak(sideslip)", x="plant.initial_speed")
+    with pytest.raises(
+        yb.ScenarioError, match=r"did you mean 'peak\(sideslip\)'"
+    ):
+        runs.plot("peak(sideslp)", x="plant.initial_speed", lines="controller")
+
+
+def test_a_run_that_fails_is_a_row_with_its_reason_and_the_others_are_made(base):
+    def careless(yaw_rate_ref, yaw_rate):
+        return 20000 * yaw_rate_ref / yaw_rate
+
+    made = yb.experiment(base, {"controller": [careless, "controller_off"]}).run(workers=1, keep=False)
+    assert made.table["status"].tolist() == ["failed", "completed"]
+    assert "float division by zero" in made.table["reason"][0]
+    assert made.runs is None
+
+
+@pytest.mark.parametrize(
+    ("axes", "said"),
+    [
+        ({"controlller": ["a"]}, "the scenario has no unit 'controlller'; did you mean 'controller'"),
+        ({"driver.amplitude": []}, "axes.driver.amplitude.values: has no values"),
+        ({"driver.amplitude": ["1 deg", 2]}, "driver.amplitude: give all levels in one unit, or none"),
+        ({"driver.amplitde": [1, 2]}, "has no parameter 'amplitde'; did you mean 'amplitude'"),
+        ({"controller": [Proportional(), Proportional()]}, "controller: two levels are called Proportional"),
+    ],
+)
+def test_what_is_wrong_is_said_before_any_run_is_made(base, axes, said):
+    with pytest.raises(yb.ScenarioError, match=said):
+        yb.experiment(base, axes).run()

@@ -1,0 +1,247 @@
+"""Many runs of a scenario: every combination of levels, one table, curves and maps."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from orchestrator.errors import Problem, ScenarioError, YawbenchError
+from orchestrator.experiments.experiment import Experiment as Design
+from orchestrator.experiments.experiment import NamedRun
+from orchestrator.experiments.figures import draw_over_axes
+from orchestrator.experiments.findings import Findings
+from orchestrator.experiments.jobs import Job, Once, Outcome, Record, measured
+from orchestrator.experiments.planning import jobs_of, metrics_of, plan_experiment
+from orchestrator.experiments.schema import ExperimentSpec, FigureSpec
+from orchestrator.experiments.table import columns_of, to_pandas
+from orchestrator.experiments.workers import execute
+from orchestrator.master.simulate import simulate_in_memory
+from orchestrator.results.read import Results
+from orchestrator.scenario.strict import Model, validate
+from orchestrator.scenario.yaml_lines import Document
+from orchestrator.wording import hint
+
+from .run import Run, shown_in_notebooks
+from .scenario import Scenario
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+def experiment(
+    base: Scenario, axes: Mapping[str, Sequence[Any]], *, metrics: Iterable[str] = ()
+) -> Experiment:
+    """Return the runs of a scenario at every combination of levels, to be made by `run`.
+
+        >>> axes = {"controller": ["controller_off", "controller_fnn"], "plant.initial_speed": [20, 30]}
+        >>> yb.experiment(base, axes, metrics=["peak(sideslip)"])
+        <Experiment 'Sideslip tracking at 25 m/s, mu 0.65': 4 runs over controller and plant.initial_speed>
+
+    Args:
+        base: the scenario.
+        axes: a unit -> FMUs by name or path, or plain Python, as `Scenario.swap` takes them; what
+            `Scenario.set` changes -> values, numbers in SI or all with one unit ("80 km/h").
+        metrics: columns of the table, such as "peak(sideslip)"; default: the usual ones.
+
+    Raises:
+        ScenarioError: an axis, a level or a metric is wrong.
+    """
+    given: dict[str, Any] = {}
+    changed = base
+    for name, levels in axes.items():
+        if name in base.loaded.units:
+            variants = {}
+            for level in levels:
+                swapped = changed.swap(**{name: level})
+                swap, *brought = swapped.changes[len(changed.changes) :]
+                words = level if isinstance(level, str) else Path(str(swap.value)).stem
+                if words in variants:
+                    raise ScenarioError(f"{name}: two levels are called {words}")
+                settings = {one.place: one.value for one in brought}
+                variants[words] = {"swap": {name: str(swap.value)}, "set": settings}
+                changed = Scenario(base.path, base.changes, swapped.programs)
+            given[name] = {"variants": variants}
+        else:
+            given[name] = {"vary": name, **_values(name, levels)}
+    spec = {"scenario": base.path.name, "axes": given, "metrics": {one: {"metric": one} for one in metrics}}
+    made = _checked(ExperimentSpec, {"title": base.title or base.path.stem, **spec})
+    run = NamedRun("", "", "", base.path, ())
+    return Experiment(changed, Design(base.path, made, {"": run}, (), base.changes))
+
+
+def _checked(model: type[Model], given: dict[str, Any]) -> Model:
+    """Return what is given as its schema has it, with every problem of it as a sentence."""
+    document = Document(Path(), given)
+    made = validate(model, document)
+    if made is None:
+        raise ScenarioError([Problem(one.text, place=one.place) for one in document.problems])
+    return made
+
+
+def _values(name: str, levels: Sequence[Any]) -> dict[str, Any]:
+    """Return levels as an axis has them: numbers apart from the unit that they share."""
+    split = [re.fullmatch(r"\s*([+-]?[\d.]+(?:e[+-]?\d+)?)\s+(\S.*)", str(level)) for level in levels]
+    units = {one[2] for one in split if one}
+    if not units:
+        return {"values": [float(x) if hasattr(x, "dtype") else x for x in levels]}
+    if len(units) > 1 or not all(split):
+        raise ScenarioError(f"{name}: give all levels in one unit, or none")
+    return {"values": [float(one[1]) for one in split if one], "unit": units.pop()}
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A design, not yet run; made by `experiment`.
+
+    >>> made = yb.experiment(base, {"driver.amplitude": [0.02, 0.03]}, metrics=["peak(sideslip)"]).run()
+    >>> made.table[["driver.amplitude", "status"]]
+       driver.amplitude     status
+    0              0.02  completed
+    1              0.03  completed
+    """
+
+    base: Scenario
+    design: Design
+
+    def __len__(self) -> int:
+        return len(self.design.cases)
+
+    def __repr__(self) -> str:
+        over = " and ".join(self.design.spec.axes)
+        return f"<Experiment {self.design.spec.title!r}: {len(self)} runs over {over}>"
+
+    def run(self, *, workers: int | None = None, keep: bool = True, progress: bool = False) -> Runs:
+        """Make all runs and return what they come to; nothing is written.
+
+        Every run has a process of its own, but for those of plain Python, which follow each other in this
+        one. A run that fails is a row of the table with its reason.
+
+        Args:
+            workers: processes at a time; default: one per core.
+            keep: keep the results of all runs in memory, for `Runs.runs`.
+            progress: show a bar.
+
+        Raises:
+            YawbenchError: a run cannot start; none has been made.
+        """
+        programs = {path: program.fmu for path, program in self.base.programs.items()}
+        once = Once(build=True, tell=lambda text: None, opened=programs)
+        planned = plan_experiment(self.design, jobs_of(self.design, self.base.path.parent), once=once)
+        metrics = metrics_of(planned.experiment)
+        outcomes: dict[int, Outcome] = {}
+        here: list[tuple[int, Job]] = []
+        apart: list[tuple[int, Job]] = []
+        for number, job in enumerate(planned.jobs):
+            plain = any(unit.fmu.path in programs for unit in job.plan.units) if job.plan else False
+            (here if plain else apart).append((number, job))
+        with _bar(self.design.spec.title, len(self), shown=progress) as told:
+            made = execute([job for _, job in apart], workers=workers, done=told, run=_in_memory)
+            outcomes |= zip((number for number, _ in apart), made, strict=True)
+            for number, job in here:
+                outcomes[number] = self._here(job)
+                told(outcomes[number])
+        results = [outcomes[number].value for number in range(len(self))]
+        records = [
+            measured(one, metrics) if isinstance(one, Results) else Record({}, outcomes[number].problems)
+            for number, one in enumerate(results)
+        ]
+        runs = [Run(one) if isinstance(one, Results) else None for one in results] if keep else None
+        return Runs(Findings(planned.experiment, records, {}, planned), runs)
+
+    def _here(self, job: Job) -> Outcome:
+        assert job.plan is not None
+        try:
+            return Outcome(job, value=self.base._simulate(job.plan))
+        except YawbenchError as error:
+            return Outcome(job, tuple(error.problems), error.exit_status)
+
+
+def _in_memory(job: Job) -> Results:
+    assert job.plan is not None
+    return simulate_in_memory(job.plan)
+
+
+@dataclass(frozen=True)
+class Runs:
+    """What the runs of an experiment come to.
+
+        >>> made = yb.experiment(base, {"driver.amplitude": [0.02, 0.03]}).run()
+        >>> made.runs[0].metric("peak(sideslip)") < made.runs[1].metric("peak(sideslip)")
+        True
+
+    Attributes:
+        findings: metrics and reasons, as studies and sweeps have them.
+        runs: every run with its results, None for one that failed; None if they were not kept.
+    """
+
+    findings: Findings
+    runs: list[Run | None] | None = None
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """One row per run: axes, status, reason, metrics, key; `attrs["units"]` holds the units."""
+        return to_pandas(columns_of(self.findings))
+
+    def plot(
+        self, metric: str, *, x: str, y: str = "", lines: str = "", panels: str = "", **more: Any
+    ) -> Figure:
+        """Return a figure of a metric over an axis, or as a map over two.
+
+            >>> made = yb.experiment(base, {"driver.amplitude": [0.02, 0.03]}).run()
+            >>> made.plot("peak(sideslip)", x="driver.amplitude").savefig("curve.svg")
+
+        Args:
+            metric: a column of the table.
+            x: axis to the right.
+            y: axis upwards, of a map.
+            lines, panels: axes with a line or a panel per level.
+            more: `title`, `scale`, `largest`, `mark`, `only`, as a figure of a sweep file has them.
+
+        Raises:
+            ScenarioError: there is no such axis or metric, or an axis has no place.
+            ResultsError: no run gives a number.
+        """
+        spec = self.findings.spec
+        for name in filter(None, (x, y, lines, panels)):
+            if name not in spec.axes:
+                raise ScenarioError(f"there is no axis {name!r}{hint(name, spec.axes, lead='axes')}")
+        if metric not in spec.metrics:
+            raise ScenarioError(f"there is no metric {metric!r}{hint(metric, spec.metrics, lead='metrics')}")
+        if left := [name for name in spec.axes if name not in (x, y, lines, panels, *more.get("only", ()))]:
+            raise ScenarioError(f"the axis {left[0]!r} has no place in this figure: give lines or panels")
+        places = {key: value for key, value in (("y", y), ("lines", lines), ("panels", panels)) if value}
+        given = {
+            "name": "figure",
+            "kind": "map" if y else "curve",
+            "metric": metric,
+            "x": x,
+            **places,
+            **more,
+        }
+        return shown_in_notebooks(draw_over_axes(self.findings, _checked(FigureSpec, given)))
+
+    def __repr__(self) -> str:
+        failed = len(self.findings.failed)
+        return f"<Runs {self.findings.spec.title!r}: {len(self.findings.records)} runs, {failed} failed>"
+
+    def _repr_html_(self) -> str:
+        return str(self.table.drop(columns="key").to_html(index=False, na_rep=""))
+
+
+@contextlib.contextmanager
+def _bar(title: str, total: int, *, shown: bool) -> Iterator[Callable[[Outcome], None]]:
+    """Show a bar that every outcome moves on, if that is asked for."""
+    if not shown:
+        yield lambda outcome: None
+        return
+    from rich.progress import Progress
+
+    with Progress() as bar:
+        task = bar.add_task(title.replace("[", r"\["), total=total)
+        yield lambda outcome: bar.advance(task)
