@@ -52,9 +52,7 @@ def test_a_metric_is_drawn_over_an_axis_with_a_line_per_level(runs):
     assert [line.get_xdata().tolist() for line in axes.get_lines()] == [[54.0, 90.0], [54.0, 90.0]]
     with pytest.raises(yb.ScenarioError, match="the axis 'controller' has no place in this figure"):
         runs.plot("peak(sideslip)", x="plant.initial_speed")
-    with pytest.raises(
-        yb.ScenarioError, match=r"did you mean 'peak\(sideslip\)'"
-    ):
+    with pytest.raises(yb.ScenarioError, match=r"did you mean 'peak\(sideslip\)'"):
         runs.plot("peak(sideslp)", x="plant.initial_speed", lines="controller")
 
 
