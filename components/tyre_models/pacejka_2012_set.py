@@ -49,8 +49,8 @@ COMMON = {
         "N",
         1.0,
     ),
-    "nompres": _Row(220000.0, "Nominal inflation pressure p_i0", _BOOK, "Pa", 1000.0),
-    "inflpres": _Row(220000.0, "Inflation pressure p_i", _BOOK, "Pa", 1000.0),
+    "nompres": _Row(220000.0, "Nominal inflation pressure p_i0", _BOOK, "Pa", 1e-3),
+    "inflpres": _Row(220000.0, "Inflation pressure p_i", _BOOK, "Pa", 1e-3),
     "lfzo": _Row(1.0, "Scaling of the nominal load", "chosen: the set as measured", "1", 0.01),
 }
 """What every part of the law needs."""

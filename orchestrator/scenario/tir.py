@@ -164,8 +164,6 @@ class _Reading:
             self._warn(
                 self.units["ANGLE"], "degrees are taken for ranges only: coefficients are read as in radians"
             )
-        given.setdefault("PRESSURE", given.get("FORCE", 1.0) / given.get("LENGTH", 1.0) ** 2)
-
         return lambda powers: prod(given.get(name, 1.0) ** power for name, power in powers.items())
 
     def _side(self) -> str:
@@ -243,7 +241,10 @@ class _Reading:
             self._refuse(self.entries["LFZO"], f"must be above 0 (got {self.entries['LFZO'].text})")
         pressure = self._at("NOMPRES") or self._at("INFLPRES")
         if pressure > 0.0:
-            values |= {"NOMPRES": pressure, "INFLPRES": self._at("INFLPRES") or pressure}
+            inflated = self._at("INFLPRES") or pressure
+            if not 0.1 < inflated / pressure < 10.0:
+                self._refuse(self.entries["INFLPRES"], "must be in the unit of NOMPRES, and of its size")
+            values |= {"NOMPRES": pressure, "INFLPRES": inflated}
         values["FZMAX"] = self._largest_load(values)
         radius = self._at("UNLOADED_RADIUS") or self._radius()
         if radius:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import codecs
+import random
 import re
+from math import isfinite
 
 import pytest
 
@@ -156,6 +158,7 @@ def test_without_fzmax_loads_go_to_three_times_the_nominal_or_to_where_a_stiffne
         ({"PCX1": "1e999"}, {}, "PCX1: must be a number"),
         ({"PDX1": "1.2 1.3"}, {}, "PDX1: must be a number (got '1.2 1.3')"),
         ({"LFZO": "0"}, {}, "LFZO: must be above 0"),
+        ({"INFLPRES": "2.2"}, {}, "INFLPRES: must be in the unit of NOMPRES"),
         ({}, {"units": UNITS | {"LENGTH": "'furlong'"}}, "a.tir:5: LENGTH: furlong is no unit of length"),
         ({}, {"units": UNITS | {"FORCE": "'stone'"}}, "FORCE: stone is no unit of force"),
     ],
@@ -220,3 +223,23 @@ def test_a_missing_file_a_folder_and_a_very_large_one_are_refused(tmp_path):
     (tmp_path / "large.tir").write_bytes(b"$" * 1_000_001)
     with pytest.raises(ScenarioError, match="larger than 1 MB"):
         read_tir(tmp_path / "large.tir")
+
+
+def test_files_damaged_at_random_are_read_or_refused_in_foreseen_sentences(tmp_path):
+    rng, base = random.Random(1), text_of().encode()
+    path, refused = tmp_path / "damaged.tir", 0
+    for _ in range(400):
+        raw = bytearray(base)
+        for _ in range(rng.randint(1, 4)):
+            at = rng.randrange(len(raw))
+            if rng.random() < 0.5:
+                raw[at] = rng.randrange(256)
+            else:
+                del raw[at : at + rng.randint(1, 40)]
+        path.write_bytes(bytes(raw))
+        try:
+            assert all(isfinite(value) for value in read_tir(path).values.values())
+        except ScenarioError as error:
+            refused += 1
+            assert not any("not understood" in problem for problem in error.problems), error.problems
+    assert 50 < refused < 350
