@@ -287,6 +287,7 @@ def test_ctrl_c_ends_a_study_and_keeps_finished_runs(fmus, folder):
     assert json.loads((folder / "o/fuzzy_sideslip/run.json").read_text())["status"] == "completed"
 
 
+@pytest.mark.exhaustive
 def test_plot_draws_one_run_into_its_folder_and_several_beside_them(yawbench, folder):
     yawbench("study", "study.yaml", "--out", "o")
     status, _, said = yawbench("plot", "o/off")

@@ -325,7 +325,8 @@ def test_every_command_that_runs_a_scenario_takes_fmus_that_are_formally_wrong_i
     monkeypatch.chdir(tmp_path)
     (tmp_path / "sweep.yaml").write_text(
         "title: Wrong\nscenario: two.yaml\nset: {a.validate: false, b.validate: false}\n"
-        "axes: {start: {vary: inputs.a.Real_in, values: [0.25, 0.5]}}\nmetrics: {m: {metric: peak(b.Real_out)}}\n"
+        "axes: {start: {vary: inputs.a.Real_in, values: [0.25, 0.5]}}\n"
+        "metrics: {m: {metric: peak(b.Real_out)}}\n"
     )
     for command in (["sweep", "sweep.yaml"], ["converge", "two.yaml", "--signal", "b.Real_out", *both]):
         with pytest.raises(SystemExit) as ended:

@@ -228,6 +228,7 @@ def test_a_thinned_line_keeps_its_peaks_and_its_ends():
     assert np.all(np.diff(thin_t) > 0)
 
 
+@pytest.mark.exhaustive
 def test_files_are_svg_and_png_and_the_same_every_time(tmp_path: Path):
     first = save(draw(SEVERAL), tmp_path / "a" / "overview.25mps")
     again = save(draw(SEVERAL), tmp_path / "b" / "overview.25mps")

@@ -174,7 +174,7 @@ def test_the_coupling_error_of_the_sine_at_1_ms_is_small(fmus, tmp_path):
 @pytest.mark.parametrize(
     ("run", "setting"), [("sine", "driver.amplitude=-1.5"), ("double_lane_change", "driver.lane_offset=-3.5")]
 )
-@pytest.mark.sampled(1)
+@pytest.mark.exhaustive
 def test_the_mirrored_manoeuvre_gives_the_mirrored_motion(study, fmus, tmp_path, run, setting):
     out = tmp_path / run
     (outcome,) = execute([Job(run, FOLDER / f"{run}.yaml", out, changed(settings=[setting]), fmus)])

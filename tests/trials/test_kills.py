@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -14,12 +13,9 @@ from tests.orchestrator.test_batch_commands import UNITS
 from .kills import trial
 
 
-def exhaustive(command: str) -> Any:
-    return pytest.param(command, marks=pytest.mark.exhaustive)
-
-
+@pytest.mark.exhaustive
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
-@pytest.mark.parametrize("command", ["run", exhaustive("study"), exhaustive("sweep")])
+@pytest.mark.parametrize("command", ["run", "study", "sweep"])
 def test_a_killed_command_passes_nothing_half_for_whole_and_the_next_call_repairs_all(
     command: str, tmp_path: Path
 ) -> None:
