@@ -16,7 +16,7 @@ Value = float | int | bool | str
 OF_RUN = ("start_time", "stop_time", "step_size", "algorithm")
 """What a change gives without naming a unit."""
 FACTS = ("friction", "speed")
-"""What one change tells all units that have to know it (see `wiring.facts`)."""
+"""What one change tells all units that have to know it (see `wiring.shared_facts`)."""
 TYRES = "tyres"
 """What names the tyre property files, of both axles or as `tyres.front`, `tyres.rear` of one."""
 Algorithm = Literal["jacobi", "gauss_seidel", "extrapolated"]

@@ -15,7 +15,7 @@ from orchestrator.master.opening import open_unit
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.plan import Change, Plan, Value
 from orchestrator.results.read import Results
-from orchestrator.scenario import catalogue, schema
+from orchestrator.scenario import catalogue, scenario_schema
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wording import hint
@@ -122,7 +122,7 @@ class Scenario:
         return scenario
 
     @cached_property
-    def loaded(self) -> schema.Scenario:
+    def loaded(self) -> scenario_schema.Scenario:
         """The scenario as its schema has it, all changes applied; the file is read once."""
         return load_scenario(self.path, changes=self.changes)
 

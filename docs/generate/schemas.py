@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from orchestrator.experiments import schema as experiment
-from orchestrator.scenario import schema as scenario
+from orchestrator.scenario import scenario_schema as scenario
 
 from .text import NOTE, cell, code, docstring, table
 

@@ -167,7 +167,7 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
 def _matters(unit: Unit, name: str) -> bool:
     """Return whether a value is worth a line even if it is the FMU's own: the car, its speed, the road."""
     from ..wiring.agreement import CAR
-    from ..wiring.facts import FACTS
+    from ..wiring.shared_facts import FACTS
 
     return name in CAR or any(name in fact.inputs or fact.counts(unit, name) for fact in FACTS.values())
 

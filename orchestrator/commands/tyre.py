@@ -46,8 +46,8 @@ def tyre(
     in combined slip at five slip angles, stiffnesses and relaxation lengths over load; in one figure.
     """
     from ..figures.style import save
-    from ..tyres.drawing import draw_tyre
     from ..tyres.stand import put_on_stand
+    from ..tyres.tyre_drawing import draw_tyre
     from .batch import say
 
     stand = put_on_stand(source, friction=friction, fmus=fmus, build=not no_build)

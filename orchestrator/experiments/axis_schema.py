@@ -19,7 +19,7 @@ from pydantic import Field, PlainValidator, model_validator
 
 from ..plan import FACTS, OF_RUN, Algorithm
 from ..scenario.measurement_units import parse_unit
-from ..scenario.schema import Scalar, Time
+from ..scenario.scenario_schema import Scalar, Time
 from ..scenario.strict import Strict
 from ..wording import short
 from .numbers import Number, is_finite, text_of

@@ -21,7 +21,7 @@ import numpy as np
 from ..errors import ResultsError, ScenarioError
 from ..figures.style import QUIET, RC, frame, line_style
 from ..metrics.run_metrics import Value
-from ..metrics.signals import words
+from ..metrics.symbols import words
 from ..plan import Algorithm, Change
 from ..plan import Value as Plain
 from ..results.read import Results

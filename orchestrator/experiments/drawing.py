@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..figures.style import QUIET, literal
-from ..metrics.signals import variable_of, words
+from ..metrics.symbols import variable_of, words
 from .design import Level
 from .experiment import RUN, Case
 from .findings import Findings

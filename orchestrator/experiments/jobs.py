@@ -20,7 +20,7 @@ from ..sources import OF_METRICS, sources_hash
 from ..wording import hint
 
 if TYPE_CHECKING:
-    from ..scenario.schema import Scenario
+    from ..scenario.scenario_schema import Scenario
 
 MANY = 10
 """Problems shown; more are only counted."""

@@ -16,7 +16,7 @@ from ..errors import ModelDescriptionError, ScenarioError
 from ..fmu.archive import open_fmu
 from ..metrics.measures import catalogue as measures
 from ..metrics.run_metrics import STANDARD, Value, columns_of, metric
-from ..metrics.signals import symbol
+from ..metrics.symbols import symbol
 from ..plan import Fmu, Plan
 from ..results.read import Results
 from ..results.runs import FoundRun

@@ -12,7 +12,7 @@ from ..metrics.run_metrics import STANDARD, metric, results_to_be, unit_in
 from ..plan import Fmu, Plan
 from ..results.read import Results
 from ..scenario import quantities
-from ..wiring.facts import FACTS
+from ..wiring.shared_facts import FACTS
 from .axis_schema import AxisSpec
 from .design import Level
 from .experiment import RUNS, Case, Experiment

@@ -75,7 +75,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..figures.plots import OVERVIEW
-from ..scenario.schema import Scalar
+from ..scenario.scenario_schema import Scalar
 from ..scenario.strict import Strict
 from .axis_schema import MOST, AxisSpec, Changes
 from .judged_schema import Alternatives, Claim, DerivedSpec, GridSpec, LimitSpec, MetricSpec

@@ -6,7 +6,7 @@ import math
 
 from vocabulary.units import SHOWN
 
-from ..metrics.signals import si_of, symbol, variable_of
+from ..metrics.symbols import si_of, symbol, variable_of
 
 
 def in_formula(signal: str) -> str:

@@ -19,7 +19,7 @@ from vocabulary.wheels import WHEEL_NAMES
 
 from ..errors import ScenarioError
 from ..metrics.run_metrics import columns_of, reference_of
-from ..metrics.signals import variable_of, words
+from ..metrics.symbols import variable_of, words
 from ..results.read import Results
 from ..wording import cut, fold, hint
 from .display import digits_of, in_formula, shown_unit

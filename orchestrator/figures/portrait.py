@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..metrics.run_metrics import columns_of, reference_of
-from ..metrics.signals import words
+from ..metrics.symbols import words
 from ..results.read import Results
 from .display import digits_of, in_formula, shown_unit
 from .style import REFERENCE, line_style, literal, note_above

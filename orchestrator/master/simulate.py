@@ -11,9 +11,9 @@ from ..results.in_memory import MemoryRecorder
 from ..results.read import Results
 from .apart import can_be_apart
 from .course import Opener, Progress
+from .ending import Run
 from .log import Message
 from .opening import open_unit
-from .run import Run
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from ..errors import ResultsError, ScenarioError
 from ..scenario.quantities import convert
 from ..wording import closest, fold, hint, short
 from .measures import MEASURES, Measure
-from .signals import si_of, symbol, variable_of, words
+from .symbols import si_of, symbol, variable_of, words
 
 if TYPE_CHECKING:
     from ..plan import Plan

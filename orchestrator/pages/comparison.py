@@ -11,7 +11,7 @@ from ..experiments.tables import Cell, Table, marked, remarks
 from ..figures.display import digits_of, shown, shown_unit
 from ..figures.panels import Run
 from ..metrics.run_metrics import Value, metric
-from ..metrics.signals import variable_of
+from ..metrics.symbols import variable_of
 from .divergence import SAME, SEEN, Divergence, Parting, divergence
 from .facts import Figure, figure_of
 

@@ -17,7 +17,7 @@ from vocabulary.wheels import WHEEL_NAMES, WHEELS
 from ..plan import Plan, Unit, Value
 from ..scenario.load import Scenario
 from ..scenario.yaml_lines import Document, Key
-from ..wiring.facts import facts_of
+from ..wiring.shared_facts import facts_of
 from ..wording import fold
 
 PAPER, LITERATURE, CHOSEN, ERRATUM, VARIED, NEUTRAL = (

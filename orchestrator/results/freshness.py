@@ -14,7 +14,7 @@ from .digest import checksum
 from .folder import COMPLETED, RESULTS_FILE, RUN_FILE, is_dead
 from .key import key_of
 from .read import load_results
-from .record import load_record
+from .record_file import load_record
 from .run_record import PROGRAMS, run_record
 
 COMPARED = {

@@ -18,7 +18,7 @@ from ..wording import listed, short
 from .digest import checksum
 from .folder import COMPLETED, FILES, RESULTS_FILE, RUN_FILE
 from .formats import source_of
-from .record import load_record
+from .record_file import load_record
 from .thinning import thinned
 
 __all__ = ["RESULTS_FILE", "RUN_FILE", "Results", "load_results"]

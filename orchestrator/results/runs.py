@@ -10,7 +10,7 @@ from typing import Any
 
 from ..errors import ResultsError
 from .folder import DIED, PART, RUN_FILE, RUNNING, is_dead, unfinished
-from .record import load_record
+from .record_file import load_record
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from ..files import reads
 from ..plan import Change
 from ..wording import hint, listed
 from . import overrides, quantities, strict, yaml_lines
-from .schema import Connection, Endpoint, Scenario, UnitSpec, Vehicle, endpoint
+from .scenario_schema import Connection, Endpoint, Scenario, UnitSpec, Vehicle, endpoint
 from .tir import TyreFile, read_tir
 from .yaml_lines import Document, Key
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from ..plan import Finding, Unit, Value, Variable
 from ..scenario.load import Scenario
 from ..wording import fold, listed
-from .facts import FACTS
+from .shared_facts import FACTS
 
 CAR = (
     "mass", "sprung_mass", "yaw_inertia", "roll_inertia", "cg_to_front_axle", "cg_to_rear_axle",

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 from ..plan import Fmu, Series, Value, Variable
 from ..scenario.load import Scenario
-from ..scenario.schema import SeriesSpec
+from ..scenario.scenario_schema import SeriesSpec
 from ..scenario.yaml_lines import Key
 from ..wording import fold, hint
-from .facts import facts_of
 from .parameters import origin, value_for
 from .patterns import Replaced, had, matching
+from .shared_facts import facts_of
 
 Input = tuple[str, str]  # unit, variable
 

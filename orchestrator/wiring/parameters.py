@@ -11,8 +11,8 @@ from ..scenario import quantities
 from ..scenario.load import Scenario
 from ..scenario.yaml_lines import Document, Key
 from ..wording import closest, fold, hint, listed, short
-from .facts import facts_of
 from .patterns import had
+from .shared_facts import facts_of
 
 LARGEST, LARGEST_SINGLE = sys.float_info.max, (2 - 2**-23) * 2.0**127
 """Numbers of double and single precision."""

@@ -16,7 +16,7 @@ from ..files import reading
 from ..plan import Series, Value, Variable
 from ..scenario.load import Scenario
 from ..scenario.measurement_units import Measure, conversion, measure_of
-from ..scenario.schema import SeriesSpec
+from ..scenario.scenario_schema import SeriesSpec
 from .parameters import value_for
 from .series_file import SeriesFile
 

@@ -18,7 +18,7 @@ from orchestrator.cli import _application
 from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.fmu.archive import open_fmu
 from orchestrator.metrics.measures import MEASURES
-from orchestrator.scenario.schema import Scenario
+from orchestrator.scenario.scenario_schema import Scenario
 from orchestrator.wording import fold
 from tests.checkout import ROOT
 from vocabulary.signals import SIGNALS

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -165,3 +166,13 @@ def test_no_module_imports_itself_by_way_of_others():
     files = modules()
     sorter = TopologicalSorter({name: needs(name, files) for name in files})
     sorter.prepare()  # a CycleError names the circle
+
+
+def test_no_name_of_a_module_is_used_twice():
+    """But for those of commands and of the library, which are called after what users call."""
+    names = Counter(
+        path.stem
+        for name, path in modules().items()
+        if path.stem != "__init__" and not name.startswith(("orchestrator.commands.", "yawbench."))
+    )
+    assert [name for name, count in names.items() if count > 1] == []
