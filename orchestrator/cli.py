@@ -95,6 +95,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _status(arguments: Sequence[str]) -> int:
     """Run a command, say what is wrong, and return the exit status."""
     try:
+        os.getcwd()
+    except OSError:
+        print("the working folder is not there any more; change to another", file=sys.stderr)
+        return 2
+    try:
         try:
             _application(arguments)(arguments)
         except SystemExit as ended:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -123,6 +122,6 @@ def isolation(isolate: bool, call_limit: str | None) -> float | None:
     if call_limit is None:
         return CALL_LIMIT
     try:
-        return float(seconds(Fraction(call_limit) if call_limit.isdecimal() else call_limit))
+        return float(seconds(int(call_limit) if call_limit.isdecimal() else call_limit))
     except ValueError as error:
         raise ScenarioError(f"--call-limit: {error}") from None

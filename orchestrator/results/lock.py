@@ -59,9 +59,10 @@ class Lock:
     def __init__(self, folder: Path) -> None:
         home = folder.absolute()
         self._path = home / LOCK_FILE
-        self._made = [place for place in (home, *home.parents) if not place.exists()]
+        self._made: list[Path] = []
         self._descriptor: int | None = None
         try:
+            self._made = [place for place in (home, *home.parents) if not place.exists()]
             home.mkdir(parents=True, exist_ok=True)
             self._descriptor = _claimed(self._path)
             os.ftruncate(self._descriptor, 0)

@@ -90,3 +90,12 @@ def test_a_command_imports_what_it_needs_itself():
     loaded = set(done.stderr.split())
     assert "orchestrator.commands.list" in loaded
     assert not {f"orchestrator.commands.{name}" for name in COMMANDS if name != "list"} & loaded
+
+
+def test_a_working_folder_that_is_gone_is_one_sentence(tmp_path):
+    code = "import os, sys; os.rmdir(os.getcwd()); os.execv(sys.argv[1], sys.argv[1:])"
+    done = subprocess.run(
+        [sys.executable, "-c", code, PROGRAM, "list", "metrics"], cwd=tmp_path, capture_output=True, text=True
+    )
+    said = "the working folder is not there any more; change to another\n"
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", said)

@@ -248,3 +248,8 @@ def test_a_pipe_in_place_of_a_file_of_ours_keeps_nobody_waiting(name, tmp_path):
         os.mkfifo(tmp_path / name)
     with pytest.raises(ResultsError, match="the run ended without a word"):
         load_results(tmp_path)
+
+
+def test_a_name_that_is_too_long_for_a_folder_is_one_sentence(tmp_path):
+    with pytest.raises(ResultsError, match=r"results cannot be written here: File name too long\."):
+        Lock(tmp_path / ("n" * 300))

@@ -201,7 +201,7 @@ def test_a_failure_in_an_isolated_unit_is_the_sentence_of_one_that_is_not(fmus, 
 
 @pytest.mark.parametrize(
     ("option", "says"),
-    [("0 s", "--call-limit"), ("soon", "--call-limit")],
+    [("0 s", "--call-limit"), ("0", "(got 0)"), ("soon", "--call-limit")],
 )
 def test_a_limit_that_is_no_time_is_refused(option, says, capsys):
     with pytest.raises(SystemExit) as exit_:
