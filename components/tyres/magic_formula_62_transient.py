@@ -95,36 +95,36 @@ class MagicFormula62Transient(Tyre):
 
     def start(self, t: float, u: list[float]) -> None:
         self.step_size = FIRST_STEP
-        self.deflections = [(0.0, 0.0)] * 4
         self._see(u)
+        self.lengths = self._stiffnesses(u)
         self.deflections = [
             (s_x * sigma_x / v_x if v_x else 0.0, s_y * sigma_y / v_y if v_y else 0.0)
-            for (s_x, v_x, s_y, v_y, _), (sigma_x, sigma_y, *_) in zip(
-                self.speeds, self._stiffness(u), strict=True
-            )
+            for (s_x, v_x, s_y, v_y, _), (sigma_x, sigma_y, *_) in zip(self.speeds, self.lengths, strict=True)
         ]
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
+        before, self.lengths = self.lengths, self._stiffnesses(u)
         if h <= 0.0:
             return
         self.step_size = h
         self._see(u)
-        self.deflections = [
-            (deflected(x, s_x, v_x, sigma_x, h), deflected(y, s_y, v_y, sigma_y, h))
-            for (x, y), (s_x, v_x, s_y, v_y, _), (sigma_x, sigma_y, *_) in zip(
-                self.deflections, self.speeds, self._stiffness(u), strict=True
+        wheels = zip(self.deflections, self.speeds, before, self.lengths, strict=True)
+        self.deflections = [  # loads are those of the step's end: lengths in its middle are means
+            (
+                deflected(x, s_x, v_x, 0.5 * (old[0] + new[0]), h),
+                deflected(y, s_y, v_y, 0.5 * (old[1] + new[1]), h),
             )
+            for (x, y), (s_x, v_x, s_y, v_y, _), old, new in wheels
         ]
 
     def output(self, t: float, u: list[float]) -> list[float]:
         p, h = self.p, self.step_size
         _, _, loads, frictions, cambers, _, _ = self.by_signal(u)
         found = []
-        lengths = self._stiffness(u)
         for i, ((x, y), (s_x, v_x, s_y, v_y, forward)) in enumerate(
             zip(self.deflections, self.speeds, strict=True)
         ):
-            sigma_x, sigma_y, k_x, k_y = lengths[i]
+            sigma_x, sigma_y, k_x, k_y = self.lengths[i]
             damper_x = self._damping(v_x) / k_x if k_x > 0.0 else 0.0
             damper_y = self._damping(v_y) / -k_y if k_y < 0.0 else 0.0
             kappa = min(max(x / sigma_x + damper_x * s_x, -2.0), 2.0)
@@ -147,7 +147,7 @@ class MagicFormula62Transient(Tyre):
             forward = along >= 0.0
             self.speeds.append((rolling - v, max(abs(rolling), abs(v)), s_y, hypot(v, s_y), forward))
 
-    def _stiffness(self, u: list[float]) -> list[tuple[float, float, float, float]]:
+    def _stiffnesses(self, u: list[float]) -> list[tuple[float, float, float, float]]:
         """Return per wheel sigma_x, sigma_y [m], K_x [N] and K_y [N/rad] at the load of the inputs."""
         _, _, loads, _, cambers, _, _ = self.by_signal(u)
         found = []

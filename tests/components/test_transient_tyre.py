@@ -216,3 +216,14 @@ def test_slip_angle_of_the_patch_never_leaves_its_quadrant():
     tyre.start(**rolling(-8.0, s_y=2.0))
     y = tyre.step(1.0, **rolling(-8.0, s_y=2.0))
     assert y["patch_slip_angle_fl"] == pytest.approx(slip_angle(-8.0, 2.0, LOW), rel=1e-12)
+
+
+def test_the_coupling_with_the_car_is_of_second_order_in_the_step():
+    """Loads move from side to side while the car turns in, and relaxation lengths with them."""
+    rates = []
+    for steps in (125, 250, 4000):
+        loop, _ = driven(SevenDof, 0.5, steps, steer=0.05)
+        rates.append(loop["yaw_rate"])
+    coarse, half, fine = rates
+    assert abs(coarse - fine) > 3.2 * abs(half - fine) > 0.0
+    assert abs(half - fine) < 1e-3 * abs(fine)
