@@ -1,15 +1,4 @@
-"""The schema of axes: what varies from run to run, and the values it takes.
-
-What an axis varies is written as on the command line: `unit.parameter`, `vehicle.parameter` and
-`inputs.pattern` take values, as do `stop_time`, `step_size` and `algorithm`; a unit alone takes FMUs
-(`fmu:parameter=value` brings parameters along), `vehicle` takes vehicle files. Several places may
-share an axis. In place of `vary` and `values`, `variants` change several things at once:
-
-    control:
-      variants:
-        no control: {swap: {controller: controller_off}}
-        with slip control: {swap: {wheel_control: wheel_control_slip}, set: {driver.amplitude: 0.04}}
-"""
+"""The schema of axes: what varies from run to run, the values it takes."""
 
 from __future__ import annotations
 

@@ -64,7 +64,12 @@ Along axes, a limit is how far one of them may go; curves and maps show a metric
 What an axis varies is written as on the command line: `unit.parameter`, `vehicle.parameter` and
 `inputs.pattern` take values, as do `stop_time`, `step_size` and `algorithm`; a unit alone takes FMUs
 (`fmu:parameter=value` brings parameters along), `vehicle` takes vehicle files. Several places may
-share an axis. In place of `vary` and `values`, `variants` change several things at once.
+share an axis. In place of `vary` and `values`, `variants` change several things at once:
+
+    control:
+      variants:
+        no control: {swap: {controller: controller_off}}
+        with slip control: {swap: {wheel_control: wheel_control_slip}, set: {driver.amplitude: 0.04}}
 """
 
 from __future__ import annotations

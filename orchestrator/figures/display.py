@@ -8,6 +8,9 @@ from vocabulary.units import SHOWN
 
 from ..metrics.symbols import si_of, symbol, variable_of
 
+RESOLUTION = 1e-3
+"""Of angles and their rates, as shown [°, °/s, °/s²]; chosen: less than any sensor of a car can tell."""
+
 
 def in_formula(signal: str) -> str:
     """Return the symbol of a signal as matplotlib sets it, or nothing where the field has none."""
@@ -27,8 +30,10 @@ def shown_unit(unit: str) -> tuple[str, float]:
 
 
 def shown(value: float, unit: str, *, digits: int = 3) -> str:
-    """Return a value given in SI as text in the unit that people read, e.g. `3.94 %`."""
+    """Return a value given in SI as text in the unit that people read, e.g. `3.94 %`; `< 0.001 °` of less."""
     text, factor = shown_unit(unit)
+    if text.startswith("°") and 0 < abs(value * factor) < RESOLUTION:
+        return f"< {RESOLUTION:g} {text}"
     number = digits_of(value * factor, digits)
     return f"{number} {text}".rstrip() if math.isfinite(value) else number
 

@@ -109,7 +109,8 @@ def test_a_panel_without_a_unit_ends_its_title_without_a_comma():
 
 def test_a_long_note_on_lost_cars_is_broken_into_lines():
     lost = [Run(f"a car with a rather long name, number {k}", car(40.0 + k)) for k in range(3)]
-    axes = panel(draw([*lost, Run("held", car(1.1))], ["sideslip"]), "sideslip")
+    held = [Run(f"held {k}", car(1.1)) for k in range(3)]  # no more may leave the axes than stay
+    axes = panel(draw([*lost, *held], ["sideslip"]), "sideslip")
     rows = axes.texts[0].get_text().splitlines()
     assert len(rows) > 1
     assert max(map(len, rows)) <= NOTE_WIDTH

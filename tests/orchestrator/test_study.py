@@ -24,6 +24,7 @@ from orchestrator.experiments.planning import jobs_of
 from orchestrator.experiments.record import write_findings
 from orchestrator.experiments.tables import Table, for_terminal
 from orchestrator.experiments.verdicts import claim_tables, derived_tables, run_tables
+from orchestrator.figures.display import shown
 from orchestrator.metrics.run_metrics import Value
 from orchestrator.pages.chapter import chapter
 from orchestrator.pages.report import report_page
@@ -521,6 +522,12 @@ def test_a_study_without_any_result_still_says_so(study, tmp_path):
     _, said = draw_all(findings, tmp_path / "empty")
     assert said == [f"figure {name}: none of its runs has results" for name in ("both", "roll")]
     assert "no results here" in page(findings, tmp_path / "empty")
+
+
+def test_an_angle_below_what_can_be_told_is_shown_as_such():
+    assert shown(7.6e-11, "rad") == "< 0.001 °"
+    assert shown(-1e-9, "rad/s") == "< 0.001 °/s"
+    assert (shown(0.0, "rad"), shown(2e-5, "rad"), shown(1e-9, "%")) == ("0 °", "0.00115 °", "1.00e-07 %")
 
 
 def test_the_studies_of_paper_b_are_right_in_themselves():
