@@ -39,6 +39,7 @@ from ..tyre_models.tyre import INPUTS, Tyre
 from .magic_formula_62 import WHEELS
 
 AT_ONCE = ("vertical_load_*", "friction_*", "inclination_angle_*")
+OF_SIDE = ("vertical_load_*", "inclination_angle_*")
 FIRST_STEP = 0.001
 """Step [s] for the slip stiffness until one is known; chosen: the usual one."""
 
@@ -83,10 +84,10 @@ class MagicFormula62Transient(Tyre):
         output("overturning_moment_*", *AT_ONCE),
         output("slip_stiffness_*", *AT_ONCE),
         output("tyre_slip_ratio_*"),
-        output("patch_slip_ratio_*", *AT_ONCE, unit="1", text="Slip kappa' of the contact patch"),
-        output("patch_slip_angle_*", *AT_ONCE, unit="rad", text="Slip angle alpha' of the contact patch"),
-        output("relaxation_length_x_*", *AT_ONCE, unit="m", text="Relaxation length of F_x"),
-        output("relaxation_length_y_*", *AT_ONCE, unit="m", text="Relaxation length of F_y"),
+        output("patch_slip_ratio_*", "vertical_load_*", unit="1", text="Slip kappa' of the contact patch"),
+        output("patch_slip_angle_*", *OF_SIDE, unit="rad", text="Slip angle alpha' of the contact patch"),
+        output("relaxation_length_x_*", "vertical_load_*", unit="m", text="Relaxation length of F_x"),
+        output("relaxation_length_y_*", *OF_SIDE, unit="m", text="Relaxation length of F_y"),
     )
 
     def configure(self) -> None:

@@ -149,7 +149,9 @@ def test_the_same_sources_give_the_same_bytes_in_another_process(tmp_path):
 def test_the_launcher_compiles_to_the_same_bytes_again(tmp_path, monkeypatch):
     made = []
     for cache in ("a", "b"):
-        monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / cache))
+        monkeypatch.setattr(
+            "orchestrator.cache.cache_folders", lambda folder=tmp_path / cache: iter([folder])
+        )
         compiler._launcher.cache_clear()
         made.append(compile_launcher()[0])
         assert len(list(tmp_path.glob(f"{cache}/launcher/*"))) == 1
@@ -161,7 +163,7 @@ def test_the_launcher_compiles_to_the_same_bytes_again(tmp_path, monkeypatch):
 @pytest.mark.sampled(1)
 def test_a_damaged_launcher_in_the_cache_is_compiled_anew(harm, tmp_path, monkeypatch):
     """Believed, it would end the build with SIGBUS, or have every FMU fail."""
-    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path))
+    monkeypatch.setattr("orchestrator.cache.cache_folders", lambda: iter([tmp_path]))
     compiler._launcher.cache_clear()
     good = compile_launcher()[0]
     (kept,) = tmp_path.glob("launcher/*")

@@ -34,8 +34,8 @@ def test_of_several_merged_mappings_the_first_one_counts(document):
 
 def test_a_merged_value_has_the_line_it_stands_in_and_a_given_one_its_own(document):
     made = document("a: &a\n  x: 1\n  y: 2\nb:\n  <<: *a\n  y: 3\n")
-    assert made.place(("b", "x")) == "a.yaml:2: b.x"
-    assert made.place(("b", "y")) == "a.yaml:6: b.y"
+    assert made.problem(("b", "x"), "wrong") == "a.yaml:2: b.x: wrong"
+    assert made.problem(("b", "y"), "wrong") == "a.yaml:6: b.y: wrong"
 
 
 def test_a_quoted_merge_key_is_a_name_like_any_other(document):
