@@ -18,6 +18,7 @@ from math import atan, cos, exp, pi, sin, sqrt, tan
 from typing import Any
 
 from .pacejka_2002 import SMALLEST_FRICTION, SMALLEST_LOAD
+from .pacejka_2012_set import of_axle
 
 Numbers = tuple[float, ...]
 Curve2012 = tuple[float, ...]
@@ -34,9 +35,7 @@ def longitudinal_set(p: Any, axle: str, *, left: bool) -> tuple[Numbers, Numbers
         ValueError: a stiffness has the wrong sign.
     """
 
-    def of(name: str) -> float:
-        return float(getattr(p, f"{name}_{axle}"))
-
+    of = of_axle(p, axle)
     load_0 = of("fnomin") * of("lfzo")
     pressure = of("inflpres") / of("nompres") - 1.0
     _check_stiffness(axle, "K_x (PKX1)", of("pkx1") * of("lkx"))
@@ -62,9 +61,7 @@ def longitudinal_set(p: Any, axle: str, *, left: bool) -> tuple[Numbers, Numbers
 def whole_set(p: Any, axle: str, *, left: bool) -> tuple[Numbers, ...]:
     """Return what all forces and moments need; arguments and errors as of `longitudinal_set`."""
 
-    def of(name: str) -> float:
-        return float(getattr(p, f"{name}_{axle}"))
-
+    of = of_axle(p, axle)
     six = of("fittyp") >= 60.0
     load, load_0 = of("fnomin"), of("fnomin") * of("lfzo")
     pressure = of("inflpres") / of("nompres") - 1.0

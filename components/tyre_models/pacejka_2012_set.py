@@ -12,6 +12,7 @@ resistance (QSY*: plants have their own), the decay of friction with speed (LMUV
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import make_dataclass
 from typing import Any, NamedTuple
 
@@ -261,6 +262,11 @@ def of_axles(name: str, rows: dict[str, _Row], *more: tuple[str, Any], bases: tu
             )
             fields.append((f"{key}_{axle}", float, made))
     return make_dataclass(name, fields, bases=bases, frozen=True, namespace={"__module__": __name__})
+
+
+def of_axle(p: Any, axle: str) -> Callable[[str], float]:
+    """Return what gives a coefficient of the axle "front" or "rear" by its name without it."""
+    return lambda name: float(getattr(p, f"{name}_{axle}"))
 
 
 LongitudinalParameters = of_axles(

@@ -16,6 +16,8 @@ from __future__ import annotations
 from math import atan, exp, expm1, sin
 from typing import Any
 
+from .pacejka_2012_set import of_axle
+
 SHORTEST = 0.02
 """Relaxation lengths [m] are not below this: a hardly loaded tyre; chosen: less than a contact patch has."""
 
@@ -40,9 +42,7 @@ def part(z: float) -> float:
 def relaxation_set(p: Any, axle: str) -> tuple[float, ...]:
     """Return what `relaxation_lengths` needs of the parameters `p` on the axle "front" or "rear"."""
 
-    def of(name: str) -> float:
-        return float(getattr(p, f"{name}_{axle}"))
-
+    of = of_axle(p, axle)
     pressure = of("inflpres") / of("nompres") - 1.0
     load_0, radius = of("fnomin") * of("lfzo"), of("unloaded_radius")
     return (

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -105,12 +106,12 @@ def conduct(experiment: Experiment, folder: Path, wishes: Wishes, **of_jobs: Any
 
 def _along_axes(planned: Planned, folder: Path, wishes: Wishes) -> Findings:
     """Make the runs of cases along axes that are left; a journal knows of those that are finished."""
-    from ..experiments.execution import finish, here, left_to_do, on_cluster
+    from ..experiments.execution import finish, left_to_do, runner_of
     from ..experiments.findings import judge_records
     from ..experiments.journal import Journal
 
     experiment = planned.experiment
-    runner = on_cluster(planned, wishes.scheduler) if wishes.scheduler else here(wishes.workers)
+    runner = runner_of(planned, wishes.workers, wishes.scheduler)
     with contextlib.closing(Journal(folder, experiment.identity, fresh=wishes.fresh)) as journal:
         left = [] if wishes.no_run else left_to_do(planned.jobs, journal.records)
         total = len({job.key for job in planned.jobs})
@@ -122,10 +123,10 @@ def _along_axes(planned: Planned, folder: Path, wishes: Wishes) -> Findings:
 
 def _named(planned: Planned, wishes: Wishes) -> Sequence[Any]:
     """Make the named runs that are left; what has been made already stands in their folders."""
-    from ..experiments.execution import here, left_to_do, on_cluster
+    from ..experiments.execution import left_to_do, runner_of
 
     left = planned.jobs if wishes.fresh else left_to_do(planned.jobs, {})
-    runner = on_cluster(planned, wishes.scheduler) if wishes.scheduler else here(wishes.workers)
+    runner = runner_of(planned, wishes.workers, wishes.scheduler)
     total = len(planned.jobs)
     _announce(planned.experiment.spec.title, total, total - len(left), total)
     outcomes: list[Any] = []
@@ -165,6 +166,14 @@ def chapter_of(
     return facts | {"comparison": None, "results": []} | more
 
 
+def command_of(preset: str, path: Path, **options: Iterable[object] | None) -> str:
+    """Return the command line that makes an experiment again; `options`: name -> what it was given."""
+    import shlex
+
+    given = [(f"--{name}", str(value)) for name, values in options.items() for value in values or ()]
+    return shlex.join(["yawbench", preset, str(path), *itertools.chain.from_iterable(given)])
+
+
 def write_page(chapters: Sequence[dict[str, Any]], folder: Path) -> None:
     """Write the page of chapters into a folder and say where it is."""
     from ..pages.report import PAGE, report_page
@@ -189,7 +198,6 @@ def of_files(
         typer.Exit: a run failed.
     """
     import os
-    import shlex
 
     from ..errors import ScenarioError
     from ..experiments.experiment import load_experiment
@@ -211,13 +219,12 @@ def of_files(
     chapters, failed = [], False
     for experiment, folder in zip(experiments, folders, strict=True):
         findings = conduct(experiment, folder, wishes)
-        given = [
-            part
-            for change in changes
-            for part in ("--swap" if change.swaps else "--set", f"{change.place}={change.value}")
-        ]
-        preset = "sweep" if experiment.spec.axes else "study"
-        command = shlex.join(["yawbench", preset, str(experiment.path), *given])
+        command = command_of(
+            "sweep" if experiment.spec.axes else "study",
+            experiment.path,
+            swap=[f"{one.place}={one.value}" for one in changes if one.swaps],
+            set=[f"{one.place}={one.value}" for one in changes if not one.swaps],
+        )
         chapters.append(chapter_of(findings, folder, command, shown_in=page))
         failed = failed or bool(findings.failed)
         if len(files) == 1:

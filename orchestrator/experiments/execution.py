@@ -6,7 +6,7 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from ..errors import KEPT, ResultsError
+from ..errors import KEPT, ResultsError, ScenarioError
 from ..results.freshness import staleness
 from .jobs import Job, Outcome, Record, Told, read_back
 from .journal import Journal
@@ -14,12 +14,7 @@ from .planning import Planned
 from .workers import execute
 
 Runner = Callable[[Sequence[Job], Told], object]
-"""Makes runs: `here`, or on a cluster."""
-
-
-def here(workers: int | None = None) -> Runner:
-    """Return what makes runs in processes of this machine (see `execute`)."""
-    return lambda jobs, told: execute(jobs, workers=workers, done=told)
+"""Makes runs; see `runner_of`."""
 
 
 def stale(jobs: Sequence[Job]) -> dict[str, str]:
@@ -72,14 +67,14 @@ def record_of(outcome: Outcome) -> Record:
     return Record({}, problems) if problems else outcome.value.record
 
 
-def on_cluster(planned: Planned, scheduler: str) -> Runner:
-    """Return what makes runs on a Dask cluster.
+def runner_of(planned: Planned, workers: int | None, scheduler: str | None) -> Runner:
+    """Return what makes runs: processes of this machine (see `execute`), or a Dask cluster.
 
     Raises:
         ScenarioError: the package that a cluster needs is missing.
     """
-    from ..errors import ScenarioError
-
+    if not scheduler:
+        return lambda jobs, told: execute(jobs, workers=workers, done=told)
     try:
         from .cluster import run_on_cluster
     except ImportError:

@@ -274,11 +274,8 @@ def _check_names(experiment: Experiment, document: Document) -> None:
             ):
                 sentence = f"grid {number.rank_correlation!r} has no published numbers to compare with"
                 document.report(place, sentence)
-    judged = (("claims", enumerate(spec.claims)), ("checks", enumerate(spec.checks)))
-    for group, items in (*judged, ("limits", spec.limits.items())):
-        for which, one in items:
-            for k, condition in enumerate(one.holds_if):
-                _check_condition(experiment, document, (group, which, "holds_if", k), condition)
+    for key, condition in spec.conditions():
+        _check_condition(experiment, document, key, condition)
     for name, limit in spec.limits.items():
         check_axis(("limits", name, "of"), limit.of)
         if limit.of in spec.axes and not spec.axes[limit.of].numeric:

@@ -86,9 +86,14 @@ class Findings:
         return next(iter(self.at.values()))
 
     @cached_property
+    def derived_at(self) -> dict[Point, dict[str, Value]]:
+        """Point -> numbers derived from several runs, those that exist."""
+        return {point: derive(self.spec, values) for point, values in self.at.items()}
+
+    @property
     def derived(self) -> dict[str, Value]:
         """Numbers derived from several runs, as `values`."""
-        return derive(self.spec, self.values)
+        return next(iter(self.derived_at.values()))
 
     @cached_property
     def claims(self) -> list[Judgement]:
@@ -103,7 +108,7 @@ class Findings:
     def judged(self, claim: Claim) -> Judgement:
         """Return whether a claim holds; along axes, whether it does at every point."""
         words = {run.name: run.row for run in self.experiment.runs.values()}
-        every = [judge(claim, values, words, derive(self.spec, values)) for values in self.at.values()]
+        every = [judge(claim, values, words, self.derived_at[at]) for at, values in self.at.items()]
         if len(every) == 1:
             return every[0]
         verdicts = [one.holds for one in every]

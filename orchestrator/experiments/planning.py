@@ -12,6 +12,7 @@ from ..metrics.run_metrics import STANDARD, metric, results_to_be, unit_in
 from ..plan import Fmu, Plan
 from ..results.read import Results
 from ..scenario import quantities
+from ..scenario.yaml_lines import dotted
 from ..wiring.shared_facts import FACTS
 from .axis_schema import AxisSpec
 from .design import Level
@@ -154,15 +155,11 @@ def _metric_units(experiment: Experiment, made_up: list[Results]) -> dict[str, s
 def _bounds(experiment: Experiment, units: dict[str, str]) -> Iterable[tuple[str, str, float | str]]:
     """Yield (place, unit, bound) of all bounds in the file whose unit is known."""
     spec = experiment.spec
-    judged = (("claims", enumerate(spec.claims)), ("checks", enumerate(spec.checks)))
-    for group, items in (*judged, ("limits", spec.limits.items())):
-        for which, one in items:
-            place = f"{group}.{which}" if group == "limits" else f"{group}[{which}]"
-            for i, condition in enumerate(one.holds_if):
-                derived = spec.derived.get(condition.derived)
-                unit = derived.unit if derived else units.get(condition.metric)
-                if unit is not None and not isinstance(condition.bound, Reference):
-                    yield f"{place}.holds_if[{i}]", unit, condition.bound
+    for key, condition in spec.conditions():
+        derived = spec.derived.get(condition.derived)
+        unit = derived.unit if derived else units.get(condition.metric)
+        if unit is not None and not isinstance(condition.bound, Reference):
+            yield dotted(key), unit, condition.bound
     for i, figure in enumerate(spec.figures):
         for name in ("largest", "mark"):
             if figure.metric in units and (given := getattr(figure, name)) is not None:

@@ -75,6 +75,7 @@ share an axis. In place of `vary` and `values`, `variants` change several things
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -82,8 +83,9 @@ from pydantic import BeforeValidator, Field, model_validator
 from ..figures.plots import OVERVIEW
 from ..scenario.scenario_schema import Scalar
 from ..scenario.strict import Strict
+from ..scenario.yaml_lines import Key
 from .axis_schema import MOST, AxisSpec, Changes
-from .judged_schema import Alternatives, Claim, DerivedSpec, GridSpec, LimitSpec, MetricSpec
+from .judged_schema import Alternatives, Claim, Condition, DerivedSpec, GridSpec, LimitSpec, MetricSpec
 from .numbers import Quantity
 
 Patterns = Annotated[list[str], Field(min_length=1)]
@@ -209,6 +211,14 @@ class ExperimentSpec(Changes):
         if number > MOST:
             raise ValueError(f"{number} runs; at most {MOST} are taken")
         return self
+
+    def conditions(self) -> Iterator[tuple[Key, Condition]]:
+        """Yield every condition of claims, checks and limits, with its place in the file."""
+        judged = (("claims", enumerate(self.claims)), ("checks", enumerate(self.checks)))
+        for group, items in (*judged, ("limits", self.limits.items())):
+            for which, one in items:
+                for k, condition in enumerate(one.holds_if):
+                    yield (group, which, "holds_if", k), condition
 
     def number_of_points(self) -> int:
         """Return how many points the design has."""
