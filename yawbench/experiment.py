@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,6 +21,7 @@ from orchestrator.experiments.table import columns_of, to_pandas
 from orchestrator.experiments.workers import execute
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.results.read import Results
+from orchestrator.scenario.quantities import number_and_unit
 from orchestrator.scenario.strict import Model, validate
 from orchestrator.scenario.yaml_lines import Document
 from orchestrator.wording import hint
@@ -86,13 +86,13 @@ def _checked(model: type[Model], given: dict[str, Any]) -> Model:
 
 def _values(name: str, levels: Sequence[Any]) -> dict[str, Any]:
     """Return levels as an axis has them: numbers apart from the unit that they share."""
-    split = [re.fullmatch(r"\s*([+-]?[\d.]+(?:e[+-]?\d+)?)\s+(\S.*)", str(level)) for level in levels]
-    units = {one[2] for one in split if one}
+    split = [number_and_unit(level) if isinstance(level, str) else None for level in levels]
+    units = {one[1] for one in split if one}
     if not units:
         return {"values": [float(x) if hasattr(x, "dtype") else x for x in levels]}
     if len(units) > 1 or not all(split):
         raise ScenarioError(f"{name}: give all levels in one unit, or none")
-    return {"values": [float(one[1]) for one in split if one], "unit": units.pop()}
+    return {"values": [float(one[0]) for one in split if one], "unit": units.pop()}
 
 
 @dataclass(frozen=True)
@@ -130,8 +130,8 @@ class Experiment:
         Raises:
             YawbenchError: a run cannot start; none has been made.
         """
-        programs = {path: program.fmu for path, program in self.base.programs.items()}
-        once = Once(build=True, tell=lambda text: None, opened=programs)
+        programs = self.base.programs
+        once = Once(**self.base._opening())
         planned = plan_experiment(self.design, jobs_of(self.design, self.base.path.parent), once=once)
         metrics = metrics_of(planned.experiment)
         outcomes: dict[int, Outcome] = {}

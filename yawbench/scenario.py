@@ -133,15 +133,18 @@ class Scenario:
             YawbenchError: an FMU is missing, a component whose source has changed cannot be built, or
                 the units cannot be connected.
         """
-        programs = {path: program.fmu for path, program in self.programs.items()}
-        opener = Opener(build=True, tell=lambda text: None, opened=programs)
-        plan = make_plan(self.loaded, opener=opener)
+        plan = make_plan(self.loaded, opener=Opener(**self._opening()))
         notes = tuple(
             f"{unit.name}: {unit.fmu.name} is plain Python of this process, no FMU"
             for unit in plan.units
             if unit.fmu.path in self.programs
         )
         return replace(plan, notes=plan.notes + notes)
+
+    def _opening(self) -> dict[str, Any]:
+        """Return the options of an `Opener`: what is stale is built in silence, plain Python is there."""
+        opened = {path: program.fmu for path, program in self.programs.items()}
+        return {"build": True, "tell": lambda text: None, "opened": opened}
 
     def run(self, *, progress: Callable[[int, int], None] | None = None) -> Run:
         """Run the scenario in this process and return its results; nothing is written.

@@ -38,6 +38,12 @@ _LARGEST = Fraction(sys.float_info.max)
 _COMMA = re.compile(r"\s*([+-]?\d+),(\d+\s*[^,]*?)\s*", re.ASCII)
 
 
+def number_and_unit(text: str) -> tuple[str, str] | None:
+    """Return what a quantity is written as, ("80", "km/h"); None if `text` is no number with a unit."""
+    match = _NUMBER.fullmatch(text) if len(text) <= WRITTEN else None
+    return (match["number"], match["unit"]) if match and match["unit"] else None
+
+
 def convert(text: str, unit: str | None, definition: UnitDefinition | None = None) -> Fraction | float:
     """Return the quantity `text` as a number in `unit`: a Fraction where that is exact.
 
@@ -46,13 +52,13 @@ def convert(text: str, unit: str | None, definition: UnitDefinition | None = Non
     Raises:
         ValueError: a sentence that says what `text` should have been.
     """
-    match = _NUMBER.fullmatch(text) if len(text) <= WRITTEN else None
-    if match is None or not match["unit"]:
+    written = number_and_unit(text)
+    if written is None:
         wanted = f" in {unit}" if unit else ""
         comma = _COMMA.fullmatch(text) if len(text) <= WRITTEN else None
         point = f"; write a decimal point: {comma[1]}.{comma[2]}" if comma else ""
         raise ValueError(f"{short(text)} is neither a number{wanted} nor a number with its unit{point}")
-    number, given = Fraction(match["number"]), match["unit"]
+    number, given = Fraction(written[0]), written[1]
     if abs(number) > _LARGEST:
         raise ValueError(f"must be a finite number{f' in {unit}' if unit else ''} (got {text!r})")
     if given == unit:

@@ -72,6 +72,7 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_others_are_made(base)
         ({"controlller": ["a"]}, "the scenario has no unit 'controlller'; did you mean 'controller'"),
         ({"driver.amplitude": []}, "axes.driver.amplitude.values: has no values"),
         ({"driver.amplitude": ["1 deg", 2]}, "driver.amplitude: give all levels in one unit, or none"),
+        ({"driver.amplitude": ["1.2.3 deg"]}, "'1.2.3 deg': give plain numbers, and their unit"),
         ({"driver.amplitde": [1, 2]}, "has no parameter 'amplitde'; did you mean 'amplitude'"),
         ({"controller": [Proportional(), Proportional()]}, "controller: two levels are called Proportional"),
     ],
