@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .batch import Jobs, hold, print_tables
-from .experiment import Wishes, chapter_of, conduct, write_page
+from .experiment import Wishes, chapter_of, command_of, conduct, write_page
 from .options import CallLimit, Fmus, Format, Fresh, Isolate, NoBuild, Out, ScenarioFile, Set, isolation
 
 Swaps = Annotated[
@@ -44,8 +44,6 @@ def compare(
     Without --out, results go to results/<folder of the scenario>/<its name>-compare. A run that
     fails is named and takes no other with it.
     """
-    import shlex
-
     from ..experiments.compare import comparison, comparison_table
     from ..pages.comparison import comparison_facts
     from ..results.formats import check_format
@@ -59,8 +57,7 @@ def compare(
     wishes = Wishes(fmus, not no_build, jobs, None, format_, isolation(isolate, call_limit), fresh=fresh)
     findings = conduct(comparison(scenario, swap, for_each), folder, wishes)
     print_tables([comparison_table(findings)])
-    options = [*(("--swap", one) for one in swap), *(("--set", one) for one in set_ or ())]
-    command = shlex.join(["yawbench", "compare", str(scenario), *(part for one in options for part in one)])
+    command = command_of("compare", scenario, swap=swap, set=set_)
     facts = {"comparison": comparison_facts(findings)}
     write_page([chapter_of(findings, folder, command, shown_in=folder, **facts)], folder)
     if findings.failed:

@@ -8,7 +8,7 @@ import typer
 
 from ..plan import Algorithm
 from .batch import hold, print_tables
-from .experiment import Wishes, chapter_of, conduct, write_page
+from .experiment import Wishes, chapter_of, command_of, conduct, write_page
 from .options import CallLimit, Fmus, Isolate, NoBuild, Out, ScenarioFile, Set, Swap, isolation
 
 Halvings = Annotated[
@@ -46,7 +46,6 @@ def converge(
     follow each other, so that their wall times can be compared. Without --out, results go to
     results/<folder of the scenario>/<its name>-converge.
     """
-    import shlex
     from typing import get_args
 
     from ..errors import ScenarioError
@@ -79,7 +78,15 @@ def converge(
     table = convergence_table(rows, experiment.spec.title)
     write_whole(folder / "converge.csv", to_csv(columns_of(rows)))
     print_tables([table])
-    command = ["yawbench", "converge", str(scenario), "--halvings", str(halvings), "--signal", signal]
+    command = command_of(
+        "converge",
+        scenario,
+        halvings=[halvings],
+        signal=[signal],
+        algorithm=algorithm,
+        swap=swap,
+        set=set_,
+    )
     charts = []
     if any(row.error for row in rows):
         note = f"yawbench converge {scenario} · units with a step size of their own keep it"
@@ -87,6 +94,6 @@ def converge(
         save(figure, folder / "converge")
         charts = [image_of(folder / "converge.svg", experiment.spec.title)]
     facts = {"results": [table], "charts": charts}
-    write_page([chapter_of(findings, folder, shlex.join(command), shown_in=folder, **facts)], folder)
+    write_page([chapter_of(findings, folder, command, shown_in=folder, **facts)], folder)
     if any(row.failed for row in rows):
         raise typer.Exit(1)

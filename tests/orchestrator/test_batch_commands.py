@@ -134,6 +134,8 @@ def test_converge_halves_the_step_and_reports_order_and_cost(yawbench, folder):
     rows = list(csv.DictReader((folder / "o/converge.csv").open()))
     assert float(rows[0]["order [1]"]) == pytest.approx(1.0, abs=0.1)  # jacobi is one step late
     assert float(rows[0]["wall_time [s]"]) > 0
+    again = "--halvings 2 --signal reference.yaw_rate_ref --algorithm jacobi --algorithm gauss_seidel"
+    assert f"yawbench converge half.yaml {again}" in (folder / "o/report.html").read_text()
 
 
 def test_converge_records_only_the_signal(yawbench, folder):
