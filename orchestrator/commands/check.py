@@ -38,7 +38,8 @@ def check(
 ) -> None:
     """Validate a scenario; show units, values, wires.
 
-    Every value is shown with its origin, the units with the reason for their order.
+    Every value is shown with its origin, the units with the reason for their order, and what the
+    control side sees as the truth, a measurement or an estimate.
     """
     plan = plan_of_scenario(scenario, swap, set_, fmus=fmus, build=not no_build, validate=not no_validate)
     show(plan, scenario, defaults=all_)
@@ -79,7 +80,11 @@ def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None
     if hidden:
         also = " or come from tyre files" if plan.scenario.get("tyre_files") else ""
         console.print(f"  {hidden} more are left at the FMUs' defaults{also}: --all shows them", style="dim")
-    _show(console, "Wires", ("from", "to", "variables"), _wire_rows(plan))
+    wires = list(_wire_rows(plan))
+    if any(seen for _, _, seen, _ in wires):
+        _show(console, "Wires", ("from", "to", "as", "variables"), wires)
+    else:
+        _show(console, "Wires", ("from", "to", "variables"), [(of, to, what) for of, to, _, what in wires])
     direct = evaluate({unit.name: unit.fmu for unit in plan.units}, plan.wires).direct
     headings = ("unit", "after", "because its outputs follow")
     _show(console, "Why this order", headings, _order_rows(plan, direct))
@@ -177,7 +182,9 @@ def _shown(value: Value | None, measure: str | None) -> str:
     return f"{text}{f' {measure}' if measure and measure != '1' else ''}"
 
 
-def _wire_rows(plan: Plan) -> Iterable[Sequence[str]]:
+def _wire_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
+    """Yield source, target, as what the control side sees the source, and the variables."""
+    from ..wiring.seen import seen_as
     from ..wording import fold_wires, star
 
     units = {unit.name: unit.fmu.variables for unit in plan.units}
@@ -191,7 +198,7 @@ def _wire_rows(plan: Plan) -> Iterable[Sequence[str]]:
             if example.converts:
                 measure = f"{of or '?'} → {measure or '?'}: {_scaled(example)}"
             shown.append(f"{ends} [{measure}]" if measure else ends)
-        yield source, target, ", ".join(shown)
+        yield source, target, seen_as(wires[0], plan.units), ", ".join(shown)
 
 
 def _scaled(wire: Wire) -> str:

@@ -189,7 +189,8 @@ class Connection(Strict):
 
     Lists of units choose among equal names: `{from: [estimator, sensor], to: [controller, reference]}`
     lets each input of the latter take the output of its name from the first of the former that has it,
-    before any other unit. `from: null` leaves inputs without a source, whatever outputs there are.
+    before any other unit; what none of them has comes from elsewhere. Several lists for one unit have to
+    agree on an order. `from: null` leaves inputs without a source, whatever outputs there are.
     """
 
     source: Source = Field(alias="from", description="unit.output, or units in order, or null")

@@ -7,8 +7,9 @@ nothing is connected by equal names.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import replace
+from itertools import pairwise
 
 from vocabulary.wheels import WHEELS
 
@@ -47,6 +48,7 @@ class Connector:
         for unit, outputs in self._outputs.items():
             for name in outputs:
                 self._having.setdefault(name, []).append(unit)
+        self._preferring: dict[str, list[tuple[list[str], Key]]] = {}  # unit -> lists of sources
         self._preferred: dict[str, list[tuple[str, Key]]] = {}  # unit -> sources of equal names, in order
         self._refused: set[Input] = set()  # by equal names
         self._fitting: dict[object, dict[str, list[str]]] = {}  # kind of an input -> see `_fitting_outputs`
@@ -54,6 +56,7 @@ class Connector:
     def connect(self) -> tuple[list[Wire], dict[str, dict[str, Value | Series]]]:
         """Return all wires, and each unit's constants and time series."""
         wires = self._by_connections()
+        self._put_in_order()
         given = constants(self._scenario, self._fmus, self._replaced, self._notes, self._found)
         own = {target for target, constant in given.items() if constant.of_unit}
         self._note_overruled(own - wires.keys())
@@ -124,8 +127,7 @@ class Connector:
         """Return the wires of a connection; lists of units and null are kept for equal names."""
         ends = connection.source, connection.target
         if isinstance(ends[0], list) and isinstance(ends[1], list):
-            for unit in ends[1]:
-                self._preferred.setdefault(unit, []).extend((source, key) for source in ends[0])
+            self._prefer(ends[0], ends[1], key)
             return []
         (target, to_pattern) = ends[1]
         inputs = matching(to_pattern, self._inputs[target])
@@ -154,6 +156,37 @@ class Connector:
             given, wanted = listed(outputs, last="or"), listed(inputs, last="or")
             self._report(key, f"nothing matches: in 'from' the * can be {given}, in 'to' {wanted}")
         return [Wire(source, output, target, name) for output, name in pairs]
+
+    def _prefer(self, sources: list[str], targets: list[str], key: Key) -> None:
+        """Keep which sources go first for units; report lists that mean nothing."""
+        for end, names in (("from", sources), ("to", targets)):
+            if twice := next((name for name in names if names.count(name) > 1), None):
+                self._report((*key, end), f"names {twice} twice")
+        for unit in targets:
+            self._preferring.setdefault(unit, []).append((sources, key))
+        ends = [(s, t) for s in sources for t in targets if s != t]
+        if any(self._outputs[s].keys() & self._inputs[t].keys() for s, t in ends):
+            return
+        if self._scenario.replaced.keys() & {*sources, *targets}:
+            self._notes.append(f"{dotted(key)} is left out: no names are equal any more")
+            return
+        given, wanted = listed(sources, last="or"), listed(targets, last="or")
+        self._report(key, f"nothing matches: no output of {given} has the name of an input of {wanted}")
+
+    def _put_in_order(self) -> None:
+        """Put the sources that a unit prefers in the one order that agrees with every list of them."""
+        for unit, lists in self._preferring.items():
+            keys = {source: key for sources, key in reversed(lists) for source in sources}
+            left = list(dict.fromkeys(source for sources, _ in lists for source in sources))
+            order = self._preferred.setdefault(unit, [])
+            while left:
+                behind = {s for sources, _ in lists for s in [one for one in sources if one in left][1:]}
+                first = next((s for s in left if s not in behind), None)
+                if first is None:
+                    self._report(lists[-1][1], f"{unit} cannot prefer {_in_a_circle(lists, left)}")
+                    first = left[0]  # so that nothing else is reported of it
+                left.remove(first)
+                order.append((first, keys[first]))
 
     def _no_such(self, key: Key, unit: str, pattern: str, kind: str) -> None:
         """Report a pattern without a match, or note it if the FMU that was replaced has one."""
@@ -289,3 +322,16 @@ class Connector:
         for unit, measure in odd:
             who = f"{unit} ({self._fmus[unit].name})"
             self._notes.append(f"{who} defines {measure} otherwise than usual: taken as it defines it")
+
+
+def _in_a_circle(lists: Sequence[tuple[list[str], Key]], left: Sequence[str]) -> str:
+    """Return in words the preferences of lists that lead in a circle, all of them among the units `left`."""
+    before: dict[str, tuple[str, Key]] = {}
+    for sources, key in lists:
+        for one, other in pairwise([s for s in sources if s in left]):
+            before.setdefault(other, (one, key))
+    path = [left[0]]
+    while path[-1] not in path[:-1]:
+        path.append(before[path[-1]][0])
+    circle = path[path.index(path[-1]) :]
+    return listed(f"{before[b][0]} to {b} ({dotted(before[b][1])})" for b in circle[:-1])

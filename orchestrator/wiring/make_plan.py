@@ -31,6 +31,7 @@ from .functions import missing_functions
 from .order import evaluate
 from .parameters import Parameters
 from .recording import recorded
+from .seen import exact
 
 
 def make_plan(
@@ -91,6 +92,7 @@ def make_plan(
         "so a wire against the evaluation order uses earlier values"
         for loop in evaluation.possible_loops[:1]
     ]
+    notes += exact(list(units.values()), wires)
     findings = remarks(scenario, units)
     return Plan(
         units=tuple(units[name] for name in evaluation.order),

@@ -207,3 +207,47 @@ def test_a_wire_that_converts_says_from_what_into_what(capsys: pytest.CaptureFix
     make_fmu(Path("Läufe 2/driver_deg.fmu"), outputs=outputs)
     assert check("Läufe 2/a.yaml", "--swap", "driver=Läufe 2/driver_deg.fmu") == 0
     assert "steer_angle [deg → rad: x 0.0174533]" in capsys.readouterr().out
+
+
+SENSED = """\
+stop_time: 2
+step_size: 1 ms
+units:
+  driver: {fmu: driver_a}
+  reference: {fmu: reference_a}
+  ideal: {fmu: reference_a}
+  controller: {fmu: controller_a}
+  plant: {fmu: plant_a}
+  gyro: {fmu: sensor_a}
+  estimator: {fmu: estimator_a}
+connections:
+  - {from: plant.*, to: gyro.*_true}
+  - {from: [estimator, gyro, reference], to: [reference, controller, estimator]}
+  - {from: [plant], to: [ideal, driver]}
+"""
+
+
+def test_what_the_control_side_sees_is_shown_and_what_it_sees_exactly_is_noted(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    fmus = Path("fmus")
+    rate, angle = {"unit": "rad/s"}, {"unit": "rad"}
+    steered, turning = Var("steer_angle", "rad"), Var("yaw_rate", "rad/s")
+    make_fmu(fmus / "driver_a.fmu", inputs=[turning], outputs=[out("steer_angle", **angle)])
+    make_fmu(fmus / "reference_a.fmu", inputs=[steered, turning], outputs=[out("yaw_rate_ref", **rate)])
+    make_fmu(fmus / "controller_a.fmu", outputs=[out("yaw_moment", unit="N.m")],
+             inputs=[turning, Var("sideslip", "rad"), Var("yaw_rate_ref", "rad/s")])  # fmt: skip
+    make_fmu(fmus / "plant_a.fmu", inputs=[steered, Var("yaw_moment", "N.m")],
+             outputs=[out("yaw_rate", **rate), out("sideslip", **angle)])  # fmt: skip
+    make_fmu(fmus / "sensor_a.fmu", inputs=[Var("yaw_rate_true", "rad/s")], outputs=[out("yaw_rate", **rate)])
+    make_fmu(fmus / "estimator_a.fmu", inputs=[turning], outputs=[out("sideslip", **angle)])
+    Path("b.yaml").write_text(SENSED)
+    assert check("b.yaml") == 0
+    shown = capsys.readouterr()
+    rows = [line.split(maxsplit=3) for line in shown.out.splitlines()]
+    assert ["gyro", "controller", "measurement", "yaw_rate [rad/s]"] in rows
+    assert ["estimator", "controller", "estimate", "sideslip [rad]"] in rows
+    assert ["gyro", "estimator", "measurement", "yaw_rate [rad/s]"] in rows
+    assert ["plant", "ideal", "truth", "yaw_rate [rad/s]"] in rows
+    assert ["reference", "controller", "yaw_rate_ref", "[rad/s]"] in rows
+    assert shown.err == "note: exact, though there is a sensor: steer_angle of reference (from driver)\n"

@@ -800,6 +800,31 @@ def test_a_list_of_units_goes_after_connections_and_constants_that_name_the_inpu
     assert sources(made, "yaw_rate") == {"controller": "estimator"}
 
 
+def test_several_lists_of_units_count_in_the_order_that_all_of_them_allow(folder: Path) -> None:
+    rest = TORQUES + "  - {from: [road, driver], to: [tyre, controller]}\n"
+    rest += "  - {from: [estimator, road], to: [controller]}\n"
+    made = plan(scenario(estimators(folder), rest))
+    assert sources(made, "friction") == {"controller": "estimator"}
+    assert sources(made, "friction_fl") == {"tyre": "road"}
+
+
+def test_what_a_swap_leaves_without_equal_names_is_no_error_but_a_note() -> None:
+    path = scenario(rest=CONSTANTS + TORQUES + "  - {from: [driver], to: [controller]}\n")
+    made = plan(path, swaps=["controller=controller_off"])
+    assert "connections[1] is left out: no names are equal any more" in made.notes
+
+
+def test_lists_that_prefer_in_a_circle_are_an_error_that_names_it(folder: Path) -> None:
+    rest = TORQUES + "  - {from: [estimator, road], to: [controller]}\n"
+    rest += "  - {from: [road, driver], to: [tyre, controller]}\n"
+    rest += "  - {from: [driver, estimator], to: [controller]}\n"
+    said = (
+        "a.yaml:14: connections[3]: controller cannot prefer driver to estimator (connections[3]), "
+        "road to driver (connections[2]) and estimator to road (connections[1])"
+    )
+    assert problems(scenario(estimators(folder), rest)) == [said]
+
+
 def test_null_leaves_an_input_without_a_source(folder: Path) -> None:
     units = estimators(folder).replace("  road: {fmu: road}\n", "")
     refused = TORQUES + "  - {from: null, to: tyre.friction_*}\n"
@@ -829,6 +854,11 @@ def test_null_leaves_an_input_without_a_source(folder: Path) -> None:
             ": gain and offset are for a connection of unit.variable to unit.variable",
         ),
         ("{from: [plant.x], to: [tyre]}", ".from: must be names of units (got ['plant.x'])"),
+        ("{from: [driver, driver], to: [plant]}", ".from: names driver twice"),
+        (
+            "{from: [tyre, driver], to: [tyre]}",
+            ": nothing matches: no output of tyre or driver has the name of an input of tyre",
+        ),
         ("{from: [plnt], to: [tyre]}", ".from: there is no unit 'plnt'; did you mean 'plant'?"),
         (
             "{from: null, to: tyre.fricton_*}",
