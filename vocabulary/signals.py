@@ -57,6 +57,11 @@ SIGNALS: dict[str, Entry] = {
         "1", "Friction coefficient mu of the road, as known to reference and controller", minimum=0.0
     ),
     "friction_*": Entry("1", "Friction coefficient mu under the wheel", minimum=0.0),
+    "friction_delayed": Entry("1", "Friction coefficient mu of the road, known with a delay", minimum=0.0),
+    "slope": Entry("rad", "Angle by which the road rises along the vehicle's x axis", "θ_road"),
+    "bank": Entry("rad", "Angle by which the road rises along the vehicle's y axis, to the left", "φ_road"),
+    "wind_force_y": Entry("N", "Side force of the wind, vehicle axes, at the centre of mass", "F_wind"),
+    "wind_moment_z": Entry("N.m", "Moment of the wind about the vertical axis", "M_wind"),
     "yaw_rate_ref": Entry("rad/s", "Yaw rate the driver asks for"),
     "sideslip_ref": Entry("rad", "Sideslip angle the driver asks for"),
     "yaw_acceleration_ref": Entry("rad/s2", "Time derivative of yaw_rate_ref"),

@@ -25,6 +25,7 @@ class Kind(str, Enum):
     reference = "reference"
     tyre = "tyre"
     plant = "plant"
+    road = "road"
     vehicle = "vehicle"
     scenario = "scenario"
     study = "study"
@@ -54,8 +55,8 @@ Project = Annotated[
 def new(kind: What, name: Name, language: Written = Language.python, out: Project = None) -> None:
     """Write a starting point that works as it stands.
 
-    KIND is a unit (controller, driver, reference, tyre, plant), written with its test and a scenario that
-    uses it; a vehicle with a scenario; a scenario; or a study or sweep of one. The next steps are
+    KIND is a unit (controller, driver, reference, tyre, plant, road), written with its test and a scenario
+    that uses it; a vehicle with a scenario; a scenario; or a study or sweep of one. The next steps are
     printed. In a checkout of yawbench the files are put among its own, where `yawbench build` finds them;
     elsewhere into folders controllers, tests, scenarios and so on. Nothing is ever overwritten.
     """
@@ -86,7 +87,7 @@ def new(kind: What, name: Name, language: Written = Language.python, out: Projec
 
 def _next(kind: str, name: str, begun: Beginning, folder: Path, in_checkout: bool) -> list[list[str]]:
     """Return the commands that build, test and run what has been written."""
-    from ..scaffold.beginnings import UNITS
+    from ..scaffold.beginnings import MORE, UNITS
 
     yawbench, python = _program("yawbench"), _program("python")
     fmus = [] if in_checkout else ["--out", str(_shown(folder / "fmus"))]
@@ -100,7 +101,7 @@ def _next(kind: str, name: str, begun: Beginning, folder: Path, in_checkout: boo
     main = str(_shown(folder / begun.main))
     commands.append([yawbench, kind if kind in ("study", "sweep") else "run", main])
     if begun.source:
-        other = "controller_off" if kind == "controller" else UNITS[kind][0]
+        other = "controller_off" if kind == "controller" else (UNITS | MORE)[kind][0]
         commands.append([yawbench, "compare", main, "--swap", f"{kind}={other},{kind}_{name}"])
     return commands
 

@@ -23,7 +23,9 @@ UNITS = {
     "tyre": ("tyre_dugoff", ""),
 }
 """Unit -> FMU and what else a scenario says of it: paper A's run at 25 m/s."""
-ROLES = ("controller", "driver", "reference", "tyre", "plant")
+MORE = {"road": ("road_patchwork", "")}
+"""Units which that run does without."""
+ROLES = ("controller", "driver", "reference", "tyre", "plant", "road")
 """Units that can be begun with."""
 KINDS = (*ROLES, "vehicle", "scenario", "study", "sweep")
 """All that can be begun with."""
@@ -82,7 +84,7 @@ def _unit(
     home = PurePosixPath("components" if in_checkout else "", f"{role}s")
     source = home / (f"{name}.py" if language == "python" else name)
     test = PurePosixPath("tests/components" if in_checkout else "tests", f"test_{name}.py")
-    own = {"driver": ""}.get(role, UNITS[role][1])  # its parameters are its own
+    own = {"driver": ""}.get(role, (UNITS | MORE)[role][1])  # its parameters are its own
     facts |= {
         "role": role,
         "fmu": f"{role}_{name}",
@@ -91,7 +93,7 @@ def _unit(
         "source": source,
         "levels": len(test.parts) - 1,
         "source_words": f"{facts['source_words']}, with a {role} of your own",
-        "units": [(u, f"{role}_{name}", own) if u == role else (u, *UNITS[u]) for u in UNITS],
+        "units": [(unit, *fmu) for unit, fmu in (UNITS | {role: (f"{role}_{name}", own)}).items()],
         **LAW,
     }
     templates = {scenario: "scenario.yaml.j2"}

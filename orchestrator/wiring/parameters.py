@@ -140,8 +140,8 @@ class Parameters:
             for unit, name in takers:
                 self._put(given, unit, name, raw, self._scenario.document, (fact_name,))
             by_change.update(takers if changed else ())
-            if not fact.parameters or takers:
-                continue
+            if not fact.parameters or fact.inputs or takers:
+                continue  # a fact with inputs is judged by these
             before = [
                 had(self._scenario, self._replaced, self._fmus, name, "parameter") for name in fact.parameters
             ]

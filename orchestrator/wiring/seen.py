@@ -26,11 +26,15 @@ def role_of(unit: str, fmu: Fmu) -> str:
 
 
 def seen_as(wire: Wire, units: Iterable[Unit]) -> str:
-    """Return "truth", "measurement" or "estimate"; "" for what the control side says, or does not see."""
+    """Return "truth", "late truth", "measurement" or "estimate".
+
+    "" for what the control side says itself, or does not see.
+    """
     roles = {unit.name: role_of(unit.name, unit.fmu) for unit in units}
     if roles[wire.target] not in (*CONTROL, "estimator") or roles[wire.source] in CONTROL:
         return ""
-    return SENSING.get(roles[wire.source], TRUTH)
+    truth = "late truth" if wire.output.endswith("_delayed") else TRUTH
+    return SENSING.get(roles[wire.source], truth)
 
 
 def exact(units: Sequence[Unit], wires: Iterable[Wire]) -> list[str]:

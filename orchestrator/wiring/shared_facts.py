@@ -1,6 +1,7 @@
 """What one name tells all units that have to know it: the friction of the road, the speed of the car.
 
-    friction: 0.65         # every input `friction`, `friction_fl` .. `friction_rr` that no unit drives
+    friction: 0.65         # every parameter `base_friction` of a road, and every input `friction`,
+                           # `friction_fl` .. `friction_rr` that no unit drives
     speed: 80 km/h         # every parameter `initial_speed`, `target_speed`
 
 In a scenario a fact stands behind what is given by its own name; as a change (`--set friction=0.3`) it goes
@@ -39,7 +40,7 @@ class Fact:
 
 
 FACTS = {
-    "friction": Fact("1", inputs=("friction", *wheels("friction_*"))),
+    "friction": Fact("1", ("friction", *wheels("friction_*")), {"base_friction": ""}),
     "speed": Fact("m/s", parameters={"initial_speed": "", "target_speed": "speed_gain"}),
 }
 assert tuple(FACTS) == NAMES

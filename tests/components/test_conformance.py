@@ -35,12 +35,15 @@ continuous = pytest.mark.parametrize(
     ids=[name for name, c in COMPONENTS.items() if not c.sampled],
 )
 
+TEXTS = {"patches": {"y > 0": "y < 0"}}
+"""Parameters that are free text: values, and what the same looks like in a mirror."""
+
 VARIANTS = [
     pytest.param(component, {v.name: other}, id=f"{name}, {v.name}={other}")
     for name, component in COMPONENTS.items()
     for v in component.variables
     if v.causality == "parameter" and v.type in ("Boolean", "String")
-    for other in (v.choices or (not v.start,))
+    for other in TEXTS.get(v.name) or v.choices or (not v.start,)
     if other != v.start
 ]
 as_every_variant = pytest.mark.parametrize(
@@ -82,10 +85,14 @@ ODD = {
     *wheels("tyre_moment_z_*"),
     *wheels("inclination_angle_*"),
     *wheels("patch_slip_angle_*"),
+    *("bank", "wind_force_y", "wind_moment_z"),
 }
 """What changes its sign in a mirror; all else keeps it."""
 LOPSIDED = {("asymmetric_terms", True), ("table_reading", "printed"), ("wheel_choice", "printed")}
-ODD_PARAMETERS = ("amplitude", "final_steer_angle", "lane_offset", "initial_sideslip", "initial_yaw_rate")
+ODD_PARAMETERS = (
+    *("amplitude", "final_steer_angle", "lane_offset", "initial_sideslip", "initial_yaw_rate"),
+    *("road_bank", "wind_force"),
+)
 OTHER_SIDE = {"_fl": "_fr", "_fr": "_fl", "_rl": "_rr", "_rr": "_rl"}
 
 ROUNDED = dict.fromkeys(("controller_fnn", "controller_fuzzy_feedback", "controller_fuzzy_sideslip"), 1e-6)
@@ -152,7 +159,8 @@ def test_the_mirrored_inputs_give_the_mirrored_outputs(component, parameters):
         pytest.skip("tells left from right on purpose")
     left, right = Stand(component, **parameters), Stand(component, **parameters)
     turned = {n: -x for n, x in parameters_of(component).items() if n in ODD_PARAMETERS}
-    right.set(**turned)
+    texts = {n: TEXTS[n][x] for n, x in parameters.items() if n in TEXTS}
+    right.set(**turned, **texts)
     inputs = some_inputs(component, 0)
     rounding = ROUNDED.get(component.fmu_name, 0.0)
     assert right.start(**mirrored(inputs)) == pytest.approx(
@@ -226,7 +234,7 @@ def test_without_any_input_nothing_stirs(component):
 
 FREE = (
     *("yaw_rate_proportional_gain", "sideslip_proportional_gain", "reaching", "path_offset"),
-    "relaxation_length",
+    *("relaxation_length", "friction"),
 )
 """Outputs that are settings, not answers."""
 

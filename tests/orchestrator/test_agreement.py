@@ -9,6 +9,7 @@ import pytest
 from orchestrator.errors import WiringError
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
+from orchestrator.wiring.seen import seen_as
 from tests.changed import changed
 from vocabulary.wheels import WHEELS
 
@@ -50,7 +51,8 @@ def folder(tmp_path, monkeypatch):
         parameters=[Var("mass", "kg", start=1100.0), Var("initial_speed", "m/s", start=25.0), smooth[0]],
     )
     make_fmu(fmus / "tyre_x.fmu", inputs=[Var("friction_*")], outputs=[out("tyre_force_x_*", unit="N")])
-    make_fmu(fmus / "road_x.fmu", outputs=[out("friction_*")])
+    base = Var("base_friction", start=0.9)
+    make_fmu(fmus / "road_x.fmu", outputs=[out("friction_*"), out("friction_delayed")], parameters=[base])
     return tmp_path
 
 
@@ -119,10 +121,29 @@ def test_one_speed_reaches_the_plant_and_the_driver():
     assert made.findings == ()
 
 
-def test_friction_that_a_road_gives_is_left_to_it():
-    made = plan(facts="friction: 0.5", more="  road: {fmu: road_x}\n")
-    assert values(made, "reference") == {"mass": 1200.0, "friction": 0.5}
-    assert values(made, "tyre") == {}
+def test_friction_that_a_road_gives_is_left_to_it_and_is_that_of_the_road():
+    for given in ({"facts": "friction: 0.5"}, {"settings": "friction=0.5"}):
+        settings = [given["settings"]] if "settings" in given else []
+        facts = given.get("facts", "friction: 0.7")
+        made = plan(*settings, facts=facts, more="  road: {fmu: road_x}\n")
+        assert values(made, "reference") == {"mass": 1200.0, "friction": 0.5}
+        assert values(made, "road") == {"base_friction": 0.5}
+        assert values(made, "tyre") == {}
+
+
+def test_a_reference_that_is_told_another_friction_than_the_roads_is_named_unless_it_is_meant():
+    road = "  road: {fmu: road_x}\n"
+    assert remarks("inputs.reference.friction=0.3", facts="friction: 0.5", more=road) == [
+        "friction has two values: road.base_friction 0.5 (scenario), reference.friction 0.3 (--set); "
+        "--set friction=VALUE gives all of them one value"
+    ]
+    meant = plan(facts='friction: 0.5\ninputs: {"reference.friction": 0.3}', more=road)
+    assert values(meant, "reference")["friction"] == 0.3
+    assert meant.findings == ()
+    late = "connections:\n  - {from: road.friction_delayed, to: reference.friction}\n"
+    told = plan(facts="friction: 0.5", more=road + late)
+    (wire,) = (w for w in told.wires if w.target == "reference")
+    assert seen_as(wire, told.units) == "late truth"
 
 
 def test_a_fact_in_the_wrong_unit_is_refused():

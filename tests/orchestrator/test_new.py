@@ -65,7 +65,7 @@ def beginnings(project):
     """The same folder with one beginning of every other kind, taken as far as a run."""
     folder, _ = project
     made = {}
-    for kind in ("driver", "reference", "tyre", "plant", "vehicle", "scenario", "study", "sweep"):
+    for kind in ("driver", "reference", "tyre", "plant", "road", "vehicle", "scenario", "study", "sweep"):
         done = run_in(folder, "yawbench", "new", kind, f"my_{kind}")
         assert done.returncode == 0, done.stderr
         _, *commands = [shlex.split(line) for line in done.stdout.splitlines()]
@@ -83,6 +83,7 @@ def beginnings(project):
         ("reference", "reference_steady_state"),
         ("tyre", "tyre_dugoff"),
         ("plant", "plant_seven_dof"),
+        ("road", "road_patchwork"),
     ],
 )
 @pytest.mark.exhaustive

@@ -1,0 +1,1 @@
+"""Roads: what lies under the wheels, and what blows from the side."""

@@ -1,0 +1,135 @@
+"""The patches of a road: places whose friction is another one, written as text.
+
+    y > 0                                    left of the line y = 0: split friction
+    60 < x < 80                              from x = 60 m to 80 m: a jump down and up again
+    x % 40 < 20                              20 m of every 40 m
+    x % 10 < 5, y % 3 < 1.5                  where both hold; the same again every 10 m along x, 3 m along y
+    (20 0) (45 0) (30 2)                     a polygon of these corners x y
+    0.3: y > 0; 0.1: 60 < x < 80             several, with a friction of their own
+
+Patches are apart by `;` or stand on lines of their own; what follows a `#` is a remark. A patch without a
+friction of its own has that which its road has for patches. A later patch lies upon the earlier ones.
+Coordinates are those of the road [m], x = y = 0 where the car begins; the lower edge belongs to the patch.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_FRICTION = re.compile(rf"\s*({_NUMBER})\s*:")
+_SPAN = re.compile(
+    rf"(?:({_NUMBER})\s*<\s*)?([xy])(?:\s*%\s*({_NUMBER}))?(?:\s*([<>])\s*({_NUMBER}))?", re.ASCII
+)
+_CORNER = re.compile(rf"\(\s*({_NUMBER})[\s,]\s*({_NUMBER})\s*\)\s*")
+_EXAMPLES = "'y > 0', '60 < x < 80', 'x % 10 < 5, y % 3 < 1.5' or corners '(20 0) (45 0) (30 2)'"
+
+Point = tuple[float, float]
+
+
+class Span(NamedTuple):
+    """A condition: low <= x or y < high, within each period if there is one (0: none) [m]."""
+
+    axis: int  # 0: x, 1: y
+    low: float
+    high: float
+    period: float
+
+
+class Patch(NamedTuple):
+    """A place: where all spans hold, and within the polygon if there is one."""
+
+    friction: float | None  # None: what the road has for patches
+    spans: tuple[Span, ...]
+    corners: tuple[Point, ...]
+
+    def holds(self, point: Point) -> bool:
+        """Return whether a point x, y [m] lies on the patch."""
+        for axis, low, high, period in self.spans:
+            place = point[axis] % period if period else point[axis]
+            if not low <= place < high:
+                return False
+        return not self.corners or _inside(point, self.corners)
+
+
+def patches_of(text: str) -> tuple[Patch, ...]:
+    """Return the patches that a text says, in its order.
+
+    Raises:
+        ValueError: what is no patch, and what is one.
+    """
+    parts = ";".join(line.partition("#")[0] for line in text.splitlines()).split(";")
+    return tuple(_patch(part.strip()) for part in parts if part.strip())
+
+
+def friction_at(point: Point, patches: tuple[Patch, ...], *, base: float, patch: float) -> float:
+    """Return the friction [1] at x, y [m]: that of the last patch that holds it.
+
+    Args:
+        base: friction outside all patches.
+        patch: friction of patches that have none of their own.
+    """
+    for one in reversed(patches):
+        if one.holds(point):
+            return patch if one.friction is None else one.friction
+    return base
+
+
+def _patch(text: str) -> Patch:
+    friction, rest = None, text
+    if begin := _FRICTION.match(text):
+        friction, rest = float(begin[1]), text[begin.end() :]
+        if friction < 0.0:
+            raise ValueError(f"the friction of a patch must not be negative (got {text!r})")
+    spans: list[Span] = []
+    corners: tuple[Point, ...] = ()
+    for condition in re.split(r",(?![^(]*\))", rest):  # no comma within brackets
+        condition = condition.strip()
+        if condition.startswith("(") and not corners:
+            corners = _corners(condition, text)
+        else:
+            spans.append(_span(condition, text))
+    return Patch(friction, tuple(spans), corners)
+
+
+def _span(condition: str, text: str) -> Span:
+    found = _SPAN.fullmatch(condition)
+    low_text, axis, period_text, sign, bound = found.groups("") if found else ("",) * 5
+    if not axis or not (low_text or sign) or (low_text and sign == ">"):
+        raise ValueError(f"{condition!r} is no place on a road (in {text!r}): {_EXAMPLES} is")
+    low, high = float(low_text or "-inf"), float("inf")
+    if sign == ">":
+        low = float(bound)
+    elif sign == "<":
+        high = float(bound)
+    period = float(period_text or 0.0)
+    if period_text and not period > 0.0:
+        raise ValueError(f"{condition!r}: what follows % must be above zero (in {text!r})")
+    if not low < high or (period and (low >= period or high <= 0.0)):
+        raise ValueError(f"{condition!r} holds nowhere (in {text!r})")
+    return Span("xy".index(axis), low, high, period)
+
+
+def _corners(condition: str, text: str) -> tuple[Point, ...]:
+    corners, at = [], 0
+    while found := _CORNER.match(condition, at):
+        corners.append((float(found[1]), float(found[2])))
+        at = found.end()
+    if at < len(condition) or len(corners) < 3:
+        raise ValueError(
+            f"{condition!r}: a polygon is three corners or more, such as (20 0) (45 0) (30 2) (in {text!r})"
+        )
+    return tuple(corners)
+
+
+def _inside(point: Point, corners: tuple[Point, ...]) -> bool:
+    """Return whether a point is in a polygon: a ray from it crosses an odd number of edges."""
+    x, y = point
+    inside = False
+    x_0, y_0 = corners[-1]
+    for x_1, y_1 in corners:
+        if (y_0 > y) != (y_1 > y) and x < x_0 + (x_1 - x_0) * (y - y_0) / (y_1 - y_0):
+            inside = not inside
+        x_0, y_0 = x_1, y_1
+    return inside
