@@ -21,7 +21,7 @@ from orchestrator.cache import draft_of
 from orchestrator.errors import BuildError
 
 from .c.c_recipe import CRecipe, find_c_components
-from .check import defects
+from .check import defects, reference_files
 from .closure import Parts, Sources
 from .compiler import compile_launcher
 from .mark import Mark, read_mark
@@ -202,6 +202,11 @@ def bring_up_to_date(recipe: Recipe, target: Path, mark: Mark, force: bool = Fal
             return False
         files, modules = recipe.make()
         credits = CREDITS if mark.is_component else {}
+        if mark.is_component:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with draft_of(target, to_bytes(files, mark)) as draft:
+                made = reference_files(draft, *modules)
+            files |= {path: text.encode() for path, text in made.items()}
         files = presented(files, recipe.listing(), role=recipe.role, credits=credits)
         put(target, to_bytes(files, mark), *modules)
     except BuildError as error:

@@ -1,4 +1,4 @@
-"""Is an FMU that has just been built right: its model description, and does it load?
+"""Is an FMU that has just been built right: its model description, and does it load? What does it compute?
 
 It is loaded in a process of its own, one for all FMUs of a build: an FMU may end its process, and
 what it leaves behind in one is nobody's concern.
@@ -27,6 +27,21 @@ def defects(fmu: Path, *modules: str) -> list[str]:
     It is validated, loaded once, and its parameters must have the values that its model
     description says.
     """
+    answer = _ask("defects", fmu, *modules)
+    return [f"does not load: its process {answer}"] if isinstance(answer, str) else answer
+
+
+def reference_files(fmu: Path, *modules: str) -> dict[str, str]:
+    """Return path in the archive -> text of an FMU's reference result, nothing if its run fails.
+
+    It fails here where there is no binary for this platform, for instance.
+    """
+    answer = _ask("reference_files", fmu, *modules)
+    return {} if isinstance(answer, str) else answer
+
+
+def _ask(what: str, *arguments: object) -> Any:
+    """Return the answer to a request; a text says how the process that should give it ended."""
     global _checker
     if _checker is None or _checker.poll() is not None:
         _checker = subprocess.Popen(
@@ -34,13 +49,11 @@ def defects(fmu: Path, *modules: str) -> list[str]:
         )
         atexit.register(_end, _checker)
     try:
-        print(json.dumps([str(fmu), *modules]), file=_checker.stdin, flush=True)
+        print(json.dumps([what, *map(str, arguments)]), file=_checker.stdin, flush=True)
         answer = _checker.stdout.readline()  # type: ignore[union-attr]
     except BrokenPipeError:
         answer = ""
-    if answer:
-        return json.loads(answer)
-    return [f"does not load: its process {how_it_ended(_checker.wait()).rstrip(',')}"]
+    return json.loads(answer) if answer else how_it_ended(_checker.wait()).rstrip(",")
 
 
 def _end(checker: subprocess.Popen) -> None:
@@ -56,8 +69,21 @@ def main() -> None:
         die_with_parent()
     answers: IO[str] = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
+    answering = {"defects": _defects, "reference_files": _reference_files}
     for line in sys.stdin:
-        print(json.dumps(_defects(*json.loads(line))), file=answers, flush=True)
+        what, *arguments = json.loads(line)
+        print(json.dumps(answering[what](*arguments)), file=answers, flush=True)
+
+
+def _reference_files(fmu: str, *modules: str) -> dict[str, str]:
+    from .reference_result import reference_result
+    from .staging import apart
+
+    try:
+        with apart(*modules):
+            return reference_result(Path(fmu))
+    except Exception:  # the FMU's own, or fmpy's
+        return {}
 
 
 def _defects(fmu: str, *modules: str) -> list[str]:

@@ -15,6 +15,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
+from .reference_result import FOLDER
+
 DESCRIPTION = "modelDescription.xml"
 DATE = "2026-11-22T00:00:00Z"
 """Of this version of the program; the time of a build would make equal sources give different FMUs."""
@@ -45,7 +47,7 @@ def presented(
             root.set(key, value)
     shown = {
         DESCRIPTION: ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n",
-        "documentation/index.html": _page(root, sources).encode(),
+        "documentation/index.html": _page(root, sources, _reference(files)).encode(),
     }
     for file in icon(role):
         shown["model.png"] = file.read_bytes()
@@ -57,7 +59,7 @@ def icon(role: str) -> list[Path]:
     return [file] if (file := ICONS / f"{role}.png").exists() else []
 
 
-def _page(root: Element, sources: Mapping[str, str]) -> str:
+def _page(root: Element, sources: Mapping[str, str], reference: str) -> str:
     name = root.get("modelName") or ""
     variables = [(v, v[0]) for v in root.iterfind("ModelVariables/ScalarVariable")]
     facts = {key: root.get(key) for key in ("author", "copyright", "license", "version", "generationTool")}
@@ -69,6 +71,7 @@ def _page(root: Element, sources: Mapping[str, str]) -> str:
         _variables("Outputs", "output", (), variables, _followed(root)),
         _variables("Parameters", "parameter", ("start", "min", "max"), variables),
         _needs(root),
+        reference,
         "<h2>About</h2>\n" + _table((), [(key, value) for key, value in facts.items() if value]),
         "<h2>Source</h2>",
         *(f"<h3>{_text(path)}</h3>\n<pre>{_text(source)}</pre>" for path, source in sources.items()),
@@ -121,6 +124,21 @@ def _needs(root: Element) -> str:
     if needed is None:
         return ""
     return f"<h2>Needs</h2>\n<p>The host's Python must have: {_text(needed.get('names'))}.</p>"
+
+
+def _reference(files: Iterable[str]) -> str:
+    links = [
+        f'<a href="../{path}">{_text(path.rpartition("/")[2])}</a>'
+        for path in files
+        if path.startswith(FOLDER)
+    ]
+    if not links:
+        return ""
+    return (
+        "<h2>Reference result</h2>\n<p>What the FMU computes from given inputs with its default parameters, "
+        "in the form of the FMI Cross-Check: does it do the same in your tool? "
+        f"{', '.join(links)}</p>"
+    )
 
 
 def _followed(root: Element) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import posixpath
 import shutil
 import subprocess
 import sys
@@ -9,7 +10,10 @@ import zipfile
 from importlib.metadata import version
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
+from fmpy import simulate_fmu
+from fmpy.util import read_csv, read_ref_opt_file
 from fmpy.validation import validate_fmu
 from lxml import html
 
@@ -17,9 +21,11 @@ from components.fmi.roles import ROLES
 from fmus import compiler
 from fmus.build import COMPONENTS, build_all, build_component, find_components, put
 from fmus.build import HERE as FMUS
+from fmus.check import reference_files
 from fmus.compiler import compile_launcher
 from fmus.mark import read_mark
 from fmus.packing import to_bytes
+from fmus.reference_result import FOLDER
 from orchestrator.cache import content_of
 from orchestrator.errors import BuildError
 
@@ -116,6 +122,8 @@ def test_an_archive_holds_what_the_fmu_needs_and_nothing_else(archive):
         "binaries/linux64/libpythonfmu-export.so",
         "binaries/win64/controller_off.dll",
         "documentation/index.html",
+        *(f"{FOLDER}/{file}" for file in ("controller_off_in.csv", "controller_off_ref.csv")),
+        *(f"{FOLDER}/{file}" for file in ("controller_off_ref.opt", "fmi-ls-manifest.xml")),
         "model.png",
         "modelDescription.xml",
         f"resources/{module}.py",
@@ -313,3 +321,43 @@ def test_every_file_in_a_role_folder_becomes_an_fmu():
         if file.stem != "__init__"
     ]
     assert sorted(files) == NAMES
+
+
+@pytest.mark.sampled(8)
+@pytest.mark.parametrize("name", NAMES)
+def test_an_fmu_repeats_its_reference_result(archive, tmp_path, name):
+    with zipfile.ZipFile(archive(name)) as fmu:
+        fmu.extractall(tmp_path)
+    folder = tmp_path / FOLDER
+    settings = read_ref_opt_file(folder / f"{name}_ref.opt")
+    reference = read_csv(folder / f"{name}_ref.csv")
+    inputs = read_csv(folder / f"{name}_in.csv")
+    result = simulate_fmu(
+        str(archive(name)),
+        stop_time=settings["StopTime"],
+        output_interval=settings["StepSize"],
+        input=inputs if inputs.dtype.names[1:] else None,
+        output=reference.dtype.names[1:],
+    )
+    assert len(reference) == 101
+    for column in reference.dtype.names:
+        error = abs(result[column] - reference[column]).max()
+        assert error <= settings["RelTol"] * abs(reference[column]).max(), column
+    moving = [c for c in reference.dtype.names[1:] if np.ptp(reference[c]) > 0.0]
+    assert moving or name == "controller_off"
+
+
+def test_a_manifest_names_the_files_that_come_with_an_fmu(archive):
+    with zipfile.ZipFile(archive("tyre_dugoff")) as fmu:
+        manifest = ElementTree.fromstring(fmu.read(f"{FOLDER}/fmi-ls-manifest.xml"))
+        roles = {posixpath.normpath(f"{FOLDER}/{one.get('source')}"): one.get("role") for one in manifest}
+        assert roles.keys() <= set(fmu.namelist())
+    assert manifest.tag == "fmiReferences"
+    assert manifest.get("{http://fmi-standard.org/fmi-ls-manifest}fmi-ls-name") == FOLDER.partition("/")[2]
+    assert sorted(roles.values()) == ["configuration", "document", "result", "testcase"]
+
+
+def test_an_fmu_whose_run_fails_has_no_reference_result(tmp_path):
+    fmu = tmp_path / "none.fmu"
+    fmu.write_bytes(b"no FMU")
+    assert reference_files(fmu) == {}

@@ -1,0 +1,115 @@
+"""A reference result: what an FMU computes here, for others to see whether it does the same there.
+
+Inputs, settings and outputs have the form of the FMI Cross-Check (`NAME_in.csv`, `NAME_ref.opt`,
+`NAME_ref.csv`), which tools know; a manifest after FMI-LS-REF 1.0.0-alpha.1, the layered standard
+for files that come with an FMU, says what each of them is.
+
+Every input swings within its usual range, each at a frequency of its own; parameters have their
+default values. Outputs have six digits of the largest value of their column: what mathematical
+libraries differ by is lost, so that the same sources give the same bytes.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from .usual_ranges import usual_range
+
+FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
+STOP, STEP = 2.0, 0.02  # [s], chosen: every unit has moved by then; few enough rows for an archive
+DIGITS = 6
+"""Of the largest value of a column. Chosen: ten orders less than what mathematical libraries differ by."""
+_LOWEST, _SPACING = 0.5, 0.07  # [Hz], chosen: between one and five periods within the run
+
+
+def reference_result(fmu: Path) -> dict[str, str]:
+    """Return path in the archive -> text of the reference result of an FMU that is run for it.
+
+    Raises:
+        Exception: the run fails.
+    """
+    import fmpy
+
+    description = fmpy.read_model_description(str(fmu))
+    name = description.modelName
+    by_causality: dict[str, list[str]] = {"input": [], "output": []}
+    for v in description.modelVariables:
+        if v.type == "Real" and v.causality in by_causality:
+            by_causality[v.causality].append(v.name)
+    inputs = _stimuli(by_causality["input"])
+    result = fmpy.simulate_fmu(
+        str(fmu),
+        stop_time=STOP,
+        output_interval=STEP,
+        input=inputs if inputs.dtype.names[1:] else None,
+        output=by_causality["output"],
+        fmi_call_logger=None,
+    )
+    settings = {"StartTime": 0.0, "StopTime": STOP, "StepSize": STEP, "RelTol": 10.0 ** (1 - DIGITS)}
+    contents = {
+        f"{name}_in.csv": ("testcase", "text/csv", "Inputs, set before every step", _csv(inputs)),
+        f"{name}_ref.opt": (
+            "configuration",
+            "text/csv",
+            "Settings of the run, in s",
+            "".join(f"{key},{value:g}\n" for key, value in settings.items()),
+        ),
+        f"{name}_ref.csv": ("result", "text/csv", "Outputs after every step", _csv(result)),
+    }
+    manifest = _manifest([(file, *facts[:3]) for file, facts in contents.items()])
+    files = {"fmi-ls-manifest.xml": manifest} | {file: facts[3] for file, facts in contents.items()}
+    return {f"{FOLDER}/{file}": text for file, text in files.items()}
+
+
+def _stimuli(names: list[str]) -> Any:
+    """Return a structured array of time and inputs, a row for each communication point."""
+    import numpy as np
+
+    table = np.zeros(round(STOP / STEP) + 1, dtype=[("time", float), *((name, float) for name in names)])
+    table["time"] = [round(k * STEP, 9) for k in range(len(table))]
+    for i, name in enumerate(names):
+        low, high = usual_range(name)
+        swing = np.sin(2.0 * math.pi * (_LOWEST + _SPACING * (i % 32)) * table["time"])
+        table[name] = _rounded((low + high) / 2.0 + (high - low) / 2.0 * swing)
+    return table
+
+
+def _rounded(values: Any) -> Any:
+    """Return values with as many decimals as give the largest its digits."""
+    largest = float(abs(values).max())
+    decimals = DIGITS - 1 - math.floor(math.log10(largest)) if largest else 0
+    return values.round(decimals) + 0.0  # no negative zero
+
+
+def _csv(table: Any) -> str:
+    columns = [_rounded(table[name]) if name != "time" else table[name] for name in table.dtype.names]
+    text = io.StringIO()
+    text.write(",".join(f'"{name}"' for name in table.dtype.names) + "\n")
+    for row in zip(*(column.tolist() for column in columns), strict=True):
+        text.write(",".join(f"{value:.10g}" for value in row) + "\n")
+    return text.getvalue()
+
+
+def _manifest(files: list[tuple[str, str, str, str]]) -> str:
+    space = "http://fmi-standard.org/fmi-ls-manifest"
+    ElementTree.register_namespace("fmi-ls", space)
+    root = ElementTree.Element(
+        "fmiReferences",
+        {
+            f"{{{space}}}fmi-ls-name": "org.fmi-standard.fmi-ls-ref",
+            f"{{{space}}}fmi-ls-version": "1.0.0-alpha.1",
+            f"{{{space}}}fmi-ls-description": "Layered Standard providing information on related files "
+            "included in an FMU.",
+        },
+    )
+    page = ("../../documentation/index.html", "document", "text/html", "Equations, variables, source")
+    for source, role, kind, text in [*files, page]:
+        ElementTree.SubElement(
+            root, "Related", {"type": kind, "source": source, "role": role, "description": text}
+        )
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, "unicode") + "\n"

@@ -1,0 +1,61 @@
+"""Where signals lie while a car is on the road: what units are tried with.
+
+From, to, in the unit of the signal. Chosen: a passenger car between 55 and 110 km/h, up to what its
+tyres carry on a dry road.
+"""
+
+from __future__ import annotations
+
+from vocabulary.wheels import WHEELS
+
+_RANGES = {
+    "velocity_x": (15.0, 30.0),
+    "velocity_y": (-1.0, 1.0),
+    "yaw_rate": (-0.4, 0.4),
+    "yaw_rate_ref": (-0.4, 0.4),
+    "sideslip": (-0.05, 0.05),
+    "sideslip_ref": (-0.05, 0.05),
+    "sideslip_rate": (-0.3, 0.3),
+    "sideslip_rate_ref": (-0.3, 0.3),
+    "yaw_acceleration_ref": (-1.0, 1.0),
+    "acceleration_x": (-4.0, 4.0),
+    "acceleration_y": (-6.0, 6.0),
+    "roll_angle": (-0.1, 0.1),
+    "roll_rate": (-0.3, 0.3),
+    "pitch_angle": (-0.05, 0.05),
+    "position_x": (0.0, 100.0),
+    "position_y": (-3.0, 3.0),
+    "yaw_angle": (-0.3, 0.3),
+    "steer_angle": (-0.08, 0.08),
+    "steering_wheel_angle": (-1.5, 1.5),
+    "drive_force": (-3000.0, 3000.0),
+    "friction": (0.3, 1.0),
+    "friction_*": (0.3, 1.0),
+    "yaw_moment": (-3000.0, 3000.0),
+    "force_request_*": (-1500.0, 1500.0),
+    "torque_request_*": (-400.0, 400.0),
+    "wheel_torque_*": (-400.0, 400.0),
+    "tyre_force_x_*": (-1000.0, 1000.0),
+    "tyre_force_y_*": (-2500.0, 2500.0),
+    "aligning_moment_*": (-50.0, 50.0),
+    "tyre_moment_z_*": (-50.0, 50.0),
+    "overturning_moment_*": (-50.0, 50.0),
+    "slip_angle_*": (-0.1, 0.1),
+    "slip_ratio_*": (-0.1, 0.1),
+    "tyre_slip_ratio_*": (-0.1, 0.1),
+    "slip_stiffness_*": (20000.0, 80000.0),
+    "inclination_angle_*": (-0.05, 0.05),
+    "vertical_load_*": (1500.0, 4500.0),
+    "wheel_speed_*": (45.0, 90.0),
+    "wheel_velocity_*": (15.0, 30.0),
+}
+
+
+def pattern_of(name: str) -> str:
+    """Return a signal's name with `*` for the wheel it ends with, if it ends with one."""
+    return f"{name[:-2]}*" if name[-2:] in WHEELS and name[-3:-2] == "_" else name
+
+
+def usual_range(name: str) -> tuple[float, float]:
+    """Return from where to where a signal goes; -1 to 1 if it is not in the list."""
+    return _RANGES.get(pattern_of(name), (-1.0, 1.0))
