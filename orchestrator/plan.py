@@ -19,6 +19,8 @@ FACTS = ("friction", "speed")
 """What one change tells all units that have to know it (see `wiring.shared_facts`)."""
 TYRES = "tyres"
 """What names the tyre property files, of both axles or as `tyres.front`, `tyres.rear` of one."""
+SENSING = {"sensor": "measurement", "estimator": "estimate"}
+"""Role of a unit -> what its outputs are, of what the car does."""
 Algorithm = Literal["jacobi", "gauss_seidel", "extrapolated"]
 
 

@@ -2,10 +2,14 @@
 
 A metric is a measure of a signal, written `measure(signal)`: `relative_peak_error(sideslip)`,
 `total_variation_rate(wheel_torque_*)`. Signals are named as in the signal dictionary, whatever the
-scenario calls its units or an FMU from elsewhere its outputs (`plant.sideslip` where two units have
-one of that name); the reference of a signal `x` is the signal `x_ref`; of four wheels (`*`) the
-largest value counts. A metric whose signals a run does not have is absent, never zero. It may be of a
-stretch of time, `peak(sideslip) from 1 s to 3 s`, or of a point, `value(sideslip) at 2 s`.
+scenario calls its units or an FMU from elsewhere its outputs; where several units have one of that name it
+is the plant's, or the only one that is neither measured nor estimated, and `estimator.sideslip` names any.
+The reference of a signal `x` is the signal `x_ref`, of several units' that of the one which acts. Another is
+named behind a comma, `relative_peak_error(yaw_rate, ideal.yaw_rate_ref)`: so a metric says against which
+truth it judges. Measures that need no reference also take a difference,
+`rms(estimator.sideslip - plant.sideslip)`. Of four wheels (`*`) the largest value counts. A metric whose
+signals a run does not have is absent, never zero. It may be of a stretch of time,
+`peak(sideslip) from 1 s to 3 s`, or of a point, `value(sideslip) at 2 s`.
 """
 
 from __future__ import annotations
@@ -22,8 +26,9 @@ import numpy as np
 from vocabulary.wheels import wheels
 
 from ..errors import ResultsError, ScenarioError
+from ..plan import SENSING
 from ..scenario.quantities import convert
-from ..wording import closest, fold, hint, short
+from ..wording import closest, fold, hint, listed, short
 from .measures import MEASURES, Measure
 from .symbols import si_of, symbol, variable_of, words
 
@@ -64,28 +69,39 @@ _TIMES_SECOND = {"1": "s", "m/s": "m", "m/s2": "m/s", "rad/s": "rad", "rad/s2": 
 
 @dataclass(frozen=True)
 class Metric:
-    """A measure of a signal."""
+    """A measure of a signal, perhaps against another."""
 
     name: str
     measure: Measure
     signal: str
     window: Window | None = None  # in place of the whole run
+    other: str = ""  # the reference, in place of the signal's own; or what is subtracted
 
     @property
     def formula(self) -> str:
         x = symbol(self.signal)
-        return self.measure.formula.replace("{x_ref}", f"{x}_ref").replace("{x}", x)
+        x_ref = f"{x}_ref"
+        if self.other:
+            needs = self.measure.needs_reference
+            x, x_ref = (self.signal, self.other) if needs else (f"({self.signal} - {self.other})", "")
+        return self.measure.formula.replace("{x_ref}", x_ref).replace("{x}", x)
 
     @property
     def definition(self) -> str:
         of_wheels = ", the largest of the four wheels" if "*" in self.signal else ""
-        return f"{self.measure.definition}{of_wheels}"
+        return f"{self.measure.definition}{self._against}{of_wheels}"
+
+    @property
+    def _against(self) -> str:
+        if not self.other:
+            return ""
+        return f", {'against' if self.measure.needs_reference else 'of the difference from'} {self.other}"
 
     @property
     def title(self) -> str:
         """The signal and the measure in few words."""
         measure = self.name.partition("(")[0].replace("_", " ").replace("rms", "RMS")
-        return f"{words(self.signal)}: {measure}{during(self.window)}"
+        return f"{words(self.signal)}: {measure}{self._against}{during(self.window)}"
 
     def unit(self, signal_unit: str) -> str:
         """Return the metric's unit for a signal in `signal_unit`."""
@@ -142,10 +158,12 @@ def _time(text: str) -> float:
 def metric(name: str) -> Metric:
     """Return the metric written as `measure(signal)`, perhaps with a window behind it: see `window_of`.
 
+    The signal may be `signal, reference` or `signal - other`.
+
     Raises:
         ScenarioError: the name is not of that form, or there is no such measure.
     """
-    match = re.fullmatch(r"\s*(\w+)\s*\(\s*([\w.*]+)\s*\)\s*(.*?)\s*", name, re.DOTALL)
+    match = _METRIC.fullmatch(name)
     if match is None:
         meant = [f"{one}({name[len(one) + 1 :]})" for one in MEASURES if name.startswith(f"{one}_")]
         likely = max(meant, key=lambda one: one.index("("), default=closest(name, STANDARD))
@@ -153,7 +171,7 @@ def metric(name: str) -> Metric:
         raise ScenarioError(
             f"{short(name)} is no metric; {guess}write measure(signal), for example {STANDARD[0]}."
         )
-    measure, signal, rest = match.groups()
+    measure, signal, between, other, rest = match.groups()
     if measure not in MEASURES:
         raise ScenarioError(
             f"{name!r}: there is no measure {measure!r}{hint(measure, MEASURES, lead='known')}"
@@ -166,16 +184,26 @@ def metric(name: str) -> Metric:
     if point != (measure == AT_A_TIME):
         allowed = f"{AT_A_TIME}({signal}) at 2 s is of a point of time, all other measures of a stretch"
         raise ScenarioError(f"{short(name)}: {allowed}")
+    needs = MEASURES[measure].needs_reference
+    if between and (between == ",") != needs:
+        right = f"{measure}({signal}{', ' if needs else ' - '}{other})"
+        why = "is against a reference" if needs else "needs no reference, but may be of a difference"
+        raise ScenarioError(f"{short(name)}: {measure} {why}: write {right}")
     written = f"{measure}({signal})"
+    if between:
+        written = f"{measure}({signal}, {other})" if needs else f"{measure}({signal} - {other})"
     if window is not None:
         written += f" at {window[0]!r} s" if point else f" from {window[0]!r} s to {window[1]!r} s"
-    return Metric(written, MEASURES[measure], signal, window)
+    return Metric(written, MEASURES[measure], signal, window, other or "")
+
+
+_METRIC = re.compile(r"\s*(\w+)\s*\(\s*([\w.*]+)\s*(?:([,-])\s*([\w.*]+)\s*)?\)\s*(.*?)\s*", re.DOTALL)
 
 
 def columns_of(results: Results, signal: str) -> list[str]:
     """Return the columns of a signal: one, or four for a `*`; empty if they were not recorded.
 
-    Where units share the name, the plant's is taken.
+    Where units share the name, the plant's is taken, else the only one that is no sensor's or estimator's.
     """
     names = wheels(signal)
     found = [column for name in names if (column := _column(results, name)) is not None]
@@ -189,7 +217,8 @@ def _column(results: Results, name: str) -> str | None:
         except ResultsError:
             continue
         return column if np.issubdtype(results.columns[column].dtype, np.number) else None
-    return None
+    found = [c for c in results.columns if variable_of(c) == name and not _is_seen(results, c)]
+    return found[0] if len(found) == 1 and np.issubdtype(results.columns[found[0]].dtype, np.number) else None
 
 
 def evaluate(results: Results, chosen: Metric, window: Window | None = None) -> Value | None:
@@ -217,6 +246,8 @@ def evaluate(results: Results, chosen: Metric, window: Window | None = None) -> 
     numbers = []
     for columns in signals:
         samples = [results.columns[c][inside] * si_of(results.units[c])[1] for c in columns]
+        if chosen.other and not chosen.measure.needs_reference:
+            samples = [samples[0] - samples[1]]
         if chosen.measure.needs_rate and len(samples) == 1:
             samples.append(np.gradient(samples[0], t))
         numbers.append(chosen.measure.function(t, *samples))
@@ -252,15 +283,29 @@ def check_metrics(plan: Plan, chosen: Iterable[Metric]) -> None:
     for one in chosen:
         if one.window is not None and not 0.0 <= one.window[0] <= one.window[1] <= end:
             problems.append(f"{one.name}: the run lasts from 0 to {end:g} s")
-        if columns_of(results, one.signal):
-            if unit_in(results, one) is None:
-                why = f"{one.signal} has no reference or not the right unit"
-                problems.append(f"{one.name}: {why}")
-        else:
-            unknown = f"no {one.signal!r} is recorded{hint(one.signal, names, lead='there are')}"
+        missing = [s for s in filter(None, (one.signal, one.other)) if not columns_of(results, s)]
+        if missing:
+            whole = list(results) if "." in missing[0] else names
+            unknown = f"no {missing[0]!r} is recorded{hint(missing[0], whole, lead='there are')}"
             problems.append(f"{one.name}: {unknown}")
+        elif unit_in(results, one) is None:
+            problems.append(f"{one.name}: {_unfit(results, one)}")
     if problems:
         raise ScenarioError(problems)
+
+
+def _unfit(results: Results, one: Metric) -> str:
+    """Return why a metric cannot be made of signals that are all there."""
+    wanted = f"{variable_of(one.signal)}_ref"
+    having = [column for column in results if variable_of(column) == wanted]
+    if one.other:
+        columns = (columns_of(results, name)[0] for name in (one.signal, one.other))
+        units = listed(f"{column} [{results.units[column] or '1'}]" for column in columns)
+        return f"{units} cannot be compared"
+    if one.measure.needs_reference and len(having) > 1:
+        example = f"{one.name.partition('(')[0]}({one.signal}, {having[0]})"
+        return f"{listed(having)} are recorded: name one of them, as in {example}"
+    return f"{one.signal} has no reference or not the right unit"
 
 
 def unit_in(results: Results, chosen: Metric) -> str | None:
@@ -278,24 +323,53 @@ def columns_for(results: Results, names: Iterable[str]) -> list[str]:
 def _signals(results: Results, chosen: Metric) -> list[list[str]]:
     """Return the columns that each function call takes, one call per wheel; empty if any is missing."""
     signals = []
-    for column in columns_of(results, chosen.signal):
-        if chosen.measure.signal_unit not in (None, si_of(results.units[column])[0]):
+    others = columns_of(results, chosen.other) if chosen.other else []
+    for k, column in enumerate(columns_of(results, chosen.signal)):
+        unit = si_of(results.units[column])[0]
+        if chosen.measure.signal_unit not in (None, unit):
             return []
         columns = [column]
-        rate = _column(results, f"{variable_of(column)}_rate") if chosen.measure.needs_rate else None
-        columns += [rate] if rate else []
-        if chosen.measure.needs_reference:
+        if chosen.other:
+            other = others[k if len(others) > 1 else 0] if others else None
+            if other is None or (si_of(results.units[other])[0] or "1") != (unit or "1"):
+                return []
+            columns.append(other)
+        elif chosen.measure.needs_reference:
             reference = reference_of(results, column)
             if reference is None:
                 return []
             columns.append(reference)
+        elif chosen.measure.needs_rate and (rate := _rate_of(results, column)):
+            columns.append(rate)
         signals.append(columns)
     return signals
 
 
+def _rate_of(results: Results, column: str) -> str | None:
+    """Return the column of a signal's rate; that of what is measured or estimated only of the same unit."""
+    if f"{column}_rate" in results:
+        return f"{column}_rate"
+    return None if _is_seen(results, column) else _column(results, f"{variable_of(column)}_rate")
+
+
+def _is_seen(results: Results, column: str) -> bool:
+    """Return whether a column is a measurement or an estimate."""
+    return any(column.partition(".")[0] in results.units_of_role(role) for role in SENSING)
+
+
 def reference_of(results: Results, column: str) -> str | None:
-    """Return the column of the signal's reference, `x_ref` for `x`, if it was recorded."""
-    return _column(results, f"{variable_of(column)}_ref")
+    """Return the column of the signal's reference, `x_ref` for `x`, if it was recorded.
+
+    Of several that of the unit which a wire leaves: one that only watches may stand beside it.
+    """
+    name = f"{variable_of(column)}_ref"
+    if found := _column(results, name):
+        return found
+    wires = results.run.get("connections")
+    given = [str(w.get("from")) for w in (wires if isinstance(wires, list) else ()) if isinstance(w, dict)]
+    acting = {end.partition(".")[0] for end in given}
+    having = [c for c in results.columns if variable_of(c) == name and c.partition(".")[0] in acting]
+    return having[0] if len(having) == 1 else None
 
 
 def evaluate_all(results: Results, names: Iterable[str] = STANDARD) -> dict[str, Value]:

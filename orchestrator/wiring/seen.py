@@ -9,11 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from ..plan import Fmu, Unit, Wire
+from ..plan import SENSING, Fmu, Unit, Wire
 from ..wording import fold, listed
 
-SENSING = {"sensor": "measurement", "estimator": "estimate"}
-"""Role of a source -> what it gives."""
 CONTROL = ("reference", "controller", "allocator", "wheel_control", "monitor")
 """Roles that decide what the car is to do."""
 TRUTH = "truth"

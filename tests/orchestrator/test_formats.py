@@ -285,6 +285,11 @@ def test_run_and_compare_write_the_format_they_are_told_and_print_metrics(driver
             ["--metric", "rms_error(steer_angle)"],
             "rms_error(steer_angle): steer_angle has no reference or not the right unit",
         ),
+        (
+            ["--metric", "rms(steer_angle - driver.steer)"],
+            "rms(steer_angle - driver.steer): no 'driver.steer' is recorded; did you mean "
+            "'driver.steer_angle'?",
+        ),
     ],
 )
 def test_a_format_or_a_metric_that_there_is_not_is_said_before_the_run(

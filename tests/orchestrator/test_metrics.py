@@ -12,6 +12,7 @@ from orchestrator.figures.display import digits_of, shown, shown_unit
 from orchestrator.figures.panels import Run, shown_by
 from orchestrator.metrics import catalogue, measures
 from orchestrator.metrics.run_metrics import AT_A_TIME, STANDARD, Value, evaluate, evaluate_all, metric
+from vocabulary.wheels import WHEELS
 
 from .recorded import UNITS, car, results
 
@@ -229,6 +230,74 @@ def test_of_two_units_with_the_signal_the_plants_counts():
     both = results({"estimator.sideslip": 0 * T, "plant.sideslip": SINE}, T)
     assert evaluate(both, metric("peak(sideslip)")).number == pytest.approx(1.0)
     assert evaluate(both, metric("peak(estimator.sideslip)")).number == 0.0
+
+
+WATCHED = {
+    "estimator.sideslip": 1.2 * SINE,
+    "gyro.yaw_rate": 7.0 * SINE,
+    "gyro.steer_angle": 9.0 * SINE,
+    "driver.steer_angle": 2.0 * SINE,
+    "plant.sideslip": SINE,
+    "plant.yaw_rate": 3.0 * SINE,
+    "reference.yaw_rate_ref": 4.0 * SINE,
+    "ideal.yaw_rate_ref": 2.5 * SINE,
+}
+"""Columns of a car that is measured and estimated, with a reference beside the one in the loop."""
+
+
+def watched():
+    """Return the recorded run of such a car."""
+    units = {name: "rad/s" if "rate" in name else "rad" for name in WATCHED}
+    run = results(WATCHED, T, units)
+    run.run["fmus"]["gyro"] = {"name": "sensor_cluster"}
+    run.run["connections"].append({"from": "reference.sideslip_ref", "to": "controller.sideslip_ref"})
+    return run
+
+
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [
+        ("peak_error(estimator.sideslip, plant.sideslip)", 0.2),
+        ("peak( estimator.sideslip-plant.sideslip )", 0.2),
+        ("rms(estimator.sideslip - sideslip)", 0.2 / math.sqrt(2)),
+        ("value(gyro.yaw_rate - plant.yaw_rate) at 0.25 s", 4.0),
+        ("relative_peak_error(yaw_rate)", 0.25),  # against the reference that acts
+        ("relative_peak_error(yaw_rate, ideal.yaw_rate_ref)", 0.2),  # against the truth
+        ("peak(steer_angle)", 2.0),  # the driver's, not what is measured of it
+        ("phase_area(estimator.sideslip - plant.sideslip)", 0.04 * 4 * math.pi**2),
+    ],
+)
+def test_a_metric_compares_two_named_columns(name, number):
+    assert evaluate(watched(), metric(name)).number == pytest.approx(number, rel=1e-4)
+
+
+def test_a_metric_of_two_columns_says_against_what_it_judges():
+    named = metric("rms_error(estimator.sideslip,plant.sideslip) from 1 s to 2 s")
+    assert named.name == "rms_error(estimator.sideslip, plant.sideslip) from 1.0 s to 2.0 s"
+    assert metric(named.name) == named
+    assert named.title == "Sideslip angle: RMS error, against plant.sideslip, 1 to 2 s"
+    assert named.formula == "√(1/T ∫(estimator.sideslip - plant.sideslip)² dt)"
+    assert metric("rms(a.x - b.x)").definition == "root mean square, of the difference from b.x"
+
+
+def test_wheels_are_compared_in_pairs_and_units_converted():
+    columns = {
+        f"{unit}.load_{w}": k * f * T for k, w in enumerate(WHEELS) for unit, f in [("a", 1), ("b", 2)]
+    }
+    run = results(columns, T, {name: "N" if name[0] == "a" else "kN" for name in columns})
+    assert evaluate(run, metric("peak(a.load_* - b.load_*)")) == Value(pytest.approx(1999.0 * 3 * 2), "N")
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("rms_error(x - y)", r"is against a reference: write rms_error\(x, y\)"),
+        ("rms(x, y)", r"needs no reference, but may be of a difference: write rms\(x - y\)"),
+    ],
+)
+def test_two_columns_that_are_not_compared_so_are_an_error(name, sentence):
+    with pytest.raises(ScenarioError, match=sentence):
+        metric(name)
 
 
 def test_an_unknown_measure_is_an_error_that_names_the_nearest():
