@@ -37,7 +37,7 @@ def load(source: str | Path) -> Scenario:
     Raises:
         ScenarioError: there is no such scenario, or something is wrong with it.
     """
-    scenario = Scenario(catalogue.find(source, "a scenario"))
+    scenario = Scenario(catalogue.find(source, "a scenario").absolute())
     scenario.loaded  # noqa: B018 - what is wrong is said now
     return scenario
 

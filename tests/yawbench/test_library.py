@@ -1,6 +1,7 @@
 """The Python library: scenarios as values, runs in memory, units in plain Python."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from components.controllers.fnn import Fnn
 from orchestrator.cli import main
 
 SCENARIO = "fnn_sideslip/25mps"
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +80,15 @@ def test_swap_and_set_leave_the_scenario_as_it_was(base):
     plant = next(unit for unit in other.plan().units if unit.name == "plant")
     assert plant.parameters["mass"] == 1200
     assert plant.parameters["initial_speed"] == pytest.approx(80 / 3.6)
+
+
+def test_a_scenario_that_was_loaded_stays_where_it_is_when_the_working_directory_changes(
+    monkeypatch, tmp_path
+):
+    monkeypatch.chdir(ROOT)
+    scenario = yb.load(f"scenarios/{SCENARIO}.yaml")
+    monkeypatch.chdir(tmp_path)
+    assert scenario.set({"stop_time": 0.01}).run().time[-1] == 0.01
 
 
 def test_names_of_signals_and_columns_give_the_same_arrays(run):
