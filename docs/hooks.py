@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from generate import commands, formulas, metrics, schemas, signals, units  # mkdocs puts docs/ on the path
+from generate import (
+    commands,
+    formulas,
+    metrics,
+    schemas,
+    signals,
+    units,
+    vehicles,
+)  # mkdocs puts docs/ on the path
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
@@ -15,6 +23,7 @@ PAGES = {
     "reference/signals.md": signals.page,
     "reference/units.md": units.page,
     "reference/metrics.md": metrics.page,
+    "reference/vehicles.md": vehicles.page,
 }
 """Path in the docs -> what writes its text."""
 

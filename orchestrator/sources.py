@@ -6,7 +6,7 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
-OF_RESULTS = ("plan.py", "scenario", "fmu", "wiring", "master", "results")
+OF_RESULTS = ("plan.py", "scenario", "fmu", "wiring", "master", "results", "tyres")
 """Modules and stages that have a say in what a run records; units have hashes of their own."""
 OF_METRICS = (*OF_RESULTS, "metrics")
 """And in the numbers made of it."""

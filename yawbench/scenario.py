@@ -17,6 +17,7 @@ from orchestrator.plan import Change, Plan, Value
 from orchestrator.results.read import Results
 from orchestrator.scenario import catalogue, scenario_schema
 from orchestrator.scenario.load import load_scenario
+from orchestrator.tyres.axle_stiffness import cornering_stiffness
 from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wording import hint
 
@@ -133,7 +134,7 @@ class Scenario:
             YawbenchError: an FMU is missing, a component whose source has changed cannot be built, or
                 the units cannot be connected.
         """
-        plan = make_plan(self.loaded, opener=Opener(**self._opening()))
+        plan = make_plan(self.loaded, opener=Opener(**self._opening()), measure=cornering_stiffness)
         notes = tuple(
             f"{unit.name}: {unit.fmu.name} is plain Python of this process, no FMU"
             for unit in plan.units

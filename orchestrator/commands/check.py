@@ -80,6 +80,9 @@ def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None
     if hidden:
         also = " or come from tyre files" if plan.scenario.get("tyre_files") else ""
         console.print(f"  {hidden} more are left at the FMUs' defaults{also}: --all shows them", style="dim")
+    _show(console, "Derived from the vehicle file", ("what", "as", "units"), _derived(plan))
+    if idle := _idle(plan):
+        console.print(f"  also in the vehicle file, but for other units: {', '.join(idle)}", style="dim")
     wires = list(_wire_rows(plan))
     if any(seen for _, _, seen, _ in wires):
         _show(console, "Wires", ("from", "to", "as", "variables"), wires)
@@ -151,7 +154,7 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
         alike: dict[tuple[str, str], list[str]] = {}
         constants = {name: value for name, value in unit.constants.items() if name not in unit.series}
         for name, value in {**own, **constants}.items():
-            origin = unit.origins.get(name, "default")
+            origin = unit.origins.get(name, "default").partition(":")[0]
             if not defaults and (origin in in_files or (origin == "default" and not _matters(unit, name))):
                 hidden += 1
             else:
@@ -169,12 +172,30 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
     return rows, hidden
 
 
+def _derived(plan: Plan) -> Iterable[Sequence[str]]:
+    """Return what was derived of the car, each with its formula."""
+    from ..wiring.parameters import DERIVED
+
+    takers: dict[tuple[str, str], list[str]] = {}
+    for unit in plan.units:
+        for name, origin in unit.origins.items():
+            if origin.startswith(DERIVED):
+                takers.setdefault((name, origin.removeprefix(DERIVED)), []).append(unit.name)
+    return [(*key, ", ".join(units)) for key, units in takers.items()]
+
+
+def _idle(plan: Plan) -> list[str]:
+    """Return what the vehicle file says that no unit takes."""
+    given = plan.scenario.get("vehicle_parameters", {})
+    return [name for name in given if not any(unit.fmu.variables.get(name) for unit in plan.units)]
+
+
 def _matters(unit: Unit, name: str) -> bool:
     """Return whether a value is worth a line even if it is the FMU's own: the car, its speed, the road."""
-    from ..wiring.agreement import CAR
+    from ..wiring.agreement import OF_CAR
     from ..wiring.shared_facts import FACTS
 
-    return name in CAR or any(name in fact.inputs or fact.counts(unit, name) for fact in FACTS.values())
+    return name in OF_CAR or any(name in fact.inputs or fact.counts(unit, name) for fact in FACTS.values())
 
 
 def _shown(value: Value | None, measure: str | None) -> str:

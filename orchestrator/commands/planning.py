@@ -36,7 +36,10 @@ def plan_of_scenario(
     from ..fmu.opener import Opener
     from ..scenario.load import load_scenario
     from ..scenario.overrides import read_changes
+    from ..tyres.axle_stiffness import cornering_stiffness
     from ..wiring.make_plan import make_plan
 
     loaded = load_scenario(scenario, changes=read_changes(swap or (), set_ or ()), validate=validate)
-    return make_plan(loaded, fmus=fmus, opener=Opener(build=build), isolated=isolated)
+    return make_plan(
+        loaded, fmus=fmus, opener=Opener(build=build), isolated=isolated, measure=cornering_stiffness
+    )

@@ -133,12 +133,15 @@ def planned(job: Job, once: Once | None = None) -> tuple[Scenario, Plan]:
         YawbenchError: the scenario, an option or an FMU is wrong.
     """
     from ..scenario.load import load_scenario
+    from ..tyres.axle_stiffness import cornering_stiffness
     from ..wiring.make_plan import make_plan
 
     once = once or Once()
     scenario = load_scenario(job.scenario, changes=job.changes, read=once.read)
     isolated = job.call_limit is not None
-    plan = make_plan(scenario, fmus=job.fmus, opener=once.opener, isolated=isolated)
+    plan = make_plan(
+        scenario, fmus=job.fmus, opener=once.opener, isolated=isolated, measure=cornering_stiffness
+    )
     if not job.record:
         return scenario, plan
     recorded = {f"{unit}.{variable}": (unit, variable) for unit, variable in plan.record}

@@ -17,6 +17,7 @@ from vocabulary.wheels import WHEEL_NAMES, WHEELS
 from ..plan import Plan, Unit, Value
 from ..scenario.load import Scenario
 from ..scenario.yaml_lines import Document, Key
+from ..wiring.parameters import DERIVED
 from ..wiring.shared_facts import facts_of
 from ..wording import fold
 
@@ -183,6 +184,8 @@ def _origin(scenario: Scenario, unit: Unit, name: str, comments: _Comments) -> O
         words = comments.beside(scenario.vehicle_document, ("parameters", name))
         words = re.sub(rf"^{re.escape(measure)}(?![\w/.])[,;]?\s*", "", words)
         return said_in(words, scenario._vehicle.source)
+    if origin.startswith(DERIVED):
+        return Origin(NEUTRAL, origin)
     if origin == "scenario":
         own = name in scenario.units[unit.name].parameters
         key: Key = ("units", unit.name, "parameters", name) if own else (_fact(scenario, name),)

@@ -1,4 +1,4 @@
-"""A tyre FMU by itself: its forces at slips, slip angles and loads that are given."""
+"""A tyre FMU by itself: its forces at slips, slip angles and loads that are given, and their slopes."""
 
 from __future__ import annotations
 
@@ -29,6 +29,10 @@ RADIUS = 0.3
 """Of the wheel [m], for tyres that want its speed and have none of their own."""
 
 
+SMALL = 1e-4
+"""Slip [1] and slip angle [rad] to each side of zero for stiffnesses."""
+
+
 class State(NamedTuple):
     """How a wheel stands and rolls: slip angle [rad], longitudinal slip [1] of the interface, load [N]."""
 
@@ -39,9 +43,10 @@ class State(NamedTuple):
 
 @dataclass(frozen=True)
 class Stand:
-    """A tyre, front left, on a stand."""
+    """A tyre on a stand, front left unless another wheel is named."""
 
     plan: Plan
+    wheel: str = WHEEL
 
     @property
     def unit(self) -> Unit:
@@ -80,15 +85,29 @@ class Stand:
         }
         times = 2.0 * np.arange(len(states))
         series = {
-            f"{name}_{WHEEL}": Series("stand", name, "", True, times, values)
+            f"{name}_{self.wheel}": Series("stand", name, "", True, times, values)
             for name, values in given.items()
-            if f"{name}_{WHEEL}" in self.unit.constants
+            if f"{name}_{self.wheel}" in self.unit.constants
         }
         unit = replace(self.unit, series=series)
         results = simulate_in_memory(replace(self.plan, units=(unit,), n_steps=2 * len(states)))
-        columns = [f"{unit.name}.{v.name}" for v in unit.fmu.of("output") if v.name.endswith(f"_{WHEEL}")]
+        columns = [
+            f"{unit.name}.{v.name}" for v in unit.fmu.of("output") if v.name.endswith(f"_{self.wheel}")
+        ]
         at_end = slice(2, None, 2)  # the second of two steps in each state
-        return {c.partition(".")[2].removesuffix(f"_{WHEEL}"): results[c][at_end] for c in columns}
+        return {c.partition(".")[2].removesuffix(f"_{self.wheel}"): results[c][at_end] for c in columns}
+
+
+def stiffnesses(stand: Stand, loads: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Return dF_x/dkappa [N] and -dF_y/dalpha [N/rad] at zero slip for some loads; shape (n,) each."""
+    slopes = []
+    for force, sign, states in (
+        ("tyre_force_x", 1.0, [State(0.0, k, load) for load in loads for k in (-SMALL, SMALL)]),
+        ("tyre_force_y", -1.0, [State(a, 0.0, load) for load in loads for a in (-SMALL, SMALL)]),
+    ):
+        found = stand.measure(states)[force].reshape(-1, 2)
+        slopes.append(sign * (found[:, 1] - found[:, 0]) / (2.0 * SMALL))
+    return slopes[0], slopes[1]
 
 
 def put_on_stand(source: str, *, friction: float, fmus: Path | None, build: bool) -> Stand:

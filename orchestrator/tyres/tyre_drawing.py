@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..figures.style import QUIET, RC, ROW, frame, line_style
-from .stand import Stand, State
+from .stand import Stand, State, stiffnesses
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,8 +21,6 @@ ANGLES = (0.0, 2.0, 4.0, 7.0, 12.0)
 LARGEST_ANGLE, LARGEST_SLIP = np.radians(15.0), 0.5
 """Ends of the curves [rad], [1]."""
 POINTS = 151
-SMALL = 1e-4
-"""Slip [1] and slip angle [rad] to each side of zero for stiffnesses."""
 
 
 def draw_tyre(stand: Stand, title: str, note: str) -> Figure:
@@ -71,18 +69,6 @@ def draw_tyre(stand: Stand, title: str, note: str) -> Figure:
         handles = [axes[0].plot([], [], **line_style(i), label=name)[0] for i, name in enumerate(names)]
         frame(figure, 3 * 1.25 * ROW, handles, title, note)
     return figure
-
-
-def stiffnesses(stand: Stand, loads: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return dF_x/dkappa [N] and -dF_y/dalpha [N/rad] at zero slip for some loads; shape (n,) each."""
-    slopes = []
-    for force, sign, states in (
-        ("tyre_force_x", 1.0, [State(0.0, k, load) for load in loads for k in (-SMALL, SMALL)]),
-        ("tyre_force_y", -1.0, [State(a, 0.0, load) for load in loads for a in (-SMALL, SMALL)]),
-    ):
-        found = stand.measure(states)[force].reshape(-1, 2)
-        slopes.append(sign * (found[:, 1] - found[:, 0]) / (2.0 * SMALL))
-    return slopes[0], slopes[1]
 
 
 def _over_load(stand: Stand, left: Axes, right: Axes, loads: np.ndarray) -> None:

@@ -7,17 +7,18 @@ from collections.abc import Iterable, Iterator, Mapping
 from itertools import product
 from typing import NamedTuple
 
+from vocabulary.vehicle import CAR
+
 from ..plan import Finding, Unit, Value, Variable
 from ..scenario.load import Scenario
 from ..wording import fold, listed
+from .parameters import STIFFNESSES
 from .shared_facts import FACTS
 
-CAR = (
-    "mass", "sprung_mass", "yaw_inertia", "roll_inertia", "cg_to_front_axle", "cg_to_rear_axle",
-    "track_width", "cg_height", "wheel_radius", "wheel_inertia", "cornering_stiffness_front",
-    "cornering_stiffness_rear", "steering_ratio",
-)  # fmt: skip
+OF_CAR = (*(name for name, one in CAR.items() if one.needed), *STIFFNESSES, "steering_ratio")
 """Parameters that describe the car, whichever unit has to know them."""
+OF_FILES = ("default", "vehicle", "derived", "scenario")
+"""Origins of values that no change has given."""
 SAME = 1e-9
 """Relative difference of values that count as equal: rounding of a conversion."""
 RADIUS = 0.03
@@ -100,8 +101,8 @@ def _one_matter(name: str, told: list[Told]) -> bool:
     if len(told) < 2 or not measured_alike or origins == {"scenario"}:
         return False
     if origins == {"default"}:
-        return name in CAR
-    return name in CAR or "vehicle" in origins or not _differ(told, start=True)
+        return name in OF_CAR
+    return name in OF_CAR or "vehicle" in origins or not _differ(told, start=True)
 
 
 def _differ(told: list[Told], *, start: bool = False) -> bool:
@@ -133,12 +134,14 @@ def _constants(units: Iterable[Unit]) -> Iterator[Told]:
 def _finding(name: str, told: list[Told], way_out: str) -> Finding:
     alike: dict[tuple[float, str], list[Told]] = {}
     for one in told:
-        alike.setdefault((float(one.value), one.origin), []).append(one)  # type: ignore[arg-type]
+        origin = one.origin.partition(":")[0]
+        alike.setdefault((float(one.value), origin), []).append(one)  # type: ignore[arg-type]
     parts = []
     for (value, origin), some in alike.items():
         names = fold([f"{one.unit}.{one.name}" for one in some])
         parts.append(f"{listed(names)} {_measured(value, some[0].variable)} ({origin})")
-    first = next((one for one in told if one.origin not in ("default", "vehicle", "scenario")), told[0])
+    by_change = (one for one in told if one.origin.partition(":")[0] not in OF_FILES)
+    first = next(by_change, told[0])
     says = f"{name} has two values: {', '.join(parts)}; {way_out}"
     return Finding("two values", f"{first.unit}.{first.name}", float(first.value), None, says)  # type: ignore[arg-type]
 
@@ -151,7 +154,7 @@ def _other_cars(scenario: Scenario, units: Mapping[str, Unit]) -> Iterator[Findi
     found = [
         one
         for one in (_parameters(units.values()) if scenario.vehicle_parameters else ())
-        if one.name in CAR and one.origin == "default" and one.value != 1
+        if one.name in OF_CAR and one.origin == "default" and one.value != 1
     ]
     if found:
         told = [f"{one.unit}.{one.name} {_measured(one.value, one.variable)}" for one in found]

@@ -14,24 +14,33 @@ among those of the input it feeds, with the same numbers.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
 
-from ..errors import BuildError, ModelDescriptionError, Problem, WiringError
+from vocabulary.wheels import WHEELS
+
+from ..errors import BuildError, ModelDescriptionError, Problem, WiringError, YawbenchError
 from ..fmu.opener import Opener, host_needs, stale_fmus
 from ..fmu.search import find_fmu, find_folder
 from ..fmu.shadowing import shadowed_modules
 from ..plan import Fmu, Plan, Series, Unit, Value, Wire
 from ..scenario.load import Scenario
 from ..scenario.overrides import is_path
+from ..wording import listed
 from .agreement import remarks
 from .connections import Connector
 from .functions import missing_functions
 from .order import evaluate
-from .parameters import Parameters
+from .parameters import DERIVED, STATIC_LOADS, STIFFNESSES, Parameters
 from .recording import recorded
 from .seen import exact
+
+TYRE_FORCES = tuple(f"tyre_force_y_{wheel}" for wheel in WHEELS)
+"""Outputs by which tyres are known."""
+Measure = Callable[[Unit, Mapping[str, float]], Mapping[str, float]]
+"""Returns the cornering stiffness [N/rad] of one tyre on some wheels: of a unit, by wheel -> load [N]."""
 
 
 def make_plan(
@@ -40,6 +49,7 @@ def make_plan(
     fmus: Path | None = None,
     opener: Opener | None = None,
     isolated: bool = False,
+    measure: Measure | None = None,
 ) -> Plan:
     """Open the scenario's FMUs and connect them.
 
@@ -48,6 +58,8 @@ def make_plan(
         fmus: the folder that holds FMUs given by name; None: the nearest `fmus/` that holds any.
         opener: of the FMUs; default: one that builds nothing.
         isolated: each unit will have a process of its own (see `master.isolation`).
+        measure: tells the stiffness of tyres, for units that want that of axles which the vehicle file
+            does not give (see `tyres.axle_stiffness`).
 
     Raises:
         ModelDescriptionError: FMUs that are missing, damaged or not supported.
@@ -58,7 +70,8 @@ def make_plan(
     opened, replaced = _open_all(scenario, fmus, opener or Opener())
     notes: list[str] = [*scenario.document.notes, *stale_fmus(opened.values()), *host_needs(opened.values())]
     origins: dict[str, dict[str, str]] = {name: {} for name in opened}
-    parameters = Parameters(scenario, opened, replaced, notes, origins).of_units()
+    distributed = Parameters(scenario, opened, replaced, notes, origins)
+    parameters = distributed.of_units()
     connector = Connector(scenario, opened, replaced, notes, origins)
     wires, values = connector.connect()
     constants, series = _divided(values, float(scenario.start_time))
@@ -84,6 +97,8 @@ def make_plan(
     }  # fmt: skip
     if not problems and not of_all:  # all variables are known
         of_all = missing_functions(units.values(), wires, record)
+    if not problems and not of_all:
+        problems += _take_from_tyres(scenario, units, distributed, measure)
     problems += [Problem(text, file=scenario.path) for text in of_all]
     if problems:
         raise WiringError([*_misplaced(scenario), *problems])
@@ -108,6 +123,40 @@ def make_plan(
         changes=scenario.changes,
         findings=tuple(findings),
     )
+
+
+def _take_from_tyres(
+    scenario: Scenario, units: dict[str, Unit], distributed: Parameters, measure: Measure | None
+) -> list[Problem]:
+    """Give units the cornering stiffnesses of axles that tyres at static loads have; return what is wrong."""
+    if not distributed.lacking:
+        return []
+    loads = [distributed.car.values[name] for name in STATIC_LOADS]
+    tyres = [u for u in units.values() if {v.name for v in u.fmu.of("output")} >= {*TYRE_FORCES}]
+    try:
+        if len(tyres) != 1 or measure is None:
+            raise ValueError("there is no one unit for the tyres to take it from")
+        found = measure(tyres[0], dict(zip(WHEELS[::2], loads, strict=True)))
+    except (ValueError, YawbenchError) as error:
+        return [
+            scenario.document.problem(
+                ("units", unit),
+                f"the vehicle file does not give {listed(names)}, and the tyres do not tell: {error}",
+            )
+            for unit, names in distributed.lacking.items()
+        ]
+    stiffness = dict(zip(STIFFNESSES, (2.0 * found[wheel] for wheel in WHEELS[::2]), strict=True))
+    for unit, names in distributed.lacking.items():
+        formula = {
+            name: f"{DERIVED}two of {tyres[0].fmu.name} at {load:.6g} N each"
+            for name, load in zip(STIFFNESSES, loads, strict=True)
+        }
+        units[unit] = replace(
+            units[unit],
+            parameters=units[unit].parameters | {name: stiffness[name] for name in names},
+            origins=units[unit].origins | {name: formula[name] for name in names},
+        )
+    return []
 
 
 def _divided(

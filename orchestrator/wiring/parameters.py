@@ -1,9 +1,16 @@
-"""Values for parameters and constants: type, unit, limits and choices checked against the FMU."""
+"""Values for parameters and constants: type, unit, limits and choices checked against the FMU.
+
+A vehicle file describes a car for all plants: what no unit here takes of it is left alone if it is a quantity
+that some unit may know (`vocabulary.vehicle`), and what a unit lacks is derived (`derivations`). A unit that
+takes part of a car takes all of it: the rest of another car, which its FMU begins with, is no answer.
+"""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
+
+from vocabulary.vehicle import CAR
 
 from ..fmu.binary import integer_limits
 from ..plan import Fmu, Value, Variable
@@ -11,9 +18,15 @@ from ..scenario import quantities
 from ..scenario.load import Scenario
 from ..scenario.yaml_lines import Document, Key
 from ..wording import closest, fold, hint, listed, short
+from .derivations import Car, car_of, contradictions
 from .patterns import had
 from .shared_facts import facts_of
 
+DERIVED = "derived: "
+"""What the origin of a value begins with that follows from the vehicle file; its formula comes after."""
+STIFFNESSES = ("cornering_stiffness_front", "cornering_stiffness_rear")
+STATIC_LOADS = ("static_load_front", "static_load_rear")
+"""What follows from tyres, and what of the car that takes (see `make_plan`)."""
 LARGEST, LARGEST_SINGLE = sys.float_info.max, (2 - 2**-23) * 2.0**127
 """Numbers of double and single precision."""
 
@@ -104,6 +117,9 @@ class Parameters:
         self._replaced = replaced
         self._notes = notes
         self._origins = origins
+        self.car = Car({})
+        self.lacking: dict[str, list[str]] = {}
+        """Unit -> those of `STIFFNESSES` that only the tyres at their static loads can tell it."""
 
     def of_units(self) -> dict[str, dict[str, Value]]:
         """Return each unit's values."""
@@ -125,6 +141,7 @@ class Parameters:
                 else:
                     sentence = _unknown(unit, fmu, name)
                     self._scenario.document.report(key, sentence)
+        self._refuse_half_a_car(given)
         return given
 
     def _from_facts(self, given: dict[str, dict[str, Value]]) -> set[tuple[str, str]]:
@@ -175,21 +192,70 @@ class Parameters:
 
     def _from_vehicle(self, given: dict[str, dict[str, Value]]) -> None:
         document = self._scenario.vehicle_document
+        numbers: dict[str, float] = {}
+        idle: list[str] = []
         for name, raw in self._scenario.vehicle_parameters.items():
             key = ("parameters", name)
             takers = [unit for unit, fmu in self._fmus.items() if _is_parameter(fmu, name)]
             for unit in takers:
                 self._put(given, unit, name, raw, document, key)
-            if takers:
+            if name in CAR:
+                try:
+                    numbers[name] = float(value_for(_quantity(name), raw))
+                except ValueError as error:
+                    if not takers:
+                        document.report(key, str(error))
+            if takers or name in CAR:
+                idle += [] if takers else [name]
                 continue
             before = (self._replaced(unit) for unit in self._scenario.replaced)
             if any(fmu is not None and _is_parameter(fmu, name) for fmu in before):
                 self._notes.append(f"vehicle.{name} is left out: no unit has such a parameter after the swap")
                 continue
             known = {v.name for fmu in self._fmus.values() for v in fmu.of("parameter")}
-            likely = closest(name, sorted(known))
+            likely = closest(name, sorted(known | CAR.keys()))
             guess = f"; did you mean {likely!r}?" if likely else ""
             document.report(key, f"no unit has a parameter {name!r}{guess}")
+        for name, sentence in contradictions(numbers):
+            document.report(("parameters", name), sentence)
+        self.car = car_of(numbers)
+        self._derive(given)
+        for name in idle:
+            if name not in self.car.used and document.override(("parameters", name)):
+                self._notes.append(f"vehicle.{name} changes nothing: no unit here takes it or what follows")
+
+    def _derive(self, given: dict[str, dict[str, Value]]) -> None:
+        """Give every unit what it declares of the car and the file does not say."""
+        for name, formula in self.car.formulas.items():
+            for unit, fmu in self._fmus.items():
+                if not _is_parameter(fmu, name):
+                    continue
+                try:
+                    given[unit][name] = value_for(fmu.variables[name], self.car.values[name])
+                except ValueError as error:
+                    place = ("parameters",)
+                    self._scenario.vehicle_document.report(place, f"{unit}.{name} = {formula}: {error}")
+                self._origins[unit][name] = f"{DERIVED}{formula}"
+
+    def _refuse_half_a_car(self, given: Mapping[str, Mapping[str, Value]]) -> None:
+        """Report units that the vehicle file gives part of a car; note what tyres have to tell.
+
+        A file that not even static loads follow from is no car, but some values for the FMUs' own.
+        """
+        if self._scenario.vehicle_document.problems or not self.car.values.keys() >= {*STATIC_LOADS}:
+            return
+        for unit, fmu in self._fmus.items():
+            lacks = [v.name for v in fmu.of("parameter") if v.name in CAR and v.name not in given[unit]]
+            if of_tyres := [name for name in lacks if name in STIFFNESSES]:
+                self.lacking[unit] = of_tyres
+            needed = [name for name in lacks if CAR[name].needed]
+            if needed and any(name in self.car.values for name in given[unit]):
+                self._scenario.document.report(
+                    ("units", unit),
+                    f"{fmu.name} takes its car from the vehicle file, which gives neither "
+                    f"{listed(needed, last='nor')} nor what {'they' if len(needed) > 1 else 'it'} would "
+                    "follow from: give them there, or to this unit",
+                )
 
     def _left_out(self, unit: str, name: str, key: Key) -> bool:
         """Return whether a value was meant for the FMU that an option has replaced."""
@@ -212,6 +278,14 @@ class Parameters:
         except ValueError as error:
             document.report(key, str(error))
         self._origins[unit][name] = origin(document, key)
+
+
+def _quantity(name: str) -> Variable:
+    """Return a quantity of a car as if it were a parameter."""
+    one = CAR[name]
+    return Variable(
+        name, 0, "Real", "parameter", "fixed", one.unit, None, one.minimum, None, one.text
+    )  # fmt: skip
 
 
 def _is_parameter(fmu: Fmu, name: str) -> bool:

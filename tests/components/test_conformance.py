@@ -11,6 +11,7 @@ import pytest
 
 from components.fmi.component import Component
 from fmus.build import find_components
+from vocabulary.vehicle import CAR
 from vocabulary.wheels import wheels
 
 from .stand import Stand
@@ -283,3 +284,11 @@ def test_parameters_arrive_after_the_instance_is_made(component):
 def test_its_state_goes_through_bytes(component):
     stand = driven(component, steps=3)
     assert pickle.loads(frozen(stand)).keys() == stand.unit._get_fmu_state().keys()
+
+
+def test_what_units_know_of_a_car_has_the_measure_of_the_vocabulary():
+    declared = {
+        (v.name, v.unit) for c in COMPONENTS.values() for v in c.variables if v.causality == "parameter"
+    }
+    assert {(name, unit) for name, unit in declared if name in CAR and unit != CAR[name].unit} == set()
+    assert {name for name, one in CAR.items() if one.needed} <= {name for name, _ in declared}

@@ -37,8 +37,9 @@ STAGES = (
     {"metrics"},
     {"master"},  # hands rows to a recorder of `results`, has `metrics` look at them
     {"figures"},
+    {"tyres"},  # measures for `experiments` what units want to know of their tyres
     {"experiments"},
-    {"interop", "scaffold", "tyres"},
+    {"interop", "scaffold"},
     {"pages"},
     {"commands"},
     {"cli"},

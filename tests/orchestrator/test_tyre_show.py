@@ -9,8 +9,8 @@ from components.tyres.magic_formula_62 import MagicFormula62
 from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.scenario.tir import read_tir
-from orchestrator.tyres.stand import State, put_on_stand
-from orchestrator.tyres.tyre_drawing import draw_tyre, stiffnesses
+from orchestrator.tyres.stand import State, put_on_stand, stiffnesses
+from orchestrator.tyres.tyre_drawing import draw_tyre
 from tests.components.stand import Stand as Bench
 
 from .tir_files import write

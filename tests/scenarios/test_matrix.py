@@ -1,4 +1,4 @@
-"""Any controller on any car on any tyre: only `--swap` between them, two seconds of a lane change each."""
+"""Any controller on any plant on any tyre: only `--swap` between them, two seconds of a lane change each."""
 
 from __future__ import annotations
 
@@ -23,6 +23,9 @@ CONTROLLERS = (
 )  # fmt: skip
 PLANTS = ("seven_dof", "eight_dof", "fourteen_dof")
 TYRES = ("dugoff", "linear", "magic_formula", "magic_formula_62", "magic_formula_1987")
+CAR = SCENARIO.parents[1] / "vehicles" / "large_saloon.yaml"
+"""A car that is described for every plant."""
+ROAD_WHEELS = ("driver.steering_ratio=1",)  # the scenario's angle is theirs
 UNITS = (
     "driver_sine", "reference_single_track", "allocator_load_proportional", "wheel_control_slip",
     "actuator_lag",
@@ -49,7 +52,10 @@ CASES = list(product(PLANTS, TYRES, CONTROLLERS))
 @pytest.mark.parametrize(("plant", "tyre", "controller"), CASES)
 def test_every_controller_runs_on_every_car_and_tyre(fmus, tmp_path, plant, tyre, controller):
     swaps = (f"controller=controller_{controller}", f"plant=plant_{plant}", f"tyre=tyre_{tyre}")
-    plan = make_plan(load_scenario(SCENARIO, changes=changed(swaps, stop_time=2.0)), fmus=fmus)
+    plan = make_plan(
+        load_scenario(SCENARIO, changes=changed(swaps, ROAD_WHEELS, stop_time=2.0, vehicle=str(CAR))),
+        fmus=fmus,
+    )
     simulate(plan, tmp_path)
     results = load_results(tmp_path)
     assert results.run["status"] == "completed", results.run["error"]

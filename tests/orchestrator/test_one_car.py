@@ -1,0 +1,258 @@
+"""One vehicle file for every plant: what follows from it, what is refused, what plants make of one car."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+from components.cars.sprung_car import FourteenDofParameters, ride_of
+from components.mathematics.gravity import G
+from fmus.build import build_all
+from orchestrator.commands.check import show
+from orchestrator.errors import WiringError
+from orchestrator.master.simulate import simulate_in_memory
+from orchestrator.scenario.load import load_scenario
+from orchestrator.tyres.axle_stiffness import cornering_stiffness
+from orchestrator.wiring import derivations
+from orchestrator.wiring.derivations import DERIVATIONS, car_of, contradictions
+from orchestrator.wiring.make_plan import make_plan
+from tests.changed import changed
+
+from .fake_fmus import Var, make_fmu, out
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+SALOON = SCENARIOS / "vehicles" / "large_saloon.yaml"
+STEADY_TURN = SCENARIOS / "one_car" / "steady_turn.yaml"
+PLANTS = ("two_dof", "seven_dof", "eight_dof", "fourteen_dof")
+
+
+@pytest.fixture(scope="module")
+def saloon():
+    """What the file of the large saloon says, with unequal wheels."""
+    given = YAML(typ="safe").load(SALOON.read_text(encoding="utf-8"))["parameters"]
+    return {name: float(value) for name, value in given.items()} | {"front_unsprung_share": 0.4}
+
+
+# Derivations
+
+
+def test_whatever_is_known_of_a_car_all_formulas_agree(saloon):
+    whole = car_of(saloon).values
+    for one in DERIVATIONS:
+        if one.name in whole and all(name in whole for name in one.inputs):
+            found = one.value(*(whole[name] for name in one.inputs))
+            assert found == pytest.approx(whole[one.name], rel=1e-12), one
+    assert contradictions(whole) == []
+
+
+@pytest.mark.parametrize(
+    ("instead", "of"),
+    [
+        (("unsprung_mass",), "mass"),
+        (("unsprung_mass",), "sprung_mass"),
+        (("wheelbase",), "cg_to_rear_axle"),
+        (("wheelbase",), "cg_to_front_axle"),
+        (("sprung_cg_height",), "cg_height"),
+        (("sprung_cg_height", "roll_arm"), "cg_height"),
+        (("roll_inertia",), "sprung_roll_inertia"),
+    ],
+)
+def test_what_another_data_sheet_gives_leads_to_the_same_car(saloon, instead, of):
+    whole = car_of(saloon).values
+    other = {name: value for name, value in saloon.items() if name != of} | {
+        name: whole[name] for name in instead
+    }
+    assert car_of(other).values[of] == pytest.approx(saloon[of], rel=1e-12)
+
+
+def test_the_derived_car_is_that_of_the_equations_of_motion(saloon):
+    known = {name: value for name, value in saloon.items() if name in FourteenDofParameters.__annotations__}
+    p = FourteenDofParameters(**known)
+    ride, car = ride_of(p), car_of(saloon).values
+    assert derivations.G == G
+    assert 2.0 * ride.load_f + 2.0 * ride.load_r == pytest.approx(p.mass * G, rel=1e-12)
+    assert [car["static_load_front"], car["static_load_rear"]] == pytest.approx([ride.load_f, ride.load_r])
+    assert car["sprung_mass"] * G * car["roll_arm"] == pytest.approx(ride.gravity_roll, rel=1e-12)
+    assert car["sprung_cg_offset"] != 0.0
+    given = {name: value for name, value in saloon.items() if name != "yaw_inertia"}
+    whole = car_of(given | {"sprung_yaw_inertia": ride.yaw_sprung}).values
+    assert whole["yaw_inertia"] == pytest.approx(p.yaw_inertia, rel=1e-12)
+
+
+def test_springs_in_series_with_stiff_tyres_are_the_springs(saloon):
+    car = car_of(saloon | {"tyre_vertical_stiffness": 1e12}).values
+    d = saloon["track_width"]
+    for axle in ("front", "rear"):
+        at_wheel = saloon[f"spring_stiffness_{axle}"] + 2.0 * saloon[f"anti_roll_stiffness_{axle}"]
+        assert car[f"roll_stiffness_{axle}"] == pytest.approx(0.5 * d * d * at_wheel, rel=1e-6)
+        assert car[f"roll_damping_{axle}"] == pytest.approx(0.5 * d * d * saloon[f"damping_{axle}"], rel=1e-6)
+
+
+def test_values_that_contradict_each_other_are_named():
+    ((name, sentence),) = contradictions({"mass": 1900.0, "sprung_mass": 1650.0, "unsprung_mass": 180.0})
+    assert name == "mass"
+    assert sentence == "1900 kg contradicts sprung_mass + unsprung_mass = 1830 kg: leave one of them out"
+    assert contradictions({"mass": 1831.0, "sprung_mass": 1650.0, "unsprung_mass": 180.0}) == []
+
+
+def test_a_car_that_weighs_nothing_gives_no_numbers():
+    assert (
+        "front_unsprung_share" not in car_of({"unsprung_mass_front": 0.0, "unsprung_mass_rear": 0.0}).values
+    )
+
+
+# Units
+
+
+CAR_TEXT = (
+    "sprung_mass: 1650, unsprung_mass: 180 kg, wheelbase: 3.05, cg_to_front_axle: 1.4, track_width: 1.6"
+)
+
+
+@pytest.fixture
+def plan(tmp_path, monkeypatch):
+    """Return the plan of a car's file, with fake units that declare parts of a car."""
+    monkeypatch.chdir(tmp_path)
+    mass, rear = Var("mass", "kg", start=1100.0), Var("cg_to_rear_axle", "m", start=1.3)
+    stiffness = Var("cornering_stiffness_front", "N/rad", start=1e5)
+    height = Var("cg_height", "m", start=0.7)
+    make_fmu(tmp_path / "fmus" / "plant_x.fmu", outputs=[out("yaw_rate")], parameters=[mass, rear])
+    make_fmu(tmp_path / "fmus" / "plant_high.fmu", outputs=[out("yaw_rate")], parameters=[mass, height])
+    make_fmu(tmp_path / "fmus" / "reference_x.fmu", outputs=[out("r")], parameters=[mass, stiffness])
+    make_fmu(
+        tmp_path / "fmus" / "tyre_x.fmu",
+        outputs=[out("tyre_force_y_*")],
+        parameters=[Var("cornering_stiffness", "N/rad", start=5e4)],
+    )
+
+    def made(car=CAR_TEXT, fmu="plant_x", settings=(), more="", measure=None):
+        Path("car.yaml").write_text(f"parameters: {{{car}}}\n")
+        units = f"units:\n  plant: {{fmu: {fmu}}}\n{more}"
+        Path("a.yaml").write_text(f"vehicle: car.yaml\nstop_time: 1\nstep_size: 0.01\n{units}")
+        return make_plan(load_scenario("a.yaml", changes=changed(settings=settings)), measure=measure)
+
+    return made
+
+
+pytestmark = pytest.mark.usefixtures("cache")
+
+
+def unit(plan, name):
+    return next(one for one in plan.units if one.name == name)
+
+
+def test_a_unit_takes_what_it_declares_and_what_follows(plan):
+    plant = unit(plan(), "plant")
+    assert plant.parameters == {"mass": 1830.0, "cg_to_rear_axle": pytest.approx(1.65)}
+    assert plant.origins == {
+        "mass": "derived: sprung_mass + unsprung_mass",
+        "cg_to_rear_axle": "derived: wheelbase - cg_to_front_axle",
+    }
+
+
+def test_check_shows_what_is_derived_and_what_other_units_are_meant_for(plan, capsys):
+    show(plan(), Path("a.yaml"))
+    said = " ".join(capsys.readouterr().out.split())
+    assert "mass 1830 kg derived plant" in said
+    assert "mass sprung_mass + unsprung_mass plant" in said
+    assert "for other units: sprung_mass, unsprung_mass, wheelbase, cg_to_front_axle, track_width" in said
+
+
+def test_a_change_of_what_others_follow_from_reaches_the_unit(plan):
+    made = plan(settings=["vehicle.sprung_mass=1.7 t"])
+    assert unit(made, "plant").parameters["mass"] == 1880.0
+    assert made.notes == ()
+
+
+def test_a_change_that_reaches_no_unit_is_told(plan):
+    assert plan(settings=["vehicle.track_width=1.5"]).notes == (
+        "vehicle.track_width changes nothing: no unit here takes it or what follows",
+    )
+
+
+@pytest.mark.parametrize(
+    ("car", "fmu", "says"),
+    [
+        (
+            CAR_TEXT,
+            "plant_high",
+            "plant_high takes its car from the vehicle file, which gives neither cg_height",
+        ),
+        (f"{CAR_TEXT}, mass: 1900", "plant_x", "parameters.mass: 1900 kg contradicts sprung_mass + unsprung"),
+        (f"{CAR_TEXT}, wheel_radius: 31 kg", "plant_x", "wheel_radius: '31 kg' is not a value in m"),
+        (
+            f"{CAR_TEXT}, trak_width: 1.5",
+            "plant_x",
+            "no unit has a parameter 'trak_width'; did you mean 'track_",
+        ),
+        ("sprung_mass: -5, unsprung_mass: 180", "plant_x", "sprung_mass: must be at least 0 kg (got -5)"),
+    ],
+)
+def test_what_is_wrong_with_a_car_is_said_in_one_sentence(plan, car, fmu, says):
+    with pytest.raises(WiringError) as raised:
+        plan(car, fmu)
+    assert len(raised.value.problems) == 1
+    assert says in str(raised.value)
+
+
+def test_a_reference_is_told_what_the_tyres_have_at_their_static_loads(plan):
+    asked = {}
+
+    def measure(tyres, loads):
+        asked.update(loads)
+        return {"fl": 30e3, "rl": 40e3}
+
+    more = "  reference: {fmu: reference_x}\n  tyre: {fmu: tyre_x}\n"
+    reference = unit(plan(more=more, measure=measure), "reference")
+    assert reference.parameters["cornering_stiffness_front"] == 60e3
+    load = 0.5 * 1830.0 * G * 1.65 / 3.05
+    assert asked == {"fl": pytest.approx(load), "rl": pytest.approx(0.5 * 1830.0 * G - load)}
+    assert reference.origins["cornering_stiffness_front"] == f"derived: two of tyre_x at {load:.6g} N each"
+
+
+def test_a_reference_without_tyres_to_ask_is_refused(plan):
+    with pytest.raises(
+        WiringError, match="does not give cornering_stiffness_front, and the tyres do not tell"
+    ):
+        plan(more="  reference: {fmu: reference_x}\n", measure=lambda tyres, loads: {})
+
+
+# Plants
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory):
+    """A folder with the FMUs of the steady turn and every plant."""
+    folder = tmp_path_factory.mktemp("fmus")
+    own = ("driver_ramp", "reference_single_track", "controller_off", "allocator_load_proportional")
+    others = ("wheel_control_direct", "tyre_magic_formula", *(f"plant_{name}" for name in PLANTS))
+    build_all(folder, components=(*own, *others))
+    return folder
+
+
+def steady_turn(fmus, swaps=(), **of_run):
+    scenario = load_scenario(STEADY_TURN, changes=changed(swaps, **of_run))
+    return make_plan(scenario, fmus=fmus, measure=cornering_stiffness)
+
+
+def test_one_car_turns_alike_at_every_number_of_degrees_of_freedom(fmus):
+    gains = {}
+    for plant in PLANTS:
+        made = steady_turn(fmus, [f"plant=plant_{plant}"], step_size=0.002, stop_time=5.0)
+        assert [note for note in made.notes if "default" in note or "FMUs have" in note] == []
+        results = simulate_in_memory(made)
+        assert 1.2 < results["plant.acceleration_y"][-1] < 2.0
+        gains[plant] = results["plant.yaw_rate"][-1] / results["driver.steer_angle"][-1]
+    assert max(gains.values()) / min(gains.values()) < 1.02, gains
+
+
+def test_the_stiffness_that_a_reference_is_told_is_that_of_the_tyres_formula(fmus, tmp_path):
+    car = YAML(typ="safe").load(SALOON.read_text(encoding="utf-8"))
+    given = {axle: car["parameters"].pop(f"cornering_stiffness_{axle}") for axle in ("front", "rear")}
+    with (tmp_path / "car.yaml").open("w") as file:
+        YAML().dump(car, file)
+    told = unit(steady_turn(fmus, vehicle=str(tmp_path / "car.yaml")), "reference").parameters
+    for axle, value in given.items():  # the paper's, to which the tyres are scaled in three digits
+        assert told[f"cornering_stiffness_{axle}"] == pytest.approx(value, rel=0.006)

@@ -1,0 +1,101 @@
+"""What a vehicle file can say of a car: name, unit of measurement and meaning of every quantity.
+
+A parameter of a unit that bears one of these names means the same and has
+the same unit of measurement.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Quantity(NamedTuple):
+    """What is known of a quantity."""
+
+    unit: str
+    text: str
+    needed: bool = False
+    """Without it a unit would be another car: what its FMU begins with stands for none but its own."""
+    minimum: float | None = None
+
+
+CAR: dict[str, Quantity] = {
+    "mass": Quantity("kg", "Mass m of the car as it drives", True, 1.0),
+    "sprung_mass": Quantity("kg", "Mass m_s of what the springs carry", True, 0.0),
+    "unsprung_mass": Quantity("kg", "Mass m_u of all wheels and what moves with them", minimum=0.0),
+    "unsprung_mass_front": Quantity("kg", "That of both front wheels", minimum=0.0),
+    "unsprung_mass_rear": Quantity("kg", "That of both rear wheels", minimum=0.0),
+    "front_unsprung_share": Quantity("1", "Front part of the unsprung mass", minimum=0.0),
+    "front_load_share": Quantity("1", "Part of the weight that the front axle carries at rest", minimum=0.0),
+    "yaw_inertia": Quantity("kg.m2", "Yaw inertia I_z of the whole car", True, 1.0),
+    "sprung_yaw_inertia": Quantity(
+        "kg.m2", "Yaw inertia of the sprung mass about its own centre", minimum=1.0
+    ),
+    "roll_inertia": Quantity("kg.m2", "Roll inertia I_x of the sprung mass about the roll axis", True, 1.0),
+    "sprung_roll_inertia": Quantity("kg.m2", "That about its own centre", True, 1.0),
+    "sprung_pitch_inertia": Quantity(
+        "kg.m2", "Pitch inertia of the sprung mass about its own centre", True, 1.0
+    ),
+    "sprung_roll_yaw_product": Quantity("kg.m2", "Product of inertia I_xz of the sprung mass"),
+    "wheelbase": Quantity("m", "Distance L of the axles", minimum=0.1),
+    "cg_to_front_axle": Quantity("m", "Distance a of the centre of mass from the front axle", True, 0.1),
+    "cg_to_rear_axle": Quantity("m", "Distance b of the centre of mass from the rear axle", True, 0.1),
+    "cg_to_front_end": Quantity("m", "Distance of the centre of mass from the front end", minimum=0.0),
+    "cg_to_rear_end": Quantity("m", "Distance of the centre of mass from the rear end", minimum=0.0),
+    "sprung_cg_offset": Quantity("m", "Centre of the sprung mass before that of the car"),
+    "track_width": Quantity("m", "Track d, the same for both axles", True, 0.1),
+    "track_width_front": Quantity("m", "Track of the front axle", minimum=0.1),
+    "track_width_rear": Quantity("m", "Track of the rear axle", minimum=0.1),
+    "vehicle_width": Quantity("m", "Width of the body without mirrors", minimum=0.1),
+    "cg_height": Quantity("m", "Height h of the centre of mass", True, 0.0),
+    "sprung_cg_height": Quantity("m", "Height of the centre of the sprung mass", minimum=0.0),
+    "unsprung_height": Quantity("m", "Height of the wheels' centres", True, 0.0),
+    "roll_centre_height_front": Quantity("m", "Front roll centre", True),
+    "roll_centre_height_rear": Quantity("m", "Rear roll centre", True),
+    "roll_axis_height": Quantity("m", "Roll axis below the centre of the sprung mass"),
+    "roll_arm": Quantity("m", "Height h_s of the sprung mass above the roll axis", True, 0.0),
+    "spring_stiffness_front": Quantity("N/m", "Front spring, at the wheel", True, 0.0),
+    "spring_stiffness_rear": Quantity("N/m", "Rear spring, at the wheel", True, 0.0),
+    "damping_front": Quantity("N.s/m", "Front damper, at the wheel", True, 0.0),
+    "damping_rear": Quantity("N.s/m", "Rear damper, at the wheel", True, 0.0),
+    "anti_roll_stiffness_front": Quantity(
+        "N/m", "Front anti-roll bar, force at each wheel per difference of travel", True
+    ),
+    "anti_roll_stiffness_rear": Quantity(
+        "N/m", "Rear anti-roll bar, force at each wheel per difference of travel", True
+    ),
+    "roll_stiffness": Quantity("N.m/rad", "Roll stiffness K of the car on its tyres", True, 0.0),
+    "roll_stiffness_front": Quantity("N.m/rad", "That of the front axle", minimum=0.0),
+    "roll_stiffness_rear": Quantity("N.m/rad", "That of the rear axle", minimum=0.0),
+    "front_roll_share": Quantity("1", "Front part of the roll stiffness", True, 0.0),
+    "roll_damping": Quantity("N.m.s/rad", "Roll damping C of the car on its tyres", True, 0.0),
+    "roll_damping_front": Quantity("N.m.s/rad", "That of the front axle", minimum=0.0),
+    "roll_damping_rear": Quantity("N.m.s/rad", "That of the rear axle", minimum=0.0),
+    "steering_ratio": Quantity("1", "Hand-wheel angle over road-wheel angle", minimum=0.1),
+    "wheel_radius": Quantity("m", "Rolling radius R of the wheels", True, 0.05),
+    "wheel_inertia": Quantity("kg.m2", "Inertia J of one wheel", True, 0.01),
+    "tyre_vertical_stiffness": Quantity("N/m", "Tyre spring k_t", True, 1.0),
+    "static_load_front": Quantity("N", "Load of one front wheel at rest", minimum=0.0),
+    "static_load_rear": Quantity("N", "Load of one rear wheel at rest", minimum=0.0),
+    "cornering_stiffness": Quantity(
+        "N/rad", "Cornering stiffness of one tyre that knows no load", minimum=0.0
+    ),
+    "longitudinal_stiffness": Quantity("N", "Slip stiffness of one tyre that knows no load", minimum=0.0),
+    "cornering_stiffness_scale_front": Quantity(
+        "1", "Scales the front tyres' cornering stiffness", minimum=0.0
+    ),
+    "cornering_stiffness_scale_rear": Quantity(
+        "1", "Scales the rear tyres' cornering stiffness", minimum=0.0
+    ),
+    "cornering_stiffness_front": Quantity("N/rad", "Cornering stiffness C_f of the front axle", minimum=1.0),
+    "cornering_stiffness_rear": Quantity("N/rad", "Cornering stiffness C_r of the rear axle", minimum=1.0),
+    "drag_coefficient": Quantity("1", "Drag coefficient C_D", minimum=0.0),
+    "frontal_area": Quantity("m2", "Frontal area A", minimum=0.0),
+    "air_density": Quantity("kg/m3", "Air density rho", minimum=0.0),
+    "rolling_resistance": Quantity("1", "Rolling resistance f", minimum=0.0),
+    "torque_limit": Quantity("N.m", "Largest torque of the motor at one wheel", minimum=0.0),
+    "drive_front_share": Quantity("1", "Part of the drive force of the front axle", minimum=0.0),
+    "brake_factor_front": Quantity("m3", "Torque of one front brake per pressure", minimum=0.0),
+    "brake_factor_rear": Quantity("m3", "Torque of one rear brake per pressure", minimum=0.0),
+    "brake_torque_limit": Quantity("N.m", "Largest brake torque of one wheel", minimum=0.0),
+}
