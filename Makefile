@@ -27,7 +27,7 @@ fmus: setup
 	$(BIN)/yawbench build
 
 demo: fmus
-	$(BIN)/yawbench report scenarios/fnn_sideslip/study.yaml
+	$(BIN)/yawbench report --quick scenarios/fnn_sideslip/study.yaml
 
 report: fmus
 	$(BIN)/yawbench report

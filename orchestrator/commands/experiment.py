@@ -17,6 +17,7 @@ from .batch import bar, hold, reported, say, stoppable
 if TYPE_CHECKING:
     from ..experiments.experiment import Experiment
     from ..experiments.findings import Findings
+    from ..experiments.jobs import Once
     from ..experiments.planning import Planned
     from ..plan import Change
 
@@ -37,6 +38,7 @@ class Wishes:
     keep: bool = False
     fresh: bool = False
     no_run: bool = False
+    quick: bool = False  # no regions
 
 
 def conduct(experiment: Experiment, folder: Path, wishes: Wishes, **of_jobs: Any) -> Findings:
@@ -91,6 +93,8 @@ def conduct(experiment: Experiment, folder: Path, wishes: Wishes, **of_jobs: Any
                 outcomes = _named(planned, wishes) if planned and not wishes.no_run else []
                 findings = judge_results(experiment, folder, outcomes, planned=planned, each=workers.map)
             drawn, problems = draw_all(findings, folder, each=workers.map)
+        if planned and experiment.spec.region and not wishes.quick:
+            findings = _over_region(planned, findings, folder, wishes, once)
         write_findings(findings, drawn, folder)
     for problem in problems:
         say(problem)
@@ -140,6 +144,36 @@ def _named(planned: Planned, wishes: Wishes) -> Sequence[Any]:
     return outcomes
 
 
+def _over_region(planned: Planned, findings: Findings, folder: Path, wishes: Wishes, once: Once) -> Findings:
+    """Return the findings with what becomes of their verdicts over the region; the journal knows its runs."""
+    from dataclasses import replace
+
+    from ..experiments.execution import finish, left_to_do, runner_of
+    from ..experiments.journal import Journal
+    from ..experiments.region import judge_region, plan_region
+
+    experiment = planned.experiment
+    with bar("planning", 0, quiet=True) as planning:
+        plan = plan_region(planned, folder, once=once, progress=planning)
+    runner = runner_of(planned, wishes.workers, wishes.scheduler)
+    with contextlib.closing(Journal(folder, experiment.identity, fresh=wishes.fresh)) as journal:
+        jobs = {job.key: job for job in plan.jobs.values()}
+        left = left_to_do(list(jobs.values()), journal.records)
+        if left and wishes.no_run:
+            say(f"note: {counted(len(left), 'run')} of the region not made yet; it is left out")
+            return findings
+        total = len(jobs)
+        _announce(f"{experiment.spec.title}, region of its verdicts", total, total - len(left), total)
+        with reported(f"{experiment.path.stem}, region", total, total - len(left), each=False) as told:
+            finish(left, journal, runner=runner, told=told)
+        failed = [key for key in jobs if not journal.records[key].ok]
+        for key in failed[:SHOWN]:
+            say(f"{jobs[key].label} failed: {journal.records[key].reason}")
+        if failed:
+            say(f"{len(failed)} of {total} runs of the region failed; they count as another verdict")
+        return replace(findings, regions=judge_region(plan, findings, journal.records))
+
+
 def _announce(title: str, runs: int, done: int, total: int) -> None:
     """Say how many runs there are, and how many of all that differ are finished."""
     before = "" if not done else ", all finished before" if done == total else f", {done} finished before"
@@ -166,12 +200,13 @@ def chapter_of(
     return facts | {"comparison": None, "results": []} | more
 
 
-def command_of(preset: str, path: Path, **options: Iterable[object] | None) -> str:
+def command_of(preset: str, path: Path, *, quick: bool = False, **options: Iterable[object] | None) -> str:
     """Return the command line that makes an experiment again; `options`: name -> what it was given."""
     import shlex
 
+    flags = ["--quick"] if quick else []
     given = [(f"--{name}", str(value)) for name, values in options.items() for value in values or ()]
-    return shlex.join(["yawbench", preset, str(path), *itertools.chain.from_iterable(given)])
+    return shlex.join(["yawbench", preset, str(path), *flags, *itertools.chain.from_iterable(given)])
 
 
 def write_page(chapters: Sequence[dict[str, Any]], folder: Path) -> None:
@@ -222,6 +257,7 @@ def of_files(
         command = command_of(
             "sweep" if experiment.spec.axes else "study",
             experiment.path,
+            quick=wishes.quick and experiment.spec.region is not None,
             swap=[f"{one.place}={one.value}" for one in changes if one.swaps],
             set=[f"{one.place}={one.value}" for one in changes if not one.swaps],
         )

@@ -51,6 +51,12 @@ Fresh = Annotated[
     bool,
     typer.Option("--fresh", "--again", help="Make all runs anew, those too that have been made already."),
 ]
+Quick = Annotated[
+    bool,
+    typer.Option(
+        "--quick", help="Judge claims at the chosen point alone, not over the region of the open values."
+    ),
+]
 NoRun = Annotated[
     bool,
     typer.Option("--no-run", help="Run and build nothing: judge and draw what stands in the results folder."),

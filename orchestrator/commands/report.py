@@ -9,7 +9,7 @@ import typer
 
 from .batch import Jobs
 from .experiment import Wishes, of_files
-from .options import CallLimit, Fmus, Format, Fresh, Isolate, NoBuild, NoRun, isolation, named
+from .options import CallLimit, Fmus, Format, Fresh, Isolate, NoBuild, NoRun, Quick, isolation, named
 
 Studies = Annotated[
     list[Path] | None,
@@ -29,6 +29,7 @@ def report(
     no_build: NoBuild = False,
     jobs: Jobs = None,
     format_: Format = "csv",
+    quick: Quick = False,
     fresh: Fresh = False,
     no_run: NoRun = False,
     isolate: Isolate = False,
@@ -39,12 +40,21 @@ def report(
     report.html: per study the verdicts, system, figures, tables, parameters and their source. One file
     that needs no server; figures lie beside it as SVG and PNG. Runs whose results are missing, or were
     made from another scenario or FMU, are made first. Without --out, the page of one study lies in its
-    folder below results/, that of several in results/.
+    folder below results/, that of several in results/. With all regions it takes half an hour on two
+    cores; --quick leaves them out.
     """
     from ..pages.report import found_studies
 
     paths = list(dict.fromkeys(studies or found_studies()))
     wishes = Wishes(
-        fmus, not no_build, jobs, None, format_, isolation(isolate, call_limit), fresh=fresh, no_run=no_run
+        fmus,
+        not no_build,
+        jobs,
+        None,
+        format_,
+        isolation(isolate, call_limit),
+        fresh=fresh,
+        no_run=no_run,
+        quick=quick,
     )
     of_files(context, paths, (), out, wishes)

@@ -18,6 +18,7 @@ from .options import (
     NoBuild,
     NoRun,
     Out,
+    Quick,
     Scheduler,
     Set,
     Swap,
@@ -41,6 +42,7 @@ def study(
     jobs: Jobs = None,
     scheduler: Scheduler = None,
     format_: Format = "csv",
+    quick: Quick = False,
     fresh: Fresh = False,
     no_run: NoRun = False,
     isolate: Isolate = False,
@@ -50,7 +52,8 @@ def study(
 
     Begin with report.html. Without --out, results go to results/<folder of the study>/<its name>. Every
     run has a process of its own; one that fails is named in the table and takes no other with it. Runs
-    that have been made already, of the same scenario, FMUs and program, are not made again.
+    that have been made already, of the same scenario, FMUs and program, are not made again. If the file
+    has a region, claims are also judged over the open values there: how far each verdict carries.
     """
     from ..scenario.overrides import read_changes
 
@@ -63,5 +66,6 @@ def study(
         isolation(isolate, call_limit),
         fresh=fresh,
         no_run=no_run,
+        quick=quick,
     )
     of_files(context, [file], read_changes(swap or (), set_ or ()), out, wishes)

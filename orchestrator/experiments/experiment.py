@@ -112,17 +112,19 @@ class Experiment:
 
     def _at(self, point: Point) -> list[Change]:
         """Return what a point changes."""
-        folder, changes = self.path.parent, []
-        for axis, level in zip(self.spec.axes.values(), point, strict=True):
-            if axis.kind == "vehicle":
-                changes.append(Change("vehicle", str(folder / str(level.value)), "sweep"))
-            elif axis.kind == "variant":
-                changes += changes_of_file(axis.variants[str(level.value)], folder, "sweep")
-            elif axis.kind == "fmu":
-                changes += overrides.changes_of({axis.vary[0]: str(level.value)}, {}, folder, "sweep")
-            else:
-                changes += [Change(place, _given(axis, level), "sweep") for place in axis.vary]
-        return changes
+        pairs = zip(self.spec.axes.values(), point, strict=True)
+        return [change for axis, level in pairs for change in changes_at(axis, level, self.path.parent)]
+
+
+def changes_at(axis: AxisSpec, level: Level, folder: Path, origin: str = "sweep") -> list[Change]:
+    """Return what a level of an axis changes, of a file in a folder."""
+    if axis.kind == "vehicle":
+        return [Change("vehicle", str(folder / str(level.value)), origin)]
+    if axis.kind == "variant":
+        return changes_of_file(axis.variants[str(level.value)], folder, origin)
+    if axis.kind == "fmu":
+        return overrides.changes_of({axis.vary[0]: str(level.value)}, {}, folder, origin)
+    return [Change(place, _given(axis, level), origin) for place in axis.vary]
 
 
 def _given(axis: AxisSpec, level: Level) -> Value:
@@ -274,6 +276,14 @@ def _check_names(experiment: Experiment, document: Document) -> None:
             ):
                 sentence = f"grid {number.rank_correlation!r} has no published numbers to compare with"
                 document.report(place, sentence)
+    open_values = spec.region.open_values if spec.region else {}
+    for name, one in open_values.items():
+        check_patterns(("region", "open_values", name), one.runs)
+    for group, judged in (("claims", spec.claims), ("checks", spec.checks)):
+        for i, claim in enumerate(judged):
+            for k, name in enumerate(claim.open_values or ()):
+                where: Key = (group, i, "open_values", k)
+                _known(document, where, name, open_values, "open value", "open values")
     for key, condition in spec.conditions():
         _check_condition(experiment, document, key, condition)
     for name, limit in spec.limits.items():

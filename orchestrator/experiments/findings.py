@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from .grids import correlation
 from .jobs import Outcome, Record, measured, read_back
 from .judged_schema import Claim
 from .judging import Judgement, Values, judge
+from .margins import Region
 from .planning import Planned, metrics_of
 from .schema import ExperimentSpec
 
@@ -34,6 +35,8 @@ class Findings:
     records: list[Record]  # of all cases, in their order
     results: dict[str, Results]  # of named runs that reached their end
     planned: Planned | None = None  # None: judged by what stands on disk alone
+    regions: Mapping[tuple[str, int], Region] = field(default_factory=dict)
+    """`claims` or `checks`, and a number -> what becomes of that verdict over the region."""
 
     @property
     def spec(self) -> ExperimentSpec:
@@ -98,12 +101,16 @@ class Findings:
     @cached_property
     def claims(self) -> list[Judgement]:
         """What the paper says, judged."""
-        return [self.judged(claim) for claim in self.spec.claims]
+        return self._all_judged("claims", self.spec.claims)
 
     @cached_property
     def checks(self) -> list[Judgement]:
         """What this project asks, judged."""
-        return [self.judged(claim) for claim in self.spec.checks]
+        return self._all_judged("checks", self.spec.checks)
+
+    def _all_judged(self, group: str, said: Sequence[Claim]) -> list[Judgement]:
+        every = enumerate(said)
+        return [replace(self.judged(one), region=self.regions.get((group, i))) for i, one in every]
 
     def judged(self, claim: Claim) -> Judgement:
         """Return whether a claim holds; along axes, whether it does at every point."""

@@ -47,6 +47,8 @@ def _metric_name(name: str) -> str:
 Alternatives = Annotated[dict[str, str], PlainValidator(_alternatives)]
 Window = Annotated[tuple[float, float], PlainValidator(_window)]
 MetricName = Annotated[str, AfterValidator(_metric_name)]
+Patterns = Annotated[list[str], Field(min_length=1)]
+"""Names of runs, with `*` and `?` for many."""
 
 
 class MetricSpec(Strict):
@@ -216,6 +218,9 @@ class Claim(Judged):
     short: str = Field("", description="The same for the table of runs, e.g. '> 100 %'")
     source: str = Field("", description="Where it is said: section, figure, table")
     note: str = Field("", description="What a reader should know about the verdict")
+    open_values: list[str] | None = Field(
+        None, description="Those of the region that it depends on; left out: all that touch its runs"
+    )
 
 
 class LimitSpec(Judged):

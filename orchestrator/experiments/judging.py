@@ -12,6 +12,7 @@ from ..errors import ScenarioError
 from ..figures.display import shown
 from ..metrics.run_metrics import Value
 from .judged_schema import Condition, Judged, Reference
+from .margins import Gap, Region, margin
 from .numbers import si_number
 
 Values = Mapping[tuple[str, str], Value]
@@ -23,6 +24,7 @@ _COMPARE = {
     "below": operator.lt,
     "at_most": operator.le,
 }
+_UPWARDS = ("above", "at_least")
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,17 @@ class Judgement:
     said: Any  # a claim, or what else has conditions
     holds: bool | None
     measured: tuple[str, ...]
+    gaps: tuple[Gap | None, ...] = ()  # of every condition, of every run it names; None: no result
+    region: Region | None = None
+
+    @property
+    def margin(self) -> float | None:
+        """How far the claim is from the other verdict, as a share of its threshold (see `margins`)."""
+        return margin(self.gaps)
+
+    def margin_from(self, chosen: Judgement) -> float | None:
+        """Return the margin of this judgement of what is judged at the chosen point, too."""
+        return margin(self.gaps, chosen.gaps)
 
 
 def judge(
@@ -49,24 +62,25 @@ def judge(
         ScenarioError: a bound is given in a unit that its metric does not have.
     """
     found = [_compare(condition, values, runs, derived or {}) for condition in said.holds_if]
-    verdicts = [holds for holds, _ in found]
+    verdicts = [holds for holds, _, _ in found]
     holds = None if None in verdicts else all(verdicts)
-    return Judgement(said, holds, tuple(dict.fromkeys(text for _, text in found)))
+    texts = dict.fromkeys(text for _, text, _ in found)
+    return Judgement(said, holds, tuple(texts), tuple(gap for _, _, gaps in found for gap in gaps))
 
 
 def _compare(
     condition: Condition, values: Values, runs: Mapping[str, str], derived: Mapping[str, Value]
-) -> tuple[bool | None, str]:
-    """Return whether a condition is true of all runs it names, and their values as text."""
+) -> tuple[bool | None, str, list[Gap | None]]:
+    """Return whether a condition is true of all runs it names, their values as text, and the gaps."""
+    bound = condition.bound
     if condition.derived:
-        measured = [("", derived.get(condition.derived))]
+        named, measured = [""], [("", derived.get(condition.derived))]
     else:
         named = [run for run in runs if fnmatchcase(run, condition.run or "*")]
         measured = [(runs[run], values.get((run, condition.metric))) for run in named]
     known = sorted(((v, run) for run, v in measured if v is not None), key=lambda one: one[0].number)
     missing = len(known) < len(measured)
     text = _range(known, missing)
-    bound = condition.bound
     limit: float | None
     if isinstance(bound, Reference):
         other = values.get((bound.run, bound.metric))
@@ -74,10 +88,16 @@ def _compare(
         text = f"{text} against {_range([(other, runs[bound.run])] if other else [], other is None)}"
     else:
         limit = _number(bound, known[0][0].unit) if known else None
+    itself = (bound.run, bound.metric) if isinstance(bound, Reference) else None
+    gaps = [
+        None if value is None or limit is None else Gap(value.number, limit, condition.operator in _UPWARDS)
+        for run, (_, value) in zip(named, measured, strict=True)
+        if (run, condition.metric) != itself  # which tells nothing
+    ]
     if missing or limit is None:
-        return None, text
+        return None, text, gaps
     compare = _COMPARE[condition.operator]
-    return all(compare(value.number, limit) for value, _ in known), text
+    return all(compare(value.number, limit) for value, _ in known), text, gaps
 
 
 def _range(known: Sequence[tuple[Value, str]], missing: bool) -> str:

@@ -34,10 +34,7 @@ class Planned:
 
     def number(self, name: str, level: Level) -> float:
         """Return the value of an axis of numbers in the unit of `units`."""
-        axis = self.experiment.spec.axes[name]
-        if axis.unit is None:
-            return float(level.value)
-        return float(quantities.convert(f"{level.value!r} {axis.unit}", self.units[name]))
+        return number_of(self.experiment.spec.axes[name], level, self.units[name])
 
     def axis_unit(self, name: str) -> str:
         """Return the unit of an axis as the file counts it, ` [km/h]`, or nothing."""
@@ -51,6 +48,13 @@ class Planned:
             unit = self.axis_unit(name).replace("[", "").replace("]", "")
             parts.append(f"{name} {level.words}{unit}" if axis.numeric else level.words)
         return ", ".join(parts)
+
+
+def number_of(axis: AxisSpec, level: Level, unit: str) -> float:
+    """Return a level of an axis of numbers in a unit, an SI unit."""
+    if axis.unit is None:
+        return float(level.value)
+    return float(quantities.convert(f"{level.value!r} {axis.unit}", unit))
 
 
 def metrics_of(experiment: Experiment) -> Metrics:

@@ -14,6 +14,7 @@ from ..writing import write_whole
 from .findings import Findings
 from .judging import Judgement
 from .limits import limits_of
+from .margins import Region
 from .numbers import si_number
 from .table import si, write_table
 from .verdicts import heading, verdict
@@ -109,5 +110,38 @@ def _judgement(one: Judgement, group: str) -> dict[str, Any]:
         "measured": list(one.measured),
         "holds": one.holds,
         "verdict": verdict(one, group),
+        "margin": _finite(one.margin),
+        "region": one.region and _region(one.region),
         "note": one.said.note,
     }
+
+
+def _region(region: Region) -> dict[str, Any]:
+    """Return how far a verdict carries; numbers of open values in SI, or as factors."""
+    flip = region.flip
+    return {
+        "points": len(region.points),
+        "holds_at": region.holding,
+        "without_result": region.without_result,
+        "spread": _finite(region.spread),
+        "decided": region.decided,
+        "robust": region.robust,
+        "flip": flip and {"open_value": flip.open_value, "at": flip.place, "words": flip.words},
+        "margins": [_finite(one.margin) for one in region.points],
+        "open_values": {
+            line.open_value: {
+                "chosen": line.chosen.place,
+                "levels": [
+                    {"at": one.words if one.place is None else one.place, "holds": one.spot.holds,
+                     "margin": _finite(one.spot.margin)}
+                    for one in line.stops
+                ],
+                "flip": line.flip and (line.flip.words if line.flip.place is None else line.flip.place),
+            }
+            for line in region.lines
+        },
+    }  # fmt: skip
+
+
+def _finite(number: float | None) -> float | str | None:
+    return number if number is None or math.isfinite(number) else str(number)

@@ -43,6 +43,23 @@ numbers computed from several runs, which claims may speak of (`{derived: gain, 
         unit: "%"
         published: 30 %                    # what the paper prints, in SI or with a unit
 
+A verdict at one point may flip beside it. A region names the values that the paper leaves open, each with a
+range; the claims are judged along each of them, and at the points of a Latin hypercube over all together.
+
+    region:
+      points: 24
+      seed: 1
+      open_values:
+        amplitude: {vary: driver.amplitude, times: true, from: 0.8, to: 1.2, says: steering amplitude,
+                    because: "chosen: the figure can be read to a fifth"}
+        tyre: {vary: tyre, values: [tyre_dugoff, tyre_magic_formula], because: "the paper names neither"}
+        actuators: {variants: {none: {}, lagging: {run: "lagging/{run}"}}, because: the paper gives no lag}
+
+An open value touches the runs that have it and do not set it themselves; with `times` it is a factor on
+what each run has. A variant may put another run in a run's place. A claim depends on all open values that
+touch its runs, or on those that its `open_values` lists. Checks are judged over the region where the runs of
+claims are all they need. How margins, shares and flips are defined: [regions](../regions.md).
+
 Along axes, a limit is how far one of them may go; curves and maps show a metric over one or two.
 
     title: How fast may the car enter the manoeuvre?
@@ -85,11 +102,18 @@ from ..scenario.scenario_schema import Scalar
 from ..scenario.strict import Strict
 from ..scenario.yaml_lines import Key
 from .axis_schema import MOST, AxisSpec, Changes
-from .judged_schema import Alternatives, Claim, Condition, DerivedSpec, GridSpec, LimitSpec, MetricSpec
+from .judged_schema import (
+    Alternatives,
+    Claim,
+    Condition,
+    DerivedSpec,
+    GridSpec,
+    LimitSpec,
+    MetricSpec,
+    Patterns,
+)
 from .numbers import Quantity
-
-Patterns = Annotated[list[str], Field(min_length=1)]
-"""Names of runs, with `*` and `?` for many."""
+from .region_schema import RegionSpec
 
 
 class RunSpec(Changes):
@@ -191,6 +215,7 @@ class ExperimentSpec(Changes):
     derived: dict[str, DerivedSpec] = {}
     claims: list[Claim] = Field([], description="What the paper says")
     checks: list[Claim] = Field([], description="What this project asks of its own results")
+    region: RegionSpec | None = Field(None, description="How far the verdicts of claims carry")
     limits: dict[str, LimitSpec] = {}
     figures: list[FigureSpec] = []
 
@@ -200,6 +225,8 @@ class ExperimentSpec(Changes):
             raise ValueError("needs either a scenario or runs")
         if self.scenario and not self.axes:
             raise ValueError("a single run needs axes")
+        if self.region and self.axes:
+            raise ValueError("region: runs along axes have none; it is for named runs at one point")
         if self.design == "latin_hypercube":
             if self.points is None or self.seed is None:
                 raise ValueError("a latin_hypercube needs points and seed")

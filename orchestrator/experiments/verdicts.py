@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
+from ..figures.display import shown
 from ..metrics.run_metrics import Value, metric
 from ..titles import changed
+from .design import levels_of
 from .experiment import NamedRun
 from .findings import Findings
 from .grids import grid_table
@@ -16,7 +19,9 @@ from .numbers import si_number
 from .schema import TableSpec
 from .tables import Cell, Table, marked, remarks
 
-HOLDS, NOT_JUDGED = "holds", "not judged"
+HOLDS, UNDECIDED, NOT_JUDGED = "holds", "undecided", "not judged"
+CARRIES = ("margin", "holds", "nearest flip")
+"""Headings of how far a verdict carries; the last two over a region."""
 FAILS = {"claims": "does not reproduce", "checks": "does not hold"}
 
 
@@ -66,13 +71,38 @@ def verdict(judgement: Judgement, group: str) -> str:
     """Return the verdict in plain words; `group` is "claims" (a paper's) or "checks" (our own)."""
     if judgement.holds is None:
         return NOT_JUDGED
+    if judgement.region and not judgement.region.decided:
+        return UNDECIDED
     return HOLDS if judgement.holds else FAILS[group]
+
+
+def margin_words(judgement: Judgement) -> str | None:
+    """Return the margin at the chosen point, `14 %`, negative where the claim does not hold; None: none."""
+    return None if judgement.margin is None else share(judgement.margin)
+
+
+def share(ratio: float) -> str:
+    """Return a ratio in per cent, two digits of it: 1.6 %."""
+    return shown(ratio, "%", digits=2) if math.isfinite(ratio) else "any"
+
+
+def region_words(judgement: Judgement) -> list[str]:
+    """Return how far a verdict carries: `in 71 % of 24 points`, `flips at amplitude 0.08 rad`."""
+    region = judgement.region
+    if region is None:
+        return []
+    failed = f", {region.without_result} without a result" if region.without_result else ""
+    flip = region.flip
+    return [
+        f"in {100 * region.holding / len(region.points):.0f} % of {len(region.points)} points{failed}",
+        f"flips at {flip.says} {flip.words}" if flip else "no flip along any open value",
+    ]
 
 
 def counts_of(judgements: Sequence[Judgement], group: str) -> dict[str, int]:
     """Return how many judgements have each verdict, those that occur."""
     words = [verdict(one, group) for one in judgements]
-    return {word: words.count(word) for word in (HOLDS, FAILS[group], NOT_JUDGED) if word in words}
+    return {word: words.count(word) for word in (HOLDS, UNDECIDED, FAILS[group], NOT_JUDGED) if word in words}
 
 
 def run_tables(findings: Findings) -> list[Table]:
@@ -92,8 +122,9 @@ def _run_table(findings: Findings, spec: TableSpec) -> Table:
             formulas.setdefault(metric(column.metric).formula, []).append(column.heading)
     table.notes = [f"{', '.join(named)}: {formula}" for formula, named in formulas.items()]
     some = any(said.values())
+    carries = CARRIES if findings.regions else CARRIES[:1]
     if some:  # beside the first metric, which the claims are about
-        table.headings[2:2] = ["the paper says", "verdict"]
+        table.headings[2:2] = ["the paper says", "verdict", *carries]
     for run in runs:
         if run.name in failed:
             cells: list[Cell] = ["failed", *[None] * (len(table.headings) - 2)]
@@ -105,7 +136,14 @@ def _run_table(findings: Findings, spec: TableSpec) -> Table:
             if some:
                 judged = said[run.name]
                 words = "; ".join(f"{j.said.short} ({j.said.source})" for j in judged)
-                cells[1:1] = [words or None, "; ".join(verdict(j, "claims") for j in judged) or None]
+                verdicts = "; ".join(verdict(j, "claims") for j in judged)
+                how_far = (_carries(j, len(carries)) for j in judged)
+                further = ("; ".join(filter(None, column)) or None for column in zip(*how_far, strict=True))
+                cells[1:1] = [
+                    words or None,
+                    verdicts or None,
+                    *(further if judged else [None] * len(carries)),
+                ]
                 table.notes += [f"{run.row}: {j.said.note}" for j in judged if j.said.note]
         results = findings.results.get(run.name)
         table.rows.append([marked(run.row, results) if results else run.row, *cells])
@@ -128,9 +166,44 @@ def _said_of(findings: Findings, run: NamedRun, table: TableSpec) -> list[Judgem
     ]
 
 
+def _carries(judgement: Judgement, columns: int) -> list[str | None]:
+    """Return the cells of `CARRIES`."""
+    how_far: list[str | None] = [*region_words(judgement)] or [None, None]
+    return [margin_words(judgement), *how_far][:columns]
+
+
+def line_table(judgement: Judgement) -> Table:
+    """Return a table of the open values that a claim depends on: margins along each, where it flips."""
+    assert judgement.region is not None
+    table = Table("", ["open value", "margin, from", "to", "flips at"])
+    for line in judgement.region.lines:
+        ends = line.margins
+        flip = line.flip.words if line.flip else None
+        table.rows.append([line.says, *map(share, ends or ()), *([] if ends else [None, None]), flip])
+    table.numbers = {1, 2}
+    if (spread := judgement.region.spread) is not None:
+        table.notes = [f"spread of the margin over all of them: {share(spread)}"]
+    return table
+
+
+def region_table(findings: Findings) -> Table:
+    """Return a table of the open values of the region: what they are, their range, why it is that."""
+    region = findings.spec.region
+    assert region is not None
+    rows: list[list[Cell]] = []
+    for name, one in region.open_values.items():
+        levels = levels_of(one.stepped)
+        given = f" {one.unit}" if one.unit else " × as chosen" if one.times else ""
+        ends = f"{levels[0].words} to {levels[-1].words}{given}"
+        rows.append([one.says or name, ends if one.start is not None else
+                     f"{', '.join(level.words for level in levels)}{given}", one.because])  # fmt: skip
+    title = f"Open values: {region.points} points over all together, and one at a time"
+    return Table(title, ["open value", "range", "because"], [*rows])
+
+
 def claim_tables(findings: Findings) -> list[Table]:
     """Return the paper's claims that stand beside no run, and the project's own checks."""
-    shown = {
+    beside = {
         id(judgement)
         for table in findings.spec.tables
         for run in findings.experiment.matching(table.runs)
@@ -143,10 +216,12 @@ def claim_tables(findings: Findings) -> list[Table]:
     ):
         rows: list[list[Cell]] = []
         for one in judged:
-            if id(one) not in shown:
+            if id(one) not in beside:
                 says = f"{one.said.says} ({one.said.source})" if one.said.source else one.said.says
                 note = f"\n{one.said.note}" if one.said.note else ""
-                rows.append([f"{says}{note}", "\n".join(one.measured), verdict(one, group)])
+                carries = _carries(one, len(CARRIES) if findings.regions else 1)
+                rows.append([f"{says}{note}", "\n".join(one.measured), verdict(one, group), *carries])
         if rows:
-            tables.append(Table(title, ["claim", "measured", "verdict"], [*rows]))
+            headings = ["claim", "measured", "verdict", *CARRIES][: len(rows[0])]
+            tables.append(Table(title, headings, [*rows]))
     return tables

@@ -12,7 +12,19 @@ from ..experiments.findings import Each, Findings
 from ..experiments.jobs import Job, Once
 from ..experiments.judging import Judgement
 from ..experiments.tables import Cell, Table
-from ..experiments.verdicts import counts_of, derived_tables, heading, limit_tables, run_tables, verdict
+from ..experiments.verdicts import (
+    HOLDS,
+    counts_of,
+    derived_tables,
+    heading,
+    limit_tables,
+    line_table,
+    margin_words,
+    region_table,
+    region_words,
+    run_tables,
+    verdict,
+)
 from ..figures import plots
 from ..metrics.run_metrics import metric
 from ..plan import Plan
@@ -64,6 +76,7 @@ def chapter(
         "conclusions": conclusions(findings),
         "claims": [judged(one, "claims") for one in findings.claims],
         "checks": [judged(one, "checks") for one in findings.checks],
+        "region": region_table(findings) if findings.regions else None,
         "limits": limit_tables(findings),
         "systems": systems(plans, spec.title),
         "animation": animation(findings),
@@ -100,9 +113,9 @@ def plans_of(findings: Findings) -> list[tuple[Job, tuple[Scenario, Plan]]]:
 
 
 def conclusions(findings: Findings) -> list[dict[str, Any]]:
-    """Return the claims and checks that do not hold, what was measured instead in words."""
+    """Return the claims and checks that do not hold or are undecided, what was measured in words."""
     every = [(one, "claims") for one in findings.claims] + [(one, "checks") for one in findings.checks]
-    return [judged(one, group) for one, group in every if not one.holds]
+    return [judged(one, group) for one, group in every if verdict(one, group) != HOLDS]
 
 
 def judged(one: Judgement, group: str) -> dict[str, Any]:
@@ -113,6 +126,11 @@ def judged(one: Judgement, group: str) -> dict[str, Any]:
         "measured": one.measured,
         "conditions": [str(condition) for condition in one.said.holds_if],
         "verdict": verdict(one, group),
+        "margin": margin_words(one),
+        "region": region_words(one),
+        "agreeing": one.region and 100 * one.region.agreeing,
+        "robust": one.region is not None and one.region.robust,
+        "lines": line_table(one) if one.region else None,
         "note": one.said.note,
     }
 

@@ -8,10 +8,15 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from ..experiments.verdicts import FAILS, HOLDS, NOT_JUDGED
+from ..experiments.verdicts import FAILS, HOLDS, NOT_JUDGED, UNDECIDED
 from ..wording import printable
 
-SIGNS = {HOLDS: ("good", "✓"), NOT_JUDGED: ("open", "–"), **{word: ("bad", "✗") for word in FAILS.values()}}
+SIGNS = {
+    HOLDS: ("good", "✓"),
+    UNDECIDED: ("unsure", "?"),
+    NOT_JUDGED: ("open", "–"),
+    **{word: ("bad", "✗") for word in FAILS.values()},
+}
 """Verdict -> class of its style, sign: told apart without colours too."""
 
 

@@ -27,6 +27,7 @@ NOT_RUN = {
     r"\S*python -m pip install .*": "takes packages from the network",
     r"\S*yawbench study scenarios/fnn_sideslip/\w+\.yaml": "tests/scenarios/test_paper_a.py",
     r"\S*yawbench study scenarios/fuzzy_sliding_mode/\w+\.yaml": "tests/scenarios/test_fuzzy_sliding_mode.py",
+    r"\S*yawbench study scenarios/fuzzy_feedback/\w+\.yaml": "tests/scenarios/test_fuzzy_feedback.py",
     r"\S*yawbench study scenarios/fuzzy_pid/\w+\.yaml": "tests/scenarios/test_fuzzy_pid.py",
 }
 """Commands that this test does not run -> why, or the test that runs the same at length."""

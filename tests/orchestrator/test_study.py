@@ -468,11 +468,11 @@ def test_rank_correlation_agrees_with_scipy():
 
 def test_what_the_paper_says_of_a_run_stands_beside_it(study, out):
     (table,) = run_tables(judge_results(study(), out))
-    assert table.headings == ["run", "largest error", "the paper says", "verdict", "max|M_z|"]
+    assert table.headings == ["run", "largest error", "the paper says", "verdict", "margin", "max|M_z|"]
     assert table.text()[:3] == [
-        ["15 m/s, no control", "140 %", "> 100 % (section 3)", "holds", "2000 N·m"],
-        ["15 m/s, neural network", "2.00 %", "≤ 1 % (section 3)", "does not reproduce", "2000 N·m"],
-        ["25 m/s, no control", "200 %", "-", "-", "2000 N·m"],
+        ["15 m/s, no control", "140 %", "> 100 % (section 3)", "holds", "40 %", "2000 N·m"],
+        ["15 m/s, neural network", "2.00 %", "≤ 1 % (section 3)", "does not reproduce", "-100 %", "2000 N·m"],
+        ["25 m/s, no control", "200 %", "-", "-", "-", "2000 N·m"],
     ]
     assert table.notes == [
         "largest error: max|β - β_ref| / max|β_ref|",
@@ -485,13 +485,13 @@ def test_claims_about_several_runs_and_checks_have_tables_of_their_own(study, ou
     (row,) = paper.text()
     assert (row[0], row[2]) == ("The network is better. (section 4)", "holds")
     assert row[1].splitlines()[1] == "4.00 % (25 m/s, neural network) against 200 % (25 m/s, no control)"
-    assert [row[2] for row in project.text()] == ["holds", "does not hold"]
+    assert [row[2:] for row in project.text()] == [["holds", "100 %"], ["does not hold", "-100 %"]]
 
 
 def test_a_failed_run_is_named_in_the_table_with_its_reason(study, out):
     lost = Outcome(Job("slow", Path("x"), out / "slow"), ("plant: lost",), 1)
     (table,) = run_tables(judge_results(study(), out, [lost]))
-    assert table.text()[-1] == ["slow", "failed", "-", "-", "-"]
+    assert table.text()[-1] == ["slow", "failed", "-", "-", "-", "-"]
     assert table.notes[-1] == "slow: plant: lost"
 
 
@@ -504,7 +504,7 @@ def test_a_study_leaves_figures_tables_and_a_record(study, out):
     assert "no run recorded any of roll_angle" in said[0]
     assert sorted(path.name for path in (out / "figures").iterdir()) == ["both.png", "both.svg"]
     report = page(findings, out)
-    assert "15 m/s, no control 140 % > 100 % (section 3) ✓ holds 2000 N·m" in report
+    assert "15 m/s, no control 140 % > 100 % (section 3) ✓ holds 40 % 2000 N·m" in report
     assert "figures/both.png" in report
     assert "largest absolute value, from 6.5 to 8 s: max|β|" in report
     assert pq.read_table(out / "table.parquet").num_rows == 5

@@ -24,7 +24,7 @@ def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("paper_d")
     build_all(folder / "fmus", components=UNITS)
     with pytest.raises(SystemExit) as exit_:
-        main(["study", str(STUDY), "--out", str(folder / "out"), "--fmus", str(folder / "fmus")])
+        main(["study", str(STUDY), "--quick", "--out", str(folder / "out"), "--fmus", str(folder / "fmus")])
     assert not exit_.value.code
     return json.loads((folder / "out" / "experiment.json").read_text())
 

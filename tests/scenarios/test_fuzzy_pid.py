@@ -46,7 +46,7 @@ def yawbench(*arguments):
 def study(tmp_path_factory, fmus):
     """What experiment.json says, and where it stands."""
     folder = tmp_path_factory.mktemp("study")
-    assert not yawbench("study", FOLDER / "study.yaml", "--out", folder, "--fmus", fmus)
+    assert not yawbench("study", FOLDER / "study.yaml", "--quick", "--out", folder, "--fmus", fmus)
     return json.loads((folder / "experiment.json").read_text()) | {"folder": folder}
 
 

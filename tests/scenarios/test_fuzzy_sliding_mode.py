@@ -40,7 +40,7 @@ def fmus(tmp_path_factory):
 def judged(name, folder, fmus):
     """Run a study and return what its experiment.json says, with its folder."""
     with pytest.raises(SystemExit) as exit_:
-        main(["study", str(FOLDER / f"{name}.yaml"), "--out", str(folder), "--fmus", str(fmus)])
+        main(["study", str(FOLDER / f"{name}.yaml"), "--quick", "--out", str(folder), "--fmus", str(fmus)])
     assert not exit_.value.code
     return json.loads((folder / "experiment.json").read_text()) | {"folder": folder}
 

@@ -1,0 +1,394 @@
+"""Claims judged over a region of open values: which runs that takes, and what it comes to.
+
+The runs are measured and not kept; a run at the chosen point is the named one itself, and is not made again.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from functools import cached_property
+from pathlib import Path
+
+from ..errors import ScenarioError
+from ..metrics.run_metrics import Value
+from ..plan import OF_RUN, Change, Plan, Unit, Variable
+from ..plan import Value as Given
+from ..wiring.shared_facts import FACTS
+from ..wording import hint, listed
+from .design import Level, latin_hypercube, levels_of
+from .experiment import RUNS, Experiment, NamedRun, changes_at
+from .findings import Findings, derive
+from .grids import cells
+from .jobs import Job, Once, Record, keyed, ready
+from .judged_schema import Claim, Reference
+from .judging import Judgement, judge
+from .margins import Line, Region, Spot, Stop
+from .planning import Planned, metrics_of, number_of
+from .region_schema import OpenValueSpec
+
+ORIGIN = "region"
+"""Of changes that open values make."""
+
+Place = tuple[tuple[str, Level], ...]
+"""Open value -> its level, of those that are not as chosen."""
+Cell = tuple[str, Place]
+"""A run, and the open values that change it."""
+Key = tuple[str, int]
+"""Of what is judged: `claims` or `checks`, and its number."""
+
+
+def found_at(plan: Plan, place: str) -> tuple[Given, str] | None:
+    """Return what a run has at a place as changes name it, and its unit; None: it has no such place."""
+    holder, _, name = place.partition(".")
+    units = {unit.name: unit for unit in plan.units}
+    if not name and holder in units:
+        return units[holder].fmu.name, ""
+    if place == "vehicle" and plan.scenario.get("vehicle"):
+        return str(plan.scenario["vehicle"]), ""
+    if place in OF_RUN:
+        values = (float(plan.start), plan.time(plan.n_steps), float(plan.step), plan.algorithm)
+        return dict(zip(OF_RUN, values, strict=True))[place], "s"
+    if holder in units and name == "step_size":
+        return float(units[holder].period * plan.step), "s"
+    for unit in plan.units:
+        for variable in unit.fmu.variables.values():
+            given = {**unit.parameters, **unit.constants}.get(variable.name, variable.start)
+            if given is not None and _names(holder, name, unit, variable):
+                return given, variable.unit or ""
+    return None
+
+
+def _names(holder: str, name: str, unit: Unit, variable: Variable) -> bool:
+    """Return whether a place, `holder.name`, is a variable of a unit."""
+    if holder in FACTS:
+        fact = FACTS[holder]
+        return fact.counts(unit, variable.name) or (
+            variable.name in fact.inputs and variable.name in unit.constants
+        )
+    if holder == "inputs":
+        names = (variable.name, f"{unit.name}.{variable.name}")
+        return variable.name in unit.constants and any(fnmatchcase(one, name) for one in names)
+    from_vehicle = holder == "vehicle" and unit.origins.get(variable.name) == "vehicle"
+    return (
+        variable.name == name and variable.causality == "parameter" and (from_vehicle or holder == unit.name)
+    )
+
+
+class Runs:
+    """What open values make of the runs of an experiment.
+
+    Args:
+        planned: the experiment, without axes, with a plan for every run.
+    """
+
+    def __init__(self, planned: Planned) -> None:
+        assert planned.experiment.spec.region is not None
+        self.planned = planned
+        self.experiment: Experiment = planned.experiment
+        self.open_values = planned.experiment.spec.region.open_values
+        self.plans = {job.label: job.plan for job in planned.jobs if job.plan is not None}
+        self.jobs = {job.label: job for job in planned.jobs}
+        self._cells: dict[Cell, Cell] = {}
+
+    @cached_property
+    def touched(self) -> dict[str, list[str]]:
+        """Open value -> the runs it touches.
+
+        Raises:
+            ScenarioError: it touches none.
+        """
+        found = {
+            name: [run for run in self.experiment.runs if self._touches(one, run)]
+            for name, one in self.open_values.items()
+        }
+        problems = [self._touches_none(name) for name, runs in found.items() if not runs]
+        if problems:
+            raise ScenarioError(problems)
+        return found
+
+    def own_value(self, run: str, place: str) -> Given | None:
+        """Return what a run has at a place."""
+        found = found_at(self.plans[run], place)
+        return None if found is None else found[0]
+
+    def _touches_none(self, name: str) -> str:
+        places = self.open_values[name].places
+        units = dict.fromkeys(unit.name for plan in self.plans.values() for unit in plan.units)
+        missing = next((place for place in places if place.partition(".")[0] not in units), "")
+        guess = hint(missing.partition(".")[0], units, lead="units") if missing else ""
+        return (
+            f"{self.experiment.path}: region.open_values.{name}: touches no run: none has "
+            f"{listed(places, last='and')} without setting it itself{guess}"
+        )
+
+    def _touches(self, one: OpenValueSpec, name: str) -> bool:
+        if not any(fnmatchcase(name, pattern) for pattern in one.runs):
+            return False
+        if one.kind == "variant":
+            return all(
+                (base := self._base(one, level, name)) is not None
+                and self._has(base, one.variants[str(level.value)].places, one.times)
+                for level in levels_of(one)
+            )
+        return self._has(self.experiment.runs[name], one.vary, one.times)
+
+    def _has(self, run: NamedRun, places: Iterable[str], times: bool) -> bool:
+        """Return whether a run has all places, and leaves them open."""
+        own = {change.place for change in (*run.changes, *self.experiment.by_options)}
+        return all(
+            self.own_value(run.name, place) is not None and (times or place not in own) for place in places
+        )
+
+    def _base(self, one: OpenValueSpec, level: Level, name: str) -> NamedRun | None:
+        """Return the run that stands in a run's place at a level; None: there is none of that name."""
+        other = one.variants[str(level.value)].run if one.kind == "variant" else ""
+        return self.experiment.runs.get(other.replace("{run}", name) if other else name)
+
+    def changes(self, name: str, place: Place) -> tuple[NamedRun, list[Change]]:
+        """Return the run that stands in a run's place, and what is changed in it besides."""
+        run, changes = self.experiment.runs[name], []
+        for key, level in place:
+            run = self._base(self.open_values[key], level, name) or run
+        for key, level in place:
+            one = self.open_values[key]
+            if one.times:
+                for where in one.vary:
+                    own = self.own_value(run.name, where)
+                    changes.append(Change(where, float(own or 0.0) * float(level.value), ORIGIN))
+            else:
+                changes += changes_at(one, level, self.experiment.path.parent, ORIGIN)
+        return run, changes
+
+    def cell(self, name: str, place: Place) -> Cell:
+        """Return a run at a point, by what changes it there."""
+        if (name, place) not in self._cells:
+            other = (one for one in place if name in self.touched[one[0]] and self._is_other(name, one))
+            self._cells[name, place] = (name, tuple(other))
+        return self._cells[name, place]
+
+    def _is_other(self, name: str, at: tuple[str, Level]) -> bool:
+        """Return whether a level is another than the one that a run has."""
+        key, level = at
+        one = self.open_values[key]
+        run, changes = self.changes(name, (at,))
+        if run.name != name or not one.numeric:
+            own = {change.place: self.own_value(name, change.place) for change in changes}
+            return run.name != name or any(own[change.place] != change.value for change in changes)
+        return self.number(key, level) != self.chosen_number(key, [name])
+
+    def number(self, key: str, level: Level) -> float:
+        """Return a level of an open value of numbers: in SI, or as a factor."""
+        one = self.open_values[key]
+        return float(level.value) if one.times else number_of(one, level, self.unit(key))
+
+    def unit(self, key: str) -> str:
+        """Return the unit that the numbers of an open value have in the runs that it touches."""
+        place = self.open_values[key].vary[0]
+        found = (found_at(self.plans[name], place) for name in self.touched[key])
+        return next((one[1] for one in found if one and one[1]), "")
+
+    def own(self, key: str, names: Iterable[str]) -> set[float]:
+        """Return the numbers that runs have where an open value of numbers varies."""
+        place = self.open_values[key].vary[0]
+        found = [self.own_value(name, place) for name in names if name in self.touched[key]]
+        return {float(value) for value in found if value is not None}
+
+    def chosen_number(self, key: str, names: Iterable[str]) -> float:
+        """Return the number chosen in runs: in SI, or 1 as a factor.
+
+        Raises:
+            ScenarioError: it is not the same in all of them.
+        """
+        if self.open_values[key].times:
+            return 1.0
+        own = self.own(key, names)
+        if len(own) > 1:
+            raise ScenarioError(
+                f"{self.experiment.path}: region.open_values.{key}: the runs of one claim have "
+                f"{listed(f'{one:g}' for one in sorted(own))} there; give factors, with `times: true`, or "
+                "name the `runs` it touches"
+            )
+        return own.pop()
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A claim or check, the runs it speaks of, and where it is to be judged."""
+
+    claim: Claim
+    runs: tuple[str, ...]
+    open_values: tuple[str, ...]
+    points: tuple[Place, ...]  # of the Latin hypercube
+    lines: dict[str, tuple[Place, ...]]  # open value -> its levels
+
+
+@dataclass(frozen=True)
+class RegionPlan:
+    """All runs of a region, ready to start."""
+
+    runs: Runs
+    asked: dict[Key, Asked]
+    jobs: dict[Cell, Job]
+
+    def cells(self, asked: Asked) -> Iterator[Cell]:
+        """Yield every run at every point that a claim is judged at."""
+        for place in itertools.chain(asked.points, *asked.lines.values()):
+            yield from (self.runs.cell(run, place) for run in asked.runs)
+
+
+def plan_region(
+    planned: Planned, folder: Path, *, once: Once, progress: Callable[[int], None] = lambda done: None
+) -> RegionPlan:
+    """Plan the runs that judge all claims over the region; checks are judged where these suffice.
+
+    Args:
+        planned: the experiment; its file has a region.
+        folder: of the experiment's results.
+        once: as `ready` takes it.
+        progress: told how many runs are planned.
+
+    Raises:
+        ScenarioError: an open value touches no run, or a level of it is none that a run can take.
+    """
+    runs = Runs(planned)
+    spec = runs.experiment.spec
+    assert spec.region is not None
+    continuous = [one.continuous for one in runs.open_values.values()]
+    hypercube = latin_hypercube(continuous, spec.region.points, spec.region.seed)
+    asked: dict[Key, Asked] = {}
+    for group, claims in (("claims", spec.claims), ("checks", spec.checks)):
+        for number, claim in enumerate(claims):
+            asked[group, number] = _asked(runs, claim, hypercube)
+    plan = RegionPlan(runs, asked, {})
+    wanted = dict.fromkeys(
+        cell for (group, _), one in asked.items() if group == "claims" for cell in plan.cells(one) if cell[1]
+    )
+    jobs = []
+    experiment = runs.experiment
+    for name, place in wanted:
+        run, own = runs.changes(name, place)
+        label = ", ".join([name, *(f"{key} {level.words}" for key, level in place)])
+        changes = (*experiment.for_all, *run.changes, *experiment.by_options, *own)
+        job = replace(runs.jobs[name], label=label, scenario=run.scenario, changes=changes, plan=None)
+        jobs.append(replace(job, out=folder / RUNS, keep=False))
+
+    def where(problem: str) -> tuple[str, str]:
+        """Tell a problem of an open value once, with its place in the file."""
+        place = getattr(problem, "place", "").removeprefix(f"{ORIGIN} ").partition("=")[0]
+        key = next((key for key, one in runs.open_values.items() if place in one.places), None)
+        return (
+            (key, f"{runs.experiment.path}: region.open_values.{key}: {problem}") if key else (problem,) * 2
+        )
+
+    metrics = metrics_of(runs.experiment)
+    made = [keyed(job, metrics) for job in ready(jobs, once=once, progress=progress, place=where)]
+    known = {
+        key: one
+        for key, one in asked.items()
+        if one.open_values and all(cell in wanted for cell in plan.cells(one) if cell[1])
+    }
+    return RegionPlan(runs, known, dict(zip(wanted, made, strict=True)))
+
+
+def _asked(runs: Runs, claim: Claim, hypercube: list[tuple[Level, ...]]) -> Asked:
+    names = runs_of(runs.experiment, claim)
+    open_values = tuple(
+        key
+        for key in runs.open_values
+        if (claim.open_values is None or key in claim.open_values)
+        and any(name in runs.touched[key] for name in names)
+    )
+    points = (zip(runs.open_values, point, strict=True) for point in hypercube)
+    return Asked(
+        claim,
+        names,
+        open_values,
+        tuple(tuple(one for one in point if one[0] in open_values) for point in points),
+        {
+            key: tuple(((key, level),) for level in levels_of(runs.open_values[key].stepped))
+            for key in open_values
+        },
+    )  # fmt: skip
+
+
+def runs_of(experiment: Experiment, claim: Claim) -> tuple[str, ...]:
+    """Return the names of all runs that decide on a claim."""
+    spec, found = experiment.spec, dict[str, None]()
+    for condition in claim.holds_if:
+        if condition.derived:
+            one = spec.derived[condition.derived]
+            found |= dict.fromkeys(source.run for source in one.of.values())
+            if one.rank_correlation is not None:
+                found |= dict.fromkeys(cell.run for cell in cells(spec.grids[one.rank_correlation]))
+        else:
+            found |= dict.fromkeys(run.name for run in experiment.matching([condition.run]))
+        if isinstance(condition.bound, Reference):
+            found[condition.bound.run] = None
+    return tuple(found)
+
+
+def judge_region(plan: RegionPlan, findings: Findings, records: Mapping[str, Record]) -> dict[Key, Region]:
+    """Return what becomes of every verdict over the region.
+
+    Args:
+        plan: of the region.
+        findings: what stands at the chosen point.
+        records: key of a run -> what became of it.
+    """
+    chosen = {"claims": findings.claims, "checks": findings.checks}
+    return {key: _judged(plan, one, chosen[key[0]][key[1]], findings, records)
+            for key, one in plan.asked.items()}  # fmt: skip
+
+
+def _judged(
+    plan: RegionPlan, asked: Asked, chosen: Judgement, findings: Findings, records: Mapping[str, Record]
+) -> Region:
+    runs = plan.runs
+    words = {run.name: run.row for run in findings.experiment.runs.values()}
+
+    def spot(place: Place) -> Spot:
+        values = {}
+        for name in asked.runs:
+            cell = runs.cell(name, place)
+            record = records[plan.jobs[cell].key] if cell[1] else None
+            for key in findings.spec.metrics:
+                measured = record and record.values.get(key)
+                value = Value(*measured) if measured else None if record else findings.values.get((name, key))
+                if value is not None:
+                    values[name, key] = value
+        found = judge(asked.claim, values, words, derive(findings.spec, values))
+        return Spot(found.holds, found.margin_from(chosen))
+
+    here = Spot(chosen.holds, chosen.margin)
+    lines = []
+    for key, places in asked.lines.items():
+        one = runs.open_values[key]
+        stops = []
+        for place in places:
+            level = place[0][1]
+            if any(runs.cell(name, place)[1] for name in asked.runs):  # else it is the chosen level
+                number = runs.number(key, level) if one.numeric else None
+                stops.append(Stop(level.words, number, spot(place)))
+        unit, factor = _shown(runs, key, asked.runs) if one.numeric else ("", 1.0)
+        at = runs.chosen_number(key, asked.runs) if one.numeric else None
+        lines.append(Line(key, one.says or key, unit, factor, Stop("as chosen", at, here), tuple(stops)))
+    return Region(here, tuple(spot(place) for place in asked.points), tuple(lines))
+
+
+def _shown(runs: Runs, key: str, names: Iterable[str]) -> tuple[str, float]:
+    """Return the unit in which an open value is shown, and the factor of its numbers to that.
+
+    Factors become numbers where all runs that they are judged by have one in common; else they are
+    "times what was chosen".
+    """
+    one = runs.open_values[key]
+    unit = runs.unit(key)
+    if one.times:
+        own = runs.own(key, names)
+        return (unit, own.pop()) if len(own) == 1 else ("× as chosen", 1.0)
+    if one.unit is None:
+        return unit, 1.0
+    return one.unit, 1.0 / number_of(one, Level(1.0, ""), unit)

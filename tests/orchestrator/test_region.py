@@ -1,0 +1,264 @@
+"""Verdicts over a region of open values, against closed forms: the peak of a sine is amplitude over ratio."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+
+import pytest
+
+from fmus.build import build_all
+from orchestrator.cli import main
+from orchestrator.errors import ScenarioError
+from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.findings import Findings
+from orchestrator.experiments.jobs import Once, Record
+from orchestrator.experiments.margins import Gap, Region, Spot, margin
+from orchestrator.experiments.planning import jobs_of, plan_experiment
+from orchestrator.experiments.region import judge_region, plan_region
+from orchestrator.experiments.verdicts import region_words, verdict
+
+SCENARIO = """
+title: A sine
+stop_time: 0.5
+step_size: 0.0125
+inputs: {velocity_x: 20}
+units:
+  driver: {fmu: driver_sine, parameters: {amplitude: 0.05, frequency: 2, start_time: 0}}
+"""
+
+STUDY = """
+title: Half a paper
+runs:
+  - {name: plain, scenario: sine.yaml}
+  - {name: double, scenario: sine.yaml, set: {driver.amplitude: 0.1}}
+metrics:
+  peak: {metric: peak(steer_angle)}
+claims:
+  - {says: It stays below 0.06 rad., short: < 0.06, holds_if: [{run: plain, metric: peak, below: 0.06}]}
+  - {says: It is above 0.01 rad., holds_if: [{run: plain, metric: peak, above: 0.01}]}
+  - says: Half the amplitude gives less.
+    holds_if: [{run: plain, metric: peak, below: {run: double, metric: peak}}]
+  - {says: It is 0.06 rad., open_values: [ratio], holds_if: [{run: plain, metric: peak, at_least: 0.06}]}
+checks:
+  - {says: Both are above nothing., holds_if: [{run: "*", metric: peak, above: 0}]}
+  - {says: The doubled one stays below 0.09 rad., holds_if: [{run: double, metric: peak, below: 0.09}]}
+tables:
+  - {title: Peaks, runs: ["*"], metrics: [peak]}
+region:
+  points: 20
+  seed: 1
+  open_values:
+    amplitude: {vary: driver.amplitude, times: true, from: 0.5, to: 1.5, because: "chosen: to show"}
+    ratio: {vary: driver.steering_ratio, runs: [plain], values: [0.5, 1, 2], because: "chosen: to show"}
+"""
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("fmus")
+    build_all(folder, components=("driver_sine",))
+    return folder
+
+
+@pytest.fixture
+def judged(tmp_path, fmus):
+    """Judge the study, texts of it replaced, with the closed form in place of runs."""
+
+    def judge(*changes: tuple[str, str], failing=lambda peak: False) -> Findings:
+        text = STUDY
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        (tmp_path / "study.yaml").write_text(text)
+        (tmp_path / "sine.yaml").write_text(SCENARIO)
+        (tmp_path / "double.yaml").write_text(SCENARIO.replace("0.05", "0.1"))
+        experiment = load_experiment(tmp_path / "study.yaml")
+        once = Once()
+        planned = plan_experiment(experiment, jobs_of(experiment, tmp_path / "o", fmus), once=once)
+
+        def record(job) -> Record:
+            own = job.plan.units[0].parameters
+            peak = own["amplitude"] / own.get("steering_ratio", 1.0)
+            return Record({}, ("it failed",)) if failing(peak) else Record({"peak": (peak, "rad")})
+
+        findings = Findings(experiment, [record(job) for job in planned.jobs], {}, planned)
+        plan = plan_region(planned, tmp_path / "o", once=once)
+        records = {job.key: record(job) for job in plan.jobs.values()}
+        regions = judge_region(plan, findings, records)
+        return Findings(experiment, findings.records, {}, planned, regions)
+
+    return judge
+
+
+def test_a_flip_lies_where_the_closed_form_has_it_and_is_named_in_the_units_of_the_run(judged):
+    (below, *_) = judged().claims
+    assert below.margin == pytest.approx(1 / 6)
+    amplitude, ratio = below.region.lines
+    assert amplitude.flip.place == pytest.approx(1.2)  # 0.06 rad; the margin is linear in the amplitude
+    assert amplitude.flip.words == "0.0600 rad"
+    worse = (0.06 - 0.1) / 0.06  # at the level 0.5
+    assert ratio.flip.place == pytest.approx(1 - 0.5 * (1 / 6) / (1 / 6 - worse))
+    assert ratio.margins == (pytest.approx(worse), pytest.approx((0.06 - 0.025) / 0.06))
+    assert below.region.flip == ratio.flip  # a fifth of its range against 0.067 of it
+    assert region_words(below)[1] == "flips at ratio 0.900"
+
+
+def test_the_share_of_a_latin_hypercube_along_one_value_is_that_of_the_closed_form(judged):
+    only = ("below: 0.06}]}", "below: 0.06}], open_values: [amplitude]}")
+    region = judged(only).claims[0].region
+    assert region.holding == 14  # factors below 1.2 of 0.5 to 1.5, in 20 equal parts
+    assert region.agreeing == pytest.approx(0.7)
+    assert verdict(judged(only).claims[0], "claims") == "undecided"
+
+
+def test_the_share_over_two_values_together_approaches_the_area(judged):
+    ranges = ("values: [0.5, 1, 2]", "from: 0.5, to: 2")
+    region = judged(ranges, ("points: 20", "points: 200")).claims[0].region
+    assert region.agreeing == pytest.approx(0.5 + 0.275, abs=0.03)  # of {f < 1.2 r}, over 1 x 1.5
+
+
+def test_a_claim_is_decided_exactly_if_its_margin_is_larger_than_the_spread(judged):
+    findings = judged()
+    for one in (*findings.claims, *findings.checks):
+        if one.region:
+            assert one.region.decided == (abs(one.margin) > one.region.spread), one.said.says
+    verdicts = [verdict(one, "claims") for one in findings.claims]
+    assert verdicts == ["undecided", "holds", "undecided", "undecided"]
+
+
+def test_a_claim_depends_on_what_touches_its_runs_or_on_what_it_names(judged):
+    below, _, less, only = judged().claims
+    assert [line.open_value for line in below.region.lines] == ["amplitude", "ratio"]
+    assert [line.open_value for line in only.region.lines] == ["ratio"]
+    amplitude, ratio = less.region.lines  # both runs have it, and each its own
+    assert amplitude.flip is None
+    assert amplitude.unit == "× as chosen"
+    assert ratio.flip.words == "0.500"  # where plain and double come to the same
+    assert len(ratio.stops) == 2  # that of the chosen value is the named run itself
+
+
+def test_a_check_is_judged_over_the_region_where_the_runs_of_claims_are_all_it_needs(judged):
+    both, doubled = judged().checks
+    assert both.region.robust
+    assert both.margin == pytest.approx(1.0)  # of the number itself, where the threshold is 0
+    assert both.region.lines[0].margins == (pytest.approx(0.5), pytest.approx(1.5))
+    assert doubled.region.agreeing == pytest.approx(0.6)  # 0.1 times more than 0.9, of 0.5 to 1.5
+    unknown = [
+        claim.region for claim in judged((", below: {run: double, metric: peak}", ", above: 0")).checks
+    ]
+    assert unknown == [None, None]
+
+
+def test_failed_runs_count_as_another_verdict_and_are_said(judged):
+    both = judged(failing=lambda peak: peak > 0.12).claims[1]
+    assert both.region.without_result > 0
+    assert both.region.agreeing == pytest.approx(1 - both.region.without_result / 20)
+    assert f"{both.region.without_result} without a result" in region_words(both)[0]
+    assert both.region.spread == math.inf
+
+
+def test_a_run_that_sets_a_value_itself_keeps_it_unless_the_open_value_is_a_factor(judged):
+    absolute = ("times: true, from: 0.5, to: 1.5", "from: 0.025, to: 0.075")
+    findings = judged(absolute)
+    assert findings.claims[0].region.lines[0].flip.words == "0.0600 rad"
+    assert findings.claims[2].region.lines[0].flip is None  # 0.075 against 0.1, which stays
+    assert findings.checks[1].region is None  # nothing touches its run
+
+
+def test_a_variant_may_put_another_run_in_the_place_of_a_run(judged):
+    ratio = re.search(r"    ratio: .*\n", STUDY)[0]
+    other = (
+        "    strong: {variants: {as it is: {}, doubled: {run: double}, three: {set: {driver.periods: 3}}}, "
+        'runs: [plain], because: "chosen: to show"}\n'
+    )
+    below = judged((ratio, other), ("[ratio]", "[strong]")).claims[0]
+    line = below.region.lines[1]
+    assert [(stop.words, stop.spot.holds) for stop in line.stops] == [("doubled", False), ("three", True)]
+    assert line.flip.words == "doubled"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("runs: [plain], values", "runs: [plan], values"), "no run is named 'plan'; did you mean 'plain'?"),
+        (("driver.steering_ratio", "drivers.ratio"), "ratio: touches no run: none has drivers.ratio"),
+        (("[ratio]", "[ration]"), "there is no open value 'ration'; did you mean 'ratio'?"),
+        (("values: [0.5, 1, 2]", "values: [0.01, 1]"), "region.open_values.ratio: "),
+        (
+            ("times: true, from: 0.5, to: 1.5", "times: true, values: [a, b]"),
+            "times: factors are plain numbers",
+        ),
+        (("points: 20", "points: 2"), "region.points: Input should be greater than or equal to 10 (got 2)"),
+    ],
+)
+def test_a_wrong_region_is_answered_by_a_sentence(judged, change, said):
+    with pytest.raises(ScenarioError) as error:
+        judged(change)
+    assert said in str(error.value)
+
+
+def test_runs_of_one_claim_that_differ_in_an_open_value_need_factors(judged):
+    with pytest.raises(ScenarioError, match=r"have 0\.05 and 0\.1 there; give factors, with `times: true`"):
+        judged(
+            ("sine.yaml, set: {driver.amplitude: 0.1}", "double.yaml"),
+            ("times: true, from: 0.5, to: 1.5", "from: 0.025, to: 0.075"),
+        )
+
+
+def test_a_margin_is_a_share_of_the_threshold_and_of_the_number_where_that_is_zero():
+    def over(number, bound, upwards=True):
+        return Gap(number, bound, upwards)
+
+    assert margin([over(114, 100)]) == pytest.approx(0.14)
+    assert margin([over(114, 100, False)]) == pytest.approx(-0.14)
+    assert margin([over(-0.5, -1)]) == 0.5
+    assert margin([over(114, 100), over(1.016, 1)]) == pytest.approx(0.016)
+    assert margin([over(2, 0)], [over(4, 0)]) == 0.5
+    assert margin([over(0, 0)]) == 0.0
+    assert margin([over(math.inf, 1)]) == math.inf
+    assert margin([over(1, math.inf, False)]) == 1.0
+    assert margin([over(1, 2), None]) is None
+    assert margin([]) is None
+
+
+def test_the_spread_is_how_far_the_worst_tenth_comes_towards_the_threshold():
+    points = tuple(Spot(m > 0, m) for m in (0.5, 0.4, 0.3, 0.2, 0.1, -0.1, 0.6, 0.7, 0.8, 0.9))
+    assert Region(Spot(True, 0.5), points, ()).spread == pytest.approx(0.6)
+    assert not Region(Spot(True, 0.5), points, ()).decided
+    assert Region(Spot(True, 0.05), points[:5] * 2, ()).spread == 0.0
+    assert Region(Spot(False, -0.5), points, ()).spread == pytest.approx(1.4)
+
+
+def test_study_makes_the_runs_of_the_region_once_and_quick_leaves_them_out(
+    fmus, tmp_path, monkeypatch, capsys
+):
+    (tmp_path / "sine.yaml").write_text(SCENARIO)
+    small = STUDY.replace("from: 0.5, to: 1.5", "values: [0.5, 1.5]").replace("[0.5, 1, 2]", "[0.5, 2]")
+    (tmp_path / "study.yaml").write_text(small)
+    monkeypatch.chdir(tmp_path)
+
+    def study(*options: str) -> tuple[str, str, dict]:
+        with pytest.raises(SystemExit) as ended:
+            main(["study", "study.yaml", "--out", "o", "--fmus", str(fmus), *options])
+        assert not ended.value.code
+        said = capsys.readouterr()
+        return said.out, said.err, json.loads((tmp_path / "o/experiment.json").read_text("utf-8"))
+
+    out, said, record = study("--jobs", "1")
+    assert "region of its verdicts: 10 runs\n" in said  # 2 x 2 and 4 of plain alone, 2 of double
+    region = record["claims"][0]["region"]
+    assert region["flip"] == {"open_value": "ratio", "at": pytest.approx(0.9), "words": "0.900"}
+    assert f"in {5 * region['holds_at']} % of 20" in out.replace("\n", " ")
+    page = (tmp_path / "o/report.html").read_text("utf-8")
+    assert "flips at ratio" in page
+    assert "unsure" in page
+    out, said, record = study("--no-run")
+    assert "region of its verdicts: 10 runs, all finished before" in said
+    assert record["claims"][0]["region"] == region
+    out, said, record = study("--no-run", "--quick")
+    assert "region" not in said
+    assert record["claims"][0]["region"] is None
+    assert record["claims"][0]["margin"] == pytest.approx(1 / 6)
+    assert "17 %" in out
