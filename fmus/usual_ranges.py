@@ -57,5 +57,5 @@ def pattern_of(name: str) -> str:
 
 
 def usual_range(name: str) -> tuple[float, float]:
-    """Return from where to where a signal goes; -1 to 1 if it is not in the list."""
-    return _RANGES.get(pattern_of(name), (-1.0, 1.0))
+    """Return from where to where a signal goes, `x_true` as `x`; -1 to 1 if it is not in the list."""
+    return _RANGES.get(pattern_of(name.removesuffix("_true")), (-1.0, 1.0))

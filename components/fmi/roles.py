@@ -52,5 +52,6 @@ ROLES: dict[str, Role] = {
         outputs=("tyre_force_x_*", "tyre_force_y_*"),
     ),
     "roads": Role("road", outputs=("friction_*", "friction")),
+    "sensors": Role("sensor"),
 }
 """Folder below `components/` -> role."""

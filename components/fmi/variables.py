@@ -263,5 +263,6 @@ def output_variables(
 
 def _on_wheel(s: Signal, name: str) -> str:
     """Return the description of one scalar, naming the wheel where there is one."""
-    wheel = WHEEL_NAMES.get(name[-2:]) if name[-3:-2] == "_" else None
+    of_wheel = name.removesuffix("_true")
+    wheel = WHEEL_NAMES.get(of_wheel[-2:]) if of_wheel[-3:-2] == "_" else None
     return s.description if wheel is None else f"{s.description}, {wheel}"

@@ -91,8 +91,15 @@ def road(ax: Axes) -> None:
         ax.add_patch(Rectangle((-0.05, y), 0.1, h, fc="white", ec="none"))
 
 
+def sensor(ax: Axes) -> None:
+    ax.add_patch(Circle((-0.45, -0.45), 0.2, fc=ACCENT, ec="none"))
+    angles = np.radians(np.linspace(5, 85, 40))
+    for radius in (0.5, 0.85, 1.2):
+        ax.plot(-0.45 + radius * np.cos(angles), -0.45 + radius * np.sin(angles), INK, lw=6)
+
+
 ROLES: tuple[Callable[[Axes], None], ...] = (
-    driver, reference, controller, allocator, wheel_control, actuator, plant, tyre, road,
+    driver, reference, controller, allocator, wheel_control, actuator, plant, tyre, road, sensor,
 )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import random
+import re
 from importlib import import_module
 from math import isfinite
 
@@ -71,6 +72,7 @@ SPREAD = {
     "N.m": 200.0,
     "1": 0.05,
     "m": 2.0,
+    "Pa": 1e5,
 }
 """How far about that, by unit."""
 
@@ -95,6 +97,9 @@ ODD_PARAMETERS = (
     *("road_bank", "wind_force"),
 )
 OTHER_SIDE = {"_fl": "_fr", "_fr": "_fl", "_rl": "_rr", "_rr": "_rl"}
+OF_WHEEL = re.compile("_[fr][lr](?=(_true)?$)")
+FLAWS = ("_noise", "_bias", "_drift")
+"""Ends of the names of parameters that give answers without a question."""
 
 ROUNDED = dict.fromkeys(("controller_fnn", "controller_fuzzy_feedback", "controller_fuzzy_sideslip"), 1e-6)
 """What may be lost in a mirror [N.m]: sums over fuzzy sets run from left to right; else not a bit."""
@@ -132,13 +137,17 @@ def some_inputs(component: type[Component], seed: int, spread: float = 1.0) -> d
 def mirrored(values: dict[str, float]) -> dict[str, float]:
     """Return what the same looks like in a mirror: left is right."""
     return {
-        (name[:-3] + OTHER_SIDE[name[-3:]] if name[-3:] in OTHER_SIDE else name): -x if name in ODD else x
+        OF_WHEEL.sub(lambda m: OTHER_SIDE[m[0]], name): -x if name.removesuffix("_true") in ODD else x
         for name, x in values.items()
     }
 
 
 def parameters_of(component: type[Component]) -> dict[str, object]:
     return {v.name: v.start for v in component.variables if v.causality == "parameter"}
+
+
+def flawless(component: type[Component]) -> dict[str, object]:
+    return {name: 0.0 for name in parameters_of(component) if name.endswith(FLAWS)}
 
 
 def driven(component: type[Component], steps: int = 60, **parameters: object) -> Stand:
@@ -161,7 +170,8 @@ def test_the_mirrored_inputs_give_the_mirrored_outputs(component, parameters):
     left, right = Stand(component, **parameters), Stand(component, **parameters)
     turned = {n: -x for n, x in parameters_of(component).items() if n in ODD_PARAMETERS}
     texts = {n: TEXTS[n][x] for n, x in parameters.items() if n in TEXTS}
-    right.set(**turned, **texts)
+    right.set(**turned, **texts, **flawless(component))
+    left.set(**flawless(component))
     inputs = some_inputs(component, 0)
     rounding = ROUNDED.get(component.fmu_name, 0.0)
     assert right.start(**mirrored(inputs)) == pytest.approx(
@@ -220,7 +230,8 @@ def test_an_output_holds_until_the_next_step_and_reading_it_changes_nothing(comp
 def test_without_any_input_nothing_stirs(component):
     """Zero in gives zero out; a car at rest stays at rest, and its loads are its weight."""
     moving = ("initial_speed", "amplitude", "final_steer_angle", "force", "speed_gain", "lane_offset")
-    stand = Stand(component, **{name: 0.0 for name in moving if name in parameters_of(component)})
+    still = {name: 0.0 for name in moving if name in parameters_of(component)}
+    stand = Stand(component, **still, **flawless(component))
     zero = {v.name: 0.0 for v in component.variables if v.causality == "input"}
     stand.start(**zero)
     for _ in range(200):

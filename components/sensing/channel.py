@@ -1,0 +1,140 @@
+"""One channel of a sensor: from a true signal to the messages that a control unit receives.
+
+    low pass    x'' + sqrt(2) w x' + w^2 x = w^2 u           w = 2 pi bandwidth, -3 dB there     (1)
+    measured    y_k = gain x(t_k) + bias + drift (t_k - t_0) + noise N_k       t_k = t_0 + k T    (2)
+    message     m_k = round(limit(y_k) / quantum) quantum                                        (3)
+    received    m_k from t_k + latency until the next message is there                            (4)
+
+A bandwidth, noise, range, quantum or latency of zero is none of it, not a zero; without sample time T every
+communication point is a message. The signal runs in a straight line from one communication point to the
+next and the low pass is solved exactly for that (`mathematics.oscillator`), so messages fall at their own
+times, whatever the step. N_k is counted, not drawn one after the other (`sensing.noise`). Until the first
+message arrives, its value is there already; a low pass starts settled.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi, sqrt
+
+from ..mathematics.oscillator import transition
+from . import noise
+
+SLACK = 1e-9
+"""Times [s] nearer to each other than this are one; chosen: far below a step, far above rounding."""
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What a channel does to its signal; `unit` is that of the signal.
+
+    Attributes:
+        bandwidth: of the low pass [Hz].
+        gain: measured over true [1].
+        bias: [unit].
+        drift: of the bias [unit/s].
+        noise: root mean square [unit].
+        range: largest magnitude [unit].
+        quantum: step of a message [unit].
+        sample_time: from one message to the next [s].
+        latency: from a message's time to its arrival [s].
+    """
+
+    bandwidth: float = 0.0
+    gain: float = 1.0
+    bias: float = 0.0
+    drift: float = 0.0
+    noise: float = 0.0
+    range: float = 0.0
+    quantum: float = 0.0
+    sample_time: float = 0.0
+    latency: float = 0.0
+
+    def measured(self, x: float, t: float, key: int, k: int) -> float:
+        """Return message `k` of the filtered signal `x`, `t` [s] after the start; equations (2), (3)."""
+        y = self.gain * x
+        if self.bias or self.drift:
+            y += self.bias + self.drift * t
+        if self.noise:
+            y += self.noise * noise.normal(key, k)
+        if self.range:
+            y = min(max(y, -self.range), self.range)
+        if self.quantum:
+            y = round(y / self.quantum) * self.quantum
+        return y
+
+
+class LowPass:
+    """Equation (1) for a signal that runs in straight lines.
+
+    Args:
+        bandwidth: [Hz], positive.
+        value: of the signal at the start, where the filter has settled.
+    """
+
+    def __init__(self, bandwidth: float, value: float) -> None:
+        self.w = 2.0 * pi * bandwidth
+        self.x, self.dx = value, 0.0
+        self.h = 0.0
+        self.phi = (1.0, 0.0, 0.0, 1.0)
+
+    def advance(self, h: float, begin: float, end: float) -> None:
+        """Take the filter over `h` > 0 [s], the signal running from `begin` to `end`."""
+        if h != self.h:
+            self.h = h
+            self.phi = transition(self.w / sqrt(2.0), self.w * self.w, h)
+        slope = (end - begin) / h
+        behind = slope * sqrt(2.0) / self.w  # the settled filter follows a ramp that far behind
+        x, dx = self.x - (begin - behind), self.dx - slope
+        t_11, t_12, t_21, t_22 = self.phi
+        self.x = end - behind + (t_11 * x + t_12 * dx)
+        self.dx = slope + (t_21 * x + t_22 * dx)
+
+
+class Channel:
+    """The messages of one signal.
+
+    Args:
+        figures: what the channel does.
+        key: of its noise, see `sensing.noise.key`.
+        t: start time t_0 [s].
+        value: of the signal at the start.
+    """
+
+    def __init__(self, figures: Figures, key: int, t: float, value: float) -> None:
+        self.figures, self.key, self.begin = figures, key, t
+        self.signal = value
+        self.filter = LowPass(figures.bandwidth, value) if figures.bandwidth else None
+        self.received = figures.measured(value, 0.0, key, 0)
+        self.number = 1  # of the next message
+        self.under_way: list[tuple[float, float]] = []  # (arrival [s], message)
+
+    def advance(self, t: float, h: float, value: float) -> None:
+        """Take the channel from `t` to `t + h` [s], where the signal has the value `value`."""
+        if h <= 0.0:
+            return
+        end, figures = t + h, self.figures
+        slope = (value - self.signal) / h
+        now, here = t, self.signal
+        while True:
+            due = self.begin + self.number * figures.sample_time if figures.sample_time else end
+            if due > end + SLACK:
+                break
+            last = due > end - SLACK
+            at, there = (end, value) if last else (due, self.signal + slope * (due - t))
+            self._filter(at - now, here, there)
+            now, here = at, there
+            x = there if self.filter is None else self.filter.x
+            message = figures.measured(x, due - self.begin, self.key, self.number)
+            self.under_way.append((due + figures.latency, message))
+            self.number += 1
+            if last and not figures.sample_time:
+                break
+        self._filter(end - now, here, value)
+        self.signal = value
+        while self.under_way and self.under_way[0][0] <= end + SLACK:
+            self.received = self.under_way.pop(0)[1]
+
+    def _filter(self, h: float, begin: float, end: float) -> None:
+        if self.filter is not None and h > 0.0:
+            self.filter.advance(h, begin, end)

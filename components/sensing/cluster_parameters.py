@@ -1,0 +1,115 @@
+"""The parameters of a cluster of sensors, made from a table of what each of its channels does.
+
+    YAW_RATE_NOISE = {"yaw_rate": {"noise": (0.0017, "a data sheet")}}
+    parameters_of(__name__, "NoisyParameters", YAW_RATE_NOISE)
+
+is a dataclass with the nine figures of every channel (`sensing.channel.Figures`), all without effect but the
+noise of the gyro, and what the whole cluster has in common.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import make_dataclass
+from typing import Any, NamedTuple
+
+from ..fmi.variables import parameter
+from .channel import Figures
+
+
+class Measured(NamedTuple):
+    """A signal that is measured: its unit, that of its drift, and what measures it."""
+
+    unit: str
+    rate_unit: str
+    text: str
+
+
+CHANNELS = {
+    "yaw_rate": Measured("rad/s", "rad/s2", "gyro"),
+    "acceleration_x": Measured("m/s2", "m/s3", "longitudinal accelerometer"),
+    "acceleration_y": Measured("m/s2", "m/s3", "lateral accelerometer"),
+    "steer_angle": Measured("rad", "rad/s", "hand-wheel sensor (at the road wheels)"),
+    "wheel_speed": Measured("rad/s", "rad/s2", "wheel-speed sensors"),
+    "brake_pressure": Measured("Pa", "Pa/s", "brake-pressure sensors"),
+}
+"""Signal, without `_*` for four wheels -> how it is measured."""
+
+Given = Mapping[str, Mapping[str, tuple[float, str]]]
+"""Channel -> figure -> value in SI units, and where it comes from."""
+
+NONE = "chosen: none"
+
+
+def parameters_of(module: str, name: str, given: Given, *, common: Mapping[str, Any]) -> type:
+    """Return a dataclass of parameters: the figures of every channel, those not given without effect.
+
+    Args:
+        module, name: of the class, so that its values can be kept in an FMU's state.
+        given: the figures that a kind of cluster has.
+        common: name -> parameter of the whole cluster; those of `COMMON` that are left out are added.
+    """
+    fields: dict[str, Any] = {**COMMON, **common}
+    for channel, (unit, rate_unit, text) in CHANNELS.items():
+        figures = given.get(channel, {})
+        for figure, (unit_of_it, what, least) in _FIGURES.items():
+            default, source = figures.get(figure, (getattr(Figures(), figure), NONE))
+            fields[f"{channel}_{figure}"] = parameter(
+                default,
+                {"signal": unit, "rate": rate_unit}.get(unit_of_it, unit_of_it),
+                what.format(text),
+                source,
+                minimum=least,
+            )
+    types = {str: str, int: int, float: float, bool: bool}
+    made = [(field, types[type(how.default)], how) for field, how in fields.items()]
+    return make_dataclass(name, made, frozen=True, namespace={"__module__": module})
+
+
+_FIGURES = {
+    "bandwidth": ("Hz", "Frequency (-3 dB) of the low pass of the {}, 0: none", 0.0),
+    "gain": ("1", "Measured over true value of the {}", None),
+    "bias": ("signal", "Bias of the {}", None),
+    "drift": ("rate", "Drift of the bias of the {}", None),
+    "noise": ("signal", "Noise of the {}, root mean square", 0.0),
+    "range": ("signal", "Largest magnitude that the {} can tell, 0: any", 0.0),
+    "quantum": ("signal", "Step of the values of the {}, 0: none", 0.0),
+    "sample_time": ("s", "Time between messages of the {}, 0: that of the cluster", 0.0),
+    "latency": ("s", "Latency of the {} beyond that of the cluster", 0.0),
+}
+"""Figure -> unit, text, smallest value."""
+
+COMMON = {
+    "seed": parameter(1, None, "Seed of the noise", "chosen: any will do"),
+    "sample_time": parameter(
+        0.0, "s", "Time between messages, 0: one at every communication point", NONE, minimum=0.0
+    ),
+    "latency": parameter(0.0, "s", "Latency of every message", NONE, minimum=0.0),
+    "feels_gravity": parameter(
+        True,
+        None,
+        "The accelerometers roll and pitch with the body and feel gravity",
+        "chosen: they are fixed to the body",
+    ),
+}
+"""Parameters of every cluster."""
+
+
+def figures_of(p: Any) -> dict[str, Figures]:
+    """Return the figures of every channel from the parameters `p` of a cluster.
+
+    Raises:
+        ValueError: a channel with noise has no sample time: its noise would belong to the step size.
+    """
+    made = {}
+    for channel in CHANNELS:
+        own = {figure: getattr(p, f"{channel}_{figure}") for figure in _FIGURES}
+        own["sample_time"] = own["sample_time"] or p.sample_time
+        own["latency"] += p.latency
+        if own["noise"] and not own["sample_time"]:
+            raise ValueError(
+                f"{channel}_noise needs a sample_time above 0 s, or one of the channel: noise of every "
+                "communication point would change with the step size"
+            )
+        made[channel] = Figures(**own)
+    return made

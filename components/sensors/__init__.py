@@ -1,0 +1,1 @@
+"""Sensors: what a car knows of itself."""

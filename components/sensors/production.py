@@ -1,0 +1,149 @@
+"""Cluster of sensors as in a production car: gyro, accelerometers, wheel speeds, hand wheel, brakes.
+
+    gyro             r
+    accelerometers   f_x = a_x cos(theta) - g sin(theta)                theta = pitch - slope         (1)
+                     f_y = a_y cos(phi) + g sin(phi)                    phi = roll + bank
+    wheel speeds     w_i;      hand wheel: delta;      brake pressures: p_i
+
+Each signal takes the way of `sensing.channel`: low pass, gain, bias, drift, noise, range, quantum, latency,
+held from message to message. Accelerometers are fixed to the body, which leans: with roll positive for the
+left side up, pitch for the nose down, and the angles by which a road rises forwards and to the left, (1) is
+what they feel of gravity and acceleration. They stand at the centre of mass. What no unit says (a plant that
+does not roll, a road that is flat) counts as zero.
+
+Inputs are the true values, named `*_true`: `{from: plant.*, to: sensor.*_true}`. Outputs have the bare
+names, so that `{from: [sensor], to: [controller]}` puts a measurement in place of the truth.
+
+The hand-wheel sensor counts in road-wheel angles: its figures are those at the hand wheel over a steering
+ratio of 16. Biases are zero here, as after the zero-point learning of a control unit that worked; what
+is left in cars is up to 0.3 deg/s and 0.2 m/s2.
+
+Sources stand at the parameters. `sensors.ideal` and `sensors.poor` are the same with other values.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+from vocabulary.signals import SIGNALS
+from vocabulary.wheels import wheels
+
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter, signal
+from ..mathematics.gravity import G
+from ..sensing.channel import Channel, Figures
+from ..sensing.cluster_parameters import Given, figures_of, parameters_of
+from ..sensing.noise import key
+
+_SMI700 = "Bosch, SMI700 product sheet"
+_CORNER = (21.0, f"{_SMI700}: 21 Hz")
+_ACCELEROMETER = {
+    "bandwidth": _CORNER,
+    "noise": (0.0588, f"{_SMI700}: 6 mg"),
+    "range": (49.05, f"{_SMI700}: 5 g"),
+    "quantum": (0.00196, f"{_SMI700}: 5000 per g"),
+}
+
+PRODUCTION: Given = {
+    "yaw_rate": {
+        "bandwidth": _CORNER,
+        "noise": (0.001745, f"{_SMI700}: 0.1 deg/s"),
+        "range": (5.236, f"{_SMI700}: 300 deg/s"),
+        "quantum": (0.0001745, f"{_SMI700}: 100 per deg/s"),
+    },
+    "acceleration_x": _ACCELEROMETER,
+    "acceleration_y": _ACCELEROMETER,
+    "steer_angle": {
+        "range": (0.85, "chosen: 780 deg at the hand wheel"),
+        "quantum": (0.000109, "a volume car's bus: 0.1 deg at the hand wheel"),
+    },
+    "wheel_speed": {
+        "noise": (0.08, "a volume car's bus: 0.1 %, here of 90 km/h"),
+        "range": (270.0, "chosen: 300 km/h"),
+        "quantum": (0.0067, "a volume car's bus: 0.0075 km/h"),
+    },
+    "brake_pressure": {
+        "bandwidth": (50.0, "chosen: a pressure sensor of a hydraulic unit"),
+        "noise": (2e4, "chosen: 0.1 % of the range"),
+        "range": (2.5e7, "chosen: 250 bar"),
+        "quantum": (1e4, "chosen: 0.1 bar"),
+    },
+}
+
+ProductionParameters = parameters_of(
+    __name__,
+    "ProductionParameters",
+    PRODUCTION,
+    common={
+        "sample_time": parameter(
+            0.01, "s", "Time between messages", "a volume car's bus: 10 ms", minimum=0.0
+        ),
+        "latency": parameter(
+            0.005,
+            "s",
+            "Latency of every message",
+            "chosen: half a message, of 5 to 20 ms in cars",
+            minimum=0.0,
+        ),
+    },
+)
+
+_PRESSURE = "Pressure in the wheel's brake cylinder"
+_ALWAYS = ("yaw_rate", "acceleration_x", "acceleration_y", "steer_angle", "wheel_speed_*")
+_AT_TIMES = ("roll_angle", "pitch_angle", "slope", "bank")
+
+
+class Production(Component):
+    """Production cluster of sensors: gyro, accelerometers, wheel speeds, hand wheel, brake pressures."""
+
+    Parameters = ProductionParameters
+    sampled = True
+    inputs = (
+        *(signal(f"{name}_true", SIGNALS[name].unit, f"True: {SIGNALS[name].text}") for name in _ALWAYS),
+        signal("brake_pressure_*_true", "Pa", f"True: {_PRESSURE}", optional=True),
+        *(
+            signal(f"{name}_true", SIGNALS[name].unit, f"True: {SIGNALS[name].text}", optional=True)
+            for name in _AT_TIMES
+        ),
+    )
+    outputs = (
+        output("yaw_rate", "yaw_rate_true"),
+        output("acceleration_x", "acceleration_x_true", "pitch_angle_true", "slope_true"),
+        output("acceleration_y", "acceleration_y_true", "roll_angle_true", "bank_true"),
+        output("steer_angle", "steer_angle_true"),
+        output("wheel_speed_*", "wheel_speed_*_true"),
+        output("brake_pressure_*", "brake_pressure_*_true", unit="Pa", text=_PRESSURE),
+    )
+
+    def configure(self) -> None:
+        self.figures = figures_of(self.p)
+
+    def start(self, t: float, u: list[float]) -> None:
+        self.channels = [
+            Channel(figures, key(self.p.seed, name), t, value)
+            for (name, figures), value in zip(self._named(), self._felt(u), strict=True)
+        ]
+
+    def advance(self, t: float, h: float, u: list[float]) -> None:
+        for channel, value in zip(self.channels, self._felt(u)):  # noqa: B905 - strict= costs a tenth
+            channel.advance(t, h, value)
+
+    def output(self, t: float, u: list[float]) -> list[float]:
+        return [channel.received for channel in self.channels]
+
+    def _named(self) -> list[tuple[str, Figures]]:
+        """Return name and figures of every channel, in the order of the outputs."""
+        named = []
+        for name, figures in self.figures.items():
+            one = f"{name}_*" if name in ("wheel_speed", "brake_pressure") else name
+            named += [(channel, figures) for channel in wheels(one)]
+        return named
+
+    def _felt(self, u: list[float]) -> list[float]:
+        """Return what reaches the sensors, in the order of the outputs; equation (1)."""
+        r, a_x, a_y, *others, roll, pitch, slope, bank = u
+        if self.p.feels_gravity:
+            theta, phi = pitch - slope, roll + bank
+            a_x = a_x * cos(theta) - G * sin(theta)
+            a_y = a_y * cos(phi) + G * sin(phi)
+        return [r, a_x, a_y, *others]
