@@ -29,6 +29,7 @@ COMMANDS = (
     "study",
     "report",
     "sweep",
+    "evaluate",
     "list",
     "diff",
     "salvage",

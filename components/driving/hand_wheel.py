@@ -9,6 +9,7 @@ every instant and not quantised to whole communication steps. The speed: `drivin
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 
 from ..fmi.component import Component
 from ..fmi.variables import parameter, signal
@@ -42,8 +43,12 @@ class HandWheelDriver(Component):
         """Return the hand-wheel angle [rad] at `t` [s]."""
         raise NotImplementedError
 
+    def coasts_from(self) -> float:
+        """Return when the accelerator is let go for good [s]; infinite: never."""
+        return inf
+
     def start(self, t: float, u: list[float]) -> None:
-        self.speed = SpeedHold(self.p)
+        self.speed = SpeedHold(self.p, self.coasts_from())
         self.speed.start(u[0])
 
     def advance(self, t: float, h: float, u: list[float]) -> None:

@@ -3,6 +3,8 @@
     F* = K e + (K / T_i) integral(e),   e = v_target - v_x,     0 <= F* <= F_max    no windup at the limits
     tau dF/dt = F* - F                  drive force = constant part + F
 
+From the time at which the accelerator is let go, F* = 0 and the constant part goes with it.
+
 The force follows the speed through the lag alone, never at the same instant, so that speed and force
 make no algebraic loop. A driver who holds the speed accelerates or lets go, but does not brake.
 
@@ -12,6 +14,7 @@ Paper C's runs are "at a constant 90 km/h"; the paper does not say how.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 
 from ..fmi.variables import parameter
 from ..mathematics.first_order_lag import Stage
@@ -54,10 +57,12 @@ class SpeedHold:
 
     Args:
         p: of the driver; read again at every step, never changed.
+        let_go: when the accelerator is let go [s], for good; default: never.
     """
 
-    def __init__(self, p: SpeedHoldingParameters) -> None:
+    def __init__(self, p: SpeedHoldingParameters, let_go: float = inf) -> None:
         self.p = p
+        self.let_go = let_go
         self.gains = Gains(p.speed_gain, p.speed_gain / p.speed_integral_time, 0.0)
         self.foot = Pid()
         self.engine = Stage(tau=p.drive_time_constant)
@@ -65,15 +70,25 @@ class SpeedHold:
     @property
     def force(self) -> float:
         """The drive force [N]."""
-        return self.p.constant_drive_force + self.engine.value
+        return self.constant + self.engine.value
 
     def start(self, v_x: float) -> None:
         """Begin at the speed `v_x` [m/s] with the constant force."""
+        self.constant = self.p.constant_drive_force
         self.foot.start(self.p.target_speed - v_x)
         self.engine = Stage(tau=self.p.drive_time_constant)
 
     def advance(self, t: float, h: float, v_x: float) -> None:
         """Take the force from `t` to `t + h` [s] at the speed `v_x` [m/s]."""
+        held = min(max(self.let_go - t, 0.0), h)
+        if held > 0.0:
+            self._hold(t, held, v_x)
+        if held < h:
+            self.engine.value += self.constant
+            self.constant = 0.0
+            self.engine.advance(t + held, h - held, 0.0)
+
+    def _hold(self, t: float, h: float, v_x: float) -> None:
         p = self.p
         if p.speed_gain == 0.0:
             return

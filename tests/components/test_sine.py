@@ -1,12 +1,13 @@
-"""The steering sine."""
+"""The steering sine, also with dwell."""
 
 from __future__ import annotations
 
-from math import pi, sin
+from math import exp, pi, sin
 
 import pytest
 
 from components.drivers.sine import Sine, SineParameters, sine_steer
+from components.drivers.sine_with_dwell import SineWithDwell, SineWithDwellParameters, sine_with_dwell
 
 from .stand import Stand
 
@@ -44,3 +45,38 @@ def test_the_drive_force_is_constant():
     stand = Stand(Sine, constant_drive_force=-300.0)
     assert stand.start()["drive_force"] == -300.0
     assert stand.step(1.25)["drive_force"] == -300.0
+
+
+DWELL = SineWithDwellParameters(amplitude=2.0, start_time=1.0)
+
+
+@pytest.mark.parametrize(
+    "after, hand",
+    [
+        (-0.1, 0.0),
+        (0.25 / 0.7, 2.0),
+        (0.5 / 0.7, 0.0),
+        (0.75 / 0.7, -2.0),
+        (0.75 / 0.7 + 0.3, -2.0),
+        (0.75 / 0.7 + 0.5, -2.0),
+        (0.875 / 0.7 + 0.5, -2.0 * sin(pi / 4)),
+        (1.0 / 0.7 + 0.5, 0.0),
+        (9.0, 0.0),
+    ],
+)
+def test_the_sine_with_dwell_pauses_at_its_second_peak(after, hand):
+    assert sine_with_dwell(1.0 + after, DWELL) == pytest.approx(hand, abs=1e-12)
+
+
+def test_the_accelerator_is_let_go_before_the_steering_at_any_step_size():
+    """The constant part of the force goes with the rest, through the lag of 0.2 s."""
+
+    def force(h: float) -> float:
+        stand = Stand(SineWithDwell, constant_drive_force=400.0, start_time=1.0, target_speed=20.0)
+        stand.start(velocity_x=20.0)
+        for _ in range(round(0.8 / h)):
+            found = stand.step(h, velocity_x=20.0)["drive_force"]
+        return found
+
+    assert force(0.01) == pytest.approx(400.0 * exp(-0.3 / 0.2), rel=1e-9)
+    assert force(0.4) == pytest.approx(force(0.01), rel=1e-9)  # let go within a step

@@ -38,6 +38,7 @@ STAGES = (
     {"master"},  # hands rows to a recorder of `results`, has `metrics` look at them
     {"figures"},
     {"tyres"},  # measures for `experiments` what units want to know of their tyres
+    {"evaluation"},
     {"experiments"},
     {"interop", "scaffold"},
     {"pages"},

@@ -1,0 +1,207 @@
+"""`yawbench evaluate`: what a standard test makes of recorded or measured runs."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..evaluation.standard_tests import TESTS
+
+if TYPE_CHECKING:
+    from ..evaluation.dwell_series import Series
+    from ..evaluation.standard_tests import Evaluated, StandardTest
+    from ..evaluation.trace import MappingSpec
+    from ..experiments.tables import Table
+
+Test = Enum("Test", {name.replace("-", "_"): name for name in TESTS}, type=str)  # type: ignore[misc]
+
+Which = Annotated[Test, typer.Argument(help="The test.", metavar="TEST")]  # type: ignore[valid-type]
+Sources = Annotated[
+    list[Path],
+    typer.Argument(
+        help="Folders of results, also with runs in folders below; or with --signals files of columns.",
+        metavar="RESULTS...",
+    ),
+]
+Signals = Annotated[
+    Path | None,
+    typer.Option("--signals", metavar="FILE", help="Mapping: which columns of measured files are what."),
+]
+SlowSteer = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--slow-steer", metavar="RESULTS", help="Runs of slowly increasing steer, for A. Repeatable."
+    ),
+]
+Angle = Annotated[
+    str | None,
+    typer.Option("--angle", metavar="ANGLE", help="A, the hand-wheel angle at 0.3 g, such as '35.8 deg'."),
+]
+Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw every run.")]
+OutFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", metavar="DIR", help="Folder for evaluation.json and figures; default: that of the run(s)."
+    ),
+]
+
+
+def evaluate(
+    test: Which,
+    sources: Sources,
+    slow_steer: SlowSteer = None,
+    angle: Angle = None,
+    signals: Signals = None,
+    figures: Figures = True,
+    out: OutFile = None,
+) -> None:
+    """Evaluate runs as a standard test says.
+
+    Every quantity, a verdict per criterion with its reason, a figure per run; also of measured data.
+    Of sine with dwell, A comes from runs of slowly increasing steer (--slow-steer) or is given
+    (--angle); several runs are judged as a series.
+    """
+    from ..evaluation.dwell_series import judge_series
+    from ..evaluation.trace import load_mapping
+    from ..wording import counted
+    from .batch import print_tables, say
+    from .recorded import folder_of_all
+
+    chosen = TESTS[test.value]  # type: ignore[attr-defined]
+    mapping = load_mapping(signals) if signals else None
+    places = [place for source in sources for place in _runs(source, mapping)]
+    known = _angle(angle, slow_steer, mapping, chosen)
+    evaluated = [_evaluated(chosen, place, mapping, known) for place in places]
+    series = judge_series([one.judged for one in evaluated], known) if known and len(evaluated) > 1 else None
+    folder = out or (
+        folder_of_all(places) if all(p.is_dir() for p in places) else Path("results") / "evaluation"
+    )
+    drawn = _draw(chosen, evaluated, series, folder, given=out) if figures else 0
+    _write(chosen, evaluated, series, known, folder)
+    print_tables(_tables(chosen, evaluated, series))
+    also = f", {counted(drawn, 'figure')}" if drawn else ""
+    say(f"{folder / FILE}{also}")
+
+
+FILE = "evaluation.json"
+
+
+def _runs(source: Path, mapping: MappingSpec | None) -> list[Path]:
+    """Return the folders of the runs in and below a folder, or the file itself."""
+    from ..errors import ResultsError
+    from ..results.folder import COMPLETED
+    from ..results.runs import found_runs
+
+    if not source.is_dir():
+        if not source.exists():
+            raise ResultsError(f"{source}: there is no such folder or file")
+        return [source]
+    found = [run.folder for run in found_runs(source) if run.status == COMPLETED]
+    if not found:
+        raise ResultsError(f"{source}: holds no run that was completed")
+    return found
+
+
+def _angle(
+    given: str | None, slow_steer: list[Path] | None, mapping: MappingSpec | None, test: StandardTest
+) -> float | None:
+    """Return A [rad], None if it is neither given nor needed."""
+    import math
+
+    from ..errors import ResultsError, ScenarioError
+    from ..evaluation.judgement import NotJudged
+    from ..evaluation.slow_steer import characteristic_angle, evaluate_slow_steer
+    from ..evaluation.trace import load_trace
+    from ..scenario.quantities import convert
+    from .batch import say
+
+    if given and slow_steer:
+        raise ScenarioError("--angle and --slow-steer both say what A is: give one of them")
+    if (given or slow_steer) and not test.needs_angle:
+        raise ScenarioError(f"{test.name} needs no A: leave --angle and --slow-steer away")
+    if given:
+        try:
+            angle = float(convert(given, "rad"))
+        except ValueError as error:
+            raise ScenarioError(f"--angle: {error}") from None
+        if not 0 < angle < 2 * math.pi:
+            raise ScenarioError(f"--angle: must be between 0 and 360 degrees (got {given})")
+        return angle
+    if not slow_steer:
+        return None
+    places = [place for source in slow_steer for place in _runs(source, mapping)]
+    try:
+        angle = characteristic_angle([evaluate_slow_steer(load_trace(p, mapping)) for p in places])
+    except NotJudged as why:
+        raise ResultsError(str(why)) from None
+    say(f"A = {math.degrees(angle):.1f} degrees, from {len(places)} of slowly increasing steer")
+    return angle
+
+
+def _evaluated(
+    test: StandardTest, place: Path, mapping: MappingSpec | None, angle: float | None
+) -> Evaluated:
+    from ..evaluation.trace import load_trace
+
+    return test.evaluate(load_trace(place, mapping), angle)
+
+
+def _draw(
+    test: StandardTest, evaluated: list[Evaluated], series: Series | None, folder: Path, *, given: Path | None
+) -> int:
+    """Draw every run, into its folder or below the one given, and the series; return how many figures."""
+    from ..figures.style import save
+
+    stem = test.name.replace("-", "_")
+    count = 0
+    for number, one in enumerate(evaluated):
+        if one.draw is None:
+            continue
+        alone = len(evaluated) == 1
+        own = one.trace.folder if one.trace.folder is not None and given is None else None
+        name = stem if own or alone else f"{stem}_{number + 1}"
+        save(one.draw(), (own or folder) / name)
+        count += 1
+    if series:
+        from ..evaluation.dwell_drawing import draw_series
+
+        titles = {one.trace.title for one in evaluated if one.trace.title}
+        note = f"A = {series.angle * 57.29577951308232:.1f}°"
+        save(
+            draw_series(series, titles.pop() if len(titles) == 1 else "Sine with dwell", note),
+            folder / f"{stem}_series",
+        )
+        count += 1
+    return count
+
+
+def _write(
+    test: StandardTest,
+    evaluated: list[Evaluated],
+    series: Series | None,
+    angle: float | None,
+    folder: Path,
+) -> None:
+    import json
+
+    from ..writing import write_whole
+
+    data = {
+        "test": test.name,
+        "A": angle,
+        "runs": [one.judged.as_data() for one in evaluated],
+        "series": series.as_data() if series else None,
+    }
+    write_whole(folder / FILE, json.dumps(data, indent=1))
+
+
+def _tables(test: StandardTest, evaluated: list[Evaluated], series: Series | None) -> list[Table]:
+    from ..experiments.evaluated_tables import run_table, runs_table
+
+    if len(evaluated) == 1:
+        return [run_table(evaluated[0].judged, test.says)]
+    runs = series.runs if series else [one.judged for one in evaluated]
+    return [runs_table(runs, test, series)]

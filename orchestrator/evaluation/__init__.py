@@ -1,0 +1,1 @@
+"""What standard tests make of recorded or measured signals: quantities, verdicts, pictures."""

@@ -1,0 +1,114 @@
+"""Sine with dwell, the whole series: which runs there must be, and what all of them come to.
+
+    1.5 A, 2 A, 2.5 A, ... up to the last run, of max(6.5 A, 270 degrees), or 300 degrees where 6.5 A is more;
+
+once left first and once right first. Steps of 0.5 A go on beyond 6.5 A where the last run is 270 degrees.
+The series passes if every run that it asks for is there and passes all that is asked of it.
+
+Source: UN Regulation No. 140, GTR 8.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from .judgement import Judgement, Ruling, Verdict, overall
+
+FIRST, STEP, LAST = 1.5, 0.5, 6.5
+"""Amplitudes over A: of the first run, from run to run, of the last."""
+LEAST, MOST = 270.0, 300.0
+"""Bounds of the last amplitude [deg]."""
+NEAR = math.radians(1.0)
+"""How far an amplitude may be from the one asked for [rad]; chosen: what steering robots keep."""
+CRITERIA = ("stability", "responsiveness")
+
+
+def amplitudes(angle: float) -> list[float]:
+    """Return the amplitudes of one direction [rad], from A [rad].
+
+    >>> [round(math.degrees(x), 1) for x in amplitudes(math.radians(44.3))][-3:]
+    [243.6, 265.8, 287.9]
+    """
+    a = math.degrees(angle)
+    last = min(max(LAST * a, LEAST), MOST)
+    steps = int((last / a - FIRST) / STEP + 1e-9)
+    found = [(FIRST + STEP * k) * a for k in range(steps + 1)]
+    if last - found[-1] > 1e-6:
+        found.append(last)
+    return [math.radians(round(x, 6)) for x in found]
+
+
+@dataclass
+class Series:
+    """What all runs of a series come to."""
+
+    angle: float  # A [rad]
+    runs: list[Judgement]
+    rulings: dict[str, Ruling] = field(default_factory=dict)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Passed if all criteria are."""
+        found = overall(ruling.verdict for ruling in self.rulings.values())
+        return Verdict.PASSED if found is Verdict.PASSED else Verdict.FAILED
+
+    def as_data(self) -> dict[str, Any]:
+        """Return it as plain data, for files."""
+        return {
+            "A": self.angle,
+            "verdict": self.verdict.value,
+            "criteria": {
+                name: {"verdict": one.verdict.value, "why": one.why} for name, one in self.rulings.items()
+            },
+        }
+
+
+def judge_series(runs: Sequence[Judgement], angle: float) -> Series:
+    """Return the verdict over all runs, in the order of their amplitudes; `angle`: A [rad]."""
+    ordered = sorted(runs, key=lambda run: (-math.copysign(1.0, _of(run)), abs(_of(run))))
+    series = Series(angle, ordered)
+    missing = [
+        math.degrees(side * wanted)
+        for side in (1.0, -1.0)
+        for wanted in amplitudes(angle)
+        if not any(abs(_of(run) - side * wanted) <= NEAR for run in runs)
+    ]
+    for criterion in CRITERIA:
+        asked = [run for run in ordered if criterion in run.rulings]
+        by_verdict = {
+            verdict: [run for run in asked if run.rulings[criterion].verdict is verdict]
+            for verdict in Verdict
+        }
+        failed, open_ = by_verdict[Verdict.FAILED], by_verdict[Verdict.NOT_JUDGED]
+        if failed:
+            said = f"{len(failed)} of {len(asked)} runs fail, {_span(failed)}"
+            series.rulings[criterion] = Ruling(Verdict.FAILED, said)
+        elif open_:
+            said = f"{len(open_)} of {len(asked)} runs are not judged: {open_[0].rulings[criterion].why}"
+            series.rulings[criterion] = Ruling(Verdict.NOT_JUDGED, said)
+        elif missing or not asked:
+            lacking = ", ".join(f"{x:+.1f}" for x in missing)
+            said = f"{len(missing)} runs are missing, of {lacking} degrees" if missing else "no run is asked"
+            series.rulings[criterion] = Ruling(Verdict.NOT_JUDGED, said)
+        else:
+            series.rulings[criterion] = Ruling(Verdict.PASSED, f"all {len(asked)} runs pass")
+    return series
+
+
+def _of(run: Judgement) -> float:
+    """Return the amplitude of a run [rad], positive if left first; nothing known sorts last."""
+    value = run["amplitude"]
+    return math.nan if value is None else value
+
+
+def _span(runs: Sequence[Judgement]) -> str:
+    """Return from which amplitude on runs fail, each direction for itself."""
+    words = []
+    for name, side in (("left first", 1.0), ("right first", -1.0)):
+        found = [math.degrees(abs(_of(run))) for run in runs if side * _of(run) > 0]
+        if found:
+            words.append(f"{name}: {len(found)}, the smallest of {min(found):.1f} degrees")
+    return "; ".join(words)

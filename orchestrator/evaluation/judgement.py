@@ -1,0 +1,94 @@
+"""What a test comes to in one run: quantities in the order in which they are found, and verdicts.
+
+A verdict is passed, failed or not judged, and says why. A quantity that does not exist stands there
+without a number, and a criterion that needs it is not judged, never passed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+
+class Verdict(str, Enum):
+    """What a criterion comes to."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    NOT_JUDGED = "not judged"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number of a run, in SI; `unit` "%" marks a ratio that is shown in per cent."""
+
+    name: str
+    value: float | None  # None: it does not exist in this run
+    unit: str
+    reading: str = ""  # how the standard was read
+
+
+@dataclass(frozen=True)
+class Ruling:
+    """The verdict of one criterion, and why."""
+
+    verdict: Verdict
+    why: str
+
+
+class NotJudged(Exception):
+    """A run cannot be judged; the message says why."""
+
+
+@dataclass
+class Judgement:
+    """What one run comes to."""
+
+    label: str
+    quantities: dict[str, Quantity] = field(default_factory=dict)  # key -> quantity
+    rulings: dict[str, Ruling] = field(default_factory=dict)  # criterion -> ruling
+    notes: list[str] = field(default_factory=list)
+
+    def add(self, key: str, name: str, value: float | None, unit: str, reading: str = "") -> None:
+        """Add a quantity."""
+        self.quantities[key] = Quantity(name, None if value is None else float(value), unit, reading)
+
+    def rule(self, criterion: str, holds: bool | None, why: str) -> None:
+        """Add the ruling of a criterion; `holds` None: it is not judged."""
+        verdict = Verdict.NOT_JUDGED if holds is None else Verdict.PASSED if holds else Verdict.FAILED
+        self.rulings[criterion] = Ruling(verdict, why)
+
+    def __getitem__(self, key: str) -> float | None:
+        found = self.quantities.get(key)
+        return found.value if found else None
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """The verdict over all criteria, None if the test has none."""
+        return overall(ruling.verdict for ruling in self.rulings.values())
+
+    def as_data(self) -> dict[str, Any]:
+        """Return it as plain data, for files."""
+        return {
+            "label": self.label,
+            "verdict": self.verdict and self.verdict.value,
+            "quantities": {
+                key: {"name": one.name, "value": one.value, "unit": one.unit, "reading": one.reading}
+                for key, one in self.quantities.items()
+            },
+            "criteria": {
+                name: {"verdict": one.verdict.value, "why": one.why} for name, one in self.rulings.items()
+            },
+            "notes": list(self.notes),
+        }
+
+
+def overall(verdicts: Iterable[Verdict]) -> Verdict | None:
+    """Return the worst of all: failed, else not judged, else passed; None of none."""
+    found = set(verdicts)
+    for verdict in (Verdict.FAILED, Verdict.NOT_JUDGED, Verdict.PASSED):
+        if verdict in found:
+            return verdict
+    return None

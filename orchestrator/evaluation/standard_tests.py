@@ -1,0 +1,75 @@
+"""The standard tests by their names: what evaluates a run, what draws it, what is shown of many."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # numpy and all that follows are loaded when a test is evaluated, not when it is named
+    from matplotlib.figure import Figure
+
+    from .judgement import Judgement
+    from .trace import Trace
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """A run that was evaluated, and what draws it; None if there is nothing to draw."""
+
+    trace: Trace
+    judged: Judgement
+    draw: Callable[[], Figure] | None = None
+
+
+@dataclass(frozen=True)
+class StandardTest:
+    """A test by its name."""
+
+    name: str  # as commands call it
+    says: str
+    evaluate: Callable[[Trace, float | None], Evaluated]  # of a run; A [rad], where it is known
+    columns: tuple[str, ...]  # keys of quantities that stand in a table of many runs
+    needs_angle: bool = False
+
+
+def _slow_steer(trace: Trace, _: float | None) -> Evaluated:
+    from .slow_steer import evaluate_slow_steer
+
+    return Evaluated(trace, evaluate_slow_steer(trace))
+
+
+def _dwell(trace: Trace, angle: float | None) -> Evaluated:
+    from .dwell_run import evaluate_dwell
+
+    judged, course = evaluate_dwell(trace, angle)
+    if course is None:
+        return Evaluated(trace, judged)
+
+    def draw() -> Figure:
+        from .dwell_drawing import draw_dwell
+
+        return draw_dwell(trace, judged, course)
+
+    return Evaluated(trace, judged, draw)
+
+
+TESTS: dict[str, StandardTest] = {
+    test.name: test
+    for test in (
+        StandardTest(
+            "slowly-increasing-steer",
+            "the hand-wheel angle at 0.3 g, from which sine with dwell follows (UN R140, GTR 8)",
+            _slow_steer,
+            ("angle", "slope", "spread", "speed"),
+        ),
+        StandardTest(
+            "sine-with-dwell",
+            "stability and responsiveness of the regulation on stability control (UN R140, GTR 8, FMVSS 126)",
+            _dwell,
+            ("amplitude", "multiple", "ratio_1000", "ratio_1750", "displacement", "sideslip", "speed_end"),
+            needs_angle=True,
+        ),
+    )
+}
+"""Name -> test, in the order in which they are driven."""

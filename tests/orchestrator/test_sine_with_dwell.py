@@ -1,0 +1,312 @@
+"""Sine with dwell evaluated over traces whose answers have closed forms, at several ways of sampling."""
+
+from __future__ import annotations
+
+import json
+import math
+from math import cosh, degrees, radians, tanh
+
+import numpy as np
+import pytest
+
+from components.drivers.sine_with_dwell import SineWithDwellParameters, sine_with_dwell
+from orchestrator.cli import main
+from orchestrator.evaluation.dwell_run import evaluate_dwell
+from orchestrator.evaluation.dwell_series import amplitudes, judge_series
+from orchestrator.evaluation.judgement import Judgement, NotJudged, Verdict
+from orchestrator.evaluation.slow_steer import G, characteristic_angle, evaluate_slow_steer
+from orchestrator.evaluation.trace import Trace
+
+A, LARGE = radians(36.0), radians(270.0)
+START = 1.5
+END = START + 1.0 / 0.7 + 0.5
+PEAK_AT, PEAK, FALL = START + 1.2, 0.8, 0.45  # yaw rate -PEAK / cosh((t - PEAK_AT) / FALL)
+FAR, MIDDLE, RISE = 4.0, START + 1.0, 0.15  # displacement FAR (1 + tanh((t - MIDDLE) / RISE)) / 2
+
+
+def uneven(step: float, last: float) -> np.ndarray:
+    """Return times whose steps differ by up to a half."""
+    rng = np.random.default_rng(1)
+    times = np.cumsum(step * rng.uniform(0.75, 1.25, int(last / step) + 50))
+    return np.concatenate([[0.0], times[times < last]])
+
+
+SAMPLING = {
+    "1 kHz": lambda last: np.arange(0.0, last, 0.001),
+    "200 Hz": lambda last: np.arange(0.0, last, 0.005),
+    "uneven": lambda last: uneven(0.004, last),
+}
+as_sampled = pytest.mark.parametrize("sampling", SAMPLING.values(), ids=SAMPLING)
+
+
+def fall(t: np.ndarray, width: float) -> np.ndarray:
+    """Return a yaw rate that has nothing before the steering, a peak, and a tail of 1 / cosh."""
+    return -PEAK / np.cosh((t - PEAK_AT) / width) * 0.5 * (1.0 + np.tanh((t - START - 0.4) / 0.1))
+
+
+def trace(
+    amplitude=LARGE, *, sampling=SAMPLING["1 kHz"], last=7.0, yaw_rate=None, offset=0.0, **more
+) -> Trace:
+    """Return a run whose signals are closed forms; `amplitude` negative: right first."""
+    t = sampling(last)
+    side = math.copysign(1.0, amplitude)
+    p = SineWithDwellParameters(amplitude=amplitude, start_time=START)
+    x = np.tanh((t - MIDDLE) / RISE)
+    signals = {
+        "steering_wheel_angle": np.array([sine_with_dwell(s, p) for s in t]) + 2.0 * offset,
+        "yaw_rate": side * (fall(t, FALL) if yaw_rate is None else yaw_rate(t)) + offset,
+        "acceleration_y": side * -FAR * x * (1.0 - x * x) / RISE**2 + offset,
+        "sideslip": np.where(t > END, radians(3.0), 0.0),
+        "velocity_x": np.full_like(t, 80.0 / 3.6),
+    }
+    return Trace("made up", t, signals, **{"mass": 1800.0, **more})
+
+
+def verdicts(judged: Judgement) -> dict[str, str]:
+    return {name: ruling.verdict.value for name, ruling in judged.rulings.items()}
+
+
+@as_sampled
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_instants_ratios_and_displacement_are_those_of_the_closed_forms(sampling, side):
+    judged, course = evaluate_dwell(trace(side * radians(270.0), sampling=sampling, offset=0.01), A)
+    assert course.side == side
+    assert judged["amplitude"] == pytest.approx(side * radians(270.0), abs=radians(0.02))
+    assert judged["begin"] == pytest.approx(START, abs=0.004)
+    # the corner at the end of the steering, behind the low pass of 10 Hz
+    assert judged["end"] == pytest.approx(END + 0.0143, abs=0.0005)
+    assert judged["peak_at"] == pytest.approx(PEAK_AT, abs=0.0051)
+    assert judged["peak"] == pytest.approx(-side * PEAK, rel=2e-4)
+    for late, key in ((1.0, "ratio_1000"), (1.75, "ratio_1750")):
+        exact = 1.0 / cosh((judged["end"] + late - PEAK_AT) / FALL)
+        assert judged[key] == pytest.approx(exact, abs=5e-4), key
+
+    def y(t: float) -> float:
+        return 0.5 * FAR * (1.0 + tanh((t - MIDDLE) / RISE))
+
+    begin = judged["begin"]
+    rate = 0.5 * FAR / RISE / cosh((begin - MIDDLE) / RISE) ** 2
+    exact = y(begin + 1.07) - y(begin) - 1.07 * rate
+    assert judged["displacement"] == pytest.approx(exact, abs=0.002)
+    assert verdicts(judged) == {"stability": "passed", "responsiveness": "passed"}
+
+
+@pytest.mark.parametrize(
+    "width, verdict",
+    # 1 / cosh(x) is 35 % at x = 1.708, and COS + 1 s is 1.743 s after the peak: x = 1.708 at 1.020
+    [(1.015, "passed"), (1.025, "failed")],
+)
+def test_the_limit_of_35_per_cent_decides(width, verdict):
+    def yaw_rate(t):
+        return fall(t, width) * 0.5 * (1.0 - np.tanh((t - END - 1.4) / 0.1))  # good at 1.75 s
+
+    judged, _ = evaluate_dwell(trace(yaw_rate=yaw_rate), A)
+    assert judged.rulings["stability"].verdict.value == verdict
+    assert (judged["ratio_1000"] > 0.35) == (verdict == "failed")
+
+
+def test_the_limit_of_20_per_cent_decides_at_1_75_seconds():
+    def yaw_rate(t):
+        return fall(t, FALL) - 0.21 * PEAK * np.exp(-(((t - END - 1.75) / 0.25) ** 2))
+
+    judged, _ = evaluate_dwell(trace(yaw_rate=yaw_rate), A)
+    assert judged["ratio_1000"] < 0.35 < 1.0
+    assert judged["ratio_1750"] > 0.20
+    assert judged.rulings["stability"].verdict is Verdict.FAILED
+
+
+def test_a_yaw_rate_that_never_falls_has_no_second_peak_and_is_unstable():
+    judged, _ = evaluate_dwell(trace(yaw_rate=lambda t: -PEAK * 0.5 * (1 + np.tanh(t - PEAK_AT))), A)
+    assert judged["peak"] is None
+    assert judged.rulings["stability"].verdict is Verdict.FAILED
+    assert "no second peak" in judged.rulings["stability"].why
+
+
+def test_a_ratio_is_signed_and_a_spin_that_passes_is_flagged():
+    made = trace(yaw_rate=lambda t: PEAK * np.tanh((t - END) / 0.3) * (t > START) * np.exp(-((t - END) ** 2)))
+    made.signals["sideslip"][made.time > END] = radians(60.0)
+    judged, _ = evaluate_dwell(made, A)
+    assert judged["ratio_1000"] < 0.0
+    assert judged.rulings["stability"].verdict is Verdict.PASSED
+    assert judged["sideslip"] == radians(60.0)
+    assert "sideslip reaches 60 degrees (stability: passed)" in judged.notes
+
+
+def test_below_26_8_degrees_the_zeroing_range_ends_at_the_first_instant_above_75_degrees_per_second():
+    """A 2 pi 0.7 Hz cos(2 pi 0.7 Hz 0.2 s) = 75 deg/s at 26.8 degrees."""
+    low, _ = evaluate_dwell(trace(radians(26.0)), radians(17.0))
+    high, _ = evaluate_dwell(trace(radians(30.0)), radians(17.0))
+    assert any("does not stay above it for 200 ms" in note for note in low.notes)
+    assert high.notes == []
+    assert low["end"] == pytest.approx(END + 0.0143, abs=0.001)  # the zero holds the first degrees, too
+
+
+@pytest.mark.parametrize(
+    "changes, why",
+    [
+        ({"last": END + 1.5}, "1.75 s are needed"),
+        ({"last": END - 0.1}, "completion of steer is not reached"),
+        ({"sampling": lambda last: np.arange(0.7, last, 0.001)}, "1 s are needed"),
+        ({"sampling": lambda last: np.arange(0.0, last, 0.04)}, "at least 50 Hz"),
+        ({"amplitude": radians(12.0)}, "does not exceed 75 deg/s"),
+    ],
+    ids=["short", "no end", "late", "coarse", "slow"],
+)
+def test_what_cannot_be_judged_says_why_and_passes_nothing(changes, why):
+    judged, _ = evaluate_dwell(trace(**changes), radians(4.0))
+    assert judged.rulings["stability"].verdict is Verdict.NOT_JUDGED
+    assert why in judged.rulings["stability"].why
+    assert judged.verdict is Verdict.NOT_JUDGED
+
+
+def test_responsiveness_is_asked_from_5_a_on_a_dry_road_at_80_km_h():
+    assert "responsiveness" not in evaluate_dwell(trace(4.99 * A), A)[0].rulings
+    assert verdicts(evaluate_dwell(trace(5.0 * A), A)[0])["responsiveness"] == "passed"
+    assert verdicts(evaluate_dwell(trace(friction=0.4), A)[0]) == {
+        "stability": "passed",
+        "responsiveness": "not judged",
+    }
+    assert verdicts(evaluate_dwell(trace(), None)[0])["responsiveness"] == "not judged"
+    slow = trace()
+    slow.signals["velocity_x"][:] = 77.0 / 3.6
+    assert set(verdicts(evaluate_dwell(slow, A)[0]).values()) == {"not judged"}
+
+
+def test_a_heavy_car_may_be_slower():
+    made = trace()
+    made.signals["acceleration_y"] *= 1.65 / 2.91  # between 1.52 and 1.83 m
+    heavy = Trace("heavy", made.time, made.signals, mass=3501.0)
+    assert 1.52 < evaluate_dwell(made, A)[0]["displacement"] < 1.83
+    assert verdicts(evaluate_dwell(made, A)[0])["responsiveness"] == "failed"
+    assert verdicts(evaluate_dwell(heavy, A)[0])["responsiveness"] == "passed"
+
+
+@pytest.mark.parametrize(
+    "angle, runs, last", [(16.0, 32, 270.0), (36.0, 13, 270.0), (44.3, 11, 287.95), (50.0, 10, 300.0)]
+)
+def test_the_ladder_goes_in_steps_of_half_a_up_to_the_last_run(angle, runs, last):
+    ladder = [degrees(x) for x in amplitudes(radians(angle))]
+    assert len(ladder) == runs
+    assert ladder[0] == pytest.approx(1.5 * angle)
+    assert ladder[-1] == pytest.approx(last)
+    assert np.diff(ladder)[:-1] == pytest.approx(0.5 * angle)
+    assert np.diff(ladder)[-1] <= 0.5 * angle + 1e-9
+
+
+def test_a_series_passes_only_if_no_run_is_missing_fails_or_is_not_judged():
+    def runs(*, without=None, spoil=None):
+        made = []
+        for side in (1.0, -1.0):
+            for amplitude in amplitudes(A):
+                judged = Judgement(f"{degrees(side * amplitude):.0f}")
+                judged.add("amplitude", "amplitude", side * amplitude, "rad")
+                judged.rule("stability", True, "")
+                judged.rule("responsiveness", True, "")
+                made.append(judged)
+        if spoil is not None:
+            made[5].rule("stability", spoil[0], spoil[1])
+        return [one for k, one in enumerate(made) if k != without]
+
+    assert judge_series(runs(), A).verdict is Verdict.PASSED
+    missing = judge_series(runs(without=3), A)
+    assert missing.verdict is Verdict.FAILED
+    assert missing.rulings["stability"].why == "1 runs are missing, of +108.0 degrees"
+    failed = judge_series(runs(spoil=(False, "")), A)
+    assert (
+        failed.rulings["stability"].why == "1 of 26 runs fail, left first: 1, the smallest of 144.0 degrees"
+    )
+    assert judge_series(runs(spoil=(None, "too short")), A).verdict is Verdict.FAILED
+
+
+def slow_steer(side=1.0, *, sampling=SAMPLING["1 kHz"], offset=0.0) -> Trace:
+    """Return 13.5 deg/s of hand wheel, and an acceleration of 0.3 g at 40 degrees; 5 g/rad2 fall off."""
+    t = sampling(9.0)
+    delta = radians(13.5) * np.maximum(t - 2.0, 0.0)
+    return Trace(
+        "slow",
+        t,
+        {
+            "steering_wheel_angle": side * delta + offset,
+            "acceleration_y": side * 0.3 * G * delta / radians(40.0),
+        },
+    )
+
+
+@as_sampled
+def test_the_angle_at_0_3_g_of_a_straight_line_is_that_of_the_line(sampling):
+    both = [evaluate_slow_steer(slow_steer(side, sampling=sampling)) for side in (1.0, -1.0)]
+    assert [degrees(one["angle"]) for one in both] == pytest.approx([40.0, -40.0], abs=1e-9)
+    assert degrees(characteristic_angle(both)) == pytest.approx(40.0, abs=1e-9)
+
+
+def test_a_is_rounded_to_a_tenth_of_a_degree_run_by_run_and_as_a_mean():
+    both = [evaluate_slow_steer(slow_steer(side, offset=radians(0.26))) for side in (1.0, -1.0)]
+    assert [degrees(one["angle"]) for one in both] == pytest.approx([40.3, -39.7], abs=1e-9)
+    assert degrees(characteristic_angle(both[:1])) == pytest.approx(40.3, abs=1e-9)
+    assert degrees(characteristic_angle(both)) == pytest.approx(40.0, abs=1e-9)
+
+
+def test_a_run_that_ends_before_0_375_g_has_no_angle():
+    made = slow_steer()
+    made.signals["acceleration_y"] *= 0.5
+    judged = evaluate_slow_steer(made)
+    assert judged["angle"] is None
+    with pytest.raises(NotJudged, match=r"reaches 0.354 g, not 0.375 g"):
+        characteristic_angle([judged])
+
+
+MAPPING = """
+time: {column: Zeit, unit: ms}
+signals:
+  steering_wheel_angle: {column: LRW, unit: deg, sign: -1}
+  yaw_rate: Gier
+  acceleration_y: {column: ay, unit: cm/s2}
+mass: 1.8 t
+"""
+
+
+def call(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as ended:
+        main([str(one) for one in arguments])
+    return ended.value.code
+
+
+def test_measured_columns_under_other_names_units_and_signs_give_the_same(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    made = trace(sampling=SAMPLING["200 Hz"])
+    columns = {
+        "Zeit": 1000.0 * made.time,
+        "LRW": -np.degrees(made["steering_wheel_angle"]),
+        "Gier [deg/s]": np.degrees(made["yaw_rate"]),
+        "ay": made["acceleration_y"] / 0.01,
+    }
+    table = np.column_stack(list(columns.values()))
+    np.savetxt("run.csv", table, "%.12g", ",", header=",".join(columns), comments="")
+    (tmp_path / "map.yaml").write_text(MAPPING)
+    ended = call("evaluate", "sine-with-dwell", "run.csv", "--signals", "map.yaml", "--angle", "36 deg",
+                 "--out", "out", "--no-figures")  # fmt: skip
+    assert ended == 0
+    found = json.loads((tmp_path / "out/evaluation.json").read_text())["runs"][0]
+    exact, _ = evaluate_dwell(made, A)
+    assert found["verdict"] == "passed"
+    for key, one in found["quantities"].items():
+        assert one["value"] == pytest.approx(exact[key], rel=1e-8), key
+    assert "sideslip was not recorded: a spin may pass the ratios unseen" in found["notes"]
+
+
+@pytest.mark.parametrize(
+    "wrong, sentence",
+    [
+        (("yaw_rate", "yaw_rat"), "'yaw_rat' is no signal; did you mean 'yaw_rate'?"),
+        (("deg,", "grad,"), "'grad' is not a unit"),
+        (("LRW", "Lenkrad"), "has no column 'Lenkrad'"),
+        (("unit: deg,", "unit: kg,"), "column 'LRW': its unit 'kg' does not fit: rad is wanted"),
+        (("1.8 t", "1.8 m"), "'1.8 m' is not a value in kg"),
+    ],
+)  # fmt: skip
+def test_a_wrong_mapping_is_answered_by_a_sentence(wrong, sentence, tmp_path, capsys):
+    (tmp_path / "run.csv").write_text("Zeit,LRW,Gier [deg/s],ay\n0,0,0,0\n5,0,0,0\n10,0,0,0\n")
+    (tmp_path / "map.yaml").write_text(MAPPING.replace(*wrong))
+    ended = call("evaluate", "sine-with-dwell", tmp_path / "run.csv", "--signals", tmp_path / "map.yaml")
+    assert ended in (1, 2)
+    assert sentence in capsys.readouterr().err
