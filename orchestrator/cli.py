@@ -30,6 +30,7 @@ COMMANDS = (
     "report",
     "sweep",
     "evaluate",
+    "drive",
     "list",
     "diff",
     "salvage",

@@ -66,8 +66,6 @@ def evaluate(
     """
     from ..evaluation.dwell_series import judge_series
     from ..evaluation.trace import load_mapping
-    from ..wording import counted
-    from .batch import print_tables, say
     from .recorded import folder_of_all
 
     chosen = TESTS[test.value]  # type: ignore[attr-defined]
@@ -76,12 +74,38 @@ def evaluate(
     known = _angle(angle, slow_steer, mapping, chosen)
     evaluated = [_evaluated(chosen, place, mapping, known) for place in places]
     series = judge_series([one.judged for one in evaluated], known) if known and len(evaluated) > 1 else None
-    folder = out or (
-        folder_of_all(places) if all(p.is_dir() for p in places) else Path("results") / "evaluation"
-    )
-    drawn = _draw(chosen, evaluated, series, folder, given=out) if figures else 0
-    _write(chosen, evaluated, series, known, folder)
-    print_tables(_tables(chosen, evaluated, series))
+    recorded_here = all(place.is_dir() for place in places)
+    folder = out or (folder_of_all(places) if recorded_here else Path("results") / "evaluation")
+    conclude(chosen, evaluated, series, known, folder, each=figures, together=out is not None)
+
+
+def conclude(
+    test: StandardTest,
+    evaluated: list[Evaluated],
+    series: Series | None,
+    angle: float | None,
+    folder: Path,
+    *,
+    each: bool,
+    together: bool = False,
+) -> None:
+    """Draw, write and print what the runs of a test come to.
+
+    Args:
+        test: the test.
+        evaluated: its runs.
+        series: what they come to together.
+        angle: A [rad].
+        folder: of evaluation.json and of the figure of the series.
+        each: draw every run, too.
+        together: into that folder, not beside its results.
+    """
+    from ..wording import counted
+    from .batch import print_tables, say
+
+    drawn = _draw(test, evaluated if each else [], series, folder, together=together)
+    _write(test, evaluated, series, angle, folder)
+    print_tables(_tables(test, evaluated, series))
     also = f", {counted(drawn, 'figure')}" if drawn else ""
     say(f"{folder / FILE}{also}")
 
@@ -105,6 +129,28 @@ def _runs(source: Path, mapping: MappingSpec | None) -> list[Path]:
     return found
 
 
+def angle_of(given: str | None) -> float | None:
+    """Return A [rad] as an option gives it, None if it does not.
+
+    Raises:
+        ScenarioError: it is no such angle.
+    """
+    import math
+
+    from ..errors import ScenarioError
+    from ..scenario.quantities import convert
+
+    if given is None:
+        return None
+    try:
+        angle = float(convert(given, "rad"))
+    except ValueError as error:
+        raise ScenarioError(f"--angle: {error}") from None
+    if not 0 < angle < 2 * math.pi:
+        raise ScenarioError(f"--angle: must be between 0 and 360 degrees (got {given})")
+    return angle
+
+
 def _angle(
     given: str | None, slow_steer: list[Path] | None, mapping: MappingSpec | None, test: StandardTest
 ) -> float | None:
@@ -115,23 +161,14 @@ def _angle(
     from ..evaluation.judgement import NotJudged
     from ..evaluation.slow_steer import characteristic_angle, evaluate_slow_steer
     from ..evaluation.trace import load_trace
-    from ..scenario.quantities import convert
     from .batch import say
 
     if given and slow_steer:
         raise ScenarioError("--angle and --slow-steer both say what A is: give one of them")
     if (given or slow_steer) and not test.needs_angle:
         raise ScenarioError(f"{test.name} needs no A: leave --angle and --slow-steer away")
-    if given:
-        try:
-            angle = float(convert(given, "rad"))
-        except ValueError as error:
-            raise ScenarioError(f"--angle: {error}") from None
-        if not 0 < angle < 2 * math.pi:
-            raise ScenarioError(f"--angle: must be between 0 and 360 degrees (got {given})")
-        return angle
     if not slow_steer:
-        return None
+        return angle_of(given)
     places = [place for source in slow_steer for place in _runs(source, mapping)]
     try:
         angle = characteristic_angle([evaluate_slow_steer(load_trace(p, mapping)) for p in places])
@@ -150,9 +187,9 @@ def _evaluated(
 
 
 def _draw(
-    test: StandardTest, evaluated: list[Evaluated], series: Series | None, folder: Path, *, given: Path | None
+    test: StandardTest, evaluated: list[Evaluated], series: Series | None, folder: Path, *, together: bool
 ) -> int:
-    """Draw every run, into its folder or below the one given, and the series; return how many figures."""
+    """Draw runs, beside their results or together in a folder, and the series; return how many figures."""
     from ..figures.style import save
 
     stem = test.name.replace("-", "_")
@@ -160,20 +197,14 @@ def _draw(
     for number, one in enumerate(evaluated):
         if one.draw is None:
             continue
-        alone = len(evaluated) == 1
-        own = one.trace.folder if one.trace.folder is not None and given is None else None
-        name = stem if own or alone else f"{stem}_{number + 1}"
-        save(one.draw(), (own or folder) / name)
+        beside = None if together else one.trace.folder
+        name = stem if beside or len(evaluated) == 1 else f"{stem}_{number + 1}"
+        save(one.draw(), (beside or folder) / name)
         count += 1
     if series:
         from ..evaluation.dwell_drawing import draw_series
 
-        titles = {one.trace.title for one in evaluated if one.trace.title}
-        note = f"A = {series.angle * 57.29577951308232:.1f}°"
-        save(
-            draw_series(series, titles.pop() if len(titles) == 1 else "Sine with dwell", note),
-            folder / f"{stem}_series",
-        )
+        save(draw_series(series, "Sine with dwell", str(folder)), folder / f"{stem}_series")
         count += 1
     return count
 

@@ -29,6 +29,7 @@ NOT_RUN = {
     r"\S*yawbench study scenarios/fuzzy_sliding_mode/\w+\.yaml": "tests/scenarios/test_fuzzy_sliding_mode.py",
     r"\S*yawbench study scenarios/fuzzy_feedback/\w+\.yaml": "tests/scenarios/test_fuzzy_feedback.py",
     r"\S*yawbench study scenarios/fuzzy_pid/\w+\.yaml": "tests/scenarios/test_fuzzy_pid.py",
+    r"\S*yawbench drive sine-with-dwell .*": "two minutes; test_sine_with_dwell.py drives a short one",
 }
 """Commands that this test does not run -> why, or the test that runs the same at length."""
 

@@ -310,3 +310,40 @@ def test_a_wrong_mapping_is_answered_by_a_sentence(wrong, sentence, tmp_path, ca
     ended = call("evaluate", "sine-with-dwell", tmp_path / "run.csv", "--signals", tmp_path / "map.yaml")
     assert ended in (1, 2)
     assert sentence in capsys.readouterr().err
+
+
+@pytest.mark.exhaustive
+def test_a_series_is_driven_from_a_and_goes_on_where_it_was(tmp_path, capsys):
+    """With steps of 5 ms; A = 180 degrees asks for two amplitudes to each side."""
+    series = tmp_path / "series"
+    settings = ("--set", "step_size=0.005", "--angle", "180 deg", "--out", series)
+    assert call("drive", "sine-with-dwell", *settings) == 0
+    first = capsys.readouterr()
+    found = json.loads((series / "evaluation.json").read_text())
+    amplitudes_ = [degrees(one["quantities"]["amplitude"]["value"]) for one in found["runs"]]
+    assert amplitudes_ == pytest.approx([270.0, 300.0, -270.0, -300.0])
+    assert found["series"]["verdict"] == "failed"  # this car without control turns round
+    left, right = ([one["quantities"] for one in found["runs"][k : k + 2]] for k in (0, 2))
+    for one, other in zip(left, right, strict=True):
+        for key in ("ratio_1000", "ratio_1750", "displacement", "sideslip"):
+            assert one[key]["value"] == pytest.approx(other[key]["value"], abs=1e-6), key
+    assert (series / "sine_with_dwell_series.png").is_file()
+    assert call("drive", "sine-with-dwell", *settings) == 0
+    again = capsys.readouterr()
+    assert "4 of 4 runs finished before" in again.err
+    assert again.out == first.out
+
+
+@pytest.mark.parametrize(
+    "options, sentence",
+    [
+        (("--vehicle", "large_salon"), "did you mean 'large_saloon'?"),
+        (("--set", "driver.amplitude=1"), "the series itself says which amplitudes are driven"),
+        (("--angle", "400 deg"), "--angle: must be between 0 and 360 degrees"),
+        (("--angle", "3 m"), "--angle: '3 m' is not a value in rad"),
+    ],
+)
+def test_what_a_series_cannot_be_driven_with_is_said_before_any_run(options, sentence, capsys, tmp_path):
+    assert call("drive", "sine-with-dwell", *options, "--out", tmp_path / "out") == 2
+    assert sentence in capsys.readouterr().err
+    assert not list(tmp_path.rglob("run.json"))
