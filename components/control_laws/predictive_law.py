@@ -1,0 +1,126 @@
+"""Model-predictive control of sideslip and yaw rate on the linear single-track car, at one speed.
+
+The errors e = (beta - beta_ref, r - r_ref) follow de/dt = A e + B M (`linear_feedback`). Over the horizon the
+references stand still and the moment has a few values, each held for some steps of prediction. These
+values z make
+
+    sum over the steps of (e_beta / beta_0)^2 + (e_r / r_0)^2 + (M / M_0)^2
+
+least, with |M| at most the limit. |beta| at the end of each value beyond its bound costs
+`penalty` times the square of the excess over beta_0: a wish, since no moment may be enough to hold it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..mathematics.quadratic_program import Rows, inverse, multipliers
+from .linear_feedback import Matrix
+
+_ORDER = 14
+"""Of the series of the matrix exponential: beyond rounding for steps below the car's time constants."""
+
+
+def _discrete(a: Matrix, b: float, h: float) -> tuple[Matrix, tuple[float, float]]:
+    """Return the transition over `h` [s] and what a unit of a held input on the second state adds."""
+    (a_11, a_12), (a_21, a_22) = a
+    p_11, p_12, p_21, p_22 = 1.0, 0.0, 0.0, 1.0
+    t_11, t_12, t_21, t_22 = 1.0, 0.0, 0.0, 1.0  # (A h)^k / k!
+    g_1, g_2 = 0.0, h * b
+    for k in range(1, _ORDER):
+        f = h / k
+        t_11, t_12, t_21, t_22 = (
+            f * (a_11 * t_11 + a_12 * t_21),
+            f * (a_11 * t_12 + a_12 * t_22),
+            f * (a_21 * t_11 + a_22 * t_21),
+            f * (a_21 * t_12 + a_22 * t_22),
+        )
+        p_11, p_12, p_21, p_22 = p_11 + t_11, p_12 + t_12, p_21 + t_21, p_22 + t_22
+        g_1 += t_12 * h / (k + 1) * b
+        g_2 += t_22 * h / (k + 1) * b
+    return ((p_11, p_12), (p_21, p_22)), (g_1, g_2)
+
+
+@dataclass(frozen=True)
+class Weights:
+    """What counts alike, and how the horizon is divided."""
+
+    beta_0: float  # [rad]
+    r_0: float  # [rad/s]
+    moment_0: float  # [N.m]
+    penalty: float  # of the excess over the bound, in squares of beta_0
+    step: float  # of the prediction [s]
+    moves: int  # values of the moment
+    steps_per_move: int
+
+
+class PredictiveLaw:
+    """The quadratic program of one speed, made ready: what is left for a sample is a vector or two."""
+
+    def __init__(self, dynamics: Matrix, i_z: float, w: Weights) -> None:
+        n = w.moves
+        phi, gamma = _discrete(dynamics, w.moment_0 / i_z, w.step)
+        free = [(1.0, 0.0), (0.0, 1.0)]  # e at the step for e_0 = (1, 0) and (0, 1)
+        forced = [(0.0, 0.0)] * n  # and for each move of M_0
+        hessian = [[0.0] * n for _ in range(n)]
+        linear = [[0.0, 0.0] for _ in range(n)]
+        self.free_beta: Rows = []
+        self.forced_beta: Rows = []
+        q_beta, q_r = w.beta_0**-2, w.r_0**-2
+        for move in range(n):
+            for _ in range(w.steps_per_move):
+                free = [_stepped(phi, e) for e in free]
+                forced = [_stepped(phi, e) for e in forced]
+                forced[move] = (forced[move][0] + gamma[0], forced[move][1] + gamma[1])
+                for i in range(move + 1):
+                    beta_i, r_i = q_beta * forced[i][0], q_r * forced[i][1]
+                    for j in range(move + 1):
+                        hessian[i][j] += beta_i * forced[j][0] + r_i * forced[j][1]
+                    for j in range(2):
+                        linear[i][j] += beta_i * free[j][0] + r_i * free[j][1]
+                hessian[move][move] += 1.0
+            self.free_beta.append([free[0][0], free[1][0]])
+            self.forced_beta.append([e[0] for e in forced])
+        inverted = inverse(hessian)
+        self.moment_0 = w.moment_0
+        self.unbound = [
+            [-sum(row[k] * linear[k][j] for k in range(n)) for j in range(2)] for row in inverted
+        ]  # z = unbound e_0 where no constraint is met
+        rows = [[1.0 if i == j else 0.0 for j in range(n)] for i in range(n)]
+        rows += self.forced_beta
+        rows += [[-value for value in row] for row in rows]  # upper bounds of all, then lower ones
+        self.rows = rows
+        self.reach = [[_dot(row, line) for row in inverted] for line in rows]
+        self.p = [[_dot(up, line) for line in rows] for up in self.reach]
+        for i, line in enumerate(self.p):
+            if i % (2 * n) >= n:  # the sideslip's
+                line[i] += 1.0 / (w.penalty * q_beta)
+
+    def moment(
+        self, beta: float, r: float, beta_ref: float, r_ref: float, *, most: float, bound: float
+    ) -> float:
+        """Return the moment [N.m] of the present sample.
+
+        Args:
+            beta, r, beta_ref, r_ref: state and references [rad], [rad/s].
+            most: limit of the moment [N.m].
+            bound: of the sideslip angle [rad].
+        """
+        e_beta, e_r = beta - beta_ref, r - r_ref
+        z = [k_beta * e_beta + k_r * e_r for k_beta, k_r in self.unbound]
+        drift = [beta_ref + f_beta * e_beta + f_r * e_r for f_beta, f_r in self.free_beta]
+        highest = most / self.moment_0
+        room = [highest] * len(z) + [bound - angle for angle in drift]
+        room += [highest] * len(z) + [bound + angle for angle in drift]
+        y = multipliers(self.p, [b - _dot(row, z) for b, row in zip(room, self.rows, strict=True)])
+        first = z[0] - sum(y_i * reach[0] for y_i, reach in zip(y, self.reach, strict=True))
+        return first * self.moment_0
+
+
+def _dot(one: list[float], other: list[float]) -> float:
+    return sum([a * b for a, b in zip(one, other, strict=True)])
+
+
+def _stepped(phi: Matrix, e: tuple[float, float]) -> tuple[float, float]:
+    (p_11, p_12), (p_21, p_22) = phi
+    return p_11 * e[0] + p_12 * e[1], p_21 * e[0] + p_22 * e[1]

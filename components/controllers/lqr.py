@@ -1,0 +1,89 @@
+"""Linear-quadratic yaw-moment control of sideslip and yaw rate, with gains for every speed.
+
+    M = k_beta(v_x) (beta_ref - beta) + k_r(v_x) (r_ref - r)
+
+The gains are optimal for the linear single-track car at the present speed; `control_laws.linear_feedback`
+has their closed form. Below `scheduling_speed` they stay what they are there, and the moment fades out
+below walking pace.
+
+A baseline, not a paper's controller. The limit comes after the law, so at the limit it is not optimal;
+`controllers.mpc` knows of it beforehand.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..cars.published_cars import PaperA
+from ..cars.single_track_car import SingleTrackCar
+from ..control_laws.linear_feedback import error_dynamics, optimal_gains
+from ..control_laws.sliding_surface import limit
+from ..fmi.component import Component
+from ..fmi.variables import like, output, parameter
+from ..references.steady_state import SteadyStateParameters
+from .pid import SEEN, PidParameters
+
+
+@dataclass(frozen=True)
+class SingleTrackParameters:
+    """Of the linear single-track car that the law is made for."""
+
+    mass: float = like(PaperA, "mass")
+    yaw_inertia: float = like(PaperA, "yaw_inertia")
+    cg_to_front_axle: float = like(PaperA, "cg_to_front_axle")
+    cg_to_rear_axle: float = like(PaperA, "cg_to_rear_axle")
+    cornering_stiffness_front: float = like(SteadyStateParameters, "cornering_stiffness_front")
+    cornering_stiffness_rear: float = like(SteadyStateParameters, "cornering_stiffness_rear")
+
+
+@dataclass(frozen=True)
+class LqrParameters(SingleTrackParameters):
+    """Weights, by what counts alike, and limits."""
+
+    sideslip_scale: float = parameter(
+        0.02,
+        "rad",
+        "Sideslip error beta_0 that weighs 1",
+        "chosen: small enough for a moment against the sideslip of an understeering car above 8 m/s",
+        minimum=1e-6,
+    )
+    yaw_rate_scale: float = parameter(
+        0.2,
+        "rad/s",
+        "Yaw-rate error r_0 that weighs 1",
+        "chosen: 11 degrees per second, so that actuators of 50 ms can follow",
+        minimum=1e-6,
+    )
+    moment_scale: float = parameter(
+        5000.0, "N.m", "Moment M_0 that weighs 1", "chosen: as large as the limit", minimum=1e-3
+    )
+    scheduling_speed: float = parameter(
+        8.0, "m/s", "Below it the gains stay", "chosen: slower cars are not in danger", minimum=0.1
+    )
+    moment_limit: float = like(PidParameters, "moment_limit")
+    fade_speed: float = like(PidParameters, "fade_speed")
+
+
+class Lqr(Component):
+    """Linear-quadratic yaw-moment controller of sideslip and yaw rate, scheduled by speed."""
+
+    Parameters = LqrParameters
+    sampled = True
+    inputs = (*SEEN, "velocity_x")
+    outputs = (output("yaw_moment", *SEEN, "velocity_x"),)
+
+    def configure(self) -> None:
+        self.car = SingleTrackCar.of(self.p, self.p.yaw_inertia)
+
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
+        p = self.p
+        r_ref, r, beta_ref, beta, speed = u
+        k_beta, k_r = optimal_gains(
+            error_dynamics(self.car, max(speed, p.scheduling_speed)),
+            p.yaw_inertia,
+            beta_0=p.sideslip_scale,
+            r_0=p.yaw_rate_scale,
+            moment_0=p.moment_scale,
+        )
+        moment = k_beta * (beta_ref - beta) + k_r * (r_ref - r)
+        return (limit(moment, p.moment_limit, speed, p.fade_speed),)

@@ -1,0 +1,97 @@
+"""Model-predictive yaw-moment control of sideslip and yaw rate.
+
+`control_laws.predictive_law` has the law: the linear single-track car is predicted over
+`moves * steps_per_move * prediction_step`, and the moments that cost least within their limit are found by a
+quadratic program (`mathematics.quadratic_program`); the first of them is given out. Weights are those of
+`controllers.lqr`, which the law becomes where the horizon is long and nothing is at a limit. The
+sideslip's bound is
+
+    beta_max = atan(0.02 s2/m  mu g)
+
+a rule of thumb for the angle up to which a tyre answers the driver: R. Rajamani, Vehicle Dynamics and
+Control, 2nd edition, equation (8.14). The car is linear at every speed of a grid, whose
+spacing is `SPACING`; the program of the last one is kept.
+
+A baseline, not a paper's controller.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan
+
+from ..cars.single_track_car import SingleTrackCar
+from ..control_laws.linear_feedback import error_dynamics
+from ..control_laws.predictive_law import PredictiveLaw, Weights
+from ..control_laws.sliding_surface import limit
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter, signal
+from ..mathematics.gravity import G
+from .lqr import LqrParameters
+from .pid import SEEN
+
+SPACING = 0.5
+"""Of the speeds [m/s]. Chosen: gains change by a hundredth or two from one to the next."""
+ANGLE_PER_ACCELERATION = 0.02
+"""Of the sideslip's bound [s2/m], Rajamani's."""
+
+
+def sideslip_bound(mu: float) -> float:
+    """Return the largest sideslip angle [rad] that the driver can be expected to master."""
+    return atan(ANGLE_PER_ACCELERATION * max(mu, 0.0) * G)
+
+
+@dataclass(frozen=True)
+class MpcParameters(LqrParameters):
+    """Those of the LQR, and the horizon."""
+
+    prediction_step: float = parameter(
+        0.02, "s", "Step of the prediction", "chosen: a tenth of the car's own times", minimum=1e-4
+    )
+    steps_per_move: int = parameter(4, None, "Steps for which a moment is held", "chosen: 80 ms", minimum=1)
+    moves: int = parameter(
+        5, None, "Moments in the horizon", "chosen: 0.4 s in all, half a yaw oscillation", minimum=1
+    )
+    sideslip_penalty: float = parameter(
+        10.0, "1", "Weight of the excess over the sideslip's bound", "chosen: ten errors", minimum=1e-6
+    )
+
+
+class Mpc(Component):
+    """Model-predictive yaw-moment controller of sideslip and yaw rate, with a bounded sideslip."""
+
+    Parameters = MpcParameters
+    sampled = True
+    inputs = (*SEEN, "velocity_x", signal("friction", start=1.0))
+    outputs = (output("yaw_moment", *SEEN, "velocity_x", "friction"),)
+
+    def configure(self) -> None:
+        p = self.p
+        self.car = SingleTrackCar.of(p, p.yaw_inertia)
+        self.weights = Weights(
+            beta_0=p.sideslip_scale,
+            r_0=p.yaw_rate_scale,
+            moment_0=p.moment_scale,
+            penalty=p.sideslip_penalty,
+            step=p.prediction_step,
+            moves=p.moves,
+            steps_per_move=p.steps_per_move,
+        )
+        self.law_at(p.scheduling_speed)
+
+    def law_at(self, speed: float) -> PredictiveLaw:
+        """Return the law at the speed of the grid next to `speed` [m/s], which is kept."""
+        place = round(max(speed, self.p.scheduling_speed) / SPACING)
+        if place != getattr(self, "place", None):
+            self.place = place
+            dynamics = error_dynamics(self.car, place * SPACING)
+            self.law = PredictiveLaw(dynamics, self.p.yaw_inertia, self.weights)
+        return self.law
+
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
+        p = self.p
+        r_ref, r, beta_ref, beta, speed, mu = u
+        moment = self.law_at(speed).moment(
+            beta, r, beta_ref, r_ref, most=p.moment_limit, bound=sideslip_bound(mu)
+        )
+        return (limit(moment, p.moment_limit, speed, p.fade_speed),)

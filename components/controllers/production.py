@@ -1,0 +1,76 @@
+"""Yaw-moment control as it is in production: dead band, sideslip limit, no more than needed.
+
+    e_r = r_ref - r                                      dead band: r_0 + share |r_ref|
+    M   = k_r D(e_r) - k_beta E(beta, beta_max)          D, E: what is beyond the dead band, the limit
+    beta_max = atan(0.02 s2/m  mu g)                     `controllers.mpc`
+
+While the car follows its driver within the dead band and keeps its sideslip below the limit, nothing
+happens. Too much turn (|r| above |r_ref|, of its sign) is fought with the whole gain; too little, where a car
+stays predictable, with `understeer_share` of it. Below `release_speed` it is off.
+
+After A. T. van Zanten, R. Erhardt, G. Pfaff, VDC, the vehicle dynamics control system of Bosch, SAE
+950759, 1995; its numbers are not public, ours are chosen. Ours differs: the moment goes to an allocator, and
+the slip of each wheel is held by the wheel control (`wheel_control_slip`, `wheel_control_hydraulic`),
+where Bosch's controller gives slip targets itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..fmi.component import Component
+from ..fmi.variables import like, output, parameter, signal
+from .mpc import sideslip_bound
+from .pid import PidParameters
+
+
+@dataclass(frozen=True)
+class ProductionParameters:
+    """Dead band, gains and limits; none is public."""
+
+    yaw_rate_threshold: float = parameter(
+        0.035, "rad/s", "Dead band r_0 of the yaw rate", "chosen: 2 degrees per second", minimum=0.0
+    )
+    yaw_rate_threshold_share: float = parameter(
+        0.1, "1", "Share of the reference that widens the dead band", "chosen: a model's error", minimum=0.0
+    )
+    yaw_rate_gain: float = parameter(
+        40000.0, "N.m.s/rad", "Gain k_r beyond the dead band", "chosen: the limit at 7 deg/s", minimum=0.0
+    )
+    understeer_share: float = parameter(
+        0.5, "1", "Share of the gain against too little turn", "chosen: half", minimum=0.0, maximum=1.0
+    )
+    sideslip_gain: float = parameter(
+        60000.0, "N.m/rad", "Gain k_beta beyond the limit", "chosen: the limit at 5 degrees", minimum=0.0
+    )
+    moment_limit: float = like(PidParameters, "moment_limit")
+    release_speed: float = parameter(
+        4.0, "m/s", "Below it the controller is off", "chosen: 15 km/h, usual", minimum=0.0
+    )
+    full_speed: float = parameter(
+        8.0, "m/s", "From here on it has its whole moment", "chosen: twice that", minimum=0.001
+    )
+
+
+def beyond(value: float, threshold: float) -> float:
+    """Return by how much `value` is outside +-`threshold`, with its sign."""
+    return value - threshold if value > threshold else value + threshold if value < -threshold else 0.0
+
+
+class Production(Component):
+    """Yaw-moment controller with dead band and sideslip limit, after van Zanten."""
+
+    Parameters = ProductionParameters
+    sampled = True
+    inputs = ("yaw_rate_ref", "yaw_rate", "sideslip", "velocity_x", signal("friction", start=1.0))
+    outputs = (output("yaw_moment", *("yaw_rate_ref", "yaw_rate", "sideslip", "velocity_x", "friction")),)
+
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
+        p = self.p
+        r_ref, r, beta, speed, mu = u
+        error = beyond(r_ref - r, p.yaw_rate_threshold + p.yaw_rate_threshold_share * abs(r_ref))
+        share = p.understeer_share if error * r_ref > 0.0 else 1.0
+        moment = share * p.yaw_rate_gain * error - p.sideslip_gain * beyond(beta, sideslip_bound(mu))
+        awake = (speed - p.release_speed) / max(p.full_speed - p.release_speed, 1e-3)
+        moment *= min(max(awake, 0.0), 1.0)
+        return (min(max(moment, -p.moment_limit), p.moment_limit),)

@@ -1,0 +1,67 @@
+"""A small convex quadratic program, solved in its dual by Hildreth's method.
+
+    least 1/2 z' H z + g' z      subject to      A z <= b
+
+H is positive definite. With the multipliers y >= 0 of the constraints, z = -H^-1 (g + A' y), and y makes
+
+    1/2 y' P y + d' y,     P = A H^-1 A',     d = b + A H^-1 g
+
+least. One y_i at a time is set to what is best for it while the others stay; that ends at the solution
+if there is one. What is soft in A z <= b + s, at a cost of w s^2 / 2, has 1 / w more on the diagonal of P.
+
+Source: C. Hildreth, A quadratic programming procedure, Naval Research Logistics Quarterly 4, 1957; L. Wang,
+Model Predictive Control System Design and Implementation Using MATLAB, 2009, section 2.4.4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+Rows = list[list[float]]
+
+SWEEPS = 500
+"""At most. Chosen: ten times what control of a car's yaw needs; programs without a solution end, too."""
+CLOSE = 1e-10
+"""Of the largest multiplier, by which none may have moved. Chosen: far below a sensor's resolution."""
+
+
+def inverse(h: Sequence[Sequence[float]]) -> Rows:
+    """Return the inverse of a symmetric positive definite matrix, by Gauss and Jordan.
+
+    Raises:
+        ZeroDivisionError: a pivot is zero, so that it is not positive definite.
+    """
+    n = len(h)
+    rows = [[*map(float, row), *(1.0 if i == j else 0.0 for j in range(n))] for i, row in enumerate(h)]
+    for i in range(n):
+        pivot = 1.0 / rows[i][i]
+        rows[i] = [value * pivot for value in rows[i]]
+        for k in range(n):
+            if k != i and (factor := rows[k][i]):
+                rows[k] = [value - factor * above for value, above in zip(rows[k], rows[i], strict=True)]
+    return [row[n:] for row in rows]
+
+
+def multipliers(p: Sequence[Sequence[float]], d: Sequence[float]) -> list[float]:
+    """Return y >= 0 that makes 1/2 y' P y + d' y least.
+
+    Args:
+        p: symmetric, positive semidefinite, with a positive diagonal.
+        d: as many numbers; none of them negative means y = 0.
+    """
+    y = [0.0] * len(d)
+    slopes = list(d)  # d + P y
+    if min(slopes, default=0.0) >= 0.0:
+        return y
+    for _ in range(SWEEPS):
+        moved = 0.0
+        for i, row in enumerate(p):
+            better = y[i] - slopes[i] / row[i]
+            change = (better if better > 0.0 else 0.0) - y[i]
+            if change:
+                y[i] += change
+                slopes = [slope + change * value for slope, value in zip(slopes, row, strict=True)]
+                moved = max(moved, abs(change))
+        if moved <= CLOSE * max(y):
+            break
+    return y

@@ -1,0 +1,151 @@
+"""The baselines beside the papers: LQR, model-predictive control, the law of production."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import numpy as np
+import pytest
+from scipy.linalg import expm, solve_continuous_are, solve_discrete_are
+from scipy.optimize import nnls
+
+from components.cars.single_track_car import SingleTrackCar
+from components.control_laws.linear_feedback import error_dynamics, optimal_gains
+from components.control_laws.predictive_law import PredictiveLaw, Weights, _discrete
+from components.controllers.lqr import Lqr
+from components.controllers.mpc import Mpc, sideslip_bound
+from components.controllers.production import Production, beyond
+from components.mathematics.quadratic_program import inverse, multipliers
+
+from .stand import Stand
+
+CARS = {
+    "neutral": SingleTrackCar(1100.0, 1249.0, 1.256, 1.368, 1e5, 1e5),
+    "understeering": SingleTrackCar(1830.0, 3234.0, 1.4, 1.65, 62618.0, 110185.0),
+    "oversteering": SingleTrackCar(1500.0, 2500.0, 1.5, 1.2, 9e4, 7e4),
+}
+SCALES = {"beta_0": 0.02, "r_0": 0.2, "moment_0": 5000.0}
+
+
+@pytest.mark.parametrize("car", CARS.values(), ids=CARS)
+@pytest.mark.parametrize("v", [8.0, 15.0, 25.0, 40.0])
+def test_the_gains_are_those_of_the_riccati_equation(car, v):
+    a = np.array(error_dynamics(car, v))
+    b = np.array([[0.0], [1.0 / car.i_z]])
+    q = np.diag([SCALES["beta_0"] ** -2, SCALES["r_0"] ** -2])
+    p = solve_continuous_are(a, b, q, [[SCALES["moment_0"] ** -2]])
+    expected = (SCALES["moment_0"] ** 2 * b.T @ p)[0]
+    assert optimal_gains(error_dynamics(car, v), car.i_z, **SCALES) == pytest.approx(expected, rel=1e-6)
+
+
+def test_gains_stay_finite_where_the_yaw_rate_does_not_reach_the_sideslip():
+    at_rest, behind, before = (
+        optimal_gains(((-5.0, a_12), (2.0, -4.0)), 3000.0, **SCALES) for a_12 in (0.0, 1e-4, -1e-4)
+    )
+    assert at_rest == pytest.approx(behind, rel=0.01)
+    assert at_rest == pytest.approx(before, rel=0.01)
+
+
+def test_the_discrete_model_is_that_of_the_matrix_exponential():
+    a = np.array(error_dynamics(CARS["oversteering"], 25.0))
+    phi, gamma = _discrete(tuple(map(tuple, a)), 3.0, 0.02)
+    whole = expm(np.vstack([np.column_stack([a, [0.0, 3.0]]), np.zeros(3)]) * 0.02)
+    assert np.allclose(phi, whole[:2, :2], rtol=1e-13, atol=1e-15)
+    assert np.allclose(gamma, whole[:2, 2], rtol=1e-12, atol=1e-15)
+
+
+def test_multipliers_are_those_of_nonnegative_least_squares():
+    """With P = L L', the dual is the problem of least squares |L' y + L^-1 d|, which nnls solves exactly."""
+    rng = np.random.default_rng(4)
+    for _ in range(50):
+        root = rng.normal(size=(8, 8))
+        p = root @ root.T + 0.3 * np.eye(8)
+        d = rng.normal(size=8)
+        lower = np.linalg.cholesky(p)
+        exact, _ = nnls(lower.T, -np.linalg.solve(lower, d))
+        assert np.allclose(multipliers(p.tolist(), d.tolist()), exact, rtol=1e-6, atol=1e-7)
+
+
+def test_an_inverse_is_one():
+    rng = np.random.default_rng(5)
+    root = rng.normal(size=(6, 6))
+    h = root @ root.T + np.eye(6)
+    assert np.allclose(inverse(h.tolist()) @ h, np.eye(6), atol=1e-10)
+
+
+@pytest.mark.parametrize("car", CARS.values(), ids=CARS)
+def test_far_from_limits_a_long_prediction_is_the_regulator_of_the_sampled_car(car):
+    a, step = error_dynamics(car, 25.0), 0.05
+    weights = Weights(**SCALES, penalty=1.0, step=step, moves=60, steps_per_move=1)
+    law = PredictiveLaw(a, car.i_z, weights)
+    phi, gamma = _discrete(a, weights.moment_0 / car.i_z, step)
+    b = np.array(gamma).reshape(2, 1)
+    q = np.diag([SCALES["beta_0"] ** -2, SCALES["r_0"] ** -2])
+    p = solve_discrete_are(phi, b, q, [[1.0]])
+    gains = np.linalg.solve(1.0 + b.T @ p @ b, b.T @ p @ phi)[0]
+    moment = law.moment(-1e-3, 2e-3, 0.0, 0.0, most=1e6, bound=1.0)
+    assert moment / weights.moment_0 == pytest.approx(gains @ [1e-3, -2e-3], rel=1e-6)
+
+
+def test_the_moments_of_the_program_are_the_best_that_are_allowed():
+    """Against all moments of a fine grid, by simulating the prediction."""
+    car = CARS["understeering"]
+    w = Weights(**SCALES, penalty=10.0, step=0.02, moves=2, steps_per_move=5)
+    a, b = error_dynamics(car, 25.0), w.moment_0 / car.i_z
+    phi, gamma = map(np.array, _discrete(a, b, w.step))
+    most, bound, beta_ref = 3000.0, 0.05, 0.01
+
+    def cost(moments, e):
+        total = 0.0
+        for z in moments:
+            for _ in range(w.steps_per_move):
+                e = phi @ e + gamma * z
+                total += (e[0] / w.beta_0) ** 2 + (e[1] / w.r_0) ** 2 + z * z
+            total += w.penalty * (max(abs(beta_ref + e[0]) - bound, 0.0) / w.beta_0) ** 2
+        return total
+
+    grid = np.linspace(-most, most, 121) / w.moment_0
+    for beta, r in ((0.08, -0.1), (-0.1, 0.02), (0.0, 0.06), (0.2, 0.3)):
+        e = np.array([beta - beta_ref, r])
+        first = PredictiveLaw(a, car.i_z, w).moment(beta, r, beta_ref, 0.0, most=most, bound=bound)
+        best = min(((cost((x, y), e), x) for x in grid for y in grid), key=lambda pair: pair[0])
+        assert abs(first - best[1] * w.moment_0) <= 1.01 * (grid[1] - grid[0]) * w.moment_0
+        assert abs(first) <= most * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("component", [Lqr, Mpc, Production])
+def test_a_spin_to_the_left_is_countered_to_the_right(component):
+    stand = Stand(component)
+    stand.start(velocity_x=25.0)
+    spin = {"yaw_rate": 0.6, "yaw_rate_ref": 0.2, "sideslip": -0.25, "velocity_x": 25.0}
+    assert stand.step(0.005, **spin)["yaw_moment"] < -1000.0
+
+
+@pytest.mark.parametrize("component", [Lqr, Mpc, Production])
+def test_moments_keep_their_limit_and_fade_out_at_rest(component):
+    rng = random.Random(3)
+    stand = Stand(component, moment_limit=2000.0)
+    stand.start(velocity_x=25.0)
+    for _ in range(100):
+        errors = {"yaw_rate": rng.uniform(-1, 1), "sideslip": rng.uniform(-0.5, 0.5)}
+        assert abs(stand.step(0.005, velocity_x=rng.uniform(0, 40), **errors)["yaw_moment"]) <= 2000.0
+    assert stand.step(0.005, velocity_x=0.0, yaw_rate=0.5)["yaw_moment"] == 0.0
+
+
+def test_production_does_nothing_within_its_dead_band_and_limit():
+    stand = Stand(Production)
+    stand.start(velocity_x=25.0)
+    calm = {"yaw_rate_ref": 0.3, "yaw_rate": 0.3 - 0.06, "sideslip": 0.15, "velocity_x": 25.0}
+    assert stand.step(0.005, **calm)["yaw_moment"] == 0.0
+    assert stand.step(0.005, **calm | {"yaw_rate": 0.23})["yaw_moment"] == pytest.approx(
+        0.5 * 40000.0 * 0.005
+    )
+    assert stand.step(0.005, **calm | {"yaw_rate": 0.37})["yaw_moment"] == pytest.approx(-40000.0 * 0.005)
+    beta = sideslip_bound(1.0) + 0.01
+    assert stand.step(0.005, **calm | {"sideslip": beta})["yaw_moment"] == pytest.approx(-600.0)
+
+
+def test_what_is_beyond_a_threshold_has_its_sign():
+    assert [beyond(x, 2.0) for x in (-3.0, -2.0, 0.0, 2.0, 5.0)] == [-1.0, 0.0, 0.0, 0.0, 3.0]
+    assert sideslip_bound(0.9) == pytest.approx(math.radians(10.0), rel=0.02)
