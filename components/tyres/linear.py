@@ -1,7 +1,7 @@
 """Linear tyre: forces proportional to slip, on request limited by friction.
 
     F_x = C_x kappa        F_y = -C_y alpha
-    limited:  F scaled by mu F_z / |F| where |F| > mu F_z
+    limited:  F scaled by mu F_z / |F| where |F| > mu F_z; none without friction
 
 For comparison with linear theory. A wheel that rolls backwards has its slip angle folded back to
 [-pi/2, pi/2], so that the force still opposes the lateral sliding. No load, no force.
@@ -46,9 +46,12 @@ class LinearTyre(Tyre):
             alpha = -pi - alpha
         c_x = axle.longitudinal_stiffness
         f_x, f_y = c_x * kappa, -axle.cornering_stiffness * alpha
-        grip, square = mu * f_z, f_x * f_x + f_y * f_y
-        size = sqrt(square)
-        if not axle.limited or size <= grip:
+        if not axle.limited:
             return f_x, f_y, c_x
-        scale = max(grip, 0.0) / size
-        return scale * f_x, scale * f_y, max(grip, 0.0) * c_x * f_y * f_y / (square * size)
+        grip, square = mu * f_z, f_x * f_x + f_y * f_y
+        if not grip > 0.0:
+            return 0.0, 0.0, 0.0
+        size = sqrt(square)
+        if size <= grip:
+            return f_x, f_y, c_x
+        return grip / size * f_x, grip / size * f_y, grip * c_x * f_y * f_y / (square * size)

@@ -38,6 +38,12 @@ def test_the_limit_keeps_the_direction_and_stops_at_friction():
     assert wheel(0.01, 0.01, 4000.0, 0.0, limited=True) == (0.0, 0.0)
 
 
+@pytest.mark.parametrize(("load", "mu"), [(-100.0, 0.5), (4000.0, -0.5), (-100.0, -0.5), (0.0, 0.0)])
+@pytest.mark.parametrize("slip", [0.0, 0.3])
+def test_limited_there_is_no_force_without_load_and_friction_above_zero(load, mu, slip):
+    assert wheel(slip, slip, load, mu, limited=True) == (0.0, 0.0)
+
+
 def linear_tyre(alpha, kappa):
     return LinearTyre.wheel(kappa, alpha, 1.0, 1.0, LinearTyreParameters())[:2]
 
