@@ -143,10 +143,10 @@ class Car(Component):
             self.wheels = self.wheel_velocities()
             return
         carried = self.move(h, 0.5 * (before + delta), signals)
-        v = self.wheels
+        v, loads = self.wheels, self.loads
         self.wheels = self.wheel_velocities()
-        self.turn_wheels(h, v, signals)
         self.finish(self.carried.to_end(h, carried))
+        self.turn_wheels(h, v, loads, signals)
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...]:
         return (*self.motion_values(), *self.wheel_values())
@@ -174,8 +174,8 @@ class Car(Component):
     def start_wheels(self) -> None:
         """Set the wheels' state at start time."""
 
-    def turn_wheels(self, h: float, v: Eight, signals: Sequence[Any]) -> None:
-        """Take the wheels' state over `h` [s], from the velocities `v` [m/s] at its start."""
+    def turn_wheels(self, h: float, v: Eight, loads: Four, signals: Sequence[Any]) -> None:
+        """Take the wheels' state over `h` [s], from the velocities `v` [m/s] and `loads` [N] at its start."""
 
     def rolling_values(self) -> tuple[float, ...]:
         """Return the values of the wheels' outputs after their slip angles."""
@@ -195,6 +195,9 @@ class DrivenCar(Car):
         signal("tyre_moment_z_*", optional=True),
     )
 
+    rolling_resistance = 0.0
+    """Moment of rolling resistance over load and wheel radius, f [1]; a plant that has one sets it."""
+
     spins: Four
 
     def start_wheels(self) -> None:
@@ -202,16 +205,31 @@ class DrivenCar(Car):
         radius = self.p.wheel_radius
         self.spins = v_fl / radius, v_fr / radius, v_rl / radius, v_rr / radius  # rolling freely
 
-    def turn_wheels(self, h: float, v: Eight, signals: Sequence[Any]) -> None:
+    def turn_wheels(self, h: float, v: Eight, loads: Four, signals: Sequence[Any]) -> None:
         p = self.p
         _, f_x, _, torque, slip_stiffness, tyre_slip, _ = signals
         radius, inertia, v_low = p.wheel_radius, p.wheel_inertia, p.low_speed
         per_load = p.slip_stiffness_per_load
+        resisting = 0.5 * self.rolling_resistance * radius  # of the mean load over the step
         # Of eight velocities the first four, the longitudinal ones.
-        wheels = zip(self.spins, torque, f_x, v, self.wheels, self.loads, slip_stiffness, tyre_slip)  # noqa: B905
+        wheels = zip(self.spins, torque, f_x, v, self.wheels, loads, self.loads, slip_stiffness, tyre_slip)  # noqa: B905
         w_fl, w_fr, w_rl, w_rr = [
-            spin(w, h, t, f, v_0, v_1, per_load * load, radius, inertia, v_low, c, kappa)
-            for w, t, f, v_0, v_1, load, c, kappa in wheels
+            spin(
+                w,
+                h,
+                t,
+                resisting * (z_0 + z_1),
+                f,
+                v_0,
+                v_1,
+                per_load * z_0,
+                radius,
+                inertia,
+                v_low,
+                c,
+                kappa,
+            )
+            for w, t, f, v_0, v_1, z_0, z_1, c, kappa in wheels
         ]
         self.spins = w_fl, w_fr, w_rl, w_rr
 

@@ -1,8 +1,13 @@
-"""What slows a car besides its tyres' slip: air and rolling resistance, as one force on the body.
+"""What slows a car besides its tyres' slip: air, on the body, and rolling resistance, on the wheels.
 
-    F = 1/2 rho C_D A v_x |v_x| + m g f v_x / |v_x|
+    F = 1/2 rho C_D A v_x |v_x|         on the body
+    M = f F_z R                         on a wheel of load F_z, friction against its rotation
 
-Rolling resistance fades below `rolling_fade_speed`, so a car at rest stays at rest.
+M as the moment M_y of H. B. Pacejka, Tyre and Vehicle Dynamics, 2nd ed. 2006, equation 4.E70, constant over
+speed. The tyre force that turns a free wheel in spite of it slows the car, by m g f in all; a driven wheel's
+torque overcomes it, and the tyre then carries that much less. A car at rest stays at rest: M is friction
+(`cars.wheel_spin`). Left out: M comes of loads that act f R ahead of the wheels, which shifts f R / L of the
+weight from axle to axle, about a thousandth.
 """
 
 from __future__ import annotations
@@ -11,7 +16,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ..fmi.variables import parameter
-from ..mathematics.gravity import G
 
 
 @dataclass(frozen=True)
@@ -24,30 +28,18 @@ class ResistanceParameters:
         1.2258, "kg/m3", "Air density rho", "paper B: what its 1 / 21.15 stands for", minimum=0.0
     )
     rolling_resistance: float = parameter(0.008, "1", "Rolling resistance f", "paper B, table 1", minimum=0.0)
-    rolling_fade_speed: float = parameter(
-        0.1, "m/s", "Rolling resistance fades below this speed", "chosen: hardly moving", minimum=0.001
-    )
 
 
-class Resistance(NamedTuple):
-    """The two resistances of one car."""
+class Drag(NamedTuple):
+    """The drag of one car."""
 
-    drag: float  # force over speed squared [kg/m]
-    rolling: float  # rolling resistance [N]
-    fade: float  # speed below which it fades [m/s]
+    per_speed_squared: float  # [kg/m]
 
     @classmethod
-    def of(cls, p: Any) -> Resistance:
-        """Return those of a car with `ResistanceParameters` and a mass."""
-        drag = 0.5 * p.air_density * p.drag_coefficient * p.frontal_area
-        return cls(drag, p.rolling_resistance * p.mass * G, p.rolling_fade_speed)
+    def of(cls, p: Any) -> Drag:
+        """Return that of a car with `ResistanceParameters`."""
+        return cls(0.5 * p.air_density * p.drag_coefficient * p.frontal_area)
 
     def force(self, v_x: float) -> float:
         """Return the resisting force [N] along x at the speed `v_x` [m/s]; it has the sign of v_x."""
-        drag, rolling, fade = self
-        share = v_x / fade
-        if share > 1.0:
-            share = 1.0
-        elif share < -1.0:
-            share = -1.0
-        return drag * v_x * abs(v_x) + rolling * share
+        return self.per_speed_squared * v_x * abs(v_x)

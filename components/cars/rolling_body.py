@@ -14,7 +14,7 @@ from ..fmi.variables import parameter
 from ..mathematics.gravity import G
 from .car import StartParameters
 from .published_cars import PaperB
-from .resistance import Resistance, ResistanceParameters
+from .resistance import Drag, ResistanceParameters
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class RollingBody:
 
     def __init__(self, p: RollingCarParameters) -> None:
         self.p = p
-        self.resistance = Resistance.of(p)
+        self.drag = Drag.of(p)
         self.coupling = coupling = p.sprung_mass * p.roll_arm  # m_s h_s [kg.m]
         if p.roll_stiffness <= coupling * G:
             raise ValueError(
@@ -108,7 +108,7 @@ class RollingBody:
         self, x: float, *, v_x: float, v_y: float, r: float, phi: float, dphi: float, dr: float
     ) -> float:
         """Return a_x [m/s2], equation (2), from the resultant `x` [N] and the motion."""
-        force = x - self.resistance.force(v_x) - self.coupling * (2.0 * r * dphi + phi * dr)
+        force = x - self.drag.force(v_x) - self.coupling * (2.0 * r * dphi + phi * dr)
         xi = self.p.rotating_mass_excess
         return (force / self.p.mass - xi * v_y * r) / (1.0 + xi)
 

@@ -1,9 +1,9 @@
-"""The spin of the wheels from drive or brake torque and tyre force, down to standstill.
+"""The spin of the wheels from drive or brake torque, rolling resistance and tyre force, down to standstill.
 
-    J dw/dt = T - F_x R                         T > 0 drives forward, T < 0 brakes
+    J dw/dt = T - F_x R - M w / |w|             T > 0 drives forward, T < 0 brakes; M >= 0 resists
 
-A torque below zero is friction: it acts against the rotation, stops the wheel and never reverses it. A
-wheel at rest under such a torque stays at rest until the tyre overcomes it.
+A torque below zero is friction, as M is: it acts against the rotation, stops the wheel and never reverses
+it. A wheel at rest stays at rest until tyre and drive overcome friction.
 
 Slip decays with the rate lambda = C R^2 / (J v), C = dF_x/dkappa, which grows without bound as the car
 slows: at walking pace a tyre force that is held over the step swings up. There are two remedies.
@@ -15,7 +15,7 @@ stiffness C > 0 there (signals tyre_slip_ratio, slip_stiffness). The wheel then 
 
 and v linear over the step, exactly:
 
-    w_end = w_0 + h phi_1 (T - R F_0) / J - h phi_2 (R C / J) kappa_v (v_end - v_0)
+    w_end = w_0 + h phi_1 (T - M - R F_0) / J - h phi_2 (R C / J) kappa_v (v_end - v_0)
     z = h (R C / J) kappa_w,  phi_1 = (1 - exp(-z)) / z,  phi_2 = (1 - phi_1) / z
 
 (the exponential Rosenbrock-Euler step), F_0 the force at kappa_0. It is stable for every z, of second order
@@ -49,6 +49,7 @@ def spin(
     w: float,
     h: float,
     torque: float,
+    resistance: float,
     f_x: float,
     v: float,
     v_end: float,
@@ -64,6 +65,7 @@ def spin(
     Args:
         w: angular velocity [rad/s].
         torque: wheel torque T [N.m], below zero a friction torque.
+        resistance: moment M of rolling resistance [N.m], >= 0, a friction torque too.
         f_x: longitudinal tyre force [N], held.
         v, v_end: longitudinal velocity of the wheel at start and end of the step, wheel axes [m/s].
         stiffness: about the tyre's slip stiffness dF_x/dkappa at its load [N], where it does not say.
@@ -78,15 +80,19 @@ def spin(
     kappa = (rolling - v) / reference
     linear = slip_stiffness > 0.0
     moment = -radius * (f_x + slip_stiffness * (kappa - tyre_slip) if linear else f_x)
-    braked = torque < 0.0
-    if not braked or w > 0.0:
-        moment += torque
-    elif w < 0.0:
-        moment -= torque
-    elif abs(moment) <= -torque:
-        return 0.0
+    friction = resistance
+    if torque < 0.0:
+        friction -= torque
     else:
-        moment += torque if moment > 0.0 else -torque
+        moment += torque
+    if w > 0.0:
+        moment -= friction
+    elif w < 0.0:
+        moment += friction
+    elif friction:
+        if abs(moment) <= friction:
+            return 0.0
+        moment -= friction if moment > 0.0 else -friction
     if linear:
         # Slopes of kappa(w R, v), at the same slip and the speed in the middle of the step.
         if speed > v_low:
@@ -121,6 +127,6 @@ def spin(
             if speed > v_low:
                 u *= v_end / v
             w_end = (v_end + (u + BEARABLE / (rate * h) * (w_end * radius - v_end - u))) / radius
-    if braked and (w * w_end < 0.0 or (w == 0.0 and w_end * moment < 0.0)):
+    if friction and (w * w_end < 0.0 or (w == 0.0 and w_end * moment < 0.0)):
         return 0.0
     return w_end

@@ -1,10 +1,10 @@
 """Car with eight degrees of freedom: plane motion and roll of the body, spin of the four wheels.
 
-    m a_x + 2 m_s h_s r dphi + m_s h_s phi dr = X - 1/2 rho C_D A v_x |v_x| - m g f v_x / |v_x|         (2)
+    m a_x + 2 m_s h_s r dphi + m_s h_s phi dr = X - 1/2 rho C_D A v_x |v_x|                     (2)
     m a_y - m_s h_s ddphi = Y_f + Y_r                                                          (1)
     I_z dr = M                                                                                 (3)
     I_x ddphi = m_s h_s a_y + m_s g h_s sin(phi) - K phi - C dphi                              (4)
-    J dw_i = T_i - F_xi R                                                                      (8)
+    J dw_i = T_i - F_xi R - f F_zi R w_i / |w_i|                                               (8)
     F_zf = (m g b - h X) / 2L -/+ (K_f phi + C_f dphi + h_f Y_f) / d      minus left, plus right   (13)
     F_zr = (m g a + h X) / 2L -/+ (K_r phi + C_r dphi + h_r Y_r) / d
 
@@ -14,8 +14,8 @@ sprung mass; v_x, v_y, a_x, a_y to the point of the roll axis below the centre o
 paper calls the centre of mass. The pair (1), (4) is solved for a_y and ddphi exactly. A wheel that
 lifts has no load; the other wheel of its axle then carries the axle.
 
-Rolling resistance is a force on the body, as in the paper, not a torque on the wheels. It fades below
-`rolling_fade_speed`, so a car at rest stays at rest.
+Ours differs: rolling resistance is a moment on each wheel (`cars.resistance`), where the paper has a force
+m g f on the body in (2). Free wheels slow the car alike; of driven ones the tyres carry m g f less.
 
 Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, equations (1)-(4),
 (8)-(13). Errata: (2) prints m_s h_s dphi, whose units are wrong, and adds xi m dv_x with xi = 1.04,
@@ -49,6 +49,7 @@ class EightDof(DrivenCar):
 
     def configure(self) -> None:
         self.body = RollingBody(self.p)
+        self.rolling_resistance = self.p.rolling_resistance
         self.step_size = 0.0
 
     def rest(self, signals: Sequence[Any]) -> Values:

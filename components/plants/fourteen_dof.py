@@ -1,8 +1,8 @@
 """Car with fourteen degrees of freedom: body in space, four wheels up and down, spin of the four wheels.
 
-    m (dv_x/dt - v_y r) = X - 1/2 rho C_D A v_x |v_x| - m g f v_x / |v_x|                   (a)
+    m (dv_x/dt - v_y r) = X - 1/2 rho C_D A v_x |v_x|                                  (a)
     m (dv_y/dt + v_x r) = Y                                                            (b)
-    J dw_i/dt = T_i - F_xi R                                                           (c)
+    J dw_i/dt = T_i - F_xi R - f F_zi R w_i / |w_i|                                    (c)
 
 with X, Y the sums of the tyre forces in vehicle axes, v_x, v_y the velocity of the car's centre of mass.
 Yaw, roll, pitch, heave and the vertical motion of the wheels are those of `cars.ride`, equations
@@ -16,7 +16,7 @@ wheels, no bump stops, no camber, no steering by roll. Ours differs: yaw axis ve
 second order in the kinetic energy, roll centres as slopes of the wheels' paths. Wheels share the
 body's horizontal motion at `unsprung_height`, no anti-dive. Derivation: docs/plant_fourteen_dof.md. A car
 that rolls over, beyond 45 degrees of roll or pitch, is an error.
-Drag acts at the centre of mass, rolling resistance as in `plants.eight_dof`.
+Drag acts at the centre of mass, rolling resistance at the wheels (`cars.resistance`).
 
 How it couples. Vertical loads follow from the tyre springs, that is from the state: there is no loop of
 loads and forces here. Nothing but the front wheels' slip and longitudinal velocity follows an input
@@ -35,7 +35,7 @@ from typing import Any
 from ..cars.car import DRIVEN_WHEELS, MOTION, DrivenCar
 from ..cars.contact_points import contact, contact_velocities
 from ..cars.plane_body import move
-from ..cars.resistance import Resistance
+from ..cars.resistance import Drag
 from ..cars.ride import AT_REST, RESOLVED, loads, move_ride
 from ..cars.sprung_car import FourteenDofParameters, ride_of
 from ..cars.wheel_kinematics import Eight
@@ -57,7 +57,8 @@ class FourteenDof(DrivenCar):
     def configure(self) -> None:
         self.ride = ride_of(self.p)
         self.longest = RESOLVED / self.ride.fastest()
-        self.resistance = Resistance.of(self.p)
+        self.drag = Drag.of(self.p)
+        self.rolling_resistance = self.p.rolling_resistance
 
     def rest(self, signals: Sequence[Any]) -> Values:
         high = self.p.initial_heave
@@ -107,4 +108,4 @@ class FourteenDof(DrivenCar):
     def _accelerations(self, x: float, y: float, v_x: float) -> tuple[float, float]:
         """Return a_x, a_y [m/s2] from the tyre forces [N] and the speed [m/s]."""
         mass = self.p.mass
-        return (x - self.resistance.force(v_x)) / mass, y / mass
+        return (x - self.drag.force(v_x)) / mass, y / mass

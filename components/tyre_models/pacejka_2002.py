@@ -10,14 +10,23 @@ without camber, turn slip and speed dependence. The set's signs are those of ISO
 
 Friction. With lambda = mu / reference_friction, pure slip obeys F(slip) = lambda F_dry(slip / lambda),
 which is what lambda_mu does in the book: lower peak, same stiffness. So pure slip is evaluated at
-scaled slips, and `low_friction` says at which slips the weights G are: unscaled (`scale`, as in
-the book) or scaled too (`similarity`: the whole of the wheel's forces then obeys that law).
+scaled slips, and `low_friction` says at which slips the weights G are: scaled too (`similarity`, the
+default: the whole of the wheel's forces then obeys that law, as by the similarity method of section 4.2)
+or unscaled (`scale`, as equations 4.E50 ff. print it). Unscaled, both forces are near their peaks at
+slips that the weights of a dry road still take for small: over friction and load the resultant grows
+from 1.21 on the dry road, the peak of F_x alone, to 1.42 at lambda = 0.3 and 1.53 at 0.1. No friction
+does that.
 
 Asymmetric terms, all zero unless switched on: PHX*, PVX*, PHY*, PVY* and QHZ* (shifts), PEY3, QEZ4
 (left-right difference of the curvatures), RHX1, RBY3 (shifts in the weights), RVY* (side force
 induced by kappa), QDZ6, QDZ7 (residual moment) and SSZ1 (constant lever arm of F_x). Without them
 F_x is even and F_y, M_z are odd in alpha, to the bit, and zero slip gives zero force. PEX4 and RHY*
 stay: they tell driving from braking, not left from right, and give no force at zero slip.
+
+The side force induced by kappa is that over mu_y F_z (4.E67), and mu_y of table A3.1 is below zero, with
+signs of ISO 8855 throughout: read literally, as here, the force has the sign of -RVY1 sin(RVY5 atan(RVY6
+kappa)). So read it programs that fit or use such sets too: Chrono's `ChPac02Tire` and the Magic Formula
+Tyre Library for MATLAB (teasit) both multiply by a mu_y that keeps the sign of PDY1.
 
 Beyond the measured range. G is not allowed below zero (with this set it would be for alpha > 31
 degrees at kappa 0). Above `maximum_load` everything is proportional to load. kappa is defined by

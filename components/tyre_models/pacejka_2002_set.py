@@ -55,12 +55,12 @@ class MagicFormulaParameters:
         minimum=0.01,
     )
     low_friction: str = parameter(
-        "scale",
+        "similarity",
         None,
-        "Combined slip where lambda_mu is not 1: scale keeps the weights of the dry tyre, similarity "
-        "scales the slips in them too",
-        "chosen: the book's lambda_mu",
-        choices=("scale", "similarity"),
+        "Combined slip where lambda_mu is not 1: similarity scales the slips in the weights too, scale keeps "
+        "the weights of the dry tyre",
+        "chosen: no wheel gives more than on a dry road, over friction; scale, the book's, does",
+        choices=("similarity", "scale"),
     )
     asymmetric_terms: bool = parameter(
         False, None, "Use the terms that break mirror symmetry or give force at zero slip", "chosen: off"

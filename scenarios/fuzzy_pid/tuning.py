@@ -57,8 +57,9 @@ START = {
 }
 """Controller -> what is tuned, from the defaults on.
 
-They end at J = 0.8671 (PID) and 0.8663 (fuzzy PID). Of fuzzy PID those six that served it best: ranges of
-dK_d in place of the error ranges ended 0.003 higher, all its twelve gains and ranges 0.002."""
+They end at J = 0.8406 (PID) and 0.8404 (fuzzy PID). Of fuzzy PID those six that served it best when they were
+chosen, with rolling resistance on the body and the tyre's `low_friction: scale`: ranges of dK_d in place
+of the error ranges ended 0.003 higher, all its twelve gains and ranges 0.002."""
 
 Found = dict[str, tuple[np.ndarray, float]]
 """Run -> its peaks, and its chatter [N.m/s]."""

@@ -10,6 +10,18 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from components.fmi.component import Component
+from components.fmi.variables import output
+
+
+class Straight(Component):
+    """Torque requests become wheel torques."""
+
+    inputs = ("torque_request_*",)
+    outputs = (output("wheel_torque_*", "torque_request_*"),)
+    sampled = True
+
+    def output(self, t: float, u: list[float]) -> list[float]:
+        return u
 
 
 class Unit:

@@ -1,8 +1,8 @@
 """Paper B's car as one system of equations, written down anew, for scipy to solve.
 
 Independent of the components: equations (1)-(4), (8)-(13) of the paper with the errata of
-`plants.eight_dof`, the accelerations from one linear system of four equations, the loop load -> force
--> load solved at every instant.
+`plants.eight_dof` and rolling resistance as moments on the wheels, the accelerations from one linear system
+of four equations, the loop load -> force -> load solved at every instant.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def balance(
             [0.0, -M_S * H_S, 0.0, I_X],
         ]
     )
-    resisting = DRAG * v_x * abs(v_x) + ROLLING * M * GRAVITY * copysign(1.0, v_x)
+    resisting = DRAG * v_x * abs(v_x)
     right = np.array(
         [
             total[0] - resisting + M * v_y * r - 2 * M_S * H_S * r * dphi,
@@ -98,10 +98,12 @@ def solve(
     """Return v_x, v_y, r, x, y, psi, phi, dphi and the four wheel speeds (rows) at `times` (columns)."""
 
     def derivatives(t: float, state: np.ndarray) -> list[float]:
-        (dv_x, dv_y, dr, ddphi), longitudinal, _ = balance(state, steer(t), mu, tyre)
+        (dv_x, dv_y, dr, ddphi), longitudinal, f_z = balance(state, steer(t), mu, tyre)
         v_x, v_y, r, _, _, psi, _, dphi = state[:8]
         moved = [v_x * cos(psi) - v_y * sin(psi), v_x * sin(psi) + v_y * cos(psi), r]
-        spun = [(t_w - f_x * R) / J for t_w, f_x in zip(torque(t), longitudinal, strict=True)]
+        resisting = [ROLLING * load * R * copysign(1.0, w) for load, w in zip(f_z, state[8:], strict=True)]
+        wheels = zip(torque(t), longitudinal, resisting, strict=True)
+        spun = [(t_w - f_x * R - m_y) / J for t_w, f_x, m_y in wheels]
         return [dv_x, dv_y, dr, *moved, dphi, ddphi, *spun]
 
     state = np.array([speed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, *[speed / R] * 4])

@@ -2,7 +2,8 @@
 
 Independent of the components: point masses and one rigid body, Jacobians of their velocities from the exact
 Euler rates of the rotation yaw, pitch, roll; the mass matrix from these; Lagrange's equations with its
-derivatives taken numerically (complex step); forces by the Jacobians of travel and contact points.
+derivatives taken numerically (complex step); forces by the Jacobians of travel and contact points; rolling
+resistance as a moment on each wheel.
 Velocities w: v_x, v_y, r, dz, dphi, dtheta, du_fl, du_fr, du_rl, du_rr. Coordinates q: the last seven.
 """
 
@@ -10,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from math import atan2, copysign, cos, sin
+from math import atan2, cos, sin
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -18,6 +19,9 @@ from scipy.integrate import solve_ivp
 M, M_S, I_Z, I_XS, I_YS, A, B, D, H, H_U = 1830.0, 1650.0, 3234.0, 928.0, 2790.0, 1.4, 1.65, 1.6, 0.5093, 0.32
 SPRINGS, DAMPERS, BARS, CENTRES = (34e3, 32e3), (3000.0, 2800.0), (14e3, 6e3), (0.06, 0.11)
 TYRE, R, J, AIR, ROLLING, GRAVITY = 230e3, 0.33, 1.5, 0.5 * 1.2258 * 0.3 * 2.2, 0.012, 9.81
+
+HELD = 470.0, 4000.0, 2.0, 3000.0, 0.2
+"""The drive: constant force [N], gain [N.s/m], integral time [s], largest force [N], lag [s]."""
 
 M_U = (M - M_S) / 4
 H_S = (M * H - 4 * M_U * H_U) / M_S
@@ -127,8 +131,7 @@ def balance(
         f_x.append(x * cos(angle) - y * sin(angle))
         f_y.append(x * sin(angle) + y * cos(angle))
     dw = accelerations(q, w, f_x, f_y)
-    v_x = w[0]
-    dw[0] -= (AIR * v_x * abs(v_x) + ROLLING * M * GRAVITY * copysign(1.0, v_x)) / M
+    dw[0] -= AIR * w[0] * abs(w[0]) / M
     return dw, longitudinal
 
 
@@ -140,24 +143,36 @@ def solve(
     speed: float,
     mu: Sequence[float],
     torque: Callable[[float], Sequence[float]] = lambda t: (0.0, 0.0, 0.0, 0.0),
+    held: float | None = None,
     kinks: Sequence[float] = (),
     tolerance: float = 1e-9,
 ) -> np.ndarray:
-    """Return x, y, psi, q (7), w (10) and the four wheel speeds (rows) at `times` (columns)."""
+    """Return x, y, psi, q (7), w (10) and the four wheel speeds (rows) at `times` (columns).
+
+    Args:
+        held: speed [m/s] that the rear wheels hold by a `HELD` drive; None if nothing drives.
+    """
 
     def derivatives(t: float, state: np.ndarray) -> np.ndarray:
-        psi, q, w, spins = state[2], state[3:10], state[10:20], state[20:]
+        psi, q, w, spins, (integral, force) = state[2], state[3:10], state[10:20], state[20:24], state[24:]
         dw, longitudinal = balance(q, w, spins, steer(t), mu, tyre)
         v_x, v_y, r = w[:3]
         moved = [v_x * cos(psi) - v_y * sin(psi), v_x * sin(psi) + v_y * cos(psi), r]
-        spun = [(t_w - f_x * R) / J for t_w, f_x in zip(torque(t), longitudinal, strict=True)]
-        return np.concatenate([moved, w[3:], dw, spun])
+        turning, pedal = np.array(torque(t)), (0.0, 0.0)
+        if held is not None:
+            constant, gain, time, most, lag = HELD
+            wanted = gain * (held - v_x) + integral
+            beyond = wanted > most if held > v_x else wanted < 0.0
+            pedal = 0.0 if beyond else gain / time * (held - v_x), (min(max(wanted, 0.0), most) - force) / lag
+            turning = turning + np.array([0.0, 0.0, 0.5, 0.5]) * (constant + force) * R
+        spun = (turning - R * np.array(longitudinal) - ROLLING * R * loads(q) * np.sign(spins)) / J
+        return np.concatenate([moved, w[3:], dw, spun, pedal])
 
-    state = np.zeros(24)
-    state[10], state[20:] = speed, speed / R
+    state = np.zeros(26)
+    state[10], state[20:24] = speed, speed / R
     columns = np.empty((24, len(times)))
     edges = [times[0], *sorted(k for k in kinks if times[0] < k < times[-1]), times[-1]]
-    scale = np.array([1, 1, 0.01, *[0.01] * 7, 1, 0.1, 0.01, *[0.1] * 7, *[10.0] * 4])
+    scale = np.array([1, 1, 0.01, *[0.01] * 7, 1, 0.1, 0.01, *[0.1] * 7, *[10.0] * 4, 1e3, 1e3])
     for begin, end in pairwise(edges):
         piece = solve_ivp(
             derivatives,
@@ -169,6 +184,6 @@ def solve(
             dense_output=True,
         )
         inside = (times >= begin) & (times <= end)
-        columns[:, inside] = piece.sol(times[inside])
+        columns[:, inside] = piece.sol(times[inside])[:24]
         state = piece.y[:, -1]
     return columns

@@ -152,7 +152,8 @@ def test_forces_and_moment_are_those_of_the_printed_equations_for_any_complete_s
         names = [f.name for f in dataclasses.fields(plain) if f.name.isupper()]
         given = {name: unlisted.get(name, getattr(plain, name)) * draw.uniform(0.8, 1.2) for name in names}
         given |= {"friction_scale_x": draw.uniform(0.8, 1.2), "friction_scale_y": draw.uniform(0.8, 1.2)}
-        p = MagicFormulaParameters(asymmetric_terms=asymmetric, reference_friction=0.9, **given)
+        given |= {"asymmetric_terms": asymmetric, "low_friction": "scale"}
+        p = MagicFormulaParameters(reference_friction=0.9, **given)
         printed = p if asymmetric else dataclasses.replace(p, **dict.fromkeys(ODD, 0.0))
         kappa, alpha = draw.uniform(-0.9, 0.3), draw.uniform(-0.4, 0.4)
         f_z, mu = draw.uniform(300.0, 9000.0), draw.uniform(0.5, 1.2)
@@ -215,9 +216,10 @@ def test_scale_keeps_the_weights_of_the_dry_tyre():
     for mu in (0.1, 0.3, 1.4):
         for kappa, alpha in ((-0.05, 0.1), (0.2, 0.03)):
             ratios = [
-                (tyre(kappa, alpha, mu=m)[0] / tyre(kappa, 0.0, mu=m)[0],
-                 tyre(kappa, alpha, mu=m)[1] / tyre(0.0, alpha, mu=m)[1])
+                (both[0] / tyre(kappa, 0.0, mu=m, low_friction="scale")[0],
+                 both[1] / tyre(0.0, alpha, mu=m, low_friction="scale")[1])
                 for m in (mu, 1.0)
+                for both in [tyre(kappa, alpha, mu=m, low_friction="scale")]
             ]  # fmt: skip
             assert ratios[0] == pytest.approx(ratios[1], rel=1e-12)
 
@@ -230,9 +232,10 @@ def test_similarity_keeps_the_resultant_in_the_bounds_of_the_dry_tyre_and_scale_
             for j in range(20)
         )
 
-    dry = largest("similarity", 1.0)
-    assert largest("similarity", 0.3) <= 1.02 * dry
-    assert largest("scale", 0.3) > 1.15 * dry
+    assert largest("similarity", 1.0) == pytest.approx(1.21, abs=0.005)
+    assert largest("similarity", 0.3) == pytest.approx(1.21, abs=0.005)
+    assert largest("scale", 0.3) == pytest.approx(1.42, abs=0.005)
+    assert largest("scale", 0.1) == pytest.approx(1.53, abs=0.005)
 
 
 @pytest.mark.parametrize("mode", ["scale", "similarity"])

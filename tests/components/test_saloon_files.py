@@ -54,7 +54,7 @@ def test_a_plant_without_a_vehicle_file_is_the_papers_car(name, plant, others):
 @pytest.mark.parametrize("name, plant, others", CARS)
 def test_the_file_leaves_nothing_of_the_car_to_defaults(name, plant, others):
     choices_of_the_run = {"initial_speed", "initial_sideslip", "initial_yaw_rate", "initial_heave"}
-    numerics = {"low_speed", "slip_stiffness_per_load", "rolling_fade_speed"}
+    numerics = {"low_speed", "slip_stiffness_per_load"}
     implied = {"front_unsprung_share", "sprung_roll_yaw_product"}  # equal wheels, principal axes
     assert parameters(plant) - set(load(name)) <= choices_of_the_run | numerics | implied
 

@@ -9,8 +9,6 @@ import pytest
 from scipy.optimize import brentq
 
 from components.control_laws.slip_control import SlipControlParameters, slip_torque, wheel_torque
-from components.fmi.component import Component
-from components.fmi.variables import output
 from components.plants.eight_dof import EightDof
 from components.tyre_models.slip_curve import slip_for_force, slip_stiffness
 from components.tyres.dugoff import Dugoff
@@ -22,7 +20,7 @@ from components.wheel_controls.direct import Direct
 from components.wheel_controls.slip import TYRES as KNOWN
 from components.wheel_controls.slip import Slip, SlipParameters
 
-from .loop import Loop
+from .loop import Loop, Straight
 from .stand import Stand
 
 WHEELS = ("fl", "fr", "rl", "rr")
@@ -390,17 +388,6 @@ def test_braking_ends_at_rest_and_stays_there():
     rows = QuarterCar(6.0, mu=0.8, ts=0.001).run(lambda t: -2000.0, 2.0)
     assert max(abs(kappa) for kappa, _, _ in rows) < 0.1
     assert all(v < 1e-9 and abs(torque) < 1e-6 for _, torque, v in rows[-300:])
-
-
-class Straight(Component):
-    """Torque requests become wheel torques."""
-
-    inputs = ("torque_request_*",)
-    outputs = (output("wheel_torque_*", "torque_request_*"),)
-    sampled = True
-
-    def output(self, t, u):
-        return u
 
 
 def drive(control, *, total, steer, speed, low_friction="scale", until=1.5):

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from components.cars.wheel_spin import spin
 
 R, J, LOW = 0.31, 2.0, 0.5
-WHEEL = {"radius": R, "inertia": J, "stiffness": 0.0, "v_low": LOW}
+WHEEL = {"radius": R, "inertia": J, "stiffness": 0.0, "v_low": LOW, "resistance": 0.0}
 
 
 def slip(w, v):
@@ -128,6 +128,17 @@ def test_driving_backwards_is_the_mirror_of_driving_forwards(w, v, v_end, torque
 def test_a_brake_stops_the_wheel_and_does_not_reverse_it():
     for w in (3.0, -3.0, 1e-9):
         assert spin(w, 0.01, torque=-5000.0, v=0.0, v_end=0.0, **linear(w, 0.0, 1e3), **WHEEL) == 0.0
+
+
+def test_resistance_slows_a_wheel_either_way_holds_it_at_rest_and_never_turns_it_back():
+    resisting = WHEEL | {"f_x": 0.0, "v": 0.0, "v_end": 0.0, "resistance": 20.0}
+    for sign in (1.0, -1.0):
+        assert spin(sign, 0.01, torque=0.0, **resisting) == pytest.approx(0.9 * sign, rel=1e-14)
+        assert spin(0.05 * sign, 0.01, torque=0.0, **resisting) == 0.0
+    assert spin(1.0, 0.01, torque=50.0, **resisting) == pytest.approx(1.15, rel=1e-14)
+    assert spin(1.0, 0.01, torque=-50.0, **resisting) == pytest.approx(0.65, rel=1e-14)
+    assert spin(0.0, 0.01, torque=15.0, **resisting) == 0.0
+    assert spin(0.0, 0.01, torque=25.0, **resisting) == pytest.approx(0.025, rel=1e-14)
 
 
 def test_a_locked_wheel_stays_locked_until_the_tyre_overcomes_the_brake():

@@ -91,7 +91,7 @@ def test_fuzzy_pid_is_at_or_below_pid(metric, run, peak):
 def test_the_advantage_goes_when_both_are_tuned_alike(derived):
     assert derived("advantage") > 0.05
     assert abs(derived("tuned_advantage")) < 0.02
-    assert derived("tuned_chatter") >= 1.0
+    assert derived("tuned_chatter") == pytest.approx(1.0, abs=0.1)
 
 
 def test_the_gains_of_the_study_are_those_that_tuning_prefers(study):
@@ -114,8 +114,8 @@ def test_the_gains_of_the_study_are_those_that_tuning_prefers(study):
         for controller in CONTROLLERS
         for name in (controller, f"{controller}_tuned")
     }
-    assert cost["pid_tuned"] == pytest.approx(0.8671, abs=0.001)  # as tuning.py prints it
-    assert cost["fuzzy_pid_tuned"] == pytest.approx(0.8663, abs=0.001)
+    assert cost["pid_tuned"] == pytest.approx(0.8406, abs=0.001)  # as tuning.py prints it
+    assert cost["fuzzy_pid_tuned"] == pytest.approx(0.8404, abs=0.001)
     assert cost["pid_tuned"] < cost["fuzzy_pid"] < cost["pid"]
 
 
@@ -124,20 +124,27 @@ def test_the_double_lane_change_is_driven_as_a_path_and_clean_between_cones_at_7
         assert metric(f"double_lane_change/{controller}", "displacement") >= 3.5
         assert metric(f"double_lane_change/{controller}", "late_offset") <= 0.1
         assert metric(f"double_lane_change/{controller}", "overrun") > 0.5
-        assert metric(f"cones/{controller}", "overrun") == 0.0
-    assert metric("cones/long_transitions", "overrun") == 0.0
+    for run in (*CONTROLLERS, "long_transitions"):
+        assert metric(f"cones/{run}", "overrun") == 0.0
+    assert 0.0 < metric("cones/off", "overrun") < 0.005
 
 
-def test_the_printed_limit_harms_and_the_printed_table_is_one_sided(metric, derived):
-    assert metric("ramp/pid_printed_limit", "sideslip") > metric("ramp/off", "sideslip")
+def test_the_printed_limit_does_nothing_in_the_ramp_and_the_printed_table_is_one_sided(metric, derived):
+    assert metric("ramp/pid_printed_limit", "sideslip") == pytest.approx(
+        metric("ramp/off", "sideslip"), rel=1e-3
+    )
     assert derived("printed_advantage") < derived("advantage")
     right = metric("printed_table/-1.5", "sideslip")
     assert right > 1.05 * metric("printed_table/1.5", "sideslip")
     assert right > metric("ramp/pid", "sideslip")
 
 
-def test_every_check_holds_and_the_order_of_the_claims_but_not_their_size(study):
-    assert {check["verdict"] for check in study["checks"]} == {"holds"}
+def test_the_order_of_the_claims_holds_but_not_their_size_and_all_checks_but_three(study):
+    assert [check["says"] for check in study["checks"] if check["verdict"] != "holds"] == [
+        "Tuned alike, next to nothing remains of that, 2 % of the peaks at most, at no less chatter.",
+        "With the limit as printed PID makes the ramp's sideslip worse than without control.",
+        "Between cones it is clean at 70 km/h, and at 90 km/h with transitions twice as long.",
+    ]
     verdicts = {claim["says"]: claim["verdict"] for claim in study["claims"]}
     assert verdicts.pop("Sine: with fuzzy PID the curves are smoother.")  # too close to be pinned
     for says, verdict in verdicts.items():
@@ -190,19 +197,28 @@ def test_the_mirrored_manoeuvre_gives_the_mirrored_motion(study, fmus, tmp_path,
 
 
 @pytest.mark.exhaustive
-def test_with_combined_slip_by_similarity_the_sine_loses_the_car_without_control_alone(fmus, tmp_path):
+def test_under_a_tenth_more_steering_the_sine_loses_the_car_without_control_alone(fmus, tmp_path):
+    settings = {
+        "off": ["driver.amplitude=1.65"],
+        **{controller: ["driver.amplitude=1.65"] for controller in CONTROLLERS},
+        "off, 1.6 rad": ["driver.amplitude=1.6"],
+        "off, weights of a dry road": ["tyre.low_friction=scale"],
+    }
     jobs = [
         Job(
-            controller, FOLDER / "sine.yaml", tmp_path / controller,
-            changed([f"controller=controller_{controller}"], ["tyre.low_friction=similarity"]),
+            name, FOLDER / "sine.yaml", tmp_path / name,
+            changed([f"controller=controller_{name.partition(',')[0]}"], setting),
             fmus, record=("plant.sideslip",),
         )
-        for controller in ("off", *CONTROLLERS)
+        for name, setting in settings.items()
     ]  # fmt: skip
     assert all(outcome.ok for outcome in execute(jobs))
-    off, *held = (np.degrees(np.max(np.abs(load_results(job.out)["plant.sideslip"]))) for job in jobs)
+    off, *held, near, dry = (
+        np.degrees(np.max(np.abs(load_results(job.out)["plant.sideslip"]))) for job in jobs
+    )
     assert off > 90.0
     assert max(held) < 2.5
+    assert (near, dry) == pytest.approx((5.28, 2.48), abs=0.02)  # as docs/theory/paper_c.md says
 
 
 def test_the_readme_tells_what_the_study_found(metric, derived):

@@ -1,0 +1,20 @@
+"""What samples has a sample time of its own, so that a finer communication step leaves it as it is."""
+
+from __future__ import annotations
+
+import pytest
+
+from orchestrator.scenario.catalogue import SHIPPED, files
+from orchestrator.scenario.load import load_scenario
+from tests.components.test_conformance import COMPONENTS
+
+SCENARIOS = [path for path, _ in files(SHIPPED, ["a scenario"])]
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_every_sampled_unit_of_a_scenario_has_a_sample_time_of_its_own(path):
+    units = load_scenario(path).units
+    assert units
+    sampled = {name for name, unit in units.items() if COMPONENTS[unit.fmu].sampled}
+    assert sampled
+    assert {name for name in sampled if units[name].step_size is None} == set()
