@@ -1,4 +1,4 @@
-"""The baselines beside the papers: LQR, model-predictive control, the law of production."""
+"""The baselines beside the papers: LQR, model-predictive control, dead band."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from scipy.optimize import nnls
 from components.cars.single_track_car import SingleTrackCar
 from components.control_laws.linear_feedback import error_dynamics, optimal_gains
 from components.control_laws.predictive_law import PredictiveLaw, Weights, _discrete
+from components.controllers.dead_band import DeadBand, beyond
 from components.controllers.lqr import Lqr
 from components.controllers.mpc import Mpc, sideslip_bound
-from components.controllers.production import Production, beyond
 from components.mathematics.quadratic_program import inverse, multipliers
 
 from .stand import Stand
@@ -114,7 +114,7 @@ def test_the_moments_of_the_program_are_the_best_that_are_allowed():
         assert abs(first) <= most * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("component", [Lqr, Mpc, Production])
+@pytest.mark.parametrize("component", [Lqr, Mpc, DeadBand])
 def test_a_spin_to_the_left_is_countered_to_the_right(component):
     stand = Stand(component)
     stand.start(velocity_x=25.0)
@@ -122,7 +122,7 @@ def test_a_spin_to_the_left_is_countered_to_the_right(component):
     assert stand.step(0.005, **spin)["yaw_moment"] < -1000.0
 
 
-@pytest.mark.parametrize("component", [Lqr, Mpc, Production])
+@pytest.mark.parametrize("component", [Lqr, Mpc, DeadBand])
 def test_moments_keep_their_limit_and_fade_out_at_rest(component):
     rng = random.Random(3)
     stand = Stand(component, moment_limit=2000.0)
@@ -133,8 +133,8 @@ def test_moments_keep_their_limit_and_fade_out_at_rest(component):
     assert stand.step(0.005, velocity_x=0.0, yaw_rate=0.5)["yaw_moment"] == 0.0
 
 
-def test_production_does_nothing_within_its_dead_band_and_limit():
-    stand = Stand(Production)
+def test_it_does_nothing_within_its_dead_band_and_limit():
+    stand = Stand(DeadBand)
     stand.start(velocity_x=25.0)
     calm = {"yaw_rate_ref": 0.3, "yaw_rate": 0.3 - 0.06, "sideslip": 0.15, "velocity_x": 25.0}
     assert stand.step(0.005, **calm)["yaw_moment"] == 0.0

@@ -19,7 +19,7 @@ from tests.conftest import evenly
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "fuzzy_sliding_mode" / "high_friction.yaml"
 CONTROLLERS = (
     "off", "fuzzy_sideslip", "fnn", "sliding_mode", "fuzzy_sliding_mode", "pid", "fuzzy_pid",
-    "fuzzy_feedback", "lqr", "mpc", "production",
+    "fuzzy_feedback", "lqr", "mpc", "dead_band",
 )  # fmt: skip
 PLANTS = ("seven_dof", "eight_dof", "fourteen_dof")
 TYRES = ("dugoff", "linear", "magic_formula", "magic_formula_62", "magic_formula_1987")

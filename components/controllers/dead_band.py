@@ -25,7 +25,7 @@ from .pid import PidParameters
 
 
 @dataclass(frozen=True)
-class ProductionParameters:
+class DeadBandParameters:
     """Dead band, gains and limits; none is public."""
 
     yaw_rate_threshold: float = parameter(
@@ -57,10 +57,10 @@ def beyond(value: float, threshold: float) -> float:
     return value - threshold if value > threshold else value + threshold if value < -threshold else 0.0
 
 
-class Production(Component):
+class DeadBand(Component):
     """Yaw-moment controller with dead band and sideslip limit, after van Zanten."""
 
-    Parameters = ProductionParameters
+    Parameters = DeadBandParameters
     sampled = True
     inputs = ("yaw_rate_ref", "yaw_rate", "sideslip", "velocity_x", signal("friction", start=1.0))
     outputs = (output("yaw_moment", *("yaw_rate_ref", "yaw_rate", "sideslip", "velocity_x", "friction")),)
