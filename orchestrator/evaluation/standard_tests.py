@@ -54,6 +54,18 @@ def _dwell(trace: Trace, angle: float | None) -> Evaluated:
     return Evaluated(trace, judged, draw)
 
 
+def _step(trace: Trace, _: float | None) -> Evaluated:
+    from .step_response import evaluate_step
+
+    return Evaluated(trace, evaluate_step(trace))
+
+
+def _understeer(trace: Trace, _: float | None) -> Evaluated:
+    from .understeer import evaluate_understeer
+
+    return Evaluated(trace, evaluate_understeer(trace))
+
+
 TESTS: dict[str, StandardTest] = {
     test.name: test
     for test in (
@@ -69,6 +81,18 @@ TESTS: dict[str, StandardTest] = {
             _dwell,
             ("amplitude", "multiple", "ratio_1000", "ratio_1750", "displacement", "sideslip", "speed_end"),
             needs_angle=True,
+        ),
+        StandardTest(
+            "step-steer",
+            "gains, response times, overshoots of a step of the hand wheel (after ISO 7401)",
+            _step,
+            ("yaw_rate_gain", "yaw_rate_response", "yaw_rate_overshoot", "acceleration_y_response", "t_beta"),
+        ),
+        StandardTest(
+            "understeer-gradient",
+            "extra steering per lateral acceleration, of a slow ramp or a constant radius (after ISO 4138)",
+            _understeer,
+            ("gradient", "gradient_hand", "characteristic_speed", "gradient_4", "largest"),
         ),
     )
 }

@@ -1,0 +1,125 @@
+"""Step steer and understeer gradient: closed forms, ways of sampling, and the theory for every plant."""
+
+from __future__ import annotations
+
+from math import atan2, exp, log, pi, sqrt
+
+import numpy as np
+import pytest
+
+import yawbench as yb
+from orchestrator.evaluation.step_response import evaluate_step
+from orchestrator.evaluation.trace import Trace, trace_of
+from orchestrator.evaluation.understeer import evaluate_understeer
+from orchestrator.scenario.catalogue import SHIPPED
+from orchestrator.scenario.load import load_scenario
+from orchestrator.tyres.axle_stiffness import cornering_stiffness
+from orchestrator.wiring.make_plan import make_plan
+
+from .test_sine_with_dwell import as_sampled
+
+SINGLE_TRACK = ("plant_two_dof", "plant_seven_dof", "plant_eight_dof", "plant_fourteen_dof")
+NO_DRAG = {
+    "vehicle.drag_coefficient": 0.0,
+    "vehicle.rolling_resistance": 0.0,
+    "driver.constant_drive_force": 0.0,
+}
+STEP, GAIN, DAMPING, FREQUENCY = 0.8, 0.25, 0.5, 8.0  # hand wheel [rad], of the yaw rate [1/s], [1], [rad/s]
+
+
+def step_trace(sampling) -> Trace:
+    """Return a car whose yaw rate is an oscillator's answer to a step at 1 s, to the right."""
+    t = sampling(7.0)
+    s = np.maximum(t - 1.0, 0.0)
+    damped = FREQUENCY * sqrt(1.0 - DAMPING**2)
+    phase = atan2(sqrt(1.0 - DAMPING**2), DAMPING)
+    fading = np.exp(-DAMPING * FREQUENCY * s) / sqrt(1.0 - DAMPING**2)
+    answer = np.where(t >= 1.0, 1.0 - fading * np.sin(damped * s + phase), 0.0)
+    return Trace(
+        "step",
+        t,
+        {
+            "steering_wheel_angle": -STEP * np.clip((t - 0.9) / 0.2, 0.0, 1.0),
+            "yaw_rate": -GAIN * STEP * answer,
+            "acceleration_y": -5.0 * (1.0 - np.exp(-s / 0.2)),
+            "sideslip": 0.02 * (1.0 - np.exp(-s / 0.2)),
+            "velocity_x": np.full_like(t, 25.0),
+        },
+    )
+
+
+@as_sampled
+def test_a_step_steer_gives_gain_response_time_and_overshoot_of_its_closed_form(sampling):
+    judged = evaluate_step(step_trace(sampling))
+    assert judged.notes == []
+    assert judged["step"] == pytest.approx(-STEP)
+    assert judged["zero"] == pytest.approx(1.0, abs=1e-9)
+    assert judged["yaw_rate_gain"] == pytest.approx(GAIN, rel=1e-5)
+    assert judged["yaw_rate_overshoot"] == pytest.approx(exp(-pi * DAMPING / sqrt(1 - DAMPING**2)), abs=2e-4)
+    assert judged["yaw_rate_peak"] == pytest.approx(pi / (FREQUENCY * sqrt(1 - DAMPING**2)), abs=0.006)
+    assert judged["acceleration_y_gain"] == pytest.approx(5.0 / STEP, rel=1e-5)
+    assert judged["acceleration_y_response"] == pytest.approx(0.2 * log(10.0), abs=2e-4)
+    assert judged["t_beta"] == pytest.approx(0.02 * judged["yaw_rate_peak"], rel=1e-5)
+
+
+def test_a_wheel_that_is_not_held_is_no_step():
+    made = step_trace(lambda last: np.arange(0.0, last, 0.001))
+    made.signals["steering_wheel_angle"] = 0.1 * made.time
+    judged = evaluate_step(made)
+    assert judged.notes == ["the hand wheel is still turned at the end of the record"]
+    assert judged.quantities == {}
+
+
+@as_sampled
+@pytest.mark.parametrize("held", ["speed", "radius"])
+def test_the_understeer_gradient_does_not_depend_on_what_is_held(sampling, held):
+    t = sampling(30.0)
+    a_y = 0.2 * t
+    v = np.full_like(t, 22.0) if held == "speed" else np.sqrt(np.maximum(a_y, 1e-3) * 60.0)
+    r = a_y / v
+    extra = 0.004 * a_y + 1e-4 * a_y**3
+    facts = {"steering_ratio": 16.0, "cg_to_front_axle": 1.2, "cg_to_rear_axle": 1.5}
+    signals = {"velocity_x": v, "yaw_rate": -r, "acceleration_y": -a_y,
+               "steering_wheel_angle": -16.0 * (2.7 * r / v + extra)}  # fmt: skip
+    judged = evaluate_understeer(Trace("slow", t, signals, facts=facts))
+    assert judged["gradient"] == pytest.approx(0.004, rel=1e-9)
+    assert judged["gradient_hand"] == pytest.approx(0.064, rel=1e-9)
+    assert judged["gradient_4"] == pytest.approx(0.004 + 3e-4 * 16.0, rel=0.01)  # over 1 m/s2
+    assert judged["characteristic_speed"] == pytest.approx(sqrt(2.7 / 0.004))
+    assert judged["gradient_6"] is None  # 5.5 to 6.5 m/s2, the run ends at 6
+    del facts["steering_ratio"]
+    assert evaluate_understeer(Trace("slow", t, signals, facts=facts)).notes == [
+        "the run does not tell steering_ratio"
+    ]
+
+
+def theory() -> tuple[float, float, float, float]:
+    """Return wheelbase, stability factor K, steering ratio and speed; stiffness of the tyres."""
+    plan = make_plan(load_scenario(SHIPPED / "proving_ground" / "step_steer.yaml"))
+    units = {unit.name: unit for unit in plan.units}
+    car = units["plant"].parameters
+    m, a, b = (car[name] for name in ("mass", "cg_to_front_axle", "cg_to_rear_axle"))
+    loads = {"fl": m * 9.81 * b / (a + b) / 2, "rl": m * 9.81 * a / (a + b) / 2}
+    stiffness = cornering_stiffness(units["tyre"], loads)
+    k = m / (a + b) ** 2 * (b / stiffness["fl"] - a / stiffness["rl"]) / 2
+    return a + b, k, units["driver"].parameters["steering_ratio"], car["initial_speed"]
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("plant", SINGLE_TRACK)
+def test_the_yaw_gain_of_a_step_of_0_2_m_per_s2_is_that_of_the_single_track_theory(plant):
+    wheelbase, k, ratio, v = theory()
+    gain = v / (wheelbase * (1.0 + k * v * v)) / ratio
+    base = yb.load("proving_ground/step_steer").swap(plant=plant).set(NO_DRAG)
+    judged = evaluate_step(trace_of(base.set({"driver.amplitude": 0.2 / (gain * v)}).run().results))
+    assert judged["acceleration_y_steady"] == pytest.approx(0.2, rel=0.003)
+    assert judged["yaw_rate_gain"] == pytest.approx(gain, rel=0.0005)  # 0.3 % was asked for
+    assert judged.notes == []
+
+
+@pytest.mark.exhaustive
+def test_the_understeer_gradient_of_a_slow_ramp_is_that_of_the_single_track_theory():
+    wheelbase, k, _, _ = theory()
+    run = yb.load("proving_ground/slow_ramp").set({"stop_time": 10.0, **NO_DRAG}).run()
+    judged = evaluate_understeer(trace_of(run.results))
+    assert judged["gradient"] == pytest.approx(k * wheelbase, rel=0.003)  # 1 % was asked for
