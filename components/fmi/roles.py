@@ -53,5 +53,6 @@ ROLES: dict[str, Role] = {
     ),
     "roads": Role("road", outputs=("friction_*", "friction")),
     "sensors": Role("sensor"),
+    "estimators": Role("estimator", outputs=("velocity_x", "sideslip")),
 }
 """Folder below `components/` -> role."""

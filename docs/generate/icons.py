@@ -98,8 +98,17 @@ def sensor(ax: Axes) -> None:
         ax.plot(-0.45 + radius * np.cos(angles), -0.45 + radius * np.sin(angles), INK, lw=6)
 
 
+def estimator(ax: Axes) -> None:
+    t = np.linspace(-0.9, 0.9, 80)
+    shape = 0.6 * np.exp(-4 * t * t)
+    ax.fill_between(t, -0.5, shape - 0.5, color=ACCENT, alpha=0.35, lw=0)
+    ax.plot(t, shape - 0.5, ACCENT, lw=5)
+    ax.plot([-0.9, 0.9], [-0.5, -0.5], INK, lw=5)
+    ax.plot([0, 0], [-0.5, 0.75], INK, lw=5, ls=(0, (2, 1)))
+
+
 ROLES: tuple[Callable[[Axes], None], ...] = (
-    driver, reference, controller, allocator, wheel_control, actuator, plant, tyre, road, sensor,
+    driver, reference, controller, allocator, wheel_control, actuator, plant, tyre, road, sensor, estimator,
 )  # fmt: skip
 
 

@@ -1,0 +1,180 @@
+"""The base of estimators: what sensors say, taken to one state of the car and to all that follows from it.
+
+An estimator overrides two methods:
+
+    begin()                          sets its state, for a car that goes straight ahead
+    lateral(h, r, delta, a_x, a_y, straight)    takes it to a message; returns v_y and dv_y/dt
+
+Common to all, in this order:
+
+    zero points of gyro and a_y      learned straight ahead                        `estimation.zero_points`
+    a_y = (f_y - zero) / (1 + phi_g)        phi_g: roll angle at 1 g               roll compensation
+    v_x                              from wheels and a_x                       `estimation.reference_speed`
+    beta, dbeta/dt                   atan2(v_y, v_x), (v_x dv_y - v_y dv_x) / (v_x^2 + v_y^2)
+    slips, velocities of wheels      kinematics                                 `cars.wheel_kinematics`
+    loads                            quasi-static from a_x, a_y                  `cars.load_transfer`
+
+v_x and v_y are carried on by their rates over `signal_delay`, since messages are late and filtered. The body
+leans by g phi_g per a_y / g, which adds phi_g a_y to what the accelerometer feels.
+
+There is no output `friction_*`: by its name it would drive the tyres of a scenario, and what an estimator
+believes is not the road. Connect `friction` to who has to know it by wheel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan2
+
+from vocabulary.wheels import wheels
+
+from ..cars.load_transfer import quasi_static_loads
+from ..cars.published_cars import PaperB
+from ..cars.wheel_kinematics import slip_angle, slip_ratio, wheel_velocities
+from ..fmi.component import Component
+from ..fmi.variables import like, output, parameter
+from .reference_speed import ReferenceSpeed
+from .zero_points import ZeroPoints
+
+INPUTS = ("yaw_rate", "acceleration_x", "acceleration_y", "steer_angle", "wheel_speed_*")
+NAMES = (
+    *("velocity_x", "velocity_y", "sideslip", "sideslip_rate"),
+    *("slip_angle_*", "slip_ratio_*", "vertical_load_*", "wheel_velocity_*"),
+)
+OUTPUTS = tuple(output(name, *INPUTS[:-1], *wheels("wheel_speed_*")) for name in NAMES)
+"""What every estimator gives, all of it following all inputs at once."""
+
+
+@dataclass(frozen=True)
+class EstimatorParameters:
+    """Of the car, as a control unit knows it, and of what all estimators do."""
+
+    mass: float = like(PaperB, "mass")
+    cg_to_front_axle: float = like(PaperB, "cg_to_front_axle")
+    cg_to_rear_axle: float = like(PaperB, "cg_to_rear_axle")
+    track_width: float = like(PaperB, "track_width")
+    cg_height: float = like(PaperB, "cg_height")
+    wheel_radius: float = like(PaperB, "wheel_radius")
+    roll_at_1_g: float = parameter(
+        0.0, "rad", "Roll angle phi_g of the body at 1 g", "chosen: a car that does not roll", minimum=0.0
+    )
+    slip_stiffness_per_load: float = parameter(
+        20.0,
+        "1",
+        "Slip stiffness c over load of the tyres",
+        "chosen: between dry tyres of 15 and 25",
+        minimum=1.0,
+    )
+    signal_delay: float = parameter(
+        0.02,
+        "s",
+        "Age of what the inertial sensors say",
+        "chosen: 10 ms of a message and its latency, 10 ms of a low pass of 21 Hz",
+        minimum=0.0,
+    )
+    speed_gain: float = parameter(
+        10.0, "1/s", "How fast the speed follows wheels that are believed", "chosen: 0.1 s", minimum=0.0
+    )
+    speed_doubt: float = parameter(
+        0.5, "m/s", "Difference s from which on a wheel is doubted", "chosen: 2 % of 90 km/h", minimum=0.01
+    )
+    straight_steer_angle: float = parameter(
+        0.003, "rad", "Straight ahead: largest steer angle", "chosen: 3 deg at the hand wheel", minimum=0.0
+    )
+    straight_yaw_rate: float = parameter(
+        0.01, "rad/s", "Straight ahead: largest yaw rate", "chosen: six times the gyro's noise", minimum=0.0
+    )
+    straight_time: float = parameter(
+        0.3, "s", "Straight ahead: since when at least", "chosen: a yaw motion has died away", minimum=0.0
+    )
+    zero_point_memory: float = parameter(
+        5.0, "s", "Memory of the zero points", "chosen: beyond the noise, before temperature", minimum=0.1
+    )
+    zero_point_limit_yaw_rate: float = parameter(
+        0.01, "rad/s", "Largest zero point of the gyro", "chosen: twice 0.3 deg/s", minimum=0.0
+    )
+    zero_point_limit_acceleration: float = parameter(
+        0.7, "m/s2", "Largest zero point of a_y", "chosen: 0.2 m/s2 and a bank of 3 deg", minimum=0.0
+    )
+
+
+class Estimator(Component):
+    """Base: an estimator of the car's motion from what its sensors say."""
+
+    sampled = True
+    inputs = INPUTS
+    outputs = OUTPUTS
+
+    # ---- for the estimator ------------------------------------------------------------------
+
+    def begin(self) -> None:
+        """Set the state of a car that goes straight ahead."""
+
+    def lateral(
+        self, h: float, *, r: float, delta: float, a_x: float, a_y: float, straight: float
+    ) -> tuple[float, float]:
+        """Take the state over `h` [s] to a message; return v_y [m/s] and dv_y/dt [m/s2].
+
+        Args:
+            r, delta: yaw rate [rad/s] and steer angle [rad].
+            a_x, a_y: accelerations [m/s2], those of the road plane.
+            straight: time for which the car has gone straight ahead [s].
+        """
+        raise NotImplementedError
+
+    # ---- what all estimators do -------------------------------------------------------------
+
+    def start(self, t: float, u: list[float]) -> None:
+        self.zeros = ZeroPoints(self.p)
+        self.speed = ReferenceSpeed(u[4:8], self.p)
+        self.v_y = 0.0
+        self.begin()
+        self._conclude(u, 0.0, 0.0)
+
+    def advance(self, t: float, h: float, u: list[float]) -> None:
+        if h <= 0.0:
+            return
+        felt_r, a_x, felt_y, delta = u[:4]
+        zeros = self.zeros
+        zeros.see(h, r=felt_r, a_y=felt_y, delta=delta)
+        r = felt_r - zeros.yaw_rate
+        a_y = (felt_y - zeros.acceleration) / (1.0 + self.p.roll_at_1_g)
+        self.speed.see(u[4:8], h, r=r, v_y=self.v_y, delta=delta, a_x=a_x)
+        self.v_y, rate = self.lateral(h, r=r, delta=delta, a_x=a_x, a_y=a_y, straight=zeros.straight)
+        self._conclude(u, a_y, rate)
+
+    def output(self, t: float, u: list[float]) -> list[float]:
+        return self.known
+
+    def _conclude(self, u: list[float], a_y: float, rate: float) -> None:
+        """Set what is known of the car now, from a_y and dv_y/dt [m/s2]."""
+        p = self.p
+        r, a_x, delta = u[0] - self.zeros.yaw_rate, u[1], u[3]
+        ahead = self.speed.rate
+        v_x = max(self.speed.v + p.signal_delay * ahead, 0.0)
+        v_y = self.v_y + p.signal_delay * rate
+        square = max(v_x * v_x + v_y * v_y, LOW_SPEED * LOW_SPEED)
+        velocities = wheel_velocities(
+            v_x,
+            v_y,
+            r=r,
+            delta=delta,
+            a=p.cg_to_front_axle,
+            b=p.cg_to_rear_axle,
+            half_track=0.5 * p.track_width,
+        )
+        along, across = velocities[:4], velocities[4:]
+        self.known = [
+            v_x,
+            v_y,
+            atan2(v_y, v_x),
+            (v_x * rate - v_y * ahead) / square,
+            *(slip_angle(v, side, LOW_SPEED) for v, side in zip(along, across, strict=True)),
+            *(slip_ratio(w * p.wheel_radius, v, LOW_SPEED) for w, v in zip(u[4:8], along, strict=True)),
+            *quasi_static_loads(a_x, a_y, p),
+            *along,
+        ]
+
+
+LOW_SPEED = 2.0
+"""Speed [m/s] that slips and rates refer to when the car is slower; chosen: walking pace."""

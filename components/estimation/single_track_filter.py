@@ -1,0 +1,138 @@
+"""Lateral velocity and friction from yaw rate and lateral acceleration: a Kalman filter on a single track.
+
+    a_m      = (F_f(alpha_f) cos(delta) + F_r(alpha_r)) / m                    `estimation.dugoff_axle`    (1)
+    alpha_f  = atan2(v_y + a r, v_x) - delta,     alpha_r = atan2(v_y - b r, v_x)
+    dv_y/dt  = (1 - share) a_m + share a_y - v_x r,        dmu/dt = 0                                      (2)
+    y        = a_m + noise                                                                           (3)
+
+The state is (v_y, mu), the measurement y the lateral acceleration, which also shares in the prediction; the
+yaw rate is taken as measured. Extended Kalman filter: P follows from the slopes of (1) by v_y and mu. While
+the tyres grip, a_m depends on v_y alone and mu stays; where they slide, it depends on mu, which is then
+learned upwards and downwards. So friction is known only where it is used.
+
+Guards, because a prediction that learns may explain anything:
+
+    mu >= used_share max over the last seconds of |a_y| / g, forgotten with `friction_memory`              (4)
+    v_y fades within `straight_fade` once the car goes straight ahead                                      (5)
+    P_mu <= initial_friction_deviation^2, so that friction stays where it was rather than nowhere          (6)
+
+Source: R. E. Kalman, Journal of Basic Engineering 82(1), 1960, 35-45; that sideslip and friction are
+observed together, H. F. Grip et al., Vehicle sideslip estimation, IEEE Control Systems Magazine 29(5), 2009,
+36-52. Ours has other tyres and another gain, and adds the share and (4) to (6).
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos
+from typing import Protocol
+
+from ..mathematics.gravity import G
+from .dugoff_axle import axle_force
+
+SLOWEST = 2.0
+"""Speed [m/s] below which slip angles are taken at this speed; chosen: walking pace."""
+SMALLEST = 0.05
+"""Least friction [1]; chosen: wet ice."""
+
+
+class FilterTuning(Protocol):
+    """The car and how far model, measurement and friction are trusted."""
+
+    @property
+    def mass(self) -> float: ...
+    @property
+    def cg_to_front_axle(self) -> float: ...
+    @property
+    def cg_to_rear_axle(self) -> float: ...
+    @property
+    def cg_height(self) -> float: ...
+    @property
+    def cornering_stiffness_front(self) -> float: ...
+    @property
+    def cornering_stiffness_rear(self) -> float: ...
+    @property
+    def initial_friction(self) -> float: ...
+    @property
+    def initial_friction_deviation(self) -> float: ...
+    @property
+    def largest_friction(self) -> float: ...
+    @property
+    def friction_memory(self) -> float: ...
+    @property
+    def used_share(self) -> float: ...
+    @property
+    def measured_share(self) -> float: ...
+    @property
+    def velocity_wander(self) -> float: ...
+    @property
+    def friction_wander(self) -> float: ...
+    @property
+    def acceleration_deviation(self) -> float: ...
+    @property
+    def straight_time(self) -> float: ...
+    @property
+    def straight_fade(self) -> float: ...
+
+
+class SingleTrackFilter:
+    """v_y [m/s] and its rate [m/s2], mu [1], begun straight ahead."""
+
+    def __init__(self, p: FilterTuning) -> None:
+        self.p = p
+        self.v_y = self.rate = 0.0
+        self.mu = p.initial_friction
+        self.used = 0.0
+        self.p_v, self.p_vm, self.p_m = 0.0, 0.0, p.initial_friction_deviation**2
+
+    def model(self, *, v_x: float, r: float, delta: float, a_x: float) -> tuple[float, float, float]:
+        """Return a_m [m/s2] and its slopes by v_y [1/s] and mu [m/s2]; equation (1)."""
+        p = self.p
+        a, b, weight = (
+            p.cg_to_front_axle,
+            p.cg_to_rear_axle,
+            p.mass / (p.cg_to_front_axle + p.cg_to_rear_axle),
+        )
+        v = max(v_x, SLOWEST)
+        front, rear = atan2(self.v_y + a * r, v), atan2(self.v_y - b * r, v)
+        lift = p.cg_height * a_x
+        f, f_alpha, f_mu = axle_force(
+            front - delta, weight * max(G * b - lift, 0.1 * G * b), self.mu, p.cornering_stiffness_front
+        )
+        q, q_alpha, q_mu = axle_force(
+            rear, weight * max(G * a + lift, 0.1 * G * a), self.mu, p.cornering_stiffness_rear
+        )
+        turned = cos(delta)
+        by_v = (f_alpha * turned * cos(front) ** 2 + q_alpha * cos(rear) ** 2) / v
+        return (f * turned + q) / p.mass, by_v / p.mass, (f_mu * turned + q_mu) / p.mass
+
+    def see(
+        self, h: float, *, v_x: float, r: float, delta: float, a_x: float, a_y: float, straight: float
+    ) -> None:
+        """Take the state over `h` [s] to a message; equations (2) to (6).
+
+        Args:
+            v_x, r, delta, a_x, a_y: speed [m/s], yaw rate [rad/s], steer angle [rad], accelerations [m/s2].
+            straight: time for which the car has gone straight ahead [s].
+        """
+        p = self.p
+        at = {"v_x": v_x, "r": r, "delta": delta, "a_x": a_x}
+        a_m, by_v, by_mu = self.model(**at)
+        rest = 1.0 - p.measured_share
+        self.rate = rest * a_m + p.measured_share * a_y - v_x * r
+        self.v_y += h * self.rate
+        f, g = 1.0 + h * rest * by_v, h * rest * by_mu
+        p_v, p_vm, p_m = self.p_v, self.p_vm, self.p_m
+        p_v = f * (f * p_v + g * p_vm) + g * (f * p_vm + g * p_m) + h * p.velocity_wander**2
+        p_vm = f * p_vm + g * p_m
+        p_m = min(p_m + h * p.friction_wander**2, p.initial_friction_deviation**2)
+        a_m, by_v, by_mu = self.model(**at)
+        to_v, to_m = p_v * by_v + p_vm * by_mu, p_vm * by_v + p_m * by_mu
+        spread = by_v * to_v + by_mu * to_m + p.acceleration_deviation**2
+        self.v_y += to_v * (a_y - a_m) / spread
+        self.mu += to_m * (a_y - a_m) / spread
+        self.p_v, self.p_vm = p_v - to_v * to_v / spread, p_vm - to_v * to_m / spread
+        self.p_m = p_m - to_m * to_m / spread
+        self.used = max(self.used * (1.0 - min(h / p.friction_memory, 1.0)), abs(a_y) / G)
+        self.mu = min(max(self.mu, p.used_share * self.used, SMALLEST), p.largest_friction)
+        if straight > p.straight_time:
+            self.v_y *= 1.0 - min(h / p.straight_fade, 1.0)

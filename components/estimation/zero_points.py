@@ -1,0 +1,58 @@
+"""Zero points of gyro and lateral accelerometer, learned while a car goes straight ahead.
+
+Straight ahead means |delta|, |r| and |a_y|, as they come, below thresholds for some time. The zero points are
+then the mean of what is measured: of all such messages at first, with a long memory later
+
+    b <- b + max(1 / n, h / memory) (y - b)
+
+A zero point of the accelerometer is also what a bank of the road gives. What is learned is limited: a car
+does not have more.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+
+class ZeroTuning(Protocol):
+    """When a car is taken to go straight ahead, and for how long that counts."""
+
+    @property
+    def straight_steer_angle(self) -> float: ...
+    @property
+    def straight_yaw_rate(self) -> float: ...
+    @property
+    def straight_time(self) -> float: ...
+    @property
+    def zero_point_memory(self) -> float: ...
+    @property
+    def zero_point_limit_yaw_rate(self) -> float: ...
+    @property
+    def zero_point_limit_acceleration(self) -> float: ...
+
+
+class ZeroPoints:
+    """Zero points of yaw rate [rad/s] and lateral acceleration [m/s2], and the time straight ahead [s]."""
+
+    def __init__(self, p: ZeroTuning) -> None:
+        self.p = p
+        self.yaw_rate = self.acceleration = 0.0
+        self.messages = 0
+        self.straight = 0.0
+
+    def see(self, h: float, *, r: float, a_y: float, delta: float) -> None:
+        """Learn from a message, `h` [s] after the last: yaw rate, lateral acceleration, steer angle."""
+        p = self.p
+        if abs(delta) > p.straight_steer_angle or abs(r - self.yaw_rate) > p.straight_yaw_rate:
+            self.straight = 0.0
+            return
+        self.straight += h
+        if self.straight < p.straight_time and self.messages >= 10:
+            return
+        self.messages += 1
+        part = max(1.0 / self.messages, h / p.zero_point_memory)
+        self.yaw_rate += part * (r - self.yaw_rate)
+        self.acceleration += part * (a_y - self.acceleration)
+        most, most_a = p.zero_point_limit_yaw_rate, p.zero_point_limit_acceleration
+        self.yaw_rate = min(max(self.yaw_rate, -most), most)
+        self.acceleration = min(max(self.acceleration, -most_a), most_a)

@@ -1,0 +1,1 @@
+"""Estimators: what a car can know of what it does not measure."""
