@@ -51,8 +51,8 @@ def _(mo):
 def _(controller, friction, speed, steering, yb):
     scenario = yb.load("fnn_sideslip/25mps").set(
         {
-            "plant.initial_speed": speed.value,
-            "inputs.friction*": friction.value,
+            "speed": speed.value,
+            "friction": friction.value,
             "driver.amplitude": steering.value,
         }
     )

@@ -19,7 +19,7 @@ UNITS = {
     "controller": ("controller_fnn", ", step_size: 0.002"),
     "allocator": ("allocator_load_proportional", ", step_size: 0.002"),
     "wheel_control": ("wheel_control_direct", ", step_size: 0.002"),
-    "plant": ("plant_seven_dof", ", parameters: {initial_speed: 25.0}"),
+    "plant": ("plant_seven_dof", ""),
     "tyre": ("tyre_dugoff", ""),
 }
 """Unit -> FMU and what else a scenario says of it: paper A's run at 25 m/s."""

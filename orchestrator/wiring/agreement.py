@@ -77,7 +77,7 @@ def _two_values(units: Mapping[str, Unit]) -> Iterator[Finding]:
     """Yield a remark for everything that two units are told differently.
 
     Not if the scenario gives both values for their units, or both are the FMUs' own of what is no
-    property of the car: then they are meant.
+    property of the car: then they are meant. But a speed held that is not that of the start is always told.
     """
     in_facts = {name for fact in FACTS.values() for name in (*fact.inputs, *fact.parameters)}
     groups: dict[str, list[Told]] = {}
@@ -90,7 +90,8 @@ def _two_values(units: Mapping[str, Unit]) -> Iterator[Finding]:
     for name, fact in FACTS.items():
         told = [one for one in _parameters(units.values()) if fact.counts(units[one.unit], one.name)]
         told += [one for one in _constants(units.values()) if one.name in fact.inputs]
-        if _differ(told) and {one.origin for one in told} not in ({"scenario"}, {"default"}):
+        meant = ({"scenario"}, {"default"}) if fact.inputs else ()  # a road may differ from wheel to wheel
+        if _differ(told) and {one.origin for one in told} not in meant:
             yield _finding(name, told, f"--set {name}=VALUE gives all of them one value")
 
 

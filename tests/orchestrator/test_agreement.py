@@ -159,6 +159,8 @@ def test_a_speed_held_by_the_driver_that_is_not_the_cars_is_named():
         "--set speed=VALUE gives all of them one value"
     ]
     assert remarks("plant.initial_speed=80 km/h") == []  # the driver holds no speed
+    (both,) = remarks(plant="initial_speed: 20", driver="speed_gain: 100, target_speed: 30")
+    assert both.startswith("speed has two values: driver.target_speed 30 m/s (scenario), plant.initial")
 
 
 def test_one_mass_for_the_reference_and_another_for_the_plant_is_named():

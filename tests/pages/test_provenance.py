@@ -53,6 +53,8 @@ parameters:
   mass: 1100                     # kg
   cg_to_front_axle: 1.2          # m; erratum: printed as 12
   cg_to_rear_axle: 1.4           # m; chosen: a guess
+  cornering_stiffness_front: 1e5 # N/rad
+  cornering_stiffness_rear: 1e5
 """
 
 
