@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -19,6 +20,8 @@ FACTS = ("friction", "speed")
 """What one change tells all units that have to know it (see `wiring.shared_facts`)."""
 TYRES = "tyres"
 """What names the tyre property files, of both axles or as `tyres.front`, `tyres.rear` of one."""
+FAULTS = "faults"
+"""What a change of the faults at a place begins with: `faults.sensor.yaw_rate`."""
 SENSING = {"sensor": "measurement", "estimator": "estimate"}
 """Role of a unit -> what its outputs are, of what the car does."""
 Algorithm = Literal["jacobi", "gauss_seidel", "extrapolated"]
@@ -199,6 +202,24 @@ class Wire:
 
 
 @dataclass(frozen=True)
+class Fault:
+    """What goes wrong with a signal: with an output for all who take it, or with an input alone."""
+
+    unit: str
+    variable: str
+    of_output: bool
+    kind: str  # see `scenario.fault_schema.KINDS`
+    value: float | None = None  # in the variable's unit, or as the kind has it
+    begin: float = -math.inf  # [s]
+    end: float = math.inf  # [s], no longer faulty then
+    share: float = 0.0  # of the messages
+    every: float = 0.0  # time from one message to the next [s]
+    stream: int = 0  # of random numbers, below 2**64
+    place: str = ""  # as written: "plant.yaw_rate -> sensor"
+    says: str = ""  # likewise: "freeze from 2 s"
+
+
+@dataclass(frozen=True)
 class Change:
     """One thing that is other than in the scenario file."""
 
@@ -216,8 +237,16 @@ class Change:
         """Whether the FMU of a unit was replaced."""
         return "." not in self.place and self.place not in (*OF_RUN, "vehicle", TYRES, *FACTS)
 
+    @property
+    def faulty(self) -> str | None:
+        """Where it puts faults, None if it changes something else."""
+        holder, _, place = self.place.partition(".")
+        return place if holder == FAULTS and place else None
+
     def __str__(self) -> str:
         value = str(self.value).lower() if isinstance(self.value, bool) else str(self.value)
+        if self.faulty:
+            return f"{self.origin} {cut(self.faulty)}: {cut(value)}"
         return f"{self.origin} {cut(self.place)}={cut(value)}"
 
 
@@ -248,6 +277,7 @@ class Plan:
     notes: tuple[str, ...] = ()  # worth telling the user, but no error
     changes: tuple[Change, ...] = ()  # against the scenario file
     findings: tuple[Finding, ...] = ()  # on given values
+    faults: tuple[Fault, ...] = ()  # those of one variable in the order in which they act
 
     def time(self, k: int) -> float:
         """Return the time [s] of communication point `k`, correctly rounded."""

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from .plan import Change
+from .plan import Change, Plan
 
 OF_TIME = ("start_time", "stop_time", "step_size")
 """Changes of the run that are times."""
@@ -20,6 +20,8 @@ def changed(changes: Iterable[Change]) -> str:
 def in_words(change: Change) -> str:
     """Return a change in words."""
     value = change.value
+    if change.faulty:
+        return f"{change.faulty}: {value}"
     if change.swaps:
         return f"{fmu_of(change)} for {change.place}"
     if change.place == "vehicle":
@@ -32,6 +34,11 @@ def in_words(change: Change) -> str:
     is_time = change.place in OF_TIME or change.place.endswith(".step_size")
     seconds = " s" if is_time and not isinstance(value, str) else ""
     return f"{change.place} = {text}{seconds}"
+
+
+def faults_of(plan: Plan) -> str:
+    """Return the faults of a plan in words."""
+    return "; ".join(dict.fromkeys(f"{one.place}: {one.says}" for one in plan.faults))
 
 
 def with_changes(title: str, changes: Iterable[Change]) -> str:

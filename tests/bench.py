@@ -111,13 +111,13 @@ def bench(path: Path) -> None:
         times = [1e-3 * meter.spent[unit.name, kind] * unit.period / n for kind in ("set", "step", "get")]
         cells = "".join(f"{t:8.2f}" for t in (*times, sum(times)))
         print(f"  {unit.name:24s}{cells}   {'1' if unit.period == 1 else f'1/{unit.period}'}")
-    inside = {kind: 0.0 for kind in ("set", "step", "get", "gather", "keep")}
+    inside = {kind: 0.0 for kind in ("set", "step", "get", "gather", "keep", "fault")}
     for (_, kind), spent in meter.spent.items():
         inside[kind] += 1e-3 * spent / n
     whole = 1e6 * best["step"]
     loop = 1e6 * min(measure(plan, lambda operation: [])["step"] for _ in range(REPEATS))
     units_share = inside["set"] + inside["step"] + inside["get"]
-    own = inside["gather"] + inside["keep"] + loop
+    own = inside["gather"] + inside["keep"] + inside["fault"] + loop
     print(f"\n  per communication step   {whole:8.2f} us")
     print(
         f"    in the units           {units_share:8.2f} us: set {inside['set']:.2f}, "

@@ -6,7 +6,9 @@ from orchestrator.plan import Change, Value
 from orchestrator.scenario.overrides import read_changes
 
 
-def changed(swaps: Iterable[str] = (), settings: Iterable[str] = (), **of_run: Value) -> tuple[Change, ...]:
-    """Return what --swap and --set with these texts change, and times and the algorithm by name."""
+def changed(
+    swaps: Iterable[str] = (), settings: Iterable[str] = (), faults: Iterable[str] = (), **of_run: Value
+) -> tuple[Change, ...]:
+    """Return what --swap, --set and --fault with these texts change, and times and the algorithm by name."""
     named = [Change(place, value, "test") for place, value in of_run.items()]
-    return (*read_changes(swaps, settings), *named)
+    return (*read_changes(swaps, settings, faults), *named)

@@ -17,6 +17,7 @@ from orchestrator.plan import Change, Plan, Value
 from orchestrator.results.read import Results
 from orchestrator.scenario import catalogue, scenario_schema
 from orchestrator.scenario.load import load_scenario
+from orchestrator.scenario.overrides import read_changes
 from orchestrator.tyres.axle_stiffness import cornering_stiffness
 from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wording import hint
@@ -119,6 +120,44 @@ class Scenario:
         """
         changed = [Change(place, value, "set") for place, value in values.items()]
         scenario = replace(self, changes=(*self.changes, *changed))
+        scenario.loaded  # noqa: B018 - what is wrong is said now
+        return scenario
+
+    def fault(
+        self,
+        place: str,
+        *,
+        kind: str,
+        value: float | str | None = None,
+        start: float | str | None = None,
+        until: float | str | None = None,
+        **told: float | str,
+    ) -> Scenario:
+        """Return the scenario with a fault; several at one place act one after the other.
+
+            >>> blind = base.fault("plant.sideslip", kind="freeze", start=1.5)
+            >>> blind = blind.fault("plant.sideslip -> controller", kind="bias", value="0.5 deg", until=3)
+            >>> [fault["fault"] for fault in blind.run().record["faults"]]
+            ['freeze from 1.5 s', 'bias 0.5 deg until 3 s']
+
+        Args:
+            place: `unit.output` for all who take it and the results, `unit.output -> unit` on the way to
+                one of them, `unit.input`; a `*` stands for several.
+            kind: bias, gain, drift, noise, freeze, value, dropout, outlier, delay, saturation, loss or stuck.
+            value: as the kind has it: in SI, or with its unit.
+            start, until: when it begins and ends [s]; default: with the run.
+            told: `share` of the messages, `every` how often they come [s], `seed` of what is random.
+
+        Raises:
+            ScenarioError: there is no such place or kind, or it takes something else.
+        """
+        given = {"value": value, **told, "from": start, "until": until}
+        words = [f"{name} {x}" if name != "value" else f"{x}" for name, x in given.items() if x is not None]
+        (one,) = read_changes(faults=[f"{place}: {' '.join([kind, *words])}"])
+        earlier = next((c for c in self.changes if (c.place, c.origin) == (one.place, "fault")), None)
+        line = f"{earlier.value}; {one.value}" if earlier else one.value
+        others = [change for change in self.changes if change is not earlier]
+        scenario = replace(self, changes=(*others, Change(one.place, line, "fault")))
         scenario.loaded  # noqa: B018 - what is wrong is said now
         return scenario
 

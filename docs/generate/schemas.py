@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from orchestrator.experiments import schema as experiment
+from orchestrator.scenario import fault_schema
 from orchestrator.scenario import scenario_schema as scenario
 
 from .text import NOTE, cell, code, docstring, table
@@ -97,6 +98,8 @@ def _kind(annotation: Any, models: list[type[BaseModel]]) -> str:
         return f"[{title(annotation)}](#{title(annotation).lower()})"
     if annotation is scenario.Endpoint:
         return "text: unit.variable"
+    if annotation is fault_schema.Place:
+        return "text: unit.variable, unit.output -> unit"
     if origin is typing.Annotated:
         return _kind(arms[0], models)
     if origin is Literal:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .options import Fmus, NoBuild, Set, Swap
+from .options import Fault, Fmus, NoBuild, Set, Swap
 from .recorded import Labels, Sources
 
 Page = Annotated[Path | None, typer.Option("--out", metavar="FILE.html", help="The page to write.")]
@@ -18,6 +18,7 @@ def animate(
     label: Labels = None,
     swap: Swap = None,
     set_: Set = None,
+    fault: Fault = None,
     out: Page = None,
     fmus: Fmus = None,
     no_build: NoBuild = False,
@@ -40,7 +41,9 @@ def animate(
 
     if len(sources) > MOST:
         raise ScenarioError(f"an animation shows up to {MOST} runs, not {len(sources)}")
-    folders = recorded(sources, read_changes(swap or (), set_ or ()), fmus, None, build=not no_build)
+    folders = recorded(
+        sources, read_changes(swap or (), set_ or (), fault or ()), fmus, None, build=not no_build
+    )
     runs = list(zip(labels_of(folders, label), map(load_results, folders), strict=True))
     titles = [str(results.run.get("title") or name) for name, results in runs]
     changed = changed_each([(name, changes_in(results.run)) for name, results in runs])

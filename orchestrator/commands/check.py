@@ -12,7 +12,7 @@ import typer
 from ..plan import OF_RUN
 from ..wording import printable
 from .batch import say
-from .options import Fmus, NoBuild, NoValidate, ScenarioFile, Set, Swap
+from .options import Fault, Fmus, NoBuild, NoValidate, ScenarioFile, Set, Swap
 from .planning import plan_of_scenario
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ def check(
     scenario: ScenarioFile,
     swap: Swap = None,
     set_: Set = None,
+    fault: Fault = None,
     fmus: Fmus = None,
     all_: All = False,
     no_build: NoBuild = False,
@@ -41,7 +42,9 @@ def check(
     Every value is shown with its origin, the units with the reason for their order, and what the
     control side sees as the truth, a measurement or an estimate.
     """
-    plan = plan_of_scenario(scenario, swap, set_, fmus=fmus, build=not no_build, validate=not no_validate)
+    plan = plan_of_scenario(
+        scenario, swap, set_, fault, fmus=fmus, build=not no_build, validate=not no_validate
+    )
     show(plan, scenario, defaults=all_)
     for note in plan.notes:
         say(f"note: {note}")
@@ -88,6 +91,7 @@ def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None
         _show(console, "Wires", ("from", "to", "as", "variables"), wires)
     else:
         _show(console, "Wires", ("from", "to", "variables"), [(of, to, what) for of, to, _, what in wires])
+    _show(console, "Faults", ("on", "what", "of"), _fault_rows(plan))
     direct = evaluate({unit.name: unit.fmu for unit in plan.units}, plan.wires).direct
     headings = ("unit", "after", "because its outputs follow")
     _show(console, "Why this order", headings, _order_rows(plan, direct))
@@ -220,6 +224,14 @@ def _wire_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
                 measure = f"{of or '?'} → {measure or '?'}: {_scaled(example)}"
             shown.append(f"{ends} [{measure}]" if measure else ends)
         yield source, target, seen_as(wires[0], plan.units), ", ".join(shown)
+
+
+def _fault_rows(plan: Plan) -> Iterable[Sequence[str]]:
+    from ..results.run_record import faults_of
+    from ..wording import fold
+
+    for fault in faults_of(plan):
+        yield fault["on"], fault["fault"], ", ".join(fold(fault["at"]))
 
 
 def _scaled(wire: Wire) -> str:

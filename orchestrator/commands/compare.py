@@ -9,7 +9,19 @@ import typer
 
 from .batch import Jobs, hold, print_tables
 from .experiment import Wishes, chapter_of, command_of, conduct, write_page
-from .options import CallLimit, Fmus, Format, Fresh, Isolate, NoBuild, Out, ScenarioFile, Set, isolation
+from .options import (
+    CallLimit,
+    Fault,
+    Fmus,
+    Format,
+    Fresh,
+    Isolate,
+    NoBuild,
+    Out,
+    ScenarioFile,
+    Set,
+    isolation,
+)
 
 Swaps = Annotated[
     list[str],
@@ -27,6 +39,7 @@ def compare(
     scenario: ScenarioFile,
     swap: Swaps,
     set_: Set = None,
+    fault: Fault = None,
     out: Out = None,
     fmus: Fmus = None,
     no_build: NoBuild = False,
@@ -50,14 +63,14 @@ def compare(
     from ..results.naming import default_folder
     from ..scenario.overrides import read_changes
 
-    for_each = read_changes(settings=set_ or ())
+    for_each = read_changes(settings=set_ or (), faults=fault or ())
     folder: Path = out or default_folder(scenario, for_each, suffix="-compare")
     check_format(format_)
     hold(context, folder)
     wishes = Wishes(fmus, not no_build, jobs, None, format_, isolation(isolate, call_limit), fresh=fresh)
     findings = conduct(comparison(scenario, swap, for_each), folder, wishes)
     print_tables([comparison_table(findings)])
-    command = command_of("compare", scenario, swap=swap, set=set_)
+    command = command_of("compare", scenario, swap=swap, set=set_, fault=fault)
     facts = {"comparison": comparison_facts(findings)}
     write_page([chapter_of(findings, folder, command, shown_in=folder, **facts)], folder)
     if findings.failed:

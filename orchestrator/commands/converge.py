@@ -9,7 +9,7 @@ import typer
 from ..plan import Algorithm
 from .batch import hold, print_tables
 from .experiment import Wishes, chapter_of, command_of, conduct, write_page
-from .options import CallLimit, Fmus, Isolate, NoBuild, Out, ScenarioFile, Set, Swap, isolation
+from .options import CallLimit, Fault, Fmus, Isolate, NoBuild, Out, ScenarioFile, Set, Swap, isolation
 
 Halvings = Annotated[
     int, typer.Option("--halvings", metavar="N", min=2, max=10, help="How often the step is halved.")
@@ -34,6 +34,7 @@ def converge(
     algorithm: Algorithms = None,
     swap: Swap = None,
     set_: Set = None,
+    fault: Fault = None,
     out: Out = None,
     fmus: Fmus = None,
     no_build: NoBuild = False,
@@ -62,7 +63,7 @@ def converge(
         if name not in get_args(Algorithm):
             guess = hint(name, get_args(Algorithm), lead="there are")
             raise ScenarioError(f"--algorithm {name}: no such algorithm{guess}")
-    given = read_changes(swap or (), set_ or ())
+    given = read_changes(swap or (), set_ or (), fault or ())
     folder = out or default_folder(scenario, given, suffix="-converge")
     hold(context, folder)
     experiment = refinements(

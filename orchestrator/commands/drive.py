@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .batch import Jobs
-from .options import CallLimit, Fmus, Fresh, Isolate, NoBuild, Out, Set, Swap, isolation
+from .options import CallLimit, Fault, Fmus, Fresh, Isolate, NoBuild, Out, Set, Swap, isolation
 
 if TYPE_CHECKING:
     from ..experiments.jobs import Job
@@ -48,6 +48,7 @@ def drive(
     test: Which,
     swap: Swap = None,
     set_: Set = None,
+    fault: Fault = None,
     vehicle: Vehicle = None,
     scenario: Scenario = "proving_ground/sine_with_dwell",
     slow_steer: Slow = "proving_ground/slowly_increasing_steer",
@@ -82,7 +83,7 @@ def drive(
     from .batch import hold, say
     from .evaluate import angle_of, conclude
 
-    changes = (*_vehicle(vehicle), *read_changes(swap or (), set_ or ()))
+    changes = (*_vehicle(vehicle), *read_changes(swap or (), set_ or (), fault or ()))
     one_run = catalogue.find(scenario, "a scenario")
     folder = out or default_folder(one_run, changes, suffix="_series")
     limit = isolation(isolate, call_limit)

@@ -259,7 +259,8 @@ def of_files(
             experiment.path,
             quick=wishes.quick and experiment.spec.region is not None,
             swap=[f"{one.place}={one.value}" for one in changes if one.swaps],
-            set=[f"{one.place}={one.value}" for one in changes if not one.swaps],
+            set=[f"{one.place}={one.value}" for one in changes if not (one.swaps or one.faulty)],
+            fault=[f"{one.faulty}: {one.value}" for one in changes if one.faulty],
         )
         chapters.append(chapter_of(findings, folder, command, shown_in=page))
         failed = failed or bool(findings.failed)

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from .batch import say
-from .options import Fmus, NoBuild, ScenarioFile, Set, Swap
+from .options import Fault, Fmus, NoBuild, ScenarioFile, Set, Swap
 from .planning import plan_of_scenario
 
 Archive = Annotated[
@@ -27,6 +27,7 @@ def export_ssp(
     scenario: ScenarioFile,
     swap: Swap = None,
     set_: Set = None,
+    fault: Fault = None,
     out: Archive = None,
     for_: For = "all",
     standard: Standard = "1.0",
@@ -39,9 +40,12 @@ def export_ssp(
     """
     from ..interop.omsimulator import for_omsimulator
     from ..interop.ssp_write import write_ssp
+    from ..titles import faults_of
 
-    plan = plan_of_scenario(scenario, swap, set_, fmus=fmus, build=not no_build)
+    plan = plan_of_scenario(scenario, swap, set_, fault, fmus=fmus, build=not no_build)
     notes = list(plan.notes)
+    if plan.faults:
+        notes.append(f"faults are not part of the archive: {faults_of(plan)}")
     if for_ == "omsimulator":
         plan, more = for_omsimulator(plan)
         notes += more

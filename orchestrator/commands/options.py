@@ -47,6 +47,16 @@ Set = Annotated[
         "start_time, stop_time, step_size, algorithm. Repeatable.",
     ),
 ]
+Fault = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fault",
+        metavar="'PLACE: KIND VALUE'",
+        help="Let something go wrong, such as 'plant.yaw_rate -> sensor: freeze from 2 s until 3 s'; place: "
+        "unit.output, unit.output -> unit or unit.input; kind: bias, gain, drift, noise, freeze, value, "
+        "dropout, outlier, delay, saturation, loss, stuck; none: not what the scenario has. Repeatable.",
+    ),
+]
 Fresh = Annotated[
     bool,
     typer.Option("--fresh", "--again", help="Make all runs anew, those too that have been made already."),

@@ -14,6 +14,7 @@ def plan_of_scenario(
     scenario: Path,
     swap: Sequence[str] | None,
     set_: Sequence[str] | None,
+    fault: Sequence[str] | None = None,
     *,
     fmus: Path | None,
     build: bool,
@@ -24,7 +25,7 @@ def plan_of_scenario(
 
     Args:
         scenario: file.
-        swap, set_: options as given.
+        swap, set_, fault: options as given.
         fmus: folder of FMUs given by name.
         build: build first what is stale of the FMUs that it uses.
         isolated: each unit will have a process of its own.
@@ -39,7 +40,9 @@ def plan_of_scenario(
     from ..tyres.axle_stiffness import cornering_stiffness
     from ..wiring.make_plan import make_plan
 
-    loaded = load_scenario(scenario, changes=read_changes(swap or (), set_ or ()), validate=validate)
+    loaded = load_scenario(
+        scenario, changes=read_changes(swap or (), set_ or (), fault or ()), validate=validate
+    )
     return make_plan(
         loaded, fmus=fmus, opener=Opener(build=build), isolated=isolated, measure=cornering_stiffness
     )

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .options import CallLimit, Fmus, Isolate, NoBuild, Out, Set, Swap, isolation
+from .options import CallLimit, Fault, Fmus, Isolate, NoBuild, Out, Set, Swap, isolation
 from .recorded import Labels, Sources
 
 Panels = Annotated[
@@ -27,6 +27,7 @@ def plot(
     panel: Panels = None,
     swap: Swap = None,
     set_: Set = None,
+    fault: Fault = None,
     out: Out = None,
     fmus: Fmus = None,
     no_build: NoBuild = False,
@@ -49,7 +50,9 @@ def plot(
     from .recorded import folder_of_all, labels_of, recorded
 
     limit = isolation(isolate, call_limit)
-    folders = recorded(sources, read_changes(swap or (), set_ or ()), fmus, limit, build=not no_build)
+    folders = recorded(
+        sources, read_changes(swap or (), set_ or (), fault or ()), fmus, limit, build=not no_build
+    )
     labels = labels_of(folders, label)
     runs = [Run(name, load_results(folder, thin=True)) for name, folder in zip(labels, folders, strict=True)]
     check_panels(runs, panel or ())

@@ -48,7 +48,7 @@ def recorded(
     sources = [one if os.path.exists(one) else catalogue.named(one) or one for one in sources]
     scenarios = [one for one in sources if one.suffix in catalogue.ENDINGS and not os.path.isdir(one)]
     if changes and not scenarios:
-        raise ScenarioError("--swap and --set change a scenario; only folders of results are given")
+        raise ScenarioError("--swap, --set and --fault change a scenario; only folders of results are given")
     given = [Job(one.stem, one, Path(), changes, fmus, call_limit=limit) for one in scenarios]
     jobs = {}
     for job in ready(given, once=Once(build=build)):

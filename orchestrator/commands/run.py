@@ -14,6 +14,7 @@ import typer
 from .batch import say
 from .options import (
     CallLimit,
+    Fault,
     Fmus,
     Format,
     Isolate,
@@ -56,6 +57,7 @@ def run(
     scenario: ScenarioFile,
     swap: Swap = None,
     set_: Set = None,
+    fault: Fault = None,
     out: Out = None,
     name: Name = None,
     fmus: Fmus = None,
@@ -88,7 +90,7 @@ def run(
     metrics = _metric_names(metric or ())
     limit = isolation(isolate, call_limit)
     plan = plan_of_scenario(
-        scenario, swap, set_, fmus=fmus, build=not no_build, validate=not no_validate, isolated=isolate
+        scenario, swap, set_, fault, fmus=fmus, build=not no_build, validate=not no_validate, isolated=isolate
     )
     if named := [name for name in metric or () if name != "standard"]:
         from ..metrics import run_metrics

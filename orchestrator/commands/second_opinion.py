@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .batch import say
-from .options import Fmus, NoBuild, ScenarioFile, Set, Swap
+from .options import Fault, Fmus, NoBuild, ScenarioFile, Set, Swap
 from .planning import plan_of_scenario
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ def second_opinion(
     scenario: ScenarioFile,
     swap: Swap = None,
     set_: Set = None,
+    fault: Fault = None,
     fmus: Fmus = None,
     no_build: NoBuild = False,
     master: Masters = None,
@@ -41,7 +42,7 @@ def second_opinion(
     """
     from ..errors import ScenarioError, SimulationError
     from ..interop.second_opinion import MASTERS, second_opinion
-    from ..titles import changed
+    from ..titles import changed, faults_of
     from ..wording import hint
 
     known = {one.title.lower(): one for one in MASTERS}
@@ -49,7 +50,9 @@ def second_opinion(
         if name.lower() not in known:
             raise ScenarioError(f"--master {name}: there is no such master{hint(name, known, lead='known')}")
     chosen = [known[name.lower()] for name in master or known]
-    plan = plan_of_scenario(scenario, swap, set_, fmus=fmus, build=not no_build)
+    plan = plan_of_scenario(scenario, swap, set_, fault, fmus=fmus, build=not no_build)
+    if plan.faults:
+        raise ScenarioError(f"{scenario}: other masters know nothing of faults; leave out {faults_of(plan)}")
     if plan.changes:
         say(f"changed: {changed(plan.changes)}")
     with tempfile.TemporaryDirectory(prefix="yawbench-") as folder:

@@ -11,6 +11,7 @@ from .batch import Jobs
 from .experiment import Wishes, of_files
 from .options import (
     CallLimit,
+    Fault,
     Fmus,
     Format,
     Fresh,
@@ -36,6 +37,7 @@ def study(
     file: StudyFile,
     swap: Swap = None,
     set_: Set = None,
+    fault: Fault = None,
     out: Out = None,
     fmus: Fmus = None,
     no_build: NoBuild = False,
@@ -68,4 +70,4 @@ def study(
         no_run=no_run,
         quick=quick,
     )
-    of_files(context, [file], read_changes(swap or (), set_ or ()), out, wishes)
+    of_files(context, [file], read_changes(swap or (), set_ or (), fault or ()), out, wishes)

@@ -11,6 +11,7 @@ from .batch import Jobs
 from .experiment import Wishes, of_files
 from .options import (
     CallLimit,
+    Fault,
     Fmus,
     Format,
     Fresh,
@@ -38,6 +39,7 @@ def sweep(
     file: SweepFile,
     swap: Swap = None,
     set_: Set = None,
+    fault: Fault = None,
     out: Out = None,
     fmus: Fmus = None,
     no_build: NoBuild = False,
@@ -62,4 +64,4 @@ def sweep(
     wishes = Wishes(
         fmus, not no_build, jobs, scheduler, format_, isolation(isolate, call_limit), keep, fresh, no_run
     )
-    of_files(context, [file], read_changes(swap or (), set_ or ()), out, wishes)
+    of_files(context, [file], read_changes(swap or (), set_ or (), fault or ()), out, wishes)

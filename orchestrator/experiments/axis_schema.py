@@ -6,7 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, model_validator
 
-from ..plan import FACTS, OF_RUN, Algorithm
+from ..plan import FACTS, FAULTS, OF_RUN, Algorithm
+from ..scenario.fault_schema import FaultSpec
 from ..scenario.measurement_units import parse_unit
 from ..scenario.scenario_schema import Scalar, Time
 from ..scenario.strict import Strict
@@ -57,6 +58,7 @@ class Changes(Strict):
     swap: dict[str, str] = Field({}, description="Unit -> FMU, a name or a path")
     set: dict[str, Scalar] = Field({}, description="unit.parameter -> value")
     vehicle: str | None = Field(None, description="Vehicle file, relative to this file")
+    faults: list[FaultSpec] = Field([], description="In place of the scenario's at these places")
     stop_time: Time | None = Field(None, description="In place of the scenario's")
     step_size: Time | None = Field(None, description="In place of the scenario's")
     algorithm: Algorithm | None = Field(None, description="In place of the scenario's")
@@ -65,7 +67,7 @@ class Changes(Strict):
     def places(self) -> list[str]:
         """What is changed."""
         own = [place for place in ("vehicle", *OF_RUN) if getattr(self, place, None) is not None]
-        return [*self.swap, *self.set, *own]
+        return [*self.swap, *self.set, *(f"{FAULTS}.{one.on}" for one in self.faults), *own]
 
 
 class VariantSpec(Changes):

@@ -13,8 +13,9 @@ from pathlib import Path
 
 from ..errors import ScenarioError
 from ..files import reads
-from ..plan import Change, Value
+from ..plan import FAULTS, Change, Value
 from ..scenario import overrides, yaml_lines
+from ..scenario.fault_schema import lines_of
 from ..scenario.strict import validate
 from ..scenario.yaml_lines import Document, Key
 from ..wording import hint, short
@@ -138,7 +139,8 @@ def changes_of_file(given: Changes, folder: Path, origin: str) -> list[Change]:
     """Return the changes that a part of a file in a folder gives."""
     vehicle = [Change("vehicle", str(folder / given.vehicle), origin)] if given.vehicle else []
     of_run = overrides.changes_of_run(given, origin)
-    return vehicle + of_run + overrides.changes_of(given.swap, given.set, folder, origin)
+    faults = [Change(f"{FAULTS}.{place}", line, origin) for place, line in lines_of(given.faults).items()]
+    return vehicle + of_run + overrides.changes_of(given.swap, given.set, folder, origin) + faults
 
 
 @reads("experiment file", ScenarioError)

@@ -9,7 +9,7 @@ signals no run has does not exist.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,7 @@ from ..results.read import Results
 from ..wording import cut, fold, hint
 from .display import digits_of, in_formula, shown_unit
 from .portrait import curves_of, draw_portrait, signals_of
+from .spans import Span, mark, spans_of
 from .style import REFERENCE, ROW, WIDTH, line_style, literal, note_above
 
 if TYPE_CHECKING:
@@ -102,7 +103,19 @@ def panels_of(runs: Sequence[Run], name: str, *, whole: bool = False) -> list[Pa
 
 def shown_by(runs: Sequence[Run], names: Sequence[str], *, whole: bool = False) -> list[Panel]:
     """Return all panels that the names stand for, in order (see `panels_of`)."""
-    return [panel for name in names for panel in panels_of(runs, name, whole=whole)]
+    panels = [panel for name in names for panel in panels_of(runs, name, whole=whole)]
+    spans = spans_of([(run.label, run.results) for run in runs])
+    if not spans:
+        return panels
+    return [replace(panel, draw=_marked(panel.draw, spans)) if panel.over_time else panel for panel in panels]
+
+
+def _marked(draw: Callable[[Axes], None], spans: Sequence[Span]) -> Callable[[Axes], None]:
+    def fill(axes: Axes) -> None:
+        draw(axes)
+        mark(axes, spans)
+
+    return fill
 
 
 def check_panels(runs: Sequence[Run], names: Sequence[str]) -> None:

@@ -14,12 +14,13 @@ from ..errors import ResultsError
 from ..titles import changed_each, changes_in
 from .display import digits_of
 from .panels import Panel, Run, shown_by
+from .spans import FAULTY, in_legend, spans_of
 from .style import RC, REFERENCE, ROW, frame, line_style, reference_words
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 OVERVIEW = (
     "steer_angle",
@@ -113,15 +114,19 @@ def _pair(left: Panel, right: Panel) -> bool:
     return not left.wide and not right.wide and left.over_time == right.over_time
 
 
-def _legend(figure: Figure, runs: Sequence[Run]) -> list[Line2D]:
-    """Return what the legend shows: the runs if there are several, and what the pale lines are."""
+def _legend(figure: Figure, runs: Sequence[Run]) -> list[Artist]:
+    """Return what the legend shows: the runs if there are several, what the pale lines and the spans are."""
     from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
     several = len(runs) > 1
-    handles = [Line2D([], [], label=run.label, **line_style(k)) for k, run in enumerate(runs) if several]
+    handles: list[Artist] = [
+        Line2D([], [], label=run.label, **line_style(k)) for k, run in enumerate(runs) if several
+    ]
     if says := reference_words(line for axes in figure.axes for line in axes.get_lines()):
         handles.append(Line2D([], [], label=says, **REFERENCE))
-    return handles
+    spans = spans_of([(run.label, run.results) for run in runs])
+    return [*handles, *(Patch(facecolor=FAULTY, label=says) for says in in_legend(spans))]
 
 
 def title_of(runs: Sequence[Run]) -> str:

@@ -69,6 +69,12 @@ def weights(algorithm: Algorithm, relation: Relation, k: int) -> Weights:
     return Weights(1.0 + ahead / n, -ahead / n)
 
 
+def halves_ahead(algorithm: Algorithm, period: int, *, direct: bool) -> int:
+    """Return for when an input is taken, in halves of a communication step after its unit's step begins."""
+    held = {"jacobi": 0, "gauss_seidel": 2 * period}
+    return held.get(algorithm, 2 * period if direct else period)
+
+
 def _last_sample(relation: Relation, k: int) -> int:
     """Return the communication point of the source's last sample when the target steps to `k`."""
     n = relation.source_period

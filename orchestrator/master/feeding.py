@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ..plan import Plan, Series, Variable
+from .coupling import halves_ahead
 from .log import OK
 from .memory import Memory, Station
 from .slave import Status
@@ -45,9 +46,7 @@ def feeding(memory: Memory, s: Station) -> Callable[[], Status]:
 def _column(plan: Plan, s: Station, variable: Variable, series: Series) -> Iterator:
     """Yield the values of one input, step by step."""
     period, first = s.unit.period, 0
-    ahead = {"jacobi": 0, "gauss_seidel": 2 * period}.get(plan.algorithm)  # in halves of a communication step
-    if ahead is None:
-        ahead = 2 * period if s.direct(variable) else period
+    ahead = halves_ahead(plan.algorithm, period, direct=s.direct(variable))
     halves, start = plan.step / 2, float(plan.start)
     while True:
         k = np.arange(first, first + period * BLOCK, period)

@@ -231,6 +231,8 @@ def _renew_others(memory: Memory, s: Station, check: Check, moving: list[Movemen
 def _get(memory: Memory, s: Station, check: Check) -> None:
     if s.outputs:
         check(s.name, "reading outputs", s.calls.get())
+        if s.output_faults is not None:
+            s.output_faults.begin(s.y)
     for chosen in _by_type(s.other_outputs):
         status, values = s.slave.fetch([v.place for v in chosen])
         memory.others.update(((s.name, v.name), value) for v, value in zip(chosen, values, strict=True))

@@ -19,6 +19,7 @@ import numpy as np
 from ..errors import SimulationError
 from ..plan import Plan, Unit, Value, Variable, Wire
 from .coupling import Relation
+from .faulting import Faulting, of_inputs, of_outputs
 from .slave import Calls, Slave
 
 
@@ -40,6 +41,8 @@ class Station:
     u: np.ndarray = field(default_factory=lambda: np.empty(0))  # its inputs
     y: np.ndarray = field(default_factory=lambda: np.empty(0))  # its outputs in the pool
     y_before: np.ndarray = field(default_factory=lambda: np.empty(0))
+    output_faults: Faulting | None = None
+    input_faults: Faulting | None = None
     calls: Calls = field(init=False)
 
     @functools.cached_property
@@ -98,6 +101,8 @@ class Memory:
         self.time.value = plan.time(0)
         self._place_outputs()
         self._place_inputs(2 * n_out, 2 * n_out + n_in)
+        for s in self.stations if plan.faults else ():
+            s.output_faults, s.input_faults = of_outputs(self, s), of_inputs(self, s)
 
     def _place_outputs(self) -> None:
         at = 0
@@ -126,9 +131,12 @@ class Memory:
             at = end
 
     def taken(self, s: Station) -> np.ndarray:
-        """Return what a unit's Real inputs get of the present outputs."""
+        """Return what a unit's Real inputs get of the outputs at the start."""
         values = self.pool[s.sources]
-        return values if s.scale is None else values * s.scale[0] + s.scale[1]
+        values = values if s.scale is None else values * s.scale[0] + s.scale[1]
+        if s.input_faults is not None:
+            s.input_faults.begin(values)
+        return values
 
     def other(self, wire: Wire) -> Value:
         """Return what a wire that is no Real gives its input.

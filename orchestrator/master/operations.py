@@ -16,6 +16,7 @@ import numpy as np
 
 from ..plan import Place
 from .coupling import Weights, weights
+from .faulting import Faulting
 from .feeding import feeding
 from .log import OK
 from .memory import Memory, Station
@@ -25,7 +26,7 @@ KEPT = 1024
 """Programs kept. Periods without a common factor have cycles longer than any run; then every program is
 needed once, and made anew. Chosen: more than the phases of any usual set of periods."""
 
-Kind = Literal["gather", "set", "step", "keep", "get"]
+Kind = Literal["gather", "set", "step", "keep", "get", "fault"]
 
 
 class Operation(NamedTuple):
@@ -47,6 +48,8 @@ class Programs:
         self._feeds = {
             s.name: Operation(s.name, "gather", feeding(memory, s)) for s in memory.stations if s.unit.series
         }
+        self._of_outputs = {s.name: _acting(s, s.output_faults, s.y) for s in memory.stations}
+        self._of_inputs = {s.name: _acting(s, s.input_faults, s.u) for s in memory.stations}
 
     def at(self, k: int) -> list[Operation]:
         """Return what is to be done from communication point `k` - 1 to `k`."""
@@ -70,9 +73,11 @@ class Programs:
         slow = [s for s in beginning if s.unit.period > 1 and s.inputs]
         operations += [Operation(s.name, "gather", _held(m, s.sources, s.u)) for s in slow]
         operations += [op for s in beginning for op in _converting(s)]
+        operations += [op for s in beginning for op in self._of_inputs[s.name]]
         operations += [op for s in beginning for op in _setting(m, s)]
         for s in ending:
             operations += [Operation(s.name, "step", s.calls.step), *_getting(m, s)]
+            operations += self._of_outputs[s.name]
         return operations
 
     def _in_sequence(self, k: int) -> list[Operation]:
@@ -81,12 +86,12 @@ class Programs:
         for s in self._memory.stations:
             if k % s.unit.period == 0:
                 operations += [self._feeds[s.name]] if s.unit.series else []
-                operations += self._gathering(s, k)
+                operations += [*self._gathering(s, k), *self._of_inputs[s.name]]
                 operations += _setting(self._memory, s)
                 operations.append(Operation(s.name, "step", s.calls.step))
                 if self._memory.plan.algorithm == "extrapolated" and s.outputs:
                     operations.append(Operation(s.name, "keep", _copy(s.y, s.y_before)))
-                operations += _getting(self._memory, s)
+                operations += [*_getting(self._memory, s), *self._of_outputs[s.name]]
         return operations
 
     def _gathering(self, s: Station, k: int) -> list[Operation]:
@@ -172,6 +177,11 @@ def _converting(s: Station) -> list[Operation]:
         return OK
 
     return [Operation(s.name, "gather", converted)]
+
+
+def _acting(s: Station, faults: Faulting | None, values: np.ndarray) -> list[Operation]:
+    """Return what disturbs a unit's outputs or inputs, the same in all programs; nothing without a fault."""
+    return [] if faults is None else [Operation(s.name, "fault", faults.acting(values))]
 
 
 def _copy(source: np.ndarray, target: np.ndarray) -> Callable[[], None]:

@@ -220,12 +220,19 @@ def settings(findings: Findings) -> Table:
             run.name,
             run.scenario.name,
             changed(run.changes) or None,
+            _faults(findings.results.get(run.name)),
         ]
         for run in findings.experiment.runs.values()
     ]
-    kept = [k for k in range(3) if any(row[k] is not None for row in rows)]
-    headings = ["run", "scenario", "changed"]
+    headings = ["run", "scenario", "changed", "faults"]
+    kept = [k for k in range(len(headings)) if any(row[k] is not None for row in rows)]
     return Table("", [headings[k] for k in kept], [[row[k] for k in kept] for row in rows])
+
+
+def _faults(results: Results | None) -> str | None:
+    """Return the faults of a run in words, None if it had none."""
+    had = results.run.get("faults", []) if results else []
+    return "; ".join(f"{one.get('on')}: {one.get('fault')}" for one in had) or None
 
 
 def grid_of_times(runs: Iterable[Plan | Results]) -> list[str]:

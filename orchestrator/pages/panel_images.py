@@ -17,6 +17,7 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from ..figures.panels import Panel, Run, draw_path, shown_by, thinned
+from ..figures.spans import FAULTY, in_legend, spans_of
 from ..figures.style import RC, REFERENCE, line_style, reference_words
 
 if TYPE_CHECKING:
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
 WIDTH, ROW = 4.7, 2.15
 """Width of a panel and height of a row [inches]; chosen: 9 points of type stay 7 on a phone."""
+BROAD = 11.0
+"""Width of a span in a legend [px]."""
 BUCKETS = 450
 """Buckets that a line over time is thinned to; chosen: one per pixel of a panel."""
 CURLY = str.maketrans("'\"", "’”")
@@ -127,7 +130,8 @@ def _legend(runs: Sequence[Run], drawn: Sequence[Figure]) -> list[LegendEntry]:
     entries = [_entry(run.label, line_style(k)) for k, run in enumerate(runs) if len(runs) > 1]
     if says := reference_words(line for figure in drawn for line in figure.axes[0].get_lines()):
         entries.append(_entry(says, REFERENCE))
-    return entries
+    spans = spans_of([(run.label, run.results) for run in runs])
+    return [*entries, *(LegendEntry(says, FAULTY, BROAD, "") for says in in_legend(spans))]
 
 
 def _entry(label: str, style: dict[str, Any]) -> LegendEntry:

@@ -59,6 +59,8 @@ def _facts(run: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     for wire in run.get("connections", []):
         text = wire if isinstance(wire, str) else f"{wire.get('from')} -> {wire.get('to')}"
         yield text, "connected"
+    for fault in run.get("faults", []):
+        yield f"fault of {fault.get('on')}", fault.get("fault")
     yield from run.get("versions", {}).items()
 
 

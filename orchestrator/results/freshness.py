@@ -24,6 +24,7 @@ COMPARED = {
     "stop_time": "the stop time has changed",
     "evaluation_order": "the order of the units has changed",
     "connections": "the wires have changed",
+    "faults": "the faults have changed",
     "units": "what is recorded has changed",
     "title": "the scenario has changed",
 }
@@ -60,7 +61,7 @@ def _reason(plan: Plan, recorded: Mapping[str, Any]) -> str:
     planned = run_record(plan, status="completed", started=datetime.now(timezone.utc))
     wanted = json.loads(json.dumps(planned, default=str))
     for key, sentence in COMPARED.items():
-        if recorded.get(key) != wanted[key]:
+        if recorded.get(key) != wanted.get(key):
             return sentence
     return (
         _changed_fmu(recorded.get("fmus", {}), wanted["fmus"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import astuple
 from typing import Any
 
 from ..plan import Plan
@@ -14,8 +15,8 @@ from .run_record import PROGRAMS, connections_of, version_of
 def key_of(plan: Plan, also: Any = None) -> str:
     """Return the key of the run that a plan describes; runs of one key are one run.
 
-    It is made of the content of its FMUs, all parameters and constants, wires, the time grid, the algorithm,
-    what is recorded under which title, and the program's versions and code.
+    It is made of the content of its FMUs, all parameters and constants, wires, faults, the time grid, the
+    algorithm, what is recorded under which title, and the program's versions and code.
 
     Args:
         plan: of the run.
@@ -31,6 +32,7 @@ def key_of(plan: Plan, also: Any = None) -> str:
             [u.name, name, s.sha256, s.column, s.held] for u in plan.units for name, s in u.series.items()
         ],
         "wires": connections_of(plan),
+        "faults": [list(astuple(fault)) for fault in plan.faults],
         "record": plan.record,
         "time": [str(plan.start), str(plan.step), plan.n_steps],
         "algorithm": plan.algorithm,

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, NonNegativeInt, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, ValidationError
 
 from ..errors import ResultsError
 from ..files import read_bytes, reading, reason
@@ -38,6 +38,13 @@ class _Finding(_Part):
     says: str = ""
 
 
+class _Fault(_Part):
+    on: str
+    fault: str
+    begin: float | None = Field(None, alias="from")
+    until: float | None = None
+
+
 class _Record(_Part):
     """What others rely on; all of it may be missing."""
 
@@ -59,6 +66,7 @@ class _Record(_Part):
     fmus: dict[str, _Fmu] = {}
     changes: list[dict[str, Any]] = []
     findings: list[_Finding] = []
+    faults: list[_Fault] = []
     connections: list[Any] = []
     scenario: dict[str, Any] = {}
     versions: dict[str, str] = {}

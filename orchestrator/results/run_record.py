@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import platform
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -44,6 +45,7 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
         "fmus": {name: _fmu(unit, plan) for name, unit in units.items()},
         "changes": [asdict(change) for change in plan.changes],
         "connections": connections_of(plan),
+        **({"faults": faults_of(plan)} if plan.faults else {}),
         "scenario": plan.scenario,
         "notes": list(plan.notes),
         "versions": versions(),
@@ -54,6 +56,17 @@ def connections_of(plan: Plan) -> list[dict[str, Any]]:
     """Return the wires of a plan: from, to, and where a number is converted how and into which unit."""
     units = {unit.name: unit for unit in plan.units}
     return [_connection(wire, units) for wire in plan.wires]
+
+
+def faults_of(plan: Plan) -> list[dict[str, Any]]:
+    """Return the faults of a plan as they are written, each with its time [s] and all that it acts on."""
+    found: dict[tuple[str, str], dict[str, Any]] = {}
+    for fault in plan.faults:
+        begin = None if fault.begin == -math.inf else fault.begin
+        end = None if fault.end == math.inf else fault.end
+        new: dict[str, Any] = {"on": fault.place, "fault": fault.says, "from": begin, "until": end, "at": []}
+        found.setdefault((fault.place, fault.says), new)["at"].append(f"{fault.unit}.{fault.variable}")
+    return list(found.values())
 
 
 def _connection(wire: Wire, units: Mapping[str, Unit]) -> dict[str, Any]:

@@ -5,9 +5,11 @@ that no unit may have stand for more: `--set vehicle.mass=1200` changes the para
 units share, `--set inputs.friction*=0.3` a constant, `--set friction=0.3` and `speed` what every unit that
 has to know it is told. `--set stop_time=2`, `step_size` and `algorithm` change the run,
 `--set unit.step_size=0.01` the step of a unit, `--set unit.validate=false` whether its FMU has to be
-formally right, `--set tyres=my.tir` (or `tyres.front`, `tyres.rear`) the tyre property file. Studies and
-sweeps change the same places, and `vehicle` is the vehicle file itself. A value that was changed remembers
-by what, so that later messages name that in place of a line.
+formally right, `--set tyres=my.tir` (or `tyres.front`, `tyres.rear`) the tyre property file, and
+`--fault 'sensor.yaw_rate: freeze from 2 s'`, which is `faults.sensor.yaw_rate` to files, what goes wrong at a
+place, where `none` takes away what the scenario has. Studies and sweeps change the same places, and `vehicle`
+is the vehicle file itself. A value that was changed remembers by what, so that later messages name that in
+place of a line.
 """
 
 from __future__ import annotations
@@ -21,16 +23,17 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import Problem, ScenarioError
-from ..plan import FACTS, OF_RUN, TYRES, Change, Value
+from ..plan import FACTS, FAULTS, OF_RUN, TYRES, Change, Value
 from ..wording import hint, listed
 from . import yaml_lines
+from .fault_schema import place_of, read_line
 from .yaml_lines import Document, Key
 
 HOLDERS = ("vehicle", "inputs")
 """Words that `--set` understands in place of a unit."""
 OF_UNIT = ("step_size", "validate")
 """What `--set` changes of a unit that is no parameter of its FMU."""
-RESERVED = (*HOLDERS, *FACTS, TYRES)
+RESERVED = (*HOLDERS, *FACTS, TYRES, FAULTS)
 """Names that no unit may have."""
 
 
@@ -39,13 +42,16 @@ def is_path(fmu: str) -> bool:
     return fmu.lower().endswith(".fmu") or "/" in fmu or "\\" in fmu
 
 
-def read_changes(swaps: Iterable[str] = (), settings: Iterable[str] = ()) -> tuple[Change, ...]:
+def read_changes(
+    swaps: Iterable[str] = (), settings: Iterable[str] = (), faults: Iterable[str] = ()
+) -> tuple[Change, ...]:
     """Return what the options of a command line change.
 
     Args:
         swaps: `unit=fmu`, as given to --swap; a path is relative to the working directory. An FMU may bring
             parameters along, `unit=fmu:parameter=value`.
         settings: `unit.parameter=value`, as given to --set.
+        faults: `place: kind ...`, as given to --fault (see `fault_schema`); those of one place add up.
 
     Raises:
         ScenarioError: with every option that is none.
@@ -66,6 +72,14 @@ def read_changes(swaps: Iterable[str] = (), settings: Iterable[str] = ()) -> tup
         else:
             sentence = f"write --set UNIT.PARAMETER=VALUE, or {listed((*OF_RUN, *FACTS), last='or')}=VALUE"
             problems.append(f"--set {text}: {sentence}")
+    at: dict[str, list[str]] = {}
+    for text in faults:
+        place, colon, line = (part.strip() for part in text.partition(":"))
+        if place and colon and line:
+            at.setdefault(f"{FAULTS}.{_spelled(place)}", []).append(line)
+        else:
+            problems.append(f"--fault {text}: write --fault 'UNIT.OUTPUT: KIND VALUE from TIME until TIME'")
+    changes += [Change(place, "; ".join(lines), "--fault") for place, lines in at.items()]
     if problems:
         raise ScenarioError(problems)
     return tuple(changes)
@@ -127,6 +141,8 @@ def apply_changes(
             differs = True  # see `apply_vehicle`
         elif holder == TYRES:
             differs = _put_tyres(document, vehicle, change)
+        elif change.faulty:
+            differs = _put_faults(document, change, change.faulty)
         elif holder == "vehicle":
             differs = _put(vehicle, ("parameters", name), change)
         elif holder == "inputs":
@@ -168,6 +184,52 @@ def _put_tyres(document: Document, vehicle: Document, change: Change) -> bool:
     after = {"front": file, "rear": file} if axle == TYRES else named | {axle: file}
     _put(document, (TYRES,), change, after)
     return after != named
+
+
+def _spelled(place: str) -> str:
+    """Return the place of a fault as it is written here, as it stands if it is none."""
+    try:
+        return str(place_of(place))
+    except ValueError:
+        return place
+
+
+def _put_faults(document: Document, change: Change, place: str) -> bool:
+    """Give a place other faults than the file does, behind those of other places; return whether they are."""
+    given = document.data.get(FAULTS) or []
+    if not isinstance(given, list):
+        return True  # the schema will say what is wrong
+    try:
+        items = [{"on": place, **item} for item in read_line(str(change.value))]
+    except ValueError as error:
+        document.note(Problem(str(error), place=str(change)))
+        return True
+    there = [i for i, one in enumerate(given) if isinstance(one, dict) and _at(one) == _spelled(place)]
+    left = [i for i in range(len(given)) if i not in there]
+    moved = {old: new for new, old in enumerate(left)}
+    of_file = {key: line for key, line in document.lines.items() if key[:1] != (FAULTS,) or len(key) < 2}
+    document.lines = (
+        of_file
+        | {
+            (FAULTS, moved[key[1]], *key[2:]): line  # type: ignore[index]
+            for key, line in document.lines.items()
+            if key[:1] == (FAULTS,) and len(key) > 1 and key[1] in moved
+        }
+    )
+    overrides = {key: one for key, one in document.overrides.items() if key[0] == FAULTS}
+    document.overrides = {key: one for key, one in document.overrides.items() if key[0] != FAULTS}
+    for key, one in overrides.items():
+        if key[1] in moved:
+            document.overrides[(FAULTS, moved[key[1]])] = one  # type: ignore[index]
+    document.overrides |= {(FAULTS, len(left) + k): change for k in range(len(items))}
+    document.data[FAULTS] = [given[i] for i in left] + items
+    if not document.data[FAULTS]:
+        del document.data[FAULTS]
+    return [given[i] for i in there] != items
+
+
+def _at(item: dict[str, Any]) -> str:
+    return _spelled(str(item.get("on")))
 
 
 def leave_unvalidated(document: Document) -> None:

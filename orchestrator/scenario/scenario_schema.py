@@ -28,6 +28,7 @@ from pydantic import (
 from ..plan import Algorithm, Change, Value
 from ..wording import short
 from . import overrides, quantities
+from .fault_schema import FaultSpec
 from .strict import Strict
 from .tir import TyreFile
 from .yaml_lines import Document, Key
@@ -255,6 +256,8 @@ class Scenario(Strict):
     record: list[Variables] | None = Field(
         None, description="unit.pattern, *.pattern for all units; left out: all outputs but text"
     )
+
+    faults: list[FaultSpec] = Field([], description="What goes wrong with signals, and when")
 
     _document: Document = PrivateAttr()
     _vehicle_document: Document = PrivateAttr()

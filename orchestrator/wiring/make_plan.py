@@ -31,6 +31,7 @@ from ..scenario.overrides import is_path
 from ..wording import listed
 from .agreement import remarks
 from .connections import Connector
+from .faults import faults_of
 from .functions import missing_functions
 from .order import evaluate
 from .parameters import DERIVED, STATIC_LOADS, STIFFNESSES, Parameters
@@ -76,6 +77,7 @@ def make_plan(
     wires, values = connector.connect()
     constants, series = _divided(values, float(scenario.start_time))
     record = recorded(scenario, opened, replaced, notes)
+    faults = faults_of(scenario, opened, replaced, wires, record, notes)
     if not isolated:
         _check_instances(scenario, opened)
     evaluation = evaluate(opened, wires)
@@ -122,6 +124,7 @@ def make_plan(
         notes=(*notes, *(found.says for found in findings)),
         changes=scenario.changes,
         findings=tuple(findings),
+        faults=faults,
     )
 
 

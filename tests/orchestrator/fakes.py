@@ -9,7 +9,7 @@ from typing import Any
 
 from orchestrator.master.log import ERROR, OK, Log
 from orchestrator.master.slave import Calls, Experiment, Slave
-from orchestrator.plan import Algorithm, Fmu, Place, Plan, Unit, Variable, Wire
+from orchestrator.plan import Algorithm, Fault, Fmu, Place, Plan, Unit, Variable, Wire
 
 
 class Behaviour:
@@ -156,6 +156,7 @@ def make_plan(
     constants: Mapping[str, Mapping[str, Any]] | None = None,
     parameters: Mapping[str, Mapping[str, Any]] | None = None,
     record: Iterable[str] | None = None,
+    faults: Iterable[Fault] = (),
 ) -> Plan:
     """Return a plan of fake units in the order given; wires are written `a.x -> b.y [gain offset]`."""
     made = tuple(
@@ -176,6 +177,7 @@ def make_plan(
         algorithm,
         title="fake",
         scenario={"title": "fake"},
+        faults=tuple(faults),
     )
 
 

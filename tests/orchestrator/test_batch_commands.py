@@ -331,7 +331,10 @@ def test_plot_says_what_is_wrong(yawbench, folder):
     assert status == 2
     assert said == "o/off/results.csv: is a file; name the folder that holds the results, o/off.\n"
     status, _, said = yawbench("plot", "o/off", "--set", "driver.amplitude=0.01")
-    assert (status, said) == (2, "--swap and --set change a scenario; only folders of results are given\n")
+    assert (status, said) == (
+        2,
+        "--swap, --set and --fault change a scenario; only folders of results are given\n",
+    )
     status, _, said = yawbench("plot", "half.yaml", "--swap", "brake=controller_off")
     assert status == 2
     assert said.startswith("--swap brake=controller_off: ")

@@ -222,6 +222,20 @@ def test_other_interfaces_are_refused(run, tmp_path, models, interface, words):
     assert f"an FMU for {words} only; supported are FMI 2.0 and 3.0 for co-simulation" in said
 
 
+@together_and_apart
+def test_elements_of_arrays_can_be_faulty(run, isolate):
+    units = {"d": ("Dahlquist", {}), "m": ("Matrix", {}), "n": ("Matrix", {})}
+    wires = [{"from": "d.x", "to": "m.u[2]"}, {"from": "m.y[*]", "to": "n.u[*]"}]
+    faults = ["--fault", "d.x -> m: bias 1 from 0.5 s", "--fault", "m.y[1]: gain 3"]
+    status, said, results = run(units, *isolate, *faults, inputs={"m.u[1]": 10.0}, connections=wires)
+    assert status == 0, said
+    passed_on = results["d.x"] + (results.time >= 0.5)
+    assert results["m.y[2]"] == pytest.approx(passed_on)
+    for unit in "mn":
+        assert results[f"{unit}.y[1]"] == pytest.approx(np.full(11, 30.0))
+        assert results[f"{unit}.y[2]"] == pytest.approx(passed_on)
+
+
 def test_check_shows_arrays_and_their_constants(run):
     status, said, _ = run({"m": ("Matrix", {})}, command="check", inputs={"m.u[*]": 2.5})
     assert status == 0, said

@@ -81,7 +81,11 @@ def plan_of(fmus, **options):
 
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
 def test_isolated_units_give_the_same_numbers_to_the_last_bit(algorithm, fmus, tmp_path):
-    plan = plan_of(fmus, stop_time=0.3, algorithm=algorithm)
+    faults = [
+        "driver.steer_angle -> plant: bias 1 deg from 0.1",
+        "plant.yaw_rate: noise 0.1 deg/s; delay 0.03",
+    ]
+    plan = plan_of(fmus, stop_time=0.3, algorithm=algorithm, faults=faults)
     simulate(plan, tmp_path / "together")
     with Isolation(plan.units) as isolation:
         simulate(plan, tmp_path / "apart", opener=isolation)

@@ -100,7 +100,7 @@ def test_the_schema_can_be_printed() -> None:
                 "a.yaml:1: 'stop_time' is missing",
                 "a.yaml:2: stop_tim: unknown key; did you mean 'stop_time'? allowed here: title, source, "
                 "vehicle, tyres, start_time, stop_time, step_size, algorithm, friction, speed, inputs, "
-                "units, connections and record",
+                "units, connections, record and faults",
             ],
         ),
         (

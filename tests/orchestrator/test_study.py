@@ -151,7 +151,7 @@ def test_all_problems_of_a_study_are_reported_at_once(study):
         ("above: 100 %", "above: [1]"),
     )
     assert found == [
-        "runs[1].stop_tim: unknown key; did you mean 'stop_time'? allowed here: swap, set, vehicle, "
+        "runs[1].stop_tim: unknown key; did you mean 'stop_time'? allowed here: swap, set, vehicle, faults, "
         "stop_time, step_size, algorithm, name, scenario, for, label and row",
         "metrics.error.metric: 'relative_peek_error(sideslip)': there is no measure 'relative_peek_error'"
         "; did you mean 'relative_peak_error'?",

@@ -1,0 +1,208 @@
+"""Faults as scenarios have them: where, of which kind, from when until when.
+
+    faults:
+      - {on: sensor.yaw_rate, kind: freeze, from: 1.5, until: 3.0}
+      - {on: plant.yaw_rate -> sensor, kind: bias, value: 0.5 deg/s}
+
+A place is `unit.output`, for all who take it and in the results; `unit.output -> unit`, or
+`-> unit.input`, on the way to one of them; or `unit.input`. A `*` stands for several, four wheels say. In one
+line, as `--fault` and experiments have it, a place is followed by
+`KIND VALUE share N every T seed N from T until T`, of which only the kind has to be there; several faults at
+one place stand one after the other with a `;` between, and act so.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Annotated, Any, Literal, NamedTuple, get_args
+
+from pydantic import Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
+
+from ..wording import short
+from . import quantities, yaml_lines
+from .strict import Strict
+
+EVERY = Fraction(1, 100)
+"""Time from one message to the next [s]. Chosen: what the buses of cars have."""
+NONE = "none"
+"""The line for a place that is to have no faults."""
+
+KindName = Literal[
+    "bias", "gain", "drift", "noise", "freeze", "value", "dropout", "outlier", "delay", "saturation",
+    "loss", "stuck",
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of fault: what becomes of a signal x, and what it is told."""
+
+    does: str
+    unit: str | None = None  # of its value: "{x}" that of the signal; None: it takes no value
+    default: float | None = None  # of the value
+    needs: bool = True  # a value
+    least: float | None = None  # the value may be
+    most: float | None = None
+    drawn: bool = False  # it takes seed and every
+    shared: bool = False  # it takes share
+
+
+KINDS: dict[str, Kind] = {
+    "bias": Kind("x + value", "{x}"),
+    "gain": Kind("x * value", "1"),
+    "drift": Kind("x + value * (time since the fault began)", "{x}/s"),
+    "noise": Kind(
+        "x + value * normally distributed numbers, a new one every message", "{x}", least=0, drawn=True
+    ),
+    "freeze": Kind("the x at which the fault began"),
+    "value": Kind("value", "{x}"),
+    "dropout": Kind("a share of the messages is lost, the last x before holds", drawn=True, shared=True),
+    "outlier": Kind("a share of the messages is x + value or x - value", "{x}", drawn=True, shared=True),
+    "delay": Kind("the x of so long ago", "s", least=0),
+    "saturation": Kind("x, but at most value and at least -value", "{x}", least=0),
+    "loss": Kind(
+        "of an actuator: x without this part of it, by default nothing is left", "1", 1.0, least=0, most=1
+    ),
+    "stuck": Kind("of an actuator: value, by default the x at which the fault began", "{x}", needs=False),
+}
+"""Kind -> what it does. A line more here and in `master.faulting` is a kind more."""
+assert tuple(KINDS) == get_args(KindName)
+
+
+class Place(NamedTuple):
+    """Where a fault is: at a variable of a unit, or on the wires from there to a unit."""
+
+    unit: str
+    variable: str
+    target: str = ""
+    input: str = "*"
+
+    def __str__(self) -> str:
+        to = f".{self.input}" if self.input != "*" else ""
+        return f"{self.unit}.{self.variable}" + (f" -> {self.target}{to}" if self.target else "")
+
+
+_PLACE = re.compile(r"\s*(\w+)\.([^\s>]+?)\s*(?:->\s*(\w+)(?:\.(\S+))?\s*)?")
+_NAMED = ("share", "every", "seed", "from", "until")
+"""What stands in a line with its name before it."""
+
+
+def place_of(value: object) -> Place:
+    """Return a place as written.
+
+    Raises:
+        ValueError: it is none.
+    """
+    found = _PLACE.fullmatch(value) if isinstance(value, str) else None
+    if found is None or any((part or "").count("*") > 1 for part in found.groups()):
+        raise ValueError(
+            f"must be unit.output, unit.input or unit.output -> unit, with at most one * (got {short(value)})"
+        )
+    return Place(found[1], found[2], found[3] or "", found[4] or "*")
+
+
+def read_line(line: str) -> list[dict[str, Any]]:
+    """Return faults in one line as the items of a file have them, without their place.
+
+    Raises:
+        ValueError: something stands there twice.
+    """
+    if line.strip() == NONE:
+        return []
+    items = []
+    for text in line.split(";"):
+        head, *rest = re.split(rf"(?:^|\s+)({'|'.join(_NAMED)})\s+", text.strip())
+        kind, _, value = head.strip().partition(" ")
+        item: dict[str, Any] = {"kind": kind} | ({"value": yaml_lines.scalar(value.strip())} if value else {})
+        for name, given in zip(rest[::2], rest[1::2], strict=True):
+            if name in item:
+                raise ValueError(f"has {name} twice")
+            item[name] = yaml_lines.scalar(given.strip())
+        items.append(item)
+    return items
+
+
+def _value(value: object) -> float | str | None:
+    if isinstance(value, bool) or not (isinstance(value, (int, float, str)) and value != ""):
+        raise ValueError(f"must be a number, or a number with its unit (got {short(value)})")
+    return value if isinstance(value, str) else float(value)
+
+
+def _share(value: object) -> float:
+    if isinstance(value, str) and value.endswith("%"):
+        value = float(quantities.convert(value, "1"))
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= 1:
+        raise ValueError(f"a share must be above 0 and at most 1 (got {short(value)})")
+    return float(value)
+
+
+_TIME = {"type": ["number", "string"]}
+Instant = Annotated[
+    Fraction, PlainValidator(quantities.instant), PlainSerializer(float), WithJsonSchema(_TIME)
+]
+Span = Annotated[Fraction, PlainValidator(quantities.seconds), PlainSerializer(float), WithJsonSchema(_TIME)]
+PlaceText = Annotated[
+    Place, PlainValidator(place_of), PlainSerializer(str), WithJsonSchema({"type": "string"})
+]
+FaultValue = Annotated[float | str, PlainValidator(_value), WithJsonSchema({"type": ["number", "string"]})]
+Share = Annotated[float, PlainValidator(_share), WithJsonSchema({"type": "number"})]
+
+
+class FaultSpec(Strict):
+    """What goes wrong with a signal, for a time.
+
+    Kinds are bias, gain, drift, noise, freeze, value, dropout, outlier, delay and saturation, of actuators
+    also loss and stuck.
+    """
+
+    on: PlaceText = Field(description="unit.output, unit.input or unit.output -> unit")
+    kind: KindName = Field(description="What becomes of the signal")
+    value: FaultValue | None = Field(None, description="As the kind has it, with its unit or in the signal's")
+    share: Share | None = Field(None, description="Of the messages, of dropout and outlier")
+    every: Span | None = Field(
+        None, description="Time from one message to the next, of what is random; default: 10 ms"
+    )
+    seed: int | None = Field(None, ge=0, description="Of random numbers; default: 0")
+    begin: Instant | None = Field(None, alias="from", description="s; left out: the start of the run")
+    end: Instant | None = Field(None, alias="until", description="s; left out: the end of the run")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> FaultSpec:
+        kind = KINDS[self.kind]
+        if kind.unit is None and self.value is not None:
+            raise ValueError(f"{self.kind} takes no value")
+        if kind.unit is not None and kind.needs and kind.default is None and self.value is None:
+            raise ValueError(f"{self.kind} needs a value: {kind.does}")
+        if kind.shared != (self.share is not None):
+            needs = "needs a share of the messages" if kind.shared else "takes no share"
+            raise ValueError(f"{self.kind} {needs}")
+        for name in () if kind.drawn else ("seed", "every"):
+            if getattr(self, name) is not None:
+                raise ValueError(f"{self.kind} takes no {name}: nothing of it is random")
+        if self.begin is not None and self.end is not None and not self.begin < self.end:
+            raise ValueError(f"until must be after from, {float(self.begin):g} s (got {float(self.end):g} s)")
+        return self
+
+    def __str__(self) -> str:
+        """The fault without its place, in one line."""
+        parts = [self.kind] + ([_text(self.value)] if self.value is not None else [])
+        parts += [f"share {self.share:g}"] if self.share is not None else []
+        parts += [f"every {float(self.every):g} s"] if self.every is not None else []
+        parts += [f"seed {self.seed}"] if self.seed is not None else []
+        parts += [f"from {float(self.begin):g} s"] if self.begin is not None else []
+        parts += [f"until {float(self.end):g} s"] if self.end is not None else []
+        return " ".join(parts)
+
+
+def _text(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.10g}"
+
+
+def lines_of(faults: list[FaultSpec]) -> dict[str, str]:
+    """Return place -> the faults there in one line."""
+    lines: dict[str, list[str]] = {}
+    for fault in faults:
+        lines.setdefault(str(fault.on), []).append(str(fault))
+    return {place: "; ".join(texts) for place, texts in lines.items()}
