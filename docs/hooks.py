@@ -6,6 +6,7 @@ from typing import Any
 
 from generate import (
     commands,
+    evidence,
     formulas,
     metrics,
     schemas,
@@ -23,6 +24,7 @@ PAGES = {
     "reference/signals.md": signals.page,
     "reference/units.md": units.page,
     "reference/metrics.md": metrics.page,
+    "trust.md": evidence.page,
     "reference/vehicles.md": vehicles.page,
 }
 """Path in the docs -> what writes its text."""

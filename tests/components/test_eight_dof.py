@@ -15,6 +15,7 @@ from components.plants.seven_dof import SevenDof
 from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
 from components.tyres.dugoff import Dugoff
 from components.tyres.magic_formula import MagicFormula
+from tests.evidence import measured
 
 from . import monolith, monolith_b
 from .loop import Loop
@@ -120,14 +121,16 @@ def test_roll_frequency_and_damping_match_the_closed_form():
 def test_rolling_conserves_lateral_momentum_and_loses_energy_only_to_the_dampers(damping):
     stand = Stand(EightDof, initial_speed=0.0, roll_damping=damping, **FREE)
     y = stand.start(**lateral(5000.0))
-    first, lost = roll_energy(y), 0.0
+    first, lost, off = roll_energy(y), 0.0, 0.0
     h = 2.5e-4
     for _ in range(4000):
         before = y["roll_rate"]
         y = stand.step(h, **lateral(0.0))
         lost += h * damping * ((before + y["roll_rate"]) / 2) ** 2
         assert P.mass * y["velocity_y"] == pytest.approx(COUPLING * y["roll_rate"], abs=1e-9)
-        assert roll_energy(y) + lost == pytest.approx(first, rel=2e-5)
+        off = max(off, abs(roll_energy(y) + lost - first) / first)
+    what = f"plant_eight_dof, rolling, damping {damping:g} N.m.s/rad"
+    measured("energy", what, "its start less the dampers' work", off, at_most=2e-5)
     if damping:
         assert lost == pytest.approx(first, rel=1e-3)
 
@@ -201,6 +204,7 @@ def magic(alpha: float, kappa: float, load: float, mu: float) -> tuple[float, fl
     return f_x, f_y
 
 
+SCIPY = "scipy, one system of equations"
 MAGIC = coefficients(MagicFormulaParameters(), "front")
 RUNS = [
     pytest.param(Dugoff, monolith.tyre, 25.0, 0.05, 0.65, id="Dugoff, 25 m/s, mu 0.65"),
@@ -229,8 +233,10 @@ def test_the_extrapolated_loop_agrees_with_an_independent_solution(component, ty
     for h in (4e-3, 1e-3):
         run = drive(component, mu=mu, steer=steer, until=3.0, h=h, record=names, initial_speed=speed)
         errors[h] = np.abs(run - exact[:, :: round(h / 1e-3)]).max(axis=1) / peak
-    assert np.all(errors[1e-3] < 1e-4), dict(zip(names, errors[1e-3], strict=True))
-    assert np.log(errors[4e-3][2] / errors[1e-3][2]) / np.log(4.0) > 1.8
+    car = f"plant_eight_dof, {component.fmu_name}, {3.6 * speed:.0f} km/h, mu {mu:g}"
+    measured("cars", car, SCIPY, errors[1e-3].max(), at_most=1e-4)
+    order = np.log(errors[4e-3][2] / errors[1e-3][2]) / np.log(4.0)
+    measured("order", f"`extrapolated`, {car}", SCIPY, order, at_least=1.8)
 
 
 def test_braking_agrees_with_an_independent_solution():
@@ -256,7 +262,8 @@ def test_braking_agrees_with_an_independent_solution():
         initial_speed=25.0,
     )
     error = np.abs(run - exact[[0, 2, 8]]).max(axis=1) / np.abs(exact[[0, 2, 8]]).max(axis=1)
-    assert np.all(error < 3e-4), error  # the torque steps at the start
+    car = "plant_eight_dof, tyre_magic_formula, braking in a turn"
+    measured("cars", car, SCIPY, error.max(), at_most=3e-4)  # the torque steps at the start
 
 
 def test_left_and_right_are_mirrored_to_the_last_bit():
@@ -265,7 +272,8 @@ def test_left_and_right_are_mirrored_to_the_last_bit():
     setting = {"mu": 0.9, "until": 3.0, "torque": (-200.0,), "initial_speed": 25.0}
     left = drive(Dugoff, steer=0.08, record=names, **setting)
     right = drive(Dugoff, steer=-0.08, record=mirrored, **setting)
-    assert np.array_equal(left, right * np.array([[1.0], [-1.0], [-1.0], [-1.0], [1.0], [1.0]]))
+    difference = np.abs(left - right * np.array([[1.0], [-1.0], [-1.0], [-1.0], [1.0], [1.0]])).max()
+    measured("mirror", "plant_eight_dof", "its mirror image", difference, at_most=0.0)
     assert np.ptp(left[1]) > 0.4
 
 

@@ -23,6 +23,7 @@ from components.tyre_models.bakker_1987 import (
 )
 from components.tyres.linear import LinearTyre
 from components.tyres.magic_formula_1987 import MagicFormula1987
+from tests.evidence import measured
 from vocabulary.wheels import WHEELS, wheels
 
 from .loop import Loop
@@ -269,8 +270,9 @@ def errors(h, mu=0.5):
 def test_the_coupled_car_agrees_with_an_independent_solution_to_second_order():
     coarse, fine = errors(4e-3), errors(1e-3)
     assert np.abs(exact(0.5)[1]).max() * SPEED > 4.0  # near the limit of 4.9 m/s2
-    assert np.all(fine < 1e-4), fine
-    assert log2(coarse[1] / fine[1]) / 2 > 1.8
+    car, scipy = "plant_two_dof, tyre_magic_formula_1987", "scipy, one system of equations"
+    measured("cars", car, scipy, fine.max(), at_most=1e-4)
+    measured("order", f"`extrapolated`, {car}", scipy, log2(coarse[1] / fine[1]) / 2, at_least=1.8)
 
 
 # ---- symmetry, steps, state
@@ -281,7 +283,8 @@ def test_the_mirrored_manoeuvre_gives_the_mirrored_motion_to_the_last_bit():
     mirrored = [*record[:3], "vertical_load_fr", "slip_angle_rr"]
     left = drive(record=record, driver=(Sine, {"amplitude": 0.1, "frequency": 0.5}))
     right = drive(record=mirrored, driver=(Sine, {"amplitude": -0.1, "frequency": 0.5}))
-    assert np.array_equal(left, right * np.array([[-1.0], [-1.0], [-1.0], [1.0], [-1.0]]))
+    difference = np.abs(left - right * np.array([[-1.0], [-1.0], [-1.0], [1.0], [-1.0]])).max()
+    measured("mirror", "plant_two_dof", "its mirror image", difference, at_most=0.0)
     assert np.abs(left[0]).max() > 0.2
 
 
