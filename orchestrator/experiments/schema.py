@@ -58,7 +58,7 @@ range; the claims are judged along each of them, and at the points of a Latin hy
 An open value touches the runs that have it and do not set it themselves; with `times` it is a factor on
 what each run has. A variant may put another run in a run's place. A claim depends on all open values that
 touch its runs, or on those that its `open_values` lists. Checks are judged over the region where the runs of
-claims are all they need. How margins, shares and flips are defined: [regions](../regions.md).
+claims are all they need. Margin, share, flip and "undecided" are defined in `docs/regions.md`.
 
 Along axes, a limit is how far one of them may go; curves and maps show a metric over one or two.
 

@@ -16,11 +16,14 @@ from ..files import reason
 from ..metrics.run_metrics import metric
 from ..writing import write_whole
 from .findings import Findings
+from .numbers import text_of
+from .verdicts import verdict
 
 if TYPE_CHECKING:
     import pandas as pd
 
 TABLE = "table.csv", "table.parquet"
+VERDICTS = "verdicts.csv"
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,27 @@ def columns_of(findings: Findings) -> list[Column]:
     return [*columns, Column("key", "string", keys)]
 
 
+def verdict_columns(findings: Findings) -> list[Column]:
+    """Return what was said, its verdict, margin and region: a row per claim and check."""
+    groups = ("claims", findings.claims), ("checks", findings.checks)
+    every = [(group, one) for group, judged in groups for one in judged]
+    regions = [one.region for _, one in every]
+    flips = [region and region.flip for region in regions]
+    return [
+        Column("group", "string", [group for group, _ in every]),
+        Column("says", "string", [one.said.says for _, one in every]),
+        Column("verdict", "string", [verdict(one, group) for group, one in every]),
+        Column("margin", "float64", [one.margin for _, one in every], {"unit": "1"}),
+        Column("spread", "float64", [region and region.spread for region in regions], {"unit": "1"}),
+        Column("points", "int64", [region and len(region.points) for region in regions]),
+        Column("holds at", "int64", [region and region.holding for region in regions]),
+        Column("without result", "int64", [region and region.without_result for region in regions]),
+        Column("flips by", "string", [flip and flip.open_value for flip in flips]),
+        Column("flips at", "string", [flip and flip.words for flip in flips]),
+        Column("robust", "string", [region and text_of(region.robust) for region in regions]),
+    ]
+
+
 def si(unit: str) -> str:
     """Return a metric's unit as it stands in a table for programs: ratios are not in per cent there."""
     return "1" if unit == "%" else unit
@@ -90,6 +114,8 @@ def write_table(findings: Findings, out: Path) -> None:
     """
     columns = columns_of(findings)
     contents: dict[str, str | bytes] = {TABLE[0]: to_csv(columns), TABLE[1]: _parquet(findings, columns)}
+    if findings.spec.claims or findings.spec.checks:
+        contents[VERDICTS] = to_csv(verdict_columns(findings))
     for name, content in contents.items():
         try:
             write_whole(out / name, content)

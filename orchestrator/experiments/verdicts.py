@@ -20,7 +20,7 @@ from .schema import TableSpec
 from .tables import Cell, Table, marked, remarks
 
 HOLDS, UNDECIDED, NOT_JUDGED = "holds", "undecided", "not judged"
-CARRIES = ("margin", "holds", "nearest flip")
+CARRIES = ("margin", "region", "nearest flip")
 """Headings of how far a verdict carries; the last two over a region."""
 FAILS = {"claims": "does not reproduce", "checks": "does not hold"}
 
@@ -87,14 +87,14 @@ def share(ratio: float) -> str:
 
 
 def region_words(judgement: Judgement) -> list[str]:
-    """Return how far a verdict carries: `in 71 % of 24 points`, `flips at amplitude 0.08 rad`."""
+    """Return how far a verdict carries: `holds in 71 % of 24 points`, `flips at amplitude 0.08 rad`."""
     region = judgement.region
     if region is None:
         return []
     failed = f", {region.without_result} without a result" if region.without_result else ""
     flip = region.flip
     return [
-        f"in {100 * region.holding / len(region.points):.0f} % of {len(region.points)} points{failed}",
+        f"holds in {100 * region.holding / len(region.points):.0f} % of {len(region.points)} points{failed}",
         f"flips at {flip.says} {flip.words}" if flip else "no flip along any open value",
     ]
 
@@ -187,18 +187,23 @@ def line_table(judgement: Judgement) -> Table:
 
 
 def region_table(findings: Findings) -> Table:
-    """Return a table of the open values of the region: what they are, their range, why it is that."""
+    """Return a table of the open values of the region: what is chosen, their range, why it is that."""
     region = findings.spec.region
     assert region is not None
+    lines = {line.open_value: line for one in findings.regions.values() for line in one.lines}
     rows: list[list[Cell]] = []
     for name, one in region.open_values.items():
-        levels = levels_of(one.stepped)
-        given = f" {one.unit}" if one.unit else " × as chosen" if one.times else ""
-        ends = f"{levels[0].words} to {levels[-1].words}{given}"
-        rows.append([one.says or name, ends if one.start is not None else
-                     f"{', '.join(level.words for level in levels)}{given}", one.because])  # fmt: skip
+        line, levels = lines.get(name), levels_of(one.stepped)
+        unit = one.unit or (line.unit if line and not one.times else "")
+        ends = [levels[0].words, levels[-1].words] if one.start is not None else [one.words for one in levels]
+        words = " to ".join(ends) if one.start is not None else ", ".join(ends)
+        chosen = line.words(line.chosen.place) if line and line.chosen.place is not None else None
+        rows.append([
+            one.says or name, None if one.times else chosen,
+            f"{words} × as chosen" if one.times else f"{words} {unit}".rstrip(), one.because,
+        ])  # fmt: skip
     title = f"Open values: {region.points} points over all together, and one at a time"
-    return Table(title, ["open value", "range", "because"], [*rows])
+    return Table(title, ["open value", "chosen", "range", "because"], [*rows])
 
 
 def claim_tables(findings: Findings) -> list[Table]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 import re
@@ -250,7 +251,10 @@ def test_study_makes_the_runs_of_the_region_once_and_quick_leaves_them_out(
     assert "region of its verdicts: 10 runs\n" in said  # 2 x 2 and 4 of plain alone, 2 of double
     region = record["claims"][0]["region"]
     assert region["flip"] == {"open_value": "ratio", "at": pytest.approx(0.9), "words": "0.900"}
-    assert f"in {5 * region['holds_at']} % of 20" in out.replace("\n", " ")
+    assert f"holds in {5 * region['holds_at']} % of 20" in " ".join(out.split())
+    below = next(csv.DictReader((tmp_path / "o/verdicts.csv").open(encoding="utf-8")))
+    assert (below["says"], below["verdict"]) == ("It stays below 0.06 rad.", "undecided")
+    assert (int(below["holds at"]), below["flips at"]) == (region["holds_at"], "0.900")
     page = (tmp_path / "o/report.html").read_text("utf-8")
     assert "flips at ratio" in page
     assert "unsure" in page
