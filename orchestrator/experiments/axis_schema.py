@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, model_validator
 
-from ..plan import FACTS, FAULTS, OF_RUN, Algorithm
+from ..plan import FACTS, FAULTS, OF_RUN, TYRES, Algorithm
 from ..scenario.fault_schema import FaultSpec
 from ..scenario.measurement_units import parse_unit
 from ..scenario.scenario_schema import Scalar, Time
@@ -17,14 +17,17 @@ from .numbers import Number, is_finite, text_of
 MOST = 100_000
 """Runs of an experiment; chosen: more is a slip of the pen, and would be planned for an hour."""
 
-Kind = Literal["setting", "fmu", "vehicle", "variant"]
+FILES = ("vehicle", TYRES, f"{TYRES}.front", f"{TYRES}.rear")
+"""Places that take names of files, relative to the experiment's."""
+
+Kind = Literal["setting", "fmu", "file", "variant"]
 
 
 def _places(value: object) -> list[str]:
     places = [value] if isinstance(value, str) else value
     if not isinstance(places, list) or not places or not all(isinstance(p, str) and p for p in places):
         raise ValueError(
-            "must be unit.parameter, vehicle.parameter, inputs.pattern, a unit or vehicle "
+            "must be unit.parameter, vehicle.parameter, inputs.pattern, a unit, vehicle or tyres "
             f"(got {short(value)})"
         )
     return places
@@ -77,7 +80,9 @@ class VariantSpec(Changes):
 class AxisSpec(Strict):
     """What is varied, and the values it takes: listed, or so many from one to another; or variants."""
 
-    vary: Places = Field([], description="unit.parameter, inputs.pattern, a unit (its FMU) or vehicle")
+    vary: Places = Field(
+        [], description="unit.parameter, inputs.pattern, a unit (its FMU), vehicle or tyres (files)"
+    )
     variants: dict[str, VariantSpec] = Field({}, description="Words -> changes that belong together")
     values: Levels | None = Field(None, description="A list, or a mapping of values to words")
     start: Number | None = Field(None, alias="from", description="The first of `count` values")
@@ -93,7 +98,7 @@ class AxisSpec(Strict):
         if self.variants:
             return "variant"
         place = self.vary[0]
-        return "setting" if _is_setting(place) else "vehicle" if place == "vehicle" else "fmu"
+        return "setting" if _is_setting(place) else "file" if place in FILES else "fmu"
 
     @property
     def places(self) -> list[str]:
@@ -159,7 +164,7 @@ class AxisSpec(Strict):
 
 
 def _is_setting(place: str) -> bool:
-    return "." in place or place in (*OF_RUN, *FACTS)
+    return place not in FILES and ("." in place or place in (*OF_RUN, *FACTS))
 
 
 def _is_quantity(value: object) -> bool:

@@ -119,8 +119,8 @@ class Experiment:
 
 def changes_at(axis: AxisSpec, level: Level, folder: Path, origin: str = "sweep") -> list[Change]:
     """Return what a level of an axis changes, of a file in a folder."""
-    if axis.kind == "vehicle":
-        return [Change("vehicle", str(folder / str(level.value)), origin)]
+    if axis.kind == "file":
+        return [Change(axis.vary[0], str(folder / str(level.value)), origin)]
     if axis.kind == "variant":
         return changes_of_file(axis.variants[str(level.value)], folder, origin)
     if axis.kind == "fmu":

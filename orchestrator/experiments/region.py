@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ..errors import ScenarioError
 from ..metrics.run_metrics import Value
-from ..plan import OF_RUN, Change, Plan, Unit, Variable
+from ..plan import OF_RUN, TYRES, Change, Plan, Unit, Variable
 from ..plan import Value as Given
 from ..wiring.shared_facts import FACTS
 from ..wording import hint, listed
@@ -48,6 +48,9 @@ def found_at(plan: Plan, place: str) -> tuple[Given, str] | None:
         return units[holder].fmu.name, ""
     if place == "vehicle" and plan.scenario.get("vehicle"):
         return str(plan.scenario["vehicle"]), ""
+    if holder == TYRES:
+        files = {axle: str(file["file"]) for axle, file in plan.scenario.get("tyre_files", {}).items()}
+        return (files[name or "front"], "") if files else None
     if place in OF_RUN:
         values = (float(plan.start), plan.time(plan.n_steps), float(plan.step), plan.algorithm)
         return dict(zip(OF_RUN, values, strict=True))[place], "s"

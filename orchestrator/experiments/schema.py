@@ -80,8 +80,9 @@ Along axes, a limit is how far one of them may go; curves and maps show a metric
 
 What an axis varies is written as on the command line: `unit.parameter`, `vehicle.parameter` and
 `inputs.pattern` take values, as do `stop_time`, `step_size` and `algorithm`; a unit alone takes FMUs
-(`fmu:parameter=value` brings parameters along), `vehicle` takes vehicle files. Several places may
-share an axis. In place of `vary` and `values`, `variants` change several things at once:
+(`fmu:parameter=value` brings parameters along), `vehicle` takes vehicle files, `tyres` (`tyres.front`,
+`tyres.rear`) tyre property files. Several places may share an axis. In place of `vary` and `values`,
+`variants` change several things at once:
 
     control:
       variants:

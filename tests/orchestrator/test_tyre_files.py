@@ -12,6 +12,8 @@ import pytest
 from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError, WiringError
+from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.planning import jobs_of, plan_experiment
 from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.results.key import key_of
 from orchestrator.results.naming import default_folder
@@ -100,6 +102,28 @@ def test_the_vehicle_file_may_name_them_and_the_scenario_has_the_last_word(folde
     assert (of_vehicle["pky1_front"], of_vehicle["lmuy_front"], of_vehicle["lmuy_rear"]) == (-17.0, 0.98, 0.7)
     of_scenario = parameters(plan(scenario(folder, more=", parameters: {lmuy_front: 0.5}"), fmus))
     assert (of_scenario["pky1_front"], of_scenario["lmuy_front"]) == (-12.0, 0.5)
+
+
+def test_tyres_are_an_axis_of_experiments_relative_to_their_file(folder, fmus):
+    scenario(folder)
+    sweep = folder / "sweeps" / "tyres.yaml"
+    sweep.parent.mkdir()
+    sweep.write_text(
+        "title: Tyres\nscenario: ../straight.yaml\naxes:\n"
+        "  tyre: {vary: tyres, values: {../soft.tir: soft, ../stiff.tir: stiff}}\n"
+        "  rear: {vary: tyres.rear, values: [../soft.tir, ../stiff.tir]}\n"
+        "metrics:\n  slip: {metric: peak(slip_ratio_fl)}\n"
+    )
+    loaded = load_experiment(sweep)
+    planned = plan_experiment(loaded, jobs_of(loaded, folder / "runs", fmus))
+    made = [parameters(job.plan) for job in planned.jobs]
+    assert [(one["pky1_front"], one["pky1_rear"]) for one in made] == [
+        (-12.0, -12.0), (-12.0, -17.0), (-17.0, -12.0), (-17.0, -17.0),
+    ]  # fmt: skip
+    assert len({job.key for job in planned.jobs}) == 4
+    sweep.write_text(sweep.read_text().replace("[../soft.tir,", "[1,"))
+    with pytest.raises(ScenarioError, match=r"values: tyres\.rear takes names of files or FMUs"):
+        load_experiment(sweep)
 
 
 def test_another_file_is_another_run(folder, fmus, monkeypatch):
