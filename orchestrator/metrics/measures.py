@@ -27,9 +27,19 @@ B1 = 4/24 and B2 = 1/24 s per degree, values in common use; they are not measure
 """
 
 
+JERK_WINDOW = 0.1
+"""Over which a signal is averaged before its slope is taken [s]. Chosen: the bare difference quotient of an
+acceleration is the jump at a controller's samples; people feel some 10 Hz at most."""
+
+
 def integral(t: np.ndarray, x: np.ndarray) -> float:
     """Return the integral of x over t."""
     return float(np.sum(np.diff(t) * (x[1:] + x[:-1])) / 2)
+
+
+def running_integral(t: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Return the integral of x from t[0] to every t."""
+    return np.concatenate([[0.0], np.cumsum(np.diff(t) * (x[1:] + x[:-1]) / 2)])
 
 
 def mean_error(t: np.ndarray, x: np.ndarray, x_ref: np.ndarray) -> float:
@@ -140,6 +150,37 @@ def time_beyond(t: np.ndarray, x: np.ndarray, x_rate: np.ndarray) -> float:
     return float(np.sum(np.diff(t)[outside[:-1]])) / float(t[-1] - t[0])
 
 
+def grip_use(t: np.ndarray, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> float:
+    """Return the root of the mean square of a tyre's force in the road's plane over its load."""
+    return math.sqrt(integral(t, (x**2 + y**2) / z**2) / float(t[-1] - t[0]))
+
+
+def jerk(t: np.ndarray, x: np.ndarray) -> float:
+    """Return the RMS of the slope between means over two successive windows of `JERK_WINDOW`."""
+    total = running_integral(t, x)
+    begin = t[t <= t[-1] - 2 * JERK_WINDOW]
+    if begin.size < 2:
+        return math.nan
+    first, middle, last = (np.interp(begin + k * JERK_WINDOW, t, total) for k in (0, 1, 2))
+    return rms(begin, (last - 2 * middle + first) / JERK_WINDOW**2)
+
+
+def relative_path_error(
+    t: np.ndarray,
+    y: np.ndarray,
+    yaw_angle: np.ndarray,
+    v_x: np.ndarray,
+    yaw_rate_ref: np.ndarray,
+    sideslip_ref: np.ndarray,
+) -> float:
+    """Return the RMS distance to the side from the path of a car that follows its reference.
+
+    Relative to how far that path leads aside; that car begins where and as this one does, and is as fast.
+    """
+    course = yaw_angle[0] + running_integral(t, yaw_rate_ref) + sideslip_ref
+    return relative_rms_error(t, y - y[0], running_integral(t, v_x * np.sin(course)))
+
+
 @dataclass(frozen=True)
 class Measure:
     """A row of the table of measures."""
@@ -150,7 +191,9 @@ class Measure:
     unit: str  # "{x}" the signal's, "{x}/s" per second, "%" a ratio shown in per cent, or a unit
     needs_reference: bool = False
     needs_rate: bool = False
+    beside: tuple[str, ...] = ()  # other signals that it takes, of the same wheel
     signal_unit: str | None = None  # the only unit of a signal that it means anything for
+    signal: str | None = None  # the only signal, or one of each wheel
 
 
 MEASURES: dict[str, Measure] = {
@@ -210,6 +253,29 @@ MEASURES: dict[str, Measure] = {
         "{x}/s2",
     ),
     "rms": Measure(rms, "√(1/T ∫{x}² dt)", "root mean square", "{x}"),
+    "jerk": Measure(
+        jerk,
+        "√(1/T ∫(Δ{x} / 0.1 s)² dt), {x} in means over 0.1 s",
+        "comfort: root mean square of the slope between means over successive 0.1 s",
+        "{x}/s",
+    ),
+    "grip_use": Measure(
+        grip_use,
+        "√(1/T ∫(F_x² + F_y²) / F_z² dt)",
+        "root mean square of the tyre's force in the road's plane over its load",
+        "1",
+        beside=("tyre_force_y", "vertical_load"),
+        signal="tyre_force_x",
+    ),
+    "relative_path_error": Measure(
+        relative_path_error,
+        "√(1/T ∫(y - y_ref)² dt) / max|y_ref|, y_ref = ∫v_x sin(∫r_ref dt + β_ref) dt",
+        "root mean square distance to the side from the path of a car that follows its reference, over how "
+        "far that path leads aside",
+        "%",
+        beside=("yaw_angle", "velocity_x", "yaw_rate_ref", "sideslip_ref"),
+        signal="position_y",
+    ),
     "phase_area": Measure(
         phase_area,
         "∫(d{x}/dt)² dt",
@@ -265,7 +331,11 @@ def catalogue() -> list[Entry]:
             one.definition,
             one.formula.replace("{x_ref}", "x_ref").replace("{x}", "x"),
             _UNITS.get(one.unit, one.unit),
-            "a reference" if one.needs_reference else "its rate" if one.needs_rate else "",
+            "a reference"
+            if one.needs_reference
+            else "its rate"
+            if one.needs_rate
+            else " and ".join(one.beside),
         )
         for name, one in MEASURES.items()
     ]

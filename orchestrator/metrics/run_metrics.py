@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vocabulary.wheels import wheels
+from vocabulary.wheels import WHEELS, wheels
 
 from ..errors import ResultsError, ScenarioError
 from ..plan import SENSING
@@ -63,7 +63,15 @@ AT_A_TIME = "value"
 Window = tuple[float, float]
 """From, to [s]; equal: a point of time."""
 
-_PER_SECOND = {"1": "1/s", "m": "m/s", "m/s": "m/s2", "rad": "rad/s", "rad/s": "rad/s2", "rad/s2": "rad/s3"}
+_PER_SECOND = {
+    "1": "1/s",
+    "m": "m/s",
+    "m/s": "m/s2",
+    "m/s2": "m/s3",
+    "rad": "rad/s",
+    "rad/s": "rad/s2",
+    "rad/s2": "rad/s3",
+}
 _TIMES_SECOND = {"1": "s", "m/s": "m", "m/s2": "m/s", "rad/s": "rad", "rad/s2": "rad/s"}
 
 
@@ -305,6 +313,8 @@ def _unfit(results: Results, one: Metric) -> str:
     if one.measure.needs_reference and len(having) > 1:
         example = f"{one.name.partition('(')[0]}({one.signal}, {having[0]})"
         return f"{listed(having)} are recorded: name one of them, as in {example}"
+    if one.measure.signal:
+        return f"is of {one.measure.signal} where {listed(one.measure.beside)} are recorded, too"
     return f"{one.signal} has no reference or not the right unit"
 
 
@@ -341,8 +351,23 @@ def _signals(results: Results, chosen: Metric) -> list[list[str]]:
             columns.append(reference)
         elif chosen.measure.needs_rate and (rate := _rate_of(results, column)):
             columns.append(rate)
+        if chosen.measure.signal is not None:
+            beside = _beside(results, column, chosen.measure)
+            if not beside or chosen.other:
+                return []
+            columns += beside
         signals.append(columns)
     return signals
+
+
+def _beside(results: Results, column: str, measure: Measure) -> list[str]:
+    """Return the columns that a measure takes beside its signal; none if one is missing."""
+    name, signal = variable_of(column), measure.signal or ""
+    wheel = name[len(signal) :]
+    if not name.startswith(signal) or (wheel and wheel[1:] not in WHEELS):
+        return []
+    found = [_column(results, f"{other}{wheel}") for other in measure.beside]
+    return [one for one in found if one] if all(found) else []
 
 
 def _rate_of(results: Results, column: str) -> str | None:

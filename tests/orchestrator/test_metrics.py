@@ -108,6 +108,40 @@ def test_time_beyond_is_the_share_of_time_outside_the_strip():
     assert measures.time_beyond(T, 0 * T, 0 * T) == 0.0
 
 
+def test_jerk_is_the_slope_of_a_ramp_and_knows_nothing_of_a_controllers_samples():
+    assert measures.jerk(T, 3 * T) == pytest.approx(3.0)
+    assert measures.jerk(T, 3 * T + 0.01 * (np.arange(T.size) % 2)) == pytest.approx(3.0, rel=0.01)
+    assert math.isnan(measures.jerk(T[:3], T[:3]))
+
+
+def test_grip_use_is_the_tyres_force_over_its_load_and_the_worst_wheel_counts():
+    loads = {f"plant.vertical_load_{w}": 1000 + 0 * T for w in WHEELS}
+    forces = {f"tyre.tyre_force_x_{w}": 300 + 0 * T for w in WHEELS} | {
+        f"tyre.tyre_force_y_{w}": (400 if w == "rl" else 0) + 0 * T for w in WHEELS
+    }
+    found = evaluate(results(loads | forces, T), metric("grip_use(tyre_force_x_*)"))
+    assert (found.number, found.unit) == (pytest.approx(0.5), "1")
+    assert evaluate(results(forces, T), metric("grip_use(tyre_force_x_*)")) is None
+    assert evaluate(results(loads | forces, T), metric("grip_use(tyre_force_y_*)")) is None
+
+
+def test_the_path_is_compared_with_that_of_a_car_that_follows_its_reference():
+    quarter = np.pi / 2 / T[-1]  # of a circle to the left, of radius 1 m, begun northwards
+    columns = {
+        "plant.yaw_angle": np.pi / 2 + quarter * T, "plant.velocity_x": quarter + 0 * T,
+        "reference.yaw_rate_ref": quarter + 0 * T, "reference.sideslip_ref": 0 * T,
+        "plant.position_y": 5 + np.sin(quarter * T),
+    }  # fmt: skip
+    error = metric("relative_path_error(position_y)")
+    assert evaluate(results(columns, T), error).number == pytest.approx(0.0, abs=1e-7)
+    assert evaluate(results(columns, T), error, (0.5, 1.5)).number == pytest.approx(0.0, abs=1e-7)
+    columns["plant.position_y"] = 5 + 1.1 * np.sin(quarter * T)
+    assert evaluate(results(columns, T), error).number == pytest.approx(0.1 / math.sqrt(2), rel=1e-6)
+    columns["reference.sideslip_ref"] += np.pi / 2  # it drives to the west
+    columns["plant.position_y"] = 5 - 1 + np.cos(quarter * T)
+    assert evaluate(results(columns, T), error).number == pytest.approx(0.0, abs=1e-7)
+
+
 def test_a_recorded_rate_goes_before_the_difference_quotient():
     sideslip = 0.05 * SINE
     index = metric("stability_index(sideslip)")
@@ -141,6 +175,8 @@ def test_every_standard_metric_applies_to_a_complete_car():
 
 def test_every_measure_can_be_applied_and_says_its_formula_and_unit():
     for name, measure in measures.MEASURES.items():
+        if measure.signal:  # of other signals than this car has: tested above
+            continue
         chosen = metric(f"{name}(sideslip){' at 2 s' if name == AT_A_TIME else ''}")
         value = evaluate(car(1.2), chosen)
         assert value is not None
