@@ -31,13 +31,13 @@ COMMANDS = (
     "sweep",
     "evaluate",
     "drive",
+    "tune",
     "list",
     "diff",
     "salvage",
     "export-ssp",
     "second-opinion",
     "tyre",
-    "vehicle",
     "cache",
 )
 """Each a module of `orchestrator.commands` with a function of the same name, `_` for `-`."""

@@ -245,6 +245,8 @@ def of_files(
         raise ScenarioError("--fresh and --no-run contradict each other")
     check_format(wishes.format)
     experiments = [load_experiment(file, changes=changes) for file in files]
+    if tuned := [str(one.path) for one in experiments if one.spec.tuning]:
+        raise ScenarioError([f"{file}: a tuning file; it is for `yawbench tune`" for file in tuned])
     folders = [default_folder(file, changes) for file in files]
     page = out or (folders[0] if len(folders) == 1 else Path(os.path.commonpath(folders)))
     if out is not None:

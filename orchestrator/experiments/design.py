@@ -75,11 +75,11 @@ def latin_hypercube(axes: Sequence[AxisSpec], runs: int, seed: int) -> list[Poin
     columns: list[list[Level]] = []
     for axis in axes:
         places = (generator.permutation(runs) + generator.random(runs)) / runs
-        columns.append([_at(axis, float(place)) for place in places])
+        columns.append([level_at(axis, float(place)) for place in places])
     return list(zip(*columns, strict=True))
 
 
-def _at(axis: AxisSpec, place: float) -> Level:
+def level_at(axis: AxisSpec, place: float) -> Level:
     """Return the level at a place between 0 and 1."""
     if axis.variants or axis.values is not None or axis.count is not None:
         levels = levels_of(axis)

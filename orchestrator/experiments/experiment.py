@@ -286,6 +286,10 @@ def _check_names(experiment: Experiment, document: Document) -> None:
             for k, name in enumerate(claim.open_values or ()):
                 where: Key = (group, i, "open_values", k)
                 _known(document, where, name, open_values, "open value", "open values")
+    if spec.tuning:
+        objective = spec.tuning.objective
+        _known(document, ("tuning", "objective"), objective, spec.derived, "derived number", "there are")
+        check_patterns(("tuning",), spec.tuning.runs)
     for key, condition in spec.conditions():
         _check_condition(experiment, document, key, condition)
     for name, limit in spec.limits.items():

@@ -88,6 +88,20 @@ What an axis varies is written as on the command line: `unit.parameter`, `vehicl
       variants:
         no control: {swap: {controller: controller_off}}
         with slip control: {swap: {wheel_control: wheel_control_slip}, set: {driver.amplitude: 0.04}}
+
+Tuning seeks values in ranges, for several laws by one objective and one budget; `yawbench tune` does it.
+
+    tuning:
+      objective: cost                      # a derived number; the least is the best
+      population: 8                        # trials of a generation
+      generations: 8
+      seed: 1
+      runs: ["*/tuned"]                    # those that the laws drive; left out: all
+      laws:
+        PD:
+          swap: {controller: controller_pid}
+          axes:
+            gain: {vary: controller.sideslip_proportional_gain, from: 1e4, to: 1e6, spacing: log}
 """
 
 from __future__ import annotations
@@ -125,6 +139,30 @@ class RunSpec(Changes):
     for_each: dict[str, Alternatives] = Field({}, alias="for", description="Key -> values")
     label: str = Field("", description="What legends call it; default: the name")
     row: str = Field("", description="What tables call it; default: the label")
+
+
+class LawSpec(Changes):
+    """What is tuned of a law, and what is changed for it."""
+
+    axes: dict[str, AxisSpec] = Field(description="Name -> what is sought, from and to", min_length=1)
+
+    @model_validator(mode="after")
+    def _ranges(self) -> LawSpec:
+        for name, axis in self.axes.items():
+            if axis.start is None or axis.count is not None:
+                raise ValueError(f"axes.{name}: needs from and to, and no count")
+        return self
+
+
+class TuningSpec(Strict):
+    """A search for the values that make an objective least, by one budget for all laws."""
+
+    objective: str = Field(description="Key of `derived`; the least is the best")
+    population: int = Field(description="Trials of a generation", ge=5)
+    generations: int = Field(description="With the first", ge=1)
+    seed: int = Field(description="Of all that is left to chance", ge=0)
+    runs: Patterns = Field(["*"], description="Runs that the laws drive; the others stand as they are")
+    laws: dict[str, LawSpec] = Field(description="Words -> what is tuned", min_length=1)
 
 
 class TableSpec(Strict):
@@ -219,15 +257,18 @@ class ExperimentSpec(Changes):
     region: RegionSpec | None = Field(None, description="How far the verdicts of claims carry")
     limits: dict[str, LimitSpec] = {}
     figures: list[FigureSpec] = []
+    tuning: TuningSpec | None = Field(None, description="What `yawbench tune` seeks")
 
     @model_validator(mode="after")
     def _consistent(self) -> ExperimentSpec:
         if bool(self.scenario) == bool(self.runs):
             raise ValueError("needs either a scenario or runs")
-        if self.scenario and not self.axes:
+        if self.scenario and not self.axes and not self.tuning:
             raise ValueError("a single run needs axes")
         if self.region and self.axes:
             raise ValueError("region: runs along axes have none; it is for named runs at one point")
+        if self.tuning and (self.axes or self.region):
+            raise ValueError("tuning has axes of its own, law by law, and no region")
         if self.design == "latin_hypercube":
             if self.points is None or self.seed is None:
                 raise ValueError("a latin_hypercube needs points and seed")

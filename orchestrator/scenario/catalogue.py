@@ -17,7 +17,7 @@ SHIPPED = Path(__file__).resolve().parents[2] / FOLDER
 """Where this program's own scenarios lie."""
 YAML = (".yaml", ".yml")
 ENDINGS = (*YAML, ".ssp")
-COMMANDS = {"a scenario": "run", "a study file": "study", "a sweep file": "sweep"}
+COMMANDS = {"a scenario": "run", "a study file": "study", "a sweep file": "sweep", "a tuning file": "tune"}
 """Kind of file -> the command that is for it."""
 _KEY = re.compile(rf"^[\"']?({'|'.join(KINDS)})[\"']?[ \t]*:", re.MULTILINE)
 

@@ -21,6 +21,7 @@ class Strict(BaseModel):
 
 
 KINDS: dict[str, tuple[str, type, str]] = {
+    "tuning": ("a tuning file", dict, "; it is for `yawbench tune`"),
     "axes": ("a sweep file", dict, "; it is for `yawbench sweep`"),
     "units": ("a scenario", dict, "; it is for `yawbench run`"),
     "runs": ("a study file", list, "; it is for `yawbench study` and `report`"),

@@ -91,20 +91,22 @@ def test_a_folder_in_place_of_a_file_names_the_files_in_it(yawbench, command, fo
 def test_the_glance_at_a_file_sees_the_kind_that_its_schema_sees():
     kinds = {path.name: kind for path, kind in catalogue.files(SCENARIOS / "fnn_sideslip", list(KINDS))}
     assert kinds == {
-        "15mps.yaml": "a scenario", "25mps.yaml": "a scenario", "40mps.yaml": "a scenario",
-        "study.yaml": "a study file", "sweep.yaml": "a sweep file",
+        **dict.fromkeys(("15mps.yaml", "25mps.yaml", "40mps.yaml"), "a scenario"),
+        **dict.fromkeys((f"{speed}mps_actuators.yaml" for speed in (15, 25, 40)), "a scenario"),
+        "tuning.yaml": "a tuning file", "tuning_with_actuators.yaml": "a tuning file",
+        "laws.yaml": "a study file", "study.yaml": "a study file", "sweep.yaml": "a sweep file",
         "sweep_slip_control.yaml": "a sweep file",
     }  # fmt: skip
 
 
-KINDS = ("a scenario", "a study file", "a sweep file", "a vehicle file")
+KINDS = ("a scenario", "a study file", "a sweep file", "a tuning file", "a vehicle file")
 
 
 @pytest.mark.parametrize(
     ("words", "completed"),
     [
         ("run fuzzy_pid/", ["fuzzy_pid/double_lane_change", "fuzzy_pid/ramp", "fuzzy_pid/sine"]),
-        ("study fnn", ["fnn_sideslip/study"]),
+        ("study fnn", ["fnn_sideslip/laws", "fnn_sideslip/study"]),
         ("sweep fnn", ["fnn_sideslip/sweep", "fnn_sideslip/sweep_slip_control"]),
         ("second", ["second-opinion"]),
     ],

@@ -1,0 +1,78 @@
+"""`yawbench tune`: the parameters of one or several laws, sought by one objective and one budget."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .batch import Jobs, hold, print_tables
+from .experiment import Wishes, chapter_of, command_of, conduct, write_page
+from .options import CallLimit, Fmus, Fresh, Isolate, NoBuild, Out, Scheduler, Set, Swap, isolation, named
+
+if TYPE_CHECKING:
+    from ..experiments.experiment import Experiment
+    from ..experiments.findings import Findings
+
+TuningFile = Annotated[
+    Path, named("a tuning file", help="Tuning: YAML file, or a name in scenarios/.", metavar="TUNING")
+]
+
+
+def tune(
+    context: typer.Context,
+    file: TuningFile,
+    swap: Swap = None,
+    set_: Set = None,
+    out: Out = None,
+    fmus: Fmus = None,
+    no_build: NoBuild = False,
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+    fresh: Fresh = False,
+    isolate: Isolate = False,
+    call_limit: CallLimit = None,
+) -> None:
+    """Seek the parameters that make an objective least.
+
+    Every law of the file has the same objective, search (differential evolution) and budget. Without
+    --out, results go to results/<folder of the tuning file>/<its name>: report.html; trials.csv, one row per
+    trial; the history as a figure. An interrupted search goes on where it was; with the same seed, and
+    whatever the number of workers, it finds the same.
+    """
+    from dataclasses import replace
+
+    from ..experiments.experiment import load_experiment
+    from ..experiments.table import to_csv
+    from ..experiments.tuning import best_of, columns_of, history_figure, search, tuning_table
+    from ..figures.style import save
+    from ..pages.panel_images import image_of
+    from ..results.naming import default_folder
+    from ..scenario.overrides import read_changes
+    from ..writing import write_whole
+
+    changes = read_changes(swap or (), set_ or ())
+    experiment = load_experiment(file, changes=changes)
+    folder = out or default_folder(file, changes)
+    hold(context, folder)
+    wishes = Wishes(
+        fmus, not no_build, jobs, scheduler, call_limit=isolation(isolate, call_limit), fresh=fresh
+    )
+
+    def judged(trials: Experiment) -> Findings:
+        nonlocal wishes
+        findings = conduct(trials, folder, wishes)
+        wishes = replace(wishes, fresh=False)
+        return findings
+
+    found = search(experiment, judged)
+    findings = judged(best_of(experiment, found))
+    table = tuning_table(experiment, found)
+    write_whole(folder / "trials.csv", to_csv(columns_of(found)))
+    print_tables([table])
+    command = command_of("tune", file, swap=swap, set=set_)
+    save(history_figure(experiment, found, command), folder / "history")
+    charts = [image_of(folder / "history.svg", experiment.spec.title)]
+    facts = {"results": [table], "charts": charts}
+    write_page([chapter_of(findings, folder, command, shown_in=folder, **facts)], folder)

@@ -1,0 +1,230 @@
+"""Tuning: laws whose parameters are sought by one objective, one search and one budget, so that they compare.
+
+A file of an experiment with a key `tuning` names, law by law, the ranges of what is sought. Whatever is tried
+is a run of that experiment like any other: planned before it starts, made in a process of its own, noted in
+the journal. Of a search that was stopped only what is left is run when it is begun again.
+
+The search is scipy's differential evolution, strategy best/1/bin: R. Storn, K. Price, Differential Evolution
+- a simple and efficient heuristic for global optimization over continuous spaces, J. Global Optimization
+11 (1997) 341-359. It is given a first generation (the middle of all ranges, and a Latin hypercube),
+generations to come, and a seed; nothing ends it early.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ScenarioError
+from ..metrics.run_metrics import Value
+from .axis_schema import AxisSpec, Changes, VariantSpec
+from .design import level_at
+from .experiment import Experiment
+from .findings import Findings, derive
+from .judging import Values
+from .table import Column
+from .tables import Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from .schema import LawSpec, TuningSpec
+
+DIGITS = 3
+"""Of every value that is tried, so that a file can hold what is found; chosen: gains matter to a per cent."""
+TRIAL = "trial"
+"""The axis of what is tried."""
+
+Judged = Callable[[Experiment], Findings]
+"""Makes those runs of an experiment that are left, and returns what it comes to."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Values of what is sought, and what they come to; None if a run failed or gives no number."""
+
+    generation: int  # from 1
+    values: dict[str, float]  # place -> value, in the unit of its range
+    objective: float | None
+
+    @property
+    def cost(self) -> float:
+        """The objective; infinite if there is none."""
+        return math.inf if self.objective is None else self.objective
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """A law and all that was tried of it, in order; the first has the middle of all ranges."""
+
+    law: str
+    trials: list[Trial]
+
+    @property
+    def best(self) -> Trial:
+        """The trial with the least objective, the first of equal ones."""
+        return min(self.trials, key=lambda trial: trial.cost)
+
+
+def tuning_of(experiment: Experiment) -> TuningSpec:
+    """Return what an experiment asks to be tuned.
+
+    Raises:
+        ScenarioError: it asks for nothing.
+    """
+    if experiment.spec.tuning is None:
+        raise ScenarioError(f"{experiment.path}: has no 'tuning'; it is for `yawbench study` or `sweep`")
+    return experiment.spec.tuning
+
+
+def search(experiment: Experiment, judged: Judged) -> list[Tuned]:
+    """Return what the search of every law has tried.
+
+    Args:
+        experiment: with `tuning`.
+        judged: makes runs and judges them.
+
+    Raises:
+        ScenarioError: scipy is not installed, or a run cannot start.
+    """
+    try:
+        import numpy as np
+        from scipy.optimize import differential_evolution
+        from scipy.stats import qmc
+    except ImportError:
+        raise ScenarioError("tuning needs the package scipy: pip install 'yawbench[tuning]'") from None
+    tuning = tuning_of(experiment)
+    fixed = _fixed(experiment, judged)
+    found = []
+    for name, law in tuning.laws.items():
+        axes, trials = law.axes.values(), list[Trial]()
+
+        def costs(places: Any, name: str = name, law: LawSpec = law, trials: list[Trial] = trials) -> Any:
+            values = [_values(law, column) for column in np.asarray(places).T]
+            tried = [_changes(law, one) for one in values]
+            findings = judged(_trials(experiment, {f"{name}, {k + 1}": one for k, one in enumerate(tried)}))
+            objectives = [_objective(experiment, {**fixed, **at}) for at in findings.at.values()]
+            number = len(trials) // tuning.population + 1
+            trials += [Trial(number, *one) for one in zip(values, objectives, strict=True)]
+            return np.array([trial.cost for trial in trials[-len(values) :]])
+
+        chance = np.random.default_rng(tuning.seed)
+        first = qmc.LatinHypercube(len(axes), rng=chance).random(tuning.population)
+        first[0] = 0.5
+        differential_evolution(
+            costs, [(0.0, 1.0)] * len(axes), init=first, maxiter=tuning.generations - 1, rng=chance,
+            tol=0.0, atol=0.0, polish=False, vectorized=True, updating="deferred",
+        )  # fmt: skip
+        found.append(Tuned(name, trials))
+    return found
+
+
+def best_of(experiment: Experiment, found: Sequence[Tuned]) -> Experiment:
+    """Return the runs of what was best of every law."""
+    laws = tuning_of(experiment).laws
+    return _trials(experiment, {one.law: _changes(laws[one.law], one.best.values) for one in found})
+
+
+def _fixed(experiment: Experiment, judged: Judged) -> Values:
+    """Return the metrics of the runs that no law drives."""
+    left = [name for name in experiment.runs if not _driven(experiment, name)]
+    if not left:
+        return {}
+    return judged(_along(experiment, left, {"as they stand": VariantSpec.model_validate({})})).values
+
+
+def _driven(experiment: Experiment, run: str) -> bool:
+    return any(fnmatchcase(run, pattern) for pattern in tuning_of(experiment).runs)
+
+
+def _trials(experiment: Experiment, tried: dict[str, VariantSpec]) -> Experiment:
+    """Return an experiment of the runs that laws drive, with a level of its only axis for each trial."""
+    return _along(experiment, [name for name in experiment.runs if _driven(experiment, name)], tried)
+
+
+def _along(experiment: Experiment, runs: Sequence[str], variants: dict[str, VariantSpec]) -> Experiment:
+    axis = AxisSpec.model_validate({"variants": variants})
+    spec = experiment.spec.model_copy(
+        update={"axes": {TRIAL: axis}, "tuning": None, "tables": [], "figures": []}
+    )
+    return replace(experiment, spec=spec, runs={name: experiment.runs[name] for name in runs})
+
+
+def _values(law: LawSpec, places: Sequence[float]) -> dict[str, float]:
+    """Return what is tried at a point of the unit cube: place -> value."""
+    values = {}
+    for axis, place in zip(law.axes.values(), places, strict=True):
+        number = float(f"{level_at(axis, float(place)).value:.{DIGITS}g}")
+        values.update(dict.fromkeys(axis.vary, number))
+    return values
+
+
+def _changes(law: LawSpec, values: dict[str, float]) -> VariantSpec:
+    """Return a law's own changes with the values that are tried."""
+    units = {place: axis.unit for axis in law.axes.values() for place in axis.vary}
+    tried = {place: f"{x!r} {unit}" if (unit := units[place]) else x for place, x in values.items()}
+    own = {name: getattr(law, name) for name in Changes.model_fields}
+    return VariantSpec.model_construct(**{**own, "set": {**law.set, **tried}})
+
+
+def _objective(experiment: Experiment, values: Values) -> float | None:
+    found = derive(experiment.spec, values).get(tuning_of(experiment).objective)
+    return None if found is None or not math.isfinite(found.number) else found.number
+
+
+def tuning_table(experiment: Experiment, found: Sequence[Tuned]) -> Table:
+    """Return the table of laws: the objective amid the ranges, the least, and where it was found."""
+    tuning = tuning_of(experiment)
+    spec = experiment.spec.derived[tuning.objective]
+    budget = f"{tuning.population} x {tuning.generations} trials each, seed {tuning.seed}"
+    table = Table(f"{spec.says}: {budget}", ["law", "middle of the ranges", "found", "with"])
+    for one in found:
+        first, best = (
+            "failed" if trial.objective is None else Value(trial.objective, spec.unit)
+            for trial in (one.trials[0], one.best)
+        )
+        units = {place: axis.unit for axis in tuning.laws[one.law].axes.values() for place in axis.vary}
+        told = [
+            f"{place}: {number:g} {units[place] or ''}".rstrip() for place, number in one.best.values.items()
+        ]
+        table.rows.append([one.law, first, best, "\n".join(told)])
+    return table
+
+
+def columns_of(found: Sequence[Tuned]) -> list[Column]:
+    """Return all trials as columns: law, generation, objective, and every place that any law varies."""
+    rows = [(one.law, trial) for one in found for trial in one.trials]
+    places = dict.fromkeys(place for _, trial in rows for place in trial.values)
+    return [
+        Column("law", "string", [law for law, _ in rows]),
+        Column("generation", "int64", [trial.generation for _, trial in rows]),
+        Column("objective", "float64", [trial.objective for _, trial in rows]),
+        *(Column(place, "float64", [trial.values.get(place) for _, trial in rows]) for place in places),
+    ]
+
+
+def history_figure(experiment: Experiment, found: Sequence[Tuned], note: str) -> Figure:
+    """Return the least objective so far over the number of trials, a line per law."""
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    from ..figures.style import RC, frame, line_style
+
+    with matplotlib.rc_context(RC):
+        figure = Figure(layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.subplots()
+        handles = []
+        for k, one in enumerate(found):
+            least = [min(trial.cost for trial in one.trials[: n + 1]) for n in range(len(one.trials))]
+            axes.step(range(1, len(least) + 1), least, where="post", **line_style(k))
+            handles.append(Line2D([], [], label=one.law, **line_style(k)))
+        axes.set(xlabel="trials", ylabel="least objective so far")
+        axes.set_title(experiment.spec.derived[tuning_of(experiment).objective].says)
+        frame(figure, 3.4, handles, experiment.spec.title, note)
+    return figure

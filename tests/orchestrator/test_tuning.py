@@ -1,0 +1,124 @@
+"""Tuning from the file to what is found: one search and budget for all laws, resumed where it was."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+
+import pytest
+from lxml import html
+
+from fmus.build import build_all
+from orchestrator.cli import main
+
+SCENARIO = """
+title: A steering wheel
+stop_time: 0.1
+step_size: 0.01
+units: {driver: {fmu: driver_sine, parameters: {frequency: 2.5, start_time: 0}}}
+"""
+TUNING = """
+title: How far to turn
+runs:
+  - {name: turned, scenario: wheel.yaml}
+  - {name: as it stands, scenario: wheel.yaml, set: {driver.amplitude: 0.03}}
+metrics: {steer: {metric: peak(steer_angle)}}
+derived:
+  miss:
+    says: Square of the distance
+    expression: (turned - wanted) * (turned - wanted)
+    of: {turned: {run: turned, metric: steer}, wanted: {run: as_it_stands, metric: steer}}
+tuning:
+  objective: miss
+  population: 5
+  generations: 2
+  seed: 2
+  runs: [turned]
+  laws:
+    wheel: {axes: {angle: {vary: driver.amplitude, from: 0.5, to: 5, unit: deg}}}
+""".replace("as it stands, ", "as_it_stands, ")
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("fmus")
+    build_all(folder, components=("driver_sine",))
+    return folder
+
+
+@pytest.fixture
+def yawbench(fmus, tmp_path, capfd):
+    (tmp_path / "wheel.yaml").write_text(SCENARIO)
+    file = tmp_path / "tuning.yaml"
+    file.write_text(TUNING)
+
+    def run(*arguments, command="tune", **other):
+        text = TUNING
+        for old, new in other.items():
+            text = text.replace(old, new)
+        file.write_text(text)
+        with pytest.raises(SystemExit) as end:
+            main([command, str(file), "--out", str(tmp_path / "out"), "--fmus", str(fmus), *arguments])
+        told = capfd.readouterr()
+        return end.value.code or 0, told.out, told.err
+
+    return run
+
+
+def test_the_least_of_all_trials_is_found_written_down_and_not_sought_twice(yawbench, tmp_path):
+    status, out, told = yawbench()
+    assert status == 0, told
+    trials = list(csv.DictReader((tmp_path / "out/trials.csv").open()))
+    assert [row["generation"] for row in trials] == [str(1 + k // 5) for k in range(10)]
+    assert trials[0]["driver.amplitude"] == "2.75"  # amid the range
+    for row in trials:
+        angle = float(row["driver.amplitude"])
+        assert angle == float(f"{angle:.3g}")
+        wanted = (angle * 3.141592653589793 / 180 - 0.03) ** 2
+        assert float(row["objective"]) == pytest.approx(wanted, rel=1e-6, abs=1e-15)
+    best = min(trials, key=lambda row: float(row["objective"]))
+    assert float(best["driver.amplitude"]) == pytest.approx(1.719, abs=0.5)
+    assert f"driver.amplitude: {float(best['driver.amplitude']):g} deg" in out
+    found = json.loads((tmp_path / "out/experiment.json").read_text())
+    assert [*found["runs"]] == ["turned"]
+    page = html.fromstring((tmp_path / "out/report.html").read_text())
+    assert "5 x 2 trials each, seed 2" in page.text_content()
+    before = (tmp_path / "out/trials.csv").read_bytes()
+    runs = (tmp_path / "out/runs.jsonl").read_bytes()
+    status, out, told = yawbench()
+    assert (status, (tmp_path / "out/runs.jsonl").read_bytes()) == (0, runs)
+    assert (tmp_path / "out/trials.csv").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ({"objective: miss": "objective: mist"}, "there is no derived number 'mist'; did you mean 'miss'"),
+        ({"runs: [turned]": "runs: [burned]"}, "no run is named 'burned'; did you mean 'turned'"),
+        ({"from: 0.5, to: 5": "values: [1, 2]"}, "axes.angle: needs from and to, and no count"),
+        ({"population: 5": "population: 3"}, "tuning.population"),
+        ({"tuning:": "axes: {a: {vary: driver.amplitude, values: [1]}}\ntuning:"}, "has axes of its own"),
+    ],
+)
+def test_what_is_wrong_with_a_tuning_file_is_said_before_anything_runs(yawbench, wrong, sentence):
+    status, out, told = yawbench(**wrong)
+    assert (status, out) == (2, "")
+    assert sentence in told
+
+
+def test_other_commands_say_what_a_tuning_file_is_for_and_tune_what_it_is_not(yawbench):
+    for command in ("study", "run"):
+        status, _, told = yawbench(command=command)
+        assert status == 2
+        assert "a tuning file" in told
+        assert "`yawbench tune`" in told
+    status, _, told = yawbench(**{TUNING.partition("tuning:")[2]: "", "tuning:": ""})
+    assert (status, told.count("\n")) == (2, 1)
+    assert "has no 'tuning'" in told
+
+
+def test_without_scipy_a_sentence_says_what_to_install(yawbench, monkeypatch):
+    monkeypatch.setitem(sys.modules, "scipy.optimize", None)
+    status, _, told = yawbench()
+    assert (status, told) == (2, "tuning needs the package scipy: pip install 'yawbench[tuning]'\n")
