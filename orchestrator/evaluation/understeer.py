@@ -2,16 +2,16 @@
 
     delta = L kappa + K_us a_y,        delta = delta_h / i_s,  kappa = r / v_x
 
-K_us is the slope of delta - L r / v_x over a_y; so it does not matter whether the speed was held and the
-hand wheel turned slowly, or the radius was held and the speed raised. Tyres lose stiffness with the square of
-a_y, so the gradient of the linear range is that at zero of
+K_us is the slope of delta - L r / v_x over a_y; so it does not matter whether the speed was held and the hand
+wheel turned slowly, or the radius was held and the speed raised. Tyres lose stiffness with the square of a_y, so
+the gradient of the linear range is that at zero of
 
     delta - L r / v_x = c_0 + K_us a_y + c_3 a_y^3                  fitted over 0.5 to 2 m/s2
 
 and beyond it a local one, a straight line over 1 m/s2.
 
-Source: after ISO 4138, Passenger cars - Steady-state circular driving behaviour - Open-loop test methods,
-from memory of the standard, which fits a curve and differentiates it; cubic and range are our reading.
+Source: after ISO 4138, Passenger cars - Steady-state circular driving behaviour - Open-loop test methods, from
+memory of the standard, which fits a curve and differentiates it; the cubic and its range are our reading.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def evaluate_understeer(trace: Trace) -> Judgement:
         extra = side * (hand / ratio - (front + rear) * r / np.maximum(v, 0.1))
         last = int(np.argmax(a_y))  # what comes after is not the slow rise any more
         a_y, extra = a_y[: last + 1], extra[: last + 1]
-        gradient = slope(a_y, extra, *WINDOW, cubic=True)
+        gradient = _slope(a_y, extra, *WINDOW, cubic=True)
         if gradient is None:
             raise NotJudged(
                 f"lateral acceleration does not rise slowly through {WINDOW[0]:g} to {WINDOW[1]:g} m/s2"
@@ -67,7 +67,7 @@ def evaluate_understeer(trace: Trace) -> Judgement:
         speed = math.sqrt((front + rear) / gradient)
         judged.add("characteristic_speed", "characteristic speed", speed, "m/s", "sqrt(L / K_us)")
     for level in LEVELS:
-        local = slope(a_y, extra, level - HALF, level + HALF)
+        local = _slope(a_y, extra, level - HALF, level + HALF)
         judged.add(
             f"gradient_{level:g}",
             f"understeer gradient at {level:g} m/s2",
@@ -79,17 +79,9 @@ def evaluate_understeer(trace: Trace) -> Judgement:
     return judged
 
 
-def slope(
+def _slope(
     a_y: np.ndarray, extra: np.ndarray, low: float, high: float, *, cubic: bool = False
 ) -> float | None:
-    """Return d extra / d a_y [rad.s2/m] from what lies between two a_y [m/s2]; None if that is too little.
-
-    Args:
-        a_y: rising [m/s2].
-        extra: delta - L r / v_x [rad].
-        low, high: of the straight line, or of the cubic whose slope at zero is meant.
-        cubic: which of the two.
-    """
     inside = (a_y >= low) & (a_y <= high)
     if a_y.max() < high or np.count_nonzero(inside) < FEWEST:
         return None

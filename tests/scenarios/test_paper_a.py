@@ -12,11 +12,13 @@ from orchestrator.cli import main
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.findings import judge_results
 from orchestrator.experiments.verdicts import run_tables
+from orchestrator.figures.display import shown
 
 STUDY = Path(__file__).parents[2] / "scenarios" / "fnn_sideslip" / "study.yaml"
 UNITS = (
     "driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip", "controller_fnn",
-    "allocator_load_proportional", "wheel_control_direct", "plant_seven_dof", "tyre_dugoff",
+    "allocator_load_proportional", "allocator_fixed_share", "wheel_control_direct", "plant_seven_dof",
+    "tyre_dugoff",
 )  # fmt: skip
 
 
@@ -35,6 +37,12 @@ def study(tmp_path_factory):
 def metric(study):
     """Return a metric of a run."""
     return lambda run, name: study["runs"][run]["metrics"][name]["value"]
+
+
+def test_with_one_steering_input_for_all_speeds_the_network_is_lost_at_40_mps(metric):
+    errors = [metric(f"one_input/{speed}mps/fnn", "error") for speed in (25, 40)]
+    assert errors[0] > 0.05
+    assert errors[1] > 3.0 > 10 * metric("one_input/40mps/fuzzy_sideslip", "error")
 
 
 def test_without_control_the_error_is_what_the_paper_says(metric):
@@ -72,6 +80,9 @@ def test_the_verdicts_are_those_the_readme_tells(study):
         "With conventional fuzzy control it is above 10 % at 15 m/s.",
         "With conventional fuzzy control it is above 40 % at 25 m/s.",
         "With conventional fuzzy control it is above 40 % at 40 m/s.",
+        "One steering input for all speeds: with conventional fuzzy control it is above 10, 40 and 40 %.",
+        "One steering input for all speeds: with the fuzzy neural network it is within 5 %.",
+        "One steering input for all speeds: the network follows more closely than conventional fuzzy.",
         "The fuzzy neural network chatters less than conventional fuzzy control at 25 and 40 m/s.",
     }
     assert [check["says"] for check in study["checks"] if check["verdict"] != "holds"] == [
@@ -107,11 +118,61 @@ def test_the_readme_tells_what_the_study_found(study, metric):
     )
     assert f"its error reaches {harm}, where frozen weights stay at {calm}" in prose
     assert f"holds it at {recalled}" in prose
+    (net_25, fuzzy_25), (net_40, fuzzy_40) = (
+        [shown(metric(f"one_input/{speed}mps/{law}", "error"), "%") for law in ("fnn", "fuzzy_sideslip")]
+        for speed in (25, 40)
+    )
+    assert (
+        f"at 25 m/s it has {net_25} (conventional fuzzy {fuzzy_25}), at 40 m/s {net_40} ({fuzzy_40})" in prose
+    )
+    saved = [f"{100 * study['derived'][f'grip_{speed}']['value']:.1f}" for speed in (15, 25, 40)]
+    assert f"as the paper says: by {saved[0]}, {saved[1]} and {saved[2]} %" in prose
+    over = [100 * metric(f"{speed}mps/fuzzy_sideslip", "overshoot") for speed in (15, 40)]
+    assert f"grows with speed, from {over[0]:.0f} to {over[1]:.1f} %" in prose
+
+
+@pytest.mark.exhaustive
+def test_the_readme_tells_what_became_of_the_laws_with_motors_that_lag_and_tuned_alike(tmp_path):
+    build_all(tmp_path / "fmus", components=(*UNITS, "controller_pid", "actuator_lag"))
+    out = tmp_path / "out"
+    with pytest.raises(SystemExit) as exit_:
+        main(
+            ["study", str(STUDY.with_name("laws.yaml")), "--out", str(out), "--fmus", str(tmp_path / "fmus")]
+        )
+    assert not exit_.value.code
+    found = json.loads((out / "experiment.json").read_text())
+    assert [check["holds"] for check in found["checks"]] == [False, True, True]
+
+    def error(run):
+        return found["runs"][run]["metrics"]["error"]["value"]
+
+    readme = (STUDY.parents[2] / "README.md").read_text(encoding="utf-8")
+    prose = " ".join(readme.partition("What comes out")[2].partition("###")[0].split())
+    lost = [shown(error(f"lag/{speed}mps/learning_true"), "%") for speed in (25, 40)]
+    assert f"its error is {lost[0]} at 25 m/s and {lost[1]} at 40" in prose
+    laws = ("learning_false", "fuzzy_sideslip")
+    held = [100 * error(f"lag/{speed}mps/{law}") for speed in (15, 25, 40) for law in laws]
+    assert f"have {min(held):.1f} to {max(held):.1f} %" in prose
+    assert f"has {shown(error('slow/40mps/fuzzy_sideslip'), '%')} at 40 m/s" in prose
+    laws = ("fnn", "frozen", "fuzzy_sideslip", "pd")
+    cost = {law: found["derived"][f"cost_{law}"]["value"] for law in laws}
+    assert sorted(cost, key=cost.get) == [*laws]
+    told = [shown(cost[law], "%").removesuffix(" %") for law in laws]
+    assert f"the network comes to {told[0]} %, frozen weights to {told[1]}" in prose
+    assert f"conventional fuzzy control to {told[2]}, a PD law to {told[3]}." in prose
+    for law, name in zip(
+        laws, ("fuzzy neural network", "frozen weights", "conventional fuzzy", "PD"), strict=True
+    ):
+        tuned = load_experiment(STUDY.with_name("tuning.yaml")).spec.tuning.laws[name]
+        given = {one["place"]: one["value"] for one in found["runs"][f"tuned/15mps/{law}"]["changes"]}
+        for axis in tuned.axes.values():
+            assert axis.start <= given[axis.vary[0]] <= axis.end
 
 
 def test_all_figures_are_drawn(study):
     assert set(study["figures"]) == {
-        "15mps", "25mps", "40mps", "25mps_wheel_torques", "learning_15mps", "learning_25mps", "harsh",
+        "15mps", "25mps", "40mps", "one_input_40mps", "25mps_wheel_torques", "learning_15mps",
+        "learning_25mps", "harsh",
     }  # fmt: skip
     for name in study["figures"]:
         for kind in ("svg", "png"):
