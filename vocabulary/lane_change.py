@@ -1,15 +1,19 @@
-"""The lanes of ISO 3888-1, a double lane change between cones.
+"""The lanes of ISO 3888, double lane changes between cones: part 1, and part 2 to avoid an obstacle.
 
-    section      1      2       3      4       5, 6
-    length      15 m   30 m    25 m   25 m    15 + 15 m
-    lane width  1.1 w + 1/4    1.2 w + 1/4    1.3 w + 1/4      w vehicle width [m]
+    section                1              2        3             4        5 (and 6)
+    ISO 3888-1  length    15 m           30 m     25 m          25 m     15 + 15 m
+                width     1.1 w + 1/4             1.2 w + 1/4            1.3 w + 1/4
+    ISO 3888-2  length    12 m           13.5 m   11 m          12.5 m   12 m
+                width     1.1 w + 1/4             w + 1                  1.3 w + 1/4, at least 3
 
-The lane offset, 3.5 m, is measured between the right borders of lanes 1 and 3; lane 5 begins again at
-the right border of lane 1. y = 0 is the middle of lane 1. A negative offset mirrors the track.
+with the vehicle width w [m]. The lane offset of part 1, 3.5 m, is measured between the right borders of
+lanes 1 and 3; in part 2 there is 1 m between the left border of lane 1 and the right border of lane 3.
+Lane 5 begins again at the right border of lane 1. y = 0 is the middle of lane 1. A negative offset mirrors
+the track.
 
 Source: ISO 3888-1, Passenger cars - Test track for a severe lane-change manoeuvre - Part 1: Double
-lane-change. Ours adds: transitions of another length, for speeds that a slippery road does not bear on
-the standard's.
+lane-change; ISO 3888-2, Part 2: Obstacle avoidance, where the place of lane 5 is our reading. Ours adds:
+transitions of another length, for speeds that a slippery road does not bear on the standard's.
 """
 
 from __future__ import annotations
@@ -17,8 +21,11 @@ from __future__ import annotations
 from math import copysign
 from typing import NamedTuple
 
-LENGTHS = (15.0, 30.0, 25.0, 25.0, 30.0)
-"""Of lane 1, transition 2, lane 3, transition 4 and lanes 5 and 6 together [m]."""
+PART_1, PART_2 = "iso_3888_1", "iso_3888_2"
+LENGTHS = {PART_1: (15.0, 30.0, 25.0, 25.0, 30.0), PART_2: (12.0, 13.5, 11.0, 12.5, 12.0)}
+"""Of lane 1, transition 2, lane 3, transition 4 and lane 5, with 6 where there is one [m]."""
+GAP = 1.0
+"""Between lanes 1 and 3 of part 2, from border to border [m]."""
 
 
 class Lane(NamedTuple):
@@ -36,30 +43,41 @@ class Lane(NamedTuple):
 
 
 def lanes(
-    *, vehicle_width: float, track_start: float, lane_offset: float, transition_scale: float
+    *,
+    vehicle_width: float,
+    track_start: float,
+    lane_offset: float,
+    transition_scale: float,
+    standard: str = PART_1,
 ) -> tuple[Lane, Lane, Lane]:
     """Return lane 1, lane 3, and lanes 5 and 6 as one.
 
     Args:
         vehicle_width: w [m].
         track_start: x of the first cones [m].
-        lane_offset: of lane 3 to the left [m].
+        lane_offset: of lane 3 to the left [m]; of part 2 only its sign counts.
         transition_scale: length of the transitions over the standard's [1].
+        standard: a key of `LENGTHS`.
     """
-    one, two, three, four, five = LENGTHS
+    one, two, three, four, five = LENGTHS[standard]
+    w = vehicle_width
+    first, second, last = 1.1 * w + 0.25, 1.2 * w + 0.25, 1.3 * w + 0.25
+    offset = abs(lane_offset)
+    if standard == PART_2:
+        second, last, offset = w + 1.0, max(last, 3.0), first + GAP
     two *= transition_scale
     four *= transition_scale
     side = copysign(1.0, lane_offset)
-    right = -0.5 * (1.1 * vehicle_width + 0.25)
+    right = -0.5 * first
     made = []
     x = track_start
-    for length, gap, factor, offset in (
-        (one, two, 1.1, 0.0),
-        (three, four, 1.2, abs(lane_offset)),
-        (five, 0.0, 1.3, 0.0),
+    for length, gap, width, shift in (
+        (one, two, first, 0.0),
+        (three, four, second, offset),
+        (five, 0.0, last, 0.0),
     ):
-        border = right + offset
-        borders = (side * border, side * (border + factor * vehicle_width + 0.25))
+        border = right + shift
+        borders = (side * border, side * (border + width))
         made.append(Lane(x, x + length, min(borders), max(borders)))
         x += length + gap
     return made[0], made[1], made[2]

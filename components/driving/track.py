@@ -1,9 +1,9 @@
 """The track of a double lane change as its driver knows it: a path through the lanes, overruns of cones.
 
-The lanes are those of ISO 3888-1 (`vocabulary.lane_change`); x = 0 is the start of the car. The path runs
+The lanes are those of ISO 3888 (`vocabulary.lane_change`); x = 0 is the start of the car. The path runs
 along the middles of lanes 1 and 5 and, in lane 3, at the lane offset from lane 1's: right of the middle by
-5 % of the vehicle width, since cars run wide to the left there. In the transitions 2 and 4 it is a half
-cosine. Paper C names neither path nor lanes.
+5 % of the vehicle width in part 1, since cars run wide to the left there. In the transitions 2 and 4 it is a
+half cosine. Paper C names neither path nor lanes.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from math import cos, hypot, pi, sin
 from typing import NamedTuple
 
-from vocabulary.lane_change import lanes
+from vocabulary.lane_change import PART_1, PART_2, lanes
 
 from ..fmi.variables import parameter
 
@@ -47,6 +47,13 @@ class LaneChangeParameters:
     transition_scale: float = parameter(
         1.0, "1", "Length of the transitions over that of the standard", "ISO 3888-1", minimum=0.1
     )
+    track_standard: str = parameter(
+        PART_1,
+        None,
+        "Lanes of which standard; in part 2 of lane_offset only the sign counts",
+        "chosen: part 1",
+        choices=(PART_1, PART_2),
+    )
 
 
 class Track:
@@ -58,8 +65,9 @@ class Track:
             track_start=p.track_start,
             lane_offset=p.lane_offset,
             transition_scale=p.transition_scale,
+            standard=p.track_standard,
         )
-        self.offset = p.lane_offset
+        self.offset = p.lane_offset if p.track_standard == PART_1 else self.lanes[1].middle
         self.outline = Outline(p.cg_to_front_end, p.cg_to_rear_end, 0.5 * p.vehicle_width)
 
     def path(self, x: float) -> float:

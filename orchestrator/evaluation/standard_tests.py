@@ -66,6 +66,12 @@ def _understeer(trace: Trace, _: float | None) -> Evaluated:
     return Evaluated(trace, evaluate_understeer(trace))
 
 
+def _lane_change(trace: Trace, _: float | None) -> Evaluated:
+    from .lane_change_run import evaluate_lane_change
+
+    return Evaluated(trace, evaluate_lane_change(trace))
+
+
 TESTS: dict[str, StandardTest] = {
     test.name: test
     for test in (
@@ -93,6 +99,12 @@ TESTS: dict[str, StandardTest] = {
             "extra steering per lateral acceleration, of a slow ramp or a constant radius (after ISO 4138)",
             _understeer,
             ("gradient", "gradient_hand", "characteristic_speed", "gradient_4", "largest"),
+        ),
+        StandardTest(
+            "lane-change",
+            "a double lane change between cones, clean or not (ISO 3888)",
+            _lane_change,
+            ("entry", "exit", "overrun", "sideslip", "acceleration", "hand"),
         ),
     )
 }

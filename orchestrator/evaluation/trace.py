@@ -13,6 +13,7 @@ which column is which:
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -89,6 +90,11 @@ def trace_of(results: Results, label: str = "", mass: float | None = None) -> Tr
         found = columns_of(results, name)
         if found:
             signals[name] = results.columns[found[0]] * si_of(results.units[found[0]])[1]
+    own = Counter(column.partition(".")[2] for column in results)
+    for column, values in results.columns.items():  # what only one unit has, such as overruns of cones
+        name = column.partition(".")[2]
+        if name not in signals and own[name] == 1 and np.issubdtype(values.dtype, np.number):
+            signals[name] = values
     fmus = results.run.get("fmus", {})
     facts = {name: value for fmu in fmus.values() for name, value in _parameters(fmu).items()}
     told = [value for fmu in fmus.values() for name, value in _constants(fmu) if name.startswith("friction_")]

@@ -3,15 +3,15 @@
     delta = L kappa + K_us a_y,        delta = delta_h / i_s,  kappa = r / v_x
 
 K_us is the slope of delta - L r / v_x over a_y; so it does not matter whether the speed was held and the hand
-wheel turned slowly, or the radius was held and the speed raised. Tyres lose stiffness with the square of a_y, so
-the gradient of the linear range is that at zero of
+wheel turned slowly, or the radius was held and the speed raised. Tyres lose stiffness with the square of
+a_y, so the gradient of the linear range is that at zero of
 
     delta - L r / v_x = c_0 + K_us a_y + c_3 a_y^3                  fitted over 0.5 to 2 m/s2
 
 and beyond it a local one, a straight line over 1 m/s2.
 
-Source: after ISO 4138, Passenger cars - Steady-state circular driving behaviour - Open-loop test methods, from
-memory of the standard, which fits a curve and differentiates it; the cubic and its range are our reading.
+Source: after ISO 4138, Passenger cars - Steady-state circular driving behaviour - Open-loop test methods,
+from memory of the standard, which fits a curve and differentiates it; the cubic and its range are ours.
 """
 
 from __future__ import annotations

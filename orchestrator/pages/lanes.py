@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from vocabulary.lane_change import Lane, lanes
+from vocabulary.lane_change import LENGTHS, PART_1, Lane, lanes
 
 PARAMETERS = ("vehicle_width", "track_start", "lane_offset", "transition_scale")
 """Parameters of a driver that knows such a track."""
@@ -16,4 +16,6 @@ def lanes_of(parameters: Mapping[str, Any]) -> list[Lane]:
     known = {name: parameters.get(name) for name in PARAMETERS}
     if not all(isinstance(value, (int, float)) for value in known.values()):
         return []
-    return list(lanes(**{name: float(value) for name, value in known.items()}))  # type: ignore[arg-type]
+    numbers: dict[str, Any] = {name: float(value) for name, value in known.items() if value is not None}
+    standard = parameters.get("track_standard", PART_1)
+    return list(lanes(**numbers, standard=standard)) if standard in LENGTHS else []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 
 import pytest
 
@@ -86,3 +87,80 @@ def test_hand_wheel_angle_and_rate_are_limited():
         assert abs(now) <= 6.0 + 1e-12
         last = now
     assert last == pytest.approx(-6.0, rel=1e-6)
+
+
+def test_the_lanes_of_part_2_have_the_lengths_widths_and_gap_of_the_standard():
+    lanes = Track(LaneChangeParameters(vehicle_width=2.2, track_start=0.0, track_standard="iso_3888_2")).lanes
+    assert [(lane.start, lane.end) for lane in lanes] == [(0.0, 12.0), (25.5, 36.5), (49.0, 61.0)]
+    assert [lane.left - lane.right for lane in lanes] == pytest.approx(
+        [1.1 * 2.2 + 0.25, 3.2, 1.3 * 2.2 + 0.25]
+    )
+    assert lanes[1].right - lanes[0].left == pytest.approx(1.0)
+    narrow = Track(LaneChangeParameters(vehicle_width=1.7, track_standard="iso_3888_2")).lanes[2]
+    assert narrow.left - narrow.right == 3.0  # at least
+    mirrored = Track(LaneChangeParameters(track_standard="iso_3888_2", lane_offset=-0.1))
+    plain = Track(LaneChangeParameters(track_standard="iso_3888_2"))
+    assert [mirrored.path(x) for x in range(100)] == [-plain.path(x) for x in range(100)]
+
+
+def clipped(polygon, a, b, c):
+    """Return the part of a polygon with a x + b y <= c (Sutherland and Hodgman)."""
+    kept = []
+    for (x, y), (u, v) in zip(polygon, [*polygon[1:], *polygon[:1]], strict=True):
+        one, other = c - a * x - b * y, c - a * u - b * v
+        if one >= 0.0:
+            kept.append((x, y))
+        if one * other < 0.0:
+            share = one / (one - other)
+            kept.append((x + share * (u - x), y + share * (v - y)))
+    return kept
+
+
+def sticking_out(p, track, x, y, psi):
+    """Return by how much [m] what of the body is between a lane's ends is beyond its borders."""
+    c, s, half = math.cos(psi), math.sin(psi), 0.5 * p.vehicle_width
+    front, rear = p.cg_to_front_end, -p.cg_to_rear_end
+    corners = [(front, half), (front, -half), (rear, -half), (rear, half)]
+    body = [(x + u * c - w * s, y + u * s + w * c) for u, w in corners]
+    worst = 0.0
+    for lane in track.lanes:
+        part = clipped(clipped(body, -1.0, 0.0, -lane.start), 1.0, 0.0, lane.end)
+        worst = max([worst, *(max(v - lane.left, lane.right - v) for _, v in part)])
+    return worst
+
+
+def test_the_largest_overrun_of_a_drive_is_that_of_the_outline_clipped_to_the_lanes():
+    """Within 15 mm, along paths that leave the lanes by up to 0.4 m; beyond, no cone stands any more."""
+    p = LaneChangeParameters()
+    track = Track(p)
+    chance = random.Random(3)
+    compared = 0
+    while compared < 15:
+        size, length, phase, shift = (chance.uniform(*r) for r in ((0.0, 0.4), (25, 60), (0, 6), (-0.2, 0.2)))
+
+        def y_of(x, size=size, length=length, phase=phase, shift=shift):
+            return track.path(x) + shift + size * math.sin(2 * math.pi * x / length + phase)
+
+        most = clip = 0.0
+        for k in range(720):
+            x = 17.0 + 0.2 * k
+            y, psi = y_of(x), math.atan((y_of(x + 0.01) - y_of(x - 0.01)) / 0.02)
+            most = max(most, track.overrun(x, y, psi))
+            clip = max(clip, sticking_out(p, track, x, y, psi))
+        if 0.0 < clip < 0.4:
+            compared += 1
+            assert most == pytest.approx(clip, abs=0.015)
+
+
+def test_yaw_feedback_steers_against_a_turn_and_a_drift_that_nobody_asked_for():
+    def steer(**motion):
+        stand = Stand(DoubleLaneChange, yaw_feedback=0.5, steering_lag=0.0, steering_wheel_rate_limit=1e6)
+        inputs = {"velocity_x": 20.0, "position_x": 0.0, "position_y": 0.0, "yaw_angle": 0.0, **motion}
+        stand.start(**inputs)
+        stand.step(0.001, **inputs)
+        return stand.step(0.001, **inputs)["steer_angle"], stand.unit.car.gains(20.0)[0]
+
+    assert steer()[0] == 0.0
+    assert steer(velocity_y=0.5)[0] < 0.0
+    delta, gain = steer(yaw_rate=0.2)
+    assert delta == pytest.approx(-0.5 * 0.2 / gain)

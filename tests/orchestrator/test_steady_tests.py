@@ -1,4 +1,4 @@
-"""Step steer and understeer gradient: closed forms, ways of sampling, and the theory for every plant."""
+"""Step steer, understeer gradient, lane change: closed forms, and the theory for every plant."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import yawbench as yb
+from orchestrator.evaluation.judgement import Verdict
+from orchestrator.evaluation.lane_change_run import evaluate_lane_change
 from orchestrator.evaluation.step_response import evaluate_step
 from orchestrator.evaluation.trace import Trace, trace_of
 from orchestrator.evaluation.understeer import evaluate_understeer
@@ -123,3 +125,30 @@ def test_the_understeer_gradient_of_a_slow_ramp_is_that_of_the_single_track_theo
     run = yb.load("proving_ground/slow_ramp").set({"stop_time": 10.0, **NO_DRAG}).run()
     judged = evaluate_understeer(trace_of(run.results))
     assert judged["gradient"] == pytest.approx(k * wheelbase, rel=0.003)  # 1 % was asked for
+
+
+@pytest.mark.exhaustive
+def test_the_lane_change_of_iso_3888_1_is_driven_clean_at_80_km_per_h_without_control_to_either_side():
+    base = yb.load("proving_ground/iso_3888_1").set({"stop_time": 7.5})
+    for side in (3.5, -3.5):
+        judged = evaluate_lane_change(trace_of(base.set({"driver.lane_offset": side}).run().results))
+        assert judged.rulings["clean"].verdict is Verdict.PASSED
+        assert judged["entry"] == pytest.approx(80.0 / 3.6, rel=0.005)
+
+
+def test_a_lane_change_that_touches_a_cone_says_where():
+    t = np.arange(0.0, 8.0, 0.01)
+    signals = {
+        "position_x": 20.0 * t,
+        "velocity_x": 20.0 - 0.1 * t,
+        "acceleration_y": np.sin(t),
+        "cone_overrun": np.where(abs(t - 4.0) < 0.005, 0.12, 0.0),
+    }
+    made = Trace("cones", t, signals, facts={"track_start": 25.0, "cg_to_front_end": 2.0})
+    judged = evaluate_lane_change(made)
+    assert judged["entry"] == pytest.approx(20.0 - 0.1 * 23.0 / 20.0)
+    assert judged.rulings["clean"].why == "0.120 m beyond the cones, 55.0 m from the first ones"
+    signals["cone_overrun"][:] = 0.0
+    assert evaluate_lane_change(made).verdict is Verdict.PASSED
+    stopped = Trace("cones", t, {**signals, "position_x": 0.0 * t}, facts=made.facts)
+    assert evaluate_lane_change(stopped).verdict is Verdict.NOT_JUDGED

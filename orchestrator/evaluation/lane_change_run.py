@@ -1,0 +1,54 @@
+"""A double lane change between cones: was it clean, and how fast.
+
+Clean: no part of the body is beyond a row of cones, as the driver unit tells in `cone_overrun`. What scores
+is the highest speed at the first cones at which the track is driven clean.
+
+Source: ISO 3888-1 and ISO 3888-2, Passenger cars - Test track for a severe lane-change manoeuvre.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .filters import at, first_crossing
+from .judgement import Judgement
+from .trace import Trace
+
+TOUCH = 1e-9
+"""Overrun above which a cone is hit [m]."""
+
+
+def evaluate_lane_change(trace: Trace) -> Judgement:
+    """Return speeds, largest overrun, sideslip and lateral acceleration, and whether it was clean.
+
+    Raises:
+        ResultsError: a signal is missing.
+    """
+    judged = Judgement(trace.label)
+    t, over = trace.time, trace["cone_overrun"]
+    start = trace.facts.get("track_start")
+    instant = None
+    if isinstance(start, (int, float)):
+        front = trace.facts.get("cg_to_front_end", 0.0)
+        instant = first_crossing(t, trace["position_x"], float(start) - float(front), float(t[0]))
+    speed = None if instant is None else at(t, trace["velocity_x"], instant)
+    judged.add("entry", "speed at the first cones", speed, "m/s", "of the front end")
+    judged.add("exit", "speed at the end", float(trace["velocity_x"][-1]), "m/s")
+    worst = int(np.argmax(over))
+    judged.add("overrun", "largest distance beyond the cones", float(over[worst]), "m")
+    if over[worst] > TOUCH:
+        place = trace["position_x"][worst] - (start if isinstance(start, (int, float)) else 0.0)
+        said = f"{over[worst]:.3f} m beyond the cones, {place:.1f} m from the first ones"
+        judged.rule("clean", False, said)
+    elif instant is None:
+        judged.rule("clean", None, "the car has not reached the first cones")
+    else:
+        judged.rule("clean", True, "no cone is touched")
+    if "sideslip" in trace:
+        judged.add("sideslip", "peak sideslip", float(np.abs(trace["sideslip"]).max()), "rad")
+    a_y = float(np.abs(trace["acceleration_y"]).max())
+    judged.add("acceleration", "largest lateral acceleration", a_y, "m/s2")
+    if "steering_wheel_angle" in trace:
+        hand = float(np.abs(trace["steering_wheel_angle"]).max())
+        judged.add("hand", "largest hand-wheel angle", hand, "rad")
+    return judged
