@@ -38,6 +38,7 @@ COMMANDS = (
     "export-ssp",
     "second-opinion",
     "tyre",
+    "vehicle",
     "cache",
 )
 """Each a module of `orchestrator.commands` with a function of the same name, `_` for `-`."""

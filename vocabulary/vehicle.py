@@ -77,6 +77,8 @@ CAR: dict[str, Quantity] = {
     "tyre_vertical_stiffness": Quantity("N/m", "Tyre spring k_t", True, 1.0),
     "static_load_front": Quantity("N", "Load of one front wheel at rest", minimum=0.0),
     "static_load_rear": Quantity("N", "Load of one rear wheel at rest", minimum=0.0),
+    "nominal_load": Quantity("N", "Nominal load F_z0 of the tyres", minimum=1.0),
+    "unloaded_radius": Quantity("m", "Radius R_0 of the tyres without load", minimum=0.05),
     "cornering_stiffness": Quantity(
         "N/rad", "Cornering stiffness of one tyre that knows no load", minimum=0.0
     ),

@@ -7,6 +7,9 @@ A plant adds its body in four methods, called in this order:
     wheel_velocities()          of the wheels at the present motion and steer angle
     finish(carried)             `self.end` (a_x, a_y) and `self.loads` at the present time
 
+`rest` and `move` also set `self.pull`, what road and wind do to all parts of the car alike
+(`cars.road_plane`); what is carried is of the tyres alone.
+
 and, if its body has outputs of its own, in `output`.
 
 `signals` are the inputs, one item each: steer angle, tyre forces x and y, then the plant's own; forces are
@@ -31,6 +34,8 @@ from ..fmi.component import Component
 from ..fmi.variables import output, parameter, signal
 from ..mathematics.carry import Carried, Values
 from .plane_body import Motion
+from .road_plane import INPUTS as ROAD_PLANE
+from .road_plane import LEVEL, Pull
 from .wheel_kinematics import Eight, slip_angle, slip_ratio, wheel_velocities
 from .wheel_spin import spin
 
@@ -85,6 +90,7 @@ class Car(Component):
     wheels: Eight
     end: tuple[float, float]
     loads: Four
+    pull: Pull = LEVEL
 
     # ---- for the plant ----------------------------------------------------------------------
 
@@ -193,6 +199,7 @@ class DrivenCar(Car):
         signal("slip_stiffness_*", optional=True),
         signal("tyre_slip_ratio_*", optional=True),
         signal("tyre_moment_z_*", optional=True),
+        *ROAD_PLANE,
     )
 
     rolling_resistance = 0.0
@@ -207,7 +214,7 @@ class DrivenCar(Car):
 
     def turn_wheels(self, h: float, v: Eight, loads: Four, signals: Sequence[Any]) -> None:
         p = self.p
-        _, f_x, _, torque, slip_stiffness, tyre_slip, _ = signals
+        _, f_x, _, torque, slip_stiffness, tyre_slip, *_ = signals
         radius, inertia, v_low = p.wheel_radius, p.wheel_inertia, p.low_speed
         per_load = p.slip_stiffness_per_load
         resisting = 0.5 * self.rolling_resistance * radius  # of the mean load over the step

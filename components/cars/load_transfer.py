@@ -1,4 +1,4 @@
-"""Quasi-static wheel loads of a rigid car from the accelerations of its centre of mass.
+"""Quasi-static wheel loads of a rigid car from the accelerations that its tyres give it.
 
     F_zf = m g b / 2L - m h a_x / 2L -/+ b m h a_y / (L d)        minus left, plus right
     F_zr = m g a / 2L + m h a_x / 2L -/+ a m h a_y / (L d)
@@ -26,10 +26,16 @@ class Weight(Geometry, Protocol):
     def cg_height(self) -> float: ...
 
 
-def quasi_static_loads(a_x: float, a_y: float, p: Weight) -> Four:
-    """Return F_z [N] of fl, fr, rl, rr from the accelerations [m/s2]."""
+def quasi_static_loads(a_x: float, a_y: float, p: Weight, gravity: float = G) -> Four:
+    """Return F_z [N] of fl, fr, rl, rr.
+
+    Args:
+        a_x, a_y: accelerations that the tyres give the car, X / m and Y / m [m/s2].
+        p: the car.
+        gravity: towards the road [m/s2].
+    """
     a, b = p.cg_to_front_axle, p.cg_to_rear_axle
-    weight = p.mass * G
+    weight = p.mass * gravity
     lift = p.mass * p.cg_height
     front = min(max((weight * b - lift * a_x) / (a + b), 0.0), weight)
     rear = weight - front

@@ -41,6 +41,7 @@ from collections.abc import Sequence
 from math import ceil, cos, sin, sqrt
 from typing import NamedTuple
 
+from ..mathematics.gravity import G
 from ..mathematics.integrators import rk4
 from .contact_points import Contact
 
@@ -122,14 +123,20 @@ class Ride(NamedTuple):
         return moving + stored + 0.5 * self.s_f * (fl - fr) ** 2 + 0.5 * self.s_r * (rl - rr) ** 2
 
 
-def rates(y: Sequence[float], held: Contact, ride: Ride) -> tuple[float, ...]:
-    """Return the time derivative of `y` = (r, coordinates, their rates); equations (1)-(11)."""
+def rates(y: Sequence[float], held: Contact, ride: Ride, lighter: float = -0.0) -> tuple[float, ...]:
+    """Return the time derivative of `y` = (r, coordinates, their rates); equations (1)-(11).
+
+    `lighter` [m/s2] is what gravity towards the road is less than g, on an incline; -0.0 changes no bit.
+    """
     r, z, phi, theta, u_fl, u_fr, u_rl, u_rr, dz, dphi, dtheta, du_fl, du_fr, du_rl, du_rr = y
     x_fl, x_fr, x_rl, x_rr, y_fl, y_fr, y_rl, y_rr, x_all, y_all, moment = held
     (
         m_s, m_f, m_r, a, b, t, h, k_f, k_r, d_f, d_r, s_f, s_r, p_f, p_r, k_t, load_f, load_r,
         gravity_roll, gravity_pitch, roll, pitch, yaw_sprung, yaw, tilt,
     ) = ride  # fmt: skip
+    if lighter:
+        gravity_roll *= 1.0 - lighter / G
+        gravity_pitch *= 1.0 - lighter / G
     side = t * phi
     front = z - a * theta
     rear = z + b * theta
@@ -190,24 +197,31 @@ def rates(y: Sequence[float], held: Contact, ride: Ride) -> tuple[float, ...]:
         du_fr,
         du_rl,
         du_rr,
-        (front + rear) / m_s,
+        (front + rear) / m_s + lighter,
         q_phi / roll + eta * dr,
         q_theta / pitch - lean * dr,
-        -(n_fl + e_fl) / m_f,
-        -(n_fr + e_fr) / m_f,
-        -(n_rl + e_rl) / m_r,
-        -(n_rr + e_rr) / m_r,
+        -(n_fl + e_fl) / m_f + lighter,
+        -(n_fr + e_fr) / m_f + lighter,
+        -(n_rl + e_rl) / m_r + lighter,
+        -(n_rr + e_rr) / m_r + lighter,
     )
 
 
 def move_ride(
-    r: float, y: Sequence[float], h: float, *, held: Contact, ride: Ride, longest: float
+    r: float,
+    y: Sequence[float],
+    h: float,
+    *,
+    held: Contact,
+    ride: Ride,
+    longest: float,
+    lighter: float = -0.0,
 ) -> tuple[float, ...]:
     """Return (r, coordinates, their rates) after `h` [s] of held forces, in substeps up to `longest` [s]."""
     state: tuple[float, ...] = (r, *y)
 
     def derivatives(t: float, y: Sequence[float]) -> tuple[float, ...]:
-        return rates(y, held, ride)
+        return rates(y, held, ride, lighter)
 
     if h <= longest:
         return rk4(derivatives, 0.0, h, state)

@@ -15,6 +15,7 @@ from ..mathematics.gravity import G
 from .car import StartParameters
 from .published_cars import PaperB
 from .resistance import Drag, ResistanceParameters
+from .road_plane import LEVEL, Pull
 
 
 @dataclass(frozen=True)
@@ -84,39 +85,44 @@ class RollingBody:
     def __deepcopy__(self, memo: object) -> RollingBody:
         return self  # never changes: saving a unit's state need not copy it
 
-    def forcing(self, y: float, phi: float) -> float:
+    def forcing(self, y: float, phi: float, pull: Pull = LEVEL) -> float:
         """Return the roll acceleration [rad/s2] that the lateral force `y` [N] drives, springs apart."""
-        return self.coupling * (y / self.p.mass + G * (sin(phi) - phi)) / self.inertia
+        sine = sin(phi)
+        driven = y / self.p.mass + G * (sine - phi)
+        if pull.lighter:
+            driven -= pull.lighter * sine
+        return self.coupling * driven / self.inertia
 
     def accelerations(
-        self, forces: Four, *, v_x: float, v_y: float, r: float, phi: float, dphi: float
+        self, forces: Four, *, pull: Pull, v_x: float, v_y: float, r: float, phi: float, dphi: float
     ) -> tuple[float, float]:
         """Return (a_x, a_y) [m/s2]; equations (1)-(4).
 
         Args:
-            forces: resultants X, Y_f, Y_r [N], M [N.m].
+            forces: resultants X, Y_f, Y_r [N], M [N.m] of the tyres.
+            pull: of road and wind.
             v_x, v_y, r, phi, dphi: motion [m/s], [rad/s], [rad], [rad/s].
         """
         x, y_f, y_r, moment = forces
         y = y_f + y_r
-        dr = moment / self.p.yaw_inertia
-        ddphi = self.forcing(y, phi) - self.stiffness * phi - 2.0 * self.decay * dphi
-        a_x = self.longitudinal(x, v_x=v_x, v_y=v_y, r=r, phi=phi, dphi=dphi, dr=dr)
-        return a_x, (y + self.coupling * ddphi) / self.p.mass
+        dr = (moment + pull.turn) / self.p.yaw_inertia
+        ddphi = self.forcing(y, phi, pull) - self.stiffness * phi - 2.0 * self.decay * dphi
+        a_x = self.longitudinal(x, pull=pull, v_x=v_x, v_y=v_y, r=r, phi=phi, dphi=dphi, dr=dr)
+        return a_x, (y + self.coupling * ddphi) / self.p.mass + pull.y
 
     def longitudinal(
-        self, x: float, *, v_x: float, v_y: float, r: float, phi: float, dphi: float, dr: float
+        self, x: float, *, pull: Pull, v_x: float, v_y: float, r: float, phi: float, dphi: float, dr: float
     ) -> float:
         """Return a_x [m/s2], equation (2), from the resultant `x` [N] and the motion."""
         force = x - self.drag.force(v_x) - self.coupling * (2.0 * r * dphi + phi * dr)
         xi = self.p.rotating_mass_excess
-        return (force / self.p.mass - xi * v_y * r) / (1.0 + xi)
+        return (force / self.p.mass + pull.x - xi * v_y * r) / (1.0 + xi)
 
-    def vertical_loads(self, forces: Four, *, phi: float, dphi: float) -> Four:
+    def vertical_loads(self, forces: Four, *, pull: Pull, phi: float, dphi: float) -> Four:
         """Return F_z [N] of fl, fr, rl, rr from the resultants and the roll motion; equation (13)."""
         p = self.p
         x, y_f, y_r, _ = forces
-        weight = p.mass * G
+        weight = p.mass * (G - pull.lighter)
         wheelbase = p.cg_to_front_axle + p.cg_to_rear_axle
         front = min(max((weight * p.cg_to_rear_axle - p.cg_height * x) / wheelbase, 0.0), weight)
         rear = 0.5 * (weight - front)

@@ -12,7 +12,7 @@ with a_x = dv_x - v_y r, a_y = dv_y + v_x r, dotted quantities written with a d,
 left side up, X, Y_f, Y_r, M the resultants of the tyre forces (`cars.plane_body`). phi belongs to the
 sprung mass; v_x, v_y, a_x, a_y to the point of the roll axis below the centre of mass, which is what the
 paper calls the centre of mass. The pair (1), (4) is solved for a_y and ddphi exactly. A wheel that
-lifts has no load; the other wheel of its axle then carries the axle.
+lifts has no load; the other wheel of its axle then carries the axle. Inclines and wind: `cars.road_plane`.
 
 Ours differs: rolling resistance is a moment on each wheel (`cars.resistance`), where the paper has a force
 m g f on the body in (2). Free wheels slow the car alike; of driven ones the tyres carry m g f less.
@@ -36,6 +36,7 @@ from typing import Any
 
 from ..cars.car import DRIVEN_WHEELS, MOTION, DrivenCar
 from ..cars.plane_body import move, resultants
+from ..cars.road_plane import pull_of
 from ..cars.rolling_body import RollingBody, RollingCarParameters
 from ..mathematics.carry import Values
 from ..mathematics.oscillator import transition
@@ -54,9 +55,10 @@ class EightDof(DrivenCar):
 
     def rest(self, signals: Sequence[Any]) -> Values:
         held = resultants(signals[0], signals[1], signals[2], self.p, signals[6])
+        self.pull = pull_of(signals[7:], self.p.mass)
         phi = 0.0
         for _ in range(20):  # the body hangs in its springs; sin(phi) - phi is tiny
-            phi = self.body.forcing(held[1] + held[2], phi) / self.body.stiffness
+            phi = self.body.forcing(held[1] + held[2], phi, self.pull) / self.body.stiffness
         self.angle, self.rate = phi, 0.0
         return held
 
@@ -64,21 +66,23 @@ class EightDof(DrivenCar):
         p, body = self.p, self.body
         x, y_f, y_r, moment = held = resultants(delta, signals[1], signals[2], self.p, signals[6])
         y = y_f + y_r
+        self.pull = pull = pull_of(signals[7:], p.mass)
         if h != self.step_size:
             self.step_size = h
             self.transition = transition(body.decay, body.stiffness, h)
         phi, dphi = self.angle, self.rate
-        rest = body.forcing(y, phi + 0.5 * h * dphi) / body.stiffness
+        rest = body.forcing(y, phi + 0.5 * h * dphi, pull) / body.stiffness
         t_11, t_12, t_21, t_22 = self.transition
         offset = phi - rest
         self.angle = phi_end = rest + (t_11 * offset + t_12 * dphi)
         self.rate = dphi_end = t_21 * offset + t_22 * dphi
         v_x, v_y, r = self.motion[:3]
-        dr = moment / p.yaw_inertia
+        dr = (moment + pull.turn) / p.yaw_inertia
         half = 0.5 * h
-        a_y = (y + body.coupling * (dphi_end - dphi) / h) / p.mass  # mean over the step
+        a_y = (y + body.coupling * (dphi_end - dphi) / h) / p.mass + pull.y  # mean over the step
         a_x = body.longitudinal(
             x,
+            pull=pull,
             v_x=v_x + half * (self.end[0] + v_y * r),  # at the middle of the step
             v_y=v_y + half * (a_y - v_x * r),
             r=r + half * dr,
@@ -94,8 +98,9 @@ class EightDof(DrivenCar):
         v_x, v_y, r = self.motion[:3]
         phi, dphi = self.angle, self.rate
         held = x, y_f, y_r, moment
-        self.end = self.body.accelerations(held, v_x=v_x, v_y=v_y, r=r, phi=phi, dphi=dphi)
-        self.loads = self.body.vertical_loads(held, phi=phi, dphi=dphi)
+        pull = self.pull
+        self.end = self.body.accelerations(held, pull=pull, v_x=v_x, v_y=v_y, r=r, phi=phi, dphi=dphi)
+        self.loads = self.body.vertical_loads(held, pull=pull, phi=phi, dphi=dphi)
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...]:
         return (*self.motion_values(), self.angle, self.rate, *self.wheel_values())

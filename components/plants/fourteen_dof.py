@@ -37,6 +37,7 @@ from ..cars.contact_points import contact, contact_velocities
 from ..cars.plane_body import move
 from ..cars.resistance import Drag
 from ..cars.ride import AT_REST, RESOLVED, loads, move_ride
+from ..cars.road_plane import pull_of
 from ..cars.sprung_car import FourteenDofParameters, ride_of
 from ..cars.wheel_kinematics import Eight
 from ..fmi.variables import output
@@ -64,12 +65,18 @@ class FourteenDof(DrivenCar):
         high = self.p.initial_heave
         self.body: tuple[float, ...] = (high, 0.0, 0.0, high, high, high, high, *AT_REST[7:])
         held = contact(signals[0], signals[1], signals[2], self.p, signals[6])
+        self.pull = pull_of(signals[7:], self.p.mass)
         return held.x, held.y
 
     def move(self, h: float, delta: float, signals: Sequence[Any]) -> Values:
         held = contact(delta, signals[1], signals[2], self.p, signals[6])
+        self.pull = pull = pull_of(signals[7:], self.p.mass)
+        if pull.turn:
+            held = held._replace(moment=held.moment + pull.turn)
         v_x, v_y, r = self.motion[:3]
-        r_end, *body = move_ride(r, self.body, h, held=held, ride=self.ride, longest=self.longest)
+        r_end, *body = move_ride(
+            r, self.body, h, held=held, ride=self.ride, longest=self.longest, lighter=pull.lighter
+        )
         _, roll, pitch = body[:3]
         if abs(roll) >= ROLLED_OVER or abs(pitch) >= ROLLED_OVER:
             raise ValueError(
@@ -108,4 +115,5 @@ class FourteenDof(DrivenCar):
     def _accelerations(self, x: float, y: float, v_x: float) -> tuple[float, float]:
         """Return a_x, a_y [m/s2] from the tyre forces [N] and the speed [m/s]."""
         mass = self.p.mass
-        return (x - self.drag.force(v_x)) / mass, y / mass
+        pull = self.pull
+        return (x - self.drag.force(v_x)) / mass + pull.x, y / mass + pull.y

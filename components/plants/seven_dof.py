@@ -9,8 +9,9 @@
     F_zf = m g b / 2L - m h a_x / 2L -/+ b m h a_y / (L d)        minus left, plus right   (17)
     F_zr = m g a / 2L + m h a_x / 2L -/+ a m h a_y / (L d)                                 (18)
 
-with a_x = X / m, a_y = Y / m. A wheel that lifts has no load; the other wheel of its axle then
-carries the axle, so the loads always add up to m g. Roll, pitch and suspension are left out.
+with a_x = X / m, a_y = Y / m; inclines and wind add theirs (`cars.road_plane`). A wheel that lifts has no
+load; the other wheel of its axle then carries the axle, so the loads always add up to m g. Roll, pitch and
+suspension are left out.
 
 Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
 FNN, equations (5)-(8), (13)-(20). Ours differs: the lifted wheel; slips at rest, see
@@ -38,8 +39,10 @@ from ..cars.car import DRIVEN_WHEELS, MOTION, DrivenCar, StartParameters
 from ..cars.load_transfer import quasi_static_loads
 from ..cars.plane_body import move, resultants
 from ..cars.published_cars import PaperA
+from ..cars.road_plane import pull_of
 from ..fmi.variables import parameter
 from ..mathematics.carry import Values
+from ..mathematics.gravity import G
 
 
 @dataclass(frozen=True)
@@ -63,20 +66,24 @@ class SevenDof(DrivenCar):
     outputs = (*MOTION, *DRIVEN_WHEELS)
 
     def rest(self, signals: Sequence[Any]) -> Values:
+        self.pull = pull_of(signals[7:], self.p.mass)
         return self._accelerations(signals[0], signals)[:2]
 
     def move(self, h: float, delta: float, signals: Sequence[Any]) -> Values:
         a_x, a_y, dr = self._accelerations(delta, signals)
-        self.motion = move(self.motion, h, a_x=a_x, a_y=a_y, dr=dr)
+        self.pull = pull = pull_of(signals[7:], self.p.mass)
+        dr += pull.turn / self.p.yaw_inertia
+        self.motion = move(self.motion, h, a_x=a_x + pull.x, a_y=a_y + pull.y, dr=dr)
         return a_x, a_y
 
     def finish(self, carried: Values) -> None:
         a_x, a_y = carried
-        self.end = a_x, a_y
-        self.loads = quasi_static_loads(a_x, a_y, self.p)
+        pull = self.pull
+        self.end = a_x + pull.x, a_y + pull.y
+        self.loads = quasi_static_loads(a_x, a_y, self.p, G - pull.lighter)
 
     def _accelerations(self, delta: float, signals: Sequence[Any]) -> tuple[float, float, float]:
-        """Return (a_x, a_y [m/s2], dr/dt [rad/s2]) of the centre of mass; equations (5)-(7)."""
+        """Return what the tyres give, a_x, a_y [m/s2], dr/dt [rad/s2]; equations (5)-(7)."""
         p = self.p
         x, front, rear, moment = resultants(delta, signals[1], signals[2], p, signals[6])
         return x / p.mass, (front + rear) / p.mass, moment / p.yaw_inertia

@@ -9,6 +9,8 @@ Each wheel has its own slip angle and its own load, quasi-static from a_y = Y / 
 longitudinal slip is 0, and longitudinal tyre forces, which the role has as inputs, are left out as in
 the paper. The controller's yaw moment M acts on the body from outside.
 
+A bank and wind act as `cars.road_plane` says; on a slope, too, something holds v_x and loads no axle.
+
 Whatever holds v_x does work: a car that spins gains speed here, v_x / cos(beta), at 60 degrees of sideslip
 twice its own. Beyond some 20 degrees the model says that the car is lost, not how it moves.
 
@@ -32,9 +34,12 @@ from typing import Any
 from ..cars.car import MOTION, Car, StartParameters, of_steered_wheels
 from ..cars.load_transfer import quasi_static_loads
 from ..cars.plane_body import Geometry, Motion, sum_of
+from ..cars.road_plane import INPUTS as ROAD_PLANE
+from ..cars.road_plane import pull_of
 from ..cars.wheel_kinematics import earth_velocity
 from ..fmi.variables import parameter, signal
 from ..mathematics.carry import Values
+from ..mathematics.gravity import G
 
 _GAUSS = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
 
@@ -91,6 +96,7 @@ class TwoDof(Car):
     inputs = (
         *("steer_angle", "tyre_force_x_*", "tyre_force_y_*", "yaw_moment"),
         signal("tyre_moment_z_*", optional=True),
+        *ROAD_PLANE,
     )
     outputs = (
         *MOTION,
@@ -101,17 +107,20 @@ class TwoDof(Car):
     )
 
     def rest(self, signals: Sequence[Any]) -> Values:
+        self.pull = pull_of(signals[5:], self.p.mass)
         return (lateral_resultants(signals[0], signals[2], self.p)[0] / self.p.mass,)
 
     def move(self, h: float, delta: float, signals: Sequence[Any]) -> Values:
-        yaw_moment = signals[3] + sum_of(signals[4])
+        self.pull = pull = pull_of(signals[5:], self.p.mass)
+        yaw_moment = signals[3] + sum_of(signals[4]) + pull.turn
         force, moment = lateral_resultants(delta, signals[2], self.p)
         a_y = force / self.p.mass
-        self.motion = drift(self.motion, h, a_y=a_y, dr=(moment + yaw_moment) / self.p.yaw_inertia)
+        dr = (moment + yaw_moment) / self.p.yaw_inertia
+        self.motion = drift(self.motion, h, a_y=a_y + pull.y, dr=dr)
         return (a_y,)
 
     def finish(self, carried: Values) -> None:
         (a_y,) = carried
         _, v_y, r = self.motion[:3]
-        self.end = -v_y * r, a_y
-        self.loads = quasi_static_loads(0.0, a_y, self.p)
+        self.end = -v_y * r, a_y + self.pull.y
+        self.loads = quasi_static_loads(0.0, a_y, self.p, G - self.pull.lighter)

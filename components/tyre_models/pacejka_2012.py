@@ -43,6 +43,7 @@ def longitudinal_set(p: Any, axle: str, *, left: bool) -> tuple[Numbers, Numbers
     common = (
         *(mirror, 1.0 / p.reference_friction, of("fzmax"), 1.0 / load_0),
         1.0 if p.slip_angle_as_tangent else 0.0,
+        1.0 if p.file_low_friction == "similarity" else 0.0,
     )
     mu = of("lmux") * (1.0 + pressure * (of("ppx3") + pressure * of("ppx4")))
     k = of("lkx") * (1.0 + pressure * (of("ppx1") + pressure * of("ppx2")))
@@ -282,7 +283,7 @@ def wheel_forces(
         sets: what `whole_set` made of the parameters.
     """
     common, longitudinal, lateral, combined, aligning, overturning = sets
-    mirror, per_reference, f_top, load_scale, book = common
+    mirror, per_reference, f_top, load_scale, book, similar = common
     friction = mu * per_reference
     if not (f_z > SMALLEST_LOAD and friction > SMALLEST_FRICTION):
         return 0.0, 0.0, 0.0, 0.0, 0.0
@@ -292,9 +293,15 @@ def wheel_forces(
     slip, forward = forward_slip(alpha, mirror, book)
     gamma = mirror * (sin(gamma) if book else gamma)
     kappa, stretch = practical_slip(kappa if forward else -kappa)
+    scale = 1.0
+    if similar:  # the dry tyre at scaled slips, its forces scaled
+        scale, friction = friction, 1.0
+        slip /= scale
+        kappa /= scale
 
     curve = longitudinal_curve(slip, gamma, load, df, friction, longitudinal)
     f_x, stiffness = longitudinal_force(kappa, curve)
+    f_x *= scale
 
     f_y0, d_y, k_y, bc_y, s_h, s_v = side_force(slip, gamma, load, df, friction, lateral)
     rb1, rb2, rb3, rb4, rc, re1, re2, rh1, rh2, rv1, rv2, rv3, rv4, rv5, rv6 = combined
@@ -313,7 +320,7 @@ def wheel_forces(
         weight = 0.0
     y = rv4 * slip
     induced = d_y * (rv1 + rv2 * df + rv3 * gamma) / sqrt(1.0 + y * y) * sin(rv5 * atan(rv6 * kappa))  # 4.E66
-    f_y = weight * f_y0 + induced
+    f_y = scale * (weight * f_y0 + induced)
 
     (
         six, qb1, qb2, qb3, qb4, qb5, qb9, qb10, c_t, qd1, qd2, qd3, qd4, qd6, qd7, qd8, qd9, qd10, qd11,
@@ -347,14 +354,15 @@ def wheel_forces(
         slip_t = sqrt(alpha_t * alpha_t + ratio * ratio)
         slip_r = sqrt(alpha_r * alpha_r + ratio * ratio)
     else:
-        y, z = tan(alpha_t), tan(alpha_r)
-        slip_t = atan(sqrt(y * y + ratio * ratio))
-        slip_r = atan(sqrt(z * z + ratio * ratio))
+        y, z = tan(scale * alpha_t), tan(scale * alpha_r)
+        ratio *= scale
+        slip_t = atan(sqrt(y * y + ratio * ratio)) / scale
+        slip_r = atan(sqrt(z * z + ratio * ratio)) / scale
     x = b_t * slip_t
     trail = d_t * cos(c_t * atan(x - e * (x - atan(x)))) * cos_alpha  # 4.E73
     y = (qb9 / friction + qb10 * bc_y) * slip_r
     residual = load * d_r * friction * cos_alpha / sqrt(1.0 + y * y)  # 4.E75
-    m_z = residual + (lever + ss2 * f_y) * f_x - trail * turning  # 4.E71
+    m_z = scale * residual + (lever + ss2 * f_y) * f_x - trail * scale * turning  # 4.E71
 
     m_x = 0.0
     if overturning:

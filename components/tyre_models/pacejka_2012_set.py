@@ -291,6 +291,17 @@ LongitudinalParameters = of_axles(
             "chosen: off, as programs do that fit and use such sets",
         ),
     ),
+    (
+        "file_low_friction",
+        parameter(
+            "scale",
+            None,
+            "low_friction of tyres from a property file: scale keeps the weights of the dry tyre in "
+            "combined slip, similarity scales the slips in them too",
+            "chosen: scale, as programs do that fit and use such sets",
+            choices=("scale", "similarity"),
+        ),
+    ),
 )
 """What F_x of kappa needs."""
 

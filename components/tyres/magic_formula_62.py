@@ -57,6 +57,11 @@ Left out: turn slip; the rolling resistance M_y, which plants have; friction tha
 which the book excludes, is 0. Above fzmax everything is proportional to load, with all coefficients held;
 other ranges bound nothing. kappa is converted from the interface's (w R - v) / max(|w R|, |v|).
 
+Friction. lambda as above is the book's lambda_mu, `file_low_friction` scale: it lowers the peaks, but
+combined slip keeps the weights of the dry tyre, so that on ice both forces together exceed the friction.
+With similarity forces are lambda times those of the set at lambda = 1 and the slips kappa / lambda and
+alpha / lambda, M_z with them; pure slip without shifts is the same by either. Camber is not scaled.
+
 tyreside says on which side of the car the set was measured. Wheels of the other side are its mirror image,
 so a car on one set runs straight, whatever conicity and plysteer the set has. A wheel that rolls
 backward is the forward one reflected fore and aft.
@@ -110,19 +115,23 @@ class MagicFormula62(Tyre):
     @classmethod
     def curve(cls, alpha: float, f_z: float, mu: float, axle: Any) -> Curve:
         """Return F_x [N] of kappa without camber; arguments as of `Tyre.curve`."""
-        (mirror, per_reference, f_top, load_scale, book), longitudinal = axle
+        (mirror, per_reference, f_top, load_scale, book, similar), longitudinal = axle
         friction = mu * per_reference
         if not (f_z > SMALLEST_LOAD and friction > SMALLEST_FRICTION):
             return no_force, 1.0
         load, share = (f_z, 1.0) if f_z < f_top else (f_top, f_z / f_top)
         slip, forward = forward_slip(alpha, mirror, book)
+        scale = 1.0
+        if similar:
+            scale, friction = friction, 1.0
+            slip /= scale
         curve = longitudinal_curve(slip, 0.0, load, load * load_scale - 1.0, friction, longitudinal)
         way = 1.0 if forward else -1.0
 
         def force(kappa: float) -> float:
-            return way * share * longitudinal_force(practical_slip(way * kappa)[0], curve)[0]
+            return way * share * scale * longitudinal_force(practical_slip(way * kappa)[0] / scale, curve)[0]
 
-        return force, curve[1] / curve[7]
+        return force, scale * curve[1] / curve[7]
 
     def configure(self) -> None:
         self.sets = [whole_set(self.p, axle, left=left) for axle, left in WHEELS]

@@ -155,7 +155,7 @@ class MagicFormula62Transient(Tyre):
         for load, gamma, (common, longitudinal, lateral, *_), lag in zip(
             loads, cambers, self.sets, self.lags, strict=True
         ):
-            mirror, _, top, load_scale, _ = common
+            mirror, _, top, load_scale, *_ = common
             load = min(max(load, SMALLEST_LOAD), top)
             df, gamma = load * load_scale - 1.0, mirror * gamma
             k_x = longitudinal_curve(0.0, gamma, load, df, 1.0, longitudinal)[7]

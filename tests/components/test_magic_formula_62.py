@@ -96,7 +96,7 @@ def test_forces_moments_and_slip_stiffness_are_those_of_the_second_implementatio
     rng = np.random.default_rng([seed, int(kind)])
     given, states, mu = some_set(rng, kind), some_states(rng), rng.uniform(0.2, 1.2)
     expected = magic_62.forces(in_file_names(given), **states, mu=mu)
-    stand = tyre(given)
+    stand = tyre(given, file_low_friction="scale")
     found = np.array([at(stand, mu=mu, **state) for state in each(states)]).T
     share = 0.0
     for name, a, b in zip(("F_x", "F_y", "M_z", "M_x", "stiffness"), found, expected, strict=True):
@@ -107,6 +107,48 @@ def test_forces_moments_and_slip_stiffness_are_those_of_the_second_implementatio
     if seed == 0:
         second = "a second implementation, any set of coefficients"
         measured("tyres", f"tyre_magic_formula_62, FITTYP {kind:g}", second, share, at_most=1e-9)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_with_similarity_forces_are_those_of_the_second_implementation_at_scaled_slips(kind):
+    rng = np.random.default_rng([99, int(kind)])
+    given, states, mu = some_set(rng, kind), some_states(rng), rng.uniform(0.3, 0.6)
+    practical = (
+        np.where(states["kappa"] > 0.0, states["kappa"] / (1.0 - states["kappa"]), states["kappa"]) / mu
+    )
+    scaled = np.where(practical > 0.0, practical / (1.0 + practical), practical)
+    dry = magic_62.forces(in_file_names(given), **states | {"kappa": scaled, "alpha": states["alpha"] / mu})
+    stand = tyre(given, file_low_friction="similarity")
+    found = np.array([at(stand, mu=mu, **state) for state in each(states)]).T
+    for a, b in zip(found[:2], dry[:2], strict=True):
+        assert np.all(np.abs(a - mu * b) <= 1e-9 * np.maximum(np.abs(mu * b), 1e-3 * states["f_z"]))
+    h = 1e-6  # the slope is that of the force
+    for state, slope in zip(each(states), found[4], strict=True):
+        ahead, behind = (at(stand, mu=mu, **state | {"kappa": state["kappa"] + d})[0] for d in (h, -h))
+        if abs(state["kappa"]) > h:
+            assert slope == pytest.approx((ahead - behind) / (2.0 * h), rel=1e-4, abs=2.0)
+
+
+def test_similarity_keeps_both_forces_together_within_what_friction_leaves_of_the_dry_tyres():
+    alphas, kappas = np.linspace(0.0, 0.5, 26), np.linspace(-0.6, 0.0, 31)
+
+    def most(mu, **more):
+        stand = tyre(BOOK, **more)
+        forces = [at(stand, kappa=k, alpha=a, mu=mu)[:2] for a in alphas for k in kappas]
+        return max(np.hypot(*force) for force in forces)
+
+    dry = most(1.0)
+    for mu in (0.1, 0.3, 0.6):
+        assert most(mu, file_low_friction="similarity") <= 1.001 * mu * dry
+    assert most(0.1, file_low_friction="scale") > 1.1 * 0.1 * dry
+
+
+def test_on_the_road_of_the_set_both_readings_of_low_friction_agree_to_the_bit():
+    rng = np.random.default_rng(5)
+    given = some_set(rng, 62.0)
+    one, other = (tyre(given, file_low_friction=how) for how in ("scale", "similarity"))
+    for state in each(some_states(rng)):
+        assert at(one, **state) == at(other, **state)
 
 
 @pytest.mark.exhaustive

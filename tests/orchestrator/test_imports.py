@@ -40,7 +40,7 @@ STAGES = (
     {"tyres"},  # measures for `experiments` what units want to know of their tyres
     {"evaluation"},
     {"experiments"},
-    {"interop", "scaffold"},
+    {"interop", "scaffold", "vehicles"},
     {"pages"},
     {"commands"},
     {"cli"},

@@ -1,0 +1,115 @@
+"""Make the yaw moment by releasing the driver's brakes first, by braking the other side with the rest.
+
+    D_i < 0   the driver's brake force on wheel i, equal left and right, in fixed parts front and rear
+    released  F_i = (1 - s) D_i   on the side that holds the car back from turning as M asks,
+              s = min(|M| / sum(|D_i arm_i|), release_limit)
+    braked    the rest of M shared among the wheels of the other side, in the parts of the driver's force
+
+so a braking car gets its moment by braking less, where wheels that already slide could give none by
+braking more: on split friction those of the slippery side. What `release_limit` leaves is what the driver
+keeps of the other side's stopping power. A car that its driver does not brake gets all of M from one
+braked side. A wheel whose arm is below an eighth of the track is left alone.
+
+Source: chosen: what delays the build-up of yaw moment in anti-lock brakes on split friction, with a
+controller's moment in place of a fixed delay.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vocabulary.wheels import Four
+
+from ..cars.published_cars import PaperC
+from ..cars.wheel_kinematics import lever_arms
+from ..control_laws.moment_sharing import NO_FORCE, add_drive_force, share_moment
+from ..fmi.component import Component
+from ..fmi.variables import like, output, parameter, signal
+
+
+@dataclass(frozen=True)
+class ReleasingParameters:
+    """Geometry of the car, how far the driver's brakes may be released, and his parts front and rear."""
+
+    cg_to_front_axle: float = like(PaperC, "cg_to_front_axle")
+    track_width: float = like(PaperC, "track_width")
+    release_limit: float = parameter(
+        0.8,
+        "1",
+        "Largest part of the driver's brake force that is taken back on one side",
+        "chosen: the driver always brakes",
+        minimum=0.0,
+        maximum=1.0,
+    )
+    drive_front_share: float = parameter(
+        0.67,
+        "1",
+        "Share of the driver's force in front",
+        "chosen: brakes, two to one",
+        minimum=0.0,
+        maximum=1.0,
+    )
+
+
+def release_and_brake(
+    moment: float,
+    drive: float,
+    *,
+    delta: float,
+    front_share: float,
+    limit: float,
+    a: float,
+    half_track: float,
+) -> Four:
+    """Return the longitudinal forces [N] of fl, fr, rl, rr.
+
+    Args:
+        moment, drive: yaw moment [N.m] and sum of the driver's forces [N], negative when braking.
+        delta: steer angle [rad].
+        front_share: part of `drive` on the front axle [1].
+        limit: largest part of a wheel's brake force that is released [1].
+        a, half_track: distances of front axle and wheels from the centre of mass [m].
+    """
+    pedal = add_drive_force(NO_FORCE, drive, front_share)
+    if moment == 0.0:
+        return pedal
+    arms = lever_arms(delta, a, half_track)
+    least_arm = 0.25 * half_track
+    turns = [arm * moment > 0.0 and abs(arm) >= least_arm for arm in arms]  # driving it gives the moment
+    holding = [max(-force * abs(arm), 0.0) * t for force, arm, t in zip(pedal, arms, turns, strict=True)]
+    against = (holding[0] + holding[1]) + (holding[2] + holding[3])
+    share = min(abs(moment), limit * against) / against if against > 0.0 else 0.0
+    rest = moment - share * against * (1.0 if moment > 0.0 else -1.0)
+    front = 0.5 * front_share
+    fl, fr, rl, rr = (
+        0.0 if turning or abs(arm) < least_arm else weight
+        for turning, arm, weight in zip(turns, arms, (front, front, 0.5 - front, 0.5 - front), strict=True)
+    )
+    braked = share_moment(rest, (fl, fr, rl, rr), arms, least_arm)
+    y_fl, y_fr, y_rl, y_rr = (
+        force * (1.0 - share) + more if turning and force < 0.0 else force + more
+        for force, more, turning in zip(pedal, braked, turns, strict=True)
+    )
+    return y_fl, y_fr, y_rl, y_rr
+
+
+class Releasing(Component):
+    """Yaw moment by releasing the driver's brakes on one side, then by braking the other."""
+
+    Parameters = ReleasingParameters
+    inputs = ("yaw_moment", signal("drive_force", optional=True), "steer_angle")
+    outputs = (output("force_request_*", "yaw_moment", "drive_force", "steer_angle"),)
+    sampled = True
+
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
+        p = self.p
+        moment, drive, delta = u
+        return release_and_brake(
+            moment,
+            drive,
+            delta=delta,
+            front_share=p.drive_front_share,
+            limit=p.release_limit,
+            a=p.cg_to_front_axle,
+            half_track=0.5 * p.track_width,
+        )

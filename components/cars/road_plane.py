@@ -1,0 +1,45 @@
+"""What an inclined road and the wind do to a car, beside its tyres: they act on all of its mass alike.
+
+    e_x = -g sin(slope)              e_y = F_w / m - g sin(bank)              [m/s2], vehicle axes
+    g_n = g sqrt(1 - sin^2(slope) - sin^2(bank))        gravity towards the road
+    a_x = X / m + e_x,  a_y = Y / m + e_y,  dr = (M + M_w) / I_z              X, Y, M of the tyres
+
+Motion is that in the plane of the road. Since e_x and e_y act on every part of the car alike, what moves
+against another part (springs, loads, roll) follows the tyres' forces as on a level road: on a bank as in a
+bend of the same side force. Loads add up to m g_n. The wind F_w is taken to act like that, too: at the height
+of the centre of mass, M_w / F_w before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import sin, sqrt
+from typing import NamedTuple
+
+from ..fmi.variables import signal
+from ..mathematics.gravity import G
+
+INPUTS = tuple(signal(name, optional=True) for name in ("slope", "bank", "wind_force_y", "wind_moment_z"))
+
+
+class Pull(NamedTuple):
+    """e_x, e_y [m/s2], g - g_n [m/s2] and M_w [N.m]."""
+
+    x: float
+    y: float
+    lighter: float
+    turn: float
+
+
+LEVEL = Pull(-0.0, -0.0, -0.0, -0.0)  # adding -0.0 changes no bit of any number
+"""On a level road without wind."""
+
+
+def pull_of(told: Sequence[float], mass: float) -> Pull:
+    """Return the pull of slope, bank [rad], wind force [N] and moment [N.m] on a car of `mass` [kg]."""
+    slope, bank, force, moment = told
+    if slope == bank == force == moment == 0.0:
+        return LEVEL
+    up, aside = sin(slope), sin(bank)
+    normal = sqrt(max(1.0 - up * up - aside * aside, 0.0))
+    return Pull(-G * up, force / mass - G * aside, G - G * normal, moment)

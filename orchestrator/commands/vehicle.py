@@ -1,0 +1,134 @@
+"""`yawbench vehicle`: what the car of a vehicle file is like."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .options import Fmus, NoBuild
+
+if TYPE_CHECKING:
+    from ..experiments.tables import Table
+    from ..vehicles.handling import Handling
+
+
+class Deed(str, Enum):
+    """What to do with a car."""
+
+    show = "show"
+
+
+What = Annotated[Deed, typer.Argument(help="show: drive it, and tell what that comes to.")]
+Source = Annotated[
+    Path, typer.Argument(metavar="FILE", help="Vehicle file; a name is looked for as in list.")
+]
+Plants = Annotated[
+    str | None,
+    typer.Option(
+        "--plant",
+        metavar="FMU,FMU,...",
+        help="Plants; default: the one of most degrees of freedom that the file is enough for.",
+    ),
+]
+Tyre = Annotated[
+    str,
+    typer.Option(metavar="FMU", help="Tyres; default: those that the file is made for."),
+]
+Friction = Annotated[float, typer.Option(min=0.05, help="Coefficient of the road.")]
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="The figure, written as .svg and .png; default: results/vehicles/<name>.",
+    ),
+]
+
+
+def vehicle(
+    action: What,
+    file: Source,
+    plant: Plants = None,
+    tyre: Tyre = "",
+    friction: Friction = 1.0,
+    output: Output = None,
+    fmus: Fmus = None,
+    no_build: NoBuild = False,
+) -> None:
+    """Show what a car is like, by driving its FMUs.
+
+    Static loads, characteristic speed, roll gradient, body modes, stopping distance; understeer over lateral
+    acceleration; yaw gain, natural frequency and damping over speed. All in tables, and in one figure.
+    """
+    from ..figures.style import save
+    from ..fmu.opener import Opener
+    from ..scenario import catalogue
+    from ..vehicles.car_drawing import draw_cars
+    from ..vehicles.handling import handling_of
+    from ..vehicles.proving import TestTrack, fitting_plant
+    from .batch import print_tables, say
+
+    file = catalogue.find(file, "a vehicle file")
+    opener = Opener(build=not no_build)
+    names = plant.split(",") if plant else [fitting_plant(file, tyre, fmus, opener)]
+    tracks = [TestTrack(file, name.strip(), tyre, friction, fmus, opener) for name in names]
+    cars = [handling_of(track) for track in tracks]
+    print_tables(_tables(cars))
+    for car in cars:
+        for why in car.failed:
+            say(f"note: {car.plant}: {why}")
+    note = f"on {tracks[0].tyres}, friction {friction:g}"
+    stem = output or Path("results") / "vehicles" / file.stem
+    if stem.suffix.lower() in (".svg", ".png"):
+        stem = stem.with_suffix("")
+    paths = save(draw_cars(cars, file.stem, note), stem)
+    say(f"{paths[0]}, {paths[1].name}")
+
+
+def _tables(cars: list[Handling]) -> list[Table]:
+    """Return the tables: a column for each plant."""
+    from ..evaluation.understeer import LEVELS
+    from ..experiments.tables import Table
+    from ..vehicles.handling import SPEEDS
+
+    names = [car.plant.removeprefix("plant_") for car in cars]
+    numbers = set(range(1, len(names) + 1))
+    whole = Table("The car", ["", *names], numbers=numbers)
+    per_g = 9.80665 * 180.0 / 3.141592653589793
+    for label, values in (
+        ("load of a front wheel at rest", [_told(car.loads[0], 1e-3, "kN") for car in cars]),
+        ("load of a rear wheel at rest", [_told(car.loads[2], 1e-3, "kN") for car in cars]),
+        ("characteristic speed", [_told(car.characteristic_speed, 3.6, "km/h") for car in cars]),
+        ("roll gradient", [_told(car.roll_gradient, per_g, "°/g") for car in cars]),
+        ("roll mode at 80 km/h: natural frequency", [_mode(car.roll_mode, "frequency") for car in cars]),
+        ("roll mode at 80 km/h: damping ratio", [_mode(car.roll_mode, "damping") for car in cars]),
+        ("heave: natural frequency", [_mode(car.heave, "frequency") for car in cars]),
+        ("heave: damping ratio", [_mode(car.heave, "damping") for car in cars]),
+        ("stopping distance from 100 km/h", [_told(car.stopping_distance, 1.0, "m") for car in cars]),
+    ):
+        whole.rows.append([label, *values])
+    turn = Table("Understeer gradient at 80 km/h", ["lateral acceleration", *names], numbers=numbers)
+    for a_y in (0.0, *LEVELS):
+        label = f"{a_y:g} m/s²" if a_y else "linear range"
+        turn.rows.append([label, *(_told(car.steering.get(a_y), per_g, "°/g") for car in cars)])
+    over_speed = [
+        ("Steady yaw gain", lambda car, v: _told(car.gains.get(v), 1.0, "1/s")),
+        ("Yaw mode: natural frequency", lambda car, v: _mode(car.yaw.get(v), "frequency")),
+        ("Yaw mode: damping ratio", lambda car, v: _mode(car.yaw.get(v), "damping")),
+    ]
+    of_yaw = []
+    for title, told in over_speed:
+        rows = [[f"{3.6 * speed:.0f} km/h", *(told(car, speed) for car in cars)] for speed in SPEEDS]
+        of_yaw.append(Table(title, ["speed", *names], [*rows], numbers=numbers))
+    return [whole, turn, *of_yaw]
+
+
+def _told(value: float | None, factor: float, unit: str) -> str:
+    return "-" if value is None else f"{factor * value:.3g}{f' {unit}' if unit else ''}"
+
+
+def _mode(mode: object, what: str) -> str:
+    value = getattr(mode, what, None)
+    return _told(value, 1.0, "Hz" if what == "frequency" else "")
