@@ -21,9 +21,9 @@ def page() -> str:
         "# Vehicle files",
         NOTE,
         docstring(vehicle.__doc__ or ""),
-        "A unit that lacks one of those that cannot be left out is refused, if the file says enough "
-        "for static loads.",
-        table(("quantity", "unit", "can be left out", "meaning"), quantities),
+        "A unit that declares a quantity it cannot do without, neither given nor derived, is refused, if the "
+        "file says enough of the car for its static loads.",
+        table(("quantity", "unit", "units do without", "meaning"), quantities),
         "## What follows from what",
         docstring(derivations.__doc__ or ""),
         table(("quantity", "formula", "needs"), formulas),

@@ -52,7 +52,7 @@ def evaluate_understeer(trace: Trace) -> Judgement:
         extra = side * (hand / ratio - (front + rear) * r / np.maximum(v, 0.1))
         last = int(np.argmax(a_y))  # what comes after is not the slow rise any more
         a_y, extra = a_y[: last + 1], extra[: last + 1]
-        gradient = _slope(a_y, extra, *WINDOW, cubic=True)
+        gradient = slope(a_y, extra, *WINDOW, cubic=True)
         if gradient is None:
             raise NotJudged(
                 f"lateral acceleration does not rise slowly through {WINDOW[0]:g} to {WINDOW[1]:g} m/s2"
@@ -67,7 +67,7 @@ def evaluate_understeer(trace: Trace) -> Judgement:
         speed = math.sqrt((front + rear) / gradient)
         judged.add("characteristic_speed", "characteristic speed", speed, "m/s", "sqrt(L / K_us)")
     for level in LEVELS:
-        local = _slope(a_y, extra, level - HALF, level + HALF)
+        local = slope(a_y, extra, level - HALF, level + HALF)
         judged.add(
             f"gradient_{level:g}",
             f"understeer gradient at {level:g} m/s2",
@@ -79,9 +79,17 @@ def evaluate_understeer(trace: Trace) -> Judgement:
     return judged
 
 
-def _slope(
+def slope(
     a_y: np.ndarray, extra: np.ndarray, low: float, high: float, *, cubic: bool = False
 ) -> float | None:
+    """Return d extra / d a_y [rad.s2/m] from what lies between two a_y [m/s2]; None if that is too little.
+
+    Args:
+        a_y: rising [m/s2].
+        extra: delta - L r / v_x [rad].
+        low, high: of the straight line, or of the cubic whose slope at zero is meant.
+        cubic: which of the two.
+    """
     inside = (a_y >= low) & (a_y <= high)
     if a_y.max() < high or np.count_nonzero(inside) < FEWEST:
         return None
