@@ -50,7 +50,7 @@ class Patch(NamedTuple):
             place = point[axis] % period if period else point[axis]
             if not low <= place < high:
                 return False
-        return not self.corners or _inside(point, self.corners)
+        return not self.corners or inside_polygon(point, self.corners)
 
 
 def patches_of(text: str) -> tuple[Patch, ...]:
@@ -123,7 +123,7 @@ def _corners(condition: str, text: str) -> tuple[Point, ...]:
     return tuple(corners)
 
 
-def _inside(point: Point, corners: tuple[Point, ...]) -> bool:
+def inside_polygon(point: Point, corners: tuple[Point, ...]) -> bool:
     """Return whether a point is in a polygon: a ray from it crosses an odd number of edges."""
     x, y = point
     inside = False

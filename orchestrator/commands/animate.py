@@ -25,7 +25,8 @@ def animate(
 ) -> None:
     """Write a page that animates runs seen from above.
 
-    Cars, paths, lanes, steer angles, tyre forces and their friction circles; of at most seven runs.
+    Cars, paths, lanes, patches of the road, steer angles, tyre forces and their friction circles; of at
+    most seven runs.
     A scenario is run first if its results are missing or were made from another scenario or FMU.
     Without --out, the page of one run is animation.html in its folder; that of several lies in the
     folder that holds them all.

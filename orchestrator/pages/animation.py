@@ -24,7 +24,9 @@ from ..errors import ResultsError
 from ..figures.display import shown_unit
 from ..figures.style import LINES, line_style
 from ..results.read import Results
+from ..wording import listed
 from .animation_frames import Frames, frames_of
+from .ground import Piece
 from .rendering import render
 
 SCRIPTS = ("frames", "draw", "scene", "close_up", "strip", "player")
@@ -98,7 +100,11 @@ def _key(runs: Sequence[Frames]) -> str:
         ("sideslip", "arrow from the centre of mass: where it moves"),
         ("yaw_moment", "grey arc: yaw moment asked for"),
     )
-    key = "; ".join(sign for name, sign in signs if name in drawn)
+    said = [sign for name, sign in signs if name in drawn]
+    frictions = sorted({piece.friction for frames in runs for piece in frames.ground})
+    if frictions:
+        said.append(f"ground: the bluer the slipperier, friction {listed([f'{mu:g}' for mu in frictions])}")
+    key = "; ".join(said)
     return f"{key[:1].upper()}{key[1:]}." if key else ""
 
 
@@ -107,7 +113,16 @@ def data_of(runs: Sequence[tuple[str, Frames]]) -> dict[str, Any]:
     every = [frames for _, frames in runs]
     end = max(frames.channels["time"][-1] for frames in every)
     return {
-        "runs": [_run(number, label, frames, end) for number, (label, frames) in enumerate(runs)],
+        "runs": [
+            _run(
+                number,
+                label,
+                frames,
+                end,
+                () if frames.ground in [f.ground for f in every[:number]] else frames.ground,
+            )
+            for number, (label, frames) in enumerate(runs)
+        ],
         "still": still_of(every),
         "metres_per_newton": force_scale(every),
         "readouts": [
@@ -120,8 +135,8 @@ def data_of(runs: Sequence[tuple[str, Frames]]) -> dict[str, Any]:
     }
 
 
-def _run(number: int, label: str, frames: Frames, end: float) -> dict[str, Any]:
-    """Return one run; `end` [s] is that of the longest."""
+def _run(number: int, label: str, frames: Frames, end: float, ground: Sequence[Piece]) -> dict[str, Any]:
+    """Return one run; `end` [s] is that of the longest, `ground` what it adds to that of the runs before."""
     last = frames.channels["time"][-1]
     early = [f"this run ends at {last:.2f} s"] if last < end - 1e-6 and not frames.failed else []
     style = line_style(number)
@@ -132,6 +147,7 @@ def _run(number: int, label: str, frames: Frames, end: float) -> dict[str, Any]:
         "dash": list(dash),
         "car": asdict(frames.car),
         "lanes": [list(lane) for lane in frames.lanes],
+        "ground": [[piece.friction, piece.corners] for piece in ground],
         "notes": [*frames.notes, *early],
         "channels": {name: packed(values) for name, values in frames.channels.items()},
     }

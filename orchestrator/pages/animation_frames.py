@@ -16,6 +16,7 @@ from ..errors import ResultsError
 from ..metrics.run_metrics import columns_of
 from ..results.read import Results
 from ..wording import listed
+from .ground import Piece, ground_of
 from .lanes import lanes_of
 
 FRAMES = 600
@@ -55,6 +56,7 @@ class Frames:
     car: Car
     channels: dict[str, np.ndarray]
     lanes: tuple[Lane, ...]
+    ground: tuple[Piece, ...]
     notes: tuple[str, ...]  # what could not be drawn
     failed: bool = False
 
@@ -92,7 +94,8 @@ def frames_of(results: Results) -> Frames:
         notes.append(f"the run did not end as planned; shown until {time[-1]:.2f} s")
     elif results.ended:
         notes.append(results.ended)
-    return Frames(car, channels | forces | grip, tuple(_lanes(results)), tuple(notes), failed)
+    ground = tuple(_ground(results, x, y))
+    return Frames(car, channels | forces | grip, tuple(_lanes(results)), ground, tuple(notes), failed)
 
 
 def thinned(time: np.ndarray, most: int = FRAMES) -> np.ndarray:
@@ -207,4 +210,12 @@ def _lanes(results: Results) -> list[Lane]:
     for unit in results.units_of_role("driver"):
         if lanes := lanes_of(_parameters(results, unit)):
             return lanes
+    return []
+
+
+def _ground(results: Results, x: np.ndarray, y: np.ndarray) -> list[Piece]:
+    ranges = [(float(values.min()), float(values.max())) for values in (x, y)]
+    for unit in results.units_of_role("road"):
+        if ground := ground_of(_parameters(results, unit), *ranges):
+            return ground
     return []

@@ -13,6 +13,7 @@ from components.plants.fourteen_dof import FourteenDof
 from components.plants.seven_dof import SevenDof
 from components.plants.two_dof import TwoDof
 from components.roads.patchwork import Patchwork
+from components.tyres.magic_formula_62_transient import MagicFormula62Transient
 from vocabulary.wheels import WHEELS
 
 from .loop import Loop
@@ -125,6 +126,16 @@ def test_the_winds_moment_turns_the_car(plant):
     y = held(stand_of(plant), 0.5, wind_moment_z=300.0)
     inertia = plant.Parameters().yaw_inertia
     assert y["yaw_rate"] == pytest.approx(0.5 * 300.0 / inertia, rel=1e-5)
+
+
+def test_a_braked_car_stands_on_a_slope_on_tyres_with_relaxation_lengths():
+    braked = {f"wheel_torque_{w}": -900.0 for w in WHEELS} | {f"friction_{w}": 0.9 for w in WHEELS}
+    units = [(EightDof, {"initial_speed": 0.5}), (MagicFormula62Transient, {})]
+    loop = Loop(units, algorithm="extrapolated", constants={"slope": 0.1, **braked})
+    loop.run(6.0, 3000, lambda _: None)
+    assert abs(loop["velocity_x"]) < 1e-8
+    held = sum(loop[f"tyre_force_x_{w}"] for w in WHEELS)
+    assert held == pytest.approx(EightDof.Parameters().mass * G * sin(0.1), rel=1e-4)
 
 
 @plants

@@ -61,11 +61,22 @@ function gridWords(c, eye, step, width, height) {
   }
 }
 
-function lanes(c, run, px) {
+// Friction by place: from white, 1 and more, to blue, none.
+function ground(c, run) {
+  for (const [friction, corners] of run.ground) {
+    const less = 1 - Math.min(friction, 1);
+    c.fillStyle = `rgb(${255 - 135 * less}, ${255 - 75 * less}, ${255 - 25 * less})`;
+    c.beginPath();
+    for (const [x, y] of corners) c.lineTo(x, y);
+    c.fill();
+  }
+}
+
+function lanes(c, run, px, onGround) {
   const size = Math.max(0.15, 2.2 * px);
   for (const [start, end, right, left] of run.lanes) {
     c.fillStyle = '#f0ede4';
-    c.fillRect(start, right, end - start, left - right);
+    if (!onGround) c.fillRect(start, right, end - start, left - right);
     const pieces = Math.ceil((end - start) / CONES);
     c.fillStyle = '#8a4b00';
     for (let i = 0; i <= pieces; i++) {
@@ -88,13 +99,14 @@ function drawScene(canvas, density, runs, states, view, scale) {
   c.translate(width / 2, height / 2);
   c.scale(eye.scale, -eye.scale);
   c.translate(-eye.x, -eye.y);
+  for (const run of runs) ground(c, run);
   const step = grid(c, eye, width, height);
   const seen = new Set();
   for (const run of runs) {
     const same = JSON.stringify(run.lanes);
     if (seen.has(same)) continue;
     seen.add(same);
-    lanes(c, run, px);
+    lanes(c, run, px, runs.some((one) => one.ground.length));
     if ('path_y' in run.channels) {
       polyline(c, run.channels.x, run.channels.path_y, 0, run.channels.x.length - 1);
       stroke(c, '#999', 1, px, [5, 4]);

@@ -1,0 +1,87 @@
+"""The ground of an animation: where which friction lies, from what the road's record says of its patches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import product
+from math import floor
+from typing import Any, NamedTuple
+
+from vocabulary.patches import Patch, Point, Span, patches_of
+
+BESIDE = (50.0, 25.0)
+"""Ground drawn beyond the car's path along x and y [m]; chosen: what is in sight of it."""
+MOST = 4000
+"""Pieces drawn; chosen: a chequerboard of 2 m over 200 m by 60 m, and what a browser paints at once."""
+
+Interval = tuple[float, float]
+
+
+class Piece(NamedTuple):
+    """A polygon of one friction."""
+
+    friction: float
+    corners: tuple[Point, ...]
+
+
+def ground_of(parameters: Mapping[str, Any], x: Interval, y: Interval) -> list[Piece]:
+    """Return the ground around a path from x[0] to x[1], y[0] to y[1] [m], upper pieces behind lower ones.
+
+    None without patches, or if there would be more than `MOST` pieces.
+    """
+    text, base, patch = (parameters.get(name) for name in ("patches", "base_friction", "patch_friction"))
+    if not isinstance(text, str) or not isinstance(base, (int, float)) or not isinstance(patch, (int, float)):
+        return []
+    patches = patches_of(text)
+    box = tuple((low - more, high + more) for (low, high), more in zip((x, y), BESIDE, strict=True))
+    pieces = [Piece(float(base), _rectangle(*box))]
+    for one in patches:
+        friction = float(patch if one.friction is None else one.friction)
+        for corners in _polygons(one, box):
+            pieces.append(Piece(friction, corners))
+            if len(pieces) > MOST:
+                return []
+    return pieces if patches else []
+
+
+def _polygons(patch: Patch, box: Sequence[Interval]) -> Iterable[tuple[Point, ...]]:
+    """Yield the parts of a patch within a box."""
+    along, across = (_intervals((s for s in patch.spans if s.axis == axis), box[axis]) for axis in (0, 1))
+    for x, y in product(along, across):
+        corners = clipped(patch.corners, x, y) if patch.corners else _rectangle(x, y)
+        if corners:
+            yield corners
+
+
+def _intervals(spans: Iterable[Span], within: Interval) -> list[Interval]:
+    """Return where all spans of one axis hold, within an interval."""
+    found = [within]
+    for _, low, high, period in spans:
+        if period:
+            first, last = (floor(end / period) for end in within)
+            low, high = max(low, 0.0), min(high, period)
+            held = [(k * period + low, k * period + high) for k in range(first, last + 1)]
+        else:
+            held = [(low, high)]
+        pairs = [(max(a, c), min(b, d)) for (a, b), (c, d) in product(found, held)]
+        found = [(a, b) for a, b in pairs if a < b]
+    return found
+
+
+def _rectangle(x: Interval, y: Interval) -> tuple[Point, ...]:
+    return ((x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1]))
+
+
+def clipped(corners: Sequence[Point], x: Interval, y: Interval) -> tuple[Point, ...]:
+    """Return the part of a polygon within a rectangle (the algorithm of Sutherland and Hodgman)."""
+    for axis, bound, side in ((0, x[0], 1.0), (0, x[1], -1.0), (1, y[0], 1.0), (1, y[1], -1.0)):
+        kept: list[Point] = []
+        for before, point in zip((*corners[-1:], *corners[:-1]), corners, strict=True):
+            inside, was = (side * (p[axis] - bound) >= 0.0 for p in (point, before))
+            if inside != was:
+                part = (bound - before[axis]) / (point[axis] - before[axis])
+                kept.append(tuple(b + part * (p - b) for b, p in zip(before, point, strict=True)))  # type: ignore[arg-type]
+            if inside:
+                kept.append(point)
+        corners = kept
+    return tuple(corners)

@@ -1,0 +1,60 @@
+"""The ground of an animation: the same friction at every place as the road gives its wheels."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from orchestrator.pages.animation import data_of, page
+from orchestrator.pages.animation_frames import frames_of
+from orchestrator.pages.ground import MOST, clipped, ground_of
+from vocabulary.patches import friction_at, inside_polygon, patches_of
+
+from .made_up import whole_car
+
+TEXTS = (
+    "y > 0",
+    "0.5: y > 0; 0.1: 20 < x < 30",
+    "x % 40 < 20",
+    "x % 4 < 2, y % 4 < 2; x % 4 > 2, y % 4 > 2",
+    "(0 0) (40 0) (40 8) (20 2) (0 8), x > 10; 0.3: x % 20 > 10, x < 35, y < -3",
+)
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_the_piece_on_top_has_the_friction_of_the_place(text):
+    given = {"patches": text, "base_friction": 0.8, "patch_friction": 0.2}
+    pieces = ground_of(given, (0.0, 50.0), (-2.0, 2.0))
+    rng = np.random.default_rng(4)
+    for point in rng.uniform((-50.0, -27.0), (100.0, 27.0), (300, 2)):
+        place = (float(point[0]), float(point[1]))
+        drawn = next(piece.friction for piece in reversed(pieces) if inside_polygon(place, piece.corners))
+        assert drawn == friction_at(place, patches_of(text), base=0.8, patch=0.2)
+
+
+def test_a_polygon_is_clipped_to_its_part_within():
+    assert set(clipped(((0, 0), (4, 0), (4, 4), (0, 4)), (1, 9), (-1, 2))) == {(1, 0), (4, 0), (4, 2), (1, 2)}
+    assert clipped(((0, 0), (4, 0), (4, 4)), (5, 9), (0, 1)) == ()
+
+
+def test_there_is_no_ground_without_patches_or_of_too_many_pieces():
+    numbers = {"base_friction": 0.8, "patch_friction": 0.2}
+    assert ground_of({"patches": "", **numbers}, (0, 9), (0, 9)) == []
+    assert ground_of({}, (0, 9), (0, 9)) == []
+    fine = {"patches": "x % 0.02 < 0.01", **numbers}
+    assert ground_of(fine, (0, MOST), (0, 9)) == []
+
+
+def test_an_animation_carries_the_ground_once_and_says_what_its_colours_mean():
+    run = whole_car()
+    road = {"name": "road_a", "parameters": {"patches": "y > 0", "base_friction": 0.8}, "constants": {},
+            "defaults": {"patch_friction": 0.2}}  # fmt: skip
+    on_road = replace(run, run={**run.run, "fmus": {**run.run["fmus"], "road": road}})
+    frames = frames_of(on_road)
+    first, second = data_of([("a", frames), ("b", frames)])["runs"]
+    assert [friction for friction, _ in first["ground"]] == [0.8, 0.2]
+    assert second["ground"] == []
+    assert "slipperier" not in page([("a", run)])
+    assert "ground: the bluer the slipperier, friction 0.2 and 0.8" in page([("a", on_road)])
