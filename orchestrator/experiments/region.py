@@ -6,6 +6,7 @@ The runs are measured and not kept; a run at the chosen point is the named one i
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -27,7 +28,7 @@ from .judged_schema import Claim, Reference
 from .judging import Judgement, judge
 from .margins import Line, Region, Spot, Stop
 from .planning import Planned, metrics_of, number_of
-from .region_schema import OpenValueSpec
+from .region_schema import OpenValueSpec, OpenVariantSpec
 
 ORIGIN = "region"
 """Of changes that open values make."""
@@ -130,13 +131,14 @@ class Runs:
     def _touches(self, one: OpenValueSpec, name: str) -> bool:
         if not any(fnmatchcase(name, pattern) for pattern in one.runs):
             return False
+        run = self.experiment.runs[name]
         if one.kind == "variant":
-            return all(
-                (base := self._base(one, level, name)) is not None
-                and self._has(base, one.variants[str(level.value)].places, one.times)
-                for level in levels_of(one)
-            )
-        return self._has(self.experiment.runs[name], one.vary, one.times)
+            scenarios = [self._scenario(variant, run) for variant in one.variants.values()]
+            places = [
+                place for variant in one.variants.values() if not variant.scenario for place in variant.places
+            ]
+            return all(path.is_file() for path in scenarios) and self._has(run, places, one.times)
+        return self._has(run, one.vary, one.times)
 
     def _has(self, run: NamedRun, places: Iterable[str], times: bool) -> bool:
         """Return whether a run has all places, and leaves them open."""
@@ -145,25 +147,26 @@ class Runs:
             self.own_value(run.name, place) is not None and (times or place not in own) for place in places
         )
 
-    def _base(self, one: OpenValueSpec, level: Level, name: str) -> NamedRun | None:
-        """Return the run that stands in a run's place at a level; None: there is none of that name."""
-        other = one.variants[str(level.value)].run if one.kind == "variant" else ""
-        return self.experiment.runs.get(other.replace("{run}", name) if other else name)
+    def _scenario(self, variant: OpenVariantSpec, run: NamedRun) -> Path:
+        """Return the scenario that a run has at a level."""
+        named = variant.scenario.replace("{scenario}", run.scenario.stem)
+        return self.experiment.path.parent / named if named else run.scenario
 
-    def changes(self, name: str, place: Place) -> tuple[NamedRun, list[Change]]:
-        """Return the run that stands in a run's place, and what is changed in it besides."""
+    def changes(self, name: str, place: Place) -> tuple[Path, list[Change]]:
+        """Return the scenario that a run has at a point, and what is changed in it besides."""
         run, changes = self.experiment.runs[name], []
-        for key, level in place:
-            run = self._base(self.open_values[key], level, name) or run
+        scenario = run.scenario
         for key, level in place:
             one = self.open_values[key]
             if one.times:
                 for where in one.vary:
                     own = self.own_value(run.name, where)
                     changes.append(Change(where, float(own or 0.0) * float(level.value), ORIGIN))
-            else:
-                changes += changes_at(one, level, self.experiment.path.parent, ORIGIN)
-        return run, changes
+                continue
+            if one.kind == "variant" and one.variants[str(level.value)].scenario:
+                scenario = self._scenario(one.variants[str(level.value)], run)
+            changes += changes_at(one, level, self.experiment.path.parent, ORIGIN)
+        return scenario, changes
 
     def cell(self, name: str, place: Place) -> Cell:
         """Return a run at a point, by what changes it there."""
@@ -176,11 +179,12 @@ class Runs:
         """Return whether a level is another than the one that a run has."""
         key, level = at
         one = self.open_values[key]
-        run, changes = self.changes(name, (at,))
-        if run.name != name or not one.numeric:
-            own = {change.place: self.own_value(name, change.place) for change in changes}
-            return run.name != name or any(own[change.place] != change.value for change in changes)
-        return self.number(key, level) != self.chosen_number(key, [name])
+        scenario, changes = self.changes(name, (at,))
+        if scenario != self.experiment.runs[name].scenario:
+            return True
+        if not one.numeric:
+            return any(self.own_value(name, change.place) != change.value for change in changes)
+        return not math.isclose(self.number(key, level), self.chosen_number(key, [name]), rel_tol=1e-9)
 
     def number(self, key: str, level: Level) -> float:
         """Return a level of an open value of numbers: in SI, or as a factor."""
@@ -270,21 +274,19 @@ def plan_region(
         cell for (group, _), one in asked.items() if group == "claims" for cell in plan.cells(one) if cell[1]
     )
     jobs = []
-    experiment = runs.experiment
     for name, place in wanted:
-        run, own = runs.changes(name, place)
+        scenario, own = runs.changes(name, place)
         label = ", ".join([name, *(f"{key} {level.words}" for key, level in place)])
-        changes = (*experiment.for_all, *run.changes, *experiment.by_options, *own)
-        job = replace(runs.jobs[name], label=label, scenario=run.scenario, changes=changes, plan=None)
+        changes = (*runs.jobs[name].changes, *own)
+        job = replace(runs.jobs[name], label=label, scenario=scenario, changes=changes, plan=None)
         jobs.append(replace(job, out=folder / RUNS, keep=False))
 
     def where(problem: str) -> tuple[str, str]:
         """Tell a problem of an open value once, with its place in the file."""
         place = getattr(problem, "place", "").removeprefix(f"{ORIGIN} ").partition("=")[0]
         key = next((key for key, one in runs.open_values.items() if place in one.places), None)
-        return (
-            (key, f"{runs.experiment.path}: region.open_values.{key}: {problem}") if key else (problem,) * 2
-        )
+        at = f"{runs.experiment.path}: region.open_values.{key}: "
+        return (key, f"{at}{problem}") if key else (problem, problem)
 
     metrics = metrics_of(runs.experiment)
     made = [keyed(job, metrics) for job in ready(jobs, once=once, progress=progress, place=where)]

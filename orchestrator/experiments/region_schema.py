@@ -15,7 +15,9 @@ LEVELS = 5
 class OpenVariantSpec(VariantSpec):
     """Changes that belong together; none: as chosen."""
 
-    run: str = Field("", description="Another run in its place: `{run}` stands for its own name")
+    scenario: str = Field(
+        "", description="In place of a run's own, whose name is `{scenario}`; relative to this file"
+    )
 
 
 class OpenValueSpec(AxisSpec):

@@ -53,12 +53,12 @@ range; the claims are judged along each of them, and at the points of a Latin hy
         amplitude: {vary: driver.amplitude, times: true, from: 0.8, to: 1.2, says: steering amplitude,
                     because: "chosen: the figure can be read to a fifth"}
         tyre: {vary: tyre, values: [tyre_dugoff, tyre_magic_formula], because: "the paper names neither"}
-        actuators: {variants: {none: {}, lagging: {run: "lagging/{run}"}}, because: the paper gives no lag}
+        actuators: {variants: {none: {}, slow: {scenario: "{scenario}_slow.yaml"}}, because: "none is named"}
 
 An open value touches the runs that have it and do not set it themselves; with `times` it is a factor on
-what each run has. A variant may put another run in a run's place. A claim depends on all open values that
-touch its runs, or on those that its `open_values` lists. Checks are judged over the region where the runs of
-claims are all they need. Margin, share, flip and "undecided" are defined in `docs/regions.md`.
+what each run has. A variant may put another scenario in place of a run's. A claim depends on all open values
+that touch its runs, or on those that its `open_values` lists. Checks are judged over the region if the runs
+of claims are all they need. Margin, share, flip and "undecided" are defined in `docs/regions.md`.
 
 Along axes, a limit is how far one of them may go; curves and maps show a metric over one or two.
 

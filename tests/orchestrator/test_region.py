@@ -168,15 +168,15 @@ def test_a_run_that_sets_a_value_itself_keeps_it_unless_the_open_value_is_a_fact
     assert findings.checks[1].region is None  # nothing touches its run
 
 
-def test_a_variant_may_put_another_run_in_the_place_of_a_run(judged):
+def test_a_variant_may_put_another_scenario_in_place_of_a_runs(judged):
     ratio = re.search(r"    ratio: .*\n", STUDY)[0]
     other = (
-        "    strong: {variants: {as it is: {}, doubled: {run: double}, three: {set: {driver.periods: 3}}}, "
+        "    other: {variants: {plain: {}, doubled: {scenario: double.yaml}, long: {stop_time: 1}}, "
         'runs: [plain], because: "chosen: to show"}\n'
     )
-    below = judged((ratio, other), ("[ratio]", "[strong]")).claims[0]
+    below = judged((ratio, other), ("[ratio]", "[other]")).claims[0]
     line = below.region.lines[1]
-    assert [(stop.words, stop.spot.holds) for stop in line.stops] == [("doubled", False), ("three", True)]
+    assert [(stop.words, stop.spot.holds) for stop in line.stops] == [("doubled", False), ("long", True)]
     assert line.flip.words == "doubled"
 
 

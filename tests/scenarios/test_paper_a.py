@@ -104,7 +104,7 @@ def test_the_readme_tells_what_the_study_found(study, metric):
     told = rows(readme)
     assert len(told) == 9
     found = [[cell.removesuffix(" †") for cell in row] for row in first.text()]
-    assert told == [[row[0], row[1], row[2].partition(" (")[0], row[3], row[-1]] for row in found]
+    assert told == [[row[0], row[1], row[2].partition(" (")[0], row[3], row[4], row[-1]] for row in found]
     prose = " ".join(readme.partition("What comes out")[2].partition("###")[0].split())
     learning, frozen = (
         [f"{100 * metric(f'three_periods/15mps/{run}', f'period_{k}'):.1f}" for k in (1, 3)]
