@@ -38,10 +38,10 @@ class SineWithDwellParameters(SteeringParameters, HeldSpeedParameters):
         "chosen: room for the second that signals are zeroed by",
     )
     coasting_before: float = parameter(
-        0.5,
+        1.1,
         "s",
         "How long before the steering the accelerator is let go",
-        "chosen: drive forces below a tenth, 0.5 km/h lost",
+        "chosen: the car coasts throughout the second that signals are zeroed by",
     )
     target_speed: float = parameter(
         80.0 / 3.6, "m/s", "Speed held until then", "UN R140, GTR 8: 80 km/h", minimum=0.0

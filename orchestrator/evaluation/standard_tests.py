@@ -72,6 +72,12 @@ def _lane_change(trace: Trace, _: float | None) -> Evaluated:
     return Evaluated(trace, evaluate_lane_change(trace))
 
 
+def _turn(trace: Trace, _: float | None) -> Evaluated:
+    from .turn_response import evaluate_turn
+
+    return Evaluated(trace, evaluate_turn(trace))
+
+
 TESTS: dict[str, StandardTest] = {
     test.name: test
     for test in (
@@ -99,6 +105,12 @@ TESTS: dict[str, StandardTest] = {
             "extra steering per lateral acceleration, of a slow ramp or a constant radius (after ISO 4138)",
             _understeer,
             ("gradient", "gradient_hand", "characteristic_speed", "gradient_4", "largest"),
+        ),
+        StandardTest(
+            "turn-response",
+            "what becomes of a steady turn when the car is braked (after ISO 7975) or lifted off (ISO 9816)",
+            _turn,
+            ("deceleration", "yaw_ratio", "yaw_ratio_peak", "a_y_ratio", "sideslip", "sideslip_peak"),
         ),
         StandardTest(
             "lane-change",

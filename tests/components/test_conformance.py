@@ -93,6 +93,7 @@ ODD = {
 """What changes its sign in a mirror; all else keeps it."""
 LOPSIDED = {("asymmetric_terms", True), ("table_reading", "printed"), ("wheel_choice", "printed")}
 ODD_PARAMETERS = (
+    "radius",
     *("amplitude", "final_steer_angle", "lane_offset", "initial_sideslip", "initial_yaw_rate"),
     *("road_bank", "wind_force"),
 )

@@ -72,7 +72,7 @@ def test_the_accelerator_is_let_go_before_the_steering_at_any_step_size():
     """The constant part of the force goes with the rest, through the lag of 0.2 s."""
 
     def force(h: float) -> float:
-        stand = Stand(SineWithDwell, constant_drive_force=400.0, start_time=1.0, target_speed=20.0)
+        stand = Stand(SineWithDwell, constant_drive_force=400.0, start_time=1.6, target_speed=20.0)
         stand.start(velocity_x=20.0)
         for _ in range(round(0.8 / h)):
             found = stand.step(h, velocity_x=20.0)["drive_force"]

@@ -12,6 +12,7 @@ from orchestrator.evaluation.judgement import Verdict
 from orchestrator.evaluation.lane_change_run import evaluate_lane_change
 from orchestrator.evaluation.step_response import evaluate_step
 from orchestrator.evaluation.trace import Trace, trace_of
+from orchestrator.evaluation.turn_response import evaluate_turn
 from orchestrator.evaluation.understeer import evaluate_understeer
 from orchestrator.scenario.catalogue import SHIPPED
 from orchestrator.scenario.load import load_scenario
@@ -152,3 +153,27 @@ def test_a_lane_change_that_touches_a_cone_says_where():
     assert evaluate_lane_change(made).verdict is Verdict.PASSED
     stopped = Trace("cones", t, {**signals, "position_x": 0.0 * t}, facts=made.facts)
     assert evaluate_lane_change(stopped).verdict is Verdict.NOT_JUDGED
+
+
+@as_sampled
+def test_a_braked_turn_gives_the_ratios_of_its_closed_form(sampling):
+    t = sampling(12.0)
+    late = np.maximum(t - 9.0, 0.0)
+    v = 20.0 - 4.0 * late
+    more = 1.0 + 0.3 * late * np.exp(1.0 - late / 0.5) / 0.5  # 1.3 at its peak, 0.5 s after the action
+    signals = {
+        "velocity_x": v,
+        "yaw_rate": -v / 80.0 * more,
+        "acceleration_y": -(v**2) / 80.0 * more,
+        "sideslip": np.radians(1.0 - late),
+    }
+    judged = evaluate_turn(Trace("turn", t, signals, facts={"action_time": 9.0}))
+    assert judged.notes == []
+    assert judged["radius"] == pytest.approx(-80.0)
+    assert judged["deceleration"] == pytest.approx(4.0, rel=1e-3)
+    assert judged["yaw_ratio"] == pytest.approx(1.0 + 0.6 * exp(-1.0), rel=1e-3)
+    assert judged["yaw_ratio_peak"] == pytest.approx(1.3, rel=1e-3)
+    assert judged["a_y_ratio"] == pytest.approx(1.0 + 0.6 * exp(-1.0), rel=1e-3)
+    assert judged["sideslip"] == pytest.approx(-np.radians(1.0), rel=1e-3)
+    assert evaluate_turn(Trace("turn", t, signals, facts={})).notes[0].startswith("the run does not tell")
+    assert "not steady" in evaluate_turn(Trace("turn", t, signals), action=9.6).notes[0]
