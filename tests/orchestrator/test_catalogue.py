@@ -134,10 +134,10 @@ def test_paths_in_a_scenario_are_relative_to_it_wherever_it_is_run_from(yawbench
     text = text.replace(vehicle, f"vehicle: ../cars/{vehicle.rpartition('/')[2]}")
     changed = text.replace("fmu: controller_fuzzy_feedback", "fmu: ../units/controller_off.fmu")
     assert changed != text
-    series = "inputs:\n  plant.steer_angle: {file: measured.csv, column: delta}\n"
-    changed = changed.replace("inputs:\n", series)
+    series = "inputs:\n  plant.steer_angle: {file: measured.csv, column: delta}\nunits:\n"
+    changed = changed.replace("units:\n", series)
     (place / "mine.yaml").write_text(changed)
-    (place / "plain.yaml").write_text(changed.replace(series, "inputs:\n"))
+    (place / "plain.yaml").write_text(changed.replace(series, "units:\n"))
     (tmp_path / "elsewhere").mkdir()
     os.chdir(tmp_path / "elsewhere")
     status, shown, told = yawbench("check", "../mine/cases/mine.yaml")
