@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..plan import OF_RUN
-from ..wording import printable
+from ..wording import cut, printable
 from .batch import say
 from .options import Fault, Fmus, NoBuild, NoValidate, ScenarioFile, Set, Swap
 from .planning import plan_of_scenario
@@ -204,6 +204,8 @@ def _matters(unit: Unit, name: str) -> bool:
 
 def _shown(value: Value | None, measure: str | None) -> str:
     text = f"{value:.6g}" if isinstance(value, float) else f"{value}"
+    if isinstance(value, str):  # of many lines, perhaps
+        text = cut("; ".join(filter(None, map(str.strip, value.splitlines()))), 60)
     return f"{text}{f' {measure}' if measure and measure != '1' else ''}"
 
 

@@ -131,12 +131,27 @@ Variables = Annotated[Endpoint, PlainValidator(endpoint), WithJsonSchema({"type"
 UnitName = Annotated[str, AfterValidator(_unit_name)]
 
 
+class TextSpec(Strict):
+    """The text of a file, UTF-8, in place of a value: for parameters that are text, as a road's patches."""
+
+    file: str = Field(description="Path, relative to the scenario", min_length=1)
+
+
+def _is_text(value: object) -> str:
+    return "text" if isinstance(value, dict) else "value"
+
+
+ParameterValue = Annotated[
+    Annotated[Scalar, Tag("value")] | Annotated[TextSpec, Tag("text")], Discriminator(_is_text)
+]
+
+
 class UnitSpec(Strict):
     """One unit as the scenario gives it."""
 
     fmu: str = Field(description="Name of an FMU in fmus/, or the path of any .fmu", min_length=1)
     step_size: Time | None = Field(None, description="s, an integer multiple of the communication step")
-    parameters: dict[str, Scalar] = Field({}, description="Values of this unit's parameters")
+    parameters: dict[str, ParameterValue] = Field({}, description="Values of this unit's parameters")
     tolerance: Tolerance | None = Field(
         None, description="Relative, of the FMU's own solver; left out: that of its default experiment"
     )

@@ -16,11 +16,13 @@ from ..fmu.binary import integer_limits
 from ..plan import Fmu, Value, Variable
 from ..scenario import quantities
 from ..scenario.load import Scenario
+from ..scenario.scenario_schema import TextSpec
 from ..scenario.yaml_lines import Document, Key
 from ..wording import closest, fold, hint, listed, short
 from .derivations import Car, car_of, contradictions
 from .patterns import had
 from .shared_facts import facts_of
+from .text_file import text_of
 
 DERIVED = "derived: "
 """What the origin of a value begins with that follows from the vehicle file; its formula comes after."""
@@ -135,7 +137,7 @@ class Parameters:
                 if (unit, name) in by_change and not self._scenario.document.override(key):
                     continue
                 if _is_parameter(fmu, name):
-                    self._put(given, unit, name, raw, self._scenario.document, key)
+                    self._put_own(given, unit, name, raw, key)
                 elif self._left_out(unit, name, key):
                     self._notes.append(f"{unit}.{name} is left out: {fmu.name} has no such parameter")
                 else:
@@ -143,6 +145,22 @@ class Parameters:
                     self._scenario.document.report(key, sentence)
         self._refuse_half_a_car(given)
         return given
+
+    def _put_own(
+        self, given: dict[str, dict[str, Value]], unit: str, name: str, raw: Value | TextSpec, key: Key
+    ) -> None:
+        """Give a unit's own value, or the text of a file."""
+        document = self._scenario.document
+        if not isinstance(raw, TextSpec):
+            self._put(given, unit, name, raw, document, key)
+            return
+        try:
+            text = text_of(raw, self._scenario.path.parent, self._fmus[unit].variables[name])
+        except ValueError as error:
+            document.report(key, str(error))
+            return
+        self._put(given, unit, name, text, document, key)
+        self._origins[unit][name] = raw.file
 
     def _from_facts(self, given: dict[str, dict[str, Value]]) -> set[tuple[str, str]]:
         """Give what facts tell; return the (unit, parameter) whose fact was changed."""

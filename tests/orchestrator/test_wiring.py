@@ -982,3 +982,25 @@ def test_an_input_without_a_source_is_not_sent_to_whatever_has_its_unit_of_measu
     found = {problem.split("controller.")[1].split(" ")[0]: problem for problem in problems(scenario())}
     assert "connect plant.yaw_rate, or give" in found["roll_rate"]
     assert "no output of this name" not in found["brake"] and "connect" not in found["brake"]
+
+
+def test_a_parameter_that_is_text_can_come_from_a_file(folder):
+    parameters = [Var("patches", type="String", start=""), Var("mu", start=0.9)]
+    make_fmu(folder / "road.fmu", outputs=[out("heat")], parameters=parameters)
+    Path("sub").mkdir()
+    Path("sub/patches.txt").write_bytes("\ufeffy > 0\nx < 5 # Größe\n".encode())
+
+    def with_road(given):
+        return scenario(UNITS + f"  road: {{fmu: road, parameters: {{{given}}}}}\n")
+
+    made = unit(plan(with_road("patches: {file: sub/patches.txt}")), "road")
+    assert made.parameters["patches"] == "y > 0\nx < 5 # Größe\n"
+    assert made.origins["patches"] == "sub/patches.txt"
+    for given, said in (
+        ("patches: {file: none.txt}", "none.txt: no such file or directory"),
+        ("patches: {file: sub}", "sub: is a directory"),
+        ("mu: {file: sub/patches.txt}", "takes a value: only parameters that are text take a file"),
+    ):
+        (problem,) = problems(with_road(given))
+        assert problem.endswith(said)
+        assert "units.road.parameters." in problem
