@@ -62,15 +62,18 @@ def vehicle(
     Static loads, characteristic speed, roll gradient, body modes, stopping distance; understeer over lateral
     acceleration; yaw gain, natural frequency and damping over speed. All in tables, and in one figure.
     """
+    from ..errors import ScenarioError
     from ..figures.style import save
     from ..fmu.opener import Opener
-    from ..scenario import catalogue
+    from ..scenario import catalogue, yaml_lines
     from ..vehicles.car_drawing import draw_cars
     from ..vehicles.handling import handling_of
     from ..vehicles.proving import TestTrack, fitting_plant
     from .batch import print_tables, say
 
     file = catalogue.find(file, "a vehicle file")
+    if problems := yaml_lines.read(file, what="vehicle file").sentences():
+        raise ScenarioError(problems)
     opener = Opener(build=not no_build)
     names = plant.split(",") if plant else [fitting_plant(file, tyre, fmus, opener)]
     tracks = [TestTrack(file, name.strip(), tyre, friction, fmus, opener) for name in names]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +20,7 @@ from ..scenario.overrides import is_path
 from ..scenario.yaml_lines import Document
 from ..tyres.axle_stiffness import cornering_stiffness
 from ..wiring.make_plan import make_plan
+from ..wording import listed
 
 PLANTS = ("plant_fourteen_dof", "plant_eight_dof", "plant_seven_dof", "plant_two_dof")
 """In the order in which one is looked for that a file describes a car for."""
@@ -27,6 +28,11 @@ STEP = 0.002
 """Communication step [s]. Chosen: steady turns and yaw differ by less than 1e-4 from those at 1 ms."""
 TORQUES = "wheel_torque_fl"
 """An input of plants whose wheels are driven and braked."""
+
+
+OF_PLANTS = ("velocity_y", "yaw_rate", "acceleration_y", "vertical_load_fl", "slip_angle_fl")
+OF_TYRES = ("tyre_force_x_fl", "tyre_force_y_fl")
+"""Outputs by which they are known."""
 
 
 @dataclass(frozen=True)
@@ -53,15 +59,22 @@ class TestTrack:
 
     @cached_property
     def place(self) -> Path:
-        """Where the scenario stands, which is no file."""
-        return Path(os.path.abspath(self.vehicle)).parent / "test_track"
+        """Where the scenario stands, which is no file: messages name the car's."""
+        return Path(os.path.relpath(self.vehicle))
 
     @cached_property
     def plant_fmu(self) -> Fmu:
         """The plant's FMU."""
-        folder = Path() if is_path(self.plant) else self.fmus or find_folder(self.place, opener=self.opener)
-        name = os.path.abspath(self.plant) if is_path(self.plant) else self.plant
-        return self.opener.open(find_fmu(name, scenario=self.place, fmus=folder, opener=self.opener))
+        return self._opened(self.plant, "plant", OF_PLANTS)
+
+    def _opened(self, fmu: str, role: str, outputs: Iterable[str]) -> Fmu:
+        """Return an FMU that has to have some outputs."""
+        folder = Path() if is_path(fmu) else self.fmus or find_folder(self.place, opener=self.opener)
+        path = find_fmu(self._named(fmu), scenario=self.place, fmus=folder, opener=self.opener)
+        found = self.opener.open(path)
+        if missing := sorted({*outputs} - {variable.name for variable in found.of("output")}):
+            raise ScenarioError(f"{fmu}: this is no {role}: it has no output {listed(missing)}")
+        return found
 
     def has(self, variable: str) -> bool:
         """Return whether the plant has a variable."""
@@ -91,6 +104,7 @@ class TestTrack:
         Raises:
             YawbenchError: the file, the plant or the tyres are none, or do not go together.
         """
+        self._opened(self.tyres, "tyre", OF_TYRES)
         units: dict[str, Any] = {"driver": dict(driver)}
         plant: dict[str, Any] = {"fmu": self._named(self.plant), "parameters": of_plant}
         inputs: dict[str, Any] = {}

@@ -1,4 +1,4 @@
-"""One vehicle file for every plant: what follows from it, what is refused, what plants make of one car."""
+"""One vehicle file for every plant: what follows from it, what units take of it, what is refused."""
 
 from __future__ import annotations
 
@@ -9,12 +9,9 @@ from ruamel.yaml import YAML
 
 from components.cars.sprung_car import FourteenDofParameters, ride_of
 from components.mathematics.gravity import G
-from fmus.build import build_all
 from orchestrator.commands.check import show
 from orchestrator.errors import WiringError
-from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.scenario.load import load_scenario
-from orchestrator.tyres.axle_stiffness import cornering_stiffness
 from orchestrator.wiring import derivations
 from orchestrator.wiring.derivations import DERIVATIONS, car_of, contradictions
 from orchestrator.wiring.make_plan import make_plan
@@ -22,10 +19,7 @@ from tests.changed import changed
 
 from .fake_fmus import Var, make_fmu, out
 
-SCENARIOS = Path(__file__).parents[2] / "scenarios"
-SALOON = SCENARIOS / "vehicles" / "large_saloon.yaml"
-STEADY_TURN = SCENARIOS / "one_car" / "steady_turn.yaml"
-PLANTS = ("two_dof", "seven_dof", "eight_dof", "fourteen_dof")
+SALOON = Path(__file__).parents[2] / "scenarios" / "vehicles" / "large_saloon.yaml"
 
 
 @pytest.fixture(scope="module")
@@ -217,42 +211,3 @@ def test_a_reference_without_tyres_to_ask_is_refused(plan):
         WiringError, match="does not give cornering_stiffness_front, and the tyres do not tell"
     ):
         plan(more="  reference: {fmu: reference_x}\n", measure=lambda tyres, loads: {})
-
-
-# Plants
-
-
-@pytest.fixture(scope="module")
-def fmus(tmp_path_factory):
-    """A folder with the FMUs of the steady turn and every plant."""
-    folder = tmp_path_factory.mktemp("fmus")
-    own = ("driver_ramp", "reference_single_track", "controller_off", "allocator_load_proportional")
-    others = ("wheel_control_direct", "tyre_magic_formula", *(f"plant_{name}" for name in PLANTS))
-    build_all(folder, components=(*own, *others))
-    return folder
-
-
-def steady_turn(fmus, swaps=(), **of_run):
-    scenario = load_scenario(STEADY_TURN, changes=changed(swaps, **of_run))
-    return make_plan(scenario, fmus=fmus, measure=cornering_stiffness)
-
-
-def test_one_car_turns_alike_at_every_number_of_degrees_of_freedom(fmus):
-    gains = {}
-    for plant in PLANTS:
-        made = steady_turn(fmus, [f"plant=plant_{plant}"], step_size=0.002, stop_time=5.0)
-        assert [note for note in made.notes if "default" in note or "FMUs have" in note] == []
-        results = simulate_in_memory(made)
-        assert 1.2 < results["plant.acceleration_y"][-1] < 2.0
-        gains[plant] = results["plant.yaw_rate"][-1] / results["driver.steer_angle"][-1]
-    assert max(gains.values()) / min(gains.values()) < 1.02, gains
-
-
-def test_the_stiffness_that_a_reference_is_told_is_that_of_the_tyres_formula(fmus, tmp_path):
-    car = YAML(typ="safe").load(SALOON.read_text(encoding="utf-8"))
-    given = {axle: car["parameters"].pop(f"cornering_stiffness_{axle}") for axle in ("front", "rear")}
-    with (tmp_path / "car.yaml").open("w") as file:
-        YAML().dump(car, file)
-    told = unit(steady_turn(fmus, vehicle=str(tmp_path / "car.yaml")), "reference").parameters
-    for axle, value in given.items():  # the paper's, to which the tyres are scaled in three digits
-        assert told[f"cornering_stiffness_{axle}"] == pytest.approx(value, rel=0.006)

@@ -1,4 +1,4 @@
-"""The cars of the library, and what `vehicle show` measures of a car, against theory and published ranges."""
+"""Cars of the library on every plant; what `vehicle show` measures, against theory and published ranges."""
 
 from __future__ import annotations
 
@@ -9,17 +9,25 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
+from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
 from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.errors import WiringError
 from orchestrator.fmu.opener import Opener
+from orchestrator.master.simulate import simulate_in_memory
+from orchestrator.scenario.load import load_scenario
+from orchestrator.tyres.axle_stiffness import cornering_stiffness
 from orchestrator.vehicles import handling
 from orchestrator.vehicles.handling import SAMPLE, TURN_SPEED, Handling, fit, handling_of, modes_of
-from orchestrator.vehicles.proving import TestTrack, fitting_plant
+from orchestrator.vehicles.proving import PLANTS, STEP, TestTrack, fitting_plant
 from orchestrator.wiring.derivations import car_of
+from orchestrator.wiring.make_plan import make_plan
+from tests.changed import changed
+from tests.components.magic import forces_and_moment
 from vocabulary.vehicle import CAR
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "vehicles"
+STEADY_TURN = FOLDER.parent / "one_car" / "steady_turn.yaml"
 LIBRARY = ("mid_size", "small_car", "suv", "van", "large_saloon", "saloon75", "hard")
 """Cars for every plant."""
 PER_G = 9.80665 * 180.0 / pi
@@ -35,16 +43,48 @@ def fmus(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fmus")
     drivers = ("driver_sine", "driver_ramp", "driver_force_pulse")
     tyres = ("tyre_magic_formula", "tyre_linear", "tyre_dugoff")
-    plants = ("plant_two_dof", "plant_seven_dof", "plant_eight_dof", "plant_fourteen_dof")
-    build_all(
-        folder,
-        components=(*drivers, "allocator_load_proportional", "wheel_control_hydraulic", *tyres, *plants),
-    )
+    control = ("reference_single_track", "controller_off", "allocator_load_proportional")
+    wheels = ("wheel_control_direct", "wheel_control_hydraulic")
+    build_all(folder, components=(*drivers, *tyres, *control, *wheels, *PLANTS))
     return folder
 
 
 def track(fmus, name, plant, tyre=""):
     return TestTrack(file(name), plant, tyre, fmus=fmus)
+
+
+# One car on every plant
+
+
+def steady_turn(fmus, swaps=(), settings=(), **of_run):
+    scenario = load_scenario(STEADY_TURN, changes=changed(swaps, settings, **of_run))
+    return make_plan(scenario, fmus=fmus, measure=cornering_stiffness)
+
+
+def test_one_car_turns_alike_at_every_number_of_degrees_of_freedom(fmus):
+    soon = ("driver.start_time=0.1", "driver.ramp_time=1")
+    gains = {}
+    for plant in PLANTS:
+        made = steady_turn(fmus, [f"plant={plant}"], soon, step_size=0.002, stop_time=3.0)
+        assert made.findings == ()
+        results = simulate_in_memory(made)
+        assert 1.2 < results["plant.acceleration_y"][-1] < 2.0
+        rate = results["plant.yaw_rate"]
+        assert abs(rate[-1] - rate[-100]) < 1e-3 * rate[-1]  # steady
+        gains[plant] = rate[-1] / results["driver.steer_angle"][-1]
+    assert max(gains.values()) / min(gains.values()) < 1.02, gains
+
+
+def test_a_reference_is_told_the_slope_of_the_tyres_formula_at_the_static_loads(fmus):
+    p = YAML(typ="safe").load(file("mid_size").read_text())["parameters"]
+    loads = car_of({key: float(value) for key, value in p.items()}).values
+    plan = steady_turn(fmus, vehicle=str(file("mid_size")))
+    told = next(unit for unit in plan.units if unit.name == "reference").parameters
+    for axle in ("front", "rear"):
+        scale = {f"cornering_stiffness_scale_{axle}": p[f"cornering_stiffness_scale_{axle}"]}
+        of_tyre = coefficients(MagicFormulaParameters(**scale), axle)
+        force = forces_and_moment(0.0, 1e-6, loads[f"static_load_{axle}"], 0.9, of_tyre)[1]
+        assert told[f"cornering_stiffness_{axle}"] == pytest.approx(-2.0 * force / 1e-6, rel=1e-4)
 
 
 # Measuring
@@ -131,6 +171,31 @@ def test_the_command_prints_tables_and_draws_one_figure(fmus, tmp_path, capsys):
     assert {"car.svg", "car.png"} == {path.name for path in tmp_path.iterdir()}
 
 
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("none.yaml",), "none.yaml: no such vehicle file"),
+        ((str(file("mid_size")), "--plant", "plant_nine_dof"), "no FMU 'plant_nine_dof'"),
+        (
+            (str(file("mid_size")), "--plant", "tyre_dugoff"),
+            "tyre_dugoff: this is no plant: it has no output",
+        ),
+        ((str(file("mid_size")), "--tyre", "driver_sine"), "driver_sine: this is no tyre: it has no output"),
+        (
+            (str(file("esp_saloon")), "--plant", "plant_fourteen_dof"),
+            "takes its car from the vehicle file, which",
+        ),
+    ],
+)
+def test_what_cannot_be_driven_is_answered_in_sentences(fmus, capsys, tmp_path, monkeypatch, arguments, says):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as done:
+        main(["vehicle", "show", *arguments, "--fmus", str(fmus), "--output", str(tmp_path / "x")])
+    said = capsys.readouterr().err
+    assert done.value.code == 2
+    assert says in said and "Traceback" not in said
+
+
 # The library
 
 
@@ -142,6 +207,16 @@ def test_every_car_of_the_library_is_whole_and_says_where_it_comes_from(name):
     known = car_of({key: float(value) for key, value in data["parameters"].items()}).values
     told_by_tyres = {"cornering_stiffness_front", "cornering_stiffness_rear"}
     assert {key for key, one in CAR.items() if one.needed} - told_by_tyres <= known.keys()
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_every_car_of_the_library_fits_every_plant(fmus, name):
+    for plant in PLANTS:
+        plan = track(fmus, name, plant).plan({"fmu": "driver_sine"}, 20.0, STEP)
+        of_plant = next(unit for unit in plan.units if unit.name == "plant")
+        by_default = {v.name for v in of_plant.fmu.of("parameter")} - of_plant.parameters.keys()
+        assert not {key for key in by_default if key in CAR and CAR[key].needed}
+        assert plan.findings == ()
 
 
 BUILT_TO_LOSE = ("hard",)  # less understeer than cars have
