@@ -155,9 +155,10 @@ def _over_region(planned: Planned, findings: Findings, folder: Path, wishes: Wis
     experiment = planned.experiment
     with bar("planning", 0, quiet=True) as planning:
         plan = plan_region(planned, folder, once=once, progress=planning)
-    runner = runner_of(planned, wishes.workers, wishes.scheduler)
+    jobs = {job.key: job for job in plan.jobs.values()}
+    used = {unit.fmu.sha256: unit.fmu for job in jobs.values() if job.plan for unit in job.plan.units}
+    runner = runner_of(replace(planned, fmus=used), wishes.workers, wishes.scheduler)
     with contextlib.closing(Journal(folder, experiment.identity, fresh=wishes.fresh)) as journal:
-        jobs = {job.key: job for job in plan.jobs.values()}
         left = left_to_do(list(jobs.values()), journal.records)
         if left and wishes.no_run:
             say(f"note: {counted(len(left), 'run')} of the region not made yet; it is left out")
