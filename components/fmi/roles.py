@@ -54,5 +54,6 @@ ROLES: dict[str, Role] = {
     "roads": Role("road", outputs=("friction_*", "friction")),
     "sensors": Role("sensor"),
     "estimators": Role("estimator", outputs=("velocity_x", "sideslip")),
+    "monitors": Role("monitor", inputs=("yaw_moment_wanted",), outputs=("yaw_moment",)),
 }
 """Folder below `components/` -> role."""

@@ -107,8 +107,14 @@ def estimator(ax: Axes) -> None:
     ax.plot([0, 0], [-0.5, 0.75], INK, lw=5, ls=(0, (2, 1)))
 
 
+def monitor(ax: Axes) -> None:
+    ax.plot([-0.9, -0.35, -0.2, 0.05, 0.2, 0.9], [0, 0, 0.6, -0.6, 0, 0], INK, lw=6)
+    ax.add_patch(Circle((0.55, 0.55), 0.25, fc=ACCENT, ec="none"))
+
+
 ROLES: tuple[Callable[[Axes], None], ...] = (
     driver, reference, controller, allocator, wheel_control, actuator, plant, tyre, road, sensor, estimator,
+    monitor,
 )  # fmt: skip
 
 

@@ -88,7 +88,7 @@ ODD = {
     *wheels("tyre_moment_z_*"),
     *wheels("inclination_angle_*"),
     *wheels("patch_slip_angle_*"),
-    *("bank", "wind_force_y", "wind_moment_z"),
+    *("bank", "wind_force_y", "wind_moment_z", "yaw_moment_wanted", "implied_sideslip"),
 }
 """What changes its sign in a mirror; all else keeps it."""
 LOPSIDED = {("asymmetric_terms", True), ("table_reading", "printed"), ("wheel_choice", "printed")}

@@ -1,0 +1,1 @@
+"""Monitors: whether signals can be believed, and what becomes of control if they cannot."""

@@ -1,0 +1,188 @@
+"""Monitor of gyro, accelerometer, hand wheel and wheel speeds by what they say of each other.
+
+Wheels say how fast the car goes, three signals how fast it turns:
+
+    v   = R median(w_i)
+    r_1 = r                                          the gyro
+    r_2 = a_y / v                                    short of it by the rate of the sideslip angle
+    r_3 = v delta / l, at most mu g / v              a neutral car's, as far as the road bears it
+
+A signal is taken for faulty
+
+    that jumps, as a yaw rate, by `jump` from one sample to the next, more than a car can                 (0)
+    that stands still to the last digit for `still_time` while both others move by `moved`                (1)
+    that is the further one from r_3, of gyro and accelerometer, when the sideslip angle which the two
+      imply, the integral of r_2 - r_1 with a washout of `washout`, passes `largest_sideslip`             (2)
+    the hand wheel, if r_1 and r_2 agree to `agreeing` but differ from r_3 by `differing`                 (3)
+    the wheel whose speed is off the median by the share `wheel_share`                                    (4)
+
+where (3) and (4) must last for `lasting`. (0) and (1) are about gyro and accelerometer alone: a driver may
+jerk or hold the wheel. The first fault stands in the output `fault`; a second one is not looked for. If
+control needs the signal (`uses_*`), the yaw moment fades to zero within `fade_time`, for good: no control is
+the law that needs no signal.
+
+Limits: what is late or a little wrong passes, and so does a fault while nothing moves, until something does.
+A bias that grows slowly may be laid at the accelerometer's door. A car that slides far without control gives
+alarms too: (2) and (3) know cars that follow their steering.
+
+Source: that signals are judged by such relations is the practice of van Zanten, Bosch ESP Systems: 5 Years of
+Experience, SAE 2000-01-1633; the relations are kinematics, all thresholds are chosen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..cars.published_cars import PaperB
+from ..fmi.component import Component
+from ..fmi.variables import like, output, parameter, signal
+from ..mathematics.gravity import G
+
+GYRO, ACCELEROMETER, HAND_WHEEL, WHEEL = 1.0, 2.0, 3.0, 4.0
+SLOWEST = 3.0
+"""Speed below which nothing is judged [m/s]; chosen: a_y / v is noise there."""
+SLOW = 10.0
+"""Speed below which a jump of a_y counts as at this one [m/s]; chosen: five times the noise of a_y / v."""
+
+
+@dataclass(frozen=True)
+class RedundancyParameters:
+    """Of the car, and how far signals may be apart."""
+
+    cg_to_front_axle: float = like(PaperB, "cg_to_front_axle")
+    cg_to_rear_axle: float = like(PaperB, "cg_to_rear_axle")
+    wheel_radius: float = like(PaperB, "wheel_radius")
+    jump: float = parameter(
+        0.1, "rad/s", "What no car turns faster by from sample to sample", "chosen: 10 rad/s2 in 10 ms",
+        minimum=0.001,
+    )  # fmt: skip
+    still_time: float = parameter(
+        0.1, "s", "A signal that is alive changes within this", "chosen: ten messages", minimum=0.0
+    )
+    moved: float = parameter(
+        0.05, "rad/s", "What others must have moved by, as yaw rates", "chosen: 3 deg/s", minimum=0.001
+    )
+    washout: float = parameter(
+        1.0, "s", "Time constant of the implied sideslip angle", "chosen: bias of 1 deg/s passes", minimum=0.1
+    )
+    largest_sideslip: float = parameter(
+        0.12, "rad", "Largest implied sideslip angle", "chosen: cars under control reach 0.09", minimum=0.01
+    )
+    agreeing: float = parameter(
+        0.1, "rad/s", "Up to this gyro and accelerometer agree", "chosen: 6 deg/s", minimum=0.001
+    )
+    differing: float = parameter(
+        0.1, "rad/s", "From this on the hand wheel is wrong", "chosen: 6 deg/s", minimum=0.001
+    )
+    wheel_share: float = parameter(
+        0.3, "1", "Share of its speed that a wheel may be off", "chosen: beyond what slip control allows",
+        minimum=0.01,
+    )  # fmt: skip
+    lasting: float = parameter(
+        0.3, "s", "How long (3) and (4) must last", "chosen: longer than a tyre or a brake takes", minimum=0.0
+    )
+    uses_yaw_rate: bool = parameter(True, None, "Control needs the gyro", "chosen: so does every law here")
+    uses_acceleration: bool = parameter(True, None, "Control needs a_y", "chosen: no fault is taken lightly")
+    uses_steer_angle: bool = parameter(
+        True, None, "Control needs the hand wheel", "chosen: the reference does"
+    )
+    uses_wheel_speeds: bool = parameter(True, None, "Control needs wheel speeds", "chosen: as of a_y")
+    fade_time: float = parameter(
+        0.1, "s", "Time in which the yaw moment fades", "chosen: no jolt, and soon", minimum=0.001
+    )
+
+
+class Redundancy(Component):
+    """Monitor that fades the yaw moment out when gyro, a_y, hand wheel or a wheel contradict the others."""
+
+    Parameters = RedundancyParameters
+    sampled = True
+    inputs = (
+        *("yaw_rate", "acceleration_y", "steer_angle", "wheel_speed_*", "friction"),
+        signal("yaw_moment_wanted", "N.m", "Yaw moment that the controller asks for"),
+    )
+    outputs = (
+        output("yaw_moment", "yaw_moment_wanted"),
+        output("fault", unit="1", text="0: none; 1: gyro, 2: accelerometer, 3: hand wheel, 4: wheel speed"),
+        output("implied_sideslip", unit="rad", text="Sideslip angle that gyro and accelerometer imply"),
+    )
+
+    def configure(self) -> None:
+        p = self.p
+        uses = {
+            GYRO: p.uses_yaw_rate,
+            ACCELEROMETER: p.uses_acceleration,
+            HAND_WHEEL: p.uses_steer_angle,
+            WHEEL: p.uses_wheel_speeds,
+        }
+        self.needed = [fault for fault, used in uses.items() if used]
+
+    def start(self, t: float, u: list[float]) -> None:
+        self.fault = 0.0
+        self.share = 1.0
+        self.implied = 0.0
+        self.last = (u[0], u[1])
+        self.since: list[tuple[float, tuple[float, float, float]] | None] = [None, None]
+        self.contradicted = 0.0
+        self.off = [0.0] * 4
+
+    def advance(self, t: float, h: float, u: list[float]) -> None:
+        p = self.p
+        if self.fault:
+            self.share = max(0.0, self.share - h / p.fade_time) if self.fault in self.needed else 1.0
+            return
+        r, a_y, delta, *wheels, mu, _ = u
+        ordered = sorted(wheels)
+        median = 0.5 * (ordered[1] + ordered[2])
+        v = p.wheel_radius * median
+        if v < SLOWEST:
+            self.since, self.implied, self.contradicted, self.off = [None, None], 0.0, 0.0, [0.0] * 4
+            self.last = (r, a_y)
+            return
+        length = p.cg_to_front_axle + p.cg_to_rear_axle
+        most = mu * G / v
+        steered = min(max(v * delta / length, -most), most)
+        rates = (r, a_y / v, steered)
+        self.implied += h * (rates[1] - r - self.implied / p.washout)
+        self.contradicted = self._lasting(self.contradicted, h, self._hand_wheel_contradicts(rates))
+        self.off = [
+            self._lasting(off, h, abs(w - median) > p.wheel_share * median)
+            for off, w in zip(self.off, wheels)  # noqa: B905 - strict= costs a tenth
+        ]
+        jumps = abs(r - self.last[0]), abs(a_y - self.last[1]) / max(v, SLOW)
+        jumped = next((number for number, by in zip((GYRO, ACCELEROMETER), jumps) if by > p.jump), 0.0)  # noqa: B905
+        self.fault = jumped or self._judged(t + h, (r, a_y), rates)
+        self.last = (r, a_y)
+
+    def output(self, t: float, u: list[float]) -> tuple[float, ...]:
+        return self.share * u[-1], self.fault, self.implied
+
+    @staticmethod
+    def _lasting(so_far: float, h: float, still: bool) -> float:
+        return so_far + h if still else 0.0
+
+    def _hand_wheel_contradicts(self, rates: tuple[float, float, float]) -> bool:
+        gyro, felt, steered = rates
+        p = self.p
+        if abs(gyro - felt) > p.agreeing:
+            return False
+        return abs(0.5 * (gyro + felt) - steered) > p.differing  # type: ignore[no-any-return]
+
+    def _judged(self, t: float, seen: tuple[float, float], rates: tuple[float, float, float]) -> float:
+        """Return the number of the first fault that is found, 0 if there is none."""
+        p = self.p
+        for k, name in ((0, GYRO), (1, ACCELEROMETER)):
+            if seen[k] != self.last[k]:
+                self.since[k] = None
+                continue
+            since, then = self.since[k] or (t, rates)
+            self.since[k] = since, then
+            moved = all(abs(rates[j] - then[j]) > p.moved for j in {0, 1, 2} - {k})
+            if moved and t - since >= p.still_time:
+                return name
+        if abs(self.implied) > p.largest_sideslip:
+            gyro, felt, steered = rates
+            return GYRO if abs(gyro - steered) > abs(felt - steered) else ACCELEROMETER
+        if self.contradicted > p.lasting:
+            return HAND_WHEEL
+        return WHEEL if max(self.off) > p.lasting else 0.0
