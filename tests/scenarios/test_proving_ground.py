@@ -1,0 +1,65 @@
+"""Cars and controllers in the standard tests: where they stand, whatever the side and the step."""
+
+from __future__ import annotations
+
+from math import degrees, radians
+
+import pytest
+
+import yawbench as yb
+from orchestrator.evaluation.dwell_run import evaluate_dwell
+from orchestrator.evaluation.judgement import Judgement, Verdict
+from orchestrator.evaluation.slow_steer import evaluate_slow_steer
+from orchestrator.evaluation.trace import trace_of
+from orchestrator.plan import Change
+from orchestrator.scenario.catalogue import SHIPPED
+from yawbench.scenario import Scenario
+
+pytestmark = pytest.mark.exhaustive
+
+A = {"large_saloon": 44.5, "saloon75": 35.9, "hard": 30.2}
+"""Vehicle file -> hand-wheel angle at 0.3 g [deg]."""
+
+
+def scenario(name: str, vehicle: str) -> Scenario:
+    base = yb.load(f"proving_ground/{name}")
+    change = Change("vehicle", str(SHIPPED / "vehicles" / f"{vehicle}.yaml"), "test")
+    return Scenario(base.path, (change,), base.programs)
+
+
+def dwell(amplitude: float, controller: str = "off", **settings: object) -> Judgement:
+    """Return what saloon75 comes to with an amplitude [deg]."""
+    made = scenario("sine_with_dwell", "saloon75").swap(controller=f"controller_{controller}")
+    run = made.set({"driver.amplitude": radians(amplitude), **settings}).run()
+    judged, _ = evaluate_dwell(trace_of(run.results), radians(A["saloon75"]))
+    return judged
+
+
+@pytest.mark.parametrize("vehicle", A)
+def test_a_of_the_cars(vehicle):
+    run = scenario("slowly_increasing_steer", vehicle).run()
+    assert degrees(abs(evaluate_slow_steer(trace_of(run.results))["angle"])) == pytest.approx(
+        A[vehicle], abs=0.11
+    )
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_saloon75_fails_from_5_a_on_and_is_stable_with_fuzzy_pid(side):
+    assert dwell(side * 4.5 * A["saloon75"]).rulings["stability"].verdict is Verdict.PASSED
+    assert dwell(side * 5.0 * A["saloon75"]).rulings["stability"].verdict is Verdict.FAILED
+    held = dwell(side * 270.0, "fuzzy_pid")
+    assert {ruling.verdict for ruling in held.rulings.values()} == {Verdict.PASSED}
+
+
+def test_ratios_do_not_depend_on_the_step():
+    settings = {"step_size": 0.002, "controller.step_size": 0.004, "allocator.step_size": 0.004}
+    fine, coarse = dwell(143.2), dwell(143.2, **settings)
+    for key in ("ratio_1000", "ratio_1750"):
+        assert coarse[key] == pytest.approx(fine[key], abs=0.001)  # 0.5 points were asked for
+    assert coarse["displacement"] == pytest.approx(fine["displacement"], abs=0.001)
+
+
+def test_left_and_right_are_mirrors():
+    left, right = dwell(179.5), dwell(-179.5)
+    for key in ("ratio_1000", "ratio_1750", "displacement", "sideslip"):
+        assert left[key] == pytest.approx(right[key], abs=1e-6), key
