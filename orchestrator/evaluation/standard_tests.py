@@ -78,6 +78,12 @@ def _turn(trace: Trace, _: float | None) -> Evaluated:
     return Evaluated(trace, evaluate_turn(trace))
 
 
+def _sweep(trace: Trace, _: float | None) -> Evaluated:
+    from .frequency_response import evaluate_sweep
+
+    return Evaluated(trace, evaluate_sweep(trace))
+
+
 TESTS: dict[str, StandardTest] = {
     test.name: test
     for test in (
@@ -99,6 +105,18 @@ TESTS: dict[str, StandardTest] = {
             "gains, response times, overshoots of a step of the hand wheel (after ISO 7401)",
             _step,
             ("yaw_rate_gain", "yaw_rate_response", "yaw_rate_overshoot", "acceleration_y_response", "t_beta"),
+        ),
+        StandardTest(
+            "frequency-response",
+            "gains and phases over frequency, from a sweep of the hand wheel (after ISO 7401)",
+            _sweep,
+            (
+                "yaw_rate_gain_0.2",
+                "yaw_rate_peak",
+                "yaw_rate_peak_at",
+                "yaw_rate_bandwidth",
+                "yaw_rate_phase_1",
+            ),
         ),
         StandardTest(
             "understeer-gradient",

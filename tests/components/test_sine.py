@@ -7,6 +7,7 @@ from math import exp, pi, sin
 import pytest
 
 from components.drivers.sine import Sine, SineParameters, sine_steer
+from components.drivers.sine_sweep import SineSweepParameters, sweep
 from components.drivers.sine_with_dwell import SineWithDwell, SineWithDwellParameters, sine_with_dwell
 
 from .stand import Stand
@@ -80,3 +81,12 @@ def test_the_accelerator_is_let_go_before_the_steering_at_any_step_size():
 
     assert force(0.01) == pytest.approx(400.0 * exp(-0.3 / 0.2), rel=1e-9)
     assert force(0.4) == pytest.approx(force(0.01), rel=1e-9)  # let go within a step
+
+
+def test_the_sweep_rises_in_frequency_and_ends():
+    p = SineSweepParameters(
+        amplitude=1.0, first_frequency=0.5, last_frequency=2.5, duration=4.0, start_time=1.0
+    )
+    assert [sweep(t, p) for t in (0.0, 1.0, 5.0, 9.0)] == [0.0] * 4
+    for s in (0.3, 1.0, 3.7):  # turns are the integral of the frequency: 0.5 s + s^2 / 4
+        assert sweep(1.0 + s, p) == pytest.approx(sin(2 * pi * (0.5 * s + 0.25 * s * s)), abs=1e-12)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from cmath import phase
 from math import atan2, exp, log, pi, sqrt
 
 import numpy as np
 import pytest
+from scipy.signal import lsim
 
 import yawbench as yb
+from components.drivers.sine_sweep import SineSweepParameters, sweep
+from orchestrator.evaluation.frequency_response import evaluate_sweep
 from orchestrator.evaluation.judgement import Verdict
 from orchestrator.evaluation.lane_change_run import evaluate_lane_change
 from orchestrator.evaluation.step_response import evaluate_step
@@ -177,3 +181,23 @@ def test_a_braked_turn_gives_the_ratios_of_its_closed_form(sampling):
     assert judged["sideslip"] == pytest.approx(-np.radians(1.0), rel=1e-3)
     assert evaluate_turn(Trace("turn", t, signals, facts={})).notes[0].startswith("the run does not tell")
     assert "not steady" in evaluate_turn(Trace("turn", t, signals), action=9.6).notes[0]
+
+
+@as_sampled
+def test_a_sweep_gives_the_frequency_response_of_an_oscillator(sampling):
+    omega, damping, gain = 2 * pi * 1.2, 0.5, 0.3
+    p = SineSweepParameters(amplitude=0.5)
+    fine = np.arange(0.0, 36.0, 0.001)
+    steered = np.array([sweep(t, p) for t in fine])
+    _, answer, _ = lsim(([gain * omega**2], [1.0, 2 * damping * omega, omega**2]), steered, fine)
+    t = sampling(35.9)
+    signals = {"steering_wheel_angle": np.interp(t, fine, steered)}
+    signals |= {name: np.interp(t, fine, answer) for name in ("yaw_rate", "acceleration_y")}
+    judged = evaluate_sweep(Trace("sweep", t, signals))
+    for f in (0.5, 1.0, 1.5, 2.0):
+        exact = gain * omega**2 / (omega**2 - (2 * pi * f) ** 2 + 2j * damping * omega * 2 * pi * f)
+        assert judged[f"yaw_rate_gain_{f:g}"] == pytest.approx(abs(exact), rel=0.01), f
+        assert judged[f"yaw_rate_phase_{f:g}"] == pytest.approx(phase(exact), abs=0.015), f
+    # |H| is 1 / sqrt(2) where x^2 - (2 - 4 d^2) x - 1 = 0, x = (f / f_0)^2
+    assert judged["yaw_rate_bandwidth"] == pytest.approx(1.2 * sqrt((1 + sqrt(5)) / 2), abs=0.04)
+    assert judged["yaw_rate_peak"] == pytest.approx(1 / (2 * damping * sqrt(1 - damping**2)), rel=0.02)
