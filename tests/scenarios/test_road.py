@@ -83,7 +83,7 @@ def test_on_split_friction_cars_stop_and_stand_at_1_ms(stops):
 @pytest.mark.parametrize("controller", ["controller_off", "controller_pid"])
 def test_they_do_so_on_tyres_with_relaxation_lengths(run, controller):
     tyre = "tyre=tyre_magic_formula_62_transient"
-    results = run("split_braking", tyre, f"controller={controller}", stop_time=20.0)
+    results = run("split_braking", tyre, f"controller={controller}", stop_time=24.0)
     assert_comes_to_rest(results, within=1e-2)
 
 
@@ -105,10 +105,10 @@ def test_the_reference_is_told_the_jump_late_and_the_tyres_at_once(run):
 @pytest.mark.exhaustive
 @pytest.mark.parametrize("name", ["chequerboard", "crosswind"])
 def test_the_other_roads_are_driven_to_their_end(run, name):
-    results = run(name)
+    results = run(name, stop_time=9.0)
     assert np.abs(results["plant.position_y"]).max() < 1.0
     if name == "chequerboard":
-        assert set(results["road.friction"]) <= {0.3, 0.425, 0.55, 0.675, 0.8}
+        assert set(results["road.friction"].round(9)) <= {0.3, 0.425, 0.55, 0.675, 0.8}
         assert_comes_to_rest(results, within=1e-3)
     else:
         assert results["road.wind_force_y"].min() == -1500.0
