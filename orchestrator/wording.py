@@ -9,7 +9,8 @@ from typing import TypeVar
 
 from vocabulary.wheels import WHEELS
 
-_WHEEL_SUFFIX = re.compile(rf"_({'|'.join(WHEELS)})\b")
+_WHEEL_SUFFIX = re.compile(rf"_({'|'.join(WHEELS)})(?=_true\b|\b)")
+"""The wheel in a name, also in that of what a sensor measures (`wheel_speed_fl_true`)."""
 
 K = TypeVar("K")
 

@@ -239,15 +239,17 @@ def test_what_the_control_side_sees_is_shown_and_what_it_sees_exactly_is_noted(
     make_fmu(fmus / "reference_a.fmu", inputs=[steered, turning], outputs=[out("yaw_rate_ref", **rate)])
     make_fmu(fmus / "controller_a.fmu", outputs=[out("yaw_moment", unit="N.m")],
              inputs=[turning, Var("sideslip", "rad"), Var("yaw_rate_ref", "rad/s")])  # fmt: skip
-    make_fmu(fmus / "plant_a.fmu", inputs=[steered, Var("yaw_moment", "N.m")],
-             outputs=[out("yaw_rate", **rate), out("sideslip", **angle)])  # fmt: skip
-    make_fmu(fmus / "sensor_a.fmu", inputs=[Var("yaw_rate_true", "rad/s")], outputs=[out("yaw_rate", **rate)])
+    outputs = [out("yaw_rate", **rate), out("sideslip", **angle), out("wheel_speed_*", **rate)]
+    make_fmu(fmus / "plant_a.fmu", inputs=[steered, Var("yaw_moment", "N.m")], outputs=outputs)
+    make_fmu(fmus / "sensor_a.fmu", outputs=[out("yaw_rate", **rate)],
+             inputs=[Var("yaw_rate_true", "rad/s"), Var("wheel_speed_*_true", "rad/s")])  # fmt: skip
     make_fmu(fmus / "estimator_a.fmu", inputs=[turning], outputs=[out("sideslip", **angle)])
     Path("b.yaml").write_text(SENSED)
     assert check("b.yaml") == 0
     shown = capsys.readouterr()
     rows = [line.split(maxsplit=3) for line in shown.out.splitlines()]
     assert ["gyro", "controller", "measurement", "yaw_rate [rad/s]"] in rows
+    assert "yaw_rate → yaw_rate_true [rad/s], wheel_speed_* → wheel_speed_*_true [rad/s]" in shown.out
     assert ["estimator", "controller", "estimate", "sideslip [rad]"] in rows
     assert ["gyro", "estimator", "measurement", "yaw_rate [rad/s]"] in rows
     assert ["plant", "ideal", "truth", "yaw_rate [rad/s]"] in rows
