@@ -87,6 +87,7 @@ def converge(
         algorithm=algorithm,
         swap=swap,
         set=set_,
+        fault=fault,
     )
     charts = []
     if any(row.error for row in rows):

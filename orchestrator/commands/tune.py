@@ -9,7 +9,20 @@ import typer
 
 from .batch import Jobs, hold, print_tables
 from .experiment import Wishes, chapter_of, command_of, conduct, write_page
-from .options import CallLimit, Fmus, Fresh, Isolate, NoBuild, Out, Scheduler, Set, Swap, isolation, named
+from .options import (
+    CallLimit,
+    Fault,
+    Fmus,
+    Fresh,
+    Isolate,
+    NoBuild,
+    Out,
+    Scheduler,
+    Set,
+    Swap,
+    isolation,
+    named,
+)
 
 if TYPE_CHECKING:
     from ..experiments.experiment import Experiment
@@ -25,6 +38,7 @@ def tune(
     file: TuningFile,
     swap: Swap = None,
     set_: Set = None,
+    fault: Fault = None,
     out: Out = None,
     fmus: Fmus = None,
     no_build: NoBuild = False,
@@ -52,7 +66,7 @@ def tune(
     from ..scenario.overrides import read_changes
     from ..writing import write_whole
 
-    changes = read_changes(swap or (), set_ or ())
+    changes = read_changes(swap or (), set_ or (), fault or ())
     experiment = load_experiment(file, changes=changes)
     folder = out or default_folder(file, changes)
     hold(context, folder)
@@ -71,7 +85,7 @@ def tune(
     table = tuning_table(experiment, found)
     write_whole(folder / "trials.csv", to_csv(columns_of(found)))
     print_tables([table])
-    command = command_of("tune", file, swap=swap, set=set_)
+    command = command_of("tune", file, swap=swap, set=set_, fault=fault)
     save(history_figure(experiment, found, command), folder / "history")
     charts = [image_of(folder / "history.svg", experiment.spec.title)]
     facts = {"results": [table], "charts": charts}

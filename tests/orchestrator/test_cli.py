@@ -9,9 +9,10 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+import typer
 
 from orchestrator import cli
-from orchestrator.cli import COMMANDS, main
+from orchestrator.cli import COMMANDS, _application, main
 
 
 def say(capsys, *arguments):
@@ -99,3 +100,13 @@ def test_a_working_folder_that_is_gone_is_one_sentence(tmp_path):
     )
     said = "the working folder is not there any more; change to another\n"
     assert (done.returncode, done.stdout, done.stderr) == (2, "", said)
+
+
+def test_every_command_that_sets_parameters_takes_faults() -> None:
+    options = {
+        name: {one for parameter in command.params for one in parameter.opts}
+        for name, command in typer.main.get_command(_application()).commands.items()  # type: ignore[attr-defined]
+    }
+    setting = {name for name, own in options.items() if "--set" in own}
+    assert len(setting) > 8
+    assert {name for name in setting if "--fault" not in options[name]} == set()
