@@ -64,16 +64,19 @@ def evaluate(
     Of sine with dwell, A comes from runs of slowly increasing steer (--slow-steer) or is given
     (--angle); several runs are judged as a series.
     """
-    from ..evaluation.dwell_series import judge_series
-    from ..evaluation.trace import load_mapping
-    from .recorded import folder_of_all
+    from ..evaluation.dwell_series import is_series, judge_series
+    from ..evaluation.trace import load_mapping, load_trace
+    from .recorded import distinct, folder_of_all
 
     chosen = TESTS[test.value]  # type: ignore[attr-defined]
     mapping = load_mapping(signals) if signals else None
     places = [place for source in sources for place in _runs(source, mapping)]
+    labels = distinct(places) if len(places) > 1 else [str(places[0])]
     known = _angle(angle, slow_steer, mapping, chosen)
-    evaluated = [_evaluated(chosen, place, mapping, known) for place in places]
-    series = judge_series([one.judged for one in evaluated], known) if known and len(evaluated) > 1 else None
+    pairs = zip(places, labels, strict=True)
+    evaluated = [chosen.evaluate(load_trace(place, mapping, label), known) for place, label in pairs]
+    judged = [one.judged for one in evaluated]
+    series = judge_series(judged, known) if known and is_series(judged) else None
     recorded_here = all(place.is_dir() for place in places)
     folder = out or (folder_of_all(places) if recorded_here else Path("results") / "evaluation")
     conclude(chosen, evaluated, series, known, folder, each=figures, together=out is not None)
@@ -178,14 +181,6 @@ def _angle(
     return angle
 
 
-def _evaluated(
-    test: StandardTest, place: Path, mapping: MappingSpec | None, angle: float | None
-) -> Evaluated:
-    from ..evaluation.trace import load_trace
-
-    return test.evaluate(load_trace(place, mapping), angle)
-
-
 def _draw(
     test: StandardTest, evaluated: list[Evaluated], series: Series | None, folder: Path, *, together: bool
 ) -> int:
@@ -204,7 +199,7 @@ def _draw(
     if series:
         from ..evaluation.dwell_drawing import draw_series
 
-        save(draw_series(series, "Sine with dwell", str(folder)), folder / f"{stem}_series")
+        save(draw_series(series, str(folder)), folder / f"{stem}_series")
         count += 1
     return count
 

@@ -130,7 +130,7 @@ def _displaced(axes: Axes, course: DwellCourse, judged: Judgement, trace: Trace)
         _label(axes, instant + 0.35, least, f"at least {least:g} m", (4, -3), color=CHANGED)
 
 
-def draw_series(series: Series, title: str, note: str) -> Figure:
+def draw_series(series: Series, note: str) -> Figure:
     """Return the figure of a series: ratios and displacement over the amplitude, both directions."""
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -181,5 +181,8 @@ def draw_series(series: Series, title: str, note: str) -> Figure:
             for k, name in enumerate(("left first", "right first"))
         ]
         said = "; ".join(f"{name} {one.verdict.value}: {one.why}" for name, one in series.rulings.items())
-        frame(figure, 5.0, handles, f"{title}: the series has {series.verdict.value}", f"{said} · {note}")
+        title = (
+            f"Sine with dwell, A = {math.degrees(series.angle):.1f}°: the series has {series.verdict.value}"
+        )
+        frame(figure, 5.0, handles, title, f"{said} · {note}")
     return figure

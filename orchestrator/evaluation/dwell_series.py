@@ -10,6 +10,7 @@ Source: UN Regulation No. 140, GTR 8.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -23,6 +24,8 @@ LEAST, MOST = 270.0, 300.0
 """Bounds of the last amplitude [deg]."""
 NEAR = math.radians(1.0)
 """How far an amplitude may be from the one asked for [rad]; chosen: what steering robots keep."""
+SAME = math.radians(0.05)
+"""Amplitudes that differ by less are the same [rad]; chosen: below a tenth of a degree."""
 CRITERIA = ("stability", "responsiveness")
 
 
@@ -64,6 +67,12 @@ class Series:
                 name: {"verdict": one.verdict.value, "why": one.why} for name, one in self.rulings.items()
             },
         }
+
+
+def is_series(runs: Sequence[Judgement]) -> bool:
+    """Return whether runs can be a series: several, no two of the same amplitude."""
+    found = sorted(_of(run) for run in runs if run["amplitude"] is not None)
+    return len(runs) > 1 and all(b - a > SAME for a, b in itertools.pairwise(found))
 
 
 def judge_series(runs: Sequence[Judgement], angle: float) -> Series:

@@ -97,7 +97,7 @@ TESTS: dict[str, StandardTest] = {
             "sine-with-dwell",
             "stability and responsiveness of the regulation on stability control (UN R140, GTR 8, FMVSS 126)",
             _dwell,
-            ("amplitude", "multiple", "ratio_1000", "ratio_1750", "displacement", "sideslip", "speed_end"),
+            ("amplitude", "ratio_1000", "ratio_1750", "displacement", "sideslip", "speed_end"),
             needs_angle=True,
         ),
         StandardTest(

@@ -180,7 +180,7 @@ def load_mapping(path: Path | str) -> MappingSpec:
     return spec
 
 
-def measured(path: Path, mapping: MappingSpec) -> Trace:
+def measured(path: Path, mapping: MappingSpec, label: str = "") -> Trace:
     """Return what a file of measured columns holds, CSV, Parquet or ASAM MDF 4.
 
     Raises:
@@ -202,7 +202,7 @@ def measured(path: Path, mapping: MappingSpec) -> Trace:
             signals[name] = spec.sign * values
     assert clock is not None
     mass = None if mapping.mass is None else float(convert(mapping.mass, "kg"))
-    return Trace(path.name, clock, signals, mass, mapping.friction, {}, None, path.stem)
+    return Trace(label or path.name, clock, signals, mass, mapping.friction, {}, None, path.stem)
 
 
 @contextmanager
@@ -244,4 +244,4 @@ def load_trace(path: Path, mapping: MappingSpec | None, label: str = "") -> Trac
         raise ResultsError(
             f"{path}: is no folder of results; of a file of columns --signals says what is what"
         )
-    return measured(path, mapping)
+    return measured(path, mapping, label)

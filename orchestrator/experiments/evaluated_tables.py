@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..evaluation.judgement import Judgement, Quantity
+from ..figures.display import shown
 from ..metrics.run_metrics import Value
 from .tables import Cell, Table
 
@@ -39,6 +40,6 @@ def runs_table(runs: Sequence[Judgement], test: StandardTest, series: Series | N
     notes = []
     if series:
         notes += [f"{name}: {one.verdict.value}. {one.why}" for name, one in series.rulings.items()]
-        notes.append(f"The series has {series.verdict.value}.")
+        notes.append(f"A = {shown(series.angle, 'rad')}; the series has {series.verdict.value}.")
     notes += [f"{run.label}: {'; '.join(run.notes)}" for run in runs if run.notes]
     return Table(test.says, ["run", *(names[key] for key in keys), *criteria], rows, notes)

@@ -12,7 +12,7 @@ import pytest
 from components.drivers.sine_with_dwell import SineWithDwellParameters, sine_with_dwell
 from orchestrator.cli import main
 from orchestrator.evaluation.dwell_run import evaluate_dwell
-from orchestrator.evaluation.dwell_series import amplitudes, judge_series
+from orchestrator.evaluation.dwell_series import amplitudes, is_series, judge_series
 from orchestrator.evaluation.judgement import Judgement, NotJudged, Verdict
 from orchestrator.evaluation.slow_steer import G, characteristic_angle, evaluate_slow_steer
 from orchestrator.evaluation.trace import Trace
@@ -216,6 +216,13 @@ def test_a_series_passes_only_if_no_run_is_missing_fails_or_is_not_judged():
         failed.rulings["stability"].why == "1 of 26 runs fail, left first: 1, the smallest of 144.0 degrees"
     )
     assert judge_series(runs(spoil=(None, "too short")), A).verdict is Verdict.FAILED
+
+
+def test_runs_of_one_amplitude_are_no_series():
+    left, right, other = (evaluate_dwell(trace(x), A)[0] for x in (LARGE, -LARGE, LARGE))
+    assert is_series([left, right])
+    assert not is_series([left, right, other])
+    assert not is_series([left])
 
 
 def slow_steer(side=1.0, *, sampling=SAMPLING["1 kHz"], offset=0.0) -> Trace:
