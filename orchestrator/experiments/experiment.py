@@ -273,6 +273,13 @@ def _check_names(experiment: Experiment, document: Document) -> None:
         if number.rank_correlation is not None:
             place: Key = ("derived", name, "rank_correlation")
             _known(document, place, number.rank_correlation, spec.grids, "grid", "grids")
+            if grid_ := spec.grids.get(number.rank_correlation):
+                for axis, chosen in number.only.items():
+                    which = {**grid_.rows, **grid_.columns}
+                    _known(document, ("derived", name, "only", axis), axis, which, "axis", "the grid has")
+                    for value in chosen:
+                        _known(document, ("derived", name, "only", axis), value, which.get(axis, [value]),
+                               "value", f"{axis} has")  # fmt: skip
             if (grid_ := spec.grids.get(number.rank_correlation)) and all(
                 cell.published is None for cell in cells(grid_)
             ):

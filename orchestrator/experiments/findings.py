@@ -185,7 +185,7 @@ def derive(spec: ExperimentSpec, values: Values) -> dict[str, Value]:
     for key, one in spec.derived.items():
         number = None
         if one.rank_correlation is not None:
-            number = correlation(spec.grids[one.rank_correlation], values)
+            number = correlation(spec.grids[one.rank_correlation], values, one.only)
         elif one.expression is not None:
             known = {word: values.get((source.run, source.metric)) for word, source in one.of.items()}
             numbers = {word: value.number for word, value in known.items() if value is not None}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from ..figures.display import digits_of
@@ -35,14 +35,28 @@ def cells(spec: GridSpec) -> list[GridCell]:
     return found + [GridCell(one.run, one.says, "", one.published) for one in spec.beside]
 
 
-def correlation(spec: GridSpec, values: Values) -> float | None:
-    """Return Spearman's rank correlation with the published values; None if a run is missing."""
+def correlation(
+    spec: GridSpec, values: Values, only: Mapping[str, Collection[str]] | None = None
+) -> float | None:
+    """Return Spearman's rank correlation with the published values; None if a run is missing.
+
+    Args:
+        spec: the grid.
+        values: what the runs came to.
+        only: name of rows or columns -> those of their values that count; runs beside the grid then do not.
+    """
+    among = [cell for cell in cells(spec) if cell.published is not None]
+    if only:
+        ((row_key, rows),), ((column_key, columns),) = spec.rows.items(), spec.columns.items()
+        kept = {words for value, words in rows.items() if value in only.get(row_key, rows)}
+        in_columns = {words for value, words in columns.items() if value in only.get(column_key, columns)}
+        among = [cell for cell in among if cell.row in kept and cell.column in in_columns]
     pairs = [
         (value.number, cell.published)
-        for cell in cells(spec)
+        for cell in among
         if cell.published is not None and (value := values.get((cell.run, spec.metric))) is not None
     ]
-    wanted = sum(cell.published is not None for cell in cells(spec))
+    wanted = len(among)
     if len(pairs) < max(wanted, 2):
         return None
     measured, published = zip(*pairs, strict=True)

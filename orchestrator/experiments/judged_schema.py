@@ -127,6 +127,9 @@ class DerivedSpec(Strict):
     expression: Annotated[str, AfterValidator(_expression)] | None = None
     of: dict[str, Source] = Field({}, description="Name in the expression -> metric of a run")
     rank_correlation: str | None = Field(None, description="Grid whose order is compared with the paper's")
+    only: dict[str, Alternatives] = Field(
+        {}, description="Rows or columns of the grid -> those of their values that count"
+    )
     unit: str = Field("1", description="Of the expression's value; '%' shows a ratio in per cent")
     published: Quantity | None = Field(None, description="What the paper prints, in SI or with its unit")
 
@@ -134,6 +137,8 @@ class DerivedSpec(Strict):
     def _complete(self) -> DerivedSpec:
         if (self.expression is None) == (self.rank_correlation is None):
             raise ValueError("needs exactly one of expression and rank_correlation")
+        if self.only and self.rank_correlation is None:
+            raise ValueError("only: belongs to a rank_correlation")
         for name in derived.names_in(self.expression) if self.expression else ():
             if name not in self.of:
                 raise ValueError(f"expression: {name} stands for nothing; 'of' has {listed(self.of)}")
