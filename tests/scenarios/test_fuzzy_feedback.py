@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 
 from fmus.build import build_all
 from orchestrator.cli import main
+from orchestrator.experiments.verdicts import share
 
 STUDY = Path(__file__).parents[2] / "scenarios" / "fuzzy_feedback" / "study.yaml"
 UNITS = (
@@ -78,3 +80,23 @@ def test_the_readme_tells_what_the_study_found(study, metric):
     unknown = [run for run in study["runs"] if run.startswith("unknown/")]
     rms, path = (max(100 * metric(run, name) for run in unknown) for name in ("rms", "path"))
     assert f"({rms:.1f} % at most), but the path leaves its own (up to {path:.0f} %)" in told
+
+
+@pytest.mark.exhaustive
+def test_the_readme_tells_how_far_the_verdicts_carry(tmp_path):
+    build_all(tmp_path / "fmus", components=(*UNITS, "tyre_magic_formula"))
+    with pytest.raises(SystemExit) as ended:
+        main(["study", str(STUDY), "--out", str(tmp_path), "--fmus", str(tmp_path / "fmus")])
+    assert not ended.value.code
+    found = {row["says"]: row for row in csv.DictReader((tmp_path / "verdicts.csv").open(encoding="utf-8"))}
+    section = (STUDY.parents[2] / "README.md").read_text(encoding="utf-8").partition("### Paper D")[2]
+    table = [line for line in section.partition("## ")[0].splitlines() if line.startswith("| With")]
+    assert len(table) >= 4
+    for line in table:
+        says, verdict, margin, region, flip = (cell.strip() for cell in line.strip("|").split("|"))
+        row = found[says]
+        assert (verdict, margin) == (row["verdict"], share(float(row["margin [1]"])))
+        held = 100 * int(row["holds at"]) / int(row["points"])
+        assert region == f"holds in {held:.0f} % of {row['points']} points"
+        flips = f"flips at {row['flips by']} {row['flips at']}"
+        assert flip == (flips if row["flips by"] else "no flip along any open value")
