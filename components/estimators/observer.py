@@ -51,10 +51,10 @@ class ObserverParameters(EstimatorParameters):
         0.2, "m/s2", "Random walk of v_y, m/s per root of a second", _TUNED, minimum=0.0
     )
     friction_wander: float = parameter(
-        1.0, "1", "Random walk of friction, per root of a second", _TUNED, minimum=0.0
+        0.5, "1", "Random walk of friction, per root of a second", _TUNED, minimum=0.0
     )
     acceleration_deviation: float = parameter(
-        0.3, "m/s2", "How far the model's a_y is from the measured one", _TUNED, minimum=0.001
+        0.5, "m/s2", "How far the model's a_y is from the measured one", _TUNED, minimum=0.001
     )
     straight_fade: float = parameter(
         0.1, "s", "Time constant with which v_y fades straight ahead", "chosen: fast", minimum=0.001
