@@ -106,11 +106,15 @@ def bench(path: Path) -> None:
 
     print(f"{path}: {plan.title}")
     print(f"  {plan.algorithm}, step {float(plan.step):g} s, {n} of {plan.n_steps} steps measured\n")
-    print(f"  {'us per call':24s}{'set':>8s}{'step':>8s}{'get':>8s}{'sum':>8s}   calls per step")
+    print(
+        f"  {'us per call':24s}{'set':>8s}{'step':>8s}{'get':>8s}{'sum':>8s}   of its time   calls per step"
+    )
     for unit in plan.units:
         times = [1e-3 * meter.spent[unit.name, kind] * unit.period / n for kind in ("set", "step", "get")]
         cells = "".join(f"{t:8.2f}" for t in (*times, sum(times)))
-        print(f"  {unit.name:24s}{cells}   {'1' if unit.period == 1 else f'1/{unit.period}'}")
+        share = 1e-6 * sum(times) / (unit.period * float(plan.step))  # of the time from call to call
+        often = "1" if unit.period == 1 else f"1/{unit.period}"
+        print(f"  {unit.name:24s}{cells}{100 * share:11.2f} %   {often}")
     inside = {kind: 0.0 for kind in ("set", "step", "get", "gather", "keep", "fault")}
     for (_, kind), spent in meter.spent.items():
         inside[kind] += 1e-3 * spent / n

@@ -53,6 +53,7 @@ SHOWN: dict[str, tuple[str, float]] = {
     "rad/s3": ("°/s³", 180 / math.pi),
     "m/s": ("km/h", 3.6),
     "m/s2": ("m/s²", 1.0),
+    "m/s3": ("m/s³", 1.0),
     "N.m": ("N·m", 1.0),
     "N.m/s": ("kN·m/s", 1e-3),
     "N.m.s": ("N·m·s", 1.0),
