@@ -160,13 +160,20 @@ def test_the_readme_tells_what_became_of_the_laws_with_motors_that_lag_and_tuned
     told = [shown(cost[law], "%").removesuffix(" %") for law in laws]
     assert f"the network comes to {told[0]} %, frozen weights to {told[1]}" in prose
     assert f"conventional fuzzy control to {told[2]}, a PD law to {told[3]}." in prose
+    lag = {law: found["derived"][f"lag_cost_{law}"]["value"] for law in laws}
+    order = ("fuzzy_sideslip", "frozen", "pd", "fnn")
+    assert sorted(lag, key=lag.get) == [*order]
+    told = [shown(lag[law], "%").removesuffix(" %") for law in order]
+    assert f"conventional fuzzy control {told[0]} %, frozen weights {told[1]}, PD {told[2]}, the" in prose
+    assert f"the network {told[3]}." in prose
     for law, name in zip(
         laws, ("fuzzy neural network", "frozen weights", "conventional fuzzy", "PD"), strict=True
     ):
-        tuned = load_experiment(STUDY.with_name("tuning.yaml")).spec.tuning.laws[name]
-        given = {one["place"]: one["value"] for one in found["runs"][f"tuned/15mps/{law}"]["changes"]}
-        for axis in tuned.axes.values():
-            assert axis.start <= given[axis.vary[0]] <= axis.end
+        for file, runs in (("tuning", "tuned"), ("tuning_with_actuators", "tuned_for_lag")):
+            sought = load_experiment(STUDY.with_name(f"{file}.yaml")).spec.tuning.laws[name]
+            given = {one["place"]: one["value"] for one in found["runs"][f"{runs}/15mps/{law}"]["changes"]}
+            for axis in sought.axes.values():
+                assert axis.start <= given[axis.vary[0]] <= axis.end
 
 
 def test_all_figures_are_drawn(study):
