@@ -11,9 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from orchestrator.errors import ResultsError
+from orchestrator.errors import ResultsError, ScenarioError
+from orchestrator.evaluation.judgement import Judgement
+from orchestrator.evaluation.standard_tests import TESTS
+from orchestrator.evaluation.trace import trace_of
 from orchestrator.metrics.run_metrics import STANDARD, Value, evaluate, evaluate_all, metric
 from orchestrator.results.read import Results, load_results
+from orchestrator.wording import hint
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -127,6 +131,24 @@ class Run:
         'rad'
         """
         return evaluate_all(self.results, STANDARD)
+
+    def evaluate(self, test: str, *, angle: float | None = None) -> Judgement:
+        """Return what a standard test makes of the run: quantities in SI, verdicts with their reasons.
+
+            >>> run.evaluate("step-steer").notes  # a sine ends where it began
+            ['the hand wheel is not turned']
+
+        Args:
+            test: its name, as `yawbench evaluate` has it.
+            angle: the hand-wheel angle at 0.3 g [rad], which sine with dwell needs for responsiveness.
+
+        Raises:
+            ScenarioError: there is no such test.
+            ResultsError: the run has not recorded what it needs.
+        """
+        if test not in TESTS:
+            raise ScenarioError(f"there is no test {test!r}{hint(test, TESTS, lead='known')}")
+        return TESTS[test].evaluate(trace_of(self.results, self.title), angle).judged
 
     def plot(self, *panels: str, title: str | None = None) -> Figure:
         """Return a figure, drawn as `yawbench plot` draws it.

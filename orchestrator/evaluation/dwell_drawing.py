@@ -97,7 +97,8 @@ def _yaw_rate(axes: Axes, course: DwellCourse, judged: Judgement) -> None:
         instant = course.end + late
         ratio = judged[f"ratio_{round(1000 * late)}"]
         axes.plot([instant - 0.22, instant], [most * value] * 2, color=CHANGED, linewidth=2.2, zorder=3)
-        below = {"va": "top", "ha": "right"}
+        below: dict[str, Any] = {"va": "top", "ha": "right"}
+        below["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.85}
         _label(axes, instant, most * value, f"limit {100 * most:g} %", (-2, -3), color=CHANGED, **below)
         axes.axvline(instant, color=QUIET, linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
         if ratio is None:
