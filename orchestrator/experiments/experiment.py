@@ -274,17 +274,15 @@ def _check_names(experiment: Experiment, document: Document) -> None:
             place: Key = ("derived", name, "rank_correlation")
             _known(document, place, number.rank_correlation, spec.grids, "grid", "grids")
             if grid_ := spec.grids.get(number.rank_correlation):
-                for axis, chosen in number.only.items():
-                    which = {**grid_.rows, **grid_.columns}
-                    _known(document, ("derived", name, "only", axis), axis, which, "axis", "the grid has")
-                    for value in chosen:
-                        _known(document, ("derived", name, "only", axis), value, which.get(axis, [value]),
-                               "value", f"{axis} has")  # fmt: skip
-            if (grid_ := spec.grids.get(number.rank_correlation)) and all(
-                cell.published is None for cell in cells(grid_)
-            ):
-                sentence = f"grid {number.rank_correlation!r} has no published numbers to compare with"
-                document.report(place, sentence)
+                axes_ = {**grid_.rows, **grid_.columns}
+                for axis, counted in number.only.items():
+                    which: Key = ("derived", name, "only", axis)
+                    _known(document, which, axis, axes_, "axis", "the grid has")
+                    for part in counted if axis in axes_ else ():
+                        _known(document, which, part, axes_[axis], "value", f"{axis} has")
+                if all(cell.published is None for cell in cells(grid_)):
+                    sentence = f"grid {number.rank_correlation!r} has no published numbers to compare with"
+                    document.report(place, sentence)
     open_values = spec.region.open_values if spec.region else {}
     for name, one in open_values.items():
         check_patterns(("region", "open_values", name), one.runs)

@@ -17,8 +17,9 @@ from orchestrator.experiments.derived import calculate, rank_correlation
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.figures import draw_all
 from orchestrator.experiments.findings import judge_results
+from orchestrator.experiments.grids import correlation
 from orchestrator.experiments.jobs import Job, Outcome
-from orchestrator.experiments.judged_schema import Claim
+from orchestrator.experiments.judged_schema import Claim, GridSpec
 from orchestrator.experiments.judging import judge
 from orchestrator.experiments.planning import jobs_of
 from orchestrator.experiments.record import write_findings
@@ -545,3 +546,18 @@ def test_the_study_of_paper_a_is_right_in_itself():
     study = load_experiment(Path(__file__).parents[2] / "scenarios" / "fnn_sideslip" / "study.yaml")
     assert {f"{v}mps/{c}" for v in (15, 25, 40) for c in ("off", "fuzzy_sideslip", "fnn")} <= set(study.runs)
     assert all(run.scenario.is_file() for run in study.runs.values())
+
+
+def test_a_rank_correlation_may_be_that_of_part_of_a_grid():
+    spec = GridSpec.model_validate({
+        "title": "t", "metric": "m", "run": "{i}_{k}", "rows": {"i": ["1", "2", "3"]},
+        "columns": {"k": ["1", "2"]}, "published": [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]],
+        "beside": [{"run": "aside", "says": "aside", "published": 9.0}],
+    })  # fmt: skip
+    numbers = {"1_1": 1, "1_2": 2, "2_1": 4, "2_2": 3, "3_1": 9, "3_2": 0, "aside": 20}
+    values = {(run, "m"): Value(float(number), "1") for run, number in numbers.items()}
+    assert correlation(spec, values, {"i": ["1"]}) == pytest.approx(1.0)
+    assert correlation(spec, values, {"i": ["2", "3"], "k": ["1"]}) == pytest.approx(1.0)
+    assert correlation(spec, values, {"i": ["2", "3"]}) == pytest.approx(-0.4)
+    assert correlation(spec, values) < 1.0
+    assert correlation(spec, {("1_1", "m"): Value(1.0, "1")}, {"i": ["1"]}) is None
