@@ -25,7 +25,8 @@ PLANTS = ("seven_dof", "eight_dof", "fourteen_dof")
 TYRES = ("dugoff", "linear", "magic_formula", "magic_formula_62", "magic_formula_1987")
 CAR = SCENARIO.parents[1] / "vehicles" / "large_saloon.yaml"
 """A car that is described for every plant."""
-ROAD_WHEELS = ("driver.steering_ratio=1",)  # the scenario's angle is theirs
+STEERED = ("driver.steering_ratio=1", "driver.amplitude=0.12")
+"""Road wheels, so far [rad] that the dead band of a controller is left on every tyre."""
 UNITS = (
     "driver_sine", "reference_single_track", "allocator_load_proportional", "wheel_control_slip",
     "actuator_lag",
@@ -53,7 +54,7 @@ CASES = list(product(PLANTS, TYRES, CONTROLLERS))
 def test_every_controller_runs_on_every_car_and_tyre(fmus, tmp_path, plant, tyre, controller):
     swaps = (f"controller=controller_{controller}", f"plant=plant_{plant}", f"tyre=tyre_{tyre}")
     plan = make_plan(
-        load_scenario(SCENARIO, changes=changed(swaps, ROAD_WHEELS, stop_time=2.0, vehicle=str(CAR))),
+        load_scenario(SCENARIO, changes=changed(swaps, STEERED, stop_time=2.0, vehicle=str(CAR))),
         fmus=fmus,
     )
     simulate(plan, tmp_path)
