@@ -11,9 +11,9 @@ import sys
 
 import pytest
 
-from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.results.lock import LOCK_FILE, Holder, Lock
+from tests.fmu_copies import put_fmus
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
 
@@ -51,7 +51,7 @@ figures:
 def fmus(tmp_path_factory):
     """A folder with the FMUs of a controller in an open loop."""
     folder = tmp_path_factory.mktemp("fmus")
-    build_all(folder, components=UNITS)
+    put_fmus(folder, components=UNITS)
     return folder
 
 

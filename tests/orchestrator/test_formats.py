@@ -11,7 +11,6 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
 from orchestrator.master.simulate import simulate, simulate_in_memory
@@ -21,6 +20,7 @@ from orchestrator.results.formats import recorder_of
 from orchestrator.results.in_memory import MemoryRecorder
 from orchestrator.results.read import load_results
 from orchestrator.results.recorder import BLOCK
+from tests.fmu_copies import put_fmus
 
 from .fakes import Clock, Function, Stage, make_plan
 from .recorded import car, write
@@ -251,7 +251,7 @@ units:
 def driver(tmp_path_factory):
     """A folder with the driver's FMU."""
     folder = tmp_path_factory.mktemp("fmus")
-    build_all(folder, components=("driver_sine",))
+    put_fmus(folder, components=("driver_sine",))
     return folder
 
 

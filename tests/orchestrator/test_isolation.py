@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.build import build_all, build_component
+from fmus.build import build_component
 from orchestrator.cli import main
 from orchestrator.errors import SimulationError
 from orchestrator.master.isolation import Isolation
@@ -20,6 +20,7 @@ from orchestrator.scaffold.beginnings import begin
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
+from tests.fmu_copies import put_fmus
 
 ROOT = Path(__file__).parents[2]
 CAR = ROOT / "scenarios" / "fnn_sideslip" / "25mps.yaml"
@@ -37,7 +38,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="--isolate needs
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fmus")
-    build_all(folder, components=UNITS)
+    put_fmus(folder, components=UNITS)
     return folder
 
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.experiments.listing import runs_table
 from orchestrator.metrics.run_metrics import columns_for, evaluate_all
 from orchestrator.pages.run_differences import differences
 from orchestrator.results.read import load_results
 from orchestrator.results.runs import found_runs
+from tests.fmu_copies import put_fmus
 
 from .recorded import car, write
 
@@ -116,7 +116,7 @@ def test_files_are_listed_by_their_kind(yawbench, tmp_path, monkeypatch):
 
 
 def test_signals_metrics_and_fmus_are_listed(yawbench, tmp_path):
-    build_all(tmp_path, components=("controller_fnn", "wheel_control_direct"))
+    put_fmus(tmp_path, components=("controller_fnn", "wheel_control_direct"))
     assert "relative_peak_error(x)" in yawbench("list", "metrics")[1]
     fmus = yawbench("list", "fmus", tmp_path)[1]
     assert "controller_fnn" in fmus

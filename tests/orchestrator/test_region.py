@@ -9,7 +9,6 @@ import re
 
 import pytest
 
-from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.experiment import load_experiment
@@ -19,6 +18,7 @@ from orchestrator.experiments.margins import Gap, Region, Spot, margin
 from orchestrator.experiments.planning import jobs_of, plan_experiment
 from orchestrator.experiments.region import judge_region, plan_region
 from orchestrator.experiments.verdicts import region_words, verdict
+from tests.fmu_copies import put_fmus
 
 SCENARIO = """
 title: A sine
@@ -59,7 +59,7 @@ region:
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fmus")
-    build_all(folder, components=("driver_sine",))
+    put_fmus(folder, components=("driver_sine",))
     return folder
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_all, build_component
+from fmus.build import build_component
 from orchestrator.cli import main
 from orchestrator.master import log
 from orchestrator.master.opening import open_unit
@@ -19,6 +19,7 @@ from orchestrator.master.simulate import simulate
 from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
+from tests.fmu_copies import put_fmus
 
 UNITS = (
     "driver_sine", "reference_steady_state", "controller_fnn", "controller_off",
@@ -77,7 +78,7 @@ class {name}(Component):
 def fmus(tmp_path_factory):
     """A folder with the FMUs of a car."""
     folder = tmp_path_factory.mktemp("fmus")
-    build_all(folder, components=UNITS)
+    put_fmus(folder, components=UNITS)
     return folder
 
 
@@ -226,7 +227,7 @@ def test_two_units_of_one_fmu_have_their_own_state(yawbench, tmp_path):
 def test_paths_with_spaces_and_umlauts_work(fmus, tmp_path, monkeypatch, capsys):
     folder = tmp_path / "Prüfstand für Autos"
     scenario = car(folder / "Läufe 1")
-    build_all(folder / "meine FMUs", components=UNITS)
+    put_fmus(folder / "meine FMUs", components=UNITS)
     monkeypatch.chdir(folder)
     with pytest.raises(SystemExit) as exit_:
         main(["run", "Läufe 1/car.yaml", "--fmus", "meine FMUs", "--out", "Ergebnis ä"])

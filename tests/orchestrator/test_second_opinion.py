@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.commands.second_opinion import show
 from orchestrator.errors import WiringError
@@ -28,6 +27,7 @@ from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.evidence import measured
+from tests.fmu_copies import put_fmus
 
 from . import fmpy_exchanging
 
@@ -43,7 +43,7 @@ PAPERS = {  # until the car moves as hard as in the whole run
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fmus")
-    build_all(folder)
+    put_fmus(folder)
     return folder
 
 

@@ -7,11 +7,11 @@ from collections import namedtuple
 
 import pytest
 
-from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.results import size
 from orchestrator.results.folder import FILES
 from orchestrator.results.size import BYTES, expected_size, size_note
+from tests.fmu_copies import put_fmus
 
 from .fakes import Clock, make_plan
 
@@ -52,7 +52,7 @@ def test_results_that_do_not_fit_are_announced_whatever_their_size(plan_of, tmp_
 
 def test_run_tells_before_it_starts(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(size, "HUGE", 1000)
-    build_all(tmp_path, components=["driver_sine"])
+    put_fmus(tmp_path, components=["driver_sine"])
     (tmp_path / "a.yaml").write_text("stop_time: 1\nstep_size: 0.01\nunits: {driver: {fmu: driver_sine}}\n")
     out = tmp_path / "out"
     with pytest.raises(SystemExit) as exit_:

@@ -13,7 +13,6 @@ import fmpy.ssp
 import pytest
 from lxml import etree
 
-from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.errors import ResultsError, YawbenchError
 from orchestrator.interop.omsimulator import for_omsimulator
@@ -23,6 +22,7 @@ from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.ssp_names import DESCRIPTION_FILE, SSC, SSD, SSM, SSV
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
+from tests.fmu_copies import put_fmus
 
 from .fake_fmus import make_fmu
 
@@ -39,7 +39,7 @@ SCHEMAS = Path(fmpy.ssp.__file__).parent / "schema"
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fmus")
-    build_all(folder)
+    put_fmus(folder)
     return folder
 
 

@@ -13,12 +13,13 @@ import pyarrow.parquet as pq
 import pytest
 from lxml import html
 
-from fmus.build import build_all, build_component
+from fmus.build import build_component
 from orchestrator.cli import main
 from orchestrator.errors import ResultsError
 from orchestrator.experiments.jobs import Record
 from orchestrator.experiments.journal import Journal
 from orchestrator.results.read import load_results
+from tests.fmu_copies import put_fmus
 
 UNIT = '''
 import os
@@ -103,7 +104,7 @@ figures:
 def driver(tmp_path_factory):
     """A folder with the driver's FMU."""
     folder = tmp_path_factory.mktemp("fmus")
-    build_all(folder, components=("driver_sine",))
+    put_fmus(folder, components=("driver_sine",))
     return folder
 
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from fmus.build import build_all
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.planning import jobs_of, plan_experiment
 from tests.changed import changed
+from tests.fmu_copies import put_fmus
 
 
 def planned_of(experiment, fmus):
@@ -51,7 +51,7 @@ metrics:
 def fmus(tmp_path_factory):
     """A folder with the FMUs of a controller in an open loop."""
     folder = tmp_path_factory.mktemp("fmus")
-    build_all(folder, components=UNITS)
+    put_fmus(folder, components=UNITS)
     return folder
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.experiments import figures as sweep_figures
 from orchestrator.figures import plots
@@ -18,6 +17,7 @@ from orchestrator.figures.style import save
 from orchestrator.plan import Change
 from orchestrator.results.read import load_results
 from orchestrator.titles import changed, changed_each, changes_in, with_changes
+from tests.fmu_copies import put_fmus
 
 from .recorded import car
 
@@ -47,7 +47,7 @@ figures: [{{name: peaks, kind: curve, x: amplitude, metric: sideslip}}]
 def fmus(tmp_path_factory):
     """A folder with the FMUs of paper D."""
     folder = tmp_path_factory.mktemp("fmus")
-    build_all(folder, components=UNITS)
+    put_fmus(folder, components=UNITS)
     return folder
 
 

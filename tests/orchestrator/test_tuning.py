@@ -9,8 +9,8 @@ import sys
 import pytest
 from lxml import html
 
-from fmus.build import build_all
 from orchestrator.cli import main
+from tests.fmu_copies import put_fmus
 
 SCENARIO = """
 title: A steering wheel
@@ -43,7 +43,7 @@ tuning:
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fmus")
-    build_all(folder, components=("driver_sine",))
+    put_fmus(folder, components=("driver_sine",))
     return folder
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError, WiringError
 from orchestrator.experiments.experiment import load_experiment
@@ -22,6 +21,7 @@ from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import changes_of, read_changes
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
+from tests.fmu_copies import put_fmus
 
 from .tir_files import write
 
@@ -50,7 +50,7 @@ connections: [{{from: wheel_control.torque_request_*, to: plant.wheel_torque_*}}
 def fmus(tmp_path_factory):
     """A folder with the FMUs of the scenario."""
     folder = tmp_path_factory.mktemp("fmus")
-    build_all(folder, components=COMPONENTS)
+    put_fmus(folder, components=COMPONENTS)
     return folder
 
 

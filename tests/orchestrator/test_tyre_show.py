@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from components.tyres.magic_formula_62 import MagicFormula62
-from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.scenario.tir import read_tir
 from orchestrator.tyres.stand import State, put_on_stand, stiffnesses
 from orchestrator.tyres.tyre_drawing import draw_tyre
 from tests.components.stand import Stand as Bench
+from tests.fmu_copies import put_fmus
 
 from .tir_files import write
 
@@ -28,7 +28,7 @@ STATES = [
 def fmus(tmp_path_factory):
     """A folder with some tyres and a unit that is none."""
     folder = tmp_path_factory.mktemp("fmus")
-    build_all(folder, components=COMPONENTS)
+    put_fmus(folder, components=COMPONENTS)
     return folder
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from lxml import html
 
-from fmus.build import build_all
 from orchestrator.cli import main
+from tests.fmu_copies import put_fmus
 
 from .browser import DESK, PHONE
 from .flaws import flaws, open_all
@@ -24,7 +24,7 @@ UNITS = (
 def page(tmp_path_factory) -> Path:
     """The page that `yawbench compare` writes of paper D's scenario with three controllers."""
     folder = tmp_path_factory.mktemp("compare")
-    build_all(folder / "fmus", components=UNITS)
+    put_fmus(folder / "fmus", components=UNITS)
     fuzzy = "controller_fuzzy_feedback"
     with pytest.raises(SystemExit) as ended:
         main([

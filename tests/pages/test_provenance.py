@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_all
 from orchestrator.pages.provenance import (
     CHOSEN,
     ERRATUM,
@@ -27,6 +26,7 @@ from orchestrator.results.run_record import run_record
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
+from tests.fmu_copies import put_fmus
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_fnn")
 SCENARIO = """
@@ -92,7 +92,7 @@ def folder(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("provenance")
     (folder / "half.yaml").write_text(SCENARIO)
     (folder / "car.yaml").write_text(CAR)
-    build_all(folder / "fmus", components=UNITS)
+    put_fmus(folder / "fmus", components=UNITS)
     return folder
 
 
@@ -145,7 +145,7 @@ def test_constant_inputs_are_named_with_their_source(groups):
 
 
 def test_constants_are_shown_with_their_own_values_and_meanings(folder):
-    build_all(folder / "fmus", components=("tyre_dugoff", "controller_sliding_mode"))
+    put_fmus(folder / "fmus", components=("tyre_dugoff", "controller_sliding_mode"))
     constants = """\
   "friction*": 0.5               # chosen: all but one
   tyre.friction_fl: 0.2          # chosen: ice

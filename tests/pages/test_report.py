@@ -12,12 +12,12 @@ from types import SimpleNamespace
 import pytest
 from lxml import html
 
-from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.verdicts import share
 from orchestrator.pages.report import found_studies
+from tests.fmu_copies import put_fmus
 
 from .browser import DESK, PHONE
 from .flaws import flaws, open_all
@@ -61,7 +61,7 @@ units:
 def fmus(tmp_path_factory):
     """A folder with the FMUs of paper D."""
     folder = tmp_path_factory.mktemp("fmus")
-    build_all(folder, components=UNITS)
+    put_fmus(folder, components=UNITS)
     return folder
 
 

@@ -8,7 +8,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fmus.build import build_all
 from orchestrator.master.simulate import simulate
 from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
@@ -16,6 +15,7 @@ from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.components import monolith
 from tests.evidence import measured
+from tests.fmu_copies import put_fmus
 
 OPEN_LOOP = """
 title: Open-loop sine, no control
@@ -50,7 +50,7 @@ def exact():
 def error(tmp_path_factory):
     """Return the largest yaw-rate error of a run, as a share of the peak yaw rate."""
     fmus = tmp_path_factory.mktemp("fmus")
-    build_all(fmus, components=UNITS)
+    put_fmus(fmus, components=UNITS)
     file = fmus / "open_loop.yaml"
     values = {"amplitude": AMPLITUDE, "frequency": FREQUENCY, "start": START, "stop": STOP}
     file.write_text(OPEN_LOOP.format(**values), encoding="utf-8")

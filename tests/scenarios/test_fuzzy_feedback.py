@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.experiments.verdicts import share
+from tests.fmu_copies import put_fmus
 
 STUDY = Path(__file__).parents[2] / "scenarios" / "fuzzy_feedback" / "study.yaml"
 UNITS = (
@@ -24,7 +24,7 @@ DEGREE = 0.017453292519943295
 def study(tmp_path_factory):
     """What experiment.json says."""
     folder = tmp_path_factory.mktemp("paper_d")
-    build_all(folder / "fmus", components=UNITS)
+    put_fmus(folder / "fmus", components=UNITS)
     with pytest.raises(SystemExit) as exit_:
         main(["study", str(STUDY), "--quick", "--out", str(folder / "out"), "--fmus", str(folder / "fmus")])
     assert not exit_.value.code
@@ -84,7 +84,7 @@ def test_the_readme_tells_what_the_study_found(study, metric):
 
 @pytest.mark.exhaustive
 def test_the_readme_tells_how_far_the_verdicts_carry(tmp_path):
-    build_all(tmp_path / "fmus", components=(*UNITS, "tyre_magic_formula"))
+    put_fmus(tmp_path / "fmus", components=(*UNITS, "tyre_magic_formula"))
     with pytest.raises(SystemExit) as ended:
         main(["study", str(STUDY), "--out", str(tmp_path), "--fmus", str(tmp_path / "fmus")])
     assert not ended.value.code

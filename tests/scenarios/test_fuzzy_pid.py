@@ -1,4 +1,4 @@
-"""Paper C's scenarios and study on the real master, with FMUs built for the test."""
+"""Paper C's scenarios and study on the real master, with the FMUs of the project."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.findings import derive
@@ -18,6 +17,7 @@ from orchestrator.figures.display import shown
 from orchestrator.metrics.run_metrics import Value
 from orchestrator.results.read import load_results
 from tests.changed import changed
+from tests.fmu_copies import put_fmus
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "fuzzy_pid"
 SCENARIOS = ("double_lane_change", "sine", "ramp")
@@ -33,7 +33,7 @@ UNITS = (
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fmus")
-    build_all(folder, components=UNITS)
+    put_fmus(folder, components=UNITS)
     return folder
 
 

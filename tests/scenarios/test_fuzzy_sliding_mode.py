@@ -1,4 +1,4 @@
-"""Paper B's scenarios and studies on the real master, with FMUs built for the test."""
+"""Paper B's scenarios and studies on the real master, with the FMUs of the project."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from components.control_laws.slip_control import SlipControlParameters
-from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.experiments.jobs import Job
 from orchestrator.experiments.workers import execute
 from orchestrator.figures.display import shown
 from orchestrator.results.read import load_results
 from tests.changed import changed
+from tests.fmu_copies import put_fmus
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "fuzzy_sliding_mode"
 SCENARIOS = ("high_friction", "low_friction", "beyond_paper", "beyond_grip", "side_share")
@@ -34,7 +34,7 @@ ROADS = ("high_friction", "low_friction", "beyond_paper")
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fmus")
-    build_all(folder, components=UNITS)
+    put_fmus(folder, components=UNITS)
     return folder
 
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.build import build_all
 from orchestrator.master.simulate import simulate
 from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.conftest import evenly
+from tests.fmu_copies import put_fmus
 
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "fuzzy_sliding_mode" / "high_friction.yaml"
 CONTROLLERS = (
@@ -42,7 +42,7 @@ ON_THE_ROAD = {"plant.sideslip": 0.5, "plant.yaw_rate": 1.5}
 def fmus(tmp_path_factory):
     """A folder with all FMUs of the matrix."""
     folder = tmp_path_factory.mktemp("matrix")
-    build_all(folder, components=UNITS)
+    put_fmus(folder, components=UNITS)
     return folder
 
 

@@ -1,4 +1,4 @@
-"""The study of paper A, with FMUs built for the test."""
+"""The study of paper A, with the FMUs of the project."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.findings import judge_results
 from orchestrator.experiments.verdicts import run_tables
 from orchestrator.figures.display import shown
+from tests.fmu_copies import put_fmus
 
 STUDY = Path(__file__).parents[2] / "scenarios" / "fnn_sideslip" / "study.yaml"
 UNITS = (
@@ -26,7 +26,7 @@ UNITS = (
 def study(tmp_path_factory):
     """What experiment.json says, with the folder of the study."""
     folder = tmp_path_factory.mktemp("paper_a")
-    build_all(folder / "fmus", components=UNITS)
+    put_fmus(folder / "fmus", components=UNITS)
     with pytest.raises(SystemExit) as exit_:
         main(["study", str(STUDY), "--quick", "--out", str(folder / "out"), "--fmus", str(folder / "fmus")])
     assert not exit_.value.code
@@ -133,7 +133,7 @@ def test_the_readme_tells_what_the_study_found(study, metric):
 
 @pytest.mark.exhaustive
 def test_the_readme_tells_what_became_of_the_laws_with_motors_that_lag_and_tuned_alike(tmp_path):
-    build_all(tmp_path / "fmus", components=(*UNITS, "controller_pid", "actuator_lag"))
+    put_fmus(tmp_path / "fmus", components=(*UNITS, "controller_pid", "actuator_lag"))
     out = tmp_path / "out"
     with pytest.raises(SystemExit) as exit_:
         main(

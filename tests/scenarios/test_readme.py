@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_all, build_component
+from fmus.build import build_component
 from orchestrator.cli import COMMANDS, main
+from tests.fmu_copies import put_fmus
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -43,7 +44,7 @@ def test_the_controller_of_the_readme_runs_and_follows_the_yaw_rate(tmp_path, ca
     code = python_after("Put this into `components/controllers/yaw_rate.py`")
     file = tmp_path / "yaw_rate.py"
     file.write_text(code.replace("from ..fmi", "from components.fmi"), encoding="utf-8")
-    build_all(tmp_path, components=UNITS)
+    put_fmus(tmp_path, components=UNITS)
     build_component(file, tmp_path, role="controllers")
     with pytest.raises(SystemExit) as exit_:
         main([

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.build import build_all
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
+from tests.fmu_copies import put_fmus
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "road"
 UNITS = (
@@ -30,7 +30,7 @@ SETTLED = ("plant.velocity_x", "plant.velocity_y", "plant.yaw_rate")
 def run(tmp_path_factory):
     """Return the results of a scenario after swaps and with other values."""
     fmus = tmp_path_factory.mktemp("road") / "fmus"
-    build_all(fmus, components=UNITS)
+    put_fmus(fmus, components=UNITS)
 
     def run(name, *swaps, **values):
         scenario = load_scenario(FOLDER / f"{name}.yaml", changes=changed(swaps, **values))

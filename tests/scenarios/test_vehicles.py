@@ -10,7 +10,6 @@ import pytest
 from ruamel.yaml import YAML
 
 from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
-from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.errors import WiringError
 from orchestrator.fmu.opener import Opener
@@ -24,6 +23,7 @@ from orchestrator.wiring.derivations import car_of
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.components.magic import forces_and_moment
+from tests.fmu_copies import put_fmus
 from vocabulary.vehicle import CAR
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "vehicles"
@@ -45,7 +45,7 @@ def fmus(tmp_path_factory):
     tyres = ("tyre_magic_formula", "tyre_linear", "tyre_dugoff")
     control = ("reference_single_track", "controller_off", "allocator_load_proportional")
     wheels = ("wheel_control_direct", "wheel_control_hydraulic")
-    build_all(folder, components=(*drivers, *tyres, *control, *wheels, *PLANTS))
+    put_fmus(folder, components=(*drivers, *tyres, *control, *wheels, *PLANTS))
     return folder
 
 
