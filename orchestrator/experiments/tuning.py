@@ -213,18 +213,23 @@ def history_figure(experiment: Experiment, found: Sequence[Tuned], note: str) ->
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
+    from ..figures.display import shown_unit
     from ..figures.style import RC, frame, line_style
 
     with matplotlib.rc_context(RC):
         figure = Figure(layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.subplots()
+        spec = experiment.spec.derived[tuning_of(experiment).objective]
+        unit, factor = shown_unit(spec.unit)
         handles = []
         for k, one in enumerate(found):
-            least = [min(trial.cost for trial in one.trials[: n + 1]) for n in range(len(one.trials))]
+            least = [
+                factor * min(trial.cost for trial in one.trials[: n + 1]) for n in range(len(one.trials))
+            ]
             axes.step(range(1, len(least) + 1), least, where="post", **line_style(k))
             handles.append(Line2D([], [], label=one.law, **line_style(k)))
-        axes.set(xlabel="trials", ylabel="least objective so far")
-        axes.set_title(experiment.spec.derived[tuning_of(experiment).objective].says)
+        axes.set(xlabel="trials", ylabel=f"least so far{f' [{unit}]' if unit else ''}")
+        axes.set_title(spec.says)
         frame(figure, 3.4, handles, experiment.spec.title, note)
     return figure
