@@ -18,12 +18,17 @@ from ..mathematics.quadratic_program import Rows, inverse, multipliers
 from .linear_feedback import Matrix
 
 _ORDER = 14
-"""Of the series of the matrix exponential: beyond rounding for steps below the car's time constants."""
+"""Of the series of the matrix exponential: beyond what counts where `A h` is at most 1."""
 
 
 def _discrete(a: Matrix, b: float, h: float) -> tuple[Matrix, tuple[float, float]]:
     """Return the transition over `h` [s] and what a unit of a held input on the second state adds."""
     (a_11, a_12), (a_21, a_22) = a
+    if h * max(abs(a_11) + abs(a_12), abs(a_21) + abs(a_22)) > 1.0:  # two halves, where the series is slow
+        half, (g_1, g_2) = _discrete(a, b, 0.5 * h)
+        more_1, more_2 = _stepped(half, (g_1, g_2))
+        (p_11, p_21), (p_12, p_22) = (_stepped(half, (row[0], row[1])) for row in zip(*half, strict=True))
+        return ((p_11, p_12), (p_21, p_22)), (g_1 + more_1, g_2 + more_2)
     p_11, p_12, p_21, p_22 = 1.0, 0.0, 0.0, 1.0
     t_11, t_12, t_21, t_22 = 1.0, 0.0, 0.0, 1.0  # (A h)^k / k!
     g_1, g_2 = 0.0, h * b

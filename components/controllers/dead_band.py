@@ -1,12 +1,13 @@
 """Yaw-moment control as it is in production: dead band, sideslip limit, no more than needed.
 
     e_r = r_ref - r                                      dead band: r_0 + share |r_ref|
-    M   = k_r D(e_r) - k_beta E(beta, beta_max)          D, E: what is beyond the dead band, the limit
+    M   = k_r D(e_r) + k_beta E(beta, beta_max)          D, E: what is beyond the dead band, the limit
     beta_max = atan(0.02 s2/m  mu g)                     `controllers.mpc`
 
 While the car follows its driver within the dead band and keeps its sideslip below the limit, nothing
-happens. Too much turn (|r| above |r_ref|, of its sign) is fought with the whole gain; too little, where a car
-stays predictable, with `understeer_share` of it. Below `release_speed` it is off.
+happens. A positive moment raises the yaw rate and lowers the sideslip. Too much turn (|r| above |r_ref|, of
+its sign) is fought with the whole gain; too little, where a car stays predictable, with `understeer_share` of
+it. Below `release_speed` it is off.
 
 After A. T. van Zanten, R. Erhardt, G. Pfaff, VDC, the vehicle dynamics control system of Bosch, SAE
 950759, 1995; its numbers are not public, ours are chosen. Ours differs: the moment goes to an allocator, and
@@ -70,7 +71,7 @@ class DeadBand(Component):
         r_ref, r, beta, speed, mu = u
         error = beyond(r_ref - r, p.yaw_rate_threshold + p.yaw_rate_threshold_share * abs(r_ref))
         share = p.understeer_share if error * r_ref > 0.0 else 1.0
-        moment = share * p.yaw_rate_gain * error - p.sideslip_gain * beyond(beta, sideslip_bound(mu))
+        moment = share * p.yaw_rate_gain * error + p.sideslip_gain * beyond(beta, sideslip_bound(mu))
         awake = (speed - p.release_speed) / max(p.full_speed - p.release_speed, 1e-3)
         moment *= min(max(awake, 0.0), 1.0)
         return (min(max(moment, -p.moment_limit), p.moment_limit),)

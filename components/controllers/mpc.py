@@ -81,7 +81,7 @@ class Mpc(Component):
 
     def law_at(self, speed: float) -> PredictiveLaw:
         """Return the law at the speed of the grid next to `speed` [m/s], which is kept."""
-        place = round(max(speed, self.p.scheduling_speed) / SPACING)
+        place = max(round(max(speed, self.p.scheduling_speed) / SPACING), 1)  # at rest there is none
         if place != getattr(self, "place", None):
             self.place = place
             dynamics = error_dynamics(self.car, place * SPACING)
