@@ -38,8 +38,8 @@ def amplitudes(angle: float) -> list[float]:
     a = math.degrees(angle)
     last = min(max(LAST * a, LEAST), MOST)
     steps = int((last / a - FIRST) / STEP + 1e-9)
-    found = [(FIRST + STEP * k) * a for k in range(steps + 1)]
-    if last - found[-1] > 1e-6:
+    found = [(FIRST + STEP * k) * a for k in range(steps + 1)] if FIRST * a < last else []
+    if not found or last - found[-1] > 1e-6:
         found.append(last)
     return [math.radians(round(x, 6)) for x in found]
 

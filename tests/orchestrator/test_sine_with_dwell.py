@@ -193,6 +193,10 @@ def test_the_ladder_goes_in_steps_of_half_a_up_to_the_last_run(angle, runs, last
     assert np.diff(ladder)[-1] <= 0.5 * angle + 1e-9
 
 
+def test_a_car_that_hardly_steers_has_the_largest_amplitude_for_its_only_one():
+    assert [degrees(x) for x in amplitudes(radians(350.0))] == pytest.approx([300.0])
+
+
 def test_a_series_passes_only_if_no_run_is_missing_fails_or_is_not_judged():
     def runs(*, without=None, spoil=None):
         made = []
