@@ -240,17 +240,18 @@ def car_of(given: Mapping[str, float]) -> Car:
 
 
 def contradictions(given: Mapping[str, float]) -> list[tuple[str, str]]:
-    """Return the (name, sentence) of every value that does not agree with others that are given.
+    """Return the (name, sentence) of every value that does not agree with what follows from the others.
 
     Of formulas between the same quantities the first counts.
     """
+    known = car_of(given).values
     found, seen = [], set()
     for one in DERIVATIONS:
         among = frozenset((one.name, *one.inputs))
-        if among in seen or not all(name in given for name in among):
+        if among in seen or one.name not in given or not all(name in known for name in one.inputs):
             continue
         seen.add(among)
-        value = _number(one, [given[name] for name in one.inputs])
+        value = _number(one, [known[name] for name in one.inputs])
         if value and abs(value[0] - given[one.name]) > AGREES * max(abs(value[0]), abs(given[one.name])):
             measure = CAR[one.name].unit
             unit = "" if measure == "1" else f" {measure}"

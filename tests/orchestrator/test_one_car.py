@@ -89,6 +89,8 @@ def test_values_that_contradict_each_other_are_named():
     assert name == "mass"
     assert sentence == "1900 kg contradicts sprung_mass + unsprung_mass = 1830 kg: leave one of them out"
     assert contradictions({"mass": 1831.0, "sprung_mass": 1650.0, "unsprung_mass": 180.0}) == []
+    by_axle = {"sprung_mass": 1650.0, "unsprung_mass_front": 90.0, "unsprung_mass_rear": 90.0}
+    assert [name for name, _ in contradictions({"mass": 1900.0, **by_axle})] == ["mass"]
 
 
 def test_a_car_that_weighs_nothing_gives_no_numbers():
