@@ -97,6 +97,9 @@ def trace_of(results: Results, label: str = "", mass: float | None = None) -> Tr
             signals[name] = values
     fmus = results.run.get("fmus", {})
     facts = {name: value for fmu in fmus.values() for name, value in _parameters(fmu).items()}
+    for role in ("driver", "plant"):  # of the test and of the car they know best
+        for unit in results.units_of_role(role):
+            facts |= _parameters(fmus.get(unit))
     told = [value for fmu in fmus.values() for name, value in _constants(fmu) if name.startswith("friction_")]
     mass = mass if mass is not None else _of_plant(results, "mass")
     return Trace(

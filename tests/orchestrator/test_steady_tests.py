@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from cmath import phase
 from math import atan2, exp, log, pi, sqrt
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from orchestrator.evaluation.step_response import evaluate_step
 from orchestrator.evaluation.trace import Trace, trace_of
 from orchestrator.evaluation.turn_response import evaluate_turn
 from orchestrator.evaluation.understeer import evaluate_understeer
+from orchestrator.results.read import Results
 from orchestrator.scenario.catalogue import SHIPPED
 from orchestrator.scenario.load import load_scenario
 from orchestrator.tyres.axle_stiffness import cornering_stiffness
@@ -201,3 +203,15 @@ def test_a_sweep_gives_the_frequency_response_of_an_oscillator(sampling):
     # |H| is 1 / sqrt(2) where x^2 - (2 - 4 d^2) x - 1 = 0, x = (f / f_0)^2
     assert judged["yaw_rate_bandwidth"] == pytest.approx(1.2 * sqrt((1 + sqrt(5)) / 2), abs=0.04)
     assert judged["yaw_rate_peak"] == pytest.approx(1 / (2 * damping * sqrt(1 - damping**2)), rel=0.02)
+
+
+def test_a_trace_takes_the_car_from_the_plant_and_the_test_from_the_driver():
+    fmus = {
+        "driver": {"name": "driver_ramp", "parameters": {"steering_ratio": 17.0, "mass": 1.0}},
+        "plant": {"name": "plant_two_dof", "parameters": {"mass": 1800.0}, "defaults": {"cg_height": 0.5}},
+        "observer": {"name": "estimator_observer", "parameters": {"mass": 1300.0, "cg_height": 0.6}},
+        "other": {"name": "monitor_redundancy", "parameters": {"steering_ratio": 1.0}},
+    }
+    trace = trace_of(Results(Path(), np.arange(2.0), {}, {"time": "s"}, {"fmus": fmus}))
+    assert trace.facts == {"steering_ratio": 17.0, "mass": 1800.0, "cg_height": 0.5}
+    assert trace.mass == 1800.0
