@@ -40,7 +40,7 @@ Place = Annotated[
 
 
 def list(what: Wanted = None, place: Place = None, fmus: Fmus = None) -> None:
-    """List runs, scenarios, fmus, vehicles, signals or metrics.
+    """List runs, scenarios, FMUs, vehicles, signals or metrics.
 
     Runs are shown with when they began, their scenario, what was changed, how they ended, and the largest
     sideslip, yaw rate and lateral acceleration.

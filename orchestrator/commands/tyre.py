@@ -42,8 +42,8 @@ def tyre(
 ) -> None:
     """Show what a tyre is like, by stepping its FMU.
 
-    Lateral force and aligning moment over slip angle and longitudinal force over slip at four loads, forces
-    in combined slip at five slip angles, stiffnesses and relaxation lengths over load; in one figure.
+    One figure: lateral force and aligning moment over slip angle and longitudinal force over slip at four
+    loads, forces in combined slip at five slip angles, stiffnesses and relaxation lengths over load.
     """
     from ..figures.style import save
     from ..tyres.stand import put_on_stand
