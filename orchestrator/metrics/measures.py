@@ -151,8 +151,12 @@ def time_beyond(t: np.ndarray, x: np.ndarray, x_rate: np.ndarray) -> float:
 
 
 def grip_use(t: np.ndarray, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> float:
-    """Return the root of the mean square of a tyre's force in the road's plane over its load."""
-    return math.sqrt(integral(t, (x**2 + y**2) / z**2) / float(t[-1] - t[0]))
+    """Return the root of the mean square of a tyre's force in the road's plane over its load.
+
+    A wheel in the air, which has neither, uses nothing.
+    """
+    used = np.divide(x**2 + y**2, z**2, out=np.zeros_like(z), where=(z != 0.0) | (x != 0.0) | (y != 0.0))
+    return math.sqrt(integral(t, used) / float(t[-1] - t[0]))
 
 
 def jerk(t: np.ndarray, x: np.ndarray) -> float:

@@ -123,6 +123,10 @@ def test_grip_use_is_the_tyres_force_over_its_load_and_the_worst_wheel_counts():
     assert (found.number, found.unit) == (pytest.approx(0.5), "1")
     assert evaluate(results(forces, T), metric("grip_use(tyre_force_x_*)")) is None
     assert evaluate(results(loads | forces, T), metric("grip_use(tyre_force_y_*)")) is None
+    in_the_air = {"plant.vertical_load_fl": 0 * T, "tyre.tyre_force_x_fl": 0 * T}
+    lifted = evaluate(results(loads | forces | in_the_air, T), metric("grip_use(tyre_force_x_*)"))
+    assert lifted is not None
+    assert lifted.number == pytest.approx(0.5)
 
 
 def test_the_path_is_compared_with_that_of_a_car_that_follows_its_reference():
