@@ -54,12 +54,14 @@ Fault = Annotated[
         metavar="'PLACE: KIND VALUE'",
         help="Let something go wrong, such as 'plant.yaw_rate -> sensor: freeze from 2 s until 3 s'; place: "
         "unit.output, unit.output -> unit or unit.input; kind: bias, gain, drift, noise, freeze, value, "
-        "dropout, outlier, delay, saturation, loss, stuck; none: not what the scenario has. Repeatable.",
+        "dropout, outlier, delay, saturation, loss, stuck; none takes away the scenario's own. Repeatable.",
     ),
 ]
 Fresh = Annotated[
     bool,
-    typer.Option("--fresh", "--again", help="Make all runs anew, those too that have been made already."),
+    typer.Option(
+        "--fresh", "--again", help="Make all runs anew, including those that have been made already."
+    ),
 ]
 Quick = Annotated[
     bool,
@@ -69,7 +71,7 @@ Quick = Annotated[
 ]
 NoRun = Annotated[
     bool,
-    typer.Option("--no-run", help="Run and build nothing: judge and draw what stands in the results folder."),
+    typer.Option("--no-run", help="Run and build nothing: judge and draw what is in the results folder."),
 ]
 Scheduler = Annotated[
     str | None,

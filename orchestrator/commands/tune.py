@@ -48,7 +48,7 @@ def tune(
     isolate: Isolate = False,
     call_limit: CallLimit = None,
 ) -> None:
-    """Seek the parameters that make an objective least.
+    """Seek the parameters that minimize an objective.
 
     Every law of the file has the same objective, search (differential evolution) and budget. Without
     --out, results go to results/<folder of the tuning file>/<its name>: report.html; trials.csv, one row per

@@ -30,7 +30,7 @@ Plants = Annotated[
     typer.Option(
         "--plant",
         metavar="FMU,FMU,...",
-        help="Plants; default: the one of most degrees of freedom that the file is enough for.",
+        help="Plants; default: the one with the most degrees of freedom that the file suffices for.",
     ),
 ]
 Tyre = Annotated[
