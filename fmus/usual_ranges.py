@@ -13,7 +13,7 @@ _RANGES = {
     "velocity_y": (-1.0, 1.0),
     "yaw_rate": (-0.4, 0.4),
     "yaw_rate_ref": (-0.4, 0.4),
-    "sideslip": (-0.05, 0.05),
+    "sideslip": (-0.15, 0.15),
     "sideslip_ref": (-0.05, 0.05),
     "sideslip_rate": (-0.3, 0.3),
     "sideslip_rate_ref": (-0.3, 0.3),
@@ -48,6 +48,11 @@ _RANGES = {
     "vertical_load_*": (1500.0, 4500.0),
     "wheel_speed_*": (45.0, 90.0),
     "wheel_velocity_*": (15.0, 30.0),
+    "brake_pressure_*": (0.0, 5e6),
+    "slope": (-0.1, 0.1),
+    "bank": (-0.1, 0.1),
+    "wind_force_y": (-1000.0, 1000.0),
+    "wind_moment_z": (-500.0, 500.0),
 }
 
 

@@ -159,12 +159,13 @@ def test_the_panels_stand_in_the_order_of_the_study(paper):
 
 
 def test_parameters_tell_their_source(paper):
-    rows = {row[0].text_content(): row for row in paper.tree.cssselect("table.parameters tbody tr")}
+    every = paper.tree.cssselect("table.parameters tbody tr")  # the vehicle's first, then those of units
+    rows = {row[0].text_content(): row for row in reversed(every)}
     assert rows["mass"][1].text_content() == "1820 kg"
     assert rows["mass"].cssselect(".kind.paper")
     assert rows["sideslip_moment"].cssselect(".kind.chosen")
     assert "varied" in texts(rows["rule_table"], ".kind")
-    assert rows["tyre.friction_*"][1].text_content() == "0.5"
+    assert rows["tyre.friction_*"][1].text_content() == "0.5, 0.4, 0.6"  # the study varies it
 
 
 def test_the_page_needs_nothing_from_elsewhere(paper):
@@ -257,14 +258,17 @@ def test_several_studies_make_one_page_with_an_overview(report, half):
     assert Path("results", first).is_file()
 
 
-def test_the_four_papers_are_found_and_their_order_is_theirs():
+def test_the_four_papers_are_found_in_their_order_and_what_goes_beyond_them_after():
     found = [path.relative_to(ROOT / "scenarios").as_posix() for path in found_studies(ROOT / "scenarios")]
     assert found == [
         "fnn_sideslip/study.yaml",
+        "fnn_sideslip/laws.yaml",
         "fuzzy_sliding_mode/study.yaml",
         "fuzzy_sliding_mode/distribution.yaml",
         "fuzzy_pid/study.yaml",
         "fuzzy_feedback/study.yaml",
+        "real_signals/latency.yaml",
+        "real_signals/closed_loop.yaml",
     ]
 
 
