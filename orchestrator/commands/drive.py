@@ -66,7 +66,8 @@ def drive(
 
     Sine with dwell: slowly increasing steer to both sides gives A, from which the amplitudes follow, left
     first and right first. Without --out, results go to results/<folder of the scenario>/<its name>_series.
-    An interrupted series goes on where it was; nothing that is finished is run again.
+    An interrupted series goes on where it was; nothing that is finished is run again. Of a car that rolls
+    over, what it has recorded until then is judged, as far as it goes.
     """
     import math
 
@@ -96,17 +97,20 @@ def drive(
     known = angle_of(angle)
     if known is None:
         found = experiment.slow_steer_jobs(once)
-        _make("slowly increasing steer", found, folder, jobs, fresh=fresh)
+        if status := _make("slowly increasing steer", found, folder, jobs, fresh=fresh):
+            raise typer.Exit(status)
         try:
             known = characteristic_angle(slow_steer_of(found))
         except NotJudged as why:
             raise ResultsError(str(why)) from None
     ladder = experiment.ladder(known, once)
     say(f"A = {math.degrees(known):.1f} degrees: {len(ladder)} runs")
-    _make("sine with dwell", ladder, folder, jobs, fresh=fresh)
+    status = _make("sine with dwell", ladder, folder, jobs, fresh=fresh)
     evaluated = [chosen.evaluate(trace, known) for trace in traces(ladder)]
     series = judge_series([one.judged for one in evaluated], known)
     conclude(chosen, evaluated, series, known, folder, each=figures)
+    if status:
+        raise typer.Exit(status)
 
 
 def _vehicle(given: str | None) -> tuple[Change, ...]:
@@ -136,11 +140,11 @@ def _vehicle(given: str | None) -> tuple[Change, ...]:
     return (Change("vehicle", str(places[given].resolve()), "--vehicle"),)
 
 
-def _make(title: str, jobs: Sequence[Job], folder: Path, workers: int | None, *, fresh: bool) -> None:
-    """Make the runs that are left.
+def _make(title: str, jobs: Sequence[Job], folder: Path, workers: int | None, *, fresh: bool) -> int:
+    """Make the runs that are left; return the exit status, not 0 if one of them failed.
 
     Raises:
-        typer.Exit: one of them failed, or Ctrl-C.
+        typer.Exit: Ctrl-C.
     """
     from ..experiments.execution import left_to_do
     from ..experiments.workers import execute
@@ -151,5 +155,4 @@ def _make(title: str, jobs: Sequence[Job], folder: Path, workers: int | None, *,
         say(f"{title}: {done} of {len(jobs)} runs finished before")
     with stoppable(folder), reported(title, len(left)) as told:
         outcomes = execute(left, workers=workers, done=told)
-    if status := max((one.exit_status for one in outcomes if not one.ok), default=0):
-        raise typer.Exit(status)
+    return max((one.exit_status for one in outcomes if not one.ok), default=0)

@@ -345,6 +345,16 @@ def test_a_series_is_driven_from_a_and_goes_on_where_it_was(tmp_path, capsys):
     assert again.out == first.out
 
 
+@pytest.mark.exhaustive
+def test_a_series_with_a_car_that_rolls_over_has_a_verdict(tmp_path, capsys):
+    high = ("--vehicle", "van", "--set", "plant.cg_height=1.1", "--set", "step_size=0.005")
+    assert call("drive", "sine-with-dwell", *high, "--angle", "200 deg", "--out", tmp_path) == 1
+    assert capsys.readouterr().err.count("the car has rolled over") == 2
+    found = json.loads((tmp_path / "evaluation.json").read_text())
+    assert found["series"]["verdict"] == "failed"
+    assert found["series"]["criteria"]["stability"]["verdict"] == "not judged"
+
+
 @pytest.mark.parametrize(
     "options, sentence",
     [
