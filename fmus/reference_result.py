@@ -22,7 +22,7 @@ from .usual_ranges import usual_range
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 STOP, STEP = 2.0, 0.02  # [s], chosen: every unit has moved by then; few enough rows for an archive
 DIGITS = 6
-"""Of the largest value of a column. Chosen: ten orders less than what mathematical libraries differ by."""
+"""Of the largest value of a column. Chosen: ten orders above what mathematical libraries differ by."""
 _LOWEST, _SPACING = 0.5, 0.07  # [Hz], chosen: between one and five periods within the run
 
 
@@ -51,18 +51,12 @@ def reference_result(fmu: Path) -> dict[str, str]:
     )
     settings = {"StartTime": 0.0, "StopTime": STOP, "StepSize": STEP, "RelTol": 10.0 ** (1 - DIGITS)}
     contents = {
-        f"{name}_in.csv": ("testcase", "text/csv", "Inputs, set before every step", _csv(inputs)),
-        f"{name}_ref.opt": (
-            "configuration",
-            "text/csv",
-            "Settings of the run, in s",
-            "".join(f"{key},{value:g}\n" for key, value in settings.items()),
-        ),
-        f"{name}_ref.csv": ("result", "text/csv", "Outputs after every step", _csv(result)),
+        f"{name}_in.csv": _csv(inputs),
+        f"{name}_ref.opt": "".join(f"{key},{value:g}\n" for key, value in settings.items()),
+        f"{name}_ref.csv": _csv(result),
+        "fmi-ls-manifest.xml": _manifest(name),
     }
-    manifest = _manifest([(file, *facts[:3]) for file, facts in contents.items()])
-    files = {"fmi-ls-manifest.xml": manifest} | {file: facts[3] for file, facts in contents.items()}
-    return {f"{FOLDER}/{file}": text for file, text in files.items()}
+    return {f"{FOLDER}/{file}": text for file, text in contents.items()}
 
 
 def _stimuli(names: list[str]) -> Any:
@@ -94,7 +88,7 @@ def _csv(table: Any) -> str:
     return text.getvalue()
 
 
-def _manifest(files: list[tuple[str, str, str, str]]) -> str:
+def _manifest(name: str) -> str:
     space = "http://fmi-standard.org/fmi-ls-manifest"
     ElementTree.register_namespace("fmi-ls", space)
     root = ElementTree.Element(
@@ -106,8 +100,12 @@ def _manifest(files: list[tuple[str, str, str, str]]) -> str:
             "included in an FMU.",
         },
     )
-    page = ("../../documentation/index.html", "document", "text/html", "Equations, variables, source")
-    for source, role, kind, text in [*files, page]:
+    for source, role, kind, text in (
+        (f"{name}_in.csv", "testcase", "text/csv", "Inputs, set before every step"),
+        (f"{name}_ref.opt", "configuration", "text/csv", "Settings of the run, in s"),
+        (f"{name}_ref.csv", "result", "text/csv", "Outputs after every step"),
+        ("../../documentation/index.html", "document", "text/html", "Equations, variables, source"),
+    ):
         ElementTree.SubElement(
             root, "Related", {"type": kind, "source": source, "role": role, "description": text}
         )

@@ -70,7 +70,7 @@ class PredictiveLaw:
         hessian = [[0.0] * n for _ in range(n)]
         linear = [[0.0, 0.0] for _ in range(n)]
         self.free_beta: Rows = []
-        self.forced_beta: Rows = []
+        rows = [[1.0 if i == j else 0.0 for j in range(n)] for i in range(n)]
         q_beta, q_r = w.beta_0**-2, w.r_0**-2
         for move in range(n):
             for _ in range(w.steps_per_move):
@@ -85,14 +85,12 @@ class PredictiveLaw:
                         linear[i][j] += beta_i * free[j][0] + r_i * free[j][1]
                 hessian[move][move] += 1.0
             self.free_beta.append([free[0][0], free[1][0]])
-            self.forced_beta.append([e[0] for e in forced])
+            rows.append([e[0] for e in forced])
         inverted = inverse(hessian)
         self.moment_0 = w.moment_0
         self.unbound = [
             [-sum(row[k] * linear[k][j] for k in range(n)) for j in range(2)] for row in inverted
         ]  # z = unbound e_0 where no constraint is met
-        rows = [[1.0 if i == j else 0.0 for j in range(n)] for i in range(n)]
-        rows += self.forced_beta
         rows += [[-value for value in row] for row in rows]  # upper bounds of all, then lower ones
         self.rows = rows
         self.reach = [[_dot(row, line) for row in inverted] for line in rows]

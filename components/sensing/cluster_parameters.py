@@ -61,8 +61,7 @@ def parameters_of(module: str, name: str, given: Given, *, common: Mapping[str, 
                 source,
                 minimum=least,
             )
-    types = {str: str, int: int, float: float, bool: bool}
-    made = [(field, types[type(how.default)], how) for field, how in fields.items()]
+    made = [(field, type(how.default), how) for field, how in fields.items()]
     return make_dataclass(name, made, frozen=True, namespace={"__module__": module})
 
 

@@ -92,6 +92,9 @@ def vehicle(
 
 def _tables(cars: list[Handling]) -> list[Table]:
     """Return the tables: a column for each plant."""
+    import math
+
+    from ..evaluation.slow_steer import G
     from ..evaluation.understeer import LEVELS
     from ..experiments.tables import Table
     from ..vehicles.handling import SPEEDS
@@ -99,7 +102,7 @@ def _tables(cars: list[Handling]) -> list[Table]:
     names = [car.plant.removeprefix("plant_") for car in cars]
     numbers = set(range(1, len(names) + 1))
     whole = Table("The car", ["", *names], numbers=numbers)
-    per_g = 9.80665 * 180.0 / 3.141592653589793
+    per_g = math.degrees(G)  # of rad s2/m
     for label, values in (
         ("load of a front wheel at rest", [_told(car.loads[0], 1e-3, "kN") for car in cars]),
         ("load of a rear wheel at rest", [_told(car.loads[2], 1e-3, "kN") for car in cars]),

@@ -23,6 +23,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..metrics.measures import running_integral
 from .dwell_signals import prepared
 from .filters import at, first_crossing, running_mean
 from .judgement import Judgement, NotJudged
@@ -152,14 +153,11 @@ def _second_peak(t: np.ndarray, r: np.ndarray, reversed_: float) -> float | None
 
 def _displacement(t: np.ndarray, a_y: np.ndarray, begin: float) -> np.ndarray:
     """Return the double integral of a_y from BOS on, by the trapezoidal rule."""
-    from scipy.integrate import cumulative_trapezoid
-
     late = t > begin
     times = np.concatenate([[begin], t[late]])
     a = np.concatenate([[at(t, a_y, begin)], a_y[late]])
-    v = cumulative_trapezoid(a, times, initial=0.0)
     found = np.zeros_like(t)
-    found[late] = cumulative_trapezoid(v, times, initial=0.0)[1:]
+    found[late] = running_integral(times, running_integral(times, a))[1:]
     return found
 
 

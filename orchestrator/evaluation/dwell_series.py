@@ -63,9 +63,7 @@ class Series:
         return {
             "A": self.angle,
             "verdict": self.verdict.value,
-            "criteria": {
-                name: {"verdict": one.verdict.value, "why": one.why} for name, one in self.rulings.items()
-            },
+            "criteria": {name: one.as_data() for name, one in self.rulings.items()},
         }
 
 

@@ -37,6 +37,13 @@ class Ruling:
     verdict: Verdict
     why: str
 
+    def as_data(self) -> dict[str, str]:
+        """Return it as plain data, for files."""
+        return {"verdict": self.verdict.value, "why": self.why}
+
+    def __str__(self) -> str:
+        return f"{self.verdict.value}. {self.why}"
+
 
 class NotJudged(Exception):
     """A run cannot be judged; the message says why."""
@@ -78,9 +85,7 @@ class Judgement:
                 key: {"name": one.name, "value": one.value, "unit": one.unit, "reading": one.reading}
                 for key, one in self.quantities.items()
             },
-            "criteria": {
-                name: {"verdict": one.verdict.value, "why": one.why} for name, one in self.rulings.items()
-            },
+            "criteria": {name: one.as_data() for name, one in self.rulings.items()},
             "notes": list(self.notes),
         }
 

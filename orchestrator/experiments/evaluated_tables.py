@@ -24,7 +24,7 @@ def _cell(quantity: Quantity | None) -> Cell:
 def run_table(judged: Judgement, title: str) -> Table:
     """Return a table of one run: a row per quantity and how the standard was read, its verdicts below."""
     rows: list[Sequence[Cell]] = [[one.name, _cell(one), one.reading] for one in judged.quantities.values()]
-    notes = [f"{name}: {one.verdict.value}. {one.why}" for name, one in judged.rulings.items()]
+    notes = [f"{name}: {one}" for name, one in judged.rulings.items()]
     return Table(f"{judged.label}: {title}", ["quantity", "value", "reading"], rows, notes + judged.notes)
 
 
@@ -39,7 +39,7 @@ def runs_table(runs: Sequence[Judgement], test: StandardTest, series: Series | N
         rows.append([run.label, *(_cell(run.quantities.get(key)) for key in keys), *words])
     notes = []
     if series:
-        notes += [f"{name}: {one.verdict.value}. {one.why}" for name, one in series.rulings.items()]
+        notes += [f"{name}: {one}" for name, one in series.rulings.items()]
         notes.append(f"A = {shown(series.angle, 'rad')}; the series has {series.verdict.value}.")
     notes += [f"{run.label}: {'; '.join(run.notes)}" for run in runs if run.notes]
     return Table(test.says, ["run", *(names[key] for key in keys), *criteria], rows, notes)

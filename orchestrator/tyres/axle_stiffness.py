@@ -19,10 +19,7 @@ def cornering_stiffness(tyres: Unit, loads: Mapping[str, float]) -> dict[str, fl
         SimulationError: the FMU failed.
         ValueError: it cannot be stepped beside the run.
     """
-    from .stand import (
-        Stand,
-        stiffnesses,
-    )  # needs numpy, which takes long to import and most plans do not want
+    from .stand import Stand, stiffnesses  # needs numpy, which most plans can do without
 
     if tyres.fmu.once_per_process:
         raise ValueError(f"{tyres.fmu.name} can be instantiated only once per process")

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ..errors import ModelDescriptionError, ScenarioError, WiringError
+from ..errors import ScenarioError, WiringError
 from ..fmu.opener import Opener
 from ..fmu.search import find_fmu, find_folder
 from ..master.simulate import simulate_in_memory
@@ -164,8 +164,5 @@ def fitting_plant(vehicle: Path, tyre: str, fmus: Path | None, opener: Opener) -
         except WiringError:
             continue
         return plant
-    try:
-        TestTrack(vehicle, PLANTS[-1], tyre, fmus=fmus, opener=opener).plan(steer, 20.0, STEP)
-    except (ModelDescriptionError, ScenarioError) as error:
-        raise error from None
+    TestTrack(vehicle, PLANTS[-1], tyre, fmus=fmus, opener=opener).plan(steer, 20.0, STEP)
     return PLANTS[-1]
