@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..figures.style import CHANGED, QUIET, RC, frame, line_style
+from ..figures.style import CHANGED, QUIET, frame, line_style, new_figure
 from .dwell_run import AT, FAR, FAR_HEAVY, HEAVY, RATIOS, DwellCourse, percent
 from .dwell_series import Series
 from .filters import at
@@ -25,13 +25,7 @@ RESPONSE = "responsiveness"
 
 def draw_dwell(trace: Trace, judged: Judgement, course: DwellCourse) -> Figure:
     """Return the figure of a run: hand wheel, yaw rate with its ratios, displacement, sideslip."""
-    import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context(RC):
-        figure = Figure(layout="constrained")
-        FigureCanvasAgg(figure)
+    with new_figure() as figure:
         names = ["hand wheel", "yaw rate", "displacement", *(["sideslip"] if "sideslip" in trace else [])]
         heights = [1.0, 1.7, 1.0, 1.0][: len(names)]
         panels = figure.subplots(len(names), 1, sharex=True, height_ratios=heights)
@@ -133,9 +127,6 @@ def _displaced(axes: Axes, course: DwellCourse, judged: Judgement, trace: Trace)
 
 def draw_series(series: Series, note: str) -> Figure:
     """Return the figure of a series: ratios and displacement over the amplitude, both directions."""
-    import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
     panels: list[tuple[str, str, float, float | None]]
@@ -144,9 +135,7 @@ def draw_series(series: Series, note: str) -> Figure:
     panels += [("displacement", f"Lateral displacement at BOS + {AT:g} s [m]", 1.0, None)]
     if any(run["sideslip"] is not None for run in series.runs):
         panels += [("sideslip", "Peak sideslip [°]", 180 / math.pi, None)]
-    with matplotlib.rc_context(RC):
-        figure = Figure(layout="constrained")
-        FigureCanvasAgg(figure)
+    with new_figure() as figure:
         grid = figure.subplots(2, 2, sharex=True, squeeze=False)
         for axes, (key, says, factor, limit) in zip(grid.flat, panels, strict=False):
             for k, side in enumerate((1.0, -1.0)):

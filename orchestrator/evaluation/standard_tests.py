@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # numpy and all that follows are loaded when a test is evaluated, not when it is named
@@ -33,10 +34,13 @@ class StandardTest:
     needs_angle: bool = False
 
 
-def _slow_steer(trace: Trace, _: float | None) -> Evaluated:
-    from .slow_steer import evaluate_slow_steer
+def _plain(module: str, function: str) -> Callable[[Trace, float | None], Evaluated]:
+    """Return what evaluates a run by a function of a module here, which needs no A and draws nothing."""
 
-    return Evaluated(trace, evaluate_slow_steer(trace))
+    def evaluate(trace: Trace, _: float | None) -> Evaluated:
+        return Evaluated(trace, getattr(import_module(f".{module}", __package__), function)(trace))
+
+    return evaluate
 
 
 def _dwell(trace: Trace, angle: float | None) -> Evaluated:
@@ -54,43 +58,13 @@ def _dwell(trace: Trace, angle: float | None) -> Evaluated:
     return Evaluated(trace, judged, draw)
 
 
-def _step(trace: Trace, _: float | None) -> Evaluated:
-    from .step_response import evaluate_step
-
-    return Evaluated(trace, evaluate_step(trace))
-
-
-def _understeer(trace: Trace, _: float | None) -> Evaluated:
-    from .understeer import evaluate_understeer
-
-    return Evaluated(trace, evaluate_understeer(trace))
-
-
-def _lane_change(trace: Trace, _: float | None) -> Evaluated:
-    from .lane_change_run import evaluate_lane_change
-
-    return Evaluated(trace, evaluate_lane_change(trace))
-
-
-def _turn(trace: Trace, _: float | None) -> Evaluated:
-    from .turn_response import evaluate_turn
-
-    return Evaluated(trace, evaluate_turn(trace))
-
-
-def _sweep(trace: Trace, _: float | None) -> Evaluated:
-    from .frequency_response import evaluate_sweep
-
-    return Evaluated(trace, evaluate_sweep(trace))
-
-
 TESTS: dict[str, StandardTest] = {
     test.name: test
     for test in (
         StandardTest(
             "slowly-increasing-steer",
             "the hand-wheel angle at 0.3 g, from which sine with dwell follows (UN R140, GTR 8)",
-            _slow_steer,
+            _plain("slow_steer", "evaluate_slow_steer"),
             ("angle", "slope", "spread", "speed"),
         ),
         StandardTest(
@@ -103,13 +77,13 @@ TESTS: dict[str, StandardTest] = {
         StandardTest(
             "step-steer",
             "gains, response times, overshoots of a step of the hand wheel (after ISO 7401)",
-            _step,
+            _plain("step_response", "evaluate_step"),
             ("yaw_rate_gain", "yaw_rate_response", "yaw_rate_overshoot", "acceleration_y_response", "t_beta"),
         ),
         StandardTest(
             "frequency-response",
             "gains and phases over frequency, from a sweep of the hand wheel (after ISO 7401)",
-            _sweep,
+            _plain("frequency_response", "evaluate_sweep"),
             (
                 "yaw_rate_gain_0.2",
                 "yaw_rate_peak",
@@ -121,19 +95,19 @@ TESTS: dict[str, StandardTest] = {
         StandardTest(
             "understeer-gradient",
             "extra steering per lateral acceleration, of a slow ramp or a constant radius (after ISO 4138)",
-            _understeer,
+            _plain("understeer", "evaluate_understeer"),
             ("gradient", "gradient_hand", "characteristic_speed", "gradient_4", "largest"),
         ),
         StandardTest(
             "turn-response",
             "what becomes of a steady turn when the car is braked (after ISO 7975) or lifted off (ISO 9816)",
-            _turn,
+            _plain("turn_response", "evaluate_turn"),
             ("deceleration", "yaw_ratio", "yaw_ratio_peak", "a_y_ratio", "sideslip", "sideslip_peak"),
         ),
         StandardTest(
             "lane-change",
             "a double lane change between cones, clean or not (ISO 3888)",
-            _lane_change,
+            _plain("lane_change_run", "evaluate_lane_change"),
             ("entry", "exit", "overrun", "sideslip", "acceleration", "hand"),
         ),
     )

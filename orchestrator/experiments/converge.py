@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import ResultsError, ScenarioError
-from ..figures.style import QUIET, RC, frame, line_style
+from ..figures.style import QUIET, frame, line_style, new_figure
 from ..metrics.run_metrics import Value
 from ..metrics.symbols import words
 from ..plan import Algorithm, Change
@@ -182,9 +182,6 @@ def convergence_figure(rows: Sequence[Row], signal: str, title: str, note: str) 
     Raises:
         ResultsError: no run has an error above zero.
     """
-    import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
     from matplotlib.ticker import LogLocator
 
@@ -195,9 +192,7 @@ def convergence_figure(rows: Sequence[Row], signal: str, title: str, note: str) 
     styles = {
         name: {**line_style(k), "marker": "os^"[k % 3], "markersize": 5} for k, name in enumerate(names)
     }
-    with matplotlib.rc_context(RC):
-        figure = Figure(layout="constrained")
-        FigureCanvasAgg(figure)
+    with new_figure() as figure:
         by_step, by_cost = figure.subplots(1, 2, sharey=True)
         for name in names:
             mine = [row for row in drawn if row.algorithm == name]

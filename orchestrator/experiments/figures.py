@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ResultsError
 from ..figures.panels import Run
 from ..figures.plots import draw
-from ..figures.style import RC, ROW, frame, literal, save
+from ..figures.style import ROW, frame, literal, new_figure, save
 from ..titles import changed
 from .drawing import Drawing
 from .experiment import FIGURES
@@ -79,18 +79,12 @@ def draw_over_axes(findings: Findings, spec: FigureSpec) -> Figure:
     Raises:
         ResultsError: there is nothing to draw.
     """
-    import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     drawing = KINDS[spec.kind](findings, spec)
     panels = drawing.panels()
     columns = min(len(panels), PANELS_IN_A_ROW)
     rows = math.ceil(len(panels) / columns)
     height = rows * (1.7 if columns == 1 else 1.4) * ROW
-    with matplotlib.rc_context(RC):
-        figure = Figure(layout="constrained")
-        FigureCanvasAgg(figure)
+    with new_figure() as figure:
         grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
         drawn = list(grid.flat[: len(panels)])
         for axes in grid.flat[len(panels) :]:

@@ -208,17 +208,12 @@ def columns_of(found: Sequence[Tuned]) -> list[Column]:
 
 def history_figure(experiment: Experiment, found: Sequence[Tuned], note: str) -> Figure:
     """Return the least objective so far over the number of trials, a line per law."""
-    import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
     from ..figures.display import shown_unit
-    from ..figures.style import RC, frame, line_style
+    from ..figures.style import frame, line_style, new_figure
 
-    with matplotlib.rc_context(RC):
-        figure = Figure(layout="constrained")
-        FigureCanvasAgg(figure)
+    with new_figure() as figure:
         axes = figure.subplots()
         spec = experiment.spec.derived[tuning_of(experiment).objective]
         unit, factor = shown_unit(spec.unit)

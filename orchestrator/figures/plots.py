@@ -15,7 +15,7 @@ from ..titles import changed_each, changes_in
 from .display import digits_of
 from .panels import Panel, Run, shown_by
 from .spans import FAULTY, in_legend, spans_of
-from .style import RC, REFERENCE, ROW, frame, line_style, reference_words
+from .style import REFERENCE, ROW, frame, line_style, new_figure, reference_words
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -55,10 +55,6 @@ def draw(
     Raises:
         ResultsError: there is nothing to draw.
     """
-    import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     if early := [run for run in runs if run.results.time.size < 2]:
         raise ResultsError(nothing_recorded(early[0]))
     found = shown_by(runs, panels)
@@ -66,9 +62,7 @@ def draw(
         where = ", ".join(str(run.results.folder) for run in runs)
         raise ResultsError(f"{where}: nothing to draw, no run recorded any of {', '.join(panels)}.")
     rows = _rows(found)
-    with matplotlib.rc_context(RC):
-        figure = Figure(layout="constrained")
-        FigureCanvasAgg(figure)
+    with new_figure() as figure:
         heights = [max(panel.rows for panel in row) for row in rows]
         grid = figure.add_gridspec(len(rows), 2, height_ratios=heights)
         first: dict[str, Axes] = {}

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..results.read import Results
+from ..titles import fault_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,7 +35,7 @@ def spans_of(runs: Sequence[tuple[str, Results]]) -> list[Span]:
             span = Span(
                 float(first if begin is None else max(begin, first)),
                 float(last if end is None else min(end, last)),
-                f"{fault.get('on')}: {fault.get('fault')}",
+                fault_in(fault),
             )
             if span.begin < span.end:
                 found.setdefault(span, []).append(label)

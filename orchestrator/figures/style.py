@@ -6,7 +6,8 @@ import io
 import math
 import textwrap
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,6 +71,19 @@ NOTE_WIDTH = 72
 def line_style(number: int) -> dict[str, Any]:
     """Return the style of the run of that number, counted from 0; they repeat after the last."""
     return dict(LINES[number % len(LINES)])
+
+
+@contextmanager
+def new_figure() -> Iterator[Figure]:
+    """Give an empty figure; what is drawn within the context has the look of all figures."""
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(RC):
+        figure = Figure(layout="constrained")
+        FigureCanvasAgg(figure)
+        yield figure
 
 
 def save(figure: Figure, stem: Path) -> list[Path]:

@@ -30,7 +30,7 @@ from ..metrics.run_metrics import metric
 from ..plan import Plan
 from ..results.read import Results
 from ..scenario.load import Scenario, load_scenario
-from ..titles import changed
+from ..titles import changed, fault_in
 from ..wording import counted
 from .diagram import diagrams
 from .facts import anchor, animation_of, figure_of, fmus_of, programs_of
@@ -232,7 +232,7 @@ def settings(findings: Findings) -> Table:
 def _faults(results: Results | None) -> str | None:
     """Return the faults of a run in words, None if it had none."""
     had = results.run.get("faults", []) if results else []
-    return "; ".join(f"{one.get('on')}: {one.get('fault')}" for one in had) or None
+    return "; ".join(map(fault_in, had)) or None
 
 
 def grid_of_times(runs: Iterable[Plan | Results]) -> list[str]:

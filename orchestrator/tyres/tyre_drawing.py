@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..figures.style import QUIET, RC, ROW, frame, line_style
+from ..figures.style import QUIET, ROW, frame, line_style, new_figure
 from .stand import Stand, State, stiffnesses
 
 if TYPE_CHECKING:
@@ -29,10 +29,6 @@ def draw_tyre(stand: Stand, title: str, note: str) -> Figure:
     Raises:
         SimulationError: the FMU failed.
     """
-    import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     nominal = stand.nominal_load
     loads = [share * nominal for share in OF_NOMINAL]
     angles = np.linspace(-LARGEST_ANGLE, LARGEST_ANGLE, POINTS)
@@ -40,9 +36,7 @@ def draw_tyre(stand: Stand, title: str, note: str) -> Figure:
     around = np.sort(
         np.concatenate([-np.geomspace(1e-3, 0.98, POINTS), [0.0], np.geomspace(1e-3, 0.95, POINTS)])
     )
-    with matplotlib.rc_context(RC):
-        figure = Figure(layout="constrained")
-        FigureCanvasAgg(figure)
+    with new_figure() as figure:
         grid = figure.add_gridspec(3, 2)
         axes = [figure.add_subplot(grid[i // 2, i % 2]) for i in range(6)]
         over_angle = [stand.measure([State(alpha, 0.0, load) for alpha in angles]) for load in loads]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..figures.style import QUIET, RC, ROW, frame, line_style
+from ..figures.style import QUIET, ROW, frame, line_style, new_figure
 from .handling import Handling
 
 if TYPE_CHECKING:
@@ -17,13 +17,7 @@ if TYPE_CHECKING:
 
 def draw_cars(cars: Sequence[Handling], title: str, note: str) -> Figure:
     """Return the figure of a car on some plants."""
-    import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context(RC):
-        figure = Figure(layout="constrained")
-        FigureCanvasAgg(figure)
+    with new_figure() as figure:
         axes = list(figure.subplots(2, 2).flat)
         for number, car in enumerate(cars):
             style = line_style(number)
