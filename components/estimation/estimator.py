@@ -23,16 +23,14 @@ believes is not the road. Connect `friction` to who has to know it by wheel.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import atan2
 
 from vocabulary.wheels import wheels
 
 from ..cars.load_transfer import quasi_static_loads
-from ..cars.published_cars import PaperB
 from ..cars.wheel_kinematics import slip_angle, slip_ratio, wheel_velocities
 from ..fmi.component import Component
-from ..fmi.variables import like, output, parameter
+from ..fmi.variables import output
 from .reference_speed import ReferenceSpeed
 from .zero_points import ZeroPoints
 
@@ -43,59 +41,6 @@ NAMES = (
 )
 OUTPUTS = tuple(output(name, *INPUTS[:-1], *wheels("wheel_speed_*")) for name in NAMES)
 """What every estimator gives, all of it following all inputs at once."""
-
-
-@dataclass(frozen=True)
-class EstimatorParameters:
-    """Of the car, as a control unit knows it, and of what all estimators do."""
-
-    mass: float = like(PaperB, "mass")
-    cg_to_front_axle: float = like(PaperB, "cg_to_front_axle")
-    cg_to_rear_axle: float = like(PaperB, "cg_to_rear_axle")
-    track_width: float = like(PaperB, "track_width")
-    cg_height: float = like(PaperB, "cg_height")
-    wheel_radius: float = like(PaperB, "wheel_radius")
-    roll_at_1_g: float = parameter(
-        0.0, "rad", "Roll angle phi_g of the body at 1 g", "chosen: a car that does not roll", minimum=0.0
-    )
-    slip_stiffness_per_load: float = parameter(
-        20.0,
-        "1",
-        "Slip stiffness c over load of the tyres",
-        "chosen: between dry tyres of 15 and 25",
-        minimum=1.0,
-    )
-    signal_delay: float = parameter(
-        0.02,
-        "s",
-        "Age of what the inertial sensors say",
-        "chosen: 10 ms of a message and its latency, 10 ms of a low pass of 21 Hz",
-        minimum=0.0,
-    )
-    speed_gain: float = parameter(
-        10.0, "1/s", "How fast the speed follows wheels that are believed", "chosen: 0.1 s", minimum=0.0
-    )
-    speed_doubt: float = parameter(
-        0.5, "m/s", "Difference s from which on a wheel is doubted", "chosen: 2 % of 90 km/h", minimum=0.01
-    )
-    straight_steer_angle: float = parameter(
-        0.003, "rad", "Straight ahead: largest steer angle", "chosen: 3 deg at the hand wheel", minimum=0.0
-    )
-    straight_yaw_rate: float = parameter(
-        0.01, "rad/s", "Straight ahead: largest yaw rate", "chosen: six times the gyro's noise", minimum=0.0
-    )
-    straight_time: float = parameter(
-        0.3, "s", "Straight ahead: since when at least", "chosen: a yaw motion has died away", minimum=0.0
-    )
-    zero_point_memory: float = parameter(
-        5.0, "s", "Memory of the zero points", "chosen: beyond the noise, before temperature", minimum=0.1
-    )
-    zero_point_limit_yaw_rate: float = parameter(
-        0.01, "rad/s", "Largest zero point of the gyro", "chosen: twice 0.3 deg/s", minimum=0.0
-    )
-    zero_point_limit_acceleration: float = parameter(
-        0.7, "m/s2", "Largest zero point of a_y", "chosen: 0.2 m/s2 and a bank of 3 deg", minimum=0.0
-    )
 
 
 class Estimator(Component):

@@ -21,29 +21,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import cos, sin
-from typing import Protocol
 
 from ..mathematics.gravity import G
-
-
-class SpeedTuning(Protocol):
-    """What equations (2) and (3) need to know."""
-
-    @property
-    def cg_to_front_axle(self) -> float: ...
-    @property
-    def cg_to_rear_axle(self) -> float: ...
-    @property
-    def track_width(self) -> float: ...
-    @property
-    def wheel_radius(self) -> float: ...
-    @property
-    def slip_stiffness_per_load(self) -> float: ...
-    @property
-    def speed_gain(self) -> float: ...
-    @property
-    def speed_doubt(self) -> float: ...
-
+from .estimator_parameters import EstimatorParameters
 
 ROLLING = 0.3
 """v_y / v_x from which on no wheel rolls freely any more; chosen: 17 degrees, beyond any tyre's peak."""
@@ -52,7 +32,7 @@ DOUBTED = 0.4
 
 
 def wheel_speeds_at_centre(
-    spins: Sequence[float], *, r: float, v_y: float, delta: float, a_x: float, p: SpeedTuning
+    spins: Sequence[float], *, r: float, v_y: float, delta: float, a_x: float, p: EstimatorParameters
 ) -> list[float]:
     """Return v_x [m/s] as each of fl, fr, rl, rr has it; equation (2).
 
@@ -96,7 +76,7 @@ def shared(a_x: float, rate: float) -> float:
 class ReferenceSpeed:
     """v_x [m/s], begun from the wheels."""
 
-    def __init__(self, spins: Sequence[float], p: SpeedTuning) -> None:
+    def __init__(self, spins: Sequence[float], p: EstimatorParameters) -> None:
         self.p = p
         self.v = sum(spins) / 4.0 * p.wheel_radius
         self.rate = 0.0

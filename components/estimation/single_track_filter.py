@@ -23,61 +23,65 @@ observed together, H. F. Grip et al., Vehicle sideslip estimation, IEEE Control 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import atan2, cos
-from typing import Protocol
 
+from ..fmi.variables import parameter
 from ..mathematics.gravity import G
 from .dugoff_axle import axle_force
+from .estimator_parameters import EstimatorParameters
+from .zero_points import faded
 
 SLOWEST = 2.0
 """Speed [m/s] below which slip angles are taken at this speed; chosen: walking pace."""
 SMALLEST = 0.05
 """Least friction [1]; chosen: wet ice."""
+_TUNED = "chosen: on runs of four cars, see docs/estimators.md"
 
 
-class FilterTuning(Protocol):
-    """The car and how far model, measurement and friction are trusted."""
+@dataclass(frozen=True)
+class FilterParameters(EstimatorParameters):
+    """How far model, measurement and friction are trusted."""
 
-    @property
-    def mass(self) -> float: ...
-    @property
-    def cg_to_front_axle(self) -> float: ...
-    @property
-    def cg_to_rear_axle(self) -> float: ...
-    @property
-    def cg_height(self) -> float: ...
-    @property
-    def cornering_stiffness_front(self) -> float: ...
-    @property
-    def cornering_stiffness_rear(self) -> float: ...
-    @property
-    def initial_friction(self) -> float: ...
-    @property
-    def initial_friction_deviation(self) -> float: ...
-    @property
-    def largest_friction(self) -> float: ...
-    @property
-    def friction_memory(self) -> float: ...
-    @property
-    def used_share(self) -> float: ...
-    @property
-    def measured_share(self) -> float: ...
-    @property
-    def velocity_wander(self) -> float: ...
-    @property
-    def friction_wander(self) -> float: ...
-    @property
-    def acceleration_deviation(self) -> float: ...
-    @property
-    def straight_time(self) -> float: ...
-    @property
-    def straight_fade(self) -> float: ...
+    cornering_stiffness_front: float = parameter(
+        91600.0, "N/rad", "Stiffness C_f of the front axle", "chosen: that of the tyres of set 1", minimum=1.0
+    )
+    cornering_stiffness_rear: float = parameter(
+        67800.0, "N/rad", "Stiffness C_r of the rear axle", "chosen: that of the tyres of set 1", minimum=1.0
+    )
+    initial_friction: float = parameter(
+        0.6, "1", "Friction to begin with", "chosen: low, since upwards is learned at once", minimum=0.05
+    )
+    initial_friction_deviation: float = parameter(
+        0.3, "1", "How far that may be wrong", "chosen: from ice to dry roads within two of it", minimum=0.0
+    )
+    largest_friction: float = parameter(
+        1.2, "1", "Largest friction that is believed", "chosen: beyond tyres of cars", minimum=0.1
+    )
+    friction_memory: float = parameter(
+        2.0, "s", "Time after which a used friction is forgotten", "chosen: a lane change", minimum=0.01
+    )
+    used_share: float = parameter(
+        0.95, "1", "Friction is at least this part of what is used", "chosen: for noise in a_y", minimum=0.0
+    )
+    measured_share: float = parameter(
+        0.5, "1", "Share of the measured a_y in the prediction", _TUNED, minimum=0.0, maximum=1.0
+    )
+    velocity_wander: float = parameter(
+        0.2, "m/s2", "Random walk of v_y, m/s per root of a second", _TUNED, minimum=0.0
+    )
+    friction_wander: float = parameter(
+        0.5, "1", "Random walk of friction, per root of a second", _TUNED, minimum=0.0
+    )
+    acceleration_deviation: float = parameter(
+        0.5, "m/s2", "How far the model's a_y is from the measured one", _TUNED, minimum=0.001
+    )
 
 
 class SingleTrackFilter:
     """v_y [m/s] and its rate [m/s2], mu [1], begun straight ahead."""
 
-    def __init__(self, p: FilterTuning) -> None:
+    def __init__(self, p: FilterParameters) -> None:
         self.p = p
         self.v_y = self.rate = 0.0
         self.mu = p.initial_friction
@@ -134,5 +138,4 @@ class SingleTrackFilter:
         self.p_m = p_m - to_m * to_m / spread
         self.used = max(self.used * (1.0 - min(h / p.friction_memory, 1.0)), abs(a_y) / G)
         self.mu = min(max(self.mu, p.used_share * self.used, SMALLEST), p.largest_friction)
-        if straight > p.straight_time:
-            self.v_y *= 1.0 - min(h / p.straight_fade, 1.0)
+        self.v_y = faded(self.v_y, h, straight, p)

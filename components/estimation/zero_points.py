@@ -11,30 +11,13 @@ does not have more.
 
 from __future__ import annotations
 
-from typing import Protocol
-
-
-class ZeroTuning(Protocol):
-    """When a car is taken to go straight ahead, and for how long that counts."""
-
-    @property
-    def straight_steer_angle(self) -> float: ...
-    @property
-    def straight_yaw_rate(self) -> float: ...
-    @property
-    def straight_time(self) -> float: ...
-    @property
-    def zero_point_memory(self) -> float: ...
-    @property
-    def zero_point_limit_yaw_rate(self) -> float: ...
-    @property
-    def zero_point_limit_acceleration(self) -> float: ...
+from .estimator_parameters import EstimatorParameters
 
 
 class ZeroPoints:
     """Zero points of yaw rate [rad/s] and lateral acceleration [m/s2], and the time straight ahead [s]."""
 
-    def __init__(self, p: ZeroTuning) -> None:
+    def __init__(self, p: EstimatorParameters) -> None:
         self.p = p
         self.yaw_rate = self.acceleration = 0.0
         self.messages = 0
@@ -56,3 +39,8 @@ class ZeroPoints:
         most, most_a = p.zero_point_limit_yaw_rate, p.zero_point_limit_acceleration
         self.yaw_rate = min(max(self.yaw_rate, -most), most)
         self.acceleration = min(max(self.acceleration, -most_a), most_a)
+
+
+def faded(v_y: float, h: float, straight: float, p: EstimatorParameters) -> float:
+    """Return v_y [m/s] `h` [s] later, where it fades because the car has gone straight ahead for long [s]."""
+    return v_y * (1.0 - min(h / p.straight_fade, 1.0)) if straight > p.straight_time else v_y

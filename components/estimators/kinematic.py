@@ -15,7 +15,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..estimation.estimator import Estimator, EstimatorParameters
+from ..estimation.estimator import Estimator
+from ..estimation.estimator_parameters import EstimatorParameters
+from ..estimation.zero_points import faded
 from ..fmi.variables import parameter
 
 
@@ -25,9 +27,6 @@ class KinematicParameters(EstimatorParameters):
 
     washout: float = parameter(
         2.0, "s", "Time constant of the washout", "chosen: a lane change is shorter", minimum=0.05
-    )
-    straight_fade: float = parameter(
-        0.1, "s", "Time constant with which v_y fades straight ahead", "chosen: fast", minimum=0.001
     )
 
 
@@ -41,7 +40,4 @@ class Kinematic(Estimator):
     ) -> tuple[float, float]:
         p = self.p
         rate = a_y - self.speed.v * r - self.v_y / p.washout
-        v_y = self.v_y + h * rate
-        if straight > p.straight_time:
-            v_y *= 1.0 - min(h / p.straight_fade, 1.0)
-        return v_y, rate
+        return faded(self.v_y + h * rate, h, straight, p), rate
