@@ -166,6 +166,23 @@ class Series:
         return self.at(np.array([time])).tolist()[0]
 
 
+class ValueOrigin(NamedTuple):
+    """Where the value of a parameter or constant comes from."""
+
+    kind: (
+        str  # "default" (of the FMU), "vehicle", "derived", "scenario", "file", or that of a change: "--set"
+    )
+    detail: str = ""  # of what is derived from the vehicle file its formula, of a file its name
+
+    def __str__(self) -> str:
+        if self.kind == "file":
+            return self.detail
+        return f"{self.kind}: {self.detail}" if self.detail else self.kind
+
+
+DEFAULT = ValueOrigin("default")
+
+
 @dataclass(frozen=True)
 class Unit:
     """One instance of an FMU in a scenario."""
@@ -175,9 +192,8 @@ class Unit:
     period: int  # in communication steps
     parameters: dict[str, Value]
     constants: dict[str, Value]  # inputs that no unit drives; of those with a series, the first value
-    origins: dict[str, str] = field(default_factory=dict)
-    """Parameter or constant -> where its value comes from: "default" (the FMU), "vehicle", "scenario", or the
-    origin of the change that gave it."""
+    origins: dict[str, ValueOrigin] = field(default_factory=dict)
+    """Parameter or constant -> where its value comes from."""
     tolerance: float | None = None
     """Relative, of the FMU's own solver; None: that of its default experiment, if it has one."""
     series: dict[str, Series] = field(default_factory=dict)

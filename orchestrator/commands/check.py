@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..plan import OF_RUN
+from ..plan import DEFAULT, OF_RUN, ValueOrigin
 from ..wording import cut, printable
 from .batch import say
 from .options import Fault, Fmus, NoBuild, NoValidate, ScenarioFile, Set, Swap
@@ -142,14 +142,14 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
     ]
     files = plan.scenario.get("tyre_files", {})
     for axle, file in files.items():
-        name = Path(file["file"]).name
+        by_file = ValueOrigin("file", Path(file["file"]).name)
         takes = [
             unit.name
             for unit in plan.units
-            if any(n.endswith(f"_{axle}") and origin == name for n, origin in unit.origins.items())
+            if any(n.endswith(f"_{axle}") and origin == by_file for n, origin in unit.origins.items())
         ]
-        rows.append((f"tyres, {axle}", f"{file['kind']}, {file['side']}", name, ", ".join(takes)))
-    in_files = {Path(file["file"]).name for file in files.values()}
+        rows.append((f"tyres, {axle}", f"{file['kind']}, {file['side']}", str(by_file), ", ".join(takes)))
+    of_tyres = {ValueOrigin("file", Path(file["file"]).name) for file in files.values()}
     takers: dict[tuple[str, str, str], list[str]] = {}
     sources: dict[tuple[str, str, str], str] = {}
     hidden = 0
@@ -158,8 +158,9 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
         alike: dict[tuple[str, str], list[str]] = {}
         constants = {name: value for name, value in unit.constants.items() if name not in unit.series}
         for name, value in {**own, **constants}.items():
-            origin = unit.origins.get(name, "default").partition(":")[0]
-            if not defaults and (origin in in_files or (origin == "default" and not _matters(unit, name))):
+            source = unit.origins.get(name, DEFAULT)
+            origin = source.detail if source.kind == "file" else source.kind
+            if not defaults and (source in of_tyres or (source == DEFAULT and not _matters(unit, name))):
                 hidden += 1
             else:
                 alike.setdefault((_shown(value, unit.fmu.variables[name].unit), origin), []).append(name)
@@ -172,19 +173,17 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
     for unit in plan.units:
         for name, series in unit.series.items():
             how = "held" if series.held else "linear"
-            rows.append((name, f"{series.file}: {series.column}, {how}", unit.origins[name], unit.name))
+            rows.append((name, f"{series.file}: {series.column}, {how}", str(unit.origins[name]), unit.name))
     return rows, hidden
 
 
 def _derived(plan: Plan) -> Iterable[Sequence[str]]:
     """Return what was derived of the car, each with its formula."""
-    from ..wiring.parameters import DERIVED
-
     takers: dict[tuple[str, str], list[str]] = {}
     for unit in plan.units:
         for name, origin in unit.origins.items():
-            if origin.startswith(DERIVED):
-                takers.setdefault((name, origin.removeprefix(DERIVED)), []).append(unit.name)
+            if origin.kind == "derived":
+                takers.setdefault((name, origin.detail), []).append(unit.name)
     return [(*key, ", ".join(units)) for key, units in takers.items()]
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from ..errors import ScenarioError
 from ..metrics.run_metrics import Value
-from ..plan import OF_RUN, TYRES, Change, Plan, Unit, Variable
+from ..plan import DEFAULT, OF_RUN, TYRES, Change, Plan, Unit, Variable
 from ..plan import Value as Given
 from ..wiring.shared_facts import FACTS
 from ..wording import hint, listed
@@ -75,7 +75,7 @@ def _names(holder: str, name: str, unit: Unit, variable: Variable) -> bool:
     if holder == "inputs":
         names = (variable.name, f"{unit.name}.{variable.name}")
         return variable.name in unit.constants and any(fnmatchcase(one, name) for one in names)
-    from_vehicle = holder == "vehicle" and unit.origins.get(variable.name) == "vehicle"
+    from_vehicle = holder == "vehicle" and unit.origins.get(variable.name, DEFAULT).kind == "vehicle"
     return (
         variable.name == name and variable.causality == "parameter" and (from_vehicle or holder == unit.name)
     )

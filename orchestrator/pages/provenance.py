@@ -14,10 +14,9 @@ from pathlib import Path
 
 from vocabulary.wheels import WHEEL_NAMES, WHEELS
 
-from ..plan import Plan, Unit, Value
+from ..plan import DEFAULT, Plan, Unit, Value
 from ..scenario.load import Scenario
 from ..scenario.yaml_lines import Document, Key
-from ..wiring.parameters import DERIVED
 from ..wiring.shared_facts import facts_of
 from ..wording import fold
 
@@ -155,11 +154,11 @@ def _constant(
         meaning = meaning.removesuffix(f", {WHEEL_NAMES[WHEELS[0]]}")
     said: Origin | None = None
     given = [pattern for pattern in scenario.inputs if _names(pattern, unit.name, first)]
-    origin = unit.origins.get(first, "default")
-    if origin == "scenario":
+    origin = unit.origins.get(first, DEFAULT)
+    if origin.kind == "scenario":
         by_name: Key = ("inputs", max(given, key=lambda one: ("*" not in one, "." in one))) if given else ()
         said = _said(scenario, by_name or (_fact(scenario, first),), comments)
-    elif origin != "default":
+    elif origin != DEFAULT:
         said = VARIED_BY_STUDY
     row = group.parameters.setdefault(
         f"{unit.name}.{name}", Parameter(f"{unit.name}.{name}", meaning, variable.unit or "", default)
@@ -176,22 +175,23 @@ def _names(pattern: str, unit: str, name: str) -> bool:
 
 def _origin(scenario: Scenario, unit: Unit, name: str, comments: _Comments) -> Origin | None:
     """Return where a value comes from if the scenario or the vehicle gives it, None if the FMU does."""
-    origin = unit.origins.get(name, "default")
-    if origin == "default":
+    origin = unit.origins.get(name, DEFAULT)
+    if origin == DEFAULT:
         return None
-    if origin == "vehicle":
+    if origin.kind == "vehicle":
         measure = unit.fmu.variables[name].unit or "1"
         words = comments.beside(scenario.vehicle_document, ("parameters", name))
         words = re.sub(rf"^{re.escape(measure)}(?![\w/.])[,;]?\s*", "", words)
         return said_in(words, scenario._vehicle.source)
-    if origin.startswith(DERIVED):
-        return Origin(NEUTRAL, origin)
-    if origin == "scenario":
+    if origin.kind == "derived":
+        return Origin(NEUTRAL, str(origin))
+    if origin.kind == "scenario":
         own = name in scenario.units[unit.name].parameters
         key: Key = ("units", unit.name, "parameters", name) if own else (_fact(scenario, name),)
         return _said(scenario, key, comments)
-    if any(origin == file.path.name for file in scenario.tyre_files.values()):
-        return Origin(LITERATURE, f"tyre property file {origin}")
+    if origin.kind == "file":
+        of_tyres = any(origin.detail == file.path.name for file in scenario.tyre_files.values())
+        return Origin(LITERATURE, f"{'tyre property ' if of_tyres else ''}file {origin}")
     return VARIED_BY_STUDY
 
 

@@ -11,7 +11,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from ..plan import Plan, Series, Unit, Wire
+from ..plan import DEFAULT, Plan, Series, Unit, Wire
 from ..sources import OF_RESULTS, sources_hash
 
 PROGRAMS = ("yawbench", "fmpy", "pythonfmu", "numpy")
@@ -90,7 +90,7 @@ def _fmu(unit: Unit, plan: Plan) -> dict[str, Any]:
         "step_size": float(unit.period * plan.step),
         "tolerance": unit.tolerance or fmu.tolerance,
         "parameters": dict(unit.parameters),
-        "origins": {name: origin for name, origin in unit.origins.items() if origin != "default"},
+        "origins": {name: str(origin) for name, origin in unit.origins.items() if origin != DEFAULT},
         # what the FMU has for the others
         "defaults": {v.name: v.start for v in fmu.of("parameter") if v.name not in unit.parameters},
         "constants": {name: value for name, value in unit.constants.items() if name not in unit.series},

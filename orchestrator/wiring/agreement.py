@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from vocabulary.vehicle import CAR
 
-from ..plan import Finding, Unit, Value, Variable
+from ..plan import DEFAULT, Finding, Unit, Value, Variable
 from ..scenario.load import Scenario
 from ..wording import fold, listed
 from .parameters import STIFFNESSES
@@ -17,7 +17,7 @@ from .shared_facts import FACTS
 
 OF_CAR = (*(name for name, one in CAR.items() if one.needed), *STIFFNESSES, "steering_ratio")
 """Parameters that describe the car, whichever unit has to know them."""
-OF_FILES = ("default", "vehicle", "derived", "scenario")
+OF_FILES = ("default", "vehicle", "derived", "scenario", "file")
 """Origins of values that no change has given."""
 SAME = 1e-9
 """Relative difference of values that count as equal: rounding of a conversion."""
@@ -36,7 +36,7 @@ class Told(NamedTuple):
     unit: str
     name: str
     value: Value
-    origin: str
+    origin: str  # its kind
     variable: Variable
 
 
@@ -120,7 +120,7 @@ def _parameters(units: Iterable[Unit]) -> Iterator[Told]:
         for variable in unit.fmu.of("parameter"):
             value = unit.parameters.get(variable.name, variable.start)
             if value is not None:
-                origin = unit.origins.get(variable.name, "default")
+                origin = unit.origins.get(variable.name, DEFAULT).kind
                 yield Told(unit.name, variable.name, value, origin, variable)
 
 
@@ -128,20 +128,19 @@ def _constants(units: Iterable[Unit]) -> Iterator[Told]:
     for unit in units:
         for name, value in unit.constants.items():
             if name not in unit.series:
-                origin = unit.origins.get(name, "default")
+                origin = unit.origins.get(name, DEFAULT).kind
                 yield Told(unit.name, name, value, origin, unit.fmu.variables[name])
 
 
 def _finding(name: str, told: list[Told], way_out: str) -> Finding:
     alike: dict[tuple[float, str], list[Told]] = {}
     for one in told:
-        origin = one.origin.partition(":")[0]
-        alike.setdefault((float(one.value), origin), []).append(one)  # type: ignore[arg-type]
+        alike.setdefault((float(one.value), one.origin), []).append(one)  # type: ignore[arg-type]
     parts = []
     for (value, origin), some in alike.items():
         names = fold([f"{one.unit}.{one.name}" for one in some])
         parts.append(f"{listed(names)} {_measured(value, some[0].variable)} ({origin})")
-    by_change = (one for one in told if one.origin.partition(":")[0] not in OF_FILES)
+    by_change = (one for one in told if one.origin not in OF_FILES)
     first = next(by_change, told[0])
     says = f"{name} has two values: {', '.join(parts)}; {way_out}"
     return Finding("two values", f"{first.unit}.{first.name}", float(first.value), None, says)  # type: ignore[arg-type]

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 from vocabulary.wheels import WHEELS
 
-from ..plan import Fmu, Series, Value, Variable, Wire
+from ..plan import DEFAULT, Fmu, Series, Value, ValueOrigin, Variable, Wire
 from ..scenario.load import Connection, Scenario
 from ..scenario.yaml_lines import PROBLEMS, Key, dotted
 from ..wording import fold, fold_sentences, hint, listed
@@ -34,7 +34,7 @@ class Connector:
         fmus: Mapping[str, Fmu],
         replaced: Replaced,
         notes: list[str],
-        origins: Mapping[str, dict[str, str]],
+        origins: Mapping[str, dict[str, ValueOrigin]],
     ) -> None:
         self._scenario = scenario
         self._fmus = fmus
@@ -72,7 +72,7 @@ class Connector:
                     continue
                 if (variable.optional or self._explicit(unit)) and variable.start is not None:
                     values[(unit, name)] = variable.start
-                    self._origins[unit][name] = "default"
+                    self._origins[unit][name] = DEFAULT
                 else:
                     self._report(("units", unit), self._undriven(unit, variable))
         fitted = [self._fitted(wire, key) for wire, key in wires.values()]

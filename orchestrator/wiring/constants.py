@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from ..plan import Fmu, Series, Value, Variable
+from ..plan import Fmu, Series, Value, ValueOrigin, Variable
 from ..scenario.load import Scenario
 from ..scenario.scenario_schema import SeriesSpec
 from ..scenario.yaml_lines import Key
@@ -27,7 +27,7 @@ class Constant:
 
     value: Value | Series
     key: Key
-    origin: str
+    origin: ValueOrigin
     of_unit: bool  # the key names the unit, so it goes before equal names
     exact: bool  # the key is no pattern
     level: int = INPUTS

@@ -25,7 +25,7 @@ from ..errors import BuildError, ModelDescriptionError, Problem, WiringError, Ya
 from ..fmu.opener import Opener, host_needs, stale_fmus
 from ..fmu.search import find_fmu, find_folder
 from ..fmu.shadowing import shadowed_modules
-from ..plan import Fmu, Plan, Series, Unit, Value, Wire
+from ..plan import Fmu, Plan, Series, Unit, Value, ValueOrigin, Wire
 from ..scenario.load import Scenario
 from ..scenario.overrides import is_path
 from ..wording import listed
@@ -34,7 +34,7 @@ from .connections import Connector
 from .faults import faults_of
 from .functions import missing_functions
 from .order import evaluate
-from .parameters import DERIVED, STATIC_LOADS, STIFFNESSES, Parameters
+from .parameters import STATIC_LOADS, STIFFNESSES, Parameters
 from .recording import recorded
 from .seen import exact
 
@@ -70,7 +70,7 @@ def make_plan(
     scenario = scenario.afresh()
     opened, replaced = _open_all(scenario, fmus, opener or Opener())
     notes: list[str] = [*scenario.document.notes, *stale_fmus(opened.values()), *host_needs(opened.values())]
-    origins: dict[str, dict[str, str]] = {name: {} for name in opened}
+    origins: dict[str, dict[str, ValueOrigin]] = {name: {} for name in opened}
     distributed = Parameters(scenario, opened, replaced, notes, origins)
     parameters = distributed.of_units()
     connector = Connector(scenario, opened, replaced, notes, origins)
@@ -151,7 +151,7 @@ def _take_from_tyres(
     stiffness = dict(zip(STIFFNESSES, (2.0 * found[wheel] for wheel in WHEELS[::2]), strict=True))
     for unit, names in distributed.lacking.items():
         formula = {
-            name: f"{DERIVED}two of {tyres[0].fmu.name} at {load:.6g} N each"
+            name: ValueOrigin("derived", f"two of {tyres[0].fmu.name} at {load:.6g} N each")
             for name, load in zip(STIFFNESSES, loads, strict=True)
         }
         units[unit] = replace(

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from vocabulary.vehicle import CAR
 
 from ..fmu.binary import integer_limits
-from ..plan import Fmu, Value, Variable
+from ..plan import DEFAULT, Fmu, Value, ValueOrigin, Variable
 from ..scenario import quantities
 from ..scenario.load import Scenario
 from ..scenario.scenario_schema import TextSpec
@@ -24,8 +24,6 @@ from .patterns import had
 from .shared_facts import facts_of
 from .text_file import text_of
 
-DERIVED = "derived: "
-"""What the origin of a value begins with that follows from the vehicle file; its formula comes after."""
 STIFFNESSES = ("cornering_stiffness_front", "cornering_stiffness_rear")
 STATIC_LOADS = ("static_load_front", "static_load_rear")
 """What follows from tyres, and what of the car that takes (see `make_plan`)."""
@@ -92,10 +90,10 @@ def _other(variable: Variable, given: Value) -> Value:
     return given
 
 
-def origin(document: Document, key: Key) -> str:
+def origin(document: Document, key: Key) -> ValueOrigin:
     """Return where the value at a key comes from: the file's kind, or what changed it."""
     change = document.override(key)
-    return change.origin if change else "vehicle" if key[0] == "parameters" else "scenario"
+    return ValueOrigin(change.origin if change else "vehicle" if key[0] == "parameters" else "scenario")
 
 
 class Parameters:
@@ -112,7 +110,7 @@ class Parameters:
         fmus: Mapping[str, Fmu],
         replaced: Callable[[str], Fmu | None],
         notes: list[str],
-        origins: Mapping[str, dict[str, str]],
+        origins: Mapping[str, dict[str, ValueOrigin]],
     ) -> None:
         self._scenario = scenario
         self._fmus = fmus
@@ -127,7 +125,7 @@ class Parameters:
         """Return each unit's values."""
         given: dict[str, dict[str, Value]] = {unit: {} for unit in self._fmus}
         for unit, fmu in self._fmus.items():
-            self._origins[unit].update((variable.name, "default") for variable in fmu.of("parameter"))
+            self._origins[unit].update((variable.name, DEFAULT) for variable in fmu.of("parameter"))
         self._from_tyre_files(given)
         self._from_vehicle(given)
         by_change = self._from_facts(given)
@@ -160,7 +158,7 @@ class Parameters:
             document.report(key, str(error))
             return
         self._put(given, unit, name, text, document, key)
-        self._origins[unit][name] = raw.file
+        self._origins[unit][name] = ValueOrigin("file", raw.file)
 
     def _from_facts(self, given: dict[str, dict[str, Value]]) -> set[tuple[str, str]]:
         """Give what facts tell; return the (unit, parameter) whose fact was changed."""
@@ -200,7 +198,7 @@ class Parameters:
                         given[unit][parameter] = value_for(fmu.variables[parameter], value)
                     except ValueError as error:
                         document.report(key, f"{file.path}: {name.upper()}: {error}")
-                    self._origins[unit][parameter] = file.path.name
+                    self._origins[unit][parameter] = ValueOrigin("file", file.path.name)
         if self._scenario.tyre_files and not any(map(_takes_tyre_files, self._fmus.values())):
             before = (self._replaced(unit) for unit in self._scenario.replaced)
             if any(fmu is not None and _takes_tyre_files(fmu) for fmu in before):
@@ -253,7 +251,7 @@ class Parameters:
                 except ValueError as error:
                     place = ("parameters",)
                     self._scenario.vehicle_document.report(place, f"{unit}.{name} = {formula}: {error}")
-                self._origins[unit][name] = f"{DERIVED}{formula}"
+                self._origins[unit][name] = ValueOrigin("derived", formula)
 
     def _refuse_half_a_car(self, given: Mapping[str, Mapping[str, Value]]) -> None:
         """Report units that the vehicle file gives part of a car; note what tyres have to tell.

@@ -92,7 +92,10 @@ def test_every_unit_takes_what_it_declares_for_both_axles(folder, fmus):
     assert "pky1_front" not in control
     assert not set(parameters(planned, "plant")) & set(tyre)
     origins = {u.name: u.origins for u in planned.units}
-    assert (origins["tyre"]["pky1_front"], origins["tyre"]["pky1_rear"]) == ("soft.tir", "stiff.tir")
+    assert (str(origins["tyre"]["pky1_front"]), str(origins["tyre"]["pky1_rear"])) == (
+        "soft.tir",
+        "stiff.tir",
+    )
     assert not any("tyre" in note or "radius" in note for note in planned.notes)
 
 
