@@ -11,8 +11,8 @@ left side up, pitch for the nose down, and the angles by which a road rises forw
 what they feel of gravity and acceleration. They stand at the centre of mass. What no unit says (a plant that
 does not roll, a road that is flat) counts as zero.
 
-Inputs are the true values, named `*_true`: `{from: plant.*, to: sensor.*_true}`. Outputs have the bare
-names, so that `{from: [sensor], to: [controller]}` puts a measurement in place of the truth.
+Inputs are the true values, named `*_true`: `{from: [plant, driver], to: sensor.*_true}`. Outputs have the
+bare names, so that `{from: [sensor], to: [controller]}` puts a measurement in place of the truth.
 
 The hand-wheel sensor counts in road-wheel angles: its figures are those at the hand wheel over a steering
 ratio of 16. Biases are zero here, as after the zero-point learning of a control unit that worked; what

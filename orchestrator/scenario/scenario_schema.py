@@ -206,7 +206,9 @@ class Connection(Strict):
     Lists of units choose among equal names: `{from: [estimator, sensor], to: [controller, reference]}`
     lets each input of the latter take the output of its name from the first of the former that has it,
     before any other unit; what none of them has comes from elsewhere. Several lists for one unit have to
-    agree on an order. `from: null` leaves inputs without a source, whatever outputs there are.
+    agree on an order. A list of units to a pattern, `{from: [plant, driver], to: sensor.*_true}`, lets each
+    input take the output that the `*` names from the first unit that has it, as a connection of each would.
+    `from: null` leaves inputs without a source, whatever outputs there are.
     """
 
     source: Source = Field(alias="from", description="unit.output, or units in order, or null")
@@ -216,8 +218,11 @@ class Connection(Strict):
 
     @model_validator(mode="after")
     def _check_ends(self) -> Connection:
-        if self.source is not None and isinstance(self.source, list) != isinstance(self.target, list):
-            raise ValueError("'from' and 'to' must both be lists of units, or both unit.variable")
+        listed = isinstance(self.source, list), isinstance(self.target, list)
+        if listed == (True, False) and "*" not in self.target[1]:
+            raise ValueError("from a list of units, 'to' must be one too, or unit.variable with a *")
+        if listed == (False, True) and self.source is not None:
+            raise ValueError("from unit.variable, 'to' must be unit.variable")
         if self.source is None and isinstance(self.target, list):
             raise ValueError("with 'from: null', 'to' must be unit.variable")
         if self.scale is not None and not isinstance(self.source, Endpoint):

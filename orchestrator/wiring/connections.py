@@ -14,7 +14,7 @@ from itertools import pairwise
 from vocabulary.wheels import WHEELS
 
 from ..plan import DEFAULT, Fmu, Series, Value, ValueOrigin, Variable, Wire
-from ..scenario.load import Connection, Scenario
+from ..scenario.load import Connection, Endpoint, Scenario
 from ..scenario.yaml_lines import PROBLEMS, Key, dotted
 from ..wording import fold, fold_sentences, hint, listed
 from .constants import Constant, Input, constants
@@ -126,7 +126,8 @@ class Connector:
     def _expand(self, connection: Connection, key: Key) -> list[Wire]:
         """Return the wires of a connection; lists of units and null are kept for equal names."""
         ends = connection.source, connection.target
-        if isinstance(ends[0], list) and isinstance(ends[1], list):
+        if isinstance(ends[1], list):
+            assert isinstance(ends[0], list)
             self._prefer(ends[0], ends[1], key)
             return []
         (target, to_pattern) = ends[1]
@@ -136,13 +137,19 @@ class Connector:
         if ends[0] is None:
             self._refused.update((target, name) for name in inputs.values())
             return []
-        (source, from_pattern) = ends[0]
-        if source == target:
-            self._report(key, f"connects {source} to itself")
+        one = ends[0] if isinstance(ends[0], Endpoint) else None
+        sources = [one.unit] if one else list(ends[0])
+        from_pattern = one.variable if one else "*"
+        if target in sources:
+            self._report(key, f"connects {target} to itself")
             return []
-        outputs = matching(from_pattern, self._outputs[source])
-        if not outputs:
-            self._no_such((*key, "from"), source, from_pattern, "output")
+        self._refuse_twice(sources, (*key, "from"))
+        found = [(source, matching(from_pattern, self._outputs[source])) for source in sources]
+        if one and not found[0][1]:
+            self._no_such((*key, "from"), one.unit, from_pattern, "output")
+        outputs: dict[str, tuple[str, str]] = {}  # part -> unit and output, of the first unit that has it
+        for source, named in found:
+            outputs = {part: (source, name) for part, name in named.items()} | outputs
         if not (outputs and inputs):
             return []
         if "*" in from_pattern and "*" not in to_pattern:
@@ -151,17 +158,20 @@ class Connector:
         if "*" in from_pattern:
             pairs = [(outputs[part], n) for part, n in inputs.items() if part in outputs]
         else:
-            pairs = [(from_pattern, n) for n in inputs.values()]
+            pairs = [(outputs[""], n) for n in inputs.values()]
         if not pairs:
             given, wanted = listed(outputs, last="or"), listed(inputs, last="or")
             self._report(key, f"nothing matches: in 'from' the * can be {given}, in 'to' {wanted}")
-        return [Wire(source, output, target, name) for output, name in pairs]
+        return [Wire(source, output, target, name) for (source, output), name in pairs]
+
+    def _refuse_twice(self, names: list[str], key: Key) -> None:
+        if twice := next((name for name in names if names.count(name) > 1), None):
+            self._report(key, f"names {twice} twice")
 
     def _prefer(self, sources: list[str], targets: list[str], key: Key) -> None:
         """Keep which sources go first for units; report lists that mean nothing."""
         for end, names in (("from", sources), ("to", targets)):
-            if twice := next((name for name in names if names.count(name) > 1), None):
-                self._report((*key, end), f"names {twice} twice")
+            self._refuse_twice(names, (*key, end))
         for unit in targets:
             self._preferring.setdefault(unit, []).append((sources, key))
         ends = [(s, t) for s in sources for t in targets if s != t]

@@ -800,6 +800,21 @@ def test_a_list_of_units_goes_after_connections_and_constants_that_name_the_inpu
     assert sources(made, "yaw_rate") == {"controller": "estimator"}
 
 
+def test_a_list_of_units_gives_what_a_star_names_from_the_first_that_has_it(folder: Path) -> None:
+    true = ("yaw_rate", "steer_angle", "friction")
+    inputs = [Var(f"{name}_true", measure) for name, measure in zip(true, ("rad/s", "rad", "1"), strict=True)]
+    make_fmu(folder / "sensor.fmu", inputs=inputs)
+    rest = TORQUES + "  - {from: [road, plant, driver, estimator], to: sensor.*_true}\n"
+    rest += "  - {from: [road], to: [tyre, controller]}\n  - {from: [plant], to: [controller]}\n"
+    made = plan(scenario(estimators(folder) + "  sensor: {fmu: sensor}\n", rest))
+    seen = {w.input: f"{w.source}.{w.output}" for w in made.wires if w.target == "sensor"}
+    assert seen == {
+        "yaw_rate_true": "plant.yaw_rate",
+        "steer_angle_true": "driver.steer_angle",
+        "friction_true": "road.friction",
+    }
+
+
 def test_several_lists_of_units_count_in_the_order_that_all_of_them_allow(folder: Path) -> None:
     rest = TORQUES + "  - {from: [road, driver], to: [tyre, controller]}\n"
     rest += "  - {from: [estimator, road], to: [controller]}\n"
@@ -841,12 +856,18 @@ def test_null_leaves_an_input_without_a_source(folder: Path) -> None:
     ("connection", "expected"),
     [
         (
-            "{from: [plant], to: tyre.friction_*}",
-            ": 'from' and 'to' must both be lists of units, or both unit.variable",
+            "{from: [plant], to: tyre.friction_fl}",
+            ": from a list of units, 'to' must be one too, or unit.variable with a *",
         ),
         (
             "{from: plant.yaw_rate, to: [tyre]}",
-            ": 'from' and 'to' must both be lists of units, or both unit.variable",
+            ": from unit.variable, 'to' must be unit.variable",
+        ),
+        ("{from: [driver, driver], to: plant.*_angle}", ".from: names driver twice"),
+        ("{from: [driver, plant], to: plant.*_angle}", ": connects plant to itself"),
+        (
+            "{from: [driver], to: tyre.friction_*}",
+            ": nothing matches: in 'from' the * can be steer_angle, in 'to' fl, fr, rl or rr",
         ),
         ("{from: null, to: [tyre]}", ": with 'from: null', 'to' must be unit.variable"),
         (

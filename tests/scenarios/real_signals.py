@@ -20,8 +20,7 @@ def with_units(name: str, folder: Path, *, seen: tuple[str, ...] = ("sensor",), 
     scenario["units"] |= units
     scenario["connections"] = [
         *scenario.get("connections", ()),
-        {"from": "plant.*", "to": "sensor.*_true"},
-        {"from": "driver.*", "to": "sensor.*_true"},
+        {"from": ["plant", "driver"], "to": "sensor.*_true"},
         {"from": ["driver", "plant"], "to": [u for u in ROAD if u in scenario["units"]]},
         {"from": list(seen), "to": [u for u in CONTROL if u in scenario["units"]]},
     ]

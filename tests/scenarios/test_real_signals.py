@@ -31,6 +31,11 @@ def test_the_observer_misses_no_more_than_it_may_and_the_documentation_says_what
 
 
 @pytest.mark.parametrize("name", FILES)
+def test_four_lines_put_sensor_and_estimator_into_a_loop(name):
+    assert len(yb.load(f"real_signals/{name}").loaded.connections) <= 4
+
+
+@pytest.mark.parametrize("name", FILES)
 def test_no_input_of_the_control_side_is_exact_but_the_drivers_wish(name):
     plan = yb.load(f"real_signals/{name}").plan()
     truth = {"driver", "plant"}
