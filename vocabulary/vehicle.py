@@ -71,6 +71,8 @@ CAR: dict[str, Quantity] = {
     "roll_damping": Quantity("N.m.s/rad", "Roll damping C of the car on its tyres", True, 0.0),
     "roll_damping_front": Quantity("N.m.s/rad", "That of the front axle", minimum=0.0),
     "roll_damping_rear": Quantity("N.m.s/rad", "That of the rear axle", minimum=0.0),
+    "roll_camber_front": Quantity("1", "Inclination of the front wheels over the body's roll angle"),
+    "roll_camber_rear": Quantity("1", "Inclination of the rear wheels over the body's roll angle"),
     "steering_ratio": Quantity("1", "Hand-wheel angle over road-wheel angle", minimum=0.1),
     "wheel_radius": Quantity("m", "Rolling radius R of the wheels", True, 0.05),
     "wheel_inertia": Quantity("kg.m2", "Inertia J of one wheel", True, 0.01),

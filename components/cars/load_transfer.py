@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from vocabulary.gravity import G
 from vocabulary.wheels import Four
 
-from ..mathematics.gravity import G
 from .plane_body import Geometry
 
 

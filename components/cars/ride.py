@@ -41,7 +41,8 @@ from collections.abc import Sequence
 from math import ceil, cos, sin, sqrt
 from typing import NamedTuple
 
-from ..mathematics.gravity import G
+from vocabulary.gravity import G
+
 from ..mathematics.integrators import rk4
 from .contact_points import Contact
 

@@ -16,8 +16,9 @@ from collections.abc import Sequence
 from math import sin, sqrt
 from typing import NamedTuple
 
+from vocabulary.gravity import G
+
 from ..fmi.variables import signal
-from ..mathematics.gravity import G
 
 INPUTS = tuple(signal(name, optional=True) for name in ("slope", "bank", "wind_force_y", "wind_moment_z"))
 

@@ -8,18 +8,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import sin
 
+from vocabulary.gravity import G
 from vocabulary.wheels import Four
 
 from ..fmi.variables import parameter
-from ..mathematics.gravity import G
 from .car import StartParameters
 from .published_cars import PaperB
 from .resistance import Drag, ResistanceParameters
 from .road_plane import LEVEL, Pull
+from .roll_camber import RollCamberParameters
 
 
 @dataclass(frozen=True)
-class RollingCarParameters(StartParameters, ResistanceParameters, PaperB):
+class RollingCarParameters(StartParameters, RollCamberParameters, ResistanceParameters, PaperB):
     """The car of paper B, table 1."""
 
     sprung_mass: float = parameter(1110.0, "kg", "Sprung mass m_s", "paper B, table 1", minimum=0.0)

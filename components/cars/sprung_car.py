@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from vocabulary.gravity import G
+
 from ..fmi.variables import parameter
-from ..mathematics.gravity import G
 from .car import StartParameters
 from .published_cars import PaperC
 from .resistance import ResistanceParameters
 from .ride import Ride
+from .roll_camber import RollCamberParameters
 
 
 @dataclass(frozen=True)
-class FourteenDofParameters(StartParameters, ResistanceParameters, PaperC):
+class FourteenDofParameters(StartParameters, RollCamberParameters, ResistanceParameters, PaperC):
     """A large saloon: paper C, table 1, where it says anything."""
 
     sprung_mass: float = parameter(1650.0, "kg", "Sprung mass m_s", "paper C, table 1", minimum=1.0)

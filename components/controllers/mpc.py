@@ -20,13 +20,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import atan
 
+from vocabulary.gravity import G
+
 from ..cars.single_track_car import SingleTrackCar
 from ..control_laws.linear_feedback import error_dynamics
 from ..control_laws.predictive_law import PredictiveLaw, Weights
 from ..control_laws.sliding_surface import limit
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter, signal
-from ..mathematics.gravity import G
 from .lqr import LqrParameters
 from .pid import SEEN
 

@@ -22,7 +22,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import cos, sin
 
-from ..mathematics.gravity import G
+from vocabulary.gravity import G
+
 from .estimator_parameters import EstimatorParameters
 
 ROLLING = 0.3

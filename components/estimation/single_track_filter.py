@@ -26,8 +26,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import atan2, cos
 
+from vocabulary.gravity import G
+
 from ..fmi.variables import parameter
-from ..mathematics.gravity import G
 from .dugoff_axle import axle_force
 from .estimator_parameters import EstimatorParameters
 from .zero_points import faded

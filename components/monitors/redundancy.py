@@ -33,10 +33,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from vocabulary.gravity import G
+
 from ..cars.published_cars import PaperB
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
-from ..mathematics.gravity import G
 
 GYRO, ACCELEROMETER, HAND_WHEEL, WHEEL = 1.0, 2.0, 3.0, 4.0
 SLOWEST = 3.0

@@ -12,7 +12,8 @@ with a_x = dv_x - v_y r, a_y = dv_y + v_x r, dotted quantities written with a d,
 left side up, X, Y_f, Y_r, M the resultants of the tyre forces (`cars.plane_body`). phi belongs to the
 sprung mass; v_x, v_y, a_x, a_y to the point of the roll axis below the centre of mass, which is what the
 paper calls the centre of mass. The pair (1), (4) is solved for a_y and ddphi exactly. A wheel that
-lifts has no load; the other wheel of its axle then carries the axle. Inclines and wind: `cars.road_plane`.
+lifts has no load; the other wheel of its axle then carries the axle. Inclines and wind: `cars.road_plane`,
+camber for tyres that take it: `cars.roll_camber`.
 
 Ours differs: rolling resistance is a moment on each wheel (`cars.resistance`), where the paper has a force
 m g f on the body in (2). Free wheels slow the car alike; of driven ones the tyres carry m g f less.
@@ -37,6 +38,7 @@ from typing import Any
 from ..cars.car import DRIVEN_WHEELS, MOTION, DrivenCar
 from ..cars.plane_body import move, resultants
 from ..cars.road_plane import pull_of
+from ..cars.roll_camber import inclinations
 from ..cars.rolling_body import RollingBody, RollingCarParameters
 from ..mathematics.carry import Values
 from ..mathematics.oscillator import transition
@@ -46,7 +48,7 @@ class EightDof(DrivenCar):
     """Car with eight degrees of freedom (plane motion, roll, four wheel spins), loads through roll."""
 
     Parameters = RollingCarParameters
-    outputs = (*MOTION, "roll_angle", "roll_rate", *DRIVEN_WHEELS)
+    outputs = (*MOTION, "roll_angle", "roll_rate", *DRIVEN_WHEELS, "inclination_angle_*")
 
     def configure(self) -> None:
         self.body = RollingBody(self.p)
@@ -103,4 +105,10 @@ class EightDof(DrivenCar):
         self.loads = self.body.vertical_loads(held, pull=pull, phi=phi, dphi=dphi)
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...]:
-        return (*self.motion_values(), self.angle, self.rate, *self.wheel_values())
+        return (
+            *self.motion_values(),
+            self.angle,
+            self.rate,
+            *self.wheel_values(),
+            *inclinations(self.angle, self.p),
+        )

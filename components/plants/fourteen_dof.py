@@ -12,11 +12,12 @@ of the contact points, which move with body and wheels (`cars.contact_points`).
 Stands in for a multi-body model. Degrees of freedom and assumptions as in T. Shim, C. Ghike,
 Understanding the limitations of different vehicle models for roll dynamics studies, Vehicle System
 Dynamics 45(3), 2007, 191-216: rigid body, vertical wheel travel, linear springs and dampers at the
-wheels, no bump stops, no camber, no steering by roll. Ours differs: yaw axis vertical, roll and pitch to
+wheels, no bump stops, no steering by roll. Ours differs: yaw axis vertical, roll and pitch to
 second order in the kinetic energy, roll centres as slopes of the wheels' paths. Wheels share the
 body's horizontal motion at `unsprung_height`, no anti-dive. Derivation: docs/plant_fourteen_dof.md. A car
 that rolls over, beyond 45 degrees of roll or pitch, is an error.
-Drag acts at the centre of mass, rolling resistance at the wheels (`cars.resistance`).
+Drag acts at the centre of mass, rolling resistance at the wheels (`cars.resistance`). Wheels lean with the
+body (`cars.roll_camber`), for tyres that take camber.
 
 How it couples. Vertical loads follow from the tyre springs, that is from the state: there is no loop of
 loads and forces here. Nothing but the front wheels' slip and longitudinal velocity follows an input
@@ -38,6 +39,7 @@ from ..cars.plane_body import move
 from ..cars.resistance import Drag
 from ..cars.ride import AT_REST, RESOLVED, loads, move_ride
 from ..cars.road_plane import pull_of
+from ..cars.roll_camber import inclinations
 from ..cars.sprung_car import FourteenDofParameters, ride_of
 from ..cars.wheel_kinematics import Eight
 from ..fmi.variables import output
@@ -53,7 +55,15 @@ class FourteenDof(DrivenCar):
     """Car with fourteen degrees of freedom (body in space, wheel travel, wheel spins) on tyre springs."""
 
     Parameters = FourteenDofParameters
-    outputs = (*MOTION, "roll_angle", "roll_rate", "pitch_angle", HEAVE, *DRIVEN_WHEELS)
+    outputs = (
+        *MOTION,
+        "roll_angle",
+        "roll_rate",
+        "pitch_angle",
+        HEAVE,
+        *DRIVEN_WHEELS,
+        "inclination_angle_*",
+    )
 
     def configure(self) -> None:
         self.ride = ride_of(self.p)
@@ -95,7 +105,15 @@ class FourteenDof(DrivenCar):
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...]:
         heave, roll, pitch = self.body[:3]
-        return (*self.motion_values(), roll, self.body[8], pitch, heave, *self.wheel_values())
+        return (
+            *self.motion_values(),
+            roll,
+            self.body[8],
+            pitch,
+            heave,
+            *self.wheel_values(),
+            *inclinations(roll, self.p),
+        )
 
     def wheel_velocities(self) -> Eight:
         """Return the velocities [m/s] of the contact points in wheel axes, longitudinal and lateral."""

@@ -35,6 +35,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from vocabulary.gravity import G
+
 from ..cars.car import DRIVEN_WHEELS, MOTION, DrivenCar, StartParameters
 from ..cars.load_transfer import quasi_static_loads
 from ..cars.plane_body import move, resultants
@@ -42,7 +44,6 @@ from ..cars.published_cars import PaperA
 from ..cars.road_plane import pull_of
 from ..fmi.variables import parameter
 from ..mathematics.carry import Values
-from ..mathematics.gravity import G
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,8 @@ from dataclasses import dataclass
 from math import cos, sin
 from typing import Any
 
+from vocabulary.gravity import G
+
 from ..cars.car import MOTION, Car, StartParameters, of_steered_wheels
 from ..cars.load_transfer import quasi_static_loads
 from ..cars.plane_body import Geometry, Motion, sum_of
@@ -39,7 +41,6 @@ from ..cars.road_plane import pull_of
 from ..cars.wheel_kinematics import earth_velocity
 from ..fmi.variables import parameter, signal
 from ..mathematics.carry import Values
-from ..mathematics.gravity import G
 
 _GAUSS = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
 

@@ -28,11 +28,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan
 
+from vocabulary.gravity import G
+
 from ..cars.published_cars import PaperB
 from ..cars.single_track_car import SingleTrackCar
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
-from ..mathematics.gravity import G
 from ..mathematics.integrators import rk4
 from ..mathematics.slope import Slope
 

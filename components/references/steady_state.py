@@ -23,10 +23,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from vocabulary.gravity import G
+
 from ..cars.published_cars import PaperA
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
-from ..mathematics.gravity import G
 from ..mathematics.slope import Slope
 
 SMALLEST = 1e-3

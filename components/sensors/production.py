@@ -25,12 +25,12 @@ from __future__ import annotations
 
 from math import cos, sin
 
+from vocabulary.gravity import G
 from vocabulary.signals import SIGNALS
 from vocabulary.wheels import wheels
 
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter, signal
-from ..mathematics.gravity import G
 from ..sensing.channel import Channel, Figures
 from ..sensing.cluster_parameters import Given, figures_of, parameters_of
 from ..sensing.noise import key

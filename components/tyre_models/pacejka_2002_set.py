@@ -5,7 +5,7 @@ Defaults: H. B. Pacejka, Tyre and Vehicle Dynamics, 2nd ed. 2006, table A3.1, 20
 Coefficients that the table does not list are zero.
 
 Not here, because they would do nothing: coefficients of camber (PDX3, PDY3, PEY4, PKY3, PHY3, PVY3,
-PVY4, RVY3, QBZ4, QBZ5, QDZ3, QDZ4, QDZ8, QDZ9, QEZ5, QHZ3, QHZ4, SSZ3, SSZ4: no plant has camber), the
+PVY4, RVY3, QBZ4, QBZ5, QDZ3, QDZ4, QDZ8, QDZ9, QEZ5, QHZ3, QHZ4, SSZ3, SSZ4: it takes no camber), the
 reference speed V_0 (it only enters the speed decay of friction, zero in this set) and rolling
 resistance (QSY1: the plants have it). Scaling factors that multiply a whole group of coefficients
 are left out too: scale the coefficients.

@@ -9,17 +9,39 @@ so in steady rolling it has the slip s / V of the wheel, and at rest the tyre is
 held s, V and sigma this is solved exactly, z = V h / sigma:
 
     u_end = u exp(-z) + s h (1 - exp(-z)) / z
+
+Contact that slides holds no more than its grip, which limits the deflection of a slow wheel (`gripped`).
 """
 
 from __future__ import annotations
 
-from math import atan, exp, expm1, sin
+from math import atan, exp, expm1, hypot, sin
 from typing import Any
 
 from .pacejka_2012_set import of_axle
 
 SHORTEST = 0.02
 """Relaxation lengths [m] are not below this: a hardly loaded tyre; chosen: less than a contact patch has."""
+
+SLIDES = 3.0
+"""K slip over mu F_z from which on all of the contact slides: the brush model's (Pacejka, section 3.2)."""
+
+
+def gripped(of_patch: tuple[float, float], of_wheel: tuple[float, float], grip: float) -> float:
+    """Return the part [1] of a deflection that the contact holds.
+
+    All of it up to the grip; beyond, as much as the wheel's own slip points in its direction. So a wheel that
+    keeps sliding keeps its deflection, and one that stops or turns about loses what no contact could hold.
+
+    Args:
+        of_patch, of_wheel: slips of the contact patch and the wheel, each times its stiffness, x and y [N].
+        grip: deflecting force that is held [N].
+    """
+    held = hypot(*of_patch)
+    if held <= grip:
+        return 1.0
+    along = (of_patch[0] * of_wheel[0] + of_patch[1] * of_wheel[1]) / held
+    return min(max(grip, along) / held, 1.0)
 
 
 def deflected(u: float, s: float, v: float, sigma: float, h: float) -> float:

@@ -10,7 +10,10 @@ those of the wheel. These follow over the relaxation lengths sigma_x and sigma_y
 
 solved exactly over a step. In steady motion kappa' and alpha' are the wheel's own slips. At rest both
 deflections are springs, so the car stands, and would rock on them without end: below `damping_speed` a
-damper beside the spring fades in, kappa' + k s_x / K_x, sin(alpha') - k s_y / K_y.
+damper beside the spring fades in, kappa' + k s_x / K_x, sin(alpha') - k s_y / K_y. Contact that slides holds
+no more than its grip: there deflections end where hypot(K_x kappa', K_y sin(alpha')) is 3 mu F_z, or what the
+wheel's own slips make of it in their direction. Without that a car that slides to rest on locked wheels,
+kappa' = -1, would be thrown back over a whole relaxation length.
 
 Slip speeds are told from wheel_speed, wheel_velocity and slip_angle; the latter refers to `low_speed` where a
 wheel is slower. So wheel_radius and low_speed have to be those of the plant, as a vehicle file gives them.
@@ -34,7 +37,7 @@ from ..fmi.variables import like, output, parameter, signal
 from ..tyre_models.pacejka_2002 import SMALLEST_LOAD
 from ..tyre_models.pacejka_2012 import longitudinal_curve, side_force, wheel_forces, whole_set
 from ..tyre_models.pacejka_2012_set import RELAXATION, Pacejka2012Parameters, of_axles
-from ..tyre_models.relaxation import deflected, part, relaxation_lengths, relaxation_set
+from ..tyre_models.relaxation import SLIDES, deflected, gripped, part, relaxation_lengths, relaxation_set
 from ..tyre_models.tyre import INPUTS, Tyre
 from .magic_formula_62 import WHEELS
 
@@ -109,14 +112,20 @@ class MagicFormula62Transient(Tyre):
             return
         self.step_size = h
         self._see(u)
-        wheels = zip(self.deflections, self.speeds, before, self.lengths, strict=True)
-        self.deflections = [  # loads are those of the step's end: lengths in its middle are means
-            (
-                deflected(x, s_x, v_x, 0.5 * (old[0] + new[0]), h),
-                deflected(y, s_y, v_y, 0.5 * (old[1] + new[1]), h),
-            )
-            for (x, y), (s_x, v_x, s_y, v_y, _), old, new in wheels
-        ]
+        _, _, loads, frictions, *_ = self.by_signal(u)
+        low, slow = self.p.low_speed, self.p.damping_speed
+        for i, ((x, y), (s_x, v_x, s_y, v_y, _), old, new) in enumerate(
+            zip(self.deflections, self.speeds, before, self.lengths, strict=True)
+        ):  # loads are those of the step's end: lengths in its middle are means
+            x = deflected(x, s_x, v_x, 0.5 * (old[0] + new[0]), h)
+            y = deflected(y, s_y, v_y, 0.5 * (old[1] + new[1]), h)
+            if v_x < slow and v_y < slow:
+                sigma_x, sigma_y, k_x, k_y = new
+                of_wheel = k_x * s_x / max(v_x, low), k_y * s_y / max(v_y, low)
+                of_patch = k_x * x / sigma_x, k_y * y / sigma_y
+                kept = gripped(of_patch, of_wheel, SLIDES * frictions[i] * loads[i])
+                x, y = kept * x, kept * y
+            self.deflections[i] = x, y
 
     def output(self, t: float, u: list[float]) -> list[float]:
         p, h = self.p, self.step_size

@@ -13,13 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from vocabulary.gravity import G
 from vocabulary.wheels import WHEEL_NAMES, wheels
 
 from ..plan import Finding, Plan
 from .run_metrics import columns_of, results_to_be
 
-G = 9.81
-"""Standard gravity, rounded as in the components [m/s2]."""
 Signals = Sequence[np.ndarray]
 """The values of a check's signals over a block, in their order; shape (rows,) each."""
 

@@ -16,10 +16,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from vocabulary.gravity import G
 from vocabulary.vehicle import CAR
 
-G = 9.81
-"""Acceleration of gravity [m/s2], that of the components."""
 AGREES = 0.01
 """Relative difference of what is given from what follows. Chosen: rounding of data sheets."""
 
@@ -80,6 +79,12 @@ DERIVATIONS = (
     Derivation("mass", "sprung_mass + unsprung_mass", ("sprung_mass", "unsprung_mass"), lambda s, u: s + u),
     Derivation("unsprung_mass", "mass - sprung_mass", ("mass", "sprung_mass"), lambda m, m_s: m - m_s),
     Derivation("sprung_mass", "mass - unsprung_mass", ("mass", "unsprung_mass"), lambda m, u: m - u),
+    Derivation(
+        "unsprung_mass_front",
+        "unsprung_mass - unsprung_mass_rear",
+        ("unsprung_mass", "unsprung_mass_rear"),
+        lambda u, r: u - r,
+    ),
     Derivation(
         "front_unsprung_share",
         "unsprung_mass_front / unsprung_mass",

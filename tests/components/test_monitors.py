@@ -6,8 +6,8 @@ from math import cos, exp, pi, sin
 
 import pytest
 
-from components.mathematics.gravity import G
 from components.monitors.redundancy import ACCELEROMETER, GYRO, HAND_WHEEL, WHEEL, Redundancy
+from vocabulary.gravity import G
 
 from .stand import Stand
 

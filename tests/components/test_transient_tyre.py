@@ -12,7 +12,7 @@ from components.cars.wheel_kinematics import slip_angle, slip_ratio
 from components.plants.fourteen_dof import FourteenDof
 from components.plants.seven_dof import SevenDof
 from components.tyre_models.pacejka_2012_set import COMMON, LONGITUDINAL, REST
-from components.tyre_models.relaxation import deflected
+from components.tyre_models.relaxation import deflected, gripped
 from components.tyres.magic_formula_62 import MagicFormula62
 from components.tyres.magic_formula_62_transient import MagicFormula62Transient
 from vocabulary.wheels import wheels
@@ -96,6 +96,15 @@ def test_the_deflection_is_that_of_its_differential_equation():
     assert deflected(u_0, s, 1e-9, sigma, h) == pytest.approx(u_0 + s * h, rel=1e-8)
 
 
+def test_a_deflection_beyond_the_grip_is_kept_as_far_as_the_wheel_slides_its_way():
+    assert gripped((30.0, 40.0), (0.0, 0.0), 60.0) == 1.0
+    assert gripped((30.0, 40.0), (0.0, 0.0), 25.0) == 0.5
+    assert gripped((30.0, 40.0), (-30.0, -40.0), 25.0) == 0.5  # turned about
+    assert gripped((30.0, 40.0), (24.0, 32.0), 25.0) == pytest.approx(0.8)
+    assert gripped((30.0, 40.0), (300.0, 400.0), 25.0) == 1.0
+    assert gripped((0.0, 0.0), (1.0, 0.0), 0.0) == 1.0
+
+
 def test_at_rest_the_tyre_is_a_spring_of_the_carcass_stiffness():
     tyre = stand(damping=0.0, **SYMMETRIC)
     tyre.start(**rolling(0.0))
@@ -176,6 +185,20 @@ def test_a_braked_car_comes_to_rest_and_stays_without_a_limit_cycle(plant, mu):
     assert np.max(np.abs(last)) < 1e-3
     assert abs(sum(loop[name] for name in wheels("tyre_force_x_*"))) < 20.0  # wheels may pull at each other
     assert abs(loop["yaw_rate"]) < 1e-3
+
+
+def test_a_car_that_slides_to_rest_on_locked_wheels_springs_back_by_what_their_contact_holds():
+    course = []
+
+    def see(loop):
+        course.append((loop["velocity_x"], loop["position_x"]))
+
+    loop, _ = driven(SevenDof, 3.0, 3000, torque=-3000.0, mu=(0.8,) * 4, initial_speed=4.0, each=see)
+    v, x = np.array(course).T
+    mass = loop.units[0].slave.p.mass
+    held = 3.0 * 0.8 * (mass * 9.81 / 4.0) / 358000.0
+    assert 0.5 * held < x.max() - x[-1] < 1.1 * held
+    assert np.abs(v[-500:]).max() < 1e-3
 
 
 def test_a_braked_wheel_follows_its_equations_however_long_the_step_is():

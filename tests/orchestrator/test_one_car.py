@@ -8,14 +8,13 @@ import pytest
 from ruamel.yaml import YAML
 
 from components.cars.sprung_car import FourteenDofParameters, ride_of
-from components.mathematics.gravity import G
 from orchestrator.commands.check import show
 from orchestrator.errors import WiringError
 from orchestrator.scenario.load import load_scenario
-from orchestrator.wiring import derivations
 from orchestrator.wiring.derivations import DERIVATIONS, car_of, contradictions
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
+from vocabulary.gravity import G
 
 from .fake_fmus import Var, make_fmu, out
 
@@ -61,11 +60,18 @@ def test_what_another_data_sheet_gives_leads_to_the_same_car(saloon, instead, of
     assert car_of(other).values[of] == pytest.approx(saloon[of], rel=1e-12)
 
 
+@pytest.mark.parametrize(("axle", "mass"), [("front", 72.0), ("rear", 108.0)])
+def test_the_unsprung_mass_of_either_axle_tells_how_all_of_it_is_shared(saloon, axle, mass):
+    by_axle = {name: value for name, value in saloon.items() if name != "front_unsprung_share"}
+    whole = car_of(by_axle | {f"unsprung_mass_{axle}": mass}).values
+    assert whole["front_unsprung_share"] == pytest.approx(0.4, rel=1e-12)
+    assert whole["sprung_cg_offset"] == pytest.approx(car_of(saloon).values["sprung_cg_offset"], rel=1e-12)
+
+
 def test_the_derived_car_is_that_of_the_equations_of_motion(saloon):
     known = {name: value for name, value in saloon.items() if name in FourteenDofParameters.__annotations__}
     p = FourteenDofParameters(**known)
     ride, car = ride_of(p), car_of(saloon).values
-    assert derivations.G == G
     assert 2.0 * ride.load_f + 2.0 * ride.load_r == pytest.approx(p.mass * G, rel=1e-12)
     assert [car["static_load_front"], car["static_load_rear"]] == pytest.approx([ride.load_f, ride.load_r])
     assert car["sprung_mass"] * G * car["roll_arm"] == pytest.approx(ride.gravity_roll, rel=1e-12)

@@ -83,8 +83,9 @@ def test_on_split_friction_cars_stop_and_stand_at_1_ms(stops):
 @pytest.mark.parametrize("controller", ["controller_off", "controller_pid"])
 def test_they_do_so_on_tyres_with_relaxation_lengths(run, controller):
     tyre = "tyre=tyre_magic_formula_62_transient"
-    results = run("split_braking", tyre, f"controller={controller}", stop_time=24.0)
-    assert_comes_to_rest(results, within=1e-2)
+    results = run("split_braking", tyre, f"controller={controller}", stop_time=14.0)
+    assert_comes_to_rest(results, within=2e-3)
+    assert results["plant.velocity_x"].min() > -0.4  # carcasses spring back, not a relaxation length
 
 
 @pytest.mark.exhaustive

@@ -1,6 +1,0 @@
-"""Physical constants."""
-
-from __future__ import annotations
-
-G = 9.81
-"""Acceleration of gravity [m/s2]."""
