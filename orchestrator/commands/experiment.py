@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from ..wording import counted
+from ..wording import counted, listed
 from .batch import bar, hold, reported, say, stoppable
 
 if TYPE_CHECKING:
@@ -253,6 +253,12 @@ def of_files(
     if out is not None:
         below = [out / file.absolute().parent.name / file.stem for file in files]
         folders = [out] if len(files) == 1 else below
+    for folder in dict.fromkeys(folders):
+        if len(sharing := [str(f) for f, of in zip(files, folders, strict=True) if of == folder]) > 1:
+            raise ScenarioError(
+                f"{listed(sharing, last='and')} would share the results folder {folder}; name them apart, or "
+                "report on them one by one, with --out"
+            )
     hold(context, *folders)
     chapters, failed = [], False
     for experiment, folder in zip(experiments, folders, strict=True):

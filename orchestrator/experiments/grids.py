@@ -35,6 +35,22 @@ def cells(spec: GridSpec) -> list[GridCell]:
     return found + [GridCell(one.run, one.says, "", one.published) for one in spec.beside]
 
 
+def ranked(spec: GridSpec, only: Mapping[str, Collection[str]] | None = None) -> list[GridCell]:
+    """Return the cells whose order is compared with the paper's: those that it prints.
+
+    Args:
+        spec: the grid.
+        only: name of rows or columns -> those of their values that count; runs beside the grid then do not.
+    """
+    among = [cell for cell in cells(spec) if cell.published is not None]
+    if not only:
+        return among
+    ((row_key, rows),), ((column_key, columns),) = spec.rows.items(), spec.columns.items()
+    kept = {words for value, words in rows.items() if value in only.get(row_key, rows)}
+    in_columns = {words for value, words in columns.items() if value in only.get(column_key, columns)}
+    return [cell for cell in among if cell.row in kept and cell.column in in_columns]
+
+
 def correlation(
     spec: GridSpec, values: Values, only: Mapping[str, Collection[str]] | None = None
 ) -> float | None:
@@ -43,14 +59,9 @@ def correlation(
     Args:
         spec: the grid.
         values: what the runs came to.
-        only: name of rows or columns -> those of their values that count; runs beside the grid then do not.
+        only: see `ranked`.
     """
-    among = [cell for cell in cells(spec) if cell.published is not None]
-    if only:
-        ((row_key, rows),), ((column_key, columns),) = spec.rows.items(), spec.columns.items()
-        kept = {words for value, words in rows.items() if value in only.get(row_key, rows)}
-        in_columns = {words for value, words in columns.items() if value in only.get(column_key, columns)}
-        among = [cell for cell in among if cell.row in kept and cell.column in in_columns]
+    among = ranked(spec, only)
     pairs = [
         (value.number, cell.published)
         for cell in among

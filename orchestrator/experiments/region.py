@@ -22,7 +22,7 @@ from ..wording import hint, listed
 from .design import Level, latin_hypercube, levels_of
 from .experiment import RUNS, Experiment, NamedRun, changes_at
 from .findings import Findings, derive
-from .grids import cells
+from .grids import ranked
 from .jobs import Job, Once, Record, keyed, ready
 from .judged_schema import Claim, Reference
 from .judging import Judgement, judge
@@ -327,7 +327,8 @@ def runs_of(experiment: Experiment, claim: Claim) -> tuple[str, ...]:
             one = spec.derived[condition.derived]
             found |= dict.fromkeys(source.run for source in one.of.values())
             if one.rank_correlation is not None:
-                found |= dict.fromkeys(cell.run for cell in cells(spec.grids[one.rank_correlation]))
+                among = ranked(spec.grids[one.rank_correlation], one.only)
+                found |= dict.fromkeys(cell.run for cell in among)
         else:
             found |= dict.fromkeys(run.name for run in experiment.matching([condition.run]))
         if isinstance(condition.bound, Reference):

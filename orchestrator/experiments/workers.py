@@ -31,6 +31,9 @@ SHORT_FOLDER = "/tmp"
 """Where they go if the folder for temporary files has a longer path."""
 LOOK_EVERY = 0.2
 """Time between two looks whether to stop [s]."""
+FILES, FILES_EACH = 32, 4
+"""Files that have to be allowed open at a time, and as many for each process besides. Chosen: 32 do for two
+processes; each takes a pipe for its report and one that tells of its end."""
 TRIES = 2
 """Times that a run is begun whose process dies; chosen: a kill from outside strikes seldom twice."""
 NEEDED = ("orchestrator.wiring.make_plan", "orchestrator.master.simulate", "matplotlib.backends.backend_agg")
@@ -67,9 +70,10 @@ def execute(
 
     Raises:
         KeyboardInterrupt: Ctrl-C or SIGTERM, when all runs have ended.
+        YawbenchError: this process may not open as many files as that takes.
     """
-    context = _context()
     limit = max(1, workers or default_workers())
+    context = _context(limit)
     outcomes: dict[int, Outcome] = {}
     waiting = deque((number, job, TRIES) for number, job in enumerate(jobs))
     running: list[_Running] = []
@@ -99,16 +103,22 @@ def execute(
 
 
 def pool(workers: int | None = None) -> ProcessPoolExecutor:
-    """Return an executor for work that cannot fail as FMUs can: reading results, drawing figures."""
+    """Return an executor for work that cannot fail as FMUs can: reading results, drawing figures.
+
+    Raises:
+        YawbenchError: this process may not open as many files as that takes.
+    """
+    limit = max(1, workers or default_workers())
     return ProcessPoolExecutor(
-        max(1, workers or default_workers()),
-        mp_context=_context(),
+        limit,
+        mp_context=_context(limit),
         initializer=_end_with_caller,
     )
 
 
-def _context() -> Any:
+def _context(workers: int) -> Any:
     """Return how processes start: from a server that has imported once what each needs, or afresh."""
+    _require_files(FILES + FILES_EACH * max(workers, default_workers()))
     if "forkserver" not in multiprocessing.get_all_start_methods() or not _has_place_for_sockets():
         return SafeSpawnContext()
     context = multiprocessing.get_context("forkserver")
@@ -123,6 +133,20 @@ def _context() -> Any:
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, earlier)
     return context
+
+
+def _require_files(needed: int) -> None:
+    """Make sure that this process may open so many files, since the server of processes cannot say it."""
+    try:
+        import resource
+    except ImportError:  # Windows, which has no such limit
+        return
+    allowed, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if allowed != resource.RLIM_INFINITY and allowed < needed:
+        raise YawbenchError(
+            f"only {allowed} files may be open at a time, and these processes need {needed} "
+            f"(`ulimit -n {needed}`)"
+        )
 
 
 def _has_place_for_sockets() -> bool:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.errors import ScenarioError, SimulationError
+from orchestrator.errors import ScenarioError, SimulationError, YawbenchError
 from orchestrator.experiments.jobs import Job, read_back, ready
 from orchestrator.experiments.workers import execute, pool
 from orchestrator.results.read import load_results
@@ -185,3 +185,14 @@ def test_runs_start_where_the_path_of_temporary_files_is_too_long_for_sockets(fa
         check=False,
     )
     assert done.stdout.endswith("()\n"), done.stderr
+
+
+def test_too_few_open_files_are_told_before_a_process_starts(tmp_path):
+    resource = pytest.importorskip("resource")
+    allowed = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (30, allowed[1]))
+    try:
+        with pytest.raises(YawbenchError, match=r"only 30 files may be open .* need \d+ \(`ulimit -n"):
+            execute(jobs(tmp_path, "a"))
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, allowed)

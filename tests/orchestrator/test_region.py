@@ -16,8 +16,9 @@ from orchestrator.experiments.findings import Findings
 from orchestrator.experiments.jobs import Once, Record
 from orchestrator.experiments.margins import Gap, Region, Spot, margin
 from orchestrator.experiments.planning import jobs_of, plan_experiment
-from orchestrator.experiments.region import judge_region, plan_region
+from orchestrator.experiments.region import judge_region, plan_region, runs_of
 from orchestrator.experiments.verdicts import region_words, verdict
+from tests.checkout import ROOT
 from tests.fmu_copies import put_fmus
 
 SCENARIO = """
@@ -152,6 +153,16 @@ def test_a_check_is_judged_over_the_region_where_the_runs_of_claims_are_all_it_n
     assert unknown == [None, None]
 
 
+def test_a_rank_correlation_of_part_of_a_grid_takes_the_runs_of_that_part_alone():
+    experiment = load_experiment(ROOT / "scenarios" / "fuzzy_sliding_mode" / "distribution.yaml")
+    within, whole = (
+        next(one for one in experiment.spec.checks if words in one.says)
+        for words in ("within the groups", "rank correlation at least")
+    )
+    assert len(runs_of(experiment, within)) == 16  # shares of 0.25 and more on both sides
+    assert len(runs_of(experiment, whole)) == 26
+
+
 def test_failed_runs_count_as_another_verdict_and_are_said(judged):
     both = judged(failing=lambda peak: peak > 0.12).claims[1]
     assert both.region.without_result > 0
@@ -250,7 +261,12 @@ def test_study_makes_the_runs_of_the_region_once_and_quick_leaves_them_out(
     out, said, record = study("--jobs", "1")
     assert "region of its verdicts: 10 runs\n" in said  # 2 x 2 and 4 of plain alone, 2 of double
     region = record["claims"][0]["region"]
-    assert region["flip"] == {"open_value": "ratio", "at": pytest.approx(0.9), "words": "0.900"}
+    assert region["flip"] == {
+        "open_value": "ratio",
+        "at": pytest.approx(0.9),
+        "words": "0.900",
+        "chosen": "1.00",
+    }
     assert f"holds in {5 * region['holds_at']} % of 20" in " ".join(out.split())
     below = next(csv.DictReader((tmp_path / "o/verdicts.csv").open(encoding="utf-8")))
     assert (below["says"], below["verdict"]) == ("It stays below 0.06 rad.", "undecided")

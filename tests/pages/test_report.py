@@ -258,6 +258,15 @@ def test_several_studies_make_one_page_with_an_overview(report, half):
     assert Path("results", first).is_file()
 
 
+def test_studies_that_would_share_a_results_folder_are_refused(report, half):
+    other = half.parent / "elsewhere" / half.name
+    shutil.copytree(half, other)
+    files = [str((folder / "study.yaml").relative_to(Path.cwd())) for folder in (half, other)]
+    status, said = report(*files)
+    assert status == 2
+    assert f"{files[0]} and {files[1]} would share the results folder results/{half.name}/study" in said
+
+
 def test_the_four_papers_are_found_in_their_order_and_what_goes_beyond_them_after():
     found = [path.relative_to(ROOT / "scenarios").as_posix() for path in found_studies(ROOT / "scenarios")]
     assert found == [
