@@ -66,6 +66,8 @@ def conduct(experiment: Experiment, folder: Path, wishes: Wishes, **of_jobs: Any
     from ..fmu.opener import stale_fmus
     from ..titles import changed
 
+    if wishes.quick and experiment.spec.repeats:
+        experiment = experiment.short
     jobs = jobs_of(
         experiment, folder, wishes.fmus, keep=wishes.keep, format=wishes.format, call_limit=wishes.call_limit
     )
@@ -264,9 +266,9 @@ def of_files(
     for experiment, folder in zip(experiments, folders, strict=True):
         findings = conduct(experiment, folder, wishes)
         command = command_of(
-            "sweep" if experiment.spec.axes else "study",
+            "study" if experiment.spec.runs else "sweep",
             experiment.path,
-            quick=wishes.quick and experiment.spec.region is not None,
+            quick=wishes.quick and (experiment.spec.region is not None or bool(experiment.spec.repeats)),
             swap=[f"{one.place}={one.value}" for one in changes if one.swaps],
             set=[f"{one.place}={one.value}" for one in changes if not (one.swaps or one.faulty)],
             fault=[f"{one.faulty}: {one.value}" for one in changes if one.faulty],

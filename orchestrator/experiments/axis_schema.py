@@ -12,6 +12,7 @@ from ..scenario.measurement_units import parse_unit
 from ..scenario.scenario_schema import Scalar, Time
 from ..scenario.strict import Strict
 from ..wording import short
+from .judged_schema import Patterns
 from .numbers import Number, is_finite, text_of
 
 MOST = 100_000
@@ -161,6 +162,23 @@ class AxisSpec(Strict):
             raise ValueError(f"from must be below to (got {self.start:g} and {self.end:g})")
         if self.spacing == "log" and self.start <= 0:
             raise ValueError("from must be above 0 where spacing is log")
+
+
+class DesignAxisSpec(AxisSpec):
+    """An axis of the points at which the runs of an experiment are made."""
+
+    runs: Patterns = Field(["*"], description="Which runs it changes; the others are the same all along it")
+    repeats: bool = Field(
+        False,
+        description="Whether its values, seeds say, make repeats of one and the same: every number is then "
+        "the mean over them, with its confidence interval; listed, with at least 2 of them",
+    )
+
+    @model_validator(mode="after")
+    def _repeated(self) -> DesignAxisSpec:
+        if self.repeats and len(self.values or ()) < 2:
+            raise ValueError("repeats: needs a list of two values or more")
+        return self
 
 
 def _is_setting(place: str) -> bool:

@@ -39,7 +39,7 @@ class Drawing:
         only = {axis: set(map(text_of, values)) for axis, values in spec.only.items()}
         self.runs = [
             run
-            for run in findings.experiment.cases
+            for run in findings.experiment.first_cases
             if all(text_of(self.at(run, axis).value) in values for axis, values in only.items())
         ]
         self.what = ""  # what is drawn, without its unit
@@ -61,7 +61,7 @@ class Drawing:
 
     def panels(self) -> list[tuple[str, list[Case]]]:
         """Return the heading and the runs of each panel."""
-        runs = self.findings.experiment.cases
+        runs = self.findings.experiment.first_cases
         if not self.spec.panel_axis:
             return [("", runs)]
         return [

@@ -5,11 +5,12 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
+from typing import Any, TypeVar
 
 from ..errors import ScenarioError
 from ..files import reads
@@ -22,16 +23,22 @@ from ..wording import hint, short
 from .axis_schema import AxisSpec, Changes
 from .design import Level, Point, levels_of, points
 from .grids import cells
-from .judged_schema import Condition, Reference
+from .judged_schema import Claim, Condition, DerivedSpec, Reference
 from .numbers import text_of
 from .schema import ExperimentSpec, FigureSpec, RunSpec
 
 FIGURES, RUNS = "figures", "runs"
 """Folders of the figures and of what runs along axes keep, beside those of named runs."""
+SENTENCES = ("says", "short", "source", "note")
+"""Fields of claims and derived numbers that are for people."""
+T = TypeVar("T")
+Texts = TypeVar("Texts", Claim, DerivedSpec)
 RUN = "run"
 """What figures and tables along axes call the axis of named runs."""
 COLUMNS = (RUN, "status", "reason", "findings", "key")
 """Columns of the table beside the axes and the metrics."""
+FEW = 3
+"""Repeats in haste. Chosen: fewer say nothing of chance."""
 MOST = 10_000
 """Runs that are named. Chosen: a hundred times the largest of ours; all stand in one report."""
 LONGEST = 100
@@ -95,9 +102,38 @@ class Experiment:
         """All runs at all points, one run after the other."""
         pairs = itertools.product(self.runs.values(), self.points)
         return [
-            Case(number, run, point, (*self.for_all, *run.changes, *self.by_options, *self._at(point)))
+            Case(number, run, point, (*self.for_all, *run.changes, *self.by_options, *self._at(point, run)))
             for number, (run, point) in enumerate(pairs)
         ]
+
+    def setting(self, point: Point) -> Point:
+        """Return a point without the axes that make repeats of one and the same."""
+        pairs = zip(self.spec.axes.values(), point, strict=True)
+        return tuple(level for axis, level in pairs if not axis.repeats)
+
+    @cached_property
+    def settings(self) -> list[Point]:
+        """All points without the axes that make repeats of one and the same, each once."""
+        return list(dict.fromkeys(map(self.setting, self.points)))
+
+    @property
+    def short(self) -> Experiment:
+        """The same with the first few of its repeats."""
+        axes = {
+            name: axis.model_copy(update={"values": dict(itertools.islice((axis.values or {}).items(), FEW))})
+            if axis.repeats
+            else axis
+            for name, axis in self.spec.axes.items()
+        }
+        return replace(self, spec=self.spec.model_copy(update={"axes": axes}))
+
+    @cached_property
+    def first_cases(self) -> list[Case]:
+        """All runs at all settings: of repeats the first."""
+        found: dict[tuple[str, Point], Case] = {}
+        for case in self.cases:
+            found.setdefault((case.run.name, self.setting(case.point)), case)
+        return list(found.values())
 
     def matching(self, patterns: Sequence[str]) -> list[NamedRun]:
         """Return the runs that any of the patterns names, in the order of the patterns."""
@@ -111,9 +147,13 @@ class Experiment:
         axes = self.spec.axes.items()
         return next(((n, change.place) for n, axis in axes if change and change.place in axis.places), None)
 
-    def _at(self, point: Point) -> list[Change]:
-        """Return what a point changes."""
-        pairs = zip(self.spec.axes.values(), point, strict=True)
+    def _at(self, point: Point, run: NamedRun | None = None) -> list[Change]:
+        """Return what a point changes, in a run if one is given."""
+        pairs = [
+            (axis, level)
+            for axis, level in zip(self.spec.axes.values(), point, strict=True)
+            if run is None or any(fnmatchcase(run.name, pattern) for pattern in axis.runs)
+        ]
         return [change for axis, level in pairs for change in changes_at(axis, level, self.path.parent)]
 
 
@@ -160,6 +200,7 @@ def load_experiment(path: Path | str, *, changes: Sequence[Change] = ()) -> Expe
     spec = validate(ExperimentSpec, document)
     if spec is None or document.problems:
         raise ScenarioError(document.sentences())
+    spec = _every(spec, document)
     runs = {"": NamedRun("", "", "", path.parent / spec.scenario, ())} if spec.scenario else {}
     for i, entry in enumerate(spec.runs):
         for run in _expanded(document, ("runs", i), entry):
@@ -181,23 +222,82 @@ def load_experiment(path: Path | str, *, changes: Sequence[Change] = ()) -> Expe
     return experiment
 
 
+def _filled(document: Document, key: Key, text: str, use: Mapping[str, str]) -> str:
+    """Return a text with what its words in braces stand for."""
+    for word in re.findall(r"\{([^{}]*)\}", text):
+        if word not in use:
+            sentence = f"{{{word}}} stands for nothing" + hint(word, use, lead="'for' has")
+            document.report(key, sentence)
+    return re.sub(r"\{(\w+)\}", lambda match: use.get(match[1], match[0]), text)
+
+
+def _combinations(
+    document: Document, key: Key, for_each: Mapping[str, Mapping[str, T]], what: str
+) -> Iterator[dict[str, tuple[str, T]]]:
+    """Yield name -> value and what belongs to it, for every combination of a `for`; none of too many."""
+    number = math.prod(map(len, for_each.values()))
+    if number > MOST:
+        document.report((*key, "for"), f"stands for {number} {what}; at most {MOST} are taken")
+        return
+    for combination in itertools.product(*(choices.items() for choices in for_each.values())):
+        yield dict(zip(for_each, combination, strict=True))
+
+
+def _every(spec: ExperimentSpec, document: Document) -> ExperimentSpec:
+    """Return the file with one claim, check or derived number for each that an entry stands for."""
+    derived: dict[str, DerivedSpec] = {}
+    for name, number in spec.derived.items():
+        key: Key = ("derived", name)
+        for one in _combinations(document, key, number.for_each, "numbers"):
+            values, wording = _values_and_words(one)
+            made = name
+            if one:
+                made = _filled(document, key, name, values)
+                number = _with_texts(document, key, spec.derived[name], values, wording)
+            if made in derived:
+                document.report(key, f"there is already a derived number {made!r}")
+            derived[made] = number
+    said: dict[str, list[Claim]] = {"claims": [], "checks": []}
+    for group, every in said.items():
+        for i, claim in enumerate(getattr(spec, group)):
+            for one in _combinations(document, (group, i), claim.for_each, group):
+                filled = _with_texts(document, (group, i), claim, *_values_and_words(one)) if one else claim
+                filled._number = i
+                every.append(filled)
+    return spec.model_copy(update={"derived": derived, **said})
+
+
+def _values_and_words(one: Mapping[str, tuple[str, str]]) -> tuple[dict[str, str], dict[str, str]]:
+    return {k: value for k, (value, _) in one.items()}, {k: words for k, (_, words) in one.items()}
+
+
+def _with_texts(
+    document: Document, key: Key, entry: Texts, values: Mapping[str, str], wording: Mapping[str, str]
+) -> Texts:
+    """Return an entry, one of those it stands for: names get values, sentences their words."""
+
+    def fill(part: Any, name: str = "") -> Any:
+        if isinstance(part, dict):
+            return {k: fill(v, k) for k, v in part.items()}
+        if isinstance(part, list):
+            return [fill(v, name) for v in part]
+        use = wording if name in SENTENCES else values
+        return _filled(document, key, part, use) if isinstance(part, str) else part
+
+    given = entry.model_dump(by_alias=True, exclude_defaults=True, exclude={"for_each"})
+    return type(entry).model_validate(fill(given))
+
+
 def _expanded(document: Document, key: Key, entry: RunSpec) -> Iterator[NamedRun]:
     """Return the runs that an entry stands for, none if it is wrong."""
     known = len(document.problems)
-    number = math.prod(map(len, entry.for_each.values()))
-    if number > MOST:
-        document.report((*key, "for"), f"stands for {number} runs; at most {MOST} are taken")
-        return
-    for combination in itertools.product(*(choices.items() for choices in entry.for_each.values())):
-        values = dict(zip(entry.for_each, (value for value, _ in combination), strict=True))
-        wording = dict(zip(entry.for_each, (said for _, said in combination), strict=True))
+    for combination in _combinations(document, key, entry.for_each, "runs"):
+        values = {name: value for name, (value, _) in combination.items()}
+        wording = {name: chosen.says or value for name, (value, chosen) in combination.items()}
+        entries = [entry, *(chosen for _, chosen in combination.values())]
 
         def fill(text: str, *where: str, use: dict[str, str] = values) -> str:
-            for word in re.findall(r"\{([^{}]*)\}", text):
-                if word not in use:
-                    sentence = f"{{{word}}} stands for nothing" + hint(word, use, lead="'for' has")
-                    document.report((*key, *where), sentence)
-            return re.sub(r"\{(\w+)\}", lambda match: use.get(match[1], match[0]), text)
+            return _filled(document, (*key, *where), text, use)
 
         name = fill(entry.name, "name")
         parts = name.split("/")
@@ -207,18 +307,24 @@ def _expanded(document: Document, key: Key, entry: RunSpec) -> Iterator[NamedRun
                 sentence = f"{short(name)} is too long: at most {LONGEST} characters between two /"
             document.report((*key, "name"), sentence)
         folder = document.path.parent
-        swaps = {unit: fill(fmu, "swap", unit) for unit, fmu in entry.swap.items()}
-        settings = {
-            place: yaml_lines.scalar(fill(value, "set", place)) if isinstance(value, str) else value
-            for place, value in entry.set.items()
-        }
-        changes = changes_of_file(entry.model_copy(update={"swap": swaps, "set": settings}), folder, "study")
+        changes: dict[str, Change] = {}
+        for one in entries:
+            swaps = {unit: fill(fmu, "swap", unit) for unit, fmu in one.swap.items()}
+            settings = {
+                place: yaml_lines.scalar(fill(value, "set", place)) if isinstance(value, str) else value
+                for place, value in one.set.items()
+            }
+            filled = one.model_copy(update={"swap": swaps, "set": settings})
+            for change in changes_of_file(filled, folder, "study"):
+                if change.place in changes:
+                    document.report((*key, "for"), f"{change.place} is given twice")
+                changes[change.place] = change
         label = fill(entry.label, "label", use=wording) or name
         row = fill(entry.row, "row", use=wording) or label
         scenario = folder / fill(entry.scenario, "scenario")
         if len(document.problems) > known:
             return
-        yield NamedRun(name, label, row, scenario, tuple(changes))
+        yield NamedRun(name, label, row, scenario, tuple(changes.values()))
 
 
 def _known(document: Document, key: Key, name: str, known: Iterable[str], what: str, many: str) -> None:
@@ -258,14 +364,20 @@ def _check_names(experiment: Experiment, document: Document) -> None:
                 sentence = f"no run is named {pattern!r}" + hint(pattern, runs, lead="runs")
                 document.report((*key, "runs", k), sentence)
 
+    for name, along in spec.axes.items():
+        check_patterns(("axes", name), along.runs)
     for i, table in enumerate(spec.tables):
         check_patterns(("tables", i), table.runs)
         for k, name in enumerate(table.metrics):
             check_metric(("tables", i, "metrics", k), name)
     for name, grid in spec.grids.items():
-        check_metric(("grids", name, "metric"), grid.metric)
-        for run in dict.fromkeys(cell.run for cell in cells(grid)):
-            _known(document, ("grids", name), run, runs, "run", "runs")
+        for cell in cells(grid):
+            if grid.derived:
+                _known(document, ("grids", name), cell.metric, spec.derived, "derived number", "there are")
+            else:
+                _known(document, ("grids", name), cell.run, runs, "run", "runs")
+        if grid.metric:
+            check_metric(("grids", name, "metric"), grid.metric)
     for name, number in spec.derived.items():
         for word, source in number.of.items():
             _known(document, ("derived", name, "of", word, "run"), source.run, runs, "run", "runs")
@@ -287,7 +399,7 @@ def _check_names(experiment: Experiment, document: Document) -> None:
     for name, one in open_values.items():
         check_patterns(("region", "open_values", name), one.runs)
     for group, judged in (("claims", spec.claims), ("checks", spec.checks)):
-        for i, claim in enumerate(judged):
+        for i, claim in ((one.number(number), one) for number, one in enumerate(judged)):
             for k, name in enumerate(claim.open_values or ()):
                 where: Key = (group, i, "open_values", k)
                 _known(document, where, name, open_values, "open value", "open values")
@@ -301,6 +413,8 @@ def _check_names(experiment: Experiment, document: Document) -> None:
         check_axis(("limits", name, "of"), limit.of)
         if limit.of in spec.axes and not spec.axes[limit.of].numeric:
             document.report(("limits", name, "of"), f"the values of {limit.of!r} are no numbers")
+        if limit.of in spec.repeats:
+            document.report(("limits", name, "of"), f"numbers are means over {limit.of!r}")
         if spec.design != "grid":
             document.report(("limits", name), "limits need a grid")
     for i, figure in enumerate(spec.figures):
@@ -311,13 +425,17 @@ def _check_names(experiment: Experiment, document: Document) -> None:
                             ("panels", figure.panel_axis)):  # fmt: skip
             if name and not (name == RUN and spec.runs):
                 check_axis(("figures", i, group), name)
+            if name in spec.repeats:
+                document.report(("figures", i, group), f"numbers are means over {name!r}")
         if figure.metric:
             check_metric(("figures", i, "metric"), figure.metric)
         if figure.limit:
             _known(document, ("figures", i, "limit"), figure.limit, spec.limits, "limit", "limits")
         if figure.kind == "overlay" and spec.axes:
             document.report(("figures", i, "kind"), "runs along axes are drawn as curve, map or limit")
-        if figure.kind != "overlay":
+        if figure.grid:
+            _known(document, ("figures", i, "grid"), figure.grid, spec.grids, "grid", "grids")
+        elif figure.kind != "overlay":
             _check_places(spec, document, i, figure)
         for axis, chosen in figure.only.items():
             check_axis(("figures", i, "only", axis), axis)
@@ -362,6 +480,7 @@ def _check_places(spec: ExperimentSpec, document: Document, i: int, figure: Figu
     for axis in (figure.x, figure.y):
         if axis in spec.axes and figure.kind == "map" and not spec.axes[axis].numeric:
             document.report(("figures", i), f"the values of {axis!r} are no numbers")
+    used |= {*spec.repeats}
     left = [name for name in (*spec.axes, *([RUN] if spec.runs else [])) if name not in used]
     if spec.design == "grid" and left and not document.problems:
         sentence = f"the axis {left[0]!r} has no place in this figure: make it lines or panels"

@@ -15,13 +15,13 @@ from .drawing import Drawing
 from .experiment import FIGURES
 from .findings import Each, Findings
 from .limit_drawing import Limits
-from .metric_drawing import Curves, Map
+from .metric_drawing import Curves, GridLines, Map
 from .schema import FigureSpec
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-KINDS: dict[str, type[Drawing]] = {"curve": Curves, "map": Map, "limit": Limits}
+KINDS: dict[str, type[Drawing]] = {"curve": Curves, "map": Map, "limit": Limits, "grid": GridLines}
 PANELS_IN_A_ROW = 3
 
 
@@ -94,7 +94,7 @@ def draw_over_axes(findings: Findings, spec: FigureSpec) -> Figure:
             axes.set_title(literal(heading))
         for k, axes in enumerate(drawn):
             if k + columns >= len(drawn):  # none stands below
-                axes.set_xlabel(literal(drawing.label(spec.x)))
+                axes.set_xlabel(literal(drawing.label(spec.x)) if spec.x else "")
                 axes.tick_params(labelbottom=True)
         drawing.finish(figure, drawn, drawn[::columns])
         options = changed(findings.experiment.by_options)

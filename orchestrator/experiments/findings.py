@@ -7,14 +7,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from ..metrics.run_metrics import Value
 from ..results.read import Results
 from ..wording import counted
+from .confidence import interval
 from .derived import calculate
 from .design import Point
-from .experiment import Case, Experiment
+from .experiment import Case, Experiment, NamedRun
 from .grids import correlation
 from .jobs import Outcome, Record, measured, read_back
 from .judged_schema import Claim
@@ -23,6 +24,7 @@ from .margins import Region
 from .planning import Planned, metrics_of
 from .schema import ExperimentSpec
 
+K = TypeVar("K")
 Each = Callable[..., Iterable[Any]]
 """`map`, or the `map` of an executor."""
 
@@ -74,7 +76,11 @@ class Findings:
 
     @cached_property
     def at(self) -> dict[Point, dict[tuple[str, str], Value]]:
-        """Point -> (run, metric) -> value, of those that exist."""
+        """Setting -> (run, metric) -> value, of those that exist; over repeats the mean."""
+        return self._means(self._at_points)
+
+    @cached_property
+    def _at_points(self) -> dict[Point, dict[tuple[str, str], Value]]:
         found: dict[Point, dict[tuple[str, str], Value]] = {}
         for case in self.experiment.cases:
             here = found.setdefault(case.point, {})
@@ -85,13 +91,48 @@ class Findings:
 
     @property
     def values(self) -> Values:
-        """(run, metric) -> value, at the first point of the axes, which is all there is without axes."""
+        """(run, metric) -> value, at the first setting of the axes, which is all there is without axes."""
         return next(iter(self.at.values()))
 
     @cached_property
     def derived_at(self) -> dict[Point, dict[str, Value]]:
-        """Point -> numbers derived from several runs, those that exist."""
-        return {point: derive(self.spec, values) for point, values in self.at.items()}
+        """Setting -> numbers derived from several runs, those that exist; over repeats the mean."""
+        return self._means({point: derive(self.spec, values) for point, values in self._at_points.items()})
+
+    def mean(self, case: Case, key: str) -> Value | None:
+        """Return a metric of a case, over repeats of it the mean; None if one failed or gives none."""
+        return self.at[self.experiment.setting(case.point)].get((case.run.name, key))
+
+    def _means(self, found: Mapping[Point, Mapping[K, Value]]) -> dict[Point, dict[K, Value]]:
+        """Return setting -> what -> its mean over repeats, of what all of them have."""
+        repeats: dict[Point, list[Mapping[K, Value]]] = {}
+        for point, values in found.items():
+            repeats.setdefault(self.experiment.setting(point), []).append(values)
+        means: dict[Point, dict[K, Value]] = {}
+        for setting, several in repeats.items():
+            here = means[setting] = {}
+            for key in several[0]:
+                every = [values[key] for values in several if key in values]
+                over = interval([value.number for value in every]) if len(every) == len(several) else None
+                if over is not None:
+                    here[key] = Value(over.mean, every[0].unit, over.half)
+        return means
+
+    def cases_of(self, run: NamedRun, setting: Point) -> list[Case]:
+        """Return a run at a setting: one case, or its repeats."""
+        return self._cases[run.name, setting]
+
+    @cached_property
+    def _cases(self) -> dict[tuple[str, Point], list[Case]]:
+        found: dict[tuple[str, Point], list[Case]] = {}
+        for case in self.experiment.cases:
+            found.setdefault((case.run.name, self.experiment.setting(case.point)), []).append(case)
+        return found
+
+    def failure(self, run: NamedRun, setting: Point) -> str:
+        """Return why a run at a setting failed, or the first of its repeats that did; "" for none."""
+        records = (self.record(case) for case in self.cases_of(run, setting))
+        return next(("; ".join(record.problems) for record in records if not record.ok), "")
 
     @property
     def derived(self) -> dict[str, Value]:
@@ -113,7 +154,7 @@ class Findings:
         return [replace(self.judged(one), region=self.regions.get((group, i))) for i, one in every]
 
     def judged(self, claim: Claim) -> Judgement:
-        """Return whether a claim holds; along axes, whether it does at every point."""
+        """Return whether a claim holds; along axes, whether it does at every setting of them."""
         words = {run.name: run.row for run in self.experiment.runs.values()}
         every = [judge(claim, values, words, self.derived_at[at]) for at, values in self.at.items()]
         if len(every) == 1:

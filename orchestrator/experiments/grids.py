@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from ..figures.display import digits_of
+from ..figures.display import digits_of, shown
 from .derived import rank_correlation
 from .judged_schema import GridSpec
 from .judging import Values
@@ -17,10 +17,16 @@ from .tables import Cell, Table
 class GridCell:
     """A run of a grid, where it stands, and what the paper prints for it (None: nothing)."""
 
-    run: str
+    run: str  # "" for a derived number
+    metric: str  # or the key of a derived number
     row: str
     column: str
     published: float | None
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Where its value stands."""
+        return self.run, self.metric
 
 
 def cells(spec: GridSpec) -> list[GridCell]:
@@ -29,10 +35,13 @@ def cells(spec: GridSpec) -> list[GridCell]:
     ((column_key, columns),) = spec.columns.items()
     found = []
     for (i, row), (k, column) in itertools.product(enumerate(rows), enumerate(columns)):
-        name = spec.run.replace(f"{{{row_key}}}", row).replace(f"{{{column_key}}}", column)
+        run, derived = (
+            text.replace(f"{{{row_key}}}", row).replace(f"{{{column_key}}}", column)
+            for text in (spec.run, spec.derived)
+        )
         published = spec.published[i][k] if spec.published else None
-        found.append(GridCell(name, rows[row], columns[column], published))
-    return found + [GridCell(one.run, one.says, "", one.published) for one in spec.beside]
+        found.append(GridCell(run, spec.metric or derived, rows[row], columns[column], published))
+    return found + [GridCell(one.run, spec.metric, one.says, "", one.published) for one in spec.beside]
 
 
 def ranked(spec: GridSpec, only: Mapping[str, Collection[str]] | None = None) -> list[GridCell]:
@@ -65,7 +74,7 @@ def correlation(
     pairs = [
         (value.number, cell.published)
         for cell in among
-        if cell.published is not None and (value := values.get((cell.run, spec.metric))) is not None
+        if cell.published is not None and (value := values.get(cell.key)) is not None
     ]
     wanted = len(among)
     if len(pairs) < max(wanted, 2):
@@ -74,10 +83,24 @@ def correlation(
     return rank_correlation(measured, published)
 
 
-def grid_table(spec: GridSpec, values: Values) -> Table:
-    """Return the table: measured on the left, published on the right, all in SI and three digits."""
+def grid_table(
+    spec: GridSpec, values: Values, verdicts: Mapping[tuple[str, str], str] | None = None
+) -> Table:
+    """Return the table: measured on the left, published on the right, all in SI and three digits.
+
+    A grid that says how far down its columns `holds`, one of derived numbers, or one of means over repeats,
+    has its numbers as people read them.
+
+    Args:
+        spec: the grid.
+        values: what the runs came to, derived numbers as those of a run "".
+        verdicts: of what is said of single cells: "" if it holds, else a sign.
+    """
     ((_, rows),) = spec.rows.items()
     ((_, columns),) = spec.columns.items()
+    inside_all = [values.get(cell.key) for cell in cells(spec)]
+    if spec.holds or spec.derived or any(value and value.half for value in inside_all):
+        return _told_table(spec, values, verdicts or {})
     units = {value.unit for (_, key), value in values.items() if key == spec.metric}
     unit = "" if units <= {"1", "%"} else f" [{units.pop()}]"
     width, every = len(columns), cells(spec)
@@ -87,13 +110,13 @@ def grid_table(spec: GridSpec, values: Values) -> Table:
         table.headings += ["the paper:", *columns.values()]
     for i, row in enumerate(rows.values()):
         line = inside[i * width : (i + 1) * width]
-        measured = [_digits(_measured(cell, spec, values)) for cell in line]
+        measured = [_digits(_measured(cell, values)) for cell in line]
         printed = [_digits(cell.published) for cell in line]
         table.rows.append([row, *measured, *([row, *printed] if spec.published else [])])
     table.numbers = set(range(1, len(table.headings))) - {width + 1}
     for cell in beside:
         said = f", the paper: {_digits(cell.published)}" if cell.published is not None else ""
-        table.notes.append(f"{cell.row}: {_digits(_measured(cell, spec, values))}{said}")
+        table.notes.append(f"{cell.row}: {_digits(_measured(cell, values))}{said}")
     if spec.published:
         found = correlation(spec, values)
         table.notes.append(
@@ -103,8 +126,36 @@ def grid_table(spec: GridSpec, values: Values) -> Table:
     return table
 
 
-def _measured(cell: GridCell, spec: GridSpec, values: Values) -> float | None:
-    value = values.get((cell.run, spec.metric))
+def _told_table(spec: GridSpec, values: Values, verdicts: Mapping[tuple[str, str], str]) -> Table:
+    """Return the table with units and confidence; if it is to say so, how far down each column holds."""
+    ((_, rows),) = spec.rows.items()
+    ((_, columns),) = spec.columns.items()
+    every = cells(spec)
+    table = Table(spec.title, [spec.corner, *columns.values()], numbers=set(range(1, len(columns) + 1)))
+    for row in rows.values():
+        words = []
+        for cell in (one for one in every if one.row == row):
+            value = values.get(cell.key)
+            text = "-" if value is None else shown(value.number, value.unit, half=value.half)
+            words.append(f"{text} {verdicts.get(cell.key, '')}".rstrip() if spec.holds else text)
+        table.rows.append([row, *words])
+    if spec.holds:
+        table.rows.append([spec.holds, *(_down_to(spec, column, verdicts) for column in columns.values())])
+    return table
+
+
+def _down_to(spec: GridSpec, column: str, verdicts: Mapping[tuple[str, str], str]) -> str:
+    """Return the last row of a column down to which all that is said of its cells holds."""
+    last = ""
+    for cell in (one for one in cells(spec) if one.column == column):
+        if verdicts.get(cell.key):
+            return last or "-"
+        last = cell.row
+    return "all"
+
+
+def _measured(cell: GridCell, values: Values) -> float | None:
+    value = values.get(cell.key)
     return None if value is None else value.number
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, PlainValidator, PrivateAttr, Tag, model_validator
 
 from ..errors import ScenarioError
 from ..metrics.run_metrics import during, metric, window_of
@@ -19,7 +19,7 @@ OPERATORS = {"above": ">", "at_least": "≥", "below": "<", "at_most": "≤"}
 """Key of a condition -> its sign."""
 
 
-def _alternatives(value: object) -> dict[str, str]:
+def alternatives(value: object) -> dict[str, str]:
     """Return the values of one `for` key with their words."""
     if isinstance(value, list) and value and all(isinstance(v, (str, int, float)) for v in value):
         return {text_of(v): text_of(v) for v in value}
@@ -44,7 +44,7 @@ def _metric_name(name: str) -> str:
         raise ValueError(str(error)) from None
 
 
-Alternatives = Annotated[dict[str, str], PlainValidator(_alternatives)]
+Alternatives = Annotated[dict[str, str], PlainValidator(alternatives)]
 Window = Annotated[tuple[float, float], PlainValidator(_window)]
 MetricName = Annotated[str, AfterValidator(_metric_name)]
 Patterns = Annotated[list[str], Field(min_length=1)]
@@ -85,20 +85,32 @@ class GridSpec(Strict):
     """A metric of many runs in rows and columns, beside what a paper prints."""
 
     title: str = Field(min_length=1)
-    metric: str
-    run: str = Field(description="Names of the runs, with {name} for row and column", min_length=1)
+    metric: str = ""
+    run: str = Field("", description="Names of the runs, with {name} for row and column")
+    derived: str = Field(
+        "", description="In place of metric and run: keys of `derived`, with {name} for row and column"
+    )
     rows: Axis
     columns: Axis
     corner: str = Field("", description="Heading of the column of rows")
     published: list[list[float]] | None = Field(None, description="In SI, row by row")
     beside: list[BesideSpec] = Field([], description="Runs outside the grid")
+    holds: str = Field(
+        "",
+        description="Heading of a last row: down to where the claims and checks about a column's cells hold",
+    )
 
     @model_validator(mode="after")
     def _shape(self) -> GridSpec:
         ((row, rows),), ((column, columns),) = self.rows.items(), self.columns.items()
+        if bool(self.derived) == bool(self.metric) or bool(self.metric) != bool(self.run):
+            raise ValueError("needs run and metric, or derived in place of both")
+        if self.derived and (self.published or self.beside):
+            raise ValueError("derived: such a grid has nothing published and no run beside it")
         for name in (row, column):
-            if f"{{{name}}}" not in self.run:
-                raise ValueError(f"run: {self.run!r} does not depend on {{{name}}}")
+            if f"{{{name}}}" not in self.run + self.derived:
+                which = f"derived: {self.derived!r}" if self.derived else f"run: {self.run!r}"
+                raise ValueError(f"{which} does not depend on {{{name}}}")
         if len(rows) * len(columns) > CELLS:
             raise ValueError(f"{len(rows) * len(columns)} runs; at most {CELLS} are taken")
         if row == column:
@@ -124,6 +136,9 @@ class DerivedSpec(Strict):
     """A number derived from several runs: an expression of metrics, or a grid's rank correlation."""
 
     says: str = Field(description="What the number is", min_length=1)
+    for_each: dict[str, Alternatives] = Field(
+        {}, alias="for", description="Key -> values; one number per combination, named in its key by {key}"
+    )
     expression: Annotated[str, AfterValidator(_expression)] | None = None
     of: dict[str, Source] = Field({}, description="Name in the expression -> metric of a run")
     rank_correlation: str | None = Field(None, description="Grid whose order is compared with the paper's")
@@ -220,12 +235,20 @@ class Judged(Strict):
 class Claim(Judged):
     """What somebody says, and the comparisons that decide whether it holds."""
 
+    for_each: dict[str, Alternatives] = Field(
+        {}, alias="for", description="Key -> values; one claim per combination, {key} in its texts"
+    )
     short: str = Field("", description="The same for the table of runs, e.g. '> 100 %'")
     source: str = Field("", description="Where it is said: section, figure, table")
     note: str = Field("", description="What a reader should know about the verdict")
     open_values: list[str] | None = Field(
         None, description="Those of the region that it depends on; left out: all that touch its runs"
     )
+    _number: int | None = PrivateAttr(None)
+
+    def number(self, otherwise: int) -> int:
+        """Return where it stands in the file, for one of many of one entry; else `otherwise`."""
+        return otherwise if self._number is None else self._number
 
 
 class LimitSpec(Judged):

@@ -38,6 +38,16 @@ class Judgement:
     region: Region | None = None
 
     @property
+    def sure(self) -> bool:
+        """Whether chance leaves the verdict as it is: no threshold that decides lies within confidence."""
+        gaps = [gap for gap in self.gaps if gap is not None]
+        if self.holds is None or not any(gap.half for gap in gaps):
+            return True
+        if self.holds:
+            return all(gap.beyond >= gap.half for gap in gaps)
+        return any(gap.beyond <= -gap.half for gap in gaps)
+
+    @property
     def margin(self) -> float | None:
         """How far the claim is from the other verdict, as a share of its threshold (see `margins`)."""
         return margin(self.gaps)
@@ -85,12 +95,15 @@ def _compare(
     if isinstance(bound, Reference):
         other = values.get((bound.run, bound.metric))
         limit = None if other is None else bound.times * other.number
+        off = 0.0 if other is None else abs(bound.times) * other.half
         text = f"{text} against {_range([(other, runs[bound.run])] if other else [], other is None)}"
     else:
-        limit = _number(bound, known[0][0].unit) if known else None
+        limit, off = _number(bound, known[0][0].unit) if known else None, 0.0
     itself = (bound.run, bound.metric) if isinstance(bound, Reference) else None
     gaps = [
-        None if value is None or limit is None else Gap(value.number, limit, condition.operator in _UPWARDS)
+        None
+        if value is None or limit is None
+        else Gap(value.number, limit, condition.operator in _UPWARDS, value.half + off)
         for run, (_, value) in zip(named, measured, strict=True)
         if (run, condition.metric) != itself  # which tells nothing
     ]
@@ -104,7 +117,7 @@ def _range(known: Sequence[tuple[Value, str]], missing: bool) -> str:
     """Return the value, or the smallest and the largest where they read differently, with their runs."""
     ends: dict[str, str] = {}
     for value, run in (*known[:1], *known[-1:]):
-        ends.setdefault(shown(value.number, value.unit), run)
+        ends.setdefault(shown(value.number, value.unit, half=value.half), run)
     text = " to ".join(f"{number} ({run})" if run else number for number, run in ends.items())
     return " and ".join(filter(None, [text, "no result" if missing else ""]))
 

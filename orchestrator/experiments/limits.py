@@ -25,11 +25,13 @@ class Limit:
 
 def limits_of(findings: Findings, spec: LimitSpec) -> list[Limit]:
     """Return the limit for every run and setting of the other axes, in the order of the design."""
-    names = list(findings.spec.axes)
+    experiment = findings.experiment
+    names = [name for name, axis in findings.spec.axes.items() if not axis.repeats]
     at = names.index(spec.of)
     lines: dict[tuple[str, tuple[Level, ...]], list[Case]] = {}
-    for case in findings.experiment.cases:
-        lines.setdefault((case.run.name, case.point[:at] + case.point[at + 1 :]), []).append(case)
+    for case in experiment.first_cases:
+        setting = experiment.setting(case.point)
+        lines.setdefault((case.run.name, setting[:at] + setting[at + 1 :]), []).append(case)
     found = []
     for (name, setting), cases in lines.items():
         others = {RUN: Level(name, cases[0].run.label)} if name else {}
@@ -43,10 +45,13 @@ def _limit(
 ) -> Limit:
     largest = None
     run = cases[0].run
-    for case in sorted(cases, key=lambda case: float(case.point[at].value)):
-        here = float(case.point[at].value)
-        if not judge(spec, findings.at[case.point], {run.name: run.row}).holds:
-            return Limit(others, largest, here, failed=not findings.record(case).ok)
+    for setting in sorted(
+        map(findings.experiment.setting, (case.point for case in cases)),
+        key=lambda setting: float(setting[at].value),
+    ):
+        here = float(setting[at].value)
+        if not judge(spec, findings.at[setting], {run.name: run.row}).holds:
+            return Limit(others, largest, here, failed=bool(findings.failure(run, setting)))
         largest = here
     return Limit(others, largest, None)
 

@@ -26,6 +26,7 @@ class Gap:
     number: float
     bound: float
     upwards: bool  # whether the condition asks for more than the threshold
+    half: float = 0.0  # what both may be off by, as means over repeats
 
     @property
     def beyond(self) -> float:

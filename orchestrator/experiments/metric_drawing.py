@@ -7,7 +7,8 @@ grey print and every eye.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from ..metrics.run_metrics import metric
 from .drawing import FAILED, GUIDE, PLAIN, Drawing
 from .experiment import Case
 from .findings import Findings
+from .grids import cells
 from .numbers import si_number
 from .schema import FigureSpec
 
@@ -56,10 +58,15 @@ class MetricDrawing(Drawing):
 
     def number(self, run: Case) -> float:
         """Return the metric of a run in the unit shown, NaN if there is none that can be drawn."""
-        value = self.findings.value(run, self.spec.metric)
+        value = self.findings.mean(run, self.spec.metric)
         if value is None or not math.isfinite(value.number):
             return math.nan
         return self.factor * value.number
+
+    def half(self, run: Case) -> float:
+        """Return half the width of the confidence interval of `number`, 0 without repeats."""
+        value = self.findings.mean(run, self.spec.metric)
+        return 0.0 if value is None else self.factor * value.half
 
     @property
     def measured(self) -> str:
@@ -80,10 +87,13 @@ class Curves(MetricDrawing):
         for number, level in enumerate(self.levels(self.spec.lines) if self.spec.lines else [None]):
             mine = [run for run in runs if level is None or self.at(run, self.spec.lines) == level]
             points = sorted(
-                (self.place(self.at(run, self.spec.x), self.spec.x), self.number(run)) for run in mine
+                (self.place(self.at(run, self.spec.x), self.spec.x), self.number(run), self.half(run))
+                for run in mine
             )
-            lost = [x for x, y in points if math.isnan(y)]
-            axes.plot([x for x, _ in points], [y for _, y in points], **self._style(number))
+            lost = [x for x, y, _ in points if math.isnan(y)]
+            style = self._style(number)
+            axes.plot([x for x, *_ in points], [y for _, y, _ in points], **style)
+            draw_confidence(axes, points, style["color"])
             if lost:
                 self.failed = True
                 axes.plot(
@@ -94,7 +104,7 @@ class Curves(MetricDrawing):
         self.scale_x(axes)
 
     def _style(self, number: int) -> dict[str, Any]:
-        style = {**line_style(number), "marker": MARKERS[number % len(MARKERS)], "markersize": 4.5}
+        style = style_of(number)
         return {**style, "linestyle": ""} if self.findings.spec.design == "latin_hypercube" else style
 
     def finish(self, figure: Figure, drawn: Sequence[Axes], left: Sequence[Axes]) -> None:
@@ -118,6 +128,78 @@ class Curves(MetricDrawing):
         if self.mark is not None:
             found.append(Line2D([], [], label=self.mark_text(), **GUIDE))
         return found + super().handles()
+
+
+class GridLines(Drawing):
+    """The columns of a grid as lines over its rows."""
+
+    def __init__(self, findings: Findings, spec: FigureSpec) -> None:
+        super().__init__(findings, spec)
+        self.grid = findings.spec.grids[spec.grid]
+        values = {**findings.values, **{("", key): value for key, value in findings.derived.items()}}
+        self.cells = [(cell, values.get(cell.key)) for cell in cells(self.grid) if cell.column]
+        units = {value.unit for _, value in self.cells if value}
+        if not units:
+            raise ResultsError("nothing to draw: no cell of the grid has a number.")
+        self.quantity = min(units)
+        self.unit, self.factor = shown_unit(self.quantity)
+        self.what = self.grid.title
+        self.rows = list(dict.fromkeys(cell.row for cell, _ in self.cells))
+        self.columns = list(dict.fromkeys(cell.column for cell, _ in self.cells))
+
+    def panels(self) -> list[tuple[str, list[Case]]]:
+        return [("", [])]
+
+    def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
+        for number, column in enumerate(self.columns):
+            mine = [(self.rows.index(cell.row), value) for cell, value in self.cells if cell.column == column]
+            style = style_of(number)
+            shift = 0.03 * (number - (len(self.columns) - 1) / 2)  # so that none hides another
+            known = [(x + shift, value) for x, value in mine if value and math.isfinite(value.number)]
+            axes.plot([x for x, _ in known], [self.factor * v.number for _, v in known], **style)
+            draw_confidence(
+                axes, [(x, self.factor * v.number, self.factor * v.half) for x, v in known], style["color"]
+            )
+            lost = [x for x, value in mine if value is None]
+            if lost:
+                self.failed = True
+                axes.plot(
+                    lost, [0.0] * len(lost), transform=axes.get_xaxis_transform(), clip_on=False, **FAILED
+                )
+        if self.spec.mark is not None:
+            axes.axhline(self.factor * si_number(self.spec.mark, self.quantity), **GUIDE)
+        axes.set_xticks(range(len(self.rows)), ["\n".join(textwrap.wrap(literal(r), 14)) for r in self.rows])
+        axes.set_xlim(-0.4, len(self.rows) - 0.6)
+
+    def finish(self, figure: Figure, drawn: Sequence[Axes], left: Sequence[Axes]) -> None:
+        self.name_y(left, f"{self.what} in {self.unit}" if self.unit else self.what)
+        drawn[0].set_xlabel("")
+        drawn[0].set_yscale(self.spec.scale)
+        if self.spec.scale == "log":
+            drawn[0].yaxis.set_major_formatter(PLAIN)
+
+    def handles(self) -> list[Artist]:
+        from matplotlib.lines import Line2D
+
+        found: list[Artist] = [
+            Line2D([], [], label=column, **style_of(number)) for number, column in enumerate(self.columns)
+        ]
+        if self.spec.mark is not None:
+            label = shown(si_number(self.spec.mark, self.quantity), self.quantity)
+            found.append(Line2D([], [], label=label, **GUIDE))
+        return found + super().handles()
+
+
+def style_of(number: int) -> dict[str, Any]:
+    """Return colour, dash and marker of a line."""
+    return {**line_style(number), "marker": MARKERS[number % len(MARKERS)], "markersize": 4.5}
+
+
+def draw_confidence(axes: Axes, points: Iterable[tuple[float, float, float]], colour: str) -> None:
+    """Draw the confidence intervals of points (x, mean, half the width), those that have one."""
+    for x, y, half in points:
+        if half:
+            axes.vlines(x, y - half, y + half, color=colour, linewidth=1.2)
 
 
 class Map(MetricDrawing):

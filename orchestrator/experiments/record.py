@@ -34,7 +34,8 @@ def write_findings(findings: Findings, drawn: dict[str, str], out: Path) -> None
 
 
 def _record(findings: Findings, drawn: dict[str, str]) -> dict[str, Any]:
-    spec, failed = findings.spec, findings.failed
+    spec, settings = findings.spec, findings.experiment.settings
+    alone = not spec.axes or (len(settings) == 1 and bool(spec.runs))  # else the table has them
     return {
         "title": spec.title,
         "source": spec.source,
@@ -44,12 +45,12 @@ def _record(findings: Findings, drawn: dict[str, str]) -> dict[str, Any]:
                 "label": run.label,
                 "scenario": str(run.scenario),
                 "changes": [asdict(change) for change in run.changes],
-                "failed": failed.get(run.name),
+                "failed": (findings.failure(run, settings[0]) or None) if alone else None,
                 "fmus": _hashes(findings.results.get(run.name)),
                 "metrics": {
                     key: _value(findings.values[run.name, key])
                     for key in spec.metrics
-                    if not spec.axes and (run.name, key) in findings.values
+                    if alone and (run.name, key) in findings.values
                 },
             }
             for run in findings.experiment.runs.values()
@@ -99,7 +100,8 @@ def _hashes(results: Results | None) -> dict[str, str]:
 
 def _value(value: Value) -> dict[str, Any]:
     number = value.number if math.isfinite(value.number) else "inf"
-    return {"value": number, "unit": si(value.unit)}
+    half = {"half": value.half} if value.half else {}
+    return {"value": number, "unit": si(value.unit), **half}
 
 
 def _judgement(one: Judgement, group: str) -> dict[str, Any]:

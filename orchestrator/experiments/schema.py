@@ -43,6 +43,22 @@ numbers computed from several runs, which claims may speak of (`{derived: gain, 
         unit: "%"
         published: 30 %                    # what the paper prints, in SI or with a unit
 
+A value of a run's `for` may bring changes along, faults among them, and claims, checks and derived numbers
+may have a `for` of their own. A grid of derived numbers with `holds` tells how far down its rows what is
+said of each column's cells holds.
+
+    runs:
+      - for:
+          fault:
+            none: nothing is wrong
+            frozen: {says: gyro frozen, faults: [{on: sensor.yaw_rate, kind: freeze, from: 1}]}
+        name: "{fault}"
+        scenario: measured.yaml
+    checks:
+      - says: The car is held with its {fault}.
+        for: {fault: {frozen: gyro frozen}}
+        holds_if: [{run: "{fault}", metric: sideslip, at_most: 5 deg}]
+
 A verdict at one point may flip beside it. A region names the values that the paper leaves open, each with a
 range; the claims are judged along each of them, and at the points of a Latin hypercube over all together.
 
@@ -89,6 +105,12 @@ What an axis varies is written as on the command line: `unit.parameter`, `vehicl
         no control: {swap: {controller: controller_off}}
         with slip control: {swap: {wheel_control: wheel_control_slip}, set: {driver.amplitude: 0.04}}
 
+An axis of seeds `repeats` its runs: every number is then the mean over it, with its confidence interval
+(`confidence`), and a verdict whose threshold lies inside is undecided. `runs` names those that it changes.
+
+    axes:
+      seed: {vary: sensor.seed, values: [1, 2, 3, 4, 5], runs: ["*/noisy"], repeats: true}
+
 Tuning seeks values in ranges, for several laws by one objective and one budget; `yawbench tune` does it.
 
     tuning:
@@ -116,19 +138,36 @@ from ..figures.plots import OVERVIEW
 from ..scenario.scenario_schema import Scalar
 from ..scenario.strict import Strict
 from ..scenario.yaml_lines import Key
-from .axis_schema import MOST, AxisSpec, Changes
+from .axis_schema import MOST, AxisSpec, Changes, DesignAxisSpec
 from .judged_schema import (
-    Alternatives,
     Claim,
     Condition,
     DerivedSpec,
     GridSpec,
+    Judged,
     LimitSpec,
     MetricSpec,
     Patterns,
+    alternatives,
 )
 from .numbers import Quantity
 from .region_schema import RegionSpec
+
+
+class ChoiceSpec(Changes):
+    """A value of a `for` of runs, with what it changes."""
+
+    says: str = Field("", description="What texts call it; default: the value")
+
+
+def _choices(value: object) -> Any:
+    """Return the values of a `for` of runs, those in short with the words alone."""
+    if isinstance(value, dict) and any(isinstance(one, dict) for one in value.values()):
+        return {str(k): {"says": one} if isinstance(one, str) else one for k, one in value.items()}
+    return {k: {"says": words} for k, words in alternatives(value).items()}
+
+
+Choices = Annotated[dict[str, ChoiceSpec], BeforeValidator(_choices)]
 
 
 class RunSpec(Changes):
@@ -136,7 +175,9 @@ class RunSpec(Changes):
 
     name: str = Field(description="Name of the run and of its folder, e.g. 25mps/fnn", min_length=1)
     scenario: str = Field(description="Scenario file, relative to this file", min_length=1)
-    for_each: dict[str, Alternatives] = Field({}, alias="for", description="Key -> values")
+    for_each: dict[str, Choices] = Field(
+        {}, alias="for", description="Key -> values: a list, or each with its words, or with what it changes"
+    )
     label: str = Field("", description="What legends call it; default: the name")
     row: str = Field("", description="What tables call it; default: the label")
 
@@ -178,7 +219,7 @@ class FigureSpec(Strict):
 
     name: str = Field(description="Name of its files", pattern=r"^[\w.+-]+$")
     title: str = ""
-    kind: Literal["overlay", "curve", "map", "limit"] = "overlay"
+    kind: Literal["overlay", "curve", "map", "limit", "grid"] = "overlay"
     runs: list[str] = Field([], description="Of an overlay: names of runs, with `*` and `?` for many")
     panels: list[str] | str = Field(
         list(OVERVIEW),
@@ -187,6 +228,7 @@ class FigureSpec(Strict):
     )
     metric: str = Field("", description="Key of `metrics`, for curves and maps")
     limit: str = Field("", description="Key of `limits`, for a limit")
+    grid: str = Field("", description="Key of `grids`, for a line per column over the rows")
     x: str = Field("", description="Axis to the right")
     y: str = Field("", description="Axis upwards, of a map")
     lines: str = Field("", description="Axis with a line per value, of curves and limits")
@@ -208,11 +250,16 @@ class FigureSpec(Strict):
                 also = f", no {min(given)}" if given else ""
                 raise ValueError(f"an overlay needs runs and a list of panels{also}; else give its kind")
             return self
+        if self.kind == "grid":
+            given = self.model_fields_set - {"name", "title", "kind", "grid", "scale", "largest", "mark"}
+            if not self.grid or given:
+                raise ValueError(f"a grid needs grid{f' and no {min(given)}' if given else ''}")
+            return self
         if self.runs or ("panels" in self.model_fields_set and not self.panel_axis):
             raise ValueError(f"a {self.kind} has no runs; its panels are those of one axis")
         wanted, other = ("limit", "metric") if self.kind == "limit" else ("metric", "limit")
-        if not getattr(self, wanted) or getattr(self, other):
-            raise ValueError(f"a {self.kind} needs {wanted} and no {other}")
+        if not getattr(self, wanted) or getattr(self, other) or self.grid:
+            raise ValueError(f"a {self.kind} needs {wanted} and no {'grid' if self.grid else other}")
         if not self.x:
             raise ValueError(f"a {self.kind} needs x")
         if (self.kind == "map") != bool(self.y):
@@ -244,7 +291,7 @@ class ExperimentSpec(Changes):
     runs: Annotated[list[RunSpec], BeforeValidator(_list_of_runs)] = Field(
         [], description="In place of a scenario"
     )
-    axes: dict[str, AxisSpec] = Field({}, description="Name -> what varies")
+    axes: dict[str, DesignAxisSpec] = Field({}, description="Name -> what varies")
     design: Literal["grid", "list", "latin_hypercube"] = Field("grid", description="Which points of the axes")
     points: int | None = Field(None, ge=1, description="Of a Latin hypercube")
     seed: int | None = Field(None, ge=0, description="Of a Latin hypercube")
@@ -276,6 +323,8 @@ class ExperimentSpec(Changes):
             raise ValueError(f"points and seed belong to a latin_hypercube; the design is {self.design}")
         else:
             self._check_lengths()
+        if self.repeats and self.design != "grid":
+            raise ValueError(f"axes.{self.repeats[0]}: repeats need a grid")
         number = self.number_of_points() * max(1, len(self.runs))
         if number > MOST:
             raise ValueError(f"{number} runs; at most {MOST} are taken")
@@ -283,11 +332,20 @@ class ExperimentSpec(Changes):
 
     def conditions(self) -> Iterator[tuple[Key, Condition]]:
         """Yield every condition of claims, checks and limits, with its place in the file."""
-        judged = (("claims", enumerate(self.claims)), ("checks", enumerate(self.checks)))
-        for group, items in (*judged, ("limits", self.limits.items())):
-            for which, one in items:
-                for k, condition in enumerate(one.holds_if):
-                    yield (group, which, "holds_if", k), condition
+        judged: list[tuple[str, str | int, Judged]] = [
+            (group, one.number(i), one)
+            for group, said in (("claims", self.claims), ("checks", self.checks))
+            for i, one in enumerate(said)
+        ]
+        judged += [("limits", name, limit) for name, limit in self.limits.items()]
+        for group, which, one in judged:
+            for k, condition in enumerate(one.holds_if):
+                yield (group, which, "holds_if", k), condition
+
+    @property
+    def repeats(self) -> list[str]:
+        """The axes that make repeats of one and the same."""
+        return [name for name, axis in self.axes.items() if axis.repeats]
 
     def number_of_points(self) -> int:
         """Return how many points the design has."""

@@ -49,7 +49,7 @@ class Table:
 def _shown(cell: Cell) -> str:
     if cell is None:
         return "-"
-    return shown(cell.number, cell.unit) if isinstance(cell, Value) else printable(cell)
+    return shown(cell.number, cell.unit, half=cell.half) if isinstance(cell, Value) else printable(cell)
 
 
 def for_terminal(table: Table) -> rich.console.Group:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -11,8 +12,8 @@ from ..titles import changed
 from .design import levels_of
 from .experiment import NamedRun
 from .findings import Findings
-from .grids import grid_table
-from .judged_schema import Claim, MetricSpec, Reference
+from .grids import cells, grid_table
+from .judged_schema import Claim, GridSpec, MetricSpec, Reference
 from .judging import Judgement
 from .limits import limit_table
 from .numbers import si_number
@@ -36,24 +37,42 @@ def all_tables(findings: Findings) -> list[Table]:
 
 
 def limit_tables(findings: Findings) -> list[Table]:
-    """Return the tables of all limits."""
+    """Return the tables of all limits, and the grids that say how far down they hold."""
     tables = [limit_table(findings, name) for name in findings.spec.limits]
+    tables += [_grid_table(findings, grid) for grid in findings.spec.grids.values() if grid.holds]
     if words := changed(findings.experiment.by_options):
         for table in tables:
             table.notes.append(f"changed: {words}")
     return tables
 
 
+def _grid_table(findings: Findings, grid: GridSpec) -> Table:
+    """Return a grid with what is said of its cells."""
+    values = {**findings.values, **{("", key): value for key, value in findings.derived.items()}}
+    signs: dict[tuple[str, str], str] = {}
+    for group, judged in (("claims", findings.claims), ("checks", findings.checks)) if grid.holds else ():
+        for one in judged:
+            about = {(c.run, c.derived or c.metric) for c in one.said.holds_if}
+            if len(about) == 1:
+                word = verdict(one, group)
+                (key,) = about
+                signs[key] = signs.get(key) or (
+                    "" if word == HOLDS else "✗" if word in FAILS.values() else "?"
+                )
+    return grid_table(grid, values, signs)
+
+
 def derived_tables(findings: Findings) -> list[Table]:
     """Return the grids, and a table of the derived numbers if there are any."""
     spec = findings.spec
-    tables = [grid_table(grid, findings.values) for grid in spec.grids.values()]
-    if spec.derived:
-        rows: list[list[Cell]] = [[one.says, findings.derived.get(key)] for key, one in spec.derived.items()]
+    tables = [_grid_table(findings, grid) for grid in spec.grids.values() if not grid.holds]
+    in_grids = {cell.metric for grid in spec.grids.values() if grid.derived for cell in cells(grid)}
+    if alone := {key: one for key, one in spec.derived.items() if key not in in_grids}:
+        rows: list[list[Cell]] = [[one.says, findings.derived.get(key)] for key, one in alone.items()]
         headings = ["what", "value"]
-        if any(one.published is not None for one in spec.derived.values()):
+        if any(one.published is not None for one in alone.values()):
             headings.append("the paper says")
-            for row, one in zip(rows, spec.derived.values(), strict=True):
+            for row, one in zip(rows, alone.values(), strict=True):
                 printed = one.published
                 row.append(None if printed is None else Value(si_number(printed, one.unit), one.unit))
         tables.append(Table("Computed from several runs", headings, [*rows]))
@@ -71,7 +90,7 @@ def verdict(judgement: Judgement, group: str) -> str:
     """Return the verdict in plain words; `group` is "claims" (a paper's) or "checks" (our own)."""
     if judgement.holds is None:
         return NOT_JUDGED
-    if judgement.region and not judgement.region.decided:
+    if not judgement.sure or (judgement.region and not judgement.region.decided):
         return UNDECIDED
     return HOLDS if judgement.holds else FAILS[group]
 
@@ -112,8 +131,9 @@ def run_tables(findings: Findings) -> list[Table]:
 
 def _run_table(findings: Findings, spec: TableSpec) -> Table:
     study = findings.experiment
-    runs, failed = study.matching(spec.runs), findings.failed
-    said = {run.name: _said_of(findings, run, spec) for run in runs}
+    runs = study.matching(spec.runs)
+    alone = len(study.settings) == 1
+    said = {run.name: _said_of(findings, run, spec) if alone else [] for run in runs}
     columns = [study.spec.metrics[key] for key in spec.metrics]
     table = Table(spec.title, ["run", *map(heading, columns)])
     formulas: dict[str, list[str]] = {}
@@ -125,14 +145,16 @@ def _run_table(findings: Findings, spec: TableSpec) -> Table:
     carries = CARRIES if findings.regions else CARRIES[:1]
     if some:  # beside the first metric, which the claims are about
         table.headings[2:2] = ["the paper says", "verdict", *carries]
-    for run in runs:
-        if run.name in failed:
+    for run, setting in itertools.product(runs, study.settings):
+        row = ", ".join(filter(None, [run.row, *(level.words for level in setting)]))
+        if why := findings.failure(run, setting):
             cells: list[Cell] = ["failed", *[None] * (len(table.headings) - 2)]
-            table.notes.append(f"{run.row}: {failed[run.name]}")
+            table.notes.append(f"{row}: {why}")
         else:
-            cells = [findings.values.get((run.name, key)) for key in spec.metrics]
-            if early := findings.results[run.name].ended:
-                table.notes.append(f"{run.row}: {early}; what is of the whole run, or later, has no result")
+            cells = [findings.at[setting].get((run.name, key)) for key in spec.metrics]
+            ended = (findings.record(case).ended for case in findings.cases_of(run, setting))
+            if early := next(filter(None, ended), None):
+                table.notes.append(f"{row}: {early}; what is of the whole run, or later, has no result")
             if some:
                 judged = said[run.name]
                 words = "; ".join(f"{j.said.short} ({j.said.source})" for j in judged)
@@ -146,8 +168,8 @@ def _run_table(findings: Findings, spec: TableSpec) -> Table:
                 ]
                 table.notes += [f"{run.row}: {j.said.note}" for j in judged if j.said.note]
         results = findings.results.get(run.name)
-        table.rows.append([marked(run.row, results) if results else run.row, *cells])
-        table.notes += remarks([(run.row, results)]) if results else []
+        table.rows.append([marked(row, results) if results else row, *cells])
+        table.notes += remarks([(row, results)]) if results else []
     return table
 
 

@@ -128,10 +128,14 @@ class Metric:
 
 @dataclass(frozen=True)
 class Value:
-    """What a metric comes to in one run: SI; `unit` "%" marks a ratio that is shown in per cent."""
+    """What a metric comes to in one run: SI; `unit` "%" marks a ratio that is shown in per cent.
+
+    Of several repeats it is the mean, and `half` half the width of its confidence interval.
+    """
 
     number: float
     unit: str
+    half: float = 0.0
 
 
 def during(window: Window | None, lead: str = "") -> str:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..experiments.confidence import LEVEL
 from ..experiments.experiment import FIGURES
 from ..experiments.figures import runs_of, title_of
 from ..experiments.findings import Each, Findings
@@ -89,6 +91,7 @@ def chapter(
         "failed": failed,
         "stale": stale,
         "remarkable": findings.remarkable() if spec.axes else "",
+        "repeats": repeats(findings),
         "command": command,
         "folder": str(folder),
         "settings": settings(findings),
@@ -96,6 +99,20 @@ def chapter(
         "fmus": fmus_of(results),
         "programs": programs_of(results),
     }
+
+
+def repeats(findings: Findings) -> str:
+    """Return what numbers over repeats are, in a sentence; "" without repeats."""
+    spec = findings.spec
+    if not spec.repeats:
+        return ""
+    number = math.prod(spec.axes[name].length or 1 for name in spec.repeats)
+    said = " and ".join(spec.axes[name].says or name for name in spec.repeats)
+    sure = f"the interval that holds the true mean with {100 * LEVEL:.0f} % confidence (Student)"
+    return (
+        f"Numbers with ± are means over {number} repeats ({said}), with {sure}. "
+        "A verdict whose threshold lies inside reads undecided."
+    )
 
 
 def plans_of(findings: Findings) -> list[tuple[Job, tuple[Scenario, Plan]]]:

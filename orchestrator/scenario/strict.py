@@ -22,9 +22,9 @@ class Strict(BaseModel):
 
 KINDS: dict[str, tuple[str, type, str]] = {
     "tuning": ("a tuning file", dict, "; it is for `yawbench tune`"),
+    "runs": ("a study file", list, "; it is for `yawbench study` and `report`"),
     "axes": ("a sweep file", dict, "; it is for `yawbench sweep`"),
     "units": ("a scenario", dict, "; it is for `yawbench run`"),
-    "runs": ("a study file", list, "; it is for `yawbench study` and `report`"),
     "parameters": ("a vehicle file", dict, "; a scenario names it under 'vehicle'"),
 }
 """Key that tells a kind of file from the others -> the kind, what stands at the key, where it belongs."""

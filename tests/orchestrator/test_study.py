@@ -160,7 +160,7 @@ def test_all_problems_of_a_study_are_reported_at_once(study):
         "claims[0].holds_if[0].above: must be a number, a number with its unit ('5 %'), "
         "or {run: ..., metric: ...}",
         "figures[0].titel: unknown key; did you mean 'title'? allowed here: name, title, kind, runs, panels, "
-        "metric, limit, x, y, lines, only, scale, largest and mark",
+        "metric, limit, grid, x, y, lines, only, scale, largest and mark",
     ]
 
 

@@ -1,0 +1,172 @@
+"""Repeats by seeds: means with confidence in tables, verdicts and figures; many claims from one entry."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from components.sensing.noise import key, normal
+from orchestrator.errors import ScenarioError
+from orchestrator.experiments.confidence import interval
+from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.figures import draw_over_axes
+from orchestrator.experiments.findings import judge_records
+from orchestrator.experiments.jobs import run_job
+from orchestrator.experiments.planning import jobs_of, plan_experiment
+from orchestrator.experiments.verdicts import HOLDS, UNDECIDED, limit_tables, run_tables, verdict
+from orchestrator.metrics.run_metrics import Value
+from tests.fmu_copies import put_fmus
+
+SCENARIO = """
+title: A car that turns, and its gyro
+stop_time: 0.1
+step_size: 0.01
+inputs:
+  sensor.yaw_rate_true: 1
+  sensor.acceleration_*_true: 0
+  sensor.steer_angle_true: 0
+  sensor.wheel_speed_*_true: 0
+units:
+  sensor: {fmu: sensor_ideal, parameters: {sample_time: 0.01}}
+"""
+STUDY = """
+title: How much hangs on chance
+runs:
+  - for:
+      gain: {weak: {says: a weak gyro, set: {sensor.yaw_rate_gain: 0.5}}, right: a gyro}
+      noise: {quiet: quiet, noisy: {says: noisy, set: {sensor.yaw_rate_noise: 0.1}}}
+    name: "{gain}/{noise}"
+    row: "{gain}, {noise}"
+    scenario: gyro.yaml
+axes:
+  seed: {vary: sensor.seed, values: [1, 2, 3, 4], runs: ["*/noisy"], repeats: true, says: seeds}
+metrics: {last: {metric: final(sensor.yaw_rate)}}
+derived:
+  "share/{gain}/{noise}":
+    says: Share that is told
+    for: {gain: [weak, right], noise: [quiet, noisy]}
+    expression: x / most
+    of: {x: {run: "{gain}/{noise}", metric: last}, most: {run: right/quiet, metric: last}}
+    unit: "%"
+grids:
+  share:
+    title: Share that is told
+    derived: "share/{gain}/{noise}"
+    rows: {noise: [quiet, noisy]}
+    columns: {gain: {weak: Weak, right: Right}}
+    holds: enough down to
+tables: [{title: All, runs: ["*"], metrics: [last]}]
+checks:
+  - says: "{gain} tells nine tenths where it is {noise}."
+    for: {gain: {weak: A weak gyro, right: A gyro}, noise: [quiet, noisy]}
+    holds_if: [{derived: "share/{gain}/{noise}", at_least: 90 %}]
+figures: [{name: share, kind: grid, grid: share, mark: 90 %}]
+"""
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory):
+    """A folder with a sensor."""
+    folder = tmp_path_factory.mktemp("fmus")
+    put_fmus(folder, components=("sensor_ideal",))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def load(tmp_path_factory):
+    """Write the study with texts replaced and return it as loaded."""
+    folder = tmp_path_factory.mktemp("study")
+    (folder / "gyro.yaml").write_text(SCENARIO)
+
+    def load(*changes):
+        text = STUDY
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        (folder / "study.yaml").write_text(text)
+        return load_experiment(folder / "study.yaml")
+
+    return load
+
+
+@pytest.fixture(scope="module")
+def findings(load, fmus):
+    """What the study comes to."""
+    loaded = load()
+    planned = plan_experiment(loaded, jobs_of(loaded, Path("runs"), fmus))
+    records = {job.key: run_job(job).record for job in {job.key: job for job in planned.jobs}.values()}
+    assert len(records) == 2 + 2 * 4  # what the axis does not change is made once
+    return judge_records(planned, records)
+
+
+def told(seeds, gain=1.0):
+    return [gain + 0.1 * normal(key(seed, "yaw_rate"), 10) for seed in seeds]
+
+
+def test_numbers_over_repeats_are_means_with_their_confidence(findings):
+    over = interval(told(range(1, 5)))
+    value = findings.values["right/noisy", "last"]
+    assert (value.number, value.half) == pytest.approx((over.mean, over.half))
+    assert findings.values["weak/quiet", "last"] == Value(0.5, "rad/s")
+    assert findings.derived["share/right/noisy"].half == pytest.approx(over.half)
+
+
+def test_tables_have_a_row_for_all_repeats_together(findings):
+    (table,) = run_tables(findings)
+    assert [row[0] for row in table.text()] == [
+        *("a weak gyro, quiet", "a weak gyro, noisy", "a gyro, quiet", "a gyro, noisy")
+    ]
+    assert [" ± " in row[1] for row in table.text()] == [False, True, False, True]
+
+
+def test_a_threshold_within_confidence_leaves_the_verdict_open(load, findings):
+    assert [(one.said.says, verdict(one, "checks")) for one in findings.checks] == [
+        ("A weak gyro tells nine tenths where it is quiet.", "does not hold"),
+        ("A weak gyro tells nine tenths where it is noisy.", "does not hold"),
+        ("A gyro tells nine tenths where it is quiet.", HOLDS),
+        ("A gyro tells nine tenths where it is noisy.", UNDECIDED),
+    ]
+    sure = load(("at_least: 90 %", "at_least: 75 %"))
+    judged = replace(findings, experiment=sure).checks
+    assert [verdict(one, "checks") for one in judged] == ["does not hold", "does not hold", HOLDS, HOLDS]
+
+
+def test_a_grid_says_how_far_down_its_columns_hold(findings):
+    (table,) = limit_tables(findings)
+    *cells, down_to = table.text()
+    assert down_to == ["enough down to", "-", "quiet"]
+    assert cells[0] == ["quiet", "50.0 % ✗", "100 %"]
+    assert cells[1][2].endswith("?")
+
+
+def test_a_grid_can_be_drawn_with_a_line_per_column(findings):
+    figure = draw_over_axes(findings, findings.spec.figures[0])
+    axes = figure.axes[0]
+    lines = [line for line in axes.lines if len(line.get_xdata()) == 2 and line.get_marker() != "None"]
+    assert [next(iter(line.get_ydata())) for line in lines] == [50.0, 100.0]
+    assert len(axes.collections) == 2  # confidence where there is chance
+
+
+def test_in_haste_there_are_fewer_repeats(load):
+    assert [len(one.points) for one in (load(), load().short)] == [4, 3]
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (("values: [1, 2, 3, 4]", "from: 1, to: 4, count: 4"), "repeats: needs a list of two values or more"),
+        (('["*/noisy"]', '["*/nosy"]'), "axes.seed.runs[0]: no run is named '*/nosy'; runs: weak/quiet"),
+        (('{gain} tells', "{gian} tells"), "checks[0]: {gian} stands for nothing; did you mean 'gain'?"),
+        (('"share/{gain}/{noise}":', '"share/{gain}":'), "there is already a derived number 'share/weak'"),
+        (("noisy, set: {", "noisy, set: {sensor.yaw_rate_gain: 2, "), "sensor.yaw_rate_gain is given twice"),
+        (("kind: grid, grid: share", "kind: grid, grid: shares"), "there is no grid 'shares'"),
+        (("kind: grid, grid: share", "kind: curve, metric: last, x: seed"), "numbers are means over 'seed'"),
+        (('    derived: "share/{gain}', '    derived: "share/weak'), "does not depend on {gain}"),
+    ],
+)  # fmt: skip
+def test_mistakes_are_told_in_a_sentence(load, change, sentence):
+    with pytest.raises(ScenarioError) as refused:
+        load(change)
+    assert sentence in "\n".join(refused.value.problems)
