@@ -15,6 +15,7 @@ Coordinates are those of the road [m], x = y = 0 where the car begins; the lower
 from __future__ import annotations
 
 import re
+from math import isfinite
 from typing import NamedTuple
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -79,7 +80,7 @@ def friction_at(point: Point, patches: tuple[Patch, ...], *, base: float, patch:
 def _patch(text: str) -> Patch:
     friction, rest = None, text
     if begin := _FRICTION.match(text):
-        friction, rest = float(begin[1]), text[begin.end() :]
+        friction, rest = _number(begin[1], text), text[begin.end() :]
         if friction < 0.0:
             raise ValueError(f"the friction of a patch must not be negative (got {text!r})")
     spans: list[Span] = []
@@ -98,12 +99,13 @@ def _span(condition: str, text: str) -> Span:
     low_text, axis, period_text, sign, bound = found.groups("") if found else ("",) * 5
     if not axis or not (low_text or sign) or (low_text and sign == ">"):
         raise ValueError(f"{condition!r} is no place on a road (in {text!r}): {_EXAMPLES} is")
-    low, high = float(low_text or "-inf"), float("inf")
+    low = _number(low_text, text) if low_text else float("-inf")
+    high = float("inf")
     if sign == ">":
-        low = float(bound)
+        low = _number(bound, text)
     elif sign == "<":
-        high = float(bound)
-    period = float(period_text or 0.0)
+        high = _number(bound, text)
+    period = _number(period_text, text) if period_text else 0.0
     if period_text and not period > 0.0:
         raise ValueError(f"{condition!r}: what follows % must be above zero (in {text!r})")
     if not low < high or (period and (low >= period or high <= 0.0)):
@@ -111,10 +113,17 @@ def _span(condition: str, text: str) -> Span:
     return Span("xy".index(axis), low, high, period)
 
 
+def _number(digits: str, text: str) -> float:
+    value = float(digits)
+    if not isfinite(value):
+        raise ValueError(f"{digits} is too large a number (in {text!r})")
+    return value
+
+
 def _corners(condition: str, text: str) -> tuple[Point, ...]:
     corners, at = [], 0
     while found := _CORNER.match(condition, at):
-        corners.append((float(found[1]), float(found[2])))
+        corners.append((_number(found[1], text), _number(found[2], text)))
         at = found.end()
     if at < len(condition) or len(corners) < 3:
         raise ValueError(

@@ -1,11 +1,12 @@
 """Road of patches: friction under each wheel by its place, slope, bank, a gust from the side.
 
-    mu_i     = friction of the last patch that holds x_i, y_i, else the base friction
+    mu_i     = friction of the last patch that holds x_i, y_i, else of the table there, else the base friction
     x_i, y_i = x + a_i cos(psi) - d_i sin(psi),  y + a_i sin(psi) + d_i cos(psi)        wheel i at a_i, d_i
     friction = (mu_fl + mu_fr + mu_rl + mu_rr) / 4
 
 Split friction, jumps, a chequerboard are patches (`vocabulary.patches`): "y > 0", "60 < x < 80",
-"x % 10 < 5, y % 3 < 1.5; x % 10 > 5, y % 3 > 1.5". A tyre touches the road in one point.
+"x % 10 < 5, y % 3 < 1.5; x % 10 > 5, y % 3 > 1.5". What is measured over a grid is a table
+(`vocabulary.friction_table`). A tyre touches the road in one point.
 
 `friction_delayed` is `friction` as it was `friction_delay` ago: what an estimator would know. Scenarios say
 with their connections which of them, or which constant, reference and controller are told.
@@ -28,6 +29,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import asin, cos, pi, sin
 
+from vocabulary.friction_table import table_of
 from vocabulary.patches import friction_at, patches_of
 from vocabulary.wheels import Four
 
@@ -51,6 +53,9 @@ class PatchworkParameters:
     )
     patches: str = parameter(
         "", None, "Places of another friction, such as 'y > 0' or '0.3: 60 < x < 80'", "chosen: none"
+    )
+    friction_table: str = parameter(
+        "", None, "Friction over x and y, a row of x, then rows of y and friction", "chosen: none"
     )
     friction_delay: float = parameter(
         0.3, "s", "How much later friction_delayed is", "chosen: an estimator's", minimum=0.0
@@ -127,6 +132,10 @@ class Patchwork(Component):
             self.patches = patches_of(p.patches)
         except ValueError as error:
             raise ValueError(f"patches: {error}") from None
+        try:
+            self.table = table_of(p.friction_table)
+        except ValueError as error:
+            raise ValueError(f"friction_table: {error}") from None
         steepest = sin(p.road_slope) ** 2 + sin(p.road_bank) ** 2
         if steepest > sin(0.25 * pi) ** 2:
             raise ValueError("road_slope and road_bank together are steeper than 45 degrees")
@@ -153,8 +162,8 @@ class Patchwork(Component):
     def _frictions(self, u: list[float]) -> Four:
         """Return the friction [1] under fl, fr, rl, rr."""
         p = self.p
-        base = p.base_friction
-        if not self.patches:
+        base, table = p.base_friction, self.table
+        if not self.patches and table is None:
             return base, base, base, base
         x, y, psi = u
         c, s = cos(psi), sin(psi)
@@ -162,7 +171,9 @@ class Patchwork(Component):
 
         def under(along: float, across: float) -> float:
             point = x + (along * c - across * s), y + (along * s + across * c)
-            return friction_at(point, self.patches, base=base, patch=p.patch_friction)
+            measured = table.at(point) if table is not None else None
+            beneath = base if measured is None else measured
+            return friction_at(point, self.patches, base=beneath, patch=p.patch_friction)
 
         a, b = p.cg_to_front_axle, -p.cg_to_rear_axle
         return under(a, half), under(a, -half), under(b, half), under(b, -half)

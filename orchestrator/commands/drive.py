@@ -34,7 +34,7 @@ Slow = Annotated[
 ]
 Vehicle = Annotated[
     str | None,
-    typer.Option("--vehicle", metavar="FILE", help="Vehicle file, or the name of one in scenarios/vehicles."),
+    typer.Option("--vehicle", metavar="FILE", help="Vehicle file, or the name of one as in list."),
 ]
 Angle = Annotated[
     str | None,
@@ -119,25 +119,12 @@ def _vehicle(given: str | None) -> tuple[Change, ...]:
     Raises:
         ScenarioError: there is no such file.
     """
-    import os
-
-    from ..errors import ScenarioError
     from ..plan import Change
     from ..scenario import catalogue
-    from ..wording import hint
 
     if given is None:
         return ()
-    if os.path.isfile(given):
-        return (Change("vehicle", os.path.abspath(given), "--vehicle"),)
-    places = {
-        file.stem: file for folder in catalogue.folders() for file in sorted(folder.glob("vehicles/*.yaml"))
-    }
-    if given not in places:
-        raise ScenarioError(
-            f"--vehicle {given}: there is no such file{hint(given, places, lead='there are')}"
-        )
-    return (Change("vehicle", str(places[given].resolve()), "--vehicle"),)
+    return (Change("vehicle", str(catalogue.find(given, "a vehicle file").resolve()), "--vehicle"),)
 
 
 def _make(title: str, jobs: Sequence[Job], folder: Path, workers: int | None, *, fresh: bool) -> int:

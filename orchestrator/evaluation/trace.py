@@ -49,7 +49,7 @@ class Trace:
     time: np.ndarray  # shape (rows,) [s], increasing
     signals: dict[str, np.ndarray]  # name in the vocabulary -> shape (rows,), in SI
     mass: float | None = None  # of the car [kg]
-    friction: float | None = None  # of the road
+    friction: float | None = None  # of the road, the lowest
     facts: dict[str, Any] = field(default_factory=dict)  # other parameters of the run: name -> value
     folder: Path | None = None  # where it lies
     title: str = ""
@@ -100,14 +100,13 @@ def trace_of(results: Results, label: str = "", mass: float | None = None) -> Tr
     for role in ("driver", "plant"):  # of the test and of the car they know best
         for unit in results.units_of_role(role):
             facts |= _parameters(fmus.get(unit))
-    told = [value for fmu in fmus.values() for name, value in _constants(fmu) if name.startswith("friction_")]
     mass = mass if mass is not None else _of_plant(results, "mass")
     return Trace(
         label or str(results.folder),
         results.time,
         signals,
         mass,
-        min(told) if told else None,
+        _friction(results),
         facts,
         results.folder,
         with_changes(str(results.run.get("title") or ""), changes_in(results.run)),
@@ -121,6 +120,19 @@ def _parameters(fmu: Any) -> dict[str, Any]:
 def _constants(fmu: Any) -> Iterator[tuple[str, float]]:
     given = fmu.get("constants", {}) if isinstance(fmu, dict) else {}
     return ((name, value) for name, value in given.items() if isinstance(value, (int, float)))
+
+
+def _friction(results: Results) -> float | None:
+    """Return the lowest friction that any wheel met: as recorded, else as roads or tyres were told."""
+    if columns := columns_of(results, "friction_*"):
+        return float(min(results.columns[column].min() for column in columns))
+    fmus = results.run.get("fmus", {})
+    roads = (_parameters(fmus.get(unit)).get("base_friction") for unit in results.units_of_role("road"))
+    told = [float(value) for value in roads if isinstance(value, (int, float))]
+    told += [
+        value for fmu in fmus.values() for name, value in _constants(fmu) if name.startswith("friction_")
+    ]
+    return min(told, default=None)
 
 
 def _of_plant(results: Results, name: str) -> float | None:

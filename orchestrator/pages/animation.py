@@ -41,6 +41,8 @@ READOUTS = (
 """Channel, words, SI unit, decimals shown."""
 STRIP = ("sideslip", "yaw_rate", "steer_angle")
 """What the curve above the slider may show: the first that was recorded."""
+NAMED = 6
+"""Frictions of the ground that are named one by one; of more, the least and the largest."""
 MOST = len(LINES)
 """Runs in one animation: as many as there are colours."""
 
@@ -103,7 +105,9 @@ def _key(runs: Sequence[Frames]) -> str:
     said = [sign for name, sign in signs if name in drawn]
     frictions = sorted({piece.friction for frames in runs for piece in frames.ground})
     if frictions:
-        said.append(f"ground: the bluer the slipperier, friction {listed([f'{mu:g}' for mu in frictions])}")
+        told = [f"{mu:g}" for mu in frictions]
+        values = listed(told) if len(told) <= NAMED else f"{told[0]} to {told[-1]}"
+        said.append(f"ground: the bluer the slipperier, friction {values}")
     key = "; ".join(said)
     return f"{key[:1].upper()}{key[1:]}." if key else ""
 

@@ -1,12 +1,13 @@
-"""The ground of an animation: where which friction lies, from what the road's record says of its patches."""
+"""The ground of an animation: which friction lies where, by the patches and table in the road's record."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from itertools import product
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain, pairwise, product
 from math import floor
 from typing import Any, NamedTuple
 
+from vocabulary.friction_table import FrictionTable, table_of
 from vocabulary.patches import Patch, Point, Span, patches_of
 
 BESIDE = (50.0, 25.0)
@@ -27,21 +28,50 @@ class Piece(NamedTuple):
 def ground_of(parameters: Mapping[str, Any], x: Interval, y: Interval) -> list[Piece]:
     """Return the ground around a path from x[0] to x[1], y[0] to y[1] [m], upper pieces behind lower ones.
 
-    None without patches, or if there would be more than `MOST` pieces.
+    None without patches and table, or if there would be more than `MOST` pieces.
     """
     text, base, patch = (parameters.get(name) for name in ("patches", "base_friction", "patch_friction"))
     if not isinstance(text, str) or not isinstance(base, (int, float)) or not isinstance(patch, (int, float)):
         return []
-    patches = patches_of(text)
+    patches, table = patches_of(text), table_of(str(parameters.get("friction_table") or ""))
     box = tuple((low - more, high + more) for (low, high), more in zip((x, y), BESIDE, strict=True))
     pieces = [Piece(float(base), _rectangle(*box))]
-    for one in patches:
-        friction = float(patch if one.friction is None else one.friction)
-        for corners in _polygons(one, box):
+    try:
+        for friction, corners in chain(_of_table(table, box), _of_patches(patches, float(patch), box)):
             pieces.append(Piece(friction, corners))
             if len(pieces) > MOST:
                 return []
-    return pieces if patches else []
+    except _TooFineError:
+        return []
+    return pieces if len(pieces) > 1 or patches or table else []
+
+
+class _TooFineError(Exception):
+    """There would be more intervals than can be drawn."""
+
+
+def _of_table(table: FrictionTable | None, box: Sequence[Interval]) -> Iterator[Piece]:
+    """Yield around every point of a table what is nearer to it than to others, within a box."""
+    if table is None:
+        return
+    along, across = (_around(axis, within) for axis, within in zip((table.x, table.y), box, strict=True))
+    for (j, y), (i, x) in product(across, along):
+        yield Piece(table.rows[j][i], _rectangle(x, y))
+
+
+def _around(places: Sequence[float], within: Interval) -> list[tuple[int, Interval]]:
+    """Return (number, from middle to middle) of the places whose surroundings reach into an interval."""
+    middles = [0.5 * (a + b) for a, b in pairwise(places)]
+    found = enumerate(zip((places[0], *middles), (*middles, places[-1]), strict=True))
+    cut = ((i, (max(a, within[0]), min(b, within[1]))) for i, (a, b) in found)
+    return [(i, (a, b)) for i, (a, b) in cut if a < b]
+
+
+def _of_patches(patches: Iterable[Patch], otherwise: float, box: Sequence[Interval]) -> Iterator[Piece]:
+    """Yield the parts of patches within a box; `otherwise`: friction of those that name none."""
+    for one in patches:
+        for corners in _polygons(one, box):
+            yield Piece(otherwise if one.friction is None else one.friction, corners)
 
 
 def _polygons(patch: Patch, box: Sequence[Interval]) -> Iterable[tuple[Point, ...]]:
@@ -58,6 +88,8 @@ def _intervals(spans: Iterable[Span], within: Interval) -> list[Interval]:
     found = [within]
     for _, low, high, period in spans:
         if period:
+            if (within[1] - within[0]) / period * len(found) > MOST:
+                raise _TooFineError
             first, last = (floor(end / period) for end in within)
             low, high = max(low, 0.0), min(high, period)
             held = [(k * period + low, k * period + high) for k in range(first, last + 1)]

@@ -19,6 +19,8 @@ YAML = (".yaml", ".yml")
 ENDINGS = (*YAML, ".ssp")
 COMMANDS = {"a scenario": "run", "a study file": "study", "a sweep file": "sweep", "a tuning file": "tune"}
 """Kind of file -> the command that is for it."""
+HOMES = {"a vehicle file": "vehicles"}
+"""Kind of file -> the one folder they lie in, which names need not say: `van` for `vehicles/van`."""
 _KEY = re.compile(rf"^[\"']?({'|'.join(KINDS)})[\"']?[ \t]*:", re.MULTILINE)
 
 
@@ -57,9 +59,12 @@ def names(kind: str) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def named(name: str | Path) -> Path | None:
+def named(name: str | Path, kind: str = "") -> Path | None:
     """Return the file that a name means, None if there is none: here, or in a folder of scenarios."""
-    candidates = (base / f"{name}{ending}" for base in (Path(), *folders()) for ending in ENDINGS)
+    bases = [Path(), *folders()]
+    if kind in HOMES:
+        bases += [folder / HOMES[kind] for folder in folders()]
+    candidates = (base / f"{name}{ending}" for base in bases for ending in ENDINGS)
     return next((path for path in candidates if os.path.isfile(path)), None)
 
 
@@ -76,11 +81,11 @@ def find(source: str | Path, kind: str) -> Path:
         raise ScenarioError(f"{source}: {_what_is_in(path, kind)}")
     if os.path.exists(path):
         return path
-    known = names(kind)
+    known = [name.removeprefix(f"{HOMES.get(kind)}/") for name in names(kind)]
     elsewhere = [name for name in known if path.stem == name.rpartition("/")[2]]
     if path.suffix in ENDINGS and not elsewhere:
         return path
-    if file := named(source):
+    if file := named(source, kind):
         return file
     for folder in (base / path for base in folders()):
         if os.path.isdir(folder):

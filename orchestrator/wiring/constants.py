@@ -111,14 +111,18 @@ def _of_facts(
                 notes.append(f"{name} is left out: no unit has such an input after the swap")
             else:
                 problems.append((key, f"no unit has an input {name}"))
+        refused: dict[str, list[str]] = {}
         for unit, one in takers:
             value = raw
             try:
                 value = value_for(known[unit][one], raw)
             except ValueError as error:
-                problems.append((key, f"{error}, for {unit}.{one}"))
+                refused.setdefault(str(error), []).append(f"{unit}.{one}")
             level = CHANGED_FACT if changed else FACT
             yield (unit, one), Constant(value, key, origin(scenario.document, key), False, True, level)
+        everywhere = [len(inputs) for inputs in refused.values()] == [len(takers)]
+        for sentence, inputs in refused.items():
+            problems += [(key, sentence if everywhere else f"{sentence}, for {one}") for one in inputs]
 
 
 def _alike(pattern: str, units: Iterable[str], fmus: Mapping[str, Fmu]) -> str:

@@ -10,6 +10,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping
 
+from vocabulary.friction_table import table_of
+from vocabulary.patches import patches_of
 from vocabulary.vehicle import CAR
 
 from ..fmu.binary import integer_limits
@@ -27,6 +29,8 @@ from .text_file import text_of
 STIFFNESSES = ("cornering_stiffness_front", "cornering_stiffness_rear")
 STATIC_LOADS = ("static_load_front", "static_load_rear")
 """What follows from tyres, and what of the car that takes (see `make_plan`)."""
+WRITTEN: dict[str, Callable[[str], object]] = {"patches": patches_of, "friction_table": table_of}
+"""Parameters that are text of a form of its own, and what reads it: its mistakes are told before a run."""
 LARGEST, LARGEST_SINGLE = sys.float_info.max, (2 - 2**-23) * 2.0**127
 """Numbers of double and single precision."""
 
@@ -87,6 +91,8 @@ def _other(variable: Variable, given: Value) -> Value:
         raise ValueError(f"must be true or false (got {short(given)})")
     if variable.type == "String" and not isinstance(given, str):
         raise ValueError(f"must be text (got {short(given)}): put it in quotes")
+    if isinstance(given, str) and variable.name in WRITTEN:
+        WRITTEN[variable.name](given)
     return given
 
 

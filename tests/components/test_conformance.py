@@ -37,7 +37,10 @@ continuous = pytest.mark.parametrize(
     ids=[name for name, c in COMPONENTS.items() if not c.sampled],
 )
 
-TEXTS = {"patches": {"y > 0": "y < 0"}}
+TEXTS = {
+    "patches": {"y > 0": "y < 0"},
+    "friction_table": {",-9,9\n-2,0.2,0.4\n0,0.5,0.3\n3,0.9,0.8": ",-9,9\n2,0.2,0.4\n0,0.5,0.3\n-3,0.9,0.8"},
+}
 """Parameters that are free text: values, and what the same looks like in a mirror."""
 
 VARIANTS = [

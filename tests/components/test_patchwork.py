@@ -66,6 +66,9 @@ def test_a_later_patch_lies_upon_earlier_ones_with_its_own_friction():
         ("x % 0 > 1", "'x % 0 > 1': what follows % must be above zero"),
         ("(0 0) (1 1)", "'(0 0) (1 1)': a polygon is three corners or more"),
         ("(0 0) (1 1) (2)", "'(0 0) (1 1) (2)': a polygon is three corners or more"),
+        ("1e400: y > 0", "1e400 is too large a number (in '1e400: y > 0')"),
+        ("x % 1e400 > 1", "1e400 is too large a number"),
+        ("(0 0) (1e400 1) (2 0)", "1e400 is too large a number"),
         ("-0.1: y > 0", "the friction of a patch must not be negative (got '-0.1: y > 0')"),
     ],
 )

@@ -88,6 +88,18 @@ def test_a_folder_in_place_of_a_file_names_the_files_in_it(yawbench, command, fo
     assert ("study.yaml" in told) == (command == "study")
 
 
+def test_a_vehicle_file_goes_by_its_name_with_or_without_its_folder():
+    van = catalogue.find("van", "a vehicle file")
+    assert van == catalogue.find("vehicles/van", "a vehicle file")
+    assert van.samefile(SCENARIOS / "vehicles" / "van.yaml")
+    with pytest.raises(
+        ScenarioError, match="there is no vehicle file 'large_salon'; did you mean 'large_sal"
+    ):
+        catalogue.find("large_salon", "a vehicle file")
+    with pytest.raises(ScenarioError, match="there is no scenario '25mps'"):
+        catalogue.find("25mps", "a scenario")
+
+
 def test_the_glance_at_a_file_sees_the_kind_that_its_schema_sees():
     kinds = {path.name: kind for path, kind in catalogue.files(SCENARIOS / "fnn_sideslip", list(KINDS))}
     assert kinds == {

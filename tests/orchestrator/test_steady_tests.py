@@ -24,6 +24,7 @@ from orchestrator.scenario.catalogue import SHIPPED
 from orchestrator.scenario.load import load_scenario
 from orchestrator.tyres.axle_stiffness import cornering_stiffness
 from orchestrator.wiring.make_plan import make_plan
+from vocabulary.wheels import WHEELS
 
 from .test_sine_with_dwell import as_sampled
 
@@ -215,3 +216,19 @@ def test_a_trace_takes_the_car_from_the_plant_and_the_test_from_the_driver():
     trace = trace_of(Results(Path(), np.arange(2.0), {}, {"time": "s"}, {"fmus": fmus}))
     assert trace.facts == {"steering_ratio": 17.0, "mass": 1800.0, "cg_height": 0.5}
     assert trace.mass == 1800.0
+
+
+def test_the_friction_of_a_run_is_the_lowest_that_a_wheel_met():
+    constants = {"tyre": {"name": "tyre_a", "constants": {f"friction_{wheel}": 0.8 for wheel in WHEELS}}}
+    road = {"road": {"name": "road_a", "parameters": {"base_friction": 0.7}, "constants": {}}}
+    met = {f"road.friction_{wheel}": np.array([0.9, 0.3 if wheel == "rl" else 0.9]) for wheel in WHEELS}
+    none = {"time": "s"}
+
+    def friction(columns, fmus):
+        units = none | dict.fromkeys(columns, "1")
+        return trace_of(Results(Path(), np.arange(2.0), columns, units, {"fmus": fmus})).friction
+
+    assert friction(met, constants | road) == 0.3
+    assert friction({}, constants | road) == 0.7
+    assert friction({}, constants) == 0.8
+    assert friction({}, {}) is None

@@ -1021,6 +1021,7 @@ def test_a_parameter_that_is_text_can_come_from_a_file(folder):
         ("patches: {file: none.txt}", "none.txt: no such file or directory"),
         ("patches: {file: sub}", "sub: is a directory"),
         ("mu: {file: sub/patches.txt}", "takes a value: only parameters that are text take a file"),
+        ("patches: '1e400: y > 0'", "patches: 1e400 is too large a number (in '1e400: y > 0')"),
     ):
         (problem,) = problems(with_road(given))
         assert problem.endswith(said)
