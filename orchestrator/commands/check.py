@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from vocabulary.wheels import WHEELS
+
 from ..plan import DEFAULT, OF_RUN, ValueOrigin
 from ..wording import cut, printable
 from .batch import say
@@ -84,6 +86,8 @@ def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None
         also = " or come from tyre files" if plan.scenario.get("tyre_files") else ""
         console.print(f"  {hidden} more are left at the FMUs' defaults{also}: --all shows them", style="dim")
     _show(console, "Derived from the vehicle file", ("what", "as", "units"), _derived(plan))
+    of_stiffness = ("what", "given", "of the tyres at static loads", "apart", "units")
+    _show(console, "Given, though the tyres tell it", of_stiffness, _beside_tyres(plan))
     if idle := _idle(plan):
         console.print(f"  also in the vehicle file, but for other units: {', '.join(idle)}", style="dim")
     wires = list(_wire_rows(plan))
@@ -185,6 +189,33 @@ def _derived(plan: Plan) -> Iterable[Sequence[str]]:
             if origin.kind == "derived":
                 takers.setdefault((name, origin.detail), []).append(unit.name)
     return [(*key, ", ".join(units)) for key, units in takers.items()]
+
+
+def _beside_tyres(plan: Plan) -> Iterable[Sequence[str]]:
+    """Yield how far the axles' cornering stiffnesses given by hand are from those of the scenario's tyres."""
+    from ..errors import YawbenchError
+    from ..tyres.axle_stiffness import cornering_stiffness
+    from ..wiring.make_plan import TYRE_FORCES
+    from ..wiring.parameters import STATIC_LOADS, STIFFNESSES, known_car
+
+    takers: dict[tuple[str, float], list[str]] = {}
+    for unit in plan.units:
+        for name in STIFFNESSES:
+            if name in unit.parameters and unit.origins[name].kind not in ("derived", "default"):
+                takers.setdefault((name, float(unit.parameters[name])), []).append(unit.name)
+    tyres = [u for u in plan.units if {v.name for v in u.fmu.of("output")} >= {*TYRE_FORCES}]
+    car = known_car(plan.scenario.get("vehicle_parameters", {})) if takers and len(tyres) == 1 else None
+    if car is None or not car.values.keys() >= {*STATIC_LOADS}:
+        return
+    loads = {wheel: car.values[name] for wheel, name in zip(WHEELS[::2], STATIC_LOADS, strict=True)}
+    try:
+        found = dict(zip(STIFFNESSES, cornering_stiffness(tyres[0], loads).values(), strict=True))
+    except (ValueError, YawbenchError):
+        return  # they do not tell it
+    for (name, given), units in takers.items():
+        of_axle = 2.0 * found[name]
+        apart = f"{round(100.0 * (given / of_axle - 1.0), 1) + 0.0:+g} %" if of_axle else ""
+        yield name, _shown(given, "N/rad"), _shown(of_axle, "N/rad"), apart, ", ".join(units)
 
 
 def _idle(plan: Plan) -> list[str]:

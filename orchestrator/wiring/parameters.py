@@ -302,6 +302,12 @@ class Parameters:
         self._origins[unit][name] = origin(document, key)
 
 
+def known_car(given: Mapping[str, Value]) -> Car:
+    """Return what follows from the values of a vehicle file, which fit the quantities of a car."""
+    of_car = {name: raw for name, raw in given.items() if name in CAR}
+    return car_of({name: float(value_for(_quantity(name), raw)) for name, raw in of_car.items()})
+
+
 def _quantity(name: str) -> Variable:
     """Return a quantity of a car as if it were a parameter."""
     one = CAR[name]

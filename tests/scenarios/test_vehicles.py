@@ -11,6 +11,7 @@ from ruamel.yaml import YAML
 
 from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
 from orchestrator.cli import main
+from orchestrator.commands.check import show
 from orchestrator.errors import WiringError
 from orchestrator.fmu.opener import Opener
 from orchestrator.master.simulate import simulate_in_memory
@@ -85,6 +86,16 @@ def test_a_reference_is_told_the_slope_of_the_tyres_formula_at_the_static_loads(
         of_tyre = coefficients(MagicFormulaParameters(**scale), axle)
         force = forces_and_moment(0.0, 1e-6, loads[f"static_load_{axle}"], 0.9, of_tyre)[1]
         assert told[f"cornering_stiffness_{axle}"] == pytest.approx(-2.0 * force / 1e-6, rel=1e-4)
+
+
+def test_check_tells_how_far_stiffnesses_given_by_hand_are_from_those_of_the_tyres(fmus, capsys):
+    show(steady_turn(fmus), STEADY_TURN)
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    for axle, given in (("front", 62618.0), ("rear", 110185.0)):
+        (row,) = (line for line in lines if line[:1] == [f"cornering_stiffness_{axle}"] and "%" in line)
+        assert (float(row[1]), row[2], row[4], row[6:]) == (given, "N/rad", "N/rad", ["%", "reference"])
+        assert float(row[5]) == pytest.approx(100.0 * (given / float(row[3]) - 1.0), abs=0.051)
+        assert abs(float(row[5])) < 0.6
 
 
 # Measuring
@@ -238,9 +249,9 @@ def test_every_car_of_the_library_handles_as_cars_do(fmus, name):
     # Heave: T. D. Gillespie, Fundamentals of Vehicle Dynamics, SAE 1992, chapter 5: 1 to 1.5 Hz for passenger
     # cars; chosen: up to 2 Hz for a van, which has to carry as much again.
     assert 1.0 <= car.heave.frequency <= (2.0 if name == "van" else 1.5)
-    assert (
-        0.2 <= car.heave.damping <= 0.5
-    )  # chosen: no source found; dampers are set to 0.2 to 0.4 in most books
+    # Its damping: "typical passenger car suspension systems have a damping ratio in the range of [0.2, 0.6]",
+    # NVIDIA DriveOS SDK reference, dwEgomotionSuspensionParameters; chosen: up to 0.5.
+    assert 0.2 <= car.heave.damping <= 0.5
     # Roll and yaw modes, chosen: no ranges found in print that could be checked.
     assert 1.0 <= car.roll_mode.frequency <= 3.0
     assert 0.7 <= car.yaw[TURN_SPEED].frequency <= 2.0
