@@ -52,14 +52,24 @@ def tune(
 
     Every law of the file has the same objective, search (differential evolution) and budget. Without
     --out, results go to results/<folder of the tuning file>/<its name>: report.html; trials.csv, one row per
-    trial; the history as a figure. An interrupted search goes on where it was; with the same seed, and
-    whatever the number of workers, it finds the same.
+    trial; the history as a figure; where the file asks for it, entries.yaml for a ranking. An interrupted
+    search goes on where it was; with the same seed, and whatever the number of workers, it finds the same.
     """
     from dataclasses import replace
 
     from ..experiments.experiment import load_experiment
     from ..experiments.table import to_csv
-    from ..experiments.tuning import best_of, columns_of, history_figure, search, tuning_table
+    from ..experiments.tuning import (
+        ENTRIES,
+        best_of,
+        columns_of,
+        entries_of,
+        entries_text,
+        history_figure,
+        search,
+        tuning_of,
+        tuning_table,
+    )
     from ..figures.style import save
     from ..pages.panel_images import image_of
     from ..results.naming import default_folder
@@ -86,6 +96,8 @@ def tune(
     write_whole(folder / "trials.csv", to_csv(columns_of(found)))
     print_tables([table])
     command = command_of("tune", file, swap=swap, set=set_, fault=fault)
+    if tuning_of(experiment).entries:
+        write_whole(folder / ENTRIES, entries_text(entries_of(experiment, found), command))
     save(history_figure(experiment, found, command), folder / "history")
     charts = [image_of(folder / "history.svg", experiment.spec.title)]
     facts = {"results": [table], "charts": charts}

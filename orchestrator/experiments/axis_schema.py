@@ -160,8 +160,8 @@ class AxisSpec(Strict):
         assert self.end is not None
         if not self.start < self.end:
             raise ValueError(f"from must be below to (got {self.start:g} and {self.end:g})")
-        if self.spacing == "log" and self.start <= 0:
-            raise ValueError("from must be above 0 where spacing is log")
+        if self.spacing == "log" and self.start * self.end <= 0:
+            raise ValueError("from and to must both be above 0, or both below, where spacing is log")
 
 
 class DesignAxisSpec(AxisSpec):

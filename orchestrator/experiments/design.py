@@ -87,5 +87,6 @@ def level_at(axis: AxisSpec, place: float) -> Level:
     assert axis.start is not None
     assert axis.end is not None
     if axis.spacing == "log":
-        return _level(math.exp((1 - place) * math.log(axis.start) + place * math.log(axis.end)))
+        size = math.exp((1 - place) * math.log(abs(axis.start)) + place * math.log(abs(axis.end)))
+        return _level(math.copysign(size, axis.start))
     return _level((1 - place) * axis.start + place * axis.end)

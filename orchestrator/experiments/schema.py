@@ -204,6 +204,19 @@ class TuningSpec(Strict):
     seed: int = Field(description="Of all that is left to chance", ge=0)
     runs: Patterns = Field(["*"], description="Runs that the laws drive; the others stand as they are")
     laws: dict[str, LawSpec] = Field(description="Words -> what is tuned", min_length=1)
+    entries: str = Field(
+        "", description="Unit that every law swaps; what is found of it is written as entries of a ranking"
+    )
+
+    @model_validator(mode="after")
+    def _of_one_unit(self) -> TuningSpec:
+        for name, law in self.laws.items() if self.entries else ():
+            sought = [place for axis in law.axes.values() for place in axis.vary]
+            other = [place for place in (*law.places, *sought) if place.partition(".")[0] != self.entries]
+            if self.entries not in law.swap or other:
+                why = f"also changes {other[0]}" if other else "names no FMU for it"
+                raise ValueError(f"entries: an entry is one FMU and its parameters; {name!r} {why}")
+        return self
 
 
 class TableSpec(Strict):

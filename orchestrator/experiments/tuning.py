@@ -13,6 +13,7 @@ generations to come, and a seed; nothing ends it early.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -37,6 +38,8 @@ DIGITS = 3
 """Of every value that is tried, so that a file can hold what is found; chosen: gains matter to a per cent."""
 TRIAL = "trial"
 """The axis of what is tried."""
+ENTRIES = "entries.yaml"
+"""What is found as entries of a ranking, in the folder of the results."""
 
 Judged = Callable[[Experiment], Findings]
 """Makes those runs of an experiment that are left, and returns what it comes to."""
@@ -192,6 +195,39 @@ def tuning_table(experiment: Experiment, found: Sequence[Tuned]) -> Table:
         ]
         table.rows.append([one.law, first, best, "\n".join(told)])
     return table
+
+
+def entries_of(experiment: Experiment, found: Sequence[Tuned]) -> dict[str, dict[str, Any]]:
+    """Return what is found as entries of a ranking: name -> title, FMU, parameters, where they are from."""
+    tuning = tuning_of(experiment)
+    entries = {}
+    for one in found:
+        if one.best.objective is None:
+            continue  # nothing was found
+        law = tuning.laws[one.law]
+        told = _changes(law, one.best.values).set
+        made = f"{experiment.identity}: {len(one.trials)} trials, seed {tuning.seed}"
+        comes_to = f"{tuning.objective} {one.best.cost:.4g}, {one.trials[0].cost:.4g} amid the ranges"
+        entries[re.sub(r"\W+", "_", f"{one.law.lower()}_tuned")] = {
+            "title": f"{one.law}, tuned",
+            "fmu": law.swap[tuning.entries],
+            "gains": "tuned",
+            "parameters": {place.partition(".")[2]: value for place, value in told.items()},
+            "source": f"{made}; {comes_to}",
+        }
+    return entries
+
+
+def entries_text(entries: dict[str, dict[str, Any]], command: str) -> str:
+    """Return the file of entries that a command found."""
+    from io import StringIO
+
+    from ruamel.yaml import YAML
+
+    yaml: Any = YAML(typ="safe", pure=True)
+    yaml.default_flow_style, yaml.sort_base_mapping_type_on_output, yaml.width = False, False, 110
+    yaml.dump({"entries": entries}, stream := StringIO())
+    return f"# Written by: {command}\n{stream.getvalue()}"
 
 
 def columns_of(found: Sequence[Tuned]) -> list[Column]:

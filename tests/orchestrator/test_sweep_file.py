@@ -9,6 +9,8 @@ import pytest
 from scipy.stats import qmc
 
 from orchestrator.errors import ScenarioError
+from orchestrator.experiments.axis_schema import AxisSpec
+from orchestrator.experiments.design import level_at
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.planning import jobs_of, plan_experiment
 from tests.changed import changed
@@ -95,6 +97,11 @@ def test_logarithmic_steps_have_equal_factors(sweep):
     loaded = sweep((AMPLITUDE, "{vary: driver.amplitude, from: 0.001, to: 1, count: 4, spacing: log}"))
     found = list(dict.fromkeys(value[0] for value in values(loaded)))
     assert found == pytest.approx([0.001, 0.01, 0.1, 1.0], rel=1e-15)
+
+
+def test_a_place_in_a_range_of_equal_factors_may_be_negative():
+    axis = AxisSpec.model_validate({"vary": "a.b", "from": -2.5, "to": -0.025, "spacing": "log"})
+    assert [level_at(axis, place).value for place in (0, 0.5, 1)] == pytest.approx([-2.5, -0.25, -0.025])
 
 
 def test_a_list_takes_the_first_with_the_first(sweep):
@@ -210,7 +217,7 @@ REFUSED = [
     ("[0.01, 0.02, 0.03]", "[0.01, 0.02, 0.01]", "names 0.01 twice"),
     (AMPLITUDE, "{vary: driver.amplitude, from: 0.3, to: 0.1, count: 3}", "from must be below to"),
     (AMPLITUDE, "{vary: driver.amplitude, from: 0.1, to: 0.3}", "axes.amplitude: needs count"),
-    (AMPLITUDE, "{vary: driver.amplitude, from: 0, to: 1, count: 3, spacing: log}", "above 0 where spacing"),
+    (AMPLITUDE, "{vary: driver.amplitude, from: 0, to: 1, count: 3, spacing: log}", "both be above 0"),
     (AMPLITUDE, "{vary: driver.amplitude}", "needs values, or from, to and count"),
     (AMPLITUDE, "{vary: driver.amplitude, values: [1], count: 3}", "give either values, or from"),
     (AMPLITUDE, "{values: [1]}", "needs either vary or variants"),

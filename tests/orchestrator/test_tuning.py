@@ -8,6 +8,7 @@ import sys
 
 import pytest
 from lxml import html
+from ruamel.yaml import YAML
 
 from orchestrator.cli import main
 from tests.fmu_copies import put_fmus
@@ -35,8 +36,11 @@ tuning:
   generations: 2
   seed: 2
   runs: [turned]
+  entries: driver
   laws:
-    wheel: {axes: {angle: {vary: driver.amplitude, from: 0.5, to: 5, unit: deg}}}
+    big wheel:
+      swap: {driver: driver_sine}
+      axes: {angle: {vary: driver.amplitude, from: 0.5, to: 5, unit: deg}}
 """.replace("as it stands, ", "as_it_stands, ")
 
 
@@ -80,6 +84,14 @@ def test_the_least_of_all_trials_is_found_written_down_and_not_sought_twice(yawb
     best = min(trials, key=lambda row: float(row["objective"]))
     assert float(best["driver.amplitude"]) == pytest.approx(1.719, abs=0.5)
     assert f"driver.amplitude: {float(best['driver.amplitude']):g} deg" in out
+    (entry,) = YAML(typ="safe").load((tmp_path / "out/entries.yaml").read_text())["entries"].items()
+    made = {"amplitude": f"{float(best['driver.amplitude'])!r} deg"}
+    wanted = {"title": "big wheel, tuned", "fmu": "driver_sine", "gains": "tuned", "parameters": made}
+    source = entry[1].pop("source")
+    assert entry == ("big_wheel_tuned", wanted)
+    assert source.startswith(
+        f"{tmp_path.name}/tuning.yaml: 10 trials, seed 2; miss {float(best['objective']):.4g}"
+    )
     found = json.loads((tmp_path / "out/experiment.json").read_text())
     assert [*found["runs"]] == ["turned"]
     page = html.fromstring((tmp_path / "out/report.html").read_text())
@@ -97,6 +109,9 @@ def test_the_least_of_all_trials_is_found_written_down_and_not_sought_twice(yawb
         ({"objective: miss": "objective: mist"}, "there is no derived number 'mist'; did you mean 'miss'"),
         ({"runs: [turned]": "runs: [burned]"}, "no run is named 'burned'; did you mean 'turned'"),
         ({"from: 0.5, to: 5": "values: [1, 2]"}, "axes.angle: needs from and to, and no count"),
+        ({"entries: driver": "entries: wheel"}, "'big wheel' also changes driver"),
+        ({"swap: {driver: driver_sine}": "stop_time: 1"}, "'big wheel' also changes stop_time"),
+        ({"      swap: {driver: driver_sine}\n": ""}, "'big wheel' names no FMU for it"),
         ({"population: 5": "population: 3"}, "tuning.population"),
         ({"tuning:": "axes: {a: {vary: driver.amplitude, values: [1]}}\ntuning:"}, "has axes of its own"),
     ],

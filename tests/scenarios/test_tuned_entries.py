@@ -1,0 +1,81 @@
+"""The ranking's tuned entries are what the search of all laws found, within its ranges and its budget."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+from ruamel.yaml import YAML
+
+import yawbench as yb
+from orchestrator.cli import main
+from orchestrator.experiments.design import level_at
+from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.tuning import DIGITS, tuning_of
+from orchestrator.scenario.catalogue import SHIPPED
+from tests.checkout import ROOT
+
+HERE = SHIPPED / "proving_ground"
+TUNING = tuning_of(load_experiment(HERE / "tuning.yaml"))
+ENTRIES = YAML(typ="safe").load((HERE / "tuned.yaml").read_text(encoding="utf-8"))["entries"]
+FOUND = {entry["title"].removesuffix(", tuned"): entry for entry in ENTRIES.values()}
+"""Law -> its entry."""
+
+
+def costs(law: str) -> list[float]:
+    """Return what an entry's source says of the objective: found, and amid the ranges."""
+    return [float(text) for text in re.findall(r"cost ([\d.]+), ([\d.]+) amid", FOUND[law]["source"])[0]]
+
+
+def changes(law: str) -> dict[str, float]:
+    """Return an entry's parameters as a scenario is given them."""
+    return {f"controller.{name}": value for name, value in FOUND[law]["parameters"].items()}
+
+
+def test_every_law_of_the_search_is_an_entry_with_the_same_budget_and_no_other():
+    assert [*FOUND] == [*TUNING.laws]
+    budget = (
+        f"proving_ground/tuning.yaml: {TUNING.population * TUNING.generations} trials, seed {TUNING.seed};"
+    )
+    assert all(one["source"].startswith(budget) and one["gains"] == "tuned" for one in ENTRIES.values())
+
+
+@pytest.mark.parametrize("law", FOUND)
+def test_what_was_found_lies_in_its_ranges_about_the_authors_gains(law):
+    spec, given = TUNING.laws[law], changes(law)
+    sought = {axis.vary[0]: axis for axis in spec.axes.values()}
+    assert FOUND[law]["fmu"] == spec.swap["controller"]
+    assert given.keys() == spec.set.keys() | sought.keys()
+    assert given == given | spec.set
+    plan = yb.load("proving_ground/sine_with_dwell").swap(controller=FOUND[law]["fmu"]).set(given).plan()
+    (variables,) = (unit.fmu.variables for unit in plan.units if unit.name == "controller")
+    for place, axis in sought.items():
+        assert given[place] == float(f"{given[place]:.{DIGITS}g}")
+        assert axis.start <= given[place] <= axis.end
+        default = float(variables[place.partition(".")[2]].start)
+        assert level_at(axis, 0.5).value == pytest.approx(default, rel=1e-3), place
+    found, amid = costs(law)
+    assert found <= amid
+
+
+def test_the_docs_tell_the_objective_of_every_law_the_least_first():
+    page = (ROOT / "docs/proving_ground.md").read_text(encoding="utf-8")
+    shown = re.findall(r"^\| ([\w -]+) \| ([\d.]+) \| ([\d.]+) \|$", page, re.MULTILINE)
+    found = sorted((costs(law), law) for law in FOUND)
+    assert shown == [(law, f"{amid:.1f}", f"{least:.1f}") for (least, amid), law in found]
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("law", ["LQR", "fuzzy feedback"])
+def test_the_objective_of_an_entry_is_what_its_runs_come_to(law, tmp_path):
+    text = (HERE / "tuning.yaml").read_text(encoding="utf-8").partition("\ntuning:")[0]
+    text = text.replace("sine_with_dwell.yaml", str(HERE / "sine_with_dwell.yaml"))
+    text = text.replace("../vehicles/", f"{SHIPPED}/vehicles/")
+    driven = f"swap: {{controller: {FOUND[law]['fmu']}}}, set: {json.dumps(changes(law))}"
+    (tmp_path / "again.yaml").write_text(re.sub(r"(- \{name: \S+/tuned, .*)\}", rf"\1, {driven}}}", text))
+    with pytest.raises(SystemExit) as end:
+        main(["study", str(tmp_path / "again.yaml"), "--out", str(tmp_path / "out"), "--jobs", "1"])
+    assert not end.value.code
+    (made,) = json.loads((tmp_path / "out/experiment.json").read_text())["derived"].values()
+    assert made["value"] == pytest.approx(costs(law)[0], rel=1e-3)
