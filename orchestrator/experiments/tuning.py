@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ScenarioError
 from ..metrics.run_metrics import Value
-from .axis_schema import AxisSpec, Changes, VariantSpec
+from .axis_schema import Changes, DesignAxisSpec, VariantSpec
 from .design import level_at
 from .experiment import Experiment
 from .findings import Findings, derive
@@ -149,7 +149,7 @@ def _trials(experiment: Experiment, tried: dict[str, VariantSpec]) -> Experiment
 
 
 def _along(experiment: Experiment, runs: Sequence[str], variants: dict[str, VariantSpec]) -> Experiment:
-    axis = AxisSpec.model_validate({"variants": variants})
+    axis = DesignAxisSpec.model_validate({"variants": variants})
     spec = experiment.spec.model_copy(
         update={"axes": {TRIAL: axis}, "tuning": None, "tables": [], "figures": []}
     )
