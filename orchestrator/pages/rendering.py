@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from importlib.resources import files
 from typing import Any
 
@@ -22,6 +23,12 @@ SIGNS = {
 
 def render(template: str, **facts: Any) -> str:
     """Return a template filled with facts; a fact that it lacks is an error, not an empty place."""
+    return _templates().get_template(template).render(facts)
+
+
+@functools.cache
+def _templates() -> Environment:
+    """Return the templates, each compiled once."""
     environment = Environment(
         loader=PackageLoader("orchestrator.pages"),
         autoescape=True,
@@ -31,7 +38,7 @@ def render(template: str, **facts: Any) -> str:
         lstrip_blocks=True,
     )
     environment.filters["verdict"] = verdict_sign
-    return environment.get_template(template).render(facts)
+    return environment
 
 
 def style() -> Markup:

@@ -20,11 +20,13 @@ DRIVER = "title: Driver\nstop_time: 0.01\nstep_size: 0.001\nunits: {driver: {fmu
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the checkout, all FMUs that the tests use up to date."""
+    """A copy of the checkout, all FMUs that the tests use up to date, its modules compiled."""
     folder = copy_checkout(tmp_path_factory.mktemp("upkeep"))
     (folder / "driver.yaml").write_text(DRIVER)
-    done = run_in(folder, "yawbench", "build", YAWBENCH_CACHE=str(folder / "cache"))
-    assert done.returncode == 0, done.stderr
+    for command in ("build", "check driver.yaml", "run driver.yaml --out out"):
+        done = yawbench(folder, *command.split())
+        assert done.returncode == 0, done.stderr
+    shutil.rmtree(folder / "out")
     return folder
 
 
@@ -32,14 +34,13 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def project(built: Path, tmp_path: Path) -> Path:
     """A copy of it to spoil."""
     folder = tmp_path / "project"
-    shutil.copytree(built, folder, symlinks=True, ignore=shutil.ignore_patterns("docs", "tests", "cache"))
+    shutil.copytree(built, folder, symlinks=True, ignore=shutil.ignore_patterns("docs", "tests"))
     return folder
 
 
 def yawbench(project: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    return run_in(
-        project, "yawbench", *arguments, **{"YAWBENCH_CACHE": str(project / "cache"), **environment}
-    )
+    kept = {"YAWBENCH_CACHE": str(project / "cache"), "PYTHONDONTWRITEBYTECODE": ""}
+    return run_in(project, "yawbench", *arguments, **kept | environment)
 
 
 def edit(project: Path, old: str, new: str) -> None:

@@ -42,6 +42,8 @@ tables:
 claims:
   - {says: Without control there is no moment., holds_if: [{run: "off", metric: moment, at_most: 0}]}
   - {says: Control is gentle., holds_if: [{run: fuzzy_sideslip, metric: moment, at_most: 1 N.m}]}
+"""
+FIGURES = """
 figures:
   - {name: moments, runs: ["*"], panels: [steer_angle, yaw_moment]}
 """
@@ -166,6 +168,7 @@ def test_converge_of_what_does_not_depend_on_the_step_has_no_figure(yawbench, fo
 
 
 def test_study_runs_judges_and_draws(yawbench, folder):
+    (folder / "study.yaml").write_text(STUDY + FIGURES)
     status, out, said = yawbench("study", "study.yaml", "--out", "o")
     assert status == 0
     assert "Without control there is no moment." in out
@@ -251,18 +254,31 @@ WRITERS = {
 }
 
 
+@pytest.fixture
+def held(folder):
+    """The lock on a folder that another is writing."""
+    (folder / "sweep.yaml").write_text(SWEEP)
+    return Lock(folder / "o")
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="folders cannot be locked")
 @pytest.mark.parametrize("command", WRITERS)
-def test_a_command_leaves_a_folder_alone_that_another_is_writing(command, yawbench, folder):
-    (folder / "sweep.yaml").write_text(SWEEP)
-    lock = Lock(folder / "o")
+def test_a_command_leaves_a_folder_alone_that_another_is_writing(command, yawbench, folder, held):
     before = sorted((folder / "o").iterdir())
     status, out, said = yawbench(command, *WRITERS[command], "--out", "o")
     assert (status, out) == (2, "")
     assert f"o: {Holder.here()}".partition(", since")[0] in said
     assert said.endswith("is writing here; wait for it, or give another folder with --out.\n")
     assert sorted((folder / "o").iterdir()) == before
-    lock.release()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="folders cannot be locked")
+@pytest.mark.parametrize("command", WRITERS)
+@pytest.mark.sampled(2)
+def test_a_command_takes_a_folder_that_another_has_left_and_leaves_it_in_turn(
+    command, yawbench, folder, held
+):
+    held.release()
     assert yawbench(command, *WRITERS[command], "--out", "o")[0] == 0
     assert not list((folder / "o").rglob(LOCK_FILE))
 

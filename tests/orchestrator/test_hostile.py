@@ -26,6 +26,11 @@ TOGETHER = (
     "leave:trap", "enter:flush", "load:folder", "step:signals", "set:flood", "terminate:segfault",
     "free:_exit", "free:thread", "free:log_after", "value:nan", "value:huge_text",
 )  # fmt: skip
+OF_EACH_KIND = (
+    "step:_exit", "enter:segfault", "step:hang", "step:fork", "step:garbage", "step:close", "step:rounding",
+    "set:flood", "free:thread", "value:nan",
+)  # fmt: skip
+"""A few of them, for the first tier."""
 APART = (
     "load:exit", "enter:segfault", "step:_exit", "step:hang", "step:daemon", "step:child_crash", "step:fork",
     "step:garbage", "step:zeros", "step:endless", "step:pickle", "step:close", "get:stop", "set:flood",
@@ -33,8 +38,14 @@ APART = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize(("isolated", "harm"), [(False, TOGETHER), (True, APART)], ids=["together", "apart"])
-@pytest.mark.sampled(1)
+@pytest.mark.parametrize(
+    ("isolated", "harm"),
+    [
+        pytest.param(False, OF_EACH_KIND, id="some"),
+        pytest.param(False, TOGETHER, id="together", marks=pytest.mark.exhaustive),
+        pytest.param(True, APART, id="apart", marks=pytest.mark.exhaustive),
+    ],
+)
 def test_a_unit_that_does_harm_ends_its_run_with_a_sentence_and_the_results_so_far(isolated, harm, tmp_path):
     cases = [Case(does, isolated) for does in harm]
     assert attack(cases, tmp_path) == {case: [] for case in cases}

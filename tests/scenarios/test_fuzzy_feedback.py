@@ -3,38 +3,28 @@
 from __future__ import annotations
 
 import csv
-import json
 from pathlib import Path
 
 import pytest
 
-from orchestrator.cli import main
 from orchestrator.experiments.verdicts import share
-from tests.fmu_copies import put_fmus
+from tests.studies import judge_all, judge_some, verdicts
 
 STUDY = Path(__file__).parents[2] / "scenarios" / "fuzzy_feedback" / "study.yaml"
-UNITS = (
-    "driver_sine", "reference_single_track", "controller_off", "controller_fuzzy_feedback", "plant_two_dof",
-    "tyre_magic_formula_1987",
-)  # fmt: skip
 DEGREE = 0.017453292519943295
 
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    """What experiment.json says."""
-    folder = tmp_path_factory.mktemp("paper_d")
-    put_fmus(folder / "fmus", components=UNITS)
-    with pytest.raises(SystemExit) as exit_:
-        main(["study", str(STUDY), "--quick", "--out", str(folder / "out"), "--fmus", str(folder / "fmus")])
-    assert not exit_.value.code
-    return json.loads((folder / "out" / "experiment.json").read_text())
+    """The record of the study, without what its controller does not know."""
+    runs = ("off", "both", "yaw_rate_alone", "sideslip_alone", "unlimited/fuzzy_feedback")
+    return judge_some(STUDY, tmp_path_factory.mktemp("study"), *runs)
 
 
-@pytest.fixture
-def metric(study):
-    """Return a metric of a run."""
-    return lambda run, name: study["runs"][run]["metrics"][name]["value"]
+@pytest.fixture(scope="module")
+def whole(study):
+    """The same with all its runs."""
+    return judge_all(STUDY, study["folder"], "--quick")
 
 
 def test_the_controlled_car_follows_the_limited_reference_and_comes_to_rest(metric):
@@ -58,39 +48,50 @@ def test_the_printed_reference_asks_for_more_sideslip_than_the_road_allows_the_l
     assert metric("unlimited/fuzzy_feedback", "sideslip") > 5 * metric("both", "sideslip")
 
 
-def test_sideslip_and_robustness_do_not_reproduce_and_all_else_holds(study, metric):
-    assert {check["verdict"] for check in study["checks"]} == {"holds"}
-    assert [claim["says"] for claim in study["claims"] if claim["verdict"] != "holds"] == [
-        "With control the sideslip practically coincides with its reference.",
-        "Fuzzy control is robust, insensitive to disturbances and changed parameters.",
-    ]
+LOST = "With control the sideslip practically coincides with its reference."
+
+
+def test_all_holds_but_that_the_sideslip_follows_too(study, metric):
+    assert [says for says, verdict in verdicts(study).items() if verdict != "holds"] == [LOST]
+    assert len(verdicts(study)) == 8
     assert metric("both", "sideslip_rms") > 0.10  # one moment, two references
 
 
-def test_the_readme_tells_what_the_study_found(study, metric):
-    section = (STUDY.parents[2] / "README.md").read_text(encoding="utf-8").partition("### Paper D")[2]
-    told = " ".join(section.partition("## ")[0].split())
-    assert f"({metric('off', 'sideslip') / DEGREE:.0f} degrees of sideslip)" in told
-    assert f"({100 * metric('both', 'rms'):.1f} % RMS of the peak)" in told
-    assert f"({100 * metric('both', 'sideslip_rms'):.0f} % RMS)" in told
-    assert f"reaches {metric('both', 'sideslip') / DEGREE:.1f} degrees" in told
-    assert f"the {metric('both', 'sideslip_ref') / DEGREE:.1f} of its reference" in told
-    assert f"and {metric('unlimited/fuzzy_feedback', 'sideslip') / DEGREE:.1f} with the reference" in told
-    assert f"as far as the road bears it ({100 * metric('both', 'path'):.1f} % RMS)" in told
-    unknown = [run for run in study["runs"] if run.startswith("unknown/")]
-    rms, path = (max(100 * metric(run, name) for run in unknown) for name in ("rms", "path"))
-    assert f"({rms:.1f} % at most), but the path leaves its own (up to {path:.0f} %)" in told
+@pytest.mark.exhaustive
+def test_robustness_does_not_reproduce_either(whole):
+    robust = "Fuzzy control is robust, insensitive to disturbances and changed parameters."
+    assert [says for says, verdict in verdicts(whole).items() if verdict != "holds"] == [LOST, robust]
+    assert len(verdicts(whole)) == len(whole["claims"]) + len(whole["checks"])
+
+
+README = (STUDY.parents[2] / "README.md").read_text(encoding="utf-8")
+SECTION = README.partition("### Paper D")[2].partition("## ")[0]
+TOLD = " ".join(SECTION.split())
+
+
+def test_the_readme_tells_what_the_study_found(metric):
+    assert f"({metric('off', 'sideslip') / DEGREE:.0f} degrees of sideslip)" in TOLD
+    assert f"({100 * metric('both', 'rms'):.1f} % RMS of the peak)" in TOLD
+    assert f"({100 * metric('both', 'sideslip_rms'):.0f} % RMS)" in TOLD
+    assert f"reaches {metric('both', 'sideslip') / DEGREE:.1f} degrees" in TOLD
+    assert f"the {metric('both', 'sideslip_ref') / DEGREE:.1f} of its reference" in TOLD
+    assert f"and {metric('unlimited/fuzzy_feedback', 'sideslip') / DEGREE:.1f} with the reference" in TOLD
+    assert f"as far as the road bears it ({100 * metric('both', 'path'):.1f} % RMS)" in TOLD
 
 
 @pytest.mark.exhaustive
-def test_the_readme_tells_how_far_the_verdicts_carry(tmp_path):
-    put_fmus(tmp_path / "fmus", components=(*UNITS, "tyre_magic_formula"))
-    with pytest.raises(SystemExit) as ended:
-        main(["study", str(STUDY), "--out", str(tmp_path), "--fmus", str(tmp_path / "fmus")])
-    assert not ended.value.code
-    found = {row["says"]: row for row in csv.DictReader((tmp_path / "verdicts.csv").open(encoding="utf-8"))}
-    section = (STUDY.parents[2] / "README.md").read_text(encoding="utf-8").partition("### Paper D")[2]
-    table = [line for line in section.partition("## ")[0].splitlines() if line.startswith("| With")]
+def test_the_readme_tells_what_becomes_of_what_the_controller_does_not_know(whole, metric_of_all):
+    unknown = [run for run in whole["runs"] if run.startswith("unknown/")]
+    rms, path = (max(100 * metric_of_all(run, name) for run in unknown) for name in ("rms", "path"))
+    assert f"({rms:.1f} % at most), but the path leaves its own (up to {path:.0f} %)" in TOLD
+
+
+@pytest.mark.exhaustive
+def test_the_readme_tells_how_far_the_verdicts_carry(whole):
+    folder = judge_all(STUDY, whole["folder"])["folder"]
+    with (folder / "verdicts.csv").open(encoding="utf-8") as file:
+        found = {row["says"]: row for row in csv.DictReader(file)}
+    table = [line for line in SECTION.splitlines() if line.startswith("| With")]
     assert len(table) >= 4
     for line in table:
         says, verdict, margin, region, flip = (cell.strip() for cell in line.strip("|").split("|"))

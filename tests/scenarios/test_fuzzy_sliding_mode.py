@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ from orchestrator.figures.display import shown
 from orchestrator.results.read import load_results
 from tests.changed import changed
 from tests.fmu_copies import put_fmus
+from tests.studies import check_figures, judge_all, judge_some, verdicts
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "fuzzy_sliding_mode"
 SCENARIOS = ("high_friction", "low_friction", "beyond_paper", "beyond_grip", "side_share")
@@ -38,23 +38,18 @@ def fmus(tmp_path_factory):
     return folder
 
 
-def judged(name, folder, fmus):
-    """Run a study and return what its experiment.json says, with its folder."""
-    with pytest.raises(SystemExit) as exit_:
-        main(["study", str(FOLDER / f"{name}.yaml"), "--quick", "--out", str(folder), "--fmus", str(fmus)])
-    assert not exit_.value.code
-    return json.loads((folder / "experiment.json").read_text()) | {"folder": folder}
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """The record of the study: its three roads, and of what else it looks at a pair of runs each."""
+    runs = [f"{road}/{law}" for road in ROADS for law in ("off", *LAWS)]
+    pairs = ("sliding/weight_-0.25", "sliding/weight_0.25", "grip/6000_0.03/*")
+    return judge_some(FOLDER / "study.yaml", tmp_path_factory.mktemp("study"), *runs, *pairs)
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory, fmus):
-    return judged("study", tmp_path_factory.mktemp("study"), fmus)
-
-
-@pytest.fixture
-def metric(study):
-    """Return a metric of a run."""
-    return lambda run, name: study["runs"][run]["metrics"][name]["value"]
+def whole(study):
+    """The same with all its runs."""
+    return judge_all(FOLDER / "study.yaml", study["folder"], "--quick")
 
 
 def test_every_file_of_the_folder_is_tested_here():
@@ -62,20 +57,17 @@ def test_every_file_of_the_folder_is_tested_here():
     assert {path.stem for path in FOLDER.glob("*.yaml")} == {*SCENARIOS, *STUDIES, *elsewhere}
 
 
-@pytest.fixture(scope="module")
-def short_runs(tmp_path_factory, fmus):
-    """Scenario -> results of its first second."""
-    folder = tmp_path_factory.mktemp("short")
-    jobs = [
-        Job(name, FOLDER / f"{name}.yaml", folder / name, changed(stop_time=1), fmus) for name in SCENARIOS
-    ]
-    assert [outcome.problems for outcome in execute(jobs)] == [()] * len(jobs)
-    return {name: load_results(folder / name) for name in SCENARIOS}
+STUDIED = (*ROADS, "beyond_grip")
+"""Their first second is of the study, too."""
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_every_scenario_runs(short_runs, name):
-    run = short_runs[name]
+@pytest.mark.parametrize(
+    "name", [pytest.param(s, marks=[pytest.mark.exhaustive] * (s in STUDIED)) for s in SCENARIOS]
+)
+def test_every_scenario_runs(fmus, tmp_path, name):
+    (outcome,) = execute([Job(name, FOLDER / f"{name}.yaml", tmp_path, changed(stop_time=1), fmus)])
+    assert outcome.ok
+    run = load_results(tmp_path)
     assert run.time[-1] == 1.0
     assert run["plant.velocity_x"][-1] > 5.0
 
@@ -134,16 +126,19 @@ def test_nearly_all_of_that_is_the_boundary_layers(study):
 
 
 def test_a_sliding_car_recovers_with_the_weight_as_it_is_and_not_with_the_other_sign(metric):
-    for run in ("weight_-0.25", "weight_-1", "fuzzy_slip_control"):
-        assert metric(f"sliding/{run}", "late_sideslip") < np.radians(1.0)
-    assert np.radians(1.0) < metric("sliding/weight_0.05", "late_sideslip") < np.radians(5.0)
+    assert metric("sliding/weight_-0.25", "late_sideslip") < np.radians(1.0)
     assert metric("sliding/weight_0.25", "late_sideslip") > np.radians(20.0)
-    assert metric("sliding/weight_1", "sideslip") > np.radians(90.0)
 
 
-@pytest.mark.parametrize("steer", ["0", "0.03"])
-@pytest.mark.parametrize("force", ["-6000", "6000"])
-def test_beyond_the_grip_slip_control_keeps_the_wheels_and_direct_torque_does_not(metric, force, steer):
+@pytest.mark.exhaustive
+def test_the_further_the_weight_the_clearer_what_becomes_of_a_sliding_car(metric_of_all):
+    for run in ("weight_-1", "fuzzy_slip_control"):
+        assert metric_of_all(f"sliding/{run}", "late_sideslip") < np.radians(1.0)
+    assert np.radians(1.0) < metric_of_all("sliding/weight_0.05", "late_sideslip") < np.radians(5.0)
+    assert metric_of_all("sliding/weight_1", "sideslip") > np.radians(90.0)
+
+
+def assert_slip_control_keeps_what_direct_torque_does_not(metric, force, steer):
     slip, direct = (f"grip/{force}_{steer}/{name}" for name in ("slip", "direct"))
     assert metric(direct, "slip") > 0.6
     if steer == "0":
@@ -155,27 +150,50 @@ def test_beyond_the_grip_slip_control_keeps_the_wheels_and_direct_torque_does_no
         assert metric(direct, "sideslip") > np.radians(10.0)
 
 
-def test_claims_and_checks_of_the_study_hold_but_for_these(study):
-    assert [claim["says"] for claim in study["claims"] if not claim["holds"]] == [
-        "Without control the car suffers severe lateral instability on low friction.",
-        "Slip control keeps the slip within 0.95 of the slip of most force.",
-        "Both controllers pull the sideslip angle towards zero.",
-    ]
-    assert [check["says"] for check in study["checks"] if not check["holds"]] == [
-        "Every controller keeps the mean yaw-rate error to a quarter of that without control.",
-        "Slip control keeps the slip below 0.15.",
-        "Slip control keeps the car.",
-        "It keeps the slip below 0.15 also where driving and turning begin at the same instant.",
-    ]
-
-
-def test_driving_and_turning_at_the_same_instant_slip_stays_below_the_cap(metric):
-    assert metric("at_once/slip", "slip") < SlipControlParameters().slip_cap
+def test_driving_in_a_turn_beyond_the_grip_slip_control_keeps_the_wheels_and_direct_torque_does_not(metric):
+    assert_slip_control_keeps_what_direct_torque_does_not(metric, "6000", "0.03")
 
 
 @pytest.mark.exhaustive
-def test_the_distribution_table_is_the_papers_in_order_and_best_in_proportion_to_load(tmp_path, fmus):
-    found = judged("distribution", tmp_path, fmus)
+@pytest.mark.parametrize(("force", "steer"), [("-6000", "0"), ("-6000", "0.03"), ("6000", "0")])
+def test_braking_and_straight_ahead_it_does_too(metric_of_all, force, steer):
+    assert_slip_control_keeps_what_direct_torque_does_not(metric_of_all, force, steer)
+
+
+LOST = {
+    "Without control the car suffers severe lateral instability on low friction.",
+    "Slip control keeps the slip within 0.95 of the slip of most force.",
+    "Both controllers pull the sideslip angle towards zero.",
+    "Every controller keeps the mean yaw-rate error to a quarter of that without control.",
+}
+LOST_BEYOND_THE_GRIP = {
+    "Slip control keeps the slip below 0.15.",
+    "Slip control keeps the car.",
+    "It keeps the slip below 0.15 also where driving and turning begin at the same instant.",
+}
+
+
+def test_claims_and_checks_hold_but_for_these(study):
+    assert {says for says, verdict in verdicts(study).items() if verdict != "holds"} == LOST
+    assert len(verdicts(study)) == 14
+
+
+@pytest.mark.exhaustive
+def test_claims_and_checks_of_the_whole_study_hold_but_for_these(whole):
+    assert {says for says, verdict in verdicts(whole).items() if verdict != "holds"} == (
+        LOST | LOST_BEYOND_THE_GRIP
+    )
+    assert len(verdicts(whole)) == len(whole["claims"]) + len(whole["checks"])
+
+
+@pytest.mark.exhaustive
+def test_driving_and_turning_at_the_same_instant_slip_stays_below_the_cap(metric_of_all):
+    assert metric_of_all("at_once/slip", "slip") < SlipControlParameters().slip_cap
+
+
+@pytest.mark.exhaustive
+def test_the_distribution_table_is_the_papers_in_order_and_best_in_proportion_to_load(tmp_path):
+    found = judge_all(FOLDER / "distribution.yaml", tmp_path, "--quick")
 
     def means(reading):
         runs = found["runs"].items()
@@ -226,12 +244,7 @@ def test_the_readme_shows_what_the_study_found(study, metric):
     assert f"(RMS error {min(rms):.1f} to {max(rms):.1f} %)" in told
     shares = [100 * study["derived"][f"{road}_torque"]["value"] for road in ("high", "low", "beyond")]
     assert f"But {min(shares):.0f} to {max(shares):.0f} % of the drop" in told
-    speeds = [
-        3.6 * metric(run, "final_speed")
-        for run in ("low_friction/sign", "all_wheels/low_friction/sliding_mode")
-    ]
-    assert f"from 50 to {speeds[0]:.0f} km/h" in told
-    assert f"it ends at {speeds[1]:.0f} km/h" in told
+    assert f"from 50 to {3.6 * metric('low_friction/sign', 'final_speed'):.0f} km/h" in told
     slides, free = (np.degrees(metric(f"low_friction/{law}", "sideslip")) for law in ("sign", "off"))
     assert f"slides more, {slides:.2f} degrees, than without control, {free:.2f}." in told
     assert f"leaves the reference by {100 * metric('low_friction/off', 'relative_peak'):.1f} %" in told
@@ -239,14 +252,18 @@ def test_the_readme_shows_what_the_study_found(study, metric):
     assert f"it comes to {slip} where at most {asked} is asked for" in told
 
 
-def test_figures_and_tables_are_written(study):
-    assert set(study["figures"]) == {
-        "high_friction", "low_friction", "beyond_paper", "sliding", "braking_in_a_turn", "driving_in_a_turn",
-        "braking_straight",
-    }  # fmt: skip
-    for name in study["figures"]:
-        for kind in ("svg", "png"):
-            assert (study["folder"] / "figures" / f"{name}.{kind}").stat().st_size > 10_000
+@pytest.mark.exhaustive
+def test_the_readme_tells_where_a_moment_by_all_wheels_ends(metric_of_all):
+    speed = 3.6 * metric_of_all("all_wheels/low_friction/sliding_mode", "final_speed")
+    assert f"it ends at {speed:.0f} km/h" in section_of_the_readme()
+
+
+@pytest.mark.exhaustive
+def test_figures_and_tables_are_written(whole):
+    check_figures(
+        whole, "high_friction", "low_friction", "beyond_paper", "sliding", "braking_in_a_turn",
+        "driving_in_a_turn", "braking_straight",
+    )  # fmt: skip
 
 
 @pytest.mark.exhaustive

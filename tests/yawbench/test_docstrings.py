@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import doctest
 import re
+import shutil
 import textwrap
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pytest
@@ -23,11 +25,20 @@ def examples(name: str) -> list[doctest.DocTest]:
 
 @pytest.fixture(scope="module")
 def shown(tmp_path_factory):
-    """The names that examples use: the library, a scenario, its run, saved in the working folder."""
+    """The names that examples use: the library, a scenario, its run, saved in the working folder.
+
+    The scenario is cut short: those who use it tell of its beginning alone.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(tmp_path_factory.mktemp("examples"))
-        base = yb.load("fnn_sideslip/25mps")
-        run = base.run()
+        whole = yb.load("fnn_sideslip/25mps")
+        run = whole.run()
+        text = whole.path.read_text(encoding="utf-8")
+        assert "stop_time: 8.0" in text
+        for folder in ("fnn_sideslip", "vehicles"):
+            shutil.copytree(whole.path.parents[1] / folder, folder)
+        Path("fnn_sideslip/short.yaml").write_text(text.replace("stop_time: 8.0", "stop_time: 2.5"))
+        base = yb.load("fnn_sideslip/short.yaml")
         run.save("results/mine")
         yield {"yb": yb, "base": base, "run": run, **vars(components.fmi.variables)}
 

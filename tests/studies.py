@@ -1,0 +1,64 @@
+"""Studies of the papers: in the first tier of the tests some of their runs, in the second all of them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fmus.build import HERE as FMUS
+from fmus.build import build_all
+from orchestrator.cli import main
+from orchestrator.experiments.execution import left_to_do
+from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.findings import judge_results
+from orchestrator.experiments.planning import jobs_of, plan_experiment
+from orchestrator.experiments.record import RECORD, write_findings
+from orchestrator.experiments.workers import execute
+
+
+def judge_some(file: Path, out: Path, *runs: str) -> dict[str, Any]:
+    """Make some runs of a study, and return its record; what needs others is not judged.
+
+    Args:
+        file: the study; all its runs are planned, so that none can be wrong unnoticed.
+        out: folder of the results; `judge_all` completes them.
+        runs: names or patterns of those that are made.
+    """
+    build_all(FMUS)
+    experiment = load_experiment(file)
+    planned = plan_experiment(experiment, jobs_of(experiment, out, FMUS))
+    named = {run.name for run in experiment.matching(runs)}
+    outcomes = execute([job for job in left_to_do(planned.jobs, {}) if job.label in named])
+    assert [outcome.problems for outcome in outcomes if not outcome.ok] == []
+    write_findings(judge_results(planned.experiment, out, planned=planned), {}, out)
+    return record_of(out)
+
+
+def judge_all(file: Path, out: Path, *options: str) -> dict[str, Any]:
+    """Make all runs of a study as a user does, and return its record."""
+    with pytest.raises(SystemExit) as ended:
+        main(["study", str(file), "--out", str(out), "--fmus", str(FMUS), *options])
+    assert not ended.value.code
+    return record_of(out)
+
+
+def record_of(out: Path) -> dict[str, Any]:
+    """Return what the record of a study says, with its folder."""
+    return json.loads((out / RECORD).read_text(encoding="utf-8")) | {"folder": out}
+
+
+def verdicts(study: dict[str, Any]) -> dict[str, str]:
+    """Return claim or check -> verdict, of those that are judged."""
+    every = [*study["claims"], *study["checks"]]
+    return {one["says"]: one["verdict"] for one in every if one["holds"] is not None}
+
+
+def check_figures(study: dict[str, Any], *names: str) -> None:
+    """Assert that a study has drawn these figures and no others, as SVG and PNG."""
+    assert set(study["figures"]) == set(names)
+    for name in names:
+        for kind in ("svg", "png"):
+            assert (study["folder"] / "figures" / f"{name}.{kind}").stat().st_size > 10_000
