@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vocabulary.wheels import WHEELS
+from vocabulary.wheels import WHEELS, wheels
 
 from ..plan import DEFAULT, OF_RUN, ValueOrigin
 from ..wording import cut, printable
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 All = Annotated[
     bool, typer.Option("--all", help="Show every value, including those left at the defaults of the FMUs.")
 ]
+CAMBER = wheels("inclination_angle_*")
+"""What plants give by their roll camber."""
 PIPE_WIDTH = 140
 """Columns of what goes into a pipe or a file."""
 
@@ -157,6 +159,7 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
     takers: dict[tuple[str, str, str], list[str]] = {}
     sources: dict[tuple[str, str, str], str] = {}
     hidden = 0
+    cambered = {wire.source for wire in plan.wires if wire.output in CAMBER}
     for unit in plan.units:
         own = {v.name: unit.parameters.get(v.name, v.start) for v in unit.fmu.of("parameter")}
         alike: dict[tuple[str, str], list[str]] = {}
@@ -164,7 +167,8 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
         for name, value in {**own, **constants}.items():
             source = unit.origins.get(name, DEFAULT)
             origin = source.detail if source.kind == "file" else source.kind
-            if not defaults and (source in of_tyres or (source == DEFAULT and not _matters(unit, name))):
+            matters = _matters(unit, name) or (unit.name in cambered and name.startswith("roll_camber"))
+            if not defaults and (source in of_tyres or (source == DEFAULT and not matters)):
                 hidden += 1
             else:
                 alike.setdefault((_shown(value, unit.fmu.variables[name].unit), origin), []).append(name)

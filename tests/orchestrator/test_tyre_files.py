@@ -239,8 +239,8 @@ def test_a_unit_cannot_be_called_like_the_files(folder):
         load_scenario(path)
 
 
-def test_aligning_moments_and_camber_come_by_connections(tmp_path):
-    """The scenario that shows them: without these connections the car moves otherwise, by a little."""
+def test_aligning_moments_come_by_a_connection_and_camber_with_the_plants_roll(tmp_path):
+    """The scenario that shows them: without both the car moves otherwise, by a little."""
     shown = Path(__file__).parents[2] / "scenarios" / "tyre_file" / "lane_change.yaml"
     text = shown.read_text().replace("../vehicles", str(shown.parents[1] / "vehicles"))
     (tmp_path / "both.yaml").write_text(text)
@@ -248,9 +248,11 @@ def test_aligning_moments_and_camber_come_by_connections(tmp_path):
     peaks = {}
     for name in ("both", "none"):
         out = tmp_path / name
-        assert not yawbench(
-            ["run", str(tmp_path / f"{name}.yaml"), "--out", str(out), "--set", "stop_time=1.2"]
-        )
+        settings = ["stop_time=1.2"]
+        if name == "none":
+            settings += ["plant.roll_camber_front=0", "plant.roll_camber_rear=0"]
+        given = [text for one in settings for text in ("--set", one)]
+        assert not yawbench(["run", str(tmp_path / f"{name}.yaml"), "--out", str(out), *given])
         peaks[name] = np.max(np.abs(load_results(out)["plant.yaw_rate"]))
     assert 0.002 < abs(peaks["both"] / peaks["none"] - 1.0) < 0.2
 
