@@ -396,6 +396,19 @@ def test_a_constant_and_a_connection_of_the_replaced_fmu_are_left_out_with_a_not
     assert made.record == ()
 
 
+def test_a_friction_too_low_for_all_who_are_told_it_is_said_once_and_else_of_whom(folder: Path) -> None:
+    inputs = [Var("friction", "1", minimum=0.0), Var("friction_*", "1", minimum=0.0)]
+    base = [Var("base_friction", "1", minimum=0.0)]
+    make_fmu(folder / "plant_one.fmu", inputs=inputs, outputs=["x"], parameters=base)
+    make_fmu(folder / "reference_one.fmu", inputs=[Var("friction", "1", minimum=0.1)], outputs=["y"])
+    one, two = "  plant: {fmu: plant_one}\n", "  reference: {fmu: reference_one}\n"
+    where = "a.yaml:1: friction: must be at least"
+    assert problems(scenario(one, "", head="friction: -1\n")) == [f"{where} 0 (got -1)"]
+    assert problems(scenario(one + two, "", head="friction: 0.05\n")) == [
+        f"{where} 0.1 (got 0.05), for reference.friction"
+    ]
+
+
 def test_friction_and_speed_that_nobody_takes_after_a_swap_are_left_out_with_a_note(folder: Path) -> None:
     speed = [Var("initial_speed", "m/s")]
     make_fmu(folder / "plant_one.fmu", inputs=[Var("friction_fl", "1")], outputs=["x"], parameters=speed)
