@@ -18,14 +18,18 @@ transitions of another length, for speeds that a slippery road does not bear on 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import copysign
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 PART_1, PART_2 = "iso_3888_1", "iso_3888_2"
 LENGTHS = {PART_1: (15.0, 30.0, 25.0, 25.0, 30.0), PART_2: (12.0, 13.5, 11.0, 12.5, 12.0)}
 """Of lane 1, transition 2, lane 3, transition 4 and lane 5, with 6 where there is one [m]."""
 GAP = 1.0
 """Between lanes 1 and 3 of part 2, from border to border [m]."""
+
+PARAMETERS = ("vehicle_width", "track_start", "lane_offset", "transition_scale")
+"""Parameters of a driver that knows such a track; `track_standard` says which, part 1 if it is left out."""
 
 
 class Lane(NamedTuple):
@@ -81,3 +85,16 @@ def lanes(
         made.append(Lane(x, x + length, min(borders), max(borders)))
         x += length + gap
     return made[0], made[1], made[2]
+
+
+def lanes_of(parameters: Mapping[str, Any]) -> list[Lane]:
+    """Return the lanes that a driver's parameters describe; none if they are not of such a track.
+
+    Without an offset there is no change of lanes, and so no cones.
+    """
+    known = {name: parameters.get(name) for name in PARAMETERS}
+    if not all(isinstance(value, (int, float)) for value in known.values()) or known["lane_offset"] == 0:
+        return []
+    numbers: dict[str, Any] = {name: float(value) for name, value in known.items() if value is not None}
+    standard = parameters.get("track_standard", PART_1)
+    return list(lanes(**numbers, standard=standard)) if standard in LENGTHS else []

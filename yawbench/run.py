@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import functools
 import io
+import math
 from collections.abc import Iterator
 from html import escape
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -143,11 +145,15 @@ class Run:
             angle: the hand-wheel angle at 0.3 g [rad], which sine with dwell needs for responsiveness.
 
         Raises:
-            ScenarioError: there is no such test.
+            ScenarioError: there is no such test, or the angle is none.
             ResultsError: the run has not recorded what it needs.
         """
         if test not in TESTS:
             raise ScenarioError(f"there is no test {test!r}{hint(test, TESTS, lead='known')}")
+        if angle is not None and not TESTS[test].needs_angle:
+            raise ScenarioError(f"{test} needs no angle: leave it away")
+        if angle is not None and not (isinstance(angle, Real) and 0.0 < angle < 2.0 * math.pi):
+            raise ScenarioError(f"angle: must be a number between 0 and 2 pi rad (got {angle!r})")
         return TESTS[test].evaluate(trace_of(self.results, self.title), angle).judged
 
     def plot(self, *panels: str, title: str | None = None) -> Figure:

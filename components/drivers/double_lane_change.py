@@ -11,12 +11,6 @@ car that followed at once, the path would be approached as by an oscillator of
 sqrt(2) / T_p and damping ratio 0.7. The path and the cones: `driving.track`. The speed:
 `driving.speed_holding`.
 
-With yaw feedback w the driver looks along the car's course, psi + atan(v_y / v), not along its axis, and
-steers for kappa + w (kappa - r / v): where the tyres give less than those of the linear car, or later, he
-asks for more.
-
-He may let go of the accelerator at a place, `coasting_after` the first cones, as ISO 3888-2 has it.
-
 `path_offset` is the car's own distance from the path, `cone_overrun` how far the body is beyond the cones.
 
 Source: the single-point preview of C. C. MacAdam, IEEE Trans. Systems, Man, and Cybernetics 11(6), 1981,
@@ -26,14 +20,14 @@ Source: the single-point preview of C. C. MacAdam, IEEE Trans. Systems, Man, and
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, cos, sin
+from math import cos, sin
 
 from ..cars.published_cars import PaperC
 from ..cars.single_track_car import SingleTrackCar
 from ..driving.speed_holding import HeldSpeedParameters, SpeedHold
 from ..driving.track import LaneChangeParameters, Track
 from ..fmi.component import Component
-from ..fmi.variables import like, output, parameter, signal
+from ..fmi.variables import like, output, parameter
 from ..mathematics.first_order_lag import Stage
 
 
@@ -62,19 +56,6 @@ class DoubleLaneChangeParameters(HeldSpeedParameters, LaneChangeParameters):
     steering_ratio: float = parameter(
         17.0, "1", "Hand-wheel angle over road-wheel angle", "chosen: large saloon", minimum=0.1
     )
-    yaw_feedback: float = parameter(
-        0.0,
-        "1",
-        "Yaw feedback w: what the yaw rate lacks for the arc is asked for w times more",
-        "chosen: none, in the runs of paper C",
-        minimum=0.0,
-    )
-    coasting_after: float = parameter(
-        -1.0,
-        "m",
-        "Where the accelerator is let go, from the first cones on; negative: nowhere",
-        "chosen: the speed is held",
-    )
     mass: float = like(PaperC, "mass")
     cg_to_front_axle: float = like(PaperC, "cg_to_front_axle")
     cg_to_rear_axle: float = like(PaperC, "cg_to_rear_axle")
@@ -96,11 +77,7 @@ class DoubleLaneChange(Component):
     """Driver who takes a double lane change at a held speed, by preview of one point."""
 
     Parameters = DoubleLaneChangeParameters
-    inputs = (
-        *("velocity_x", "position_x", "position_y", "yaw_angle"),
-        signal("yaw_rate", optional=True),
-        signal("velocity_y", optional=True),
-    )
+    inputs = ("velocity_x", "position_x", "position_y", "yaw_angle")
     outputs = (
         "steer_angle",
         "drive_force",
@@ -129,9 +106,6 @@ class DoubleLaneChange(Component):
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
         self.speed.advance(t, h, u[0])
-        p = self.p
-        if p.coasting_after >= 0.0 and u[1] >= p.track_start + p.coasting_after:
-            self.speed.let_go = min(self.speed.let_go, t + h)
         before = self.wanted
         self.wanted = self._wanted(u)  # positions are those of the end of the step
         self.hands.advance(t, h, 0.5 * (before + self.wanted))
@@ -149,13 +123,10 @@ class DoubleLaneChange(Component):
     def _wanted(self, u: list[float]) -> float:
         """Return the hand-wheel angle [rad] that the driver wants."""
         p = self.p
-        v, x, y, psi, r, v_y = u
+        v, x, y, psi = u
         preview = max(v * p.preview_time, p.least_preview)
         yaw_gain, _ = self.car.gains(max(v, 0.1))
-        if p.yaw_feedback:
-            psi += atan2(v_y, max(v, 0.1))
         kappa = arc(x, y, psi, track=self.track, preview=preview)
-        kappa += p.yaw_feedback * (kappa - r / max(v, 0.1))
         delta = kappa * max(v, 0.1) / yaw_gain
         wanted: float = min(max(p.steering_ratio * delta, -p.steering_wheel_limit), p.steering_wheel_limit)
         return wanted

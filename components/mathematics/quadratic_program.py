@@ -42,6 +42,25 @@ def inverse(h: Sequence[Sequence[float]]) -> Rows:
     return [row[n:] for row in rows]
 
 
+def solution(h: Sequence[Sequence[float]], g: Sequence[float]) -> list[float]:
+    """Return z with H z = g, H symmetric and positive definite, by Gauss's elimination.
+
+    Raises:
+        ZeroDivisionError: a pivot is zero, so that H is not positive definite.
+    """
+    rows = [[*row[i:], value] for i, (row, value) in enumerate(zip(h, g, strict=True))]  # upper triangle
+    n = len(rows)
+    for i, top in enumerate(rows):
+        for k in range(1, n - i):
+            if factor := top[k] / top[0]:
+                below = rows[i + k]
+                rows[i + k] = [a - factor * b for a, b in zip(below, top[k:], strict=True)]
+    z: list[float] = []
+    for top in reversed(rows):
+        z.insert(0, (top[-1] - sum([a * b for a, b in zip(top[1:-1], z, strict=True)])) / top[0])
+    return z
+
+
 def multipliers(p: Sequence[Sequence[float]], d: Sequence[float]) -> list[float]:
     """Return y >= 0 that makes 1/2 y' P y + d' y least.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,24 +13,40 @@ from .batch import Jobs
 from .options import CallLimit, Fault, Fmus, Fresh, Isolate, NoBuild, Out, Set, Swap, isolation
 
 if TYPE_CHECKING:
-    from ..experiments.jobs import Job
+    from ..experiments.dwell_experiment import DwellExperiment
+    from ..experiments.entry_speed_experiment import EntrySpeedExperiment
+    from ..experiments.jobs import Job, Once
     from ..plan import Change
+
+    Make = Callable[[str, Sequence[Job]], int]
+    """Makes runs that have not been made, under a title; returns the exit status."""
+
+GROUND = "proving_ground"
+"""Folder of the scenarios of standard tests."""
 
 
 class Driven(str, Enum):
     """Tests of many runs."""
 
     sine_with_dwell = "sine-with-dwell"
+    iso_3888_1 = "iso-3888-1"
+    iso_3888_2 = "iso-3888-2"
 
 
 Which = Annotated[Driven, typer.Argument(help="The test.", metavar="TEST")]
 Scenario = Annotated[
-    str,
-    typer.Option("--scenario", metavar="SCENARIO", help="Scenario of one run of the test."),
+    str | None,
+    typer.Option(
+        "--scenario", metavar="SCENARIO", help="Scenario of one run; default: the test's in proving_ground."
+    ),
 ]
 Slow = Annotated[
-    str,
-    typer.Option("--slow-steer", metavar="SCENARIO", help="Scenario of slowly increasing steer, for A."),
+    str | None,
+    typer.Option(
+        "--slow-steer",
+        metavar="SCENARIO",
+        help="Scenario of slowly increasing steer, for A; default: proving_ground/slowly_increasing_steer.",
+    ),
 ]
 Vehicle = Annotated[
     str | None,
@@ -50,8 +66,8 @@ def drive(
     set_: Set = None,
     fault: Fault = None,
     vehicle: Vehicle = None,
-    scenario: Scenario = "proving_ground/sine_with_dwell",
-    slow_steer: Slow = "proving_ground/slowly_increasing_steer",
+    scenario: Scenario = None,
+    slow_steer: Slow = None,
     angle: Angle = None,
     out: Out = None,
     fmus: Fmus = None,
@@ -68,6 +84,51 @@ def drive(
     first and right first. Without --out, results go to results/<folder of the scenario>/<its name>_series.
     An interrupted series goes on where it was; nothing that is finished is run again. Of a car that rolls
     over, what it has recorded until then is judged, as far as it goes.
+
+    Lane changes of ISO 3888: the highest speed at the first cones at which no cone is touched, to half a
+    kilometre per hour, from the scenario's own speed in steps and halves.
+    """
+    from ..errors import ScenarioError
+    from ..experiments.dwell_experiment import DwellExperiment
+    from ..experiments.entry_speed_experiment import EntrySpeedExperiment
+    from ..experiments.jobs import Once
+    from ..results.naming import default_folder
+    from ..scenario import catalogue
+    from ..scenario.overrides import read_changes
+    from .batch import hold
+
+    changes = (*_vehicle(vehicle), *read_changes(swap or (), set_ or (), fault or ()))
+    one_run = catalogue.find(scenario or f"{GROUND}/{test.name}", "a scenario")
+    folder = out or default_folder(one_run, changes, suffix="_series")
+    limit = isolation(isolate, call_limit)
+    if test is not Driven.sine_with_dwell and (angle or slow_steer):
+        raise ScenarioError(f"{test.value} needs no A: leave --angle and --slow-steer away")
+
+    def make(title: str, runs: Sequence[Job]) -> int:
+        return _make(title, runs, folder, jobs, fresh=fresh)
+
+    once = Once(build=not no_build)
+    if test is Driven.sine_with_dwell:
+        slow = catalogue.find(slow_steer or f"{GROUND}/slowly_increasing_steer", "a scenario")
+        dwell = DwellExperiment(one_run, slow, folder, changes, fmus, call_limit=limit)
+        hold(context, folder)
+        status = _drive_dwell(dwell, once, angle, make, figures=figures)
+    else:
+        speeds = EntrySpeedExperiment(one_run, folder, changes, fmus, call_limit=limit)
+        hold(context, folder)
+        status = _drive_lane_change(speeds, once, make, figures=figures)
+    if status:
+        raise typer.Exit(status)
+
+
+def _drive_dwell(
+    experiment: DwellExperiment, once: Once, angle: str | None, make: Make, *, figures: bool
+) -> int:
+    """Make and evaluate the series of sine with dwell; return the exit status.
+
+    Raises:
+        ResultsError: A is not known.
+        typer.Exit: slowly increasing steer has failed.
     """
     import math
 
@@ -76,28 +137,15 @@ def drive(
     from ..evaluation.judgement import NotJudged
     from ..evaluation.slow_steer import characteristic_angle
     from ..evaluation.standard_tests import TESTS
-    from ..experiments.dwell_experiment import DwellExperiment, slow_steer_of, traces
-    from ..experiments.jobs import Once
-    from ..results.naming import default_folder
-    from ..scenario import catalogue
-    from ..scenario.overrides import read_changes
-    from .batch import hold, say
+    from ..experiments.dwell_experiment import slow_steer_of, traces
+    from .batch import say
     from .evaluate import angle_of, conclude
 
-    changes = (*_vehicle(vehicle), *read_changes(swap or (), set_ or (), fault or ()))
-    one_run = catalogue.find(scenario, "a scenario")
-    folder = out or default_folder(one_run, changes, suffix="_series")
-    limit = isolation(isolate, call_limit)
-    experiment = DwellExperiment(
-        one_run, catalogue.find(slow_steer, "a scenario"), folder, changes, fmus, call_limit=limit
-    )
-    hold(context, folder)
-    once = Once(build=not no_build)
-    chosen = TESTS[test.value]
+    chosen = TESTS[Driven.sine_with_dwell.value]
     known = angle_of(angle)
     if known is None:
         found = experiment.slow_steer_jobs(once)
-        if status := _make("slowly increasing steer", found, folder, jobs, fresh=fresh):
+        if status := make("slowly increasing steer", found):
             raise typer.Exit(status)
         try:
             known = characteristic_angle(slow_steer_of(found))
@@ -105,12 +153,30 @@ def drive(
             raise ResultsError(str(why)) from None
     ladder = experiment.ladder(known, once)
     say(f"A = {math.degrees(known):.1f} degrees: {len(ladder)} runs")
-    status = _make("sine with dwell", ladder, folder, jobs, fresh=fresh)
+    status = make("sine with dwell", ladder)
     evaluated = [chosen.evaluate(trace, known) for trace in traces(ladder)]
     series = judge_series([one.judged for one in evaluated], known)
-    conclude(chosen, evaluated, series, known, folder, each=figures)
-    if status:
-        raise typer.Exit(status)
+    conclude(chosen, evaluated, series, known, experiment.folder, each=figures)
+    return status
+
+
+def _drive_lane_change(experiment: EntrySpeedExperiment, once: Once, make: Make, *, figures: bool) -> int:
+    """Make and evaluate the runs to the highest clean entry speed; return the exit status."""
+    from ..evaluation.standard_tests import TESTS
+    from .evaluate import conclude
+
+    chosen = TESTS["lane-change"]
+    failed: list[int] = []
+
+    def made(job: Job) -> bool:
+        status = make(f"{job.label} km/h", [job])
+        failed.extend([status] if status else [])
+        return not status
+
+    traces, series = experiment.driven(once, made)
+    evaluated = [chosen.evaluate(trace, None) for trace in traces]
+    conclude(chosen, evaluated, series, None, experiment.folder, each=figures)
+    return max(failed, default=0)
 
 
 def _vehicle(given: str | None) -> tuple[Change, ...]:

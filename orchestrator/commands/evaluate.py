@@ -11,7 +11,7 @@ import typer
 from ..evaluation.standard_tests import TESTS
 
 if TYPE_CHECKING:
-    from ..evaluation.dwell_series import Series
+    from ..evaluation.judgement import Series
     from ..evaluation.standard_tests import Evaluated, StandardTest
     from ..evaluation.trace import MappingSpec
     from ..experiments.tables import Table
@@ -196,10 +196,8 @@ def _draw(
         name = stem if beside or len(evaluated) == 1 else f"{stem}_{number + 1}"
         save(one.draw(), (beside or folder) / name)
         count += 1
-    if series:
-        from ..evaluation.dwell_drawing import draw_series
-
-        save(draw_series(series, str(folder)), folder / f"{stem}_series")
+    if series and test.draw_series:
+        save(test.draw_series(series, str(folder)), folder / f"{stem}_series")
         count += 1
     return count
 

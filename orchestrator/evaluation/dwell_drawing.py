@@ -9,7 +9,7 @@ import numpy as np
 
 from ..figures.style import CHANGED, QUIET, frame, line_style, new_figure
 from .dwell_run import AT, FAR, FAR_HEAVY, HEAVY, RATIOS, DwellCourse, percent
-from .dwell_series import Series
+from .dwell_series import DwellSeries
 from .filters import at
 from .judgement import Judgement, Verdict
 from .trace import Trace
@@ -125,7 +125,7 @@ def _displaced(axes: Axes, course: DwellCourse, judged: Judgement, trace: Trace)
         _label(axes, instant + 0.35, least, f"at least {least:g} m", (4, -3), color=CHANGED)
 
 
-def draw_series(series: Series, note: str) -> Figure:
+def draw_series(series: DwellSeries, note: str) -> Figure:
     """Return the figure of a series: ratios and displacement over the amplitude, both directions."""
     from matplotlib.lines import Line2D
 

@@ -13,10 +13,11 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
-from .judgement import Judgement, Ruling, Verdict, overall
+from ..figures.display import shown
+from .judgement import Judgement, Ruling, Series, Verdict
 
 FIRST, STEP, LAST = 1.5, 0.5, 6.5
 """Amplitudes over A: of the first run, from run to run, of the last."""
@@ -45,26 +46,17 @@ def amplitudes(angle: float) -> list[float]:
 
 
 @dataclass
-class Series:
+class DwellSeries(Series):
     """What all runs of a series come to."""
 
-    angle: float  # A [rad]
-    runs: list[Judgement]
-    rulings: dict[str, Ruling] = field(default_factory=dict)
+    angle: float = 0.0  # A [rad]
 
     @property
-    def verdict(self) -> Verdict:
-        """Passed if all criteria are."""
-        found = overall(ruling.verdict for ruling in self.rulings.values())
-        return Verdict.PASSED if found is Verdict.PASSED else Verdict.FAILED
+    def summary(self) -> str:
+        return f"A = {shown(self.angle, 'rad')}; the series has {self.verdict.value}."
 
     def as_data(self) -> dict[str, Any]:
-        """Return it as plain data, for files."""
-        return {
-            "A": self.angle,
-            "verdict": self.verdict.value,
-            "criteria": {name: one.as_data() for name, one in self.rulings.items()},
-        }
+        return {"A": self.angle, **super().as_data()}
 
 
 def is_series(runs: Sequence[Judgement]) -> bool:
@@ -73,10 +65,10 @@ def is_series(runs: Sequence[Judgement]) -> bool:
     return len(runs) > 1 and all(b - a > SAME for a, b in itertools.pairwise(found))
 
 
-def judge_series(runs: Sequence[Judgement], angle: float) -> Series:
+def judge_series(runs: Sequence[Judgement], angle: float) -> DwellSeries:
     """Return the verdict over all runs, in the order of their amplitudes; `angle`: A [rad]."""
     ordered = sorted(runs, key=lambda run: (-math.copysign(1.0, _of(run)), abs(_of(run))))
-    series = Series(angle, ordered)
+    series = DwellSeries(ordered, angle=angle)
     missing = [
         math.degrees(side * wanted)
         for side in (1.0, -1.0)

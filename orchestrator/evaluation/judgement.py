@@ -1,4 +1,4 @@
-"""What a test comes to in one run: quantities in the order in which they are found, and verdicts.
+"""What a test comes to, in one run and in a series: quantities in their order, and verdicts.
 
 A verdict is passed, failed or not judged, and says why. A quantity that does not exist stands there
 without a number, and a criterion that needs it is not judged, never passed.
@@ -87,6 +87,32 @@ class Judgement:
             },
             "criteria": {name: one.as_data() for name, one in self.rulings.items()},
             "notes": list(self.notes),
+        }
+
+
+@dataclass
+class Series:
+    """What all runs of a test come to together."""
+
+    runs: list[Judgement]
+    rulings: dict[str, Ruling] = field(default_factory=dict)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Passed if all criteria are."""
+        found = overall(ruling.verdict for ruling in self.rulings.values())
+        return Verdict.PASSED if found is Verdict.PASSED else Verdict.FAILED
+
+    @property
+    def summary(self) -> str:
+        """What they come to, in a sentence."""
+        return f"The series has {self.verdict.value}."
+
+    def as_data(self) -> dict[str, Any]:
+        """Return it as plain data, for files."""
+        return {
+            "verdict": self.verdict.value,
+            "criteria": {name: one.as_data() for name, one in self.rulings.items()},
         }
 
 

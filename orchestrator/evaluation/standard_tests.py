@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # numpy and all that follows are loaded when a test is evaluated, not when it is named
     from matplotlib.figure import Figure
 
-    from .judgement import Judgement
+    from .judgement import Judgement, Series
     from .trace import Trace
 
 
@@ -32,6 +32,7 @@ class StandardTest:
     evaluate: Callable[[Trace, float | None], Evaluated]  # of a run; A [rad], where it is known
     columns: tuple[str, ...]  # keys of quantities that stand in a table of many runs
     needs_angle: bool = False
+    draw_series: Callable[[Any, str], Figure] | None = None  # of what many runs come to, and a note
 
 
 def _plain(module: str, function: str) -> Callable[[Trace, float | None], Evaluated]:
@@ -41,6 +42,29 @@ def _plain(module: str, function: str) -> Callable[[Trace, float | None], Evalua
         return Evaluated(trace, getattr(import_module(f".{module}", __package__), function)(trace))
 
     return evaluate
+
+
+def _drawn(module: str, function: str) -> Callable[[Any, str], Figure]:
+    """Return what draws a series by a function of a module here."""
+
+    def draw(series: Series, note: str) -> Figure:
+        figure: Figure = getattr(import_module(f".{module}", __package__), function)(series, note)
+        return figure
+
+    return draw
+
+
+def _lane_change(trace: Trace, _: float | None) -> Evaluated:
+    from .lane_change_run import evaluate_lane_change
+
+    judged = evaluate_lane_change(trace)
+
+    def draw() -> Figure:
+        from .lane_change_drawing import draw_lane_change
+
+        return draw_lane_change(trace, judged)
+
+    return Evaluated(trace, judged, draw)
 
 
 def _dwell(trace: Trace, angle: float | None) -> Evaluated:
@@ -73,6 +97,7 @@ TESTS: dict[str, StandardTest] = {
             _dwell,
             ("amplitude", "ratio_1000", "ratio_1750", "displacement", "sideslip", "speed_end"),
             needs_angle=True,
+            draw_series=_drawn("dwell_drawing", "draw_series"),
         ),
         StandardTest(
             "step-steer",
@@ -105,10 +130,23 @@ TESTS: dict[str, StandardTest] = {
             ("deceleration", "yaw_ratio", "yaw_ratio_peak", "a_y_ratio", "sideslip", "sideslip_peak"),
         ),
         StandardTest(
+            "straight-braking",
+            "stopping distance, yaw and correction on split friction (after ISO 14512) or over a jump of it",
+            _plain("straight_braking", "evaluate_braking"),
+            ("distance", "deceleration", "yaw_rate", "yaw_angle", "deviation", "hand", "adaptation"),
+        ),
+        StandardTest(
+            "side-wind",
+            "how far a gust blows a car off its way while the hand wheel is held (after ISO 12021)",
+            _plain("side_wind", "evaluate_side_wind"),
+            ("deviation", "yaw_angle", "yaw_rate", "acceleration_y", "sideslip"),
+        ),
+        StandardTest(
             "lane-change",
             "a double lane change between cones, clean or not (ISO 3888)",
-            _plain("lane_change_run", "evaluate_lane_change"),
+            _lane_change,
             ("entry", "exit", "overrun", "sideslip", "acceleration", "hand"),
+            draw_series=_drawn("lane_change_drawing", "draw_entry_speeds"),
         ),
     )
 }

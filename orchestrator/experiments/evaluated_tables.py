@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ..evaluation.judgement import Judgement, Quantity
-from ..figures.display import shown
+from ..evaluation.judgement import Judgement, Quantity, Series
 from ..metrics.run_metrics import Value
 from .tables import Cell, Table
 
 if TYPE_CHECKING:
-    from ..evaluation.dwell_series import Series
     from ..evaluation.standard_tests import StandardTest
 
 
@@ -40,6 +38,6 @@ def runs_table(runs: Sequence[Judgement], test: StandardTest, series: Series | N
     notes = []
     if series:
         notes += [f"{name}: {one}" for name, one in series.rulings.items()]
-        notes.append(f"A = {shown(series.angle, 'rad')}; the series has {series.verdict.value}.")
+        notes.append(series.summary)
     notes += [f"{run.label}: {'; '.join(run.notes)}" for run in runs if run.notes]
     return Table(test.says, ["run", *(names[key] for key in keys), *criteria], rows, notes)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vocabulary.lane_change import Lane
+from vocabulary.lane_change import Lane, lanes_of
 from vocabulary.wheels import WHEELS
 
 from ..errors import ResultsError
@@ -17,7 +17,6 @@ from ..metrics.run_metrics import columns_of
 from ..results.read import Results
 from ..wording import listed
 from .ground import Piece, ground_of
-from .lanes import lanes_of
 
 FRAMES = 600
 """Moments kept of a run; chosen: 75 per second of an 8 s manoeuvre, more than a screen shows."""

@@ -16,7 +16,7 @@ from components.control_laws.predictive_law import PredictiveLaw, Weights, _disc
 from components.controllers.dead_band import DeadBand, beyond
 from components.controllers.lqr import Lqr
 from components.controllers.mpc import Mpc, sideslip_bound
-from components.mathematics.quadratic_program import inverse, multipliers
+from components.mathematics.quadratic_program import inverse, multipliers, solution
 
 from .stand import Stand
 
@@ -73,6 +73,7 @@ def test_an_inverse_is_one():
     root = rng.normal(size=(6, 6))
     h = root @ root.T + np.eye(6)
     assert np.allclose(inverse(h.tolist()) @ h, np.eye(6), atol=1e-10)
+    assert np.allclose(h @ solution(h.tolist(), list(range(6))), range(6), atol=1e-9)
 
 
 @pytest.mark.parametrize("car", CARS.values(), ids=CARS)

@@ -129,14 +129,17 @@ def sticking_out(p, track, x, y, psi):
     return worst
 
 
-def test_the_largest_overrun_of_a_drive_is_that_of_the_outline_clipped_to_the_lanes():
+@pytest.mark.parametrize("standard, shortest", [("iso_3888_1", 25), ("iso_3888_2", 15)])
+def test_the_largest_overrun_of_a_drive_is_that_of_the_outline_clipped_to_the_lanes(standard, shortest):
     """Within 15 mm, along paths that leave the lanes by up to 0.4 m; beyond, no cone stands any more."""
-    p = LaneChangeParameters()
+    p = LaneChangeParameters(track_standard=standard)
     track = Track(p)
     chance = random.Random(3)
     compared = 0
     while compared < 15:
-        size, length, phase, shift = (chance.uniform(*r) for r in ((0.0, 0.4), (25, 60), (0, 6), (-0.2, 0.2)))
+        size, length, phase, shift = (
+            chance.uniform(*r) for r in ((0.0, 0.4), (shortest, 60), (0, 6), (-0.2, 0.2))
+        )
 
         def y_of(x, size=size, length=length, phase=phase, shift=shift):
             return track.path(x) + shift + size * math.sin(2 * math.pi * x / length + phase)
@@ -150,17 +153,3 @@ def test_the_largest_overrun_of_a_drive_is_that_of_the_outline_clipped_to_the_la
         if 0.0 < clip < 0.4:
             compared += 1
             assert most == pytest.approx(clip, abs=0.015)
-
-
-def test_yaw_feedback_steers_against_a_turn_and_a_drift_that_nobody_asked_for():
-    def steer(**motion):
-        stand = Stand(DoubleLaneChange, yaw_feedback=0.5, steering_lag=0.0, steering_wheel_rate_limit=1e6)
-        inputs = {"velocity_x": 20.0, "position_x": 0.0, "position_y": 0.0, "yaw_angle": 0.0, **motion}
-        stand.start(**inputs)
-        stand.step(0.001, **inputs)
-        return stand.step(0.001, **inputs)["steer_angle"], stand.unit.car.gains(20.0)[0]
-
-    assert steer()[0] == 0.0
-    assert steer(velocity_y=0.5)[0] < 0.0
-    delta, gain = steer(yaw_rate=0.2)
-    assert delta == pytest.approx(-0.5 * 0.2 / gain)

@@ -368,3 +368,34 @@ def test_what_a_series_cannot_be_driven_with_is_said_before_any_run(options, sen
     assert call("drive", "sine-with-dwell", *options, "--out", tmp_path / "out") == 2
     assert sentence in capsys.readouterr().err
     assert not list(tmp_path.rglob("run.json"))
+
+
+@pytest.mark.parametrize(
+    "options, sentence",
+    [
+        (("--angle", "40 deg"), "iso-3888-2 needs no A: leave --angle and --slow-steer away"),
+        (("--set", "speed=70km/h"), "the series itself says at what speeds is driven"),
+    ],
+)
+def test_what_a_series_of_lane_changes_cannot_be_driven_with_is_said_before_any_run(
+    options, sentence, capsys, tmp_path
+):
+    assert call("drive", "iso-3888-2", *options, "--out", tmp_path / "out") == 2
+    assert sentence in capsys.readouterr().err
+    assert not list(tmp_path.rglob("run.json"))
+
+
+@pytest.mark.exhaustive
+def test_a_series_of_lane_changes_finds_the_highest_clean_speed_and_goes_on_where_it_was(tmp_path, capsys):
+    series = tmp_path / "series"
+    settings = ("--set", "step_size=0.005", "--out", series)
+    assert call("drive", "iso-3888-2", *settings) == 0
+    first = capsys.readouterr()
+    found = json.loads((series / "evaluation.json").read_text())
+    highest, touched = (found["series"][key] for key in ("highest_clean_entry_speed", "lowest_not_clean"))
+    assert 55.0 < 3.6 * highest < 3.6 * touched < 3.6 * highest + 0.5
+    assert (series / "lane_change_series.png").is_file()
+    assert call("drive", "iso-3888-2", *settings) == 0
+    again = capsys.readouterr()
+    assert again.out == first.out
+    assert "1 of 1 runs finished before" in again.err

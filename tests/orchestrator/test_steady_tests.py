@@ -13,8 +13,9 @@ from scipy.signal import lsim
 import yawbench as yb
 from components.drivers.sine_sweep import SineSweepParameters, sweep
 from orchestrator.evaluation.frequency_response import evaluate_sweep
-from orchestrator.evaluation.judgement import Verdict
+from orchestrator.evaluation.judgement import Judgement, Verdict
 from orchestrator.evaluation.lane_change_run import evaluate_lane_change
+from orchestrator.evaluation.lane_change_series import highest_clean, judge_entry_speeds
 from orchestrator.evaluation.step_response import evaluate_step
 from orchestrator.evaluation.trace import Trace, trace_of
 from orchestrator.evaluation.turn_response import evaluate_turn
@@ -136,12 +137,13 @@ def test_the_understeer_gradient_of_a_slow_ramp_is_that_of_the_single_track_theo
 
 
 @pytest.mark.exhaustive
-def test_the_lane_change_of_iso_3888_1_is_driven_clean_at_80_km_per_h_without_control_to_either_side():
-    base = yb.load("proving_ground/iso_3888_1").set({"stop_time": 7.5})
+@pytest.mark.parametrize("name, speed", [("iso_3888_1", 80.0), ("iso_3888_1", 100.0), ("iso_3888_2", 60.0)])
+def test_the_lane_changes_of_iso_3888_are_driven_clean_without_control_to_either_side(name, speed):
+    base = yb.load(f"proving_ground/{name}").set({"speed": speed / 3.6, "stop_time": 8.0})
     for side in (3.5, -3.5):
         judged = evaluate_lane_change(trace_of(base.set({"driver.lane_offset": side}).run().results))
         assert judged.rulings["clean"].verdict is Verdict.PASSED
-        assert judged["entry"] == pytest.approx(80.0 / 3.6, rel=0.005)
+        assert judged["entry"] == pytest.approx(speed / 3.6, rel=0.005)
 
 
 def test_a_lane_change_that_touches_a_cone_says_where():
@@ -152,14 +154,53 @@ def test_a_lane_change_that_touches_a_cone_says_where():
         "acceleration_y": np.sin(t),
         "cone_overrun": np.where(abs(t - 4.0) < 0.005, 0.12, 0.0),
     }
-    made = Trace("cones", t, signals, facts={"track_start": 25.0, "cg_to_front_end": 2.0})
+    facts = {"track_start": 25.0, "cg_to_front_end": 2.0, "cg_to_rear_end": 3.0, "vehicle_width": 1.8,
+             "lane_offset": 3.5, "transition_scale": 1.0}  # fmt: skip
+    made = Trace("cones", t, signals, facts=facts)
     judged = evaluate_lane_change(made)
     assert judged["entry"] == pytest.approx(20.0 - 0.1 * 23.0 / 20.0)
+    assert judged["exit"] == pytest.approx(20.0 - 0.1 * (25.0 + 125.0 + 3.0) / 20.0, abs=0.001)
     assert judged.rulings["clean"].why == "0.120 m beyond the cones, 55.0 m from the first ones"
     signals["cone_overrun"][:] = 0.0
     assert evaluate_lane_change(made).verdict is Verdict.PASSED
-    stopped = Trace("cones", t, {**signals, "position_x": 0.0 * t}, facts=made.facts)
+    longer = Trace("cones", t, signals, facts=facts | {"cg_to_rear_end": 10.0})
+    assert evaluate_lane_change(longer).rulings["clean"].why.startswith("the record ends before the car has")
+    stopped = Trace("cones", t, {**signals, "position_x": 0.0 * t}, facts=facts)
     assert evaluate_lane_change(stopped).verdict is Verdict.NOT_JUDGED
+    plain = evaluate_lane_change(Trace("no lanes", t, signals, facts={"track_start": 25.0}))
+    assert plain["exit"] == pytest.approx(20.0 - 0.1 * 7.99)
+
+
+@pytest.mark.parametrize("edge", [47.3, 60.0, 61.26, 83.0])
+def test_the_highest_clean_speed_is_found_to_the_resolution_from_either_side(edge):
+    asked = []
+
+    def clean(v):
+        asked.append(v)
+        return v < edge
+
+    good, bad = highest_clean(clean, first=60.0, step=10.0, resolution=0.5, least=10.0, most=250.0)
+    assert good < edge <= bad <= good + 0.5
+    assert len(asked) == len(set(asked)) < 12
+
+
+def test_what_is_always_clean_or_never_ends_at_the_bounds():
+    bounds = {"first": 60.0, "step": 10.0, "resolution": 0.5, "least": 35.0, "most": 82.0}
+    assert highest_clean(lambda v: True, **bounds) == (82.0, None)
+    assert highest_clean(lambda v: False, **bounds) == (None, 35.0)
+
+
+def test_a_series_counts_no_clean_run_above_one_that_was_not():
+    def run(speed, clean):
+        judged = Judgement(f"{speed}")
+        judged.add("entry", "speed", speed, "m/s")
+        judged.rule("clean", clean, "")
+        return judged
+
+    series = judge_entry_speeds([run(18.0, True), run(16.0, True), run(17.0, None), run(15.0, True)])
+    assert (series.highest, series.touched) == (16.0, 17.0)
+    assert series.summary == "Highest clean entry speed: 57.6 km/h; not clean at 61.2 km/h."
+    assert judge_entry_speeds([run(15.0, False)]).summary == "No run is clean."
 
 
 @as_sampled

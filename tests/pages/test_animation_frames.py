@@ -13,8 +13,8 @@ from components.driving.track import LaneChangeParameters, Track
 from orchestrator.errors import ResultsError
 from orchestrator.pages.animation import data_of, force_scale, page, still_of
 from orchestrator.pages.animation_frames import FRAMES, frames_of, rotated, thinned
-from orchestrator.pages.lanes import lanes_of
 from tests.orchestrator.recorded import car
+from vocabulary.lane_change import lanes_of
 from vocabulary.wheels import WHEELS
 
 from .made_up import MU, SIZES, data_in, odd, whole_car, without

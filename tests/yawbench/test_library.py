@@ -203,3 +203,20 @@ def test_a_run_can_be_saved_again_into_the_same_folder(run, tmp_path):
     for format in ("csv", "csv", "parquet"):
         saved = yb.open(run.save(tmp_path / "mine", format=format))
     assert equal(saved, run)
+
+
+@pytest.mark.parametrize(
+    "test, angle, sentence",
+    [
+        ("sine-with-dwel", None, "there is no test 'sine-with-dwel'; did you mean 'sine-with-dwell'?"),
+        ("sine-with-dwell", 0.0, "angle: must be a number between 0 and 2 pi rad (got 0.0)"),
+        ("sine-with-dwell", -0.6, "angle: must be a number between 0 and 2 pi rad (got -0.6)"),
+        ("sine-with-dwell", float("nan"), "angle: must be a number between 0 and 2 pi rad (got nan)"),
+        ("sine-with-dwell", "36 deg", "angle: must be a number between 0 and 2 pi rad (got '36 deg')"),
+        ("step-steer", 0.6, "step-steer needs no angle: leave it away"),
+    ],
+)
+def test_what_a_run_cannot_be_evaluated_with_is_said_in_a_sentence(run, test, angle, sentence):
+    with pytest.raises(yb.ScenarioError) as raised:
+        run.evaluate(test, angle=angle)
+    assert str(raised.value) == sentence

@@ -1,0 +1,250 @@
+"""Driver for a double lane change between cones: an optimal path, followed by optimal preview.
+
+The path is the one through the cones that asks least of the tyres (`driving.lane_path`), found once for the
+car, its speed and the road. The hand wheel is turned at the rate that is optimal for the linear
+single-track car with the path known for `preview_time` (`mathematics.preview_control`):
+
+    x = (y, psi, v_y, r, delta)             d delta / dt = the input
+    least   sum of  ((y - path) / e_0)^2 + (i_s d delta / dt)^2
+
+with gains that are those of whole metres per second and run straight between them. What the linear car
+needs as side force of its front axle, F = C_f (delta - eta), eta = (v_y + a r) / v, the tyres give at a
+larger slip alpha, after Fiala:
+
+    F = F_max (1 - (1 - C_f alpha / (3 F_max))^3),      F_max = grip_share mu m g b / L
+
+so the hand wheel is at i_s (eta + alpha), and asks for no more than F_max: beyond, more steering does not
+help. Fast: neither lag nor delay, within the largest angle and rate of a skilled driver.
+
+The speed is held, or the accelerator let go at a place, `coasting_after` the first cones, as ISO 3888-2 has
+it (`driving.speed_holding`). `path_offset` is the car's own distance from the path, `cone_overrun` how far
+the body is beyond the cones.
+
+Source: R. S. Sharp, V. Valtetsiotis, Optimal preview car steering control, Vehicle System Dynamics 35
+(supplement), 2001; C. C. MacAdam, Application of an optimal preview control for simulation of closed-loop
+automobile driving, IEEE Trans. Systems, Man, and Cybernetics 11(6), 1981; E. Fiala,
+Seitenkräfte am rollenden Luftreifen, VDI-Zeitschrift 96, 1954. Path and driver's knowledge of the tyres:
+ours.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import copysign, cos, sin
+
+from vocabulary.gravity import G
+
+from ..cars.published_cars import PaperC
+from ..cars.single_track_car import SingleTrackCar
+from ..driving.lane_path import LanePath
+from ..driving.speed_holding import HeldSpeedParameters, SpeedHold
+from ..driving.track import LaneChangeParameters, Track
+from ..fmi.component import Component
+from ..fmi.variables import like, output, parameter
+from ..mathematics.preview_control import discrete, tracking_gains
+from .double_lane_change import DoubleLaneChangeParameters
+
+STEP = 0.03
+"""Of the preview [s]. Chosen: half a metre at 18 m/s."""
+SLOWEST = 2.0
+"""Speed below which gains stay what they are there [m/s]."""
+MOST = 0.99
+"""Share of F_max that is asked for; chosen: Fiala's slip is finite there, 0.78 of that of all."""
+
+
+@dataclass(frozen=True)
+class OptimalPreviewParameters(HeldSpeedParameters, LaneChangeParameters):
+    """Of the driver, of the car as the driver knows it, and of the track."""
+
+    path_margin: float = parameter(
+        0.1, "m", "Margin between body and cones that the path aims at", "chosen: tuned", minimum=0.0
+    )
+    path_give: float = parameter(
+        0.06,
+        "m",
+        "Lack of margin s_0 that weighs as much as the side force path_effort",
+        "chosen: tuned",
+        minimum=1e-3,
+    )
+    path_effort: float = parameter(
+        0.68, "1", "Share of the friction that the path asks for unless cones ask for more", "chosen: tuned",
+        minimum=0.01,
+    )  # fmt: skip
+    path_deceleration: float = parameter(
+        0.7,
+        "m/s2",
+        "Deceleration by tyres and air, while the car coasts, that the path reckons with",
+        "chosen: 60 to 53 km/h through ISO 3888-2",
+        minimum=0.0,
+    )
+    preview_time: float = parameter(
+        1.5, "s", "Time for which the path is known ahead", "chosen: longer changes nothing", minimum=0.05
+    )
+    offset_scale: float = parameter(
+        0.005,
+        "m",
+        "Distance e_0 from the path that weighs as much as 1 rad/s of the hand wheel",
+        "chosen: tuned",
+        minimum=1e-5,
+    )
+    base_friction: float = parameter(
+        0.9,
+        "1",
+        "Friction coefficient of the road that the driver reckons with",
+        "chosen: dry asphalt",
+        minimum=0.01,
+    )
+    grip_share: float = parameter(
+        0.9,
+        "1",
+        "Share of the friction that the front axle can bear",
+        "chosen: load transfer takes a tenth",
+        minimum=0.1,
+    )
+    steering_wheel_limit: float = like(DoubleLaneChangeParameters, "steering_wheel_limit")
+    steering_wheel_rate_limit: float = like(DoubleLaneChangeParameters, "steering_wheel_rate_limit")
+    steering_ratio: float = like(DoubleLaneChangeParameters, "steering_ratio")
+    coasting_after: float = parameter(
+        -1.0,
+        "m",
+        "Where the accelerator is let go, from the first cones on; negative: nowhere",
+        "chosen: the speed is held",
+    )
+    mass: float = like(PaperC, "mass")
+    yaw_inertia: float = parameter(3234.0, "kg.m2", "Yaw inertia I_z", "paper C, table 1", minimum=1.0)
+    cg_to_front_axle: float = like(PaperC, "cg_to_front_axle")
+    cg_to_rear_axle: float = like(PaperC, "cg_to_rear_axle")
+    cornering_stiffness_front: float = like(DoubleLaneChangeParameters, "cornering_stiffness_front")
+    cornering_stiffness_rear: float = like(DoubleLaneChangeParameters, "cornering_stiffness_rear")
+
+
+class OptimalPreview(Component):
+    """Driver who takes a double lane change between cones by an optimal path and optimal preview."""
+
+    Parameters = OptimalPreviewParameters
+    inputs = ("velocity_x", "velocity_y", "yaw_rate", "position_x", "position_y", "yaw_angle")
+    outputs = (
+        "steer_angle",
+        "drive_force",
+        "steering_wheel_angle",
+        output(
+            "path_offset", "position_x", "position_y", unit="m", text="Distance from the path, positive left"
+        ),
+        output(
+            "cone_overrun",
+            *("position_x", "position_y", "yaw_angle"),
+            unit="m",
+            text="How far the car's outline is beyond the cones, 0 inside",
+        ),
+    )
+
+    def configure(self) -> None:
+        self.track = Track(self.p)
+        self.car = SingleTrackCar.of(self.p, self.p.yaw_inertia)
+        self.steps = max(1, round(self.p.preview_time / STEP))
+        self.gains: dict[int, list[float]] = {}
+        self.path = planned(self.p)
+
+    def start(self, t: float, u: list[float]) -> None:
+        self.speed = SpeedHold(self.p)
+        self.speed.start(u[0])
+        self.linear = self.hand = 0.0  # hand wheel of the linear car and of this one [rad]
+
+    def advance(self, t: float, h: float, u: list[float]) -> None:
+        p: OptimalPreviewParameters = self.p
+        v, x = u[0], u[3]
+        self.speed.advance(t, h, v)
+        if p.coasting_after >= 0.0 and x >= p.track_start + p.coasting_after:
+            self.speed.let_go = min(self.speed.let_go, t + h)
+        fastest = p.steering_wheel_rate_limit * h
+        self.linear += min(max(h * self._rate(u), -fastest), fastest)
+        wanted = self._hand(u)
+        wanted = min(max(wanted, self.hand - fastest), self.hand + fastest)
+        self.hand = min(max(wanted, -p.steering_wheel_limit), p.steering_wheel_limit)
+
+    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
+        x, y, psi = u[3:]
+        return (
+            self.hand / self.p.steering_ratio,
+            self.speed.force,
+            self.hand,
+            y - self.path(x),
+            self.track.overrun(x, y, psi),
+        )
+
+    def _rate(self, u: list[float]) -> float:
+        """Return the optimal rate of the linear car's hand wheel [rad/s]: between those of two speeds."""
+        v, v_y, r, x, y, psi = u
+        along = STEP * (v * cos(psi) - v_y * sin(psi))
+        path = self.path
+        seen = [-y, -psi, -v_y, -r, -self.linear, *[path(x + k * along) for k in range(1, self.steps + 1)]]
+        level = max(v, SLOWEST)
+        lower = int(level)
+        share = level - lower
+        rate = sum([gain * value for gain, value in zip(self._gains(lower), seen, strict=True)])
+        above = sum([gain * value for gain, value in zip(self._gains(lower + 1), seen, strict=True)])
+        return rate + share * (above - rate)
+
+    def _gains(self, v: int) -> list[float]:
+        """Return the gains of the state and of the path ahead at a whole speed [m/s]."""
+        if v not in self.gains:
+            p: OptimalPreviewParameters = self.p
+            phi, gamma = discrete(*lane_dynamics(self.car, float(v), p.steering_ratio), STEP)
+            first = (1.0, 0.0, 0.0, 0.0, 0.0)  # y
+            state, ahead = tracking_gains(phi, gamma, first, weight=p.offset_scale**-2, steps=self.steps)
+            self.gains[v] = state + ahead
+        return self.gains[v]
+
+    def _hand(self, u: list[float]) -> float:
+        """Return the hand-wheel angle [rad] at which the front tyres give what the linear car's would."""
+        p: OptimalPreviewParameters = self.p
+        car, ratio = self.car, p.steering_ratio
+        v, v_y, r = u[0], u[1], u[2]
+        eta = ratio * (v_y + car.a * r) / max(v, SLOWEST)
+        largest = p.grip_share * p.base_friction * car.m * G * car.b / (car.a + car.b)
+        asked = MOST * ratio * largest / car.c_f
+        self.linear = min(max(self.linear, eta - asked), eta + asked)
+        share = (self.linear - eta) / ratio * car.c_f / largest
+        alpha: float = 3.0 * largest / car.c_f * (1.0 - (1.0 - abs(share)) ** (1.0 / 3.0))
+        return eta + copysign(ratio * alpha, share)
+
+
+def lane_dynamics(
+    car: SingleTrackCar, v: float, steering_ratio: float
+) -> tuple[list[list[float]], list[float]]:
+    """Return A and b of (y, psi, v_y, r, hand wheel), in SI, at `v` [m/s]; input: the last one's rate."""
+    columns = []
+    for v_y, r, delta in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0 / steering_ratio)):
+        turning, yawing = car.derivatives(v_y / v, r, delta=delta, v=v)
+        columns.append((v * turning, yawing))
+    (a_33, a_43), (a_34, a_44), (a_35, a_45) = columns
+    return [
+        [0.0, v, 1.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0, 1.0, 0.0],
+        [0.0, 0.0, a_33, a_34, a_35],
+        [0.0, 0.0, a_43, a_44, a_45],
+        [0.0, 0.0, 0.0, 0.0, 0.0],
+    ], [0.0, 0.0, 0.0, 0.0, 1.0]  # fmt: skip
+
+
+@lru_cache(maxsize=16)
+def planned(p: OptimalPreviewParameters) -> LanePath:
+    """Return the path through the cones that suits the car, its target speed and the road."""
+    track, car, v = Track(p), SingleTrackCar.of(p), max(p.target_speed, SLOWEST)
+    yaw_gain, slip_gain = car.gains(v)
+    lost = 2.0 * p.path_deceleration / (v * v) if p.coasting_after >= 0.0 else 0.0
+
+    def easing(x: float) -> float:
+        return max(1.0 - lost * max(0.0, x - p.track_start - p.coasting_after), 0.1)
+
+    return LanePath(
+        track.lanes,
+        track.outline,
+        margin=p.path_margin,
+        give=p.path_give,
+        bend=p.path_effort * p.base_friction * G / (v * v),
+        levers=(p.yaw_inertia / (car.m * car.b), -p.yaw_inertia / (car.m * car.a)),
+        slip=slip_gain * v / yaw_gain,
+        easing=easing,
+    )

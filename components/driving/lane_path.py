@@ -1,0 +1,237 @@
+"""The path through the lanes of a double lane change that asks least of the tyres where it asks most.
+
+    F_f / m_f = v^2 (y'' + i_f y'''),    i_f = I_z / (m b)        side force of the front axle over the mass
+    F_r / m_r = v^2 (y'' - i_r y'''),    i_r = I_z / (m a)        that it carries, of the rear axle likewise
+
+    least  integral of  sum (F / m / a_0)^8 / 8  over x  +  sum (what the margin lacks / s_0)^2 / 2
+
+A power of eight is nearly the largest value: the path spreads its curvature, begins to turn in lanes that
+are wider than the car, and goes as near to the cones as the tyres need. a_0 is the acceleration, s_0 the
+lack of margin that weigh alike. The speed falls while the car coasts, and with it what a bend asks for.
+
+y'' runs along straight lines between knots, so that y, y' and y'' at any x are linear in its values there,
+and so are the places of the body, y + s (y' - beta) +- w / 2 at s ahead of the centre of mass, with the
+sideslip beta = c y'' of a steady turn. The sum is convex; Newton's method finds its least value.
+
+Source: ours. The forces are those of the single-track car whose sideslip changes slowly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+from vocabulary.lane_change import Lane
+
+from ..mathematics.quadratic_program import Rows, solution
+from .track import Outline
+
+LEAD, TAIL = 15.0, 15.0
+"""Of the path before the first cones and behind the last ones [m]. Chosen: a turn of the wheel at 25 m/s."""
+INTERVALS = 40
+"""Between the knots. Chosen: half of them raise the largest force by 2 %."""
+POWER = 8
+MOST_STEPS = 60
+"""Of Newton's method; chosen: twice what the standard's tracks need."""
+CLOSE = 1e-5
+"""Relative gain of a step at which it ends."""
+AHEAD = 5.0
+"""The slope of the path's end counts by where it leads over this length [m]. Chosen: a car's length."""
+ROUND = 1e-4
+"""Weight of y'' itself, for places where no force counts."""
+CONES = 4
+"""Intervals along a lane, at whose ends the corners keep the margin."""
+POINTS = 5
+"""Along the body, that pass the outer cones of a lane."""
+
+
+class LanePath:
+    """The path y(x) through lanes; straight on before and behind them.
+
+    Args:
+        lanes: from x to x, between two borders each.
+        outline: of the car.
+        margin: between body and cones [m].
+        give: lack of margin s_0 [m].
+        bend: curvature a_0 / v^2 at the first cones [1/m].
+        levers: i_f and -i_r [m].
+        slip: c, sideslip of a steady turn over its curvature [m].
+        easing: of x: (v / v at the first cones)^2.
+    """
+
+    def __init__(
+        self,
+        lanes: Sequence[Lane],
+        outline: Outline,
+        *,
+        margin: float,
+        give: float,
+        bend: float,
+        levers: tuple[float, float],
+        slip: float,
+        easing: Callable[[float], float],
+    ) -> None:
+        self.start = lanes[0].start - LEAD
+        self.spacing = (lanes[-1].end + TAIL - self.start) / INTERVALS
+        knots = [self.start + self.spacing * k for k in range(INTERVALS + 1)]
+        demands = _demands(self.spacing, levers, [easing(x) for x in knots])
+        rows, bounds = self._constraints(lanes, outline, margin, slip)
+        rows = [[bend / give * value for value in row] for row in rows]
+        program = _Program(demands, rows, [bound / give for bound in bounds], self.spacing)
+        self.bends = [bend * value for value in program.solved()]  # y'' at the knots
+        self.slopes, self.places = [0.0], [0.0]  # y' and y there
+        h = self.spacing
+        for one, other in pairwise(self.bends):
+            self.places.append(self.places[-1] + h * self.slopes[-1] + h * h * (one / 3.0 + other / 6.0))
+            self.slopes.append(self.slopes[-1] + 0.5 * h * (one + other))
+
+    def __call__(self, x: float) -> float:
+        """Return y [m] at `x` [m]."""
+        s = (x - self.start) / self.spacing
+        if s <= 0.0:
+            return 0.0
+        k = min(int(s), INTERVALS)
+        t = x - self.start - self.spacing * k
+        if k == INTERVALS:
+            return self.places[k] + t * self.slopes[k]
+        bend = self.bends[k]
+        steeper = (self.bends[k + 1] - bend) / self.spacing
+        return self.places[k] + t * (self.slopes[k] + t * (0.5 * bend + t * steeper / 6.0))
+
+    def _constraints(
+        self, lanes: Sequence[Lane], outline: Outline, margin: float, slip: float
+    ) -> tuple[Rows, list[float]]:
+        """Return rows over y'' at the knots and what they may come to [m]."""
+        basis = _Basis(self.spacing)
+        front, rear, half = outline
+        body = [-rear + (front + rear) * k / (POINTS - 1) for k in range(POINTS)]
+        rows: Rows = []
+        bounds: list[float] = []
+        for lane in lanes:
+            cones = [lane.start + (lane.end - lane.start) * k / CONES for k in range(CONES + 1)]
+            for cone in cones:
+                for s in body if cone in (lane.start, lane.end) else (-rear, front):
+                    row = basis.place(cone - s - self.start, s, slip)
+                    rows += [row, [-value for value in row]]
+                    bounds += [lane.left - half - margin, -lane.right - half - margin]
+        end = [AHEAD * value for value in basis.slopes[-1]]
+        rows += [end, [-value for value in end]]
+        bounds += [0.0, 0.0]
+        return rows, bounds
+
+
+class _Demand(NamedTuple):
+    """A force at a knot k: `here` y''(k) + `next` y''(k + 1)."""
+
+    k: int
+    here: float
+    next: float
+
+
+def _demands(spacing: float, levers: tuple[float, float], easing: Sequence[float]) -> list[_Demand]:
+    """Return the forces of both axles at both ends of every interval."""
+    return [
+        _Demand(k, ease * (1.0 - end - lever / spacing), ease * (end + lever / spacing))
+        for k, ease in enumerate(easing[:-1])
+        for end in (0.0, 1.0)
+        for lever in levers
+    ]
+
+
+class _Basis:
+    """y, y' and y'' as rows over the values of y'' at the knots."""
+
+    def __init__(self, spacing: float) -> None:
+        self.spacing = h = spacing
+        count = INTERVALS + 1
+        self.bends = [[1.0 if i == k else 0.0 for i in range(count)] for k in range(count)]
+        self.slopes, self.places = [[0.0] * count], [[0.0] * count]
+        for one, other in pairwise(self.bends):
+            rows = zip(self.places[-1], self.slopes[-1], one, other, strict=True)
+            self.places.append([y + h * slope + h * h * (c / 3.0 + d / 6.0) for y, slope, c, d in rows])
+            rows = zip(self.places[-1], self.slopes[-1], one, other, strict=True)
+            self.slopes.append([slope + 0.5 * h * (c + d) for _, slope, c, d in rows])
+
+    def place(self, x: float, s: float, slip: float) -> list[float]:
+        """Return the row of y + s (y' - slip y'') at x [m] from the first knot."""
+        k = min(max(int(x / self.spacing), 0), INTERVALS - 1)
+        t = x - k * self.spacing
+        row = []
+        for y, slope, one, other in zip(
+            self.places[k], self.slopes[k], self.bends[k], self.bends[k + 1], strict=True
+        ):
+            steeper = (other - one) / self.spacing
+            there = y + t * (slope + t * (0.5 * one + t * steeper / 6.0))
+            turned = slope + t * (one + 0.5 * t * steeper) - slip * (one + t * steeper)
+            row.append(there + s * turned)
+        return row
+
+
+class _Program:
+    """Sum of what demands and unmet constraints cost, and where it is least."""
+
+    def __init__(
+        self, demands: Sequence[_Demand], rows: Rows, bounds: Sequence[float], spacing: float
+    ) -> None:
+        self.demands, self.rows, self.bounds = demands, rows, bounds
+        self.weight = spacing / 4.0  # four demands in an interval
+
+    def solved(self) -> list[float]:
+        """Return the values of y'' at the knots, over the bend that weighs 1."""
+        z = [0.0] * (INTERVALS + 1)
+        cost = self._cost(z)
+        for _ in range(MOST_STEPS):
+            slope, hessian = self._derivatives(z)
+            step = solution(hessian, [-value for value in slope])
+            share, nearer, less = 1.0, z, cost
+            while share > 1e-6:
+                nearer = [a + share * b for a, b in zip(z, step, strict=True)]
+                less = self._cost(nearer)
+                if less < cost:
+                    break
+                share *= 0.5
+            if not less < cost:
+                break
+            gained = cost - less
+            z, cost = nearer, less
+            if gained < CLOSE * cost:
+                break
+        return z
+
+    def _cost(self, z: Sequence[float]) -> float:
+        total = 0.5 * ROUND * _dot(z, z)
+        for k, here, further in self.demands:
+            total += self.weight * (here * z[k] + further * z[k + 1]) ** POWER / POWER
+        for row, bound in zip(self.rows, self.bounds, strict=True):
+            lacking = _dot(row, z) - bound
+            if lacking > 0.0:
+                total += 0.5 * lacking * lacking
+        return total
+
+    def _derivatives(self, z: Sequence[float]) -> tuple[list[float], Rows]:
+        """Return the first and second derivatives of the cost."""
+        slope = [ROUND * value for value in z]
+        hessian = [[ROUND if i == j else 0.0 for j in range(len(z))] for i in range(len(z))]
+        for k, here, further in self.demands:
+            force = here * z[k] + further * z[k + 1]
+            first = self.weight * force ** (POWER - 1)
+            second = self.weight * (POWER - 1) * force ** (POWER - 2)
+            slope[k] += here * first
+            slope[k + 1] += further * first
+            hessian[k][k] += here * here * second
+            hessian[k + 1][k + 1] += further * further * second
+            hessian[k][k + 1] += here * further * second
+            hessian[k + 1][k] += here * further * second
+        for row, bound in zip(self.rows, self.bounds, strict=True):
+            lacking = _dot(row, z) - bound
+            if lacking > 0.0:
+                for i, value in enumerate(row):
+                    if value:
+                        slope[i] += lacking * value
+                        hessian[i] = [a + value * b for a, b in zip(hessian[i], row, strict=True)]
+        return slope, hessian
+
+
+def _dot(one: Sequence[float], other: Sequence[float]) -> float:
+    return sum([a * b for a, b in zip(one, other, strict=True)])

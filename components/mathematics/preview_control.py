@@ -1,0 +1,100 @@
+"""Linear-quadratic tracking of a target that is known ahead, for one input.
+
+    x(k+1) = Phi x(k) + Gamma u(k),       y = c' x
+    least   sum of  w (y(k) - target(k))^2 + u(k)^2   over all steps to come
+
+    u = -K x + sum over j >= 1 of f_j target(k + j)
+
+    P = w c c' + Phi' P (Phi - Gamma K),  K = Gamma' P Phi / s,  s = 1 + Gamma' P Gamma
+    f_j = Gamma' ((Phi - Gamma K)')^(j-1) w c / s
+
+The target is known for a number of steps; what is beyond them does not count. P is iterated from the end of
+a horizon that grows until K stands still.
+
+Source: R. S. Sharp, V. Valtetsiotis, Optimal preview car steering control, Vehicle System Dynamics 35
+(supplement), 2001, with the target outside the state, which gives the same gains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .quadratic_program import Rows
+
+ORDER = 12
+"""Of the series of the matrix exponential: beyond what counts where its argument is at most 1."""
+LONGEST = 2000
+"""Steps of the growing horizon at most."""
+STILL = 1e-9
+"""Relative change of K per step that no longer counts."""
+
+
+def discrete(a: Sequence[Sequence[float]], b: Sequence[float], h: float) -> tuple[Rows, list[float]]:
+    """Return Phi and Gamma of dx/dt = A x + b u over `h` [s] with u held; exact to rounding."""
+    n = len(b)
+    whole = [[*map(float, row), float(gain)] for row, gain in zip(a, b, strict=True)] + [[0.0] * (n + 1)]
+    largest = max(sum(map(abs, row)) for row in whole)
+    halves = 0
+    while h * largest > 1.0:
+        h, halves = 0.5 * h, halves + 1
+    term = [[float(i == j) for j in range(n + 1)] for i in range(n + 1)]
+    total = [row[:] for row in term]
+    for k in range(1, ORDER):
+        term = [[value * h / k for value in row] for row in product(term, whole)]
+        total = [[x + y for x, y in zip(p, q, strict=True)] for p, q in zip(total, term, strict=True)]
+    for _ in range(halves):
+        total = product(total, total)
+    return [row[:n] for row in total[:n]], [row[n] for row in total[:n]]
+
+
+def tracking_gains(
+    phi: Rows, gamma: Sequence[float], c: Sequence[float], *, weight: float, steps: int
+) -> tuple[list[float], list[float]]:
+    """Return K, one number per state, and f_1 to f_steps.
+
+    Args:
+        phi, gamma: of `discrete`.
+        c: what of the state is to be at the target.
+        weight: w, in squares of the input over those of the target.
+        steps: for which the target is known.
+    """
+    aim = [[weight * x * y for y in c] for x in c]
+    across = [list(column) for column in zip(*phi, strict=True)]
+    p = aim
+    gains = [0.0] * len(c)
+    closed, s = phi, 1.0
+    for _ in range(LONGEST):
+        carried = _applied(p, gamma)
+        s = 1.0 + _dot(gamma, carried)
+        before, gains = gains, [value / s for value in _applied(across, carried)]
+        closed = [
+            [value - g * k for value, k in zip(row, gains, strict=True)]
+            for row, g in zip(phi, gamma, strict=True)
+        ]
+        p = [
+            [x + y for x, y in zip(one, other, strict=True)]
+            for one, other in zip(aim, product(across, product(p, closed)), strict=True)
+        ]
+        if max(abs(x - y) for x, y in zip(before, gains, strict=True)) <= STILL * max(map(abs, gains)):
+            break
+    back = [list(column) for column in zip(*closed, strict=True)]
+    line = [weight * value for value in c]
+    ahead = []
+    for _ in range(steps):
+        ahead.append(_dot(gamma, line) / s)
+        line = _applied(back, line)
+    return gains, ahead
+
+
+def product(one: Sequence[Sequence[float]], other: Sequence[Sequence[float]]) -> Rows:
+    """Return the product of two matrices."""
+    columns = list(zip(*other, strict=True))
+    return [[_dot(row, column) for column in columns] for row in one]
+
+
+def _applied(matrix: Sequence[Sequence[float]], vector: Sequence[float]) -> list[float]:
+    return [_dot(row, vector) for row in matrix]
+
+
+def _dot(one: Sequence[float], other: Sequence[float]) -> float:
+    return sum([x * y for x, y in zip(one, other, strict=True)])
