@@ -2,7 +2,7 @@
 
     e_r = r_ref - r                                      dead band: r_0 + share |r_ref|
     M   = k_r D(e_r) + k_beta E(beta, beta_max)          D, E: what is beyond the dead band, the limit
-    beta_max = atan(0.02 s2/m  mu g)                     `controllers.mpc`
+    beta_max: the bound for this friction                `control_laws.sideslip_bound`
 
 While the car follows its driver within the dead band and keeps its sideslip below the limit, nothing
 happens. A positive moment raises the yaw rate and lowers the sideslip. Too much turn (|r| above |r_ref|, of
@@ -19,9 +19,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..control_laws.sideslip_bound import sideslip_bound
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
-from .mpc import sideslip_bound
 from .pid import PidParameters
 
 

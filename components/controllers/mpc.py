@@ -3,14 +3,9 @@
 `control_laws.predictive_law` has the law: the linear single-track car is predicted over
 `moves * steps_per_move * prediction_step`, and the moments that cost least within their limit are found by a
 quadratic program (`mathematics.quadratic_program`); the first of them is given out. Weights are those of
-`controllers.lqr`, which the law becomes where the horizon is long and nothing is at a limit. The
-sideslip's bound is
-
-    beta_max = atan(0.02 s2/m  mu g)
-
-a rule of thumb for the angle up to which a tyre answers the driver: R. Rajamani, Vehicle Dynamics and
-Control, 2nd edition, equation (8.14). The car is linear at every speed of a grid, whose
-spacing is `SPACING`; the program of the last one is kept.
+`controllers.lqr`, which the law becomes where the horizon is long and nothing is at a limit. The sideslip's
+bound is that of `control_laws.sideslip_bound`. The car is linear at every speed of a grid, whose spacing is
+`SPACING`; the program of the last one is kept.
 
 A baseline, not a paper's controller.
 """
@@ -18,13 +13,11 @@ A baseline, not a paper's controller.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan
-
-from vocabulary.gravity import G
 
 from ..cars.single_track_car import SingleTrackCar
 from ..control_laws.linear_feedback import error_dynamics
 from ..control_laws.predictive_law import PredictiveLaw, Weights
+from ..control_laws.sideslip_bound import sideslip_bound
 from ..control_laws.sliding_surface import limit
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter, signal
@@ -33,13 +26,6 @@ from .pid import SEEN
 
 SPACING = 0.5
 """Of the speeds [m/s]. Chosen: gains change by a hundredth or two from one to the next."""
-ANGLE_PER_ACCELERATION = 0.02
-"""Of the sideslip's bound [s2/m], Rajamani's."""
-
-
-def sideslip_bound(mu: float) -> float:
-    """Return the largest sideslip angle [rad] that the driver can be expected to master."""
-    return atan(ANGLE_PER_ACCELERATION * max(mu, 0.0) * G)
 
 
 @dataclass(frozen=True)

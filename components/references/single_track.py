@@ -2,7 +2,7 @@
 
     the model of cars.single_track_car,        |delta| <= share mu g / (v r/delta)     `limit_steer_angle`
     r_ref    = r limited to                +-share mu g / v                        `limit_yaw_rate`, (17)
-    beta_ref = beta limited to             +-atan(c mu), c = 0.02 g                `limit_sideslip`, (18)
+    beta_ref = beta limited to             +-atan(c mu)             `control_laws.sideslip_bound`, (18)
 
 The limits keep the sign of the linear value (paper B writes the sign of delta). Limiting the outputs
 alone leaves yaw rate and sideslip of two different turns; limiting the steer angle that feeds the
@@ -26,12 +26,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan
 
 from vocabulary.gravity import G
 
 from ..cars.published_cars import PaperB
 from ..cars.single_track_car import SingleTrackCar
+from ..control_laws.sideslip_bound import PER_FRICTION, sideslip_bound
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
 from ..mathematics.integrators import rk4
@@ -64,7 +64,11 @@ class SingleTrackParameters:
         1.0, "1", "Share of mu that steer and yaw-rate limits use", "paper B: all of it", minimum=0.0
     )
     sideslip_per_friction: float = parameter(
-        0.1962, "1", "c in |beta_ref| <= atan(c mu)", "paper B, equation (18): 0.02 s2/m times g", minimum=0.0
+        PER_FRICTION,
+        "1",
+        "c in |beta_ref| <= atan(c mu)",
+        "paper B, equation (18): 0.02 s2/m times g",
+        minimum=0.0,
     )
     rate_time_constant: float = parameter(
         0.005, "s", "Lag tau of the rates", "chosen: one sample of the controllers", minimum=0.0
@@ -156,5 +160,5 @@ class SingleTrack(Component):
         if p.limit_yaw_rate:
             r = clamp(r, p.friction_share * mu * G / max(v, p.low_speed))
         if p.limit_sideslip:
-            beta = clamp(beta, atan(p.sideslip_per_friction * mu))
+            beta = clamp(beta, sideslip_bound(mu, p.sideslip_per_friction))
         return beta, r

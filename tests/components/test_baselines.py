@@ -13,9 +13,10 @@ from scipy.optimize import nnls
 from components.cars.single_track_car import SingleTrackCar
 from components.control_laws.linear_feedback import error_dynamics, optimal_gains
 from components.control_laws.predictive_law import PredictiveLaw, Weights, _discrete
+from components.control_laws.sideslip_bound import sideslip_bound
 from components.controllers.dead_band import DeadBand, beyond
 from components.controllers.lqr import Lqr
-from components.controllers.mpc import Mpc, sideslip_bound
+from components.controllers.mpc import Mpc
 from components.mathematics.quadratic_program import inverse, multipliers, solution
 
 from .stand import Stand

@@ -1,0 +1,21 @@
+"""How far a car may slip aside on a road, so that its driver still masters it.
+
+    beta_max = atan(c mu),      c = 0.02 s2/m g
+
+Source: R. Rajamani, Vehicle Dynamics and Control, 2nd edition, equation (8.14), a rule of thumb for the angle
+up to which a tyre answers the driver; equation (18) of paper B is the same.
+"""
+
+from __future__ import annotations
+
+from math import atan
+
+from vocabulary.gravity import G
+
+PER_FRICTION = 0.02 * G
+"""c [1]."""
+
+
+def sideslip_bound(mu: float, per_friction: float = PER_FRICTION) -> float:
+    """Return the largest sideslip angle [rad] on friction `mu` [1], with c `per_friction` [1]."""
+    return atan(per_friction * max(mu, 0.0))
