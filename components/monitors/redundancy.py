@@ -17,12 +17,16 @@ A signal is taken for faulty
     the wheel whose speed is off the median by the share `wheel_share`                                    (4)
 
 where (3) and (4) must last for `lasting`. (0) and (1) are about gyro and accelerometer alone: a driver may
-jerk or hold the wheel. The first fault stands in the output `fault`; a second one is not looked for. If
-control needs the signal (`uses_*`), the yaw moment fades to zero within `fade_time`, for good: no control is
-the law that needs no signal.
+jerk or hold the wheel. What was found last stands in the output `fault`. If control needs the signal
+(`uses_*`), the yaw moment fades to zero within `fade_time`, for good, and nothing more is looked for: no
+control is the law that needs no signal. If it does not, the signal bears no more witness, for good, and the
+others are watched on without it: (1) asks those that are left, (2) and (3) need both gyro and accelerometer,
+(2) lays it at the gyro's door if the hand wheel is lost, (4) needs three wheels. With fewer than two wheels
+nothing is judged any more.
 
 Limits: what is late or a little wrong passes, and so does a fault while nothing moves, until something does.
-A bias that grows slowly may be laid at the accelerometer's door. A car that slides far without control gives
+A gyro that is a little wrong passes where the accelerometer is lost. A bias that grows slowly may be laid at
+the accelerometer's door. A car that slides far without control gives
 alarms too: (2) and (3) know cars that follow their steering.
 
 Source: that signals are judged by such relations is the practice of van Zanten, Bosch ESP Systems: 5 Years of
@@ -120,21 +124,24 @@ class Redundancy(Component):
 
     def start(self, t: float, u: list[float]) -> None:
         self.fault = 0.0
+        self.lost: set[float] = set()
         self.share = 1.0
         self.implied = 0.0
         self.last = (u[0], u[1])
         self.since: list[tuple[float, tuple[float, float, float]] | None] = [None, None]
         self.contradicted = 0.0
         self.off = [0.0] * 4
+        self.rolling = [0, 1, 2, 3]
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
         p = self.p
-        if self.fault:
-            self.share = max(0.0, self.share - h / p.fade_time) if self.fault in self.needed else 1.0
+        if self.fault in self.needed:
+            self.share = max(0.0, self.share - h / p.fade_time)
+            return
+        if len(self.rolling) < 2:
             return
         r, a_y, delta, *wheels, mu, _ = u
-        ordered = sorted(wheels)
-        median = 0.5 * (ordered[1] + ordered[2])
+        median = self._median(wheels)
         v = p.wheel_radius * median
         if v < SLOWEST:
             self.since, self.implied, self.contradicted, self.off = [None, None], 0.0, 0.0, [0.0] * 4
@@ -144,19 +151,34 @@ class Redundancy(Component):
         most = mu * G / v
         steered = min(max(v * delta / length, -most), most)
         rates = (r, a_y / v, steered)
-        self.implied += h * (rates[1] - r - self.implied / p.washout)
-        self.contradicted = self._lasting(self.contradicted, h, self._hand_wheel_contradicts(rates))
-        self.off = [
-            self._lasting(off, h, abs(w - median) > p.wheel_share * median)
-            for off, w in zip(self.off, wheels)  # noqa: B905 - strict= costs a tenth
-        ]
+        if not self.lost & {GYRO, ACCELEROMETER}:
+            self.implied += h * (rates[1] - r - self.implied / p.washout)
+            self.contradicted = self._lasting(self.contradicted, h, self._hand_wheel_contradicts(rates))
+        for k in self.rolling if len(self.rolling) > 2 else ():
+            self.off[k] = self._lasting(self.off[k], h, abs(wheels[k] - median) > p.wheel_share * median)
         jumps = abs(r - self.last[0]), abs(a_y - self.last[1]) / max(v, SLOW)
-        jumped = next((number for number, by in zip((GYRO, ACCELEROMETER), jumps) if by > p.jump), 0.0)  # noqa: B905
-        self.fault = jumped or self._judged(t + h, (r, a_y), rates)
+        found = self._judged(t + h, (r, a_y), rates, jumps)
+        if found:
+            self._lose(found)
         self.last = (r, a_y)
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...]:
         return self.share * u[-1], self.fault, self.implied
+
+    def _median(self, wheels: list[float]) -> float:
+        """Return the median speed [rad/s] of the wheels that are believed, two at least."""
+        ordered = sorted([wheels[k] for k in self.rolling])
+        return 0.5 * (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2])
+
+    def _lose(self, found: float) -> None:
+        """Believe a signal no more."""
+        self.fault = found
+        if found == WHEEL:
+            self.rolling = [k for k in self.rolling if self.off[k] <= self.p.lasting]
+            self.off = [0.0] * 4
+            return
+        self.lost.add(found)
+        self.implied = self.contradicted = 0.0
 
     @staticmethod
     def _lasting(so_far: float, h: float, still: bool) -> float:
@@ -169,21 +191,33 @@ class Redundancy(Component):
             return False
         return abs(0.5 * (gyro + felt) - steered) > p.differing  # type: ignore[no-any-return]
 
-    def _judged(self, t: float, seen: tuple[float, float], rates: tuple[float, float, float]) -> float:
+    def _judged(
+        self,
+        t: float,
+        seen: tuple[float, float],
+        rates: tuple[float, float, float],
+        jumps: tuple[float, float],
+    ) -> float:
         """Return the number of the first fault that is found, 0 if there is none."""
-        p = self.p
-        for k, name in ((0, GYRO), (1, ACCELEROMETER)):
+        p, lost = self.p, self.lost
+        witnesses = [j for j, name in enumerate((GYRO, ACCELEROMETER, HAND_WHEEL)) if name not in lost]
+        inertial = [(k, name) for k, name in ((0, GYRO), (1, ACCELEROMETER)) if name not in lost]
+        for k, name in inertial:
+            if jumps[k] > p.jump:
+                return name
+        for k, name in inertial:
             if seen[k] != self.last[k]:
                 self.since[k] = None
                 continue
             since, then = self.since[k] or (t, rates)
             self.since[k] = since, then
-            moved = all(abs(rates[j] - then[j]) > p.moved for j in {0, 1, 2} - {k})
-            if moved and t - since >= p.still_time:
+            others = [abs(rates[j] - then[j]) > p.moved for j in witnesses if j != k]
+            if others and all(others) and t - since >= p.still_time:
                 return name
         if abs(self.implied) > p.largest_sideslip:
             gyro, felt, steered = rates
-            return GYRO if abs(gyro - steered) > abs(felt - steered) else ACCELEROMETER
-        if self.contradicted > p.lasting:
+            at_gyro = HAND_WHEEL in lost or abs(gyro - steered) > abs(felt - steered)
+            return GYRO if at_gyro else ACCELEROMETER
+        if self.contradicted > p.lasting and HAND_WHEEL not in lost:
             return HAND_WHEEL
         return WHEEL if max(self.off) > p.lasting else 0.0

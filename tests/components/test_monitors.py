@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import cos, exp, pi, sin
 
 import pytest
@@ -38,6 +39,12 @@ def weaving(t, **other):
 def found(seen):
     """Return the fault that was found first and when; None if there was none."""
     return next(((fault, t) for t, fault, *_ in seen if fault), None)
+
+
+def told(seen):
+    """Return the faults that were told, in their order."""
+    faults = [fault for _, fault, *_ in seen]
+    return [now for before, now in pairwise([0.0, *faults]) if now != before]
 
 
 def test_a_car_whose_signals_agree_keeps_its_moment():
@@ -110,3 +117,39 @@ def test_a_fault_of_what_control_does_not_need_is_told_and_takes_nothing_away():
     seen = watched(lambda t: weaving(t, wheel_speed_rl=0.0), uses_wheel_speeds=False)
     assert found(seen)[0] == WHEEL
     assert {moment for _, _, moment, _ in seen} == {1000.0}
+
+
+ONE_BY_ONE = {"uses_wheel_speeds": False, "uses_acceleration": False, "uses_steer_angle": False}
+
+
+@pytest.mark.parametrize("first", ["wheel_speed_rl", "acceleration_y", "steer_angle"])
+def test_after_a_fault_of_what_control_does_not_need_a_frozen_gyro_is_still_found(first):
+    """The first signal is at a wrong constant from 0.5 s on, the gyro stands still from 2.5 s on."""
+    frozen = {"yaw_rate": weaving(2.5)["yaw_rate"]}
+
+    def faulty(t):
+        wrong = {first: 0.1 if first == "steer_angle" else 0.0} if t >= 0.5 else {}
+        return weaving(t, **wrong, **(frozen if t >= 2.5 else {}))
+
+    seen = watched(faulty, **ONE_BY_ONE)
+    number = {"wheel_speed_rl": WHEEL, "acceleration_y": ACCELEROMETER, "steer_angle": HAND_WHEEL}[first]
+    assert told(seen) == [number, GYRO]
+    at = next(t for t, fault, *_ in seen if fault == GYRO)
+    assert 2.5 < at < 2.8
+    assert [moment for t, _, moment, _ in seen if t < at] == [1000.0] * round(at / H - 1)
+    assert seen[-1][2] == 0.0
+
+
+def test_a_gyro_that_is_off_is_found_without_the_hand_wheel():
+    def faulty(t):
+        wrong = {"steer_angle": 0.1} if t < 2.0 else {"yaw_rate": weaving(t)["yaw_rate"] - 0.05 * (t - 2.0)}
+        return weaving(t, **wrong)
+
+    assert told(watched(faulty, until=8.0, **ONE_BY_ONE)) == [HAND_WHEEL, GYRO]
+
+
+def test_wheels_that_all_contradict_each_other_end_the_watch_and_keep_the_moment():
+    apart = {f"wheel_speed_{w}": V / RADIUS * part for w, part in zip(("fl", "fr"), (0.0, 0.1), strict=True)}
+    seen = watched(lambda t: weaving(t, **apart), **ONE_BY_ONE)
+    assert found(seen)[0] == WHEEL
+    assert (seen[-1][1], seen[-1][2]) == (WHEEL, 1000.0)
