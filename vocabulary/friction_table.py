@@ -50,7 +50,7 @@ def table_of(text: str) -> FrictionTable | None:
     """Return the table that a text says, None if it says nothing.
 
     Raises:
-        ValueError: what is wrong with it, and in which row.
+        ValueError: what is wrong with it, and in which line.
     """
     rows = [
         (number, re.split(r"[,;\t]", line.partition("#")[0]))
@@ -64,11 +64,11 @@ def table_of(text: str) -> FrictionTable | None:
     for number, cells in rows[1:]:
         y, *values = (_number(cell, number) for cell in cells)
         if len(values) != len(x):
-            raise ValueError(f"row {number}: {len(values)} values of friction for {len(x)} of x")
-        if min(values) < 0.0:
-            raise ValueError(f"row {number}: friction must not be negative (got {min(values):g})")
+            raise ValueError(f"line {number}: {len(values)} values of friction for {len(x)} of x")
+        if (least := min(values, default=0.0)) < 0.0:
+            raise ValueError(f"line {number}: friction must not be negative (got {least:g})")
         if y in by_y:
-            raise ValueError(f"row {number}: y = {y:g} has a row already")
+            raise ValueError(f"line {number}: y = {y:g} has a row already")
         by_y[y] = values
     for name, axis in (("x", x), ("y", list(by_y))):
         if len(axis) < 2:
@@ -83,11 +83,11 @@ def table_of(text: str) -> FrictionTable | None:
     )
 
 
-def _number(cell: str, row: int) -> float:
+def _number(cell: str, line: int) -> float:
     try:
         value = float(cell)
     except ValueError:
         value = float("nan")
     if not isfinite(value):
-        raise ValueError(f"row {row}: {cell.strip()!r} is no number")
+        raise ValueError(f"line {line}: {cell.strip()!r} is no number")
     return value

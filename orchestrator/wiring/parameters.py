@@ -158,12 +158,16 @@ class Parameters:
         if not isinstance(raw, TextSpec):
             self._put(given, unit, name, raw, document, key)
             return
+        variable = self._fmus[unit].variables[name]
         try:
-            text = text_of(raw, self._scenario.path.parent, self._fmus[unit].variables[name])
+            text = text_of(raw, self._scenario.path.parent, variable)
         except ValueError as error:
             document.report(key, str(error))
             return
-        self._put(given, unit, name, text, document, key)
+        try:
+            given[unit][name] = value_for(variable, text)
+        except ValueError as error:
+            document.report(key, f"{raw.file}: {error}")
         self._origins[unit][name] = ValueOrigin("file", raw.file)
 
     def _from_facts(self, given: dict[str, dict[str, Value]]) -> set[tuple[str, str]]:

@@ -1019,7 +1019,8 @@ def test_an_input_without_a_source_is_not_sent_to_whatever_has_its_unit_of_measu
 
 
 def test_a_parameter_that_is_text_can_come_from_a_file(folder):
-    parameters = [Var("patches", type="String", start=""), Var("mu", start=0.9)]
+    texts = [Var(name, type="String", start="") for name in ("patches", "friction_table")]
+    parameters = [*texts, Var("mu", start=0.9)]
     make_fmu(folder / "road.fmu", outputs=[out("heat")], parameters=parameters)
     Path("sub").mkdir()
     Path("sub/patches.txt").write_bytes("\ufeffy > 0\nx < 5 # Größe\n".encode())
@@ -1034,6 +1035,7 @@ def test_a_parameter_that_is_text_can_come_from_a_file(folder):
         ("patches: {file: none.txt}", "none.txt: no such file or directory"),
         ("patches: {file: sub}", "sub: is a directory"),
         ("mu: {file: sub/patches.txt}", "takes a value: only parameters that are text take a file"),
+        ("friction_table: {file: sub/patches.txt}", "sub/patches.txt: line 2: 'x < 5' is no number"),
         ("patches: '1e400: y > 0'", "patches: 1e400 is too large a number (in '1e400: y > 0')"),
     ):
         (problem,) = problems(with_road(given))
