@@ -21,6 +21,7 @@ PAGES = {
     "reference/commands.md": commands.page,
     "reference/scenario.md": schemas.scenario_page,
     "reference/experiment.md": schemas.experiment_page,
+    "reference/ranking.md": schemas.ranking_page,
     "reference/signals.md": signals.page,
     "reference/units.md": units.page,
     "reference/metrics.md": metrics.page,

@@ -32,6 +32,7 @@ COMMANDS = (
     "evaluate",
     "drive",
     "tune",
+    "rank",
     "list",
     "diff",
     "salvage",

@@ -10,6 +10,8 @@ OF_RESULTS = ("plan.py", "scenario", "fmu", "wiring", "master", "results", "tyre
 """Modules and stages that have a say in what a run records; units have hashes of their own."""
 OF_METRICS = (*OF_RESULTS, "metrics")
 """And in the numbers made of it."""
+OF_TESTS = (*OF_METRICS, "evaluation")
+"""And in what a standard test makes of it."""
 
 _HERE = Path(__file__).parent
 

@@ -39,6 +39,7 @@ from orchestrator.errors import (
 
 from .experiment import Experiment, Runs, experiment
 from .program import output, parameter, signal
+from .ranking import Places, rank
 from .run import Run, open
 from .scenario import Scenario, load
 
@@ -46,6 +47,7 @@ __all__ = [
     "BuildError",
     "Experiment",
     "ModelDescriptionError",
+    "Places",
     "ResultsError",
     "Run",
     "Runs",
@@ -59,5 +61,6 @@ __all__ = [
     "open",
     "output",
     "parameter",
+    "rank",
     "signal",
 ]

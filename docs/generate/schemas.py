@@ -12,6 +12,7 @@ from typing import Any, Literal
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from orchestrator.experiments import ranking_schema as ranking
 from orchestrator.experiments import schema as experiment
 from orchestrator.scenario import fault_schema
 from orchestrator.scenario import scenario_schema as scenario
@@ -32,6 +33,11 @@ def scenario_page() -> str:
 def experiment_page() -> str:
     """Return the page of studies and sweeps."""
     return _page("Study and sweep files", experiment, [experiment.ExperimentSpec])
+
+
+def ranking_page() -> str:
+    """Return the page of rankings."""
+    return _page("Ranking files", ranking, [ranking.RankingSpec])
 
 
 def _page(heading: str, module: Any, roots: list[type[BaseModel]], more: str = "") -> str:

@@ -117,7 +117,7 @@ def _along_axes(planned: Planned, folder: Path, wishes: Wishes) -> Findings:
     from ..experiments.journal import Journal
 
     experiment = planned.experiment
-    runner = runner_of(planned, wishes.workers, wishes.scheduler)
+    runner = runner_of(planned.fmus, wishes.workers, wishes.scheduler)
     with contextlib.closing(Journal(folder, experiment.identity, fresh=wishes.fresh)) as journal:
         left = [] if wishes.no_run else left_to_do(planned.jobs, journal.records)
         total = len({job.key for job in planned.jobs})
@@ -132,7 +132,7 @@ def _named(planned: Planned, wishes: Wishes) -> Sequence[Any]:
     from ..experiments.execution import left_to_do, runner_of
 
     left = planned.jobs if wishes.fresh else left_to_do(planned.jobs, {})
-    runner = runner_of(planned, wishes.workers, wishes.scheduler)
+    runner = runner_of(planned.fmus, wishes.workers, wishes.scheduler)
     total = len(planned.jobs)
     _announce(planned.experiment.spec.title, total, total - len(left), total)
     outcomes: list[Any] = []
@@ -159,7 +159,7 @@ def _over_region(planned: Planned, findings: Findings, folder: Path, wishes: Wis
         plan = plan_region(planned, folder, once=once, progress=planning)
     jobs = {job.key: job for job in plan.jobs.values()}
     used = {unit.fmu.sha256: unit.fmu for job in jobs.values() if job.plan for unit in job.plan.units}
-    runner = runner_of(replace(planned, fmus=used), wishes.workers, wishes.scheduler)
+    runner = runner_of(used, wishes.workers, wishes.scheduler)
     with contextlib.closing(Journal(folder, experiment.identity, fresh=wishes.fresh)) as journal:
         left = left_to_do(list(jobs.values()), journal.records)
         if left and wishes.no_run:

@@ -54,7 +54,7 @@ class DwellExperiment:
             ScenarioError: they cannot start, or the driver has no amplitude.
         """
         first = planned_alike([self._job(self.slow_steer, "slowly_increasing_steer/as_given")], once)[0]
-        given = _amplitude(first)
+        given = amplitude_of(first)
         jobs = [
             self._job(
                 self.slow_steer,
@@ -88,7 +88,12 @@ def planned_alike(jobs: Sequence[Job], once: Once) -> list[Job]:
     return [keyed(job) for job in ready(jobs, once=once, place=lambda problem: (str(problem), problem))]
 
 
-def _amplitude(job: Job) -> float:
+def amplitude_of(job: Job) -> float:
+    """Return the amplitude that a job's driver is given [rad].
+
+    Raises:
+        ScenarioError: it has none.
+    """
     assert job.plan is not None
     unit, _, name = PLACE.partition(".")
     for one in job.plan.units:

@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from ..errors import KEPT, ResultsError, ScenarioError
+from ..plan import Fmu
 from ..results.freshness import staleness
 from .jobs import Job, Outcome, Record, Told, read_back
 from .journal import Journal
-from .planning import Planned
 from .workers import execute
 
 Runner = Callable[[Sequence[Job], Told], object]
@@ -33,7 +33,7 @@ def left_to_do(jobs: Sequence[Job], records: Mapping[str, Record]) -> list[Job]:
     for job in jobs:
         if (job.key, job.out) in left:
             continue
-        if not job.metrics:
+        if not (job.metrics or job.test):
             made = job.plan is not None and staleness(job.plan, job.out) is None
         else:
             record = records.get(job.key)
@@ -67,8 +67,13 @@ def record_of(outcome: Outcome) -> Record:
     return Record({}, problems) if problems else outcome.value.record
 
 
-def runner_of(planned: Planned, workers: int | None, scheduler: str | None) -> Runner:
+def runner_of(fmus: Mapping[str, Fmu], workers: int | None, scheduler: str | None) -> Runner:
     """Return what makes runs: processes of this machine (see `execute`), or a Dask cluster.
+
+    Args:
+        fmus: hash -> FMU, of all that the runs use.
+        workers: processes at a time; None: one per core.
+        scheduler: of the cluster.
 
     Raises:
         ScenarioError: the package that a cluster needs is missing.
@@ -81,4 +86,4 @@ def runner_of(planned: Planned, workers: int | None, scheduler: str | None) -> R
         raise ScenarioError(
             "--scheduler needs the package distributed: pip install 'yawbench[cluster]'"
         ) from None
-    return functools.partial(run_on_cluster, scheduler=scheduler, fmus=planned.fmus)
+    return functools.partial(run_on_cluster, scheduler=scheduler, fmus=fmus)

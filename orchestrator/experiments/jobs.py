@@ -16,10 +16,11 @@ from ..results.key import key_of
 from ..results.read import Results, load_results
 from ..scenario import yaml_lines
 from ..scenario.yaml_lines import Document
-from ..sources import OF_METRICS, sources_hash
+from ..sources import OF_METRICS, OF_TESTS, sources_hash
 from ..wording import hint
 
 if TYPE_CHECKING:
+    from ..master.course import Opener
     from ..scenario.scenario_schema import Scenario
 
 MANY = 10
@@ -27,6 +28,10 @@ MANY = 10
 
 Metrics = tuple[tuple[str, str, tuple[float, float] | None], ...]
 """(key, metric, window) of each metric."""
+Test = tuple[str, float | None]
+"""A standard test by its name, and A [rad] where it is known."""
+STEP_TIME = "step_time"
+"""Key of the processor time of a step of the unit that is timed [s]."""
 Measured = dict[str, tuple[float, str] | None]
 """Key of a metric -> its value and unit, None where the run gives none."""
 
@@ -44,6 +49,8 @@ class Job:
     format: str = "csv"  # of the results
     call_limit: float | None = None  # of a call of an FMU [s], in a process per unit; None: units share one
     metrics: Metrics = ()  # handed back when the run ends
+    test: Test | None = None  # likewise its quantities and verdicts
+    timed: str = ""  # likewise the time that a step of this unit takes
     keep: bool = True  # whether results are written
     plan: Plan | None = None  # once it is made
     key: str = ""  # see `keyed`
@@ -192,37 +199,66 @@ def ready(
 def keyed(job: Job, metrics: Metrics = ()) -> Job:
     """Return a job that hands back metrics, with its key: jobs of one key are one run."""
     assert job.plan is not None
-    also = [metrics, sources_hash(OF_METRICS)] if metrics else None
+    also: list[Any] | None = [metrics, sources_hash(OF_METRICS)] if metrics else None
+    if job.test:
+        also = [metrics, job.test, sources_hash(OF_TESTS)]
     return replace(job, metrics=metrics, key=key_of(job.plan, also))
 
 
-def run_job(job: Job) -> Made:
-    """Make one run in this process.
+def run_job(job: Job, opener: Opener | None = None) -> Made:
+    """Make one run in this process; `opener`: makes its instances, in place of what opens FMUs.
 
     Raises:
         YawbenchError: the scenario is wrong or the run failed.
     """
     from ..master.isolation import opener_of
     from ..master.simulate import simulate, simulate_in_memory
+    from ..master.timing import Clock, timing
 
-    plan = job.plan or planned(job)[1]
-    with opener_of(plan, job.call_limit) as opener:
-        if not job.keep:
-            results = simulate_in_memory(plan, opener=opener)
-            return Made(None, measured(results, job.metrics))
-        run = simulate(plan, job.out, opener=opener, format=job.format, apart=True).id
-    return Made(run, measured(load_results(job.out), job.metrics) if job.metrics else Record({}))
+    plan, clock, run = job.plan or planned(job)[1], Clock(), None
+    with opener_of(plan, job.call_limit) as own:
+        given = opener or own
+        timed = timing(given, job.timed, clock) if job.timed and job.call_limit is None else given
+        if job.keep:
+            apart = timed is own  # a clock counts in this process, and plain Python is at home there
+            run = simulate(plan, job.out, opener=timed, format=job.format, apart=apart).id
+            if not (job.metrics or job.test):
+                return Made(run, Record({}))
+            record = measured(load_results(job.out), job.metrics, job.test)
+        else:
+            record = measured(simulate_in_memory(plan, opener=timed), job.metrics, job.test)
+    if clock.steps:
+        record.values[STEP_TIME] = (clock.mean, "s")
+    return Made(run, record)
 
 
-def measured(results: Results, metrics: Metrics) -> Record:
-    """Return what a run that has ended comes to."""
+def measured(results: Results, metrics: Metrics, test: Test | None = None) -> Record:
+    """Return what a run that has ended comes to; of a test quantities, and verdicts as 1, 0 or None."""
     values: Measured = {}
     for key, name, window in metrics:
         value = evaluate(results, metric(name), window)
         short = results.ended and not window  # of a run that a unit has ended early it is another metric
         values[key] = None if value is None or short else (value.number, value.unit)
+    if test:
+        values |= _judged(results, *test)
     kinds = dict.fromkeys(one.kind for one in findings_in(results.run) if one.time is not None)
     return Record(values, findings=tuple(kinds), ended=results.ended)
+
+
+def _judged(results: Results, name: str, angle: float | None) -> Measured:
+    from ..evaluation.judgement import Verdict
+    from ..evaluation.standard_tests import TESTS
+    from ..evaluation.trace import trace_of
+
+    judged = TESTS[name].evaluate(trace_of(results, name), angle).judged
+    quantities = {
+        key: None if one.value is None else (one.value, one.unit) for key, one in judged.quantities.items()
+    }
+    verdicts = {
+        key: None if one.verdict is Verdict.NOT_JUDGED else (float(one.verdict is Verdict.PASSED), "1")
+        for key, one in judged.rulings.items()
+    }
+    return quantities | verdicts
 
 
 def read_back(folder: Path, run: str | None = None) -> Results | str:

@@ -38,6 +38,8 @@ TRIES = 2
 """Times that a run is begun whose process dies; chosen: a kill from outside strikes seldom twice."""
 NEEDED = ("orchestrator.wiring.make_plan", "orchestrator.master.simulate", "matplotlib.backends.backend_agg")
 """Modules that take long to import."""
+FOR_TESTS = ("scipy.signal", "orchestrator.evaluation.dwell_run")
+"""Likewise, where runs are judged by a standard test."""
 
 
 def default_workers() -> int:
@@ -73,7 +75,7 @@ def execute(
         YawbenchError: this process may not open as many files as that takes.
     """
     limit = max(1, workers or default_workers())
-    context = _context(limit)
+    context = _context(limit, FOR_TESTS if any(job.test for job in jobs) else ())
     outcomes: dict[int, Outcome] = {}
     waiting = deque((number, job, TRIES) for number, job in enumerate(jobs))
     running: list[_Running] = []
@@ -116,13 +118,13 @@ def pool(workers: int | None = None) -> ProcessPoolExecutor:
     )
 
 
-def _context(workers: int) -> Any:
+def _context(workers: int, needed: Sequence[str] = ()) -> Any:
     """Return how processes start: from a server that has imported once what each needs, or afresh."""
     _require_files(FILES + FILES_EACH * max(workers, default_workers()))
     if "forkserver" not in multiprocessing.get_all_start_methods() or not _has_place_for_sockets():
         return SafeSpawnContext()
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["__main__", *NEEDED])
+    context.set_forkserver_preload(["__main__", *NEEDED, *needed])
     # Ctrl-C is for the caller, who ends its processes: the server must not get it, nor any that it starts,
     # not even while they import what they need
     with safe_path():

@@ -159,7 +159,9 @@ def address_of(svg: str) -> Markup:
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
     svg = re.sub(r"(?<=>)[^<]+(?=<)", lambda text: text[0].translate(CURLY), svg)
     svg = svg.replace("'", "").replace('"', "'")
-    svg = re.sub(r"(\.\d\d)\d+", r"\1", svg)
+    svg = re.sub(
+        r"(scale\([^)]*\))|(\.\d\d)\d+", lambda found: found[1] or found[2], svg
+    )  # glyphs keep their size
     svg = re.sub(r"\s*\n\s*", "\n", svg)
     return Markup("data:image/svg+xml," + quote(svg, safe=" =:/'(),;.-+*!?@$[]{}|^`~"))
 

@@ -17,7 +17,13 @@ SHIPPED = Path(__file__).resolve().parents[2] / FOLDER
 """Where this program's own scenarios lie."""
 YAML = (".yaml", ".yml")
 ENDINGS = (*YAML, ".ssp")
-COMMANDS = {"a scenario": "run", "a study file": "study", "a sweep file": "sweep", "a tuning file": "tune"}
+COMMANDS = {
+    "a scenario": "run",
+    "a study file": "study",
+    "a sweep file": "sweep",
+    "a tuning file": "tune",
+    "a ranking file": "rank",
+}
 """Kind of file -> the command that is for it."""
 HOMES = {"a vehicle file": "vehicles"}
 """Kind of file -> the one folder they lie in, which names need not say: `van` for `vehicles/van`."""

@@ -1,0 +1,183 @@
+"""`yawbench rank`: controllers driven through conditions, and where each of them stands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .batch import Jobs
+from .options import CallLimit, Fmus, Fresh, Isolate, NoBuild, NoRun, Out, Scheduler, isolation, named
+
+if TYPE_CHECKING:
+    from ..experiments.jobs import Job
+    from ..experiments.ranking_course import Ranked
+    from ..experiments.ranking_schema import EntrySpec
+
+RankingFile = Annotated[
+    Path, named("a ranking file", help="Ranking: YAML file, or a name in scenarios/.", metavar="RANKING")
+]
+Controller = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--controller",
+        metavar="FMU",
+        help="A controller of your own to stand beside the file's: path of its FMU, perhaps with parameters, "
+        "my.fmu:gain=3. Repeatable.",
+    ),
+]
+Only = Annotated[
+    list[str] | None,
+    typer.Option("--only", metavar="ENTRY", help="Make the runs of this entry alone. Repeatable."),
+]
+Condition = Annotated[
+    list[str] | None,
+    typer.Option("--condition", metavar="NAME", help="Drive this condition alone. Repeatable."),
+]
+Quick = Annotated[
+    bool,
+    typer.Option("--quick", help="The last amplitude of few conditions: minutes, to see whether all works."),
+]
+
+
+def rank(
+    context: typer.Context,
+    file: RankingFile = Path("proving_ground/ranking"),
+    controller: Controller = None,
+    only: Only = None,
+    condition: Condition = None,
+    quick: Quick = False,
+    out: Out = None,
+    fmus: Fmus = None,
+    no_build: NoBuild = False,
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+    fresh: Fresh = False,
+    no_run: NoRun = False,
+    isolate: Isolate = False,
+    call_limit: CallLimit = None,
+) -> None:
+    """Rank controllers: who holds which car under which conditions, by sine with dwell.
+
+    Begin with report.html. Without --out, results go to results/<folder of the ranking>/<its name>. Runs that
+    have been made already, of the same scenario, FMUs and program, are not made again; an entry that lacks
+    some has no place. A ranking that was stopped goes on where it was.
+    """
+    import contextlib
+
+    from ..errors import ScenarioError
+    from ..experiments.execution import finish, left_to_do, runner_of
+    from ..experiments.jobs import Once
+    from ..experiments.journal import Journal
+    from ..experiments.ranking import load_ranking
+    from ..experiments.ranking_course import drive_ranking
+    from ..experiments.ranking_tables import table_of
+    from ..results.naming import default_folder
+    from ..wording import hint
+    from .batch import bar, hold, print_tables, reported, say, stoppable
+
+    if fresh and no_run:
+        raise ScenarioError("--fresh and --no-run contradict each other")
+    more = dict(map(_entry, controller or ()))
+    ranking = load_ranking(file, more=more, quick=quick, chosen=condition or ())
+    for name in only or ():
+        if name not in ranking.entries:
+            from ..wording import hint
+
+            raise ScenarioError(
+                f"--only {name}: there is no such entry{hint(name, ranking.entries, lead='known')}"
+            )
+    folder = out or default_folder(file)
+    hold(context, folder)
+    once = Once(build=not (no_build or no_run))
+    limit = isolation(isolate, call_limit)
+    with (
+        stoppable(folder),
+        contextlib.closing(Journal(folder, ranking.identity, fresh=fresh)) as journal,
+    ):
+
+        def make(title: str, wanted: Sequence[Job]) -> None:
+            keys = {job.key for job in wanted}
+            left = left_to_do(wanted, journal.records)
+            if no_run or not left:
+                return
+            used = {u.fmu.sha256: u.fmu for job in left if job.plan for u in job.plan.units}
+            runner = runner_of(used, jobs, scheduler)
+            done = len(keys) - len(left)
+            say(f"{title}: {len(keys)} runs{f', {done} finished before' if done else ''}")
+            with reported("runs", len(keys), done, each=False) as told:
+                finish(left, journal, runner=runner, told=told)
+
+        ranked = drive_ranking(
+            ranking, folder, journal, once, make, only=only or (),
+            planning=lambda total: bar("planning", total, quiet=True), fmus=fmus, call_limit=limit,
+        )  # fmt: skip
+        _write(ranked, folder, _command(file, controller, condition, quick=quick))
+    print_tables([table_of(ranked, "gains", "speed lost", "chatter")])
+    if lacking := [one.entry for one in ranked.standings if one.missing]:
+        say(f"without a place, as runs are missing: {', '.join(lacking)}")
+
+
+def _entry(given: str) -> tuple[str, EntrySpec]:
+    """Return the name and the entry of a controller from the command line."""
+    from ..errors import ScenarioError
+    from ..experiments.ranking_schema import UNIT, EntrySpec
+    from ..scenario.overrides import is_path, swap_of
+
+    fmu, *brought = swap_of(UNIT, given, "--controller")
+    name = Path(str(fmu.value)).stem
+    if is_path(str(fmu.value)) and not Path(str(fmu.value)).is_file():
+        raise ScenarioError(f"--controller {fmu.value}: there is no such file")
+    parameters = {one.place.partition(".")[2]: one.value for one in brought}
+    words = ", ".join([name, *(f"{key} {value}" for key, value in parameters.items())])
+    path = Path(str(fmu.value)).absolute() if is_path(str(fmu.value)) else fmu.value
+    spec = EntrySpec(
+        title=words, fmu=str(path), parameters=parameters, source="--controller", gains="authors"
+    )
+    return words.replace(", ", "-").replace(" ", "="), spec
+
+
+def _command(
+    file: Path, controllers: Sequence[str] | None, conditions: Sequence[str] | None, *, quick: bool
+) -> str:
+    from .experiment import command_of
+
+    return command_of("rank", file, quick=quick, controller=controllers, condition=conditions)
+
+
+def _write(ranked: Ranked, folder: Path, command: str) -> None:
+    """Draw the pictures, write tables and page, and say where it is."""
+    from ..errors import ResultsError
+    from ..experiments.experiment import FIGURES
+    from ..experiments.ranking_drawing import draw_matrix, draw_pareto, draw_run
+    from ..experiments.ranking_tables import columns_of_cells, columns_of_entries, columns_of_runs
+    from ..experiments.table import to_csv
+    from ..experiments.workers import pool
+    from ..figures.style import save
+    from ..pages.ranking import ranking_page
+    from ..pages.report import PAGE
+    from ..writing import write_whole
+    from .batch import say
+
+    kept = [
+        (one.job.out, one.angle) for one in ranked.drives if one.job and one.job.keep and one.job.out.is_dir()
+    ]
+    with pool() as workers:
+        list(workers.map(draw_run, *zip(*kept, strict=True)) if kept else ())
+    for name, columns in (
+        ("table", columns_of_entries),
+        ("cells", columns_of_cells),
+        ("runs", columns_of_runs),
+    ):
+        write_whole(folder / f"{name}.csv", to_csv(columns(ranked)))
+    (folder / FIGURES).mkdir(exist_ok=True)
+    save(draw_matrix(ranked, command), folder / FIGURES / "matrix")
+    try:
+        save(draw_pareto(ranked, command), folder / FIGURES / "pareto")
+    except ResultsError as error:
+        say(f"{FIGURES}/pareto: {error}")
+    page = folder / PAGE
+    write_whole(page, ranking_page(ranked, folder, command))
+    say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")

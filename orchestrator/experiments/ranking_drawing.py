@@ -1,0 +1,159 @@
+"""Pictures of a ranking: who passes which condition, stability over intervention, single runs."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import ResultsError
+from ..evaluation.standard_tests import TESTS
+from ..evaluation.trace import trace_of
+from ..figures.style import QUIET, frame, literal, new_figure, save
+from ..results.read import load_results
+from .ranking import SERIES
+from .standings import Cell, Standing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from .ranking_course import Ranked
+
+COLOURS = {"passed": "#BFE5D8", "spun": "#F7E3A1", "failed": "#F6CDB4", "missing": "#FFFFFF"}
+"""Of cells; words and signs tell them apart without."""
+RUN = "sine_with_dwell"
+"""Name of the figure of a run."""
+TUNED = {"authors": ("o", "#0072B2"), "tuned": ("D", "#D55E00")}
+ROW = 0.235
+"""Height of a row of the matrix [inches]."""
+
+
+def words_of(cell: Cell) -> str:
+    """Return what stands in the cell of a controller in a condition: a sign, or how many of its runs pass."""
+    if cell.state == "missing":
+        return "–"
+    if cell.state == "passed":
+        return "✓"
+    passed = sum(one.passed for one in cell.runs)
+    return f"{passed}/{len(cell.runs)}"
+
+
+def place_words(one: Standing) -> str:
+    """Return a place, `–` of an entry that lacks runs."""
+    return str(one.place) if one.place else "–"
+
+
+def draw_matrix(ranked: Ranked, note: str) -> Figure:
+    """Return the picture of who passes which condition, a row per controller, the first place at the top."""
+    from matplotlib.patches import Patch, Rectangle
+
+    rows = ranked.standings
+    conditions = ranked.ranking.conditions
+    with new_figure() as figure:
+        axes = figure.subplots()
+        for i, one in enumerate(rows):
+            for k, name in enumerate(conditions):
+                cell = one.cells[name]
+                colour = COLOURS[cell.state]
+                axes.add_patch(Rectangle((k, i), 1, 1, facecolor=colour, edgecolor="white", linewidth=1.2))
+                axes.text(k + 0.5, i + 0.52, words_of(cell), ha="center", va="center", fontsize=7.5)
+            counted = f"{one.count('passed')} of {len(conditions)}" if one.place else f"{one.missing} missing"
+            axes.text(len(conditions) + 0.15, i + 0.52, counted, va="center", fontsize=8)
+            share = f"{100 * one.share:.0f} %" if one.place else ""
+            axes.text(len(conditions) + 2.05, i + 0.52, share, va="center", ha="right", fontsize=8)
+            axes.text(-0.15, i + 0.52, literal(one.spec.title), va="center", ha="right", fontsize=8.5)
+            axes.text(-5.1, i + 0.52, place_words(one), va="center", ha="right", fontsize=8.5, weight="bold")
+        for k, spec in enumerate(conditions.values()):
+            axes.text(k + 0.35, -0.15, literal(spec.short or spec.title), rotation=40, va="bottom", ha="left",
+                      fontsize=8)  # fmt: skip
+        axes.text(-5.1, -0.15, "place", ha="right", va="bottom", fontsize=8, color=QUIET)
+        axes.text(len(conditions) + 0.15, -0.15, "passed", va="bottom", fontsize=8, color=QUIET)
+        axes.text(len(conditions) + 2.05, -0.15, "runs", va="bottom", ha="right", fontsize=8, color=QUIET)
+        axes.set(xlim=(-5.5, len(conditions) + 2.2), ylim=(len(rows) + 0.1, -4.2))
+        axes.set_axis_off()
+        handles = [
+            Patch(facecolor=COLOURS["passed"], label="passed: all runs pass"),
+            Patch(facecolor=COLOURS["spun"], label="spun: criteria met, but more than 20° of sideslip"),
+            Patch(facecolor=COLOURS["failed"], label="failed; so many runs of all pass"),
+        ]
+        frame(figure, ROW * (len(rows) + 4.3), handles, ranked.ranking.spec.title, note)
+    return figure
+
+
+def draw_pareto(ranked: Ranked, note: str) -> Figure:
+    """Return stability over intervention, a point per controller; those that none betters are joined.
+
+    Raises:
+        ResultsError: there is no controller to draw.
+    """
+    from matplotlib.lines import Line2D
+
+    points = [
+        (1e-3 * x, y, one)
+        for one in ranked.standings
+        if (x := one.mean("intervention")) is not None and (y := one.mean("margin")) is not None
+    ]
+    if not points:
+        raise ResultsError("nothing to draw: no controller has all of its runs.")
+    best = [
+        point
+        for point in points
+        if not any(x <= point[0] and y >= point[1] and (x, y) != point[:2] for x, y, _ in points)
+    ]
+    with new_figure() as figure:
+        axes = figure.subplots()
+        front = sorted(best, key=lambda point: point[0])
+        axes.plot([x for x, _, _ in front], [y for _, y, _ in front], color=QUIET, linewidth=1.0, zorder=1)
+        for x, y, one in points:
+            marker, colour = TUNED[one.spec.gains]
+            axes.plot([x], [y], marker, color=colour, markersize=6, zorder=3)
+        _label(axes, points)
+        axes.set_xlabel("Intervention: ∫|torque| dt of the wheel that gets most, mean [kN·m·s]")
+        axes.set_title("Stability margin: points of per cent below the limits, least of each condition, mean")
+        handles = [
+            Line2D([], [], linestyle="", marker=marker, color=colour, label=f"gains: {whose}")
+            for whose, (marker, colour) in TUNED.items()
+            if any(one.spec.gains == whose for _, _, one in points)
+        ]
+        handles.append(Line2D([], [], color=QUIET, linewidth=1.0, label="none is better in both"))
+        frame(figure, 4.6, handles, "Stability over intervention", note)
+    return figure
+
+
+def _label(axes: Axes, points: list[tuple[float, float, Standing]]) -> None:
+    """Write names beside points, upwards to the right, each clear of those before."""
+    xs, ys = [x for x, _, _ in points], [y for _, y, _ in points]
+    wide, high = max(xs) - min(xs) or 1.0, max(ys) - min(ys) or 1.0
+    axes.set_xlim(min(xs) - 0.05 * wide, max(xs) + 0.22 * wide)
+    axes.set_ylim(min(ys) - 0.08 * high, max(ys) + 0.1 * high)
+    taken: list[tuple[float, float]] = []
+    for x, y, one in sorted(points, key=lambda point: -point[1]):
+        at = y
+        while any(abs(x - other) < 0.2 * wide and abs(at - beside) < 0.045 * high for other, beside in taken):
+            at -= 0.015 * high
+        taken.append((x, at))
+        axes.annotate(
+            literal(one.spec.title), (x, y), (x + 0.018 * wide, at), va="center", fontsize=8,
+            arrowprops={"arrowstyle": "-", "color": "#BBBBBB", "linewidth": 0.6} if at != y else None,
+        )  # fmt: skip
+
+
+def draw_run(folder: Path, angle: float, again: bool = False) -> None:
+    """Draw a run of sine with dwell beside its results, unless that has been done; `angle`: A [rad].
+
+    A run that has left no results is passed over.
+    """
+    if not again and (folder / f"{RUN}.svg").is_file():
+        return
+    try:
+        evaluated = TESTS[SERIES].evaluate(trace_of(load_results(folder)), angle)
+    except ResultsError:
+        return
+    if evaluated.draw:
+        save(evaluated.draw(), folder / RUN)
+
+
+def degrees(amplitude: float) -> str:
+    """Return an amplitude in whole and tenths of degrees."""
+    return f"{math.degrees(abs(amplitude)):.1f}°"

@@ -1,0 +1,198 @@
+"""The page of a ranking: who passes what on the first screen, every cell one click from its runs."""
+
+from __future__ import annotations
+
+import math
+import os
+import shlex
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup
+
+from ..experiments.experiment import FIGURES
+from ..experiments.jobs import STEP_TIME
+from ..experiments.ranking_course import Ranked
+from ..experiments.ranking_drawing import RUN, place_words, words_of
+from ..experiments.ranking_schema import EntrySpec
+from ..experiments.ranking_tables import HEADINGS, RULE, row_of, runs_table, spread, table_of, value
+from ..experiments.standings import Cell, Standing
+from ..experiments.tables import Table
+from ..plan import FAULTS, Change
+from ..titles import changed
+from .facts import anchor, made_by
+from .panel_images import Image, image_of
+from .rendering import render, style
+
+STATES = {
+    "passed": "passed",
+    "spun": "criteria met, but the car spun",
+    "failed": "failed",
+    "missing": "runs are missing in this build",
+}
+
+
+def ranking_page(ranked: Ranked, folder: Path, command: str) -> str:
+    """Return the page as HTML.
+
+    Args:
+        ranked: what the ranking comes to.
+        folder: of its results, in which the page lies.
+        command: that makes it.
+    """
+    ranking = ranked.ranking
+    head = ["place", "controller", "passed", "runs"]
+    after = [
+        heading for heading in HEADINGS if heading in ("margin", "sideslip", "intervention", "time per step")
+    ]
+    return render(
+        "ranking.html.j2",
+        title=ranking.spec.title,
+        source=ranking.spec.source,
+        rule=RULE,
+        quick=ranking.quick,
+        missing=[one.spec.title for one in ranked.standings if one.missing],
+        first=head,
+        after=after,
+        conditions=[
+            {"name": name, "short": one.short or one.title, "title": one.title}
+            for name, one in ranking.conditions.items()
+        ],
+        rows=[_row(ranked, one, after) for one in ranked.standings],
+        states=STATES,
+        pareto=_image(folder / FIGURES / "pareto.svg", "Stability over intervention"),
+        table=replace(table_of(ranked), title="", notes=[]),
+        described=_conditions(ranked),
+        entries=_entries(ranked),
+        cells=[_cell(ranked, one, cell, folder) for one in ranked.standings for cell in one.cells.values()],
+        command=command,
+        folder=str(folder),
+        style=style(),
+        assets=Markup(""),
+        **made_by(),
+    )
+
+
+def _image(file: Path, title: str) -> Image | None:
+    return image_of(file, title) if file.is_file() else None
+
+
+def _row(ranked: Ranked, one: Standing, after: list[str]) -> dict[str, Any]:
+    """Return a controller's row of the first table."""
+    texts = dict(zip(HEADINGS, Table("", HEADINGS, [row_of(one)]).text()[0], strict=True))
+    return {
+        "place": place_words(one),
+        "title": one.spec.title,
+        "tuned": one.spec.gains == "tuned",
+        "passed": f"{one.count('passed')}/{len(one.cells)}" if one.place else f"{one.missing} missing",
+        "share": f"{100 * one.share:.0f} %" if one.place else "–",
+        "cells": [
+            {
+                "id": _id(cell),
+                "state": cell.state,
+                "words": words_of(cell),
+                "says": f"{one.spec.title}, {ranked.ranking.conditions[name].title}: {STATES[cell.state]}",
+            }
+            for name, cell in one.cells.items()
+        ],
+        "after": [texts[heading].replace("-", "–") if one.place else "–" for heading in after],
+    }
+
+
+def _id(cell: Cell) -> str:
+    return anchor(f"{cell.entry} in {cell.condition}")
+
+
+def _cell(ranked: Ranked, one: Standing, cell: Cell, folder: Path) -> dict[str, Any]:
+    """Return what stands behind a cell: its numbers, all its runs, its figure, its command."""
+    condition = ranked.ranking.conditions[cell.condition]
+    kept = next((run.drive for run in cell.runs if run.drive.job and run.drive.job.keep), None)
+    picture = None
+    if kept and kept.job and (kept.job.out / f"{RUN}.svg").is_file():
+        picture = Path(os.path.relpath(kept.job.out / f"{RUN}.svg", folder)).as_posix()
+    sums: list[tuple[str, str | None]] = [
+        ("runs that pass", f"{sum(run.passed for run in cell.runs)} of {len(cell.runs)}"),
+        ("stability margin", spread(cell.margin, lambda x: f"{x:.1f} points")),
+        ("peak sideslip", spread(cell.sideslip, lambda x: f"{math.degrees(x):.1f}°")),
+        ("displacement", _text(cell.displacement, "m")),
+        ("speed lost", _text(cell.mean("speed_lost"), "m/s")),
+        ("intervention", _text(cell.mean("intervention"), "N.m.s")),
+        ("chatter", _text(cell.mean("chatter"), "N.m/s")),
+        ("time per step", _text(cell.mean(STEP_TIME), "s")),
+    ]
+    return {
+        "id": _id(cell),
+        "title": f"{one.spec.title}: {condition.title}",
+        "state": cell.state,
+        "says": STATES[cell.state],
+        "sums": [(name, text) for name, text in sums if text is not None],
+        "repeats": len({run.drive.repeat for run in cell.runs}),
+        "table": runs_table(cell),
+        "picture": picture,
+        "amplitude": f"{math.degrees(kept.amplitude):.1f}°" if kept else "",
+        "command": series_command(ranked, cell),
+        "again": shlex.join(["yawbench", "rank", str(ranked.ranking.path), "--only", cell.entry,
+                             "--condition", cell.condition, "--fresh"]),
+    }  # fmt: skip
+
+
+def _text(number: float | None, unit: str) -> str | None:
+    found = Table("", ["", ""], [["", value(number, unit)]]).text()[0][1]
+    return None if number is None else found
+
+
+def series_command(ranked: Ranked, cell: Cell) -> str:
+    """Return the command that drives the regulation's whole series of a cell, with a figure of every run."""
+    ranking = ranked.ranking
+    condition = ranking.spec.conditions[cell.condition]
+    words = ["yawbench", "drive", "sine-with-dwell", "--figures"]
+    words += ["--scenario", str(ranking.path.parent / condition.scenario)]
+    words += ["--angle", f"{math.degrees(ranked.angles[condition.car]):.1f} deg"]
+    changes = {
+        one.place: one
+        for one in (*ranking.changes_of_condition(cell.condition), *ranking.changes_of_entry(cell.entry))
+    }
+    for one in changes.values():
+        words += _option(one)
+    return shlex.join(words)
+
+
+def _option(change: Change) -> list[str]:
+    """Return a change as an option of the command line."""
+    if change.place == "vehicle":
+        return ["--vehicle", os.path.relpath(str(change.value))]
+    if change.faulty:
+        return ["--fault", f"{change.place.removeprefix(f'{FAULTS}.')}: {change.value}"]
+    text = str(change.value).lower() if isinstance(change.value, bool) else str(change.value)
+    return ["--swap" if change.swaps else "--set", f"{change.place}={text}"]
+
+
+def _conditions(ranked: Ranked) -> Table:
+    """Return what the conditions are."""
+    ranking = ranked.ranking
+    table = Table(
+        "", ["condition", "car", "A", "scenario", "changed", "runs of a controller", "responsiveness"]
+    )
+    for name, one in ranking.conditions.items():
+        runs = sum(drive.condition == name for drive in ranked.drives) // max(1, len(ranking.entries))
+        own = ranking.changes_of_condition(name)
+        told = [change for change in own if change.place not in ("vehicle", "step_size", "stop_time")]
+        table.rows.append(
+            [
+                one.title, ranking.spec.cars[one.car].title, f"{math.degrees(ranked.angles[one.car]):.1f}°",
+                one.scenario, changed(told) or None, str(runs),
+                "asked" if one.dry else "no dry road: not asked",
+            ]
+        )  # fmt: skip
+    return table
+
+
+def _entries(ranked: Ranked) -> Table:
+    """Return who the controllers are."""
+    table = Table("", ["controller", "name", "FMU", "parameters", "gains", "source"])
+    for one in ranked.standings:
+        spec: EntrySpec = one.spec
+        given = ", ".join(f"{name} {number}" for name, number in spec.parameters.items())
+        table.rows.append([spec.title, one.entry, spec.fmu, given or None, spec.gains, spec.source])
+    return table

@@ -1,0 +1,195 @@
+"""A ranking: cells and places from runs made up, and a small matrix that is driven."""
+
+from __future__ import annotations
+
+import csv
+from math import radians
+from pathlib import Path
+
+import pytest
+
+from orchestrator.cli import main
+from orchestrator.experiments.jobs import Record
+from orchestrator.experiments.ranking import Drive, load_ranking
+from orchestrator.experiments.ranking_schema import EntrySpec
+from orchestrator.experiments.standings import UNHELD, WORST, Cell, Driven, Standing, placed
+
+ROOT = Path(__file__).parents[2]
+GROUND = ROOT / "scenarios" / "proving_ground"
+A = radians(36.0)
+GOOD = {"stability": 1.0, "responsiveness": 1.0, "ratio_1000": 0.05, "ratio_1750": 0.02, "sideslip": 0.1}
+
+
+def driven(multiple: float = 5.0, *, repeat: int | None = None, dry: bool = True, **numbers: float | None):
+    """Return a run of a multiple of A that passes, but for what is given."""
+    drive = Drive("x", "c", multiple * A, A, repeat)
+    known = {key: None if x is None else (x, "1") for key, x in {**GOOD, **numbers}.items()}
+    return Driven(drive, dry, Record(known))
+
+
+def standing(name: str, *cells: list[Driven]) -> Standing:
+    spec = EntrySpec(title=name, fmu="f", parameters={}, source="made up", gains="authors")
+    return Standing(name, spec, {str(k): Cell(name, str(k), runs) for k, runs in enumerate(cells)})
+
+
+def test_a_run_that_meets_the_criteria_with_much_sideslip_has_spun_and_does_not_pass():
+    assert driven().passed
+    spun = driven(sideslip=radians(21.0))
+    assert (spun.met, spun.passed, spun.verdict) == (True, False, "spun")
+    assert not driven(stability=0.0).met
+    assert Cell("x", "c", [driven(), spun]).state == "spun"
+    assert Cell("x", "c", [driven(stability=0.0), spun]).state == "failed"
+
+
+@pytest.mark.parametrize("far", [0.0, None])
+def test_responsiveness_is_asked_from_five_times_a_on_a_dry_road_alone(far):
+    assert not driven(5.0, responsiveness=far).passed
+    assert driven(4.9, responsiveness=far).passed
+    assert driven(5.0, responsiveness=far, dry=False).passed
+
+
+def test_the_margin_is_that_of_the_nearer_limit_in_points():
+    assert driven(ratio_1000=0.30, ratio_1750=0.02).margin == pytest.approx(5.0)
+    assert driven(ratio_1000=0.05, ratio_1750=0.25).margin == pytest.approx(-5.0)
+    assert driven(ratio_1000=None, ratio_1750=None).margin == pytest.approx(100 * (0.20 - UNHELD))
+    assert driven(ratio_1750=9.0).margin == WORST
+
+
+def test_a_cell_tells_how_sure_the_mean_over_its_seeds_is():
+    runs = [driven(m, repeat=r, ratio_1750=0.01 * r * m) for r in (1, 2, 3) for m in (1.0, 2.0)]
+    margin = Cell("x", "c", runs).margin
+    assert margin.mean == pytest.approx(20.0 - 4.0)  # the least of every seed: 18, 16, 14
+    assert margin.half == pytest.approx(4.302653 * 2.0 / 3**0.5, rel=1e-6)  # t of two degrees of freedom
+    assert Cell("x", "c", [driven(), driven(6.0)]).margin.half == 0.0
+
+
+def test_places_go_by_conditions_passed_then_runs_then_sideslip():
+    bad = driven(stability=0.0)
+    every = [
+        standing("one and a half", [driven()], [bad, driven()]),
+        standing("slides", [driven(sideslip=0.2)], [driven()]),
+        standing("both", [driven()], [driven()]),
+        standing("one", [driven()], [bad, bad]),
+        standing("as both", [driven()], [driven()]),
+        standing("none", [bad], [bad]),
+    ]
+    found = [(one.entry, one.place) for one in placed(every)]
+    assert found == [
+        ("both", 1), ("as both", 1), ("slides", 3), ("one and a half", 4), ("one", 5), ("none", 6),
+    ]  # fmt: skip
+
+
+def test_an_entry_without_a_run_is_missing_and_has_no_place():
+    missing = Driven(Drive("x", "c", A, A), True, None)
+    first, last = placed([standing("lacks", [driven()], [driven(), missing]), standing("has", [driven()])])
+    assert (first.entry, first.place) == ("has", 1)
+    assert (last.entry, last.place, last.missing) == ("lacks", None, 1)
+    assert last.cells["1"].state == "missing"
+    assert last.mean("margin") is None
+
+
+def test_a_run_that_broke_off_counts_as_lost():
+    lost = Driven(Drive("x", "c", A, A), True, Record({}, ("the controller has crashed",)))
+    cell = Cell("x", "c", [driven(), lost])
+    assert cell.state == "failed"
+    assert cell.margin.mean == pytest.approx(100 * (0.20 - UNHELD))
+    assert "the controller has crashed" in lost.verdict
+
+
+SMALL = f"""
+title: small
+step_size: 0.005
+stop_time: 5.5
+every: 20
+cars:
+  s:
+    title: saloon75
+    vehicle: {ROOT}/scenarios/vehicles/saloon75.yaml
+    slow_steer: {GROUND}/slowly_increasing_steer.yaml
+conditions:
+  dry: {{title: dry, car: s, scenario: {GROUND}/sine_with_dwell.yaml, quick: true}}
+  low: {{title: low, car: s, scenario: {GROUND}/sine_with_dwell.yaml, dry: false, set: {{friction: 0.4}}}}
+entries:
+  none: {{title: no control, fmu: controller_off, source: the car alone}}
+  fuzzy_pid: {{title: fuzzy PID, fmu: controller_fuzzy_pid, source: paper C}}
+"""
+"""Two controllers in two conditions, one amplitude each, with steps of 5 ms."""
+
+
+def call(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as ended:
+        main([str(one) for one in arguments])
+    return ended.value.code or 0
+
+
+def rows(file: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(file.open()))
+
+
+def test_a_small_matrix_is_driven_goes_on_where_it_was_and_shows_what_is_missing(tmp_path, capsys):
+    file, out = tmp_path / "small.yaml", tmp_path / "out"
+    file.write_text(SMALL)
+    assert call("rank", file, "--out", out, "--only", "fuzzy_pid", "--jobs", 2) == 0
+    assert "without a place, as runs are missing: none" in capsys.readouterr().err
+    page = (out / "report.html").read_text()
+    assert "runs are missing in this build: no control" in page
+    lacking = rows(out / "table.csv")
+    assert [(one["entry"], one["place"]) for one in lacking] == [("fuzzy_pid", "1"), ("none", "")]
+    assert call("rank", file, "--out", out, "--jobs", 2) == 0
+    assert "4 runs, 2 finished before" in capsys.readouterr().err
+    found = rows(out / "table.csv")
+    assert [(one["entry"], one["place"], one["passed"]) for one in found] == [
+        ("fuzzy_pid", "1", "2"), ("none", "2", "0"),
+    ]  # fmt: skip
+    assert found[0] == lacking[0]  # what has been made is not made again
+    cells = {(one["entry"], one["condition"]): one for one in rows(out / "cells.csv")}
+    assert {key: one["state"] for key, one in cells.items()} == {
+        ("fuzzy_pid", "dry"): "passed", ("fuzzy_pid", "low"): "passed",
+        ("none", "dry"): "failed", ("none", "low"): "failed",
+    }  # fmt: skip
+    assert 0 < float(found[0]["step_time [s]"]) < 0.005
+    assert len(rows(out / "runs.csv")) == 4
+    page = (out / "report.html").read_text()
+    assert 'href="#fuzzy-pid-in-low"' in page
+    assert 'id="fuzzy-pid-in-low"' in page
+    drawn = next(out.glob("runs/*/sine_with_dwell.svg"))
+    assert f'href="{drawn.relative_to(out).as_posix()}"' in page
+    assert "drive sine-with-dwell" in page
+
+
+@pytest.mark.parametrize(
+    "wrong, options, sentence",
+    [
+        (("car: s,", "car: t,"), (), "conditions.dry.car: there is no car 't'; there are s"),
+        (("every: 20", "evry: 20"), (), "unknown key; did you mean 'every'?"),
+        (("source: paper C", "sauce: paper C"), (), "did you mean 'source'?"),
+        ((), ("--only", "fuzy_pid"), "--only fuzy_pid: there is no such entry; did you mean 'fuzzy_pid'?"),
+        ((), ("--condition", "wet"), "there is no condition 'wet'"),
+        ((), ("--controller", "nowhere/my.fmu"), "--controller nowhere/my.fmu: there is no such file"),
+        ((), ("--controller", "none"), "there is already an entry 'none'"),
+        ((), ("--fresh", "--no-run"), "--fresh and --no-run contradict each other"),
+        ((), ("--no-run",), "holds no A of 's' of this build; rank without --no-run"),
+    ],
+)
+def test_what_is_wrong_with_a_ranking_is_said_before_any_run(wrong, options, sentence, tmp_path, capsys):
+    file = tmp_path / "small.yaml"
+    file.write_text(SMALL.replace(*wrong) if wrong else SMALL)
+    assert call("rank", file, "--out", tmp_path / "out", *options) in (1, 2)
+    assert sentence in capsys.readouterr().err
+    assert not list(tmp_path.rglob("run.json"))
+
+
+def test_the_ranking_of_the_proving_ground_is_as_large_as_it_says():
+    ranking = load_ranking(GROUND / "ranking.yaml")
+    assert len(ranking.spec.entries) >= 11
+    assert len(ranking.conditions) >= 12
+    quick = load_ranking(GROUND / "ranking.yaml", quick=True)
+    assert 1 < len(quick.conditions) < len(ranking.conditions)
+
+
+@pytest.mark.parametrize("name", load_ranking(GROUND / "ranking.yaml").spec.conditions)
+def test_brakes_get_no_help_from_a_drive_without_lag(name):
+    """Whoever brakes by hydraulics has an allocator that never drives a wheel."""
+    ranking = load_ranking(GROUND / "ranking.yaml")
+    text = (GROUND / ranking.spec.conditions[name].scenario).read_text()
+    assert ("wheel_control_hydraulic" in text) != ("allocator_load_proportional" in text)

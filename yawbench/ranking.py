@@ -1,0 +1,189 @@
+"""A controller among others: its place, found by the ranking of the proving ground."""
+
+from __future__ import annotations
+
+import contextlib
+import tempfile
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from components.fmi.component import Component
+from orchestrator.errors import ScenarioError, YawbenchError
+from orchestrator.experiments.execution import finish, left_to_do
+from orchestrator.experiments.jobs import Job, Made, Once, Outcome, Told, run_job
+from orchestrator.experiments.journal import Journal
+from orchestrator.experiments.ranking import load_ranking
+from orchestrator.experiments.ranking_course import Ranked, drive_ranking
+from orchestrator.experiments.ranking_drawing import draw_matrix, draw_pareto
+from orchestrator.experiments.ranking_schema import UNIT, EntrySpec
+from orchestrator.experiments.ranking_tables import columns_of_cells, columns_of_entries
+from orchestrator.experiments.table import to_pandas
+from orchestrator.experiments.workers import execute
+from orchestrator.results.lock import writing
+from orchestrator.scenario import catalogue
+from orchestrator.wording import hint
+
+from .program import Program
+from .run import shown_in_notebooks
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+def rank(
+    controller: Any = None,
+    *,
+    name: str = "",
+    against: Iterable[str] | None = None,
+    conditions: Sequence[str] = (),
+    quick: bool = False,
+    ranking: str | Path = "proving_ground/ranking",
+    out: str | Path | None = None,
+    workers: int | None = None,
+) -> Places:
+    """Drive a controller and others through the conditions of a ranking and return where they stand.
+
+        >>> class Gain:
+        ...     inputs = ("yaw_rate_ref", "yaw_rate")
+        ...     outputs = ("yaw_moment",)
+        ...
+        ...     def output(self, t, u):
+        ...         return 1e5 * (u.yaw_rate_ref - u.yaw_rate)
+        >>> places = yb.rank(Gain, against=["none"], conditions=["saloon75"], quick=True)
+        >>> places.place("Gain"), places.place("none")
+        (1, 2)
+
+    Args:
+        controller: the name or path of an FMU, or plain Python: what `Scenario.swap` takes, or a class whose
+            objects are; None: rank the others alone.
+        name: of its entry; default: its own.
+        against: entries that are driven, too; default: all of the ranking.
+        conditions: of the ranking; default: all.
+        quick: the last amplitude of few conditions.
+        ranking: a name in a folder of scenarios, or the path of a file.
+        out: folder that keeps finished runs, such as that of `yawbench rank`; default: none is kept.
+        workers: processes at a time; default: one per core. Plain Python is run in this one. A script has
+            to call this below `if __name__ == "__main__":`, as for all that starts processes.
+
+    Raises:
+        YawbenchError: the controller is none, or a run cannot start.
+    """
+    more, programs = _entry(controller, name)
+    loaded = load_ranking(
+        catalogue.find(ranking, "a ranking file"), more=more, quick=quick, chosen=conditions
+    )
+    wanted = set(loaded.entries if against is None else against)
+    if unknown := sorted(wanted - set(loaded.entries)):
+        raise ScenarioError(
+            f"there is no entry {unknown[0]!r}{hint(unknown[0], loaded.entries, lead='known')}"
+        )
+    kept = {key: one for key, one in loaded.entries.items() if key in wanted or key in more}
+    loaded = replace(loaded, entries=kept)
+    opened = {path: program.fmu for path, program in programs.items()}
+    once = Once(build=True, tell=lambda text: None, opened=opened)
+    with contextlib.ExitStack() as stack:
+        folder = Path(out or stack.enter_context(tempfile.TemporaryDirectory()))
+        stack.enter_context(writing(folder))
+        journal = stack.enter_context(contextlib.closing(Journal(folder, loaded.identity)))
+
+        def runner(jobs: Sequence[Job], told: Told) -> None:
+            here = [job for job in jobs if _program_of(job, programs)]
+            execute([job for job in jobs if job not in here], workers=workers, done=told)
+            for job in here:
+                told(_made_here(job, programs))
+
+        def make(_: str, jobs: Sequence[Job]) -> None:
+            finish(left_to_do(jobs, journal.records), journal, runner=runner)
+
+        of_jobs: dict[str, Any] = {} if out else {"keep": False}
+        return Places(drive_ranking(loaded, folder, journal, once, make, **of_jobs))
+
+
+def _entry(given: Any, name: str) -> tuple[dict[str, EntrySpec], dict[Path, Program]]:
+    """Return the entry of a controller by its name, and what it is in this process, by its path."""
+    if given is None:
+        return {}, {}
+    if isinstance(given, (str, Path)):
+        fmu = str(Path(given).absolute()) if Path(given).suffix == ".fmu" else str(given)
+        return {name or Path(fmu).stem: _spec(name or Path(fmu).stem, fmu)}, {}
+    if isinstance(given, type) and not issubclass(given, Component):
+        given = given()
+    program = Program(given, unit=UNIT, role=UNIT)
+    words = name or program.path.stem
+    return {words: _spec(words, str(program.path))}, {program.path: program}
+
+
+def _spec(name: str, fmu: str) -> EntrySpec:
+    return EntrySpec(title=name, fmu=fmu, parameters={}, source="given to rank", gains="authors")
+
+
+def _program_of(job: Job, programs: dict[Path, Program]) -> Program | None:
+    units = job.plan.units if job.plan else ()
+    return next((programs[unit.fmu.path] for unit in units if unit.fmu.path in programs), None)
+
+
+def _made_here(job: Job, programs: dict[Path, Program]) -> Outcome:
+    """Make a run of plain Python in this process."""
+    try:
+        made: Made = run_job(job, opener=lambda unit, log, corrupted: _open(programs, unit, log, corrupted))
+        return Outcome(job, value=made)
+    except YawbenchError as error:
+        return Outcome(job, tuple(error.problems), error.exit_status)
+
+
+def _open(programs: dict[Path, Program], unit: Any, log: Any, corrupted: set[Path]) -> Any:
+    from orchestrator.master.opening import open_unit
+
+    program = programs.get(unit.fmu.path)
+    return program.open(unit, log) if program else open_unit(unit, log, corrupted)
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where controllers stand; made by `rank`."""
+
+    ranked: Ranked
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """One row per controller, the first place first; `attrs["units"]` holds the units."""
+        return to_pandas(columns_of_entries(self.ranked))
+
+    @cached_property
+    def cells(self) -> pd.DataFrame:
+        """One row per controller and condition."""
+        return to_pandas(columns_of_cells(self.ranked))
+
+    def place(self, name: str) -> int | None:
+        """Return the place of an entry, None if it lacks runs.
+
+        Raises:
+            ScenarioError: there is no such entry.
+        """
+        places = {one.entry: one.place for one in self.ranked.standings}
+        if name not in places:
+            raise ScenarioError(f"there is no entry {name!r}{hint(name, places, lead='known')}")
+        return places[name]
+
+    def plot(self, kind: str = "matrix") -> Figure:
+        """Return a picture: `matrix`, who passes what, or `pareto`, stability over intervention.
+
+        Raises:
+            ScenarioError: there is no such picture.
+        """
+        drawn = {"matrix": draw_matrix, "pareto": draw_pareto}
+        if kind not in drawn:
+            raise ScenarioError(f"there is no picture {kind!r}{hint(kind, drawn, lead='known')}")
+        return shown_in_notebooks(drawn[kind](self.ranked, "yawbench.rank"))
+
+    def __repr__(self) -> str:
+        rows, columns = self.ranked.standings, self.ranked.ranking.conditions
+        return f"<Places of {len(rows)} controllers in {len(columns)} conditions>"
+
+    def _repr_html_(self) -> str:
+        shown = self.table[["place", "title", "passed", "spun", "share", "margin", "sideslip"]]
+        return str(shown.to_html(index=False, na_rep=""))
