@@ -38,8 +38,8 @@ from orchestrator.errors import (
 )
 
 from .experiment import Experiment, Runs, experiment
+from .places import Places, rank
 from .program import output, parameter, signal
-from .ranking import Places, rank
 from .run import Run, open
 from .scenario import Scenario, load
 

@@ -156,7 +156,7 @@ def _write(ranked: Ranked, folder: Path, command: str) -> None:
     from ..experiments.table import to_csv
     from ..experiments.workers import pool
     from ..figures.style import save
-    from ..pages.ranking import ranking_page
+    from ..pages.ranking_page import ranking_page
     from ..pages.report import PAGE
     from ..writing import write_whole
     from .batch import say
