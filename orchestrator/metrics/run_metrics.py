@@ -25,7 +25,7 @@ import numpy as np
 
 from vocabulary.wheels import WHEELS, wheels
 
-from ..errors import ResultsError, ScenarioError
+from ..errors import ScenarioError
 from ..plan import SENSING
 from ..scenario.quantities import convert
 from ..wording import closest, fold, hint, listed, short
@@ -224,11 +224,9 @@ def columns_of(results: Results, signal: str) -> list[str]:
 
 def _column(results: Results, name: str) -> str | None:
     for role in (None, "plant"):
-        try:
-            column = results.column(name, role=role)
-        except ResultsError:
-            continue
-        return column if np.issubdtype(results.columns[column].dtype, np.number) else None
+        found = results.candidates(name, role=role)
+        if len(found) == 1:
+            return found[0] if np.issubdtype(results.columns[found[0]].dtype, np.number) else None
     found = [c for c in results.columns if variable_of(c) == name and not _is_seen(results, c)]
     return found[0] if len(found) == 1 and np.issubdtype(results.columns[found[0]].dtype, np.number) else None
 

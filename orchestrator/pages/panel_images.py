@@ -117,8 +117,9 @@ def _share(every: Sequence[Axes]) -> None:
 def _align(drawn: Sequence[Figure]) -> None:
     """Give the axes of all panels the same left and right ends."""
     for figure in drawn:
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")
+        if (layout := figure.get_layout_engine()) is not None:
+            layout.execute(figure)  # nothing need be drawn for that
+            figure.set_layout_engine("none")
     places = [figure.axes[0].get_position(original=True) for figure in drawn]
     left = max((place.x0 for place in places), default=0.0)
     right = min((place.x1 for place in places), default=1.0)

@@ -79,14 +79,7 @@ class Results:
         Raises:
             ResultsError: no such column, or more than one.
         """
-        if role is None and variable in self.columns:
-            return variable
-        found = [name for name in self.columns if name.partition(".")[2] == variable]
-        if role is not None:
-            units = self.units_of_role(role)
-            found = [name for name in found if name.partition(".")[0] in units]
-        if not found and role is None:
-            found = self._feeding(variable)
+        found = self.candidates(variable, role=role)
         if len(found) == 1:
             return found[0]
         if not found:
@@ -94,6 +87,16 @@ class Results:
         raise ResultsError(
             f"{self.file}: '{variable}' was recorded of more than one unit: {', '.join(found)}."
         )
+
+    def candidates(self, variable: str, *, role: str | None = None) -> list[str]:
+        """Return the columns that a variable may stand for (see `column`): none, one or several."""
+        if role is None and variable in self.columns:
+            return [variable]
+        found = [name for name in self.columns if name.partition(".")[2] == variable]
+        if role is not None:
+            units = self.units_of_role(role)
+            found = [name for name in found if name.partition(".")[0] in units]
+        return found if found or role is not None else self._feeding(variable)
 
     def _feeding(self, variable: str) -> list[str]:
         """Return the columns that feed inputs of a name as they are, but for the unit of measurement."""
