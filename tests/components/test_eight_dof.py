@@ -364,6 +364,7 @@ def test_a_car_at_rest_stays_at_rest(torque):
 @pytest.mark.parametrize("tyre", [Dugoff, MagicFormula])
 @pytest.mark.parametrize("front, rear", [(-700.0, -300.0), (-3000.0, -3000.0)], ids=["rolling", "locked"])
 @pytest.mark.parametrize("steer", [0.0, 0.02])
+@pytest.mark.sampled(2)
 def test_braking_to_standstill_has_no_limit_cycle(tyre, front, rear, steer):
     names = ["velocity_x", "velocity_y", "yaw_rate", *four("wheel_speed", 0.0)]
     run = drive(

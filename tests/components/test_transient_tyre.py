@@ -174,6 +174,7 @@ def driven(plant, until, steps, *, torque=0.0, mu=None, each=lambda _: None, h=N
 
 @pytest.mark.parametrize("plant", [SevenDof, FourteenDof])
 @pytest.mark.parametrize("mu", [(1.0,) * 4, (0.2, 0.8, 0.2, 0.8)])
+@pytest.mark.sampled(2)
 def test_a_braked_car_comes_to_rest_and_stays_without_a_limit_cycle(plant, mu):
     speeds = []
 

@@ -54,6 +54,7 @@ def touch(root, path, text="\n# touched\n"):
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.sampled(8)
 def test_fmpy_finds_nothing_wrong(archive, name):
     assert validate_fmu(str(archive(name))) == []
 
@@ -78,6 +79,7 @@ def test_every_variable_carries_unit_description_and_dependencies(archive, name)
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.sampled(8)
 def test_a_host_is_shown_who_made_an_fmu_what_it_is_and_that_it_needs_no_tool(archive, name):
     with zipfile.ZipFile(archive(name)) as fmu:
         root = ElementTree.fromstring(fmu.read("modelDescription.xml"))

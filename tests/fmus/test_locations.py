@@ -23,6 +23,7 @@ from tests.fmus.programs import host_command, run
     ],
 )
 @pytest.mark.parametrize("locale", ["C", "C.UTF-8"])
+@pytest.mark.sampled(4)
 def test_an_fmu_runs_in_a_folder_of_any_name(host, archive, unpack, tmp_path, place, locale):
     folder = tmp_path / place / "unit"
     shutil.copytree(unpack(archive("driver_sine")), folder)

@@ -102,6 +102,7 @@ def test_a_broken_component_ends_the_run_before_it_begins_and_keeps_the_good_fmu
 
 
 @pytest.mark.parametrize("command", ["study", "report"])
+@pytest.mark.sampled(1)
 def test_a_command_that_runs_nothing_builds_nothing_and_names_what_is_stale(project, command):
     (project / "study.yaml").write_text(
         "title: One\nruns:\n  - {name: one, scenario: driver.yaml}\n"
@@ -157,6 +158,7 @@ def test_runs_of_a_comparison_say_that_they_are_made_of_the_sources_as_they_are(
 
 
 @pytest.mark.parametrize("how", [{"option": "--no-build"}, {"YAWBENCH_NO_BUILD": "1"}])
+@pytest.mark.sampled(1)
 def test_without_building_a_stale_fmu_runs_with_a_note_and_its_record_says_so(project, how):
     old = (project / "fmus/driver_sine.fmu").read_bytes()
     double(project)

@@ -82,19 +82,20 @@ def yawbench(fmus, folder, capsys):
 
 def test_compare_puts_the_runs_side_by_side(yawbench, folder):
     status, out, said = yawbench(
-        "compare", "half.yaml", "--swap", "controller=controller_off,controller_fuzzy_sideslip", "--out", "o"
+        "compare", "half.yaml", "--swap", "controller=controller_off,controller_fuzzy_sideslip"
     )
     assert status == 0
+    where = f"results/{folder.name}/half-compare"  # beside those of `run`, as nothing else is said
     assert "Half a car (controller exchanged)" in out
     heading = next(line for line in out.splitlines() if "metric" in line)
     assert heading.split()[1:] == ["controller_off", "controller_fuzzy_sideslip"]
-    assert said.splitlines()[-1].startswith("The page: o/report.html")
-    assert (folder / "o/figures/overview.svg").is_file()
-    rows = {row["run"]: row for row in csv.DictReader((folder / "o/table.csv").open())}
+    assert said.splitlines()[-1].startswith(f"The page: {where}/report.html")
+    assert (folder / where / "figures/overview.svg").is_file()
+    rows = {row["run"]: row for row in csv.DictReader((folder / where / "table.csv").open())}
     assert float(rows["controller_off"]["peak(yaw_moment) [N.m]"]) == 0.0
     assert float(rows["controller_fuzzy_sideslip"]["peak(yaw_moment) [N.m]"]) > 1.0
     for run in rows:
-        assert (folder / "o" / run / "results.csv").is_file()
+        assert (folder / where / run / "results.csv").is_file()
 
 
 def test_compare_finds_a_wrong_name_before_anything_runs(yawbench, folder):
@@ -116,11 +117,6 @@ def test_compare_reports_a_failed_run_and_keeps_the_others(yawbench, folder):
     assert "failed" in out
     rows = {row["run"]: row for row in csv.DictReader((folder / "o/table.csv").open())}
     assert rows["controller_fuzzy_sideslip"]["status"] == "completed"
-
-
-def test_results_go_beside_those_of_run_if_nothing_is_said(yawbench, folder):
-    yawbench("compare", "half.yaml", "--swap", "controller=controller_off")
-    assert (folder / "results" / folder.name / "half-compare" / "figures" / "overview.png").is_file()
 
 
 def test_converge_halves_the_step_and_reports_order_and_cost(yawbench, folder):
@@ -342,7 +338,7 @@ def test_plot_says_what_is_wrong(yawbench, folder):
     status, _, said = yawbench("plot", "nowhere")
     assert status == 2
     assert said.startswith("nowhere: no results here")
-    yawbench("study", "study.yaml", "--out", "o")
+    yawbench("run", "half.yaml", "--out", "o/off")
     status, _, said = yawbench("plot", "o/off/results.csv")
     assert status == 2
     assert said == "o/off/results.csv: is a file; name the folder that holds the results, o/off.\n"

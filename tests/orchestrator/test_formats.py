@@ -255,7 +255,7 @@ def driver(tmp_path_factory):
     return folder
 
 
-def test_run_and_compare_write_the_format_they_are_told_and_print_metrics(driver, tmp_path, capsys):
+def test_run_writes_the_format_it_is_told_and_prints_metrics(driver, tmp_path, capsys):
     (tmp_path / "alone.yaml").write_text(SCENARIO)
     common = [str(tmp_path / "alone.yaml"), "--fmus", str(driver), "--format", "parquet"]
     main_ok(["run", *common, "--out", str(tmp_path / "run"), "--metric", "peak(steer_angle)"])
@@ -263,10 +263,6 @@ def test_run_and_compare_write_the_format_they_are_told_and_print_metrics(driver
     assert "Steer angle: peak" in told
     assert "5.73 °" in told
     assert load_results(tmp_path / "run").file.name == "results.parquet"
-    swap = "driver=driver_sine,driver_sine:amplitude=0.2"
-    main_ok(["compare", *common, "--swap", swap, "--out", str(tmp_path / "both")])
-    files = sorted(path.name for path in (tmp_path / "both").glob("*/results.*"))
-    assert files == ["results.parquet", "results.parquet"]
 
 
 @pytest.mark.parametrize(

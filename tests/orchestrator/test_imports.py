@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import sys
 from collections import Counter
 from collections.abc import Iterator
@@ -50,10 +51,22 @@ RANK = {name: rank for rank, stage in enumerate(STAGES) for name in stage}
 SOURCES = sorted(ORCHESTRATOR.rglob("*.py"))
 
 
+@functools.cache
+def tree_of(path: Path) -> ast.Module:
+    """Return what a file says."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@functools.cache
+def nodes_of(path: Path) -> tuple[ast.AST, ...]:
+    """Return all that stands in a file, in no order."""
+    return tuple(ast.walk(tree_of(path)))
+
+
 def imported_by(path: Path) -> Iterator[tuple[int, str]]:
     """Yield (line, absolute dotted name) of every import of a module, also of those inside functions."""
     package = ("orchestrator", *path.relative_to(ORCHESTRATOR).parent.parts)
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in nodes_of(path):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -100,7 +113,7 @@ def test_the_orchestrator_never_imports_components():
 def test_the_vocabulary_imports_nothing_but_the_standard_library():
     found = set()
     for path in (ROOT / "vocabulary").glob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in nodes_of(path):
             if isinstance(node, ast.Import):
                 found |= {alias.name.partition(".")[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
@@ -113,8 +126,7 @@ def words_of(names: set[str]) -> dict[str, set[str]]:
     found: dict[str, set[str]] = {}
     for folder in PRODUCT:
         for path in sorted((ROOT / folder).rglob("*.py")):
-            nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-            texts = {node.value for node in nodes if isinstance(node, ast.Constant)}
+            texts = {node.value for node in nodes_of(path) if isinstance(node, ast.Constant)}
             if common := names & {text for text in texts if isinstance(text, str)}:
                 found[path.relative_to(ROOT).as_posix()] = common
     return found
@@ -149,7 +161,7 @@ def needs(name: str, files: dict[str, Path]) -> set[str]:
     path = files[name]
     package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
     found = set()
-    waiting: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
+    waiting: list[ast.AST] = [tree_of(path)]
     while waiting:
         for node in ast.iter_child_nodes(waiting.pop()):
             if isinstance(node, ast.ImportFrom):

@@ -347,6 +347,7 @@ def test_output_to_a_pipe_has_no_progress_bar(fmus, tmp_path):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 @pytest.mark.parametrize(("columns", "shown"), [(200, "of the [second] kind"), (60, "A car on a slalom of…")])
+@pytest.mark.sampled(1)
 def test_a_terminal_shows_a_progress_bar_and_keeps_only_the_last_line(columns, shown, fmus, tmp_path):
     import pty
 

@@ -57,6 +57,10 @@ def test_metrics_stand_side_by_side_with_their_difference_from_the_first(tree):
     assert difference == f"+{value} N·m"
 
 
+def test_the_runs_have_the_format_that_the_command_was_told(page):
+    assert [path.suffix for path in page.parent.glob("*/results.*")] == [".parquet"] * 3
+
+
 def test_it_tells_where_the_runs_part(tree):
     headings = [text for text in texts(tree, "h4") if " against " in text]
     assert len(headings) == 2
