@@ -5,7 +5,7 @@ Wheels say how fast the car goes, three signals how fast it turns:
     v   = R median(w_i)
     r_1 = r                                          the gyro
     r_2 = a_y / v                                    short of it by the rate of the sideslip angle
-    r_3 = v delta / l, at most mu g / v              a neutral car's, as far as the road bears it
+    r_3 = v delta / (l (1 + v^2 / v_ch^2)), at most mu g / v       the car's, as far as the road bears it
 
 A signal is taken for faulty
 
@@ -26,8 +26,8 @@ nothing is judged any more.
 
 Limits: what is late or a little wrong passes, and so does a fault while nothing moves, until something does.
 A gyro that is a little wrong passes where the accelerometer is lost. A bias that grows slowly may be laid at
-the accelerometer's door. A car that slides far without control gives
-alarms too: (2) and (3) know cars that follow their steering.
+the accelerometer's door. A car that slides far without control gives alarms too: (2) and (3) know cars that
+follow their steering. One that understeers and is taken for neutral gives a false alarm (3).
 
 Source: that signals are judged by such relations is the practice of van Zanten, Bosch ESP Systems: 5 Years of
 Experience, SAE 2000-01-1633; the relations are kinematics, all thresholds are chosen.
@@ -57,6 +57,12 @@ class RedundancyParameters:
     cg_to_front_axle: float = like(PaperB, "cg_to_front_axle")
     cg_to_rear_axle: float = like(PaperB, "cg_to_rear_axle")
     wheel_radius: float = like(PaperB, "wheel_radius")
+    characteristic_speed: float = parameter(
+        0.0, "m/s",
+        "Speed v_ch at which an understeering car turns half as much as a neutral one; 0: neutral",
+        "chosen: the car of paper B is nearly neutral",
+        minimum=0.0,
+    )  # fmt: skip
     jump: float = parameter(
         0.1, "rad/s", "What no car turns faster by from sample to sample", "chosen: 10 rad/s2 in 10 ms",
         minimum=0.001,
@@ -121,6 +127,7 @@ class Redundancy(Component):
             WHEEL: p.uses_wheel_speeds,
         }
         self.needed = [fault for fault, used in uses.items() if used]
+        self.understeer = 1.0 / p.characteristic_speed**2 if p.characteristic_speed else 0.0
 
     def start(self, t: float, u: list[float]) -> None:
         self.fault = 0.0
@@ -149,7 +156,7 @@ class Redundancy(Component):
             return
         length = p.cg_to_front_axle + p.cg_to_rear_axle
         most = mu * G / v
-        steered = min(max(v * delta / length, -most), most)
+        steered = min(max(v * delta / (length * (1.0 + self.understeer * v * v)), -most), most)
         rates = (r, a_y / v, steered)
         if not self.lost & {GYRO, ACCELEROMETER}:
             self.implied += h * (rates[1] - r - self.implied / p.washout)

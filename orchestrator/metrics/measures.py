@@ -104,6 +104,17 @@ def displacement(t: np.ndarray, x: np.ndarray) -> float:
     return float(np.max(np.abs(x - x[0])))
 
 
+def changes(t: np.ndarray, x: np.ndarray) -> float:
+    """Return 1 if the signal ever leaves its first value, else 0: the mean of repeats is the share."""
+    return float(np.any(x != x[0]))
+
+
+def change_time(t: np.ndarray, x: np.ndarray) -> float:
+    """Return the time from t[0] until the signal leaves its first value; NaN if it never does."""
+    left = np.flatnonzero(x != x[0])
+    return float(t[left[0]] - t[0]) if left.size else math.nan
+
+
 def final(t: np.ndarray, x: np.ndarray) -> float:
     """Return the last value."""
     return float(x[-1])
@@ -240,6 +251,12 @@ MEASURES: dict[str, Measure] = {
     "peak": Measure(peak, "max|{x}|", "largest absolute value", "{x}"),
     "displacement": Measure(
         displacement, "max|{x} - {x}(0)|", "largest distance from the first value", "{x}"
+    ),
+    "changes": Measure(
+        changes, "1 if {x} ≠ {x}(0) ever, else 0", "whether it ever leaves its first value", "%"
+    ),
+    "change_time": Measure(
+        change_time, "t: {x} ≠ {x}(0) for the first time", "time until it leaves its first value", "s"
     ),
     "value": Measure(final, "{x}(t)", "value at a time", "{x}"),
     "final": Measure(final, "{x}(T)", "last value", "{x}"),

@@ -131,11 +131,12 @@ def middle(name: str) -> float:
 def some_inputs(component: type[Component], seed: int, spread: float = 1.0) -> dict[str, float]:
     """Return values for all inputs, the same for the same seed."""
     rng = random.Random(f"{component.fmu_name} {seed}")
-    return {
+    drawn = {
         v.name: middle(v.name) + spread * rng.uniform(-1.0, 1.0) * SPREAD[v.unit or "1"]
         for v in component.variables
         if v.causality == "input"
     }
+    return {name: abs(x) if name == "friction_true" else x for name, x in drawn.items()}  # handed on as it is
 
 
 def mirrored(values: dict[str, float]) -> dict[str, float]:
@@ -241,7 +242,7 @@ def test_without_any_input_nothing_stirs(component):
     for _ in range(200):
         y = stand.step(0.001, **zero)
     loads = [value for name, value in y.items() if name.startswith("vertical_load")]
-    if loads:
+    if loads and "mass" in parameters_of(component):  # what is only told has none of its own
         assert sum(loads) == pytest.approx(9.81 * stand.unit.p.mass, rel=1e-9)
     for name, value in y.items():
         if not name.startswith(("vertical_load", "slip_stiffness", *FREE)):

@@ -9,6 +9,7 @@ import pytest
 from components.estimation.dugoff_axle import axle_force
 from components.estimators.kinematic import Kinematic
 from components.estimators.observer import Observer
+from components.estimators.told import Told
 from components.tyres.dugoff import dugoff
 from vocabulary.wheels import WHEELS
 
@@ -137,3 +138,18 @@ def test_a_body_that_rolls_is_compensated(estimator):
 def test_no_output_would_drive_a_tyre_by_its_name(estimator):
     outputs = {v.name for v in estimator.variables if v.causality == "output"}
     assert not outputs & {f"friction_{w}" for w in WHEELS}
+
+
+def test_one_that_is_told_the_truth_repeats_it_by_the_message_and_late():
+    stand = Stand(Told, sample_time=0.01, latency=0.005)
+    at_once = Stand(Told, sample_time=0.0)
+    truth = {f"{name}_true": 0.0 for name in ("velocity_x", "sideslip", "friction")}
+    for one in (stand, at_once):
+        one.start(**truth)
+    for k in range(1, 40):
+        truth = {"velocity_x_true": 20.0, "sideslip_true": 0.001 * k, "friction_true": 0.3}
+        said, known = (one.step(0.001, **truth) for one in (stand, at_once))
+        assert known["sideslip"] == 0.001 * k
+        last = (k - 5) // 10 * 10  # the last message that has arrived by now
+        assert said["sideslip"] == pytest.approx(0.001 * max(last, 0))
+    assert (said["friction"], said["velocity_x"], said["slip_angle_fl"]) == (0.3, 20.0, 0.0)

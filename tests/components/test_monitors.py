@@ -153,3 +153,12 @@ def test_wheels_that_all_contradict_each_other_end_the_watch_and_keep_the_moment
     seen = watched(lambda t: weaving(t, **apart), **ONE_BY_ONE)
     assert found(seen)[0] == WHEEL
     assert (seen[-1][1], seen[-1][2]) == (WHEEL, 1000.0)
+
+
+def test_a_car_that_understeers_is_no_faulty_hand_wheel_where_that_is_known():
+    def turned(t):
+        r = 0.4 * sin(pi * t / 2)  # at its characteristic speed it takes twice the steering of a neutral car
+        return {"yaw_rate": r, "acceleration_y": V * r, "steer_angle": 2 * r * LENGTH / V}
+
+    assert found(watched(turned))[0] == HAND_WHEEL
+    assert found(watched(turned, characteristic_speed=V)) is None

@@ -77,6 +77,14 @@ def test_overshoot_of_a_second_order_system_follows_from_its_damping():
     assert measures.overshoot(T, 0.7 * SINE, SINE) == 0.0
 
 
+def test_the_first_change_is_found_and_none_where_there_is_none():
+    x = np.where(T < 1.2, 3.0, 5.0)
+    assert measures.changes(T, x) == 1.0
+    assert measures.change_time(T, x) == pytest.approx(T[T >= 1.2][0] - T[0])
+    assert measures.changes(T, np.ones_like(T)) == 0.0
+    assert math.isnan(measures.change_time(T, np.ones_like(T)))
+
+
 def test_displacement_counts_from_the_first_value_peak_from_zero():
     assert measures.displacement(T, 10 - T) == pytest.approx(2.0)
     assert measures.peak(T, 10 - T) == pytest.approx(10.0)

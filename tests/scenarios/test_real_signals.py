@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import yawbench as yb
@@ -32,25 +33,55 @@ def test_the_observer_misses_no_more_than_it_may_and_the_documentation_says_what
 
 @pytest.mark.parametrize("name", FILES)
 def test_four_lines_put_sensor_and_estimator_into_a_loop(name):
-    assert len(yb.load(f"real_signals/{name}").loaded.connections) <= 4
+    more = name.startswith(("told_", "monitored_"))  # who is told the truth, who watches
+    assert len(yb.load(f"real_signals/{name}").loaded.connections) <= 4 + more
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_no_input_of_the_control_side_is_exact_but_the_drivers_wish(name):
     plan = yb.load(f"real_signals/{name}").plan()
     truth = {"driver", "plant"}
-    control = {"estimator", "reference", "controller", "allocator", "wheel_control"}
-    seen = {(w.source, w.output) for w in plan.wires if w.target in control and w.source in truth}
+    control = {"estimator", "reference", "controller", "monitor", "allocator", "wheel_control"}
+    wires = [w for w in plan.wires if w.target in control and w.source in truth]
+    told = name.startswith("told_")  # by an estimator that is told the truth
+    assert told == any(w.input.endswith("_true") for w in wires)
+    seen = {(w.source, w.output) for w in wires if not (told and w.target == "estimator")}
     assert seen <= {("driver", "drive_force")}
     assert not [w for w in plan.wires if w.target == "tyre" and w.source == "estimator"]
 
 
+TOLD = {
+    "told_fnn": "fnn_sideslip/25mps",
+    "told_lane_change": "fuzzy_sliding_mode/beyond_paper",
+    "told_double_lane_change": "fuzzy_pid/double_lane_change",
+    "told_single_sine": "fuzzy_feedback/single_sine",
+}
+EXACT = {"estimator.sample_time": 0, "reference.rate_time_constant": 0.005}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name == "told_fnn" else pytest.mark.exhaustive) for name in TOLD]
+)
+def test_where_all_is_told_exactly_and_at_once_a_run_is_that_of_the_paper_to_the_bit(name):
+    until = {"stop_time": 1.5}
+    told = yb.load(f"real_signals/{name}").swap(sensor="sensor_ideal").set({**EXACT, **until}).run()
+    exact = yb.load(TOLD[name]).set(until).run()
+    assert {c for c in exact if not np.array_equal(exact[c], told[c])} == set()
+    assert np.ptp(told["controller.yaw_moment"]) > 0
+
+
 @pytest.mark.exhaustive
-@pytest.mark.parametrize(("name", "rows"), [("closed_loop", kept), ("latency", late)])
-def test_the_documentation_has_what_the_studies_measure(name, rows, tmp_path):
+@pytest.mark.parametrize(
+    ("name", "rows", "page"),
+    [
+        ("closed_loop", kept, "estimators"),
+        ("latency", late, "estimators"),
+    ],
+)
+def test_the_documentation_has_what_the_studies_measure(name, rows, page, tmp_path):
     with pytest.raises(SystemExit) as exit_:
-        main(["study", str(ROOT / f"scenarios/real_signals/{name}.yaml"), "--quick", "--out", str(tmp_path)])
+        main(["study", str(ROOT / f"scenarios/real_signals/{name}.yaml"), "--out", str(tmp_path)])
     assert not exit_.value.code
     study = json.loads((tmp_path / "experiment.json").read_text("utf-8"))
-    written = (ROOT / "docs" / "estimators.md").read_text("utf-8")
+    written = (ROOT / "docs" / f"{page}.md").read_text("utf-8")
     assert [row for row in rows(study) if row not in written] == []
