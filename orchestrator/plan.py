@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -22,6 +23,10 @@ TYRES = "tyres"
 """What names the tyre property files, of both axles or as `tyres.front`, `tyres.rear` of one."""
 FAULTS = "faults"
 """What a change of the faults at a place begins with: `faults.sensor.yaw_rate`."""
+FAULT_WORDS = ("share", "every", "seed", "from", "until")
+"""What stands in the line of a fault with its name before it."""
+NO_FAULTS = "none"
+"""The line for a place that is to have no faults."""
 SENSING = {"sensor": "measurement", "estimator": "estimate"}
 """Role of a unit -> what its outputs are, of what the car does."""
 Algorithm = Literal["jacobi", "gauss_seidel", "extrapolated"]
@@ -235,13 +240,40 @@ class Fault:
     says: str = ""  # likewise: "freeze from 2 s"
 
 
+class Faults(tuple[Mapping[str, Value], ...]):
+    """What goes wrong at one place, one after the other: each as a file has it, without the place."""
+
+    __slots__ = ()
+
+    def __str__(self) -> str:
+        """In one line, as `--fault` takes it behind the place."""
+        return "; ".join(map(fault_line, self)) or NO_FAULTS
+
+
+def fault_line(fault: Mapping[str, Value]) -> str:
+    """Return a fault as a file has it in one line: kind, value, then what stands with its name before it."""
+    named = [f"{name} {_said(fault[name], name)}" for name in FAULT_WORDS if name in fault]
+    return " ".join([str(fault["kind"]), *([_said(fault["value"])] if "value" in fault else []), *named])
+
+
+def _said(value: Value, name: str = "") -> str:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return str(value)
+    return f"{value:.10g}" + (" s" if name in ("every", "from", "until") else "")
+
+
 @dataclass(frozen=True)
 class Change:
     """One thing that is other than in the scenario file."""
 
     place: str  # as in --set: "plant.mass", "inputs.friction*", "stop_time"; a unit or "vehicle" for its file
-    value: Value
+    value: Value | Faults
     origin: str  # "--set", "--swap", "study", "sweep", ...
+
+    @property
+    def plain(self) -> Value:
+        """The value as names and records have it: faults in a line."""
+        return str(self.value) if isinstance(self.value, Faults) else self.value
 
     @property
     def names_file(self) -> bool:

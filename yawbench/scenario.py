@@ -13,11 +13,11 @@ from orchestrator.errors import ScenarioError, SimulationError
 from orchestrator.fmu.opener import Opener
 from orchestrator.master.opening import open_unit
 from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.plan import Change, Plan, Value
+from orchestrator.plan import FAULTS, Change, Faults, Plan, Value
 from orchestrator.results.read import Results
 from orchestrator.scenario import catalogue, scenario_schema
 from orchestrator.scenario.load import load_scenario
-from orchestrator.scenario.overrides import read_changes
+from orchestrator.scenario.overrides import setting, spelled
 from orchestrator.tyres.axle_stiffness import cornering_stiffness
 from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wording import hint
@@ -118,7 +118,7 @@ class Scenario:
         Raises:
             ScenarioError: a place or value is wrong.
         """
-        changed = [Change(place, value, "set") for place, value in values.items()]
+        changed = [setting(place, value, "set") for place, value in values.items()]
         scenario = replace(self, changes=(*self.changes, *changed))
         scenario.loaded  # noqa: B018 - what is wrong is said now
         return scenario
@@ -151,13 +151,13 @@ class Scenario:
         Raises:
             ScenarioError: there is no such place or kind, or it takes something else.
         """
-        given = {"value": value, **told, "from": start, "until": until}
-        words = [f"{name} {x}" if name != "value" else f"{x}" for name, x in given.items() if x is not None]
-        (one,) = read_changes(faults=[f"{place}: {' '.join([kind, *words])}"])
-        earlier = next((c for c in self.changes if (c.place, c.origin) == (one.place, "fault")), None)
-        line = f"{earlier.value}; {one.value}" if earlier else one.value
+        given = {"kind": kind, "value": value, **told, "from": start, "until": until}
+        item = {name: x for name, x in given.items() if x is not None}
+        at = f"{FAULTS}.{spelled(place)}"
+        earlier = next((c for c in self.changes if (c.place, c.origin) == (at, "fault")), None)
+        before = earlier.value if earlier and isinstance(earlier.value, Faults) else ()
         others = [change for change in self.changes if change is not earlier]
-        scenario = replace(self, changes=(*others, Change(one.place, line, "fault")))
+        scenario = replace(self, changes=(*others, Change(at, Faults((*before, item)), "fault")))
         scenario.loaded  # noqa: B018 - what is wrong is said now
         return scenario
 

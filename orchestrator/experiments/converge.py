@@ -127,7 +127,7 @@ def measure(findings: Findings, signal: str) -> list[Row]:
 
 def _given(run: NamedRun, place: str) -> Plain:
     """Return what a run gives at a place."""
-    return next(change.value for change in reversed(run.changes) if change.place == place)
+    return next(change.plain for change in reversed(run.changes) if change.place == place)
 
 
 def _samples(found: Results | None, signal: str, why: str) -> tuple[np.ndarray | None, float | None, str]:

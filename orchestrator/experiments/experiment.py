@@ -16,7 +16,7 @@ from ..errors import ScenarioError
 from ..files import reads
 from ..plan import FAULTS, Change, Value
 from ..scenario import overrides, yaml_lines
-from ..scenario.fault_schema import lines_of
+from ..scenario.fault_schema import by_place
 from ..scenario.strict import validate
 from ..scenario.yaml_lines import Document, Key
 from ..wording import hint, short
@@ -165,7 +165,7 @@ def changes_at(axis: AxisSpec, level: Level, folder: Path, origin: str = "sweep"
         return changes_of_file(axis.variants[str(level.value)], folder, origin)
     if axis.kind == "fmu":
         return overrides.changes_of({axis.vary[0]: str(level.value)}, {}, folder, origin)
-    return [Change(place, _given(axis, level), origin) for place in axis.vary]
+    return [overrides.setting(place, _given(axis, level), origin) for place in axis.vary]
 
 
 def _given(axis: AxisSpec, level: Level) -> Value:
@@ -179,7 +179,7 @@ def changes_of_file(given: Changes, folder: Path, origin: str) -> list[Change]:
     """Return the changes that a part of a file in a folder gives."""
     vehicle = [Change("vehicle", str(folder / given.vehicle), origin)] if given.vehicle else []
     of_run = overrides.changes_of_run(given, origin)
-    faults = [Change(f"{FAULTS}.{place}", line, origin) for place, line in lines_of(given.faults).items()]
+    faults = [Change(f"{FAULTS}.{place}", ones, origin) for place, ones in by_place(given.faults).items()]
     return vehicle + of_run + overrides.changes_of(given.swap, given.set, folder, origin) + faults
 
 

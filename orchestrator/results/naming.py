@@ -45,14 +45,14 @@ def default_folder(
 def _with_changes(stem: str, changes: Iterable[Change]) -> str:
     """Return a name with changes behind it: readable, and with a hash where that does not say all."""
     given = list(changes)
-    values = [_text(one.value) for one in given]
+    values = [_text(one.plain) for one in given]
     of_files = [one.names_file for one in given]
     names = [re.split(r"[/\\]", v)[-1] if file else v for v, file in zip(values, of_files, strict=True)]
     readable = ",".join([stem, *(f"{one.place}={name}" for one, name in zip(given, names, strict=True))])
     portable = re.sub(r"[^\w.,=+-]", "_", readable, flags=re.ASCII)
     if not given or (names == values and portable == readable and len(portable) <= LONGEST):
         return readable
-    exact = repr([(one.place, one.value) for one in given])
+    exact = repr([(one.place, one.plain) for one in given])
     return f"{portable[: LONGEST - 7].rstrip('.')}~{hashlib.sha256(exact.encode()).hexdigest()[:6]}"
 
 

@@ -14,20 +14,20 @@ one place stand one after the other with a `;` between, and act so.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 from pydantic import Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
 
+from ..plan import FAULT_WORDS, NO_FAULTS, Faults, Value, fault_line
 from ..wording import short
 from . import quantities, yaml_lines
 from .strict import Strict
 
 EVERY = Fraction(1, 100)
 """Time from one message to the next [s]. Chosen: what the buses of cars have."""
-NONE = "none"
-"""The line for a place that is to have no faults."""
 
 KindName = Literal[
     "bias", "gain", "drift", "noise", "freeze", "value", "dropout", "outlier", "delay", "saturation",
@@ -85,8 +85,6 @@ class Place(NamedTuple):
 
 
 _PLACE = re.compile(r"\s*(\w+)\.([^\s>]+?)\s*(?:->\s*(\w+)(?:\.(\S+))?\s*)?")
-_NAMED = ("share", "every", "seed", "from", "until")
-"""What stands in a line with its name before it."""
 
 
 def place_of(value: object) -> Place:
@@ -103,17 +101,17 @@ def place_of(value: object) -> Place:
     return Place(found[1], found[2], found[3] or "", found[4] or "*")
 
 
-def read_line(line: str) -> list[dict[str, Any]]:
-    """Return faults in one line as the items of a file have them, without their place.
+def read_line(line: str) -> Faults:
+    """Return the faults that a line gives, as written behind a place.
 
     Raises:
         ValueError: something stands there twice.
     """
-    if line.strip() == NONE:
-        return []
+    if line.strip() == NO_FAULTS:
+        return Faults()
     items = []
     for text in line.split(";"):
-        head, *rest = re.split(rf"(?:^|\s+)({'|'.join(_NAMED)})\s+", text.strip())
+        head, *rest = re.split(rf"(?:^|\s+)({'|'.join(FAULT_WORDS)})\s+", text.strip())
         kind, _, value = head.strip().partition(" ")
         item: dict[str, Any] = {"kind": kind} | ({"value": yaml_lines.scalar(value.strip())} if value else {})
         for name, given in zip(rest[::2], rest[1::2], strict=True):
@@ -121,7 +119,7 @@ def read_line(line: str) -> list[dict[str, Any]]:
                 raise ValueError(f"has {name} twice")
             item[name] = yaml_lines.scalar(given.strip())
         items.append(item)
-    return items
+    return Faults(items)
 
 
 def _value(value: object) -> float | str | None:
@@ -185,24 +183,23 @@ class FaultSpec(Strict):
             raise ValueError(f"until must be after from, {float(self.begin):g} s (got {float(self.end):g} s)")
         return self
 
+    @property
+    def item(self) -> dict[str, Value]:
+        """The fault as a file has it, without its place."""
+        times = {"every": self.every, "from": self.begin, "until": self.end}
+        given = {"kind": self.kind, "value": self.value, "share": self.share, "seed": self.seed}
+        told = given | {name: None if time is None else float(time) for name, time in times.items()}
+        return {name: value for name, value in told.items() if value is not None}
+
     def __str__(self) -> str:
         """The fault without its place, in one line."""
-        parts = [self.kind] + ([_text(self.value)] if self.value is not None else [])
-        parts += [f"share {self.share:g}"] if self.share is not None else []
-        parts += [f"every {float(self.every):g} s"] if self.every is not None else []
-        parts += [f"seed {self.seed}"] if self.seed is not None else []
-        parts += [f"from {float(self.begin):g} s"] if self.begin is not None else []
-        parts += [f"until {float(self.end):g} s"] if self.end is not None else []
-        return " ".join(parts)
+        return fault_line(self.item)
 
 
-def _text(value: float | str) -> str:
-    return value if isinstance(value, str) else f"{value:.10g}"
-
-
-def lines_of(faults: list[FaultSpec]) -> dict[str, str]:
-    """Return place -> the faults there in one line."""
-    lines: dict[str, list[str]] = {}
+def by_place(faults: Iterable[FaultSpec]) -> dict[str, Faults]:
+    """Return place -> the faults there."""
+    found: dict[str, Faults] = {}
     for fault in faults:
-        lines.setdefault(str(fault.on), []).append(str(fault))
-    return {place: "; ".join(texts) for place, texts in lines.items()}
+        place = str(fault.on)
+        found[place] = Faults((*found.get(place, ()), fault.item))
+    return found

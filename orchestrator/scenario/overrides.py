@@ -20,10 +20,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from ..errors import Problem, ScenarioError
-from ..plan import FACTS, FAULTS, OF_RUN, TYRES, Change, Value
+from ..plan import FACTS, FAULTS, OF_RUN, TYRES, Change, Faults, Value
 from ..wording import hint, listed
 from . import yaml_lines
 from .fault_schema import place_of, read_line
@@ -56,7 +56,8 @@ def read_changes(
     Raises:
         ScenarioError: with every option that is none.
     """
-    changes, problems = [], []
+    changes: list[Change] = []
+    problems: list[str | Problem] = []
     for text in swaps:
         unit, equals, fmu = (part.strip() for part in text.partition("="))
         if unit and equals and fmu:
@@ -68,21 +69,42 @@ def read_changes(
         holder, dot, name = place.partition(".")
         if equals and ((holder and dot and name) or place in (*OF_RUN, *FACTS, TYRES)):
             value = os.path.abspath(raw) if holder == TYRES else yaml_lines.scalar(raw)
-            changes.append(Change(place, value, "--set"))
+            changes.append(setting(place, value, "--set"))
         else:
             sentence = f"write --set UNIT.PARAMETER=VALUE, or {listed((*OF_RUN, *FACTS), last='or')}=VALUE"
             problems.append(f"--set {text}: {sentence}")
-    at: dict[str, list[str]] = {}
+    at: dict[str, Faults] = {}
     for text in faults:
         place, colon, line = (part.strip() for part in text.partition(":"))
-        if place and colon and line:
-            at.setdefault(f"{FAULTS}.{_spelled(place)}", []).append(line)
-        else:
+        if not (place and colon and line):
             problems.append(f"--fault {text}: write --fault 'UNIT.OUTPUT: KIND VALUE from TIME until TIME'")
-    changes += [Change(place, "; ".join(lines), "--fault") for place, lines in at.items()]
+            continue
+        try:
+            one = setting(f"{FAULTS}.{place}", line, "--fault")
+        except ScenarioError as error:
+            problems += error.problems
+            continue
+        at[one.place] = Faults((*at.get(one.place, ()), *cast(Faults, one.value)))
+    changes += [Change(place, given, "--fault") for place, given in at.items()]
     if problems:
         raise ScenarioError(problems)
     return tuple(changes)
+
+
+def setting(place: str, value: Value, origin: str) -> Change:
+    """Return the change of a place to a value as it is written: faults come in a line, and leave as data.
+
+    Raises:
+        ScenarioError: the line gives something twice.
+    """
+    holder, _, at = place.partition(".")
+    if holder != FAULTS or not at:
+        return Change(place, value, origin)
+    change = Change(f"{FAULTS}.{spelled(at)}", str(value), origin)
+    try:
+        return replace(change, value=read_line(str(value)))
+    except ValueError as error:
+        raise ScenarioError([Problem(str(error), place=str(change))]) from None
 
 
 def changes_of(
@@ -90,7 +112,7 @@ def changes_of(
 ) -> list[Change]:
     """Return the changes that a file in a folder gives as unit -> FMU (see `swap_of`) and place -> value."""
     changes = [
-        Change(place, str(folder / str(value)) if place.split(".")[0] == TYRES else value, origin)
+        setting(place, str(folder / str(value)) if place.split(".")[0] == TYRES else value, origin)
         for place, value in settings.items()
     ]
     for unit, text in swaps.items():
@@ -186,7 +208,7 @@ def _put_tyres(document: Document, vehicle: Document, change: Change) -> bool:
     return after != named
 
 
-def _spelled(place: str) -> str:
+def spelled(place: str) -> str:
     """Return the place of a fault as it is written here, as it stands if it is none."""
     try:
         return str(place_of(place))
@@ -199,37 +221,19 @@ def _put_faults(document: Document, change: Change, place: str) -> bool:
     given = document.data.get(FAULTS) or []
     if not isinstance(given, list):
         return True  # the schema will say what is wrong
-    try:
-        items = [{"on": place, **item} for item in read_line(str(change.value))]
-    except ValueError as error:
-        document.note(Problem(str(error), place=str(change)))
-        return True
-    there = [i for i, one in enumerate(given) if isinstance(one, dict) and _at(one) == _spelled(place)]
-    left = [i for i in range(len(given)) if i not in there]
-    moved = {old: new for new, old in enumerate(left)}
-    of_file = {key: line for key, line in document.lines.items() if key[:1] != (FAULTS,) or len(key) < 2}
-    document.lines = (
-        of_file
-        | {
-            (FAULTS, moved[key[1]], *key[2:]): line  # type: ignore[index]
-            for key, line in document.lines.items()
-            if key[:1] == (FAULTS,) and len(key) > 1 and key[1] in moved
-        }
-    )
-    overrides = {key: one for key, one in document.overrides.items() if key[0] == FAULTS}
-    document.overrides = {key: one for key, one in document.overrides.items() if key[0] != FAULTS}
-    for key, one in overrides.items():
-        if key[1] in moved:
-            document.overrides[(FAULTS, moved[key[1]])] = one  # type: ignore[index]
-    document.overrides |= {(FAULTS, len(left) + k): change for k in range(len(items))}
-    document.data[FAULTS] = [given[i] for i in left] + items
-    if not document.data[FAULTS]:
+    assert isinstance(change.value, Faults)
+    items = [{"on": place, **item} for item in change.value]
+    places = [spelled(str(one.get("on"))) if isinstance(one, dict) else None for one in given]
+    there = [i for i, at in enumerate(places) if at == place]
+    before = [given[i] for i in there]
+    document.data[FAULTS] = given
+    for i in reversed(there):
+        document.remove((FAULTS,), i)
+    document.overrides |= {(FAULTS, len(given) + k): change for k in range(len(items))}
+    given += items
+    if not given:
         del document.data[FAULTS]
-    return [given[i] for i in there] != items
-
-
-def _at(item: dict[str, Any]) -> str:
-    return _spelled(str(item.get("on")))
+    return before != items
 
 
 def leave_unvalidated(document: Document) -> None:
@@ -244,6 +248,8 @@ def apply_to_all_runs(document: Document, changes: Iterable[Change]) -> None:
     for change in changes:
         if change.place in OF_RUN:
             _put(document, (change.place,), change)
+        elif change.faulty and isinstance(document.data, dict):
+            _put_faults(document, change, change.faulty)
         else:
             _put(document, ("swap" if change.swaps else "set", change.place), change)
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
+import yawbench as yb
 from orchestrator.cli import main
 from orchestrator.commands.experiment import command_of
 from orchestrator.errors import ScenarioError, YawbenchError
@@ -477,6 +478,26 @@ def test_faults_are_an_axis_of_an_experiment(folder):
     assert [
         f.kind for f in plan_of_scenario(load_scenario("a.yaml", changes=of_option.cases[0].changes)).faults
     ] == []
+
+
+def test_faults_stay_data_on_the_way_from_where_they_are_written(folder):
+    """A number with more digits than a line shows arrives with all of them."""
+    exact = 0.12345678901234567
+    Path("sweep.yaml").write_text(CAMPAIGN.replace("value: 1.1", f"value: {exact!r}, from: {exact!r}"))
+    (change, *_) = load_experiment(Path("sweep.yaml")).cases[0].changes
+    (fault,) = plan_of_scenario(load_scenario("a.yaml", changes=[change])).faults
+    assert (fault.value, fault.begin) == (exact, exact)
+    assert change.value == ({"kind": "gain", "value": exact, "from": exact},)
+    assert str(change) == "sweep plant.yaw_rate: gain 0.123456789 from 0.123456789 s"
+    one, other = read_changes(faults=["a.x: bias 1 deg until 2", "a.y: none"])
+    assert one.value == ({"kind": "bias", "value": "1 deg", "until": 2},)
+    assert (str(one), str(other)) == ("--fault a.x: bias 1 deg until 2 s", "--fault a.y: none")
+    both = yb.load("a.yaml").fault("gyro.yaw_rate", kind="freeze", start=exact)
+    both = both.fault("gyro.yaw_rate", kind="noise", value="1 deg/s", seed=3)
+    assert [(f.kind, f.begin, f.value) for f in both.plan().faults] == [
+        ("freeze", exact, None),
+        ("noise", -math.inf, pytest.approx(math.radians(1.0))),
+    ]
 
 
 # What is shown
