@@ -68,7 +68,7 @@ class OptimalPreviewParameters(HeldSpeedParameters, LaneChangeParameters):
         minimum=1e-3,
     )
     path_effort: float = parameter(
-        0.68, "1", "Share of the friction that the path asks for unless cones ask for more", "chosen: tuned",
+        0.75, "1", "Share of the friction that the path asks for unless cones ask for more", "chosen: tuned",
         minimum=0.01,
     )  # fmt: skip
     path_deceleration: float = parameter(
@@ -103,7 +103,13 @@ class OptimalPreviewParameters(HeldSpeedParameters, LaneChangeParameters):
         minimum=0.1,
     )
     steering_wheel_limit: float = like(DoubleLaneChangeParameters, "steering_wheel_limit")
-    steering_wheel_rate_limit: float = like(DoubleLaneChangeParameters, "steering_wheel_rate_limit")
+    steering_wheel_rate_limit: float = parameter(
+        20.0,
+        "rad/s",
+        "Fastest turn of the hand wheel",
+        "chosen: 1150 deg/s, as in an emergency; with 12 rad/s the wheel would be the limit, not the tyres",
+        minimum=0.01,
+    )
     steering_ratio: float = like(DoubleLaneChangeParameters, "steering_ratio")
     coasting_after: float = parameter(
         -1.0,

@@ -4,6 +4,7 @@
     F_r / m_r = v^2 (y'' - i_r y'''),    i_r = I_z / (m a)        that it carries, of the rear axle likewise
 
     least  integral of  sum (F / m / a_0)^8 / 8  over x  +  sum (what the margin lacks / s_0)^2 / 2
+           (and a little of (F / m / a_0)^2, so that a slow car's path is calm, too)
 
 A power of eight is nearly the largest value: the path spreads its curvature, begins to turn in lanes that
 are wider than the car, and goes as near to the cones as the tyres need. a_0 is the acceleration, s_0 the
@@ -38,8 +39,9 @@ CLOSE = 1e-5
 """Relative gain of a step at which it ends."""
 AHEAD = 5.0
 """The slope of the path's end counts by where it leads over this length [m]. Chosen: a car's length."""
-ROUND = 1e-4
-"""Weight of y'' itself, for places where no force counts."""
+CALM = 0.02
+"""Weight of (F / m / a_0)^2 / 2 beside the eighth power, which does not count where forces are small. Chosen:
+it is a twelfth of that power's share at a_0."""
 CONES = 4
 """Intervals along a lane, at whose ends the corners keep the margin."""
 POINTS = 5
@@ -200,9 +202,10 @@ class _Program:
         return z
 
     def _cost(self, z: Sequence[float]) -> float:
-        total = 0.5 * ROUND * _dot(z, z)
+        total = 0.0
         for k, here, further in self.demands:
-            total += self.weight * (here * z[k] + further * z[k + 1]) ** POWER / POWER
+            force = here * z[k] + further * z[k + 1]
+            total += self.weight * (force**POWER / POWER + 0.5 * CALM * force * force)
         for row, bound in zip(self.rows, self.bounds, strict=True):
             lacking = _dot(row, z) - bound
             if lacking > 0.0:
@@ -211,12 +214,12 @@ class _Program:
 
     def _derivatives(self, z: Sequence[float]) -> tuple[list[float], Rows]:
         """Return the first and second derivatives of the cost."""
-        slope = [ROUND * value for value in z]
-        hessian = [[ROUND if i == j else 0.0 for j in range(len(z))] for i in range(len(z))]
+        slope = [0.0] * len(z)
+        hessian = [[0.0] * len(z) for _ in z]
         for k, here, further in self.demands:
             force = here * z[k] + further * z[k + 1]
-            first = self.weight * force ** (POWER - 1)
-            second = self.weight * (POWER - 1) * force ** (POWER - 2)
+            first = self.weight * (force ** (POWER - 1) + CALM * force)
+            second = self.weight * ((POWER - 1) * force ** (POWER - 2) + CALM)
             slope[k] += here * first
             slope[k + 1] += further * first
             hessian[k][k] += here * here * second
