@@ -214,11 +214,14 @@ def command_of(preset: str, path: Path, *, quick: bool = False, **options: Itera
 
 def write_page(chapters: Sequence[dict[str, Any]], folder: Path) -> None:
     """Write the page of chapters into a folder and say where it is."""
-    from ..pages.report import PAGE, report_page
+    import os
+
+    from ..pages.report import PAGE, RANKING, report_page
     from ..writing import write_whole
 
     page = folder / PAGE
-    write_whole(page, report_page(chapters))
+    ranking = Path(os.path.relpath(RANKING, folder)).as_posix() if RANKING.is_file() else ""
+    write_whole(page, report_page(chapters, ranking))
     say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")
 
 

@@ -204,9 +204,9 @@ class Drive:
 
 
 def drives_of(ranking: Ranking, angles: Mapping[str, float]) -> list[Drive]:
-    """Return all runs, entry by entry; `angles`: car -> A [rad]."""
+    """Return all runs, condition by condition; `angles`: car -> A [rad]."""
     found = []
-    for entry, (name, condition) in product(ranking.entries, ranking.conditions.items()):
+    for (name, condition), entry in product(ranking.conditions.items(), ranking.entries):
         angle = angles[condition.car]
         rungs = amplitudes(angle)[:: -(condition.every or ranking.spec.every)][::-1]
         if ranking.quick:

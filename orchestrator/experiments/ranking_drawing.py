@@ -65,7 +65,7 @@ def draw_matrix(ranked: Ranked, note: str) -> Figure:
             axes.text(-0.15, i + 0.52, literal(one.spec.title), va="center", ha="right", fontsize=8.5)
             axes.text(-5.1, i + 0.52, place_words(one), va="center", ha="right", fontsize=8.5, weight="bold")
         for k, spec in enumerate(conditions.values()):
-            axes.text(k + 0.35, -0.15, literal(spec.short or spec.title), rotation=40, va="bottom", ha="left",
+            axes.text(k + 0.35, -0.15, literal(spec.heading), rotation=40, va="bottom", ha="left",
                       fontsize=8)  # fmt: skip
         axes.text(-5.1, -0.15, "place", ha="right", va="bottom", fontsize=8, color=QUIET)
         axes.text(len(conditions) + 0.15, -0.15, "passed", va="bottom", fontsize=8, color=QUIET)

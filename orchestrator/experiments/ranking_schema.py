@@ -51,7 +51,13 @@ class ConditionSpec(Changes):
     mirrored: bool = Field(True, description="Left and right are alike: left first stands for both")
     every: int | None = Field(None, ge=1, description="In place of the ranking's")
     repeats: dict[str, list[Scalar]] = Field({}, description="unit.parameter -> values, such as seeds")
+    seen: bool = Field(False, description="By the search that tuned gains")
     quick: bool = Field(False, description="Driven by --quick, with the last amplitude alone")
+
+    @property
+    def heading(self) -> str:
+        """Its words at the head of a column."""
+        return (self.short or self.title) + (" *" if self.seen else "")
 
     @field_validator("repeats")
     @classmethod
@@ -82,6 +88,7 @@ class RankingSpec(Strict):
 
     title: str = Field(min_length=1)
     source: str = Field("", description="Of the test that everything is judged by")
+    notes: list[str] = Field([], description="What a reader of its page has to know")
     step_size: Time | None = Field(None, description="In place of the scenarios'")
     stop_time: Time | None = Field(None, description="In place of the scenarios'")
     every: int = Field(1, ge=1, description="Every so many of the amplitudes, from the last one down")

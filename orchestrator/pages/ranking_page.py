@@ -51,12 +51,13 @@ def ranking_page(ranked: Ranked, folder: Path, command: str) -> str:
         title=ranking.spec.title,
         source=ranking.spec.source,
         rule=RULE,
+        notes=ranking.spec.notes,
         quick=ranking.quick,
         missing=[one.spec.title for one in ranked.standings if one.missing],
         first=head,
         after=after,
         conditions=[
-            {"name": name, "short": one.short or one.title, "title": one.title}
+            {"name": name, "short": one.heading, "title": one.title}
             for name, one in ranking.conditions.items()
         ],
         rows=[_row(ranked, one, after) for one in ranked.standings],

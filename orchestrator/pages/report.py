@@ -14,6 +14,8 @@ from .rendering import render, style
 
 PAGE = "report.html"
 """Name of the page."""
+RANKING = Path("results/proving_ground/ranking", PAGE)
+"""Where the page of the ranking is unless its command is told otherwise."""
 SCENARIOS = Path("scenarios")
 """Where studies are looked for when none is named."""
 TITLE = "Yaw-stability control: what papers say, and what comes out"
@@ -37,10 +39,10 @@ def found_studies(folder: Path = SCENARIOS) -> list[Path]:
     return sorted(titles, key=lambda path: (first[path.parent], path.stem != "study", titles[path]))
 
 
-def report_page(chapters: Sequence[dict[str, Any]]) -> str:
-    """Return the page of one chapter or of several as HTML."""
+def report_page(chapters: Sequence[dict[str, Any]], ranking: str = "") -> str:
+    """Return the page of one chapter or of several as HTML; `ranking`: address of its page if it is there."""
     title = TITLE if len(chapters) > 1 else str(chapters[0]["title"])
     return render(
-        "report.html.j2", title=title, chapters=chapters, style=style(), assets=assets(),
+        "report.html.j2", title=title, chapters=chapters, ranking=ranking, style=style(), assets=assets(),
         **made_by(),
     )  # fmt: skip
