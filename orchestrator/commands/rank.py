@@ -124,13 +124,16 @@ def _entry(given: str) -> tuple[str, EntrySpec]:
     """Return the name and the entry of a controller from the command line."""
     from ..errors import ScenarioError
     from ..experiments.ranking_schema import UNIT, EntrySpec
+    from ..plan import Faults
     from ..scenario.overrides import is_path, swap_of
 
     fmu, *brought = swap_of(UNIT, given, "--controller")
     name = Path(str(fmu.value)).stem
     if is_path(str(fmu.value)) and not Path(str(fmu.value)).is_file():
         raise ScenarioError(f"--controller {fmu.value}: there is no such file")
-    parameters = {one.place.partition(".")[2]: one.value for one in brought}
+    parameters = {
+        one.place.partition(".")[2]: one.value for one in brought if not isinstance(one.value, Faults)
+    }
     words = ", ".join([name, *(f"{key} {value}" for key, value in parameters.items())])
     path = Path(str(fmu.value)).absolute() if is_path(str(fmu.value)) else fmu.value
     spec = EntrySpec(
