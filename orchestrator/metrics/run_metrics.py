@@ -4,6 +4,7 @@ A metric is a measure of a signal, written `measure(signal)`: `relative_peak_err
 `total_variation_rate(wheel_torque_*)`. Signals are named as in the signal dictionary, whatever the
 scenario calls its units or an FMU from elsewhere its outputs; where several units have one of that name it
 is the plant's, or the only one that is neither measured nor estimated, and `estimator.sideslip` names any.
+A bare name never means what is measured or estimated.
 The reference of a signal `x` is the signal `x_ref`, of several units' that of the one which acts. Another is
 named behind a comma, `relative_peak_error(yaw_rate, ideal.yaw_rate_ref)`: so a metric says against which
 truth it judges. Measures that need no reference also take a difference,
@@ -215,7 +216,8 @@ _METRIC = re.compile(r"\s*(\w+)\s*\(\s*([\w.*]+)\s*(?:([,-])\s*([\w.*]+)\s*)?\)\
 def columns_of(results: Results, signal: str) -> list[str]:
     """Return the columns of a signal: one, or four for a `*`; empty if they were not recorded.
 
-    Where units share the name, the plant's is taken, else the only one that is no sensor's or estimator's.
+    Where units share the name, the plant's is taken, else the only one that is no sensor's or estimator's. A
+    bare name never means what is measured or estimated, even if nothing else is recorded.
     """
     names = wheels(signal)
     found = [column for name in names if (column := _column(results, name)) is not None]
@@ -226,7 +228,8 @@ def _column(results: Results, name: str) -> str | None:
     for role in (None, "plant"):
         found = results.candidates(name, role=role)
         if len(found) == 1:
-            return found[0] if np.issubdtype(results.columns[found[0]].dtype, np.number) else None
+            meant = found[0] == name or not _is_seen(results, found[0])
+            return found[0] if meant and np.issubdtype(results.columns[found[0]].dtype, np.number) else None
     found = [c for c in results.columns if variable_of(c) == name and not _is_seen(results, c)]
     return found[0] if len(found) == 1 and np.issubdtype(results.columns[found[0]].dtype, np.number) else None
 
@@ -297,6 +300,10 @@ def check_metrics(plan: Plan, chosen: Iterable[Metric]) -> None:
         if missing:
             whole = list(results) if "." in missing[0] else names
             unknown = f"no {missing[0]!r} is recorded{hint(missing[0], whole, lead='there are')}"
+            seen = [c for c in results if variable_of(c) in wheels(missing[0]) and _is_seen(results, c)]
+            if seen:
+                named = listed(fold(seen), last="or")
+                unknown = f"{missing[0]} is recorded only as it is seen, name it so: {named}"
             problems.append(f"{one.name}: {unknown}")
         elif unit_in(results, one) is None:
             problems.append(f"{one.name}: {_unfit(results, one)}")

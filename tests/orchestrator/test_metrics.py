@@ -319,6 +319,17 @@ def test_a_metric_compares_two_named_columns(name, number):
     assert evaluate(watched(), metric(name)).number == pytest.approx(number, rel=1e-4)
 
 
+def test_a_bare_name_never_means_what_is_only_measured_or_estimated():
+    seen = results({"gyro.yaw_rate": SINE, "estimator.sideslip": SINE, "estimator.sideslip_rate": 9 * SINE,
+                    "plant.sideslip": SINE}, T)  # fmt: skip
+    seen.run["fmus"] |= {"gyro": {"name": "sensor_cluster"}, "estimator": {"name": "estimator_a"}}
+    assert evaluate(seen, metric("peak(yaw_rate)")) is None
+    assert evaluate(seen, metric("peak(gyro.yaw_rate)")).number == pytest.approx(1.0, rel=1e-4)
+    of_truth = evaluate(seen, metric("phase_area(sideslip)")).number  # by the slope of the car's own
+    assert of_truth == pytest.approx(evaluate(results({"plant.sideslip": SINE}, T),
+                                              metric("phase_area(sideslip)")).number)  # fmt: skip
+
+
 def test_a_metric_of_two_columns_says_against_what_it_judges():
     named = metric("rms_error(estimator.sideslip,plant.sideslip) from 1 s to 2 s")
     assert named.name == "rms_error(estimator.sideslip, plant.sideslip) from 1.0 s to 2.0 s"
