@@ -1,4 +1,4 @@
-"""The two tiers of the tests, and the order in which their files begin.
+"""The two tiers of the tests, the order in which their files begin, and folders of FMUs.
 
 `exhaustive` marks what the second tier adds. `sampled(n)`, on a test or a module, leaves n cases of
 every parametrized test in the first tier, evenly spread; the others are marked `exhaustive`.
@@ -9,6 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+
+from tests.fmu_copies import put_fmus
 
 TESTS = Path(__file__).parent
 LONGEST_FIRST = ("scenarios", "trials", "pages", "docs", "orchestrator", "yawbench", "fmus", "components")
@@ -30,6 +32,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for k, item in enumerate(cases):
             if k not in kept:
                 item.add_marker(pytest.mark.exhaustive)
+
+
+@pytest.fixture(scope="module")
+def fmus(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the FMUs that a file of tests names as its UNITS, or with all."""
+    folder = tmp_path_factory.mktemp("fmus")
+    put_fmus(folder, components=getattr(request.module, "UNITS", None))
+    return folder
 
 
 def evenly(number: int, total: int) -> set[int]:

@@ -257,6 +257,22 @@ class Clock(Behaviour):
         return {name: function(t) for name, function in self.functions.items()}
 
 
+class Witness(Behaviour):
+    """Writes down when and what it gets: `middle` is integrated, `end` passed through."""
+
+    inputs = ("middle", "end")
+    outputs = {"y": ("end",)}
+
+    def __init__(self) -> None:
+        self.seen: list[tuple[float, float, float, float]] = []
+
+    def advance(self, t: float, h: float, u: Mapping[str, float]) -> None:
+        self.seen.append((t, h, u["middle"], u["end"]))
+
+    def output(self, t: float, u: Mapping[str, float]) -> dict[str, float]:
+        return {"y": u["end"]}
+
+
 class Mixed(Behaviour):
     """One output of every type there is beside Real."""
 

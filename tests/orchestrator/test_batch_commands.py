@@ -13,7 +13,6 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.results.lock import LOCK_FILE, Holder, Lock
-from tests.fmu_copies import put_fmus
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
 
@@ -47,14 +46,6 @@ FIGURES = """
 figures:
   - {name: moments, runs: ["*"], panels: [steer_angle, yaw_moment]}
 """
-
-
-@pytest.fixture(scope="session")
-def fmus(tmp_path_factory):
-    """A folder with the FMUs of a controller in an open loop."""
-    folder = tmp_path_factory.mktemp("fmus")
-    put_fmus(folder, components=UNITS)
-    return folder
 
 
 @pytest.fixture

@@ -34,7 +34,7 @@ from orchestrator.scenario.overrides import read_changes
 from orchestrator.wiring.make_plan import make_plan as plan_of_scenario
 
 from .fake_fmus import Var, make_fmu, out
-from .fakes import Behaviour, Clock, Function, Integrator, Stage, make_plan
+from .fakes import Clock, Function, Integrator, Stage, Witness, make_plan
 from .recorded import car
 
 ALGORITHMS = ("jacobi", "gauss_seidel", "extrapolated")
@@ -59,22 +59,6 @@ FORMS: dict[str, tuple[float | None, Callable[[float, float], float]]] = {
 }
 """Kind of which nothing is random -> value, and the faulty signal at t, faulty since an instant."""
 RANDOM = {"noise", "dropout", "outlier"}
-
-
-class Witness(Behaviour):
-    """Writes down when and what it gets: `middle` is integrated, `end` passed through."""
-
-    inputs = ("middle", "end")
-    outputs = {"y": ("end",)}
-
-    def __init__(self):
-        self.seen = []
-
-    def advance(self, t, h, u):
-        self.seen.append((t, h, u["middle"], u["end"]))
-
-    def output(self, t, u):
-        return {"y": u["end"]}
 
 
 WIRES = ["source.x -> target.middle", "source.x -> target.end"]

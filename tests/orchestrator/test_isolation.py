@@ -20,7 +20,6 @@ from orchestrator.scaffold.beginnings import begin
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
-from tests.fmu_copies import put_fmus
 
 ROOT = Path(__file__).parents[2]
 CAR = ROOT / "scenarios" / "fnn_sideslip" / "25mps.yaml"
@@ -33,13 +32,6 @@ STEP = "if (fabs(law(s, v)) < v->moment_limit)"
 
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="--isolate needs Linux or macOS")
-
-
-@pytest.fixture(scope="module")
-def fmus(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("fmus")
-    put_fmus(folder, components=UNITS)
-    return folder
 
 
 @pytest.fixture

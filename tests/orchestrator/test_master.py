@@ -9,7 +9,7 @@ from orchestrator.master import master, operations
 from orchestrator.master.simulate import simulate
 from orchestrator.results.read import load_results
 
-from .fakes import Behaviour, Clock, Echo, Function, Integrator, Mass, Mixed, Stage, make_plan
+from .fakes import Behaviour, Clock, Echo, Function, Integrator, Mass, Mixed, Stage, Witness, make_plan
 
 
 def run(units, wires, out, **options):
@@ -49,22 +49,6 @@ def test_extrapolated_is_second_order_in_any_order_and_at_any_rate(first, period
 def test_holding_values_is_first_order(algorithm, tmp_path):
     coarse, fine = (oscillator_error(algorithm, "mass", {}, n, tmp_path) for n in (400, 800))
     assert math.log2(coarse / fine) == pytest.approx(1.0, abs=0.05)
-
-
-class Witness(Behaviour):
-    """Writes down its inputs at every step: `middle` is integrated, `end` is passed through."""
-
-    inputs = ("middle", "end")
-    outputs = {"y": ("end",)}
-
-    def __init__(self):
-        self.seen = []
-
-    def advance(self, t, h, u):
-        self.seen.append((t, h, u["middle"], u["end"]))
-
-    def output(self, t, u):
-        return {"y": u["end"]}
 
 
 @pytest.mark.parametrize("source_first", [True, False])

@@ -19,7 +19,6 @@ from orchestrator.experiments.planning import jobs_of, plan_experiment
 from orchestrator.experiments.region import judge_region, plan_region, runs_of
 from orchestrator.experiments.verdicts import region_words, verdict
 from tests.checkout import ROOT
-from tests.fmu_copies import put_fmus
 
 SCENARIO = """
 title: A sine
@@ -57,11 +56,7 @@ region:
 """
 
 
-@pytest.fixture(scope="module")
-def fmus(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("fmus")
-    put_fmus(folder, components=("driver_sine",))
-    return folder
+UNITS = ("driver_sine",)
 
 
 @pytest.fixture

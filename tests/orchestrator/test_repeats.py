@@ -17,7 +17,6 @@ from orchestrator.experiments.jobs import run_job
 from orchestrator.experiments.planning import jobs_of, plan_experiment
 from orchestrator.experiments.verdicts import HOLDS, UNDECIDED, limit_tables, run_tables, verdict
 from orchestrator.metrics.run_metrics import Value
-from tests.fmu_copies import put_fmus
 
 SCENARIO = """
 title: A car that turns, and its gyro
@@ -66,12 +65,7 @@ figures: [{name: share, kind: grid, grid: share, mark: 90 %}]
 """
 
 
-@pytest.fixture(scope="module")
-def fmus(tmp_path_factory):
-    """A folder with a sensor."""
-    folder = tmp_path_factory.mktemp("fmus")
-    put_fmus(folder, components=("sensor_ideal",))
-    return folder
+UNITS = ("sensor_ideal",)
 
 
 @pytest.fixture(scope="module")

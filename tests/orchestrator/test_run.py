@@ -74,14 +74,6 @@ class {name}(Component):
 '''
 
 
-@pytest.fixture(scope="session")
-def fmus(tmp_path_factory):
-    """A folder with the FMUs of a car."""
-    folder = tmp_path_factory.mktemp("fmus")
-    put_fmus(folder, components=UNITS)
-    return folder
-
-
 @pytest.fixture
 def faulty(tmp_path, fmus):
     """Make a controller that does `act` from t = 0.05 s on; return a scenario with it."""

@@ -27,7 +27,6 @@ from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.evidence import measured
-from tests.fmu_copies import put_fmus
 
 from . import fmpy_exchanging
 
@@ -38,13 +37,6 @@ PAPERS = {  # until the car moves as hard as in the whole run; the one with the 
     "fuzzy_sliding_mode/high_friction.yaml": 1.5,
     "fuzzy_pid/sine.yaml": 2.5,
 }
-
-
-@pytest.fixture(scope="module")
-def fmus(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("fmus")
-    put_fmus(folder)
-    return folder
 
 
 def plan_of(fmus, scenario="fuzzy_feedback/single_sine.yaml", stop_time=0.1, settings=()):

@@ -22,7 +22,6 @@ from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.ssp_names import DESCRIPTION_FILE, SSC, SSD, SSM, SSV
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
-from tests.fmu_copies import put_fmus
 
 from .fake_fmus import make_fmu
 
@@ -34,13 +33,6 @@ PAPERS = (
     "fuzzy_feedback/single_sine.yaml",
 )
 SCHEMAS = Path(fmpy.ssp.__file__).parent / "schema"
-
-
-@pytest.fixture(scope="module")
-def fmus(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("fmus")
-    put_fmus(folder)
-    return folder
 
 
 @pytest.fixture(scope="module")

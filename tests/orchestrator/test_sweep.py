@@ -19,7 +19,6 @@ from orchestrator.errors import ResultsError
 from orchestrator.experiments.jobs import Record
 from orchestrator.experiments.journal import Journal
 from orchestrator.results.read import load_results
-from tests.fmu_copies import put_fmus
 
 UNIT = '''
 import os
@@ -100,16 +99,11 @@ figures:
 """
 
 
-@pytest.fixture(scope="module")
-def driver(tmp_path_factory):
-    """A folder with the driver's FMU."""
-    folder = tmp_path_factory.mktemp("fmus")
-    put_fmus(folder, components=("driver_sine",))
-    return folder
+UNITS = ("driver_sine",)
 
 
 @pytest.fixture
-def moods(tmp_path, driver):
+def moods(tmp_path, fmus):
     """Write a sweep over levels; return its file."""
     (tmp_path / "moody.py").write_text(UNIT.format(folder=str(tmp_path)), encoding="utf-8")
     fmu = build_component(tmp_path / "moody.py", tmp_path, role="controllers")
@@ -124,12 +118,12 @@ def moods(tmp_path, driver):
 
 
 @pytest.fixture
-def yawbench(driver, capfd, tmp_path):
+def yawbench(fmus, capfd, tmp_path):
     """Run a sweep by the command line into a folder; return exit status, stdout and stderr."""
 
     def run(file, out, *arguments):
         with pytest.raises(SystemExit) as end:
-            main(["sweep", str(file), "--out", str(tmp_path / out), "--fmus", str(driver), *arguments])
+            main(["sweep", str(file), "--out", str(tmp_path / out), "--fmus", str(fmus), *arguments])
         told = capfd.readouterr()
         return end.value.code or 0, told.out, told.err
 
@@ -285,12 +279,12 @@ def test_kept_results_can_be_loaded_in_every_format_and_are_made_once(moods, yaw
     assert [run["controller.yaw_moment"][-1] for run in kept] == pytest.approx([0.5, 0.5, 1.0, 1.0])
 
 
-def interrupted(file, out, driver, tmp_path, number):
+def interrupted(file, out, fmus, tmp_path, number):
     """Start a sweep in a process, stop it by a signal once its slow runs have begun; return its stderr."""
     os.mkfifo(tmp_path / "slow")
     command = [sys.executable, "-m", "orchestrator.cli", "sweep", str(file), "--out", str(tmp_path / out)]
     process = subprocess.Popen(
-        [*command, "--fmus", str(driver), "--jobs", "1"], stderr=subprocess.PIPE, text=True
+        [*command, "--fmus", str(fmus), "--jobs", "1"], stderr=subprocess.PIPE, text=True
     )
     assert (tmp_path / "slow").read_text() == "it has begun"
     process.send_signal(number)
@@ -302,9 +296,9 @@ def interrupted(file, out, driver, tmp_path, number):
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 @pytest.mark.sampled(1)
-def test_a_sweep_that_was_stopped_goes_on_where_it_was(number, moods, yawbench, driver, tmp_path):
+def test_a_sweep_that_was_stopped_goes_on_where_it_was(number, moods, yawbench, fmus, tmp_path):
     file = moods(5, 10, 60, 70)
-    status, told = interrupted(file, "out", driver, tmp_path, number)
+    status, told = interrupted(file, "out", fmus, tmp_path, number)
     assert status == (-number if number == signal.SIGKILL else 1)
     if number != signal.SIGKILL:
         assert f"Interrupted; what was recorded until then: {tmp_path / 'out'}" in told

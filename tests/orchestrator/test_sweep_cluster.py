@@ -16,7 +16,7 @@ from orchestrator.experiments.execution import left_to_do
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.planning import jobs_of, plan_experiment
 
-from .test_sweep import driver, moods, rows, yawbench  # noqa: F401
+from .test_sweep import UNITS, moods, rows, yawbench  # noqa: F401
 
 distributed = pytest.importorskip("distributed")
 
@@ -57,11 +57,11 @@ def test_a_run_that_kills_its_process_leaves_the_workers_alone(moods, yawbench, 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
 @pytest.mark.exhaustive
-def test_a_worker_that_is_killed_costs_no_run(moods, driver, cluster, tmp_path):  # noqa: F811
+def test_a_worker_that_is_killed_costs_no_run(moods, fmus, cluster, tmp_path):  # noqa: F811
     from orchestrator.experiments.cluster import run_on_cluster
 
     experiment = load_experiment(moods(1, 2, 3, 4, 5, 6))
-    planned = plan_experiment(experiment, jobs_of(experiment, tmp_path, driver, keep=False))
+    planned = plan_experiment(experiment, jobs_of(experiment, tmp_path, fmus, keep=False))
     told = []
 
     def done(outcome):
@@ -78,12 +78,12 @@ def test_a_worker_that_is_killed_costs_no_run(moods, driver, cluster, tmp_path):
 
 
 @pytest.mark.exhaustive
-def test_a_cluster_that_dies_is_one_sentence_and_keeps_what_is_finished(moods, driver, capfd, tmp_path):  # noqa: F811
+def test_a_cluster_that_dies_is_one_sentence_and_keeps_what_is_finished(moods, fmus, capfd, tmp_path):  # noqa: F811
     from orchestrator.errors import ResultsError
     from orchestrator.experiments.cluster import run_on_cluster
 
     experiment = load_experiment(moods(1, 2, 3, 4, 5, 6))
-    planned = plan_experiment(experiment, jobs_of(experiment, tmp_path, driver, keep=False))
+    planned = plan_experiment(experiment, jobs_of(experiment, tmp_path, fmus, keep=False))
     told, file = [], str(tmp_path / "scheduler.json")
     with _dask("scheduler", file, "--host", "127.0.0.1", "--port", "0") as scheduler, _dask("worker", file):
         with distributed.Client(scheduler_file=file, set_as_default=False) as client:
@@ -162,10 +162,10 @@ def test_a_worker_that_begins_anew_is_not_taken_for_one_without_this_program():
     assert _check_workers(_Restarting(), "tcp://c") == 2
 
 
-def test_without_its_package_the_option_says_how_to_get_it(moods, driver, capsys, tmp_path, monkeypatch):  # noqa: F811
+def test_without_its_package_the_option_says_how_to_get_it(moods, fmus, capsys, tmp_path, monkeypatch):  # noqa: F811
     monkeypatch.setitem(sys.modules, "distributed", None)
     monkeypatch.delitem(sys.modules, "orchestrator.experiments.cluster", raising=False)
-    arguments = ["--fmus", str(driver), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:9"]
+    arguments = ["--fmus", str(fmus), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:9"]
     with pytest.raises(SystemExit) as end:
         main(["sweep", str(moods(10)), *arguments])
     assert end.value.code == 2

@@ -14,7 +14,6 @@ from orchestrator.experiments.design import level_at
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.planning import jobs_of, plan_experiment
 from tests.changed import changed
-from tests.fmu_copies import put_fmus
 
 
 def planned_of(experiment, fmus):
@@ -47,14 +46,6 @@ axes:
 metrics:
   moment: {metric: peak(yaw_moment)}
 """
-
-
-@pytest.fixture(scope="session")
-def fmus(tmp_path_factory):
-    """A folder with the FMUs of a controller in an open loop."""
-    folder = tmp_path_factory.mktemp("fmus")
-    put_fmus(folder, components=UNITS)
-    return folder
 
 
 @pytest.fixture

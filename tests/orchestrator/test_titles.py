@@ -17,7 +17,6 @@ from orchestrator.figures.style import save
 from orchestrator.plan import Change
 from orchestrator.results.read import load_results
 from orchestrator.titles import changed, changed_each, changes_in, with_changes
-from tests.fmu_copies import put_fmus
 
 from .recorded import car
 
@@ -41,14 +40,6 @@ limits:
   small: {{says: Largest amplitude, of: amplitude, holds_if: [{{metric: sideslip, at_most: 10 deg}}]}}
 figures: [{{name: peaks, kind: curve, x: amplitude, metric: sideslip}}]
 """
-
-
-@pytest.fixture(scope="session")
-def fmus(tmp_path_factory):
-    """A folder with the FMUs of paper D."""
-    folder = tmp_path_factory.mktemp("fmus")
-    put_fmus(folder, components=UNITS)
-    return folder
 
 
 @pytest.fixture

@@ -11,7 +11,6 @@ from lxml import html
 from ruamel.yaml import YAML
 
 from orchestrator.cli import main
-from tests.fmu_copies import put_fmus
 
 SCENARIO = """
 title: A steering wheel
@@ -44,11 +43,7 @@ tuning:
 """.replace("as it stands, ", "as_it_stands, ")
 
 
-@pytest.fixture(scope="module")
-def fmus(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("fmus")
-    put_fmus(folder, components=("driver_sine",))
-    return folder
+UNITS = ("driver_sine",)
 
 
 @pytest.fixture

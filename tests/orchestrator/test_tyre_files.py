@@ -21,11 +21,10 @@ from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import changes_of, read_changes
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
-from tests.fmu_copies import put_fmus
 
 from .tir_files import write
 
-COMPONENTS = (
+UNITS = (
     "driver_force_pulse",
     "tyre_magic_formula_62",
     "tyre_linear",
@@ -44,14 +43,6 @@ units:
   tyre: {{fmu: tyre_magic_formula_62{more}}}
 connections: [{{from: wheel_control.torque_request_*, to: plant.wheel_torque_*}}]
 """
-
-
-@pytest.fixture(scope="module")
-def fmus(tmp_path_factory):
-    """A folder with the FMUs of the scenario."""
-    folder = tmp_path_factory.mktemp("fmus")
-    put_fmus(folder, components=COMPONENTS)
-    return folder
 
 
 @pytest.fixture

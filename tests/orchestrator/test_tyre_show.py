@@ -11,25 +11,16 @@ from orchestrator.scenario.tir import read_tir
 from orchestrator.tyres.stand import State, put_on_stand, stiffnesses
 from orchestrator.tyres.tyre_drawing import draw_tyre
 from tests.components.stand import Stand as Bench
-from tests.fmu_copies import put_fmus
 
 from .tir_files import write
 
-COMPONENTS = ("tyre_magic_formula_62", "tyre_magic_formula_62_transient", "tyre_dugoff", "controller_off")
+UNITS = ("tyre_magic_formula_62", "tyre_magic_formula_62_transient", "tyre_dugoff", "controller_off")
 STATES = [
     State(0.05, 0.02, 3000.0),
     State(-0.1, -0.3, 5000.0),
     State(0.2, 0.4, 6000.0),
     State(0.0, 0.0, 4000.0),
 ]
-
-
-@pytest.fixture(scope="module")
-def fmus(tmp_path_factory):
-    """A folder with some tyres and a unit that is none."""
-    folder = tmp_path_factory.mktemp("fmus")
-    put_fmus(folder, components=COMPONENTS)
-    return folder
 
 
 def status(*arguments):

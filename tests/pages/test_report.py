@@ -17,7 +17,6 @@ from orchestrator.errors import ScenarioError
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.verdicts import share
 from orchestrator.pages.report import found_studies
-from tests.fmu_copies import put_fmus
 
 from .browser import DESK, PHONE
 from .flaws import flaws, open_all
@@ -57,14 +56,6 @@ units:
   driver: {fmu: driver_sine, parameters: {frequency: 1, start_time: 0}}
   reference: {fmu: reference_single_track}
 """
-
-
-@pytest.fixture(scope="session")
-def fmus(tmp_path_factory):
-    """A folder with the FMUs of paper D."""
-    folder = tmp_path_factory.mktemp("fmus")
-    put_fmus(folder, components=UNITS)
-    return folder
 
 
 @pytest.fixture

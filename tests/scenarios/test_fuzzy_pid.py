@@ -16,7 +16,6 @@ from orchestrator.figures.display import shown
 from orchestrator.metrics.run_metrics import Value
 from orchestrator.results.read import load_results
 from tests.changed import changed
-from tests.fmu_copies import put_fmus
 from tests.studies import check_figures, judge_all, judge_some, verdicts
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "fuzzy_pid"
@@ -29,13 +28,6 @@ UNITS = (
     "controller_pid", "controller_fuzzy_pid", "allocator_single_wheel", "wheel_control_hydraulic",
     "plant_fourteen_dof", "tyre_magic_formula",
 )  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def fmus(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("fmus")
-    put_fmus(folder, components=UNITS)
-    return folder
 
 
 def yawbench(*arguments):

@@ -15,7 +15,6 @@ from orchestrator.experiments.workers import execute
 from orchestrator.figures.display import shown
 from orchestrator.results.read import load_results
 from tests.changed import changed
-from tests.fmu_copies import put_fmus
 from tests.studies import check_figures, judge_all, judge_some, verdicts
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "fuzzy_sliding_mode"
@@ -29,13 +28,6 @@ UNITS = (
 )  # fmt: skip
 LAWS = ("sign", "saturation", "fuzzy")
 ROADS = ("high_friction", "low_friction", "beyond_paper")
-
-
-@pytest.fixture(scope="module")
-def fmus(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("fmus")
-    put_fmus(folder, components=UNITS)
-    return folder
 
 
 @pytest.fixture(scope="module")

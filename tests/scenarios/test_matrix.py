@@ -14,7 +14,6 @@ from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 from tests.conftest import evenly
-from tests.fmu_copies import put_fmus
 
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "fuzzy_sliding_mode" / "high_friction.yaml"
 CONTROLLERS = (
@@ -36,14 +35,6 @@ UNITS = (
 )  # fmt: skip
 ON_THE_ROAD = {"plant.sideslip": 0.5, "plant.yaw_rate": 1.5}
 """What a car that has not been lost stays within: rad, rad/s."""
-
-
-@pytest.fixture(scope="module")
-def fmus(tmp_path_factory):
-    """A folder with all FMUs of the matrix."""
-    folder = tmp_path_factory.mktemp("matrix")
-    put_fmus(folder, components=UNITS)
-    return folder
 
 
 CASES = list(product(PLANTS, TYRES, CONTROLLERS))
