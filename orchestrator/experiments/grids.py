@@ -139,6 +139,10 @@ def _told_table(spec: GridSpec, values: Values, verdicts: Mapping[tuple[str, str
             text = "-" if value is None else shown(value.number, value.unit, half=value.half)
             words.append(f"{text} {verdicts.get(cell.key, '')}".rstrip() if spec.holds else text)
         table.rows.append([row, *words])
+    for cell in (one for one in every if not one.column):
+        value = values.get(cell.key)
+        text = "-" if value is None else shown(value.number, value.unit, half=value.half)
+        table.rows.append([cell.row, *[text] * len(columns)])
     if spec.holds:
         table.rows.append([spec.holds, *(_down_to(spec, column, verdicts) for column in columns.values())])
     return table

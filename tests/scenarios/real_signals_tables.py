@@ -1,9 +1,11 @@
-"""The tables of docs/estimators.md that come from studies, in Markdown, from their `experiment.json`."""
+"""Tables of the docs that come from studies of real signals, in Markdown, from their `experiment.json`."""
 
 from __future__ import annotations
 
 import re
 from typing import Any
+
+from orchestrator.figures.display import shown
 
 LATENCIES = (0, 5, 10, 20)
 CONTROLLERS = {
@@ -33,3 +35,59 @@ def late(study: dict[str, Any]) -> list[str]:
             cells = " | ".join(f"{100 * error:.3g} %" for error in errors)
             rows.append(f"| {speed} m/s, {says} | {cells} |")
     return rows
+
+
+STEPS = {
+    "exact": "exact",
+    "late": "sampled and late",
+    "noise": "noise",
+    "sideslip": "estimated sideslip",
+    "friction": "estimated friction",
+    "biases": "biases",
+}
+CASES = ("A/learning", "A/frozen", "A/conventional", "B", "C", "D")
+
+
+def step_by_step(study: dict[str, Any]) -> list[str]:
+    """Return a row per step: the share of its gain that every controller keeps."""
+    numbers = study["derived"]
+    return [
+        f"| {says} | {' | '.join(_shown(numbers[f'kept/{case}/{step}'], '%') for case in CASES)} |"
+        for step, says in STEPS.items()
+    ]
+
+
+FAULTS = {
+    "none": "no fault",
+    "gyro_frozen": "gyro frozen",
+    "gyro_zero": "gyro at zero",
+    "gyro_bias": "gyro 10 °/s too high",
+    "gyro_drift": "gyro drifts by 3 °/s²",
+    "a_y_zero": "accelerometer at zero",
+    "hand_wheel": "hand wheel frozen",
+    "wheel": "a wheel speed at zero",
+    "brake": "one wheel not braked",
+}
+
+
+def faulty(study: dict[str, Any]) -> list[str]:
+    """Return a row per car and fault: share found, time, largest sideslip with the monitor and without."""
+    runs = study["runs"]
+    rows = []
+    for car, off in (("B", "lane_change_80kmh"), ("C", "double_lane_change")):
+        rows.append(f"| {car}, no control | - | - | - | {_of(runs[f'off/{off}'], 'sideslip', 'rad')} |")
+        for fault, says in FAULTS.items():
+            held, bare = runs[f"with/{car}/{fault}"], runs[f"without/{car}/{fault}"]
+            found = f"{_of(held, 'found', '%')} | {_of(held, 'after', 's')}"
+            slides = f"{_of(held, 'sideslip', 'rad')} | {_of(bare, 'sideslip', 'rad')}"
+            rows.append(f"| {car}, {says} | {found} | {slides} |")
+    return rows
+
+
+def _of(run: dict[str, Any], metric: str, unit: str) -> str:
+    found = run["metrics"].get(metric)
+    return "-" if found is None else _shown(found, unit)
+
+
+def _shown(found: dict[str, Any], unit: str) -> str:
+    return shown(found["value"], unit, half=found.get("half", 0.0))

@@ -10,9 +10,10 @@ import pytest
 
 import yawbench as yb
 from orchestrator.cli import main
+from orchestrator.experiments.experiment import load_experiment
 
 from .open_loop import MANOEUVRES, SPEED, missed, row
-from .real_signals_tables import kept, late
+from .real_signals_tables import faulty, kept, late, step_by_step
 
 ROOT = Path(__file__).parents[2]
 FILES = sorted(
@@ -85,3 +86,27 @@ def test_the_documentation_has_what_the_studies_measure(name, rows, page, tmp_pa
     study = json.loads((tmp_path / "experiment.json").read_text("utf-8"))
     written = (ROOT / "docs" / f"{page}.md").read_text("utf-8")
     assert [row for row in rows(study) if row not in written] == []
+
+
+@pytest.mark.parametrize(("name", "noisy"), [("degradation", 6 * 4), ("faults", 2 * 9)])
+def test_every_run_with_noise_that_a_mean_is_made_of_has_ten_seeds(name, noisy):
+    study = load_experiment(ROOT / f"scenarios/real_signals/{name}.yaml")
+    seeds: dict[str, set[object]] = {}
+    for case in study.cases:
+        drawn = [change.value for change in case.changes if change.place == "sensor.seed"]
+        seeds.setdefault(case.run.name, set()).update(drawn)
+    assert sorted(map(len, seeds.values())) == [0] * (len(seeds) - noisy) + [10] * noisy
+    assert len(study.short.points) == 3
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize(("name", "rows"), [("degradation", step_by_step), ("faults", faulty)])
+def test_the_page_on_real_signals_has_no_row_that_the_studies_do_not_measure(name, rows, tmp_path):
+    with pytest.raises(SystemExit) as exit_:
+        main(["study", str(ROOT / f"scenarios/real_signals/{name}.yaml"), "--out", str(tmp_path)])
+    assert not exit_.value.code
+    measured = rows(json.loads((tmp_path / "experiment.json").read_text("utf-8")))
+    begin = tuple(" ".join(row.split(" | ")[:1]) for row in measured)
+    lines = (ROOT / "docs" / "real_signals.md").read_text("utf-8").splitlines()
+    numbers = [line for line in lines if line.startswith(begin) and line.count(" | ") > 1]
+    assert [line for line in numbers if line not in measured] == []
