@@ -40,8 +40,8 @@ def report(
     report.html: per study the verdicts, system, figures, tables, parameters and their source. One file
     that needs no server; figures lie beside it as SVG and PNG. Runs whose results are missing, or were
     made from another scenario or FMU, are made first. Without --out, the page of one study lies in its
-    folder below results/, that of several in results/. Regions take most of the time; --quick
-    leaves them out.
+    folder below results/, that of several in results/. Regions take most of the time, half an
+    hour on two cores for all studies in scenarios/; --quick leaves them out.
     """
     from ..pages.report import found_studies
 

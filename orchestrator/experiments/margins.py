@@ -19,6 +19,10 @@ ONE_IN = 10
 an exception that can be named."""
 
 
+TIMES = "× as chosen"
+"""Unit of an open value that is a factor on what each run has, where that is not one number for all."""
+
+
 @dataclass(frozen=True)
 class Gap:
     """A number and the threshold that it is compared with, in one unit."""
@@ -83,6 +87,7 @@ class Flip:
     words: str  # the level at which the verdict is another, with its unit
     place: float | None  # between two levels by the margins there (linearly); None: the values are no numbers
     distance: float  # from the chosen value, as a share of the range
+    chosen: str = ""  # the chosen value with its unit; "" if there is none to tell
 
 
 @dataclass(frozen=True)
@@ -123,7 +128,8 @@ class Line:
                 found.append(_between(*step))
         place = min(found, key=lambda one: abs(one - start))
         distance = abs(place - start) / (max(places) - min(places))
-        return Flip(self.open_value, self.says, self.words(place), place, distance)
+        chosen = "" if self.unit == TIMES else self.words(start)
+        return Flip(self.open_value, self.says, self.words(place), place, distance, chosen)
 
     def words(self, place: float) -> str:
         """Return a place as people read it."""

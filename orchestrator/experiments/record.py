@@ -128,7 +128,8 @@ def _region(region: Region) -> dict[str, Any]:
         "spread": _finite(region.spread),
         "decided": region.decided,
         "robust": region.robust,
-        "flip": flip and {"open_value": flip.open_value, "at": flip.place, "words": flip.words},
+        "flip": flip and {"open_value": flip.open_value, "at": flip.place, "words": flip.words,
+                          "chosen": flip.chosen or None},
         "margins": [_finite(one.margin) for one in region.points],
         "open_values": {
             line.open_value: {

@@ -26,7 +26,7 @@ from .grids import ranked
 from .jobs import Job, Once, Record, keyed, ready
 from .judged_schema import Claim, Reference
 from .judging import Judgement, judge
-from .margins import Line, Region, Spot, Stop
+from .margins import TIMES, Line, Region, Spot, Stop
 from .planning import Planned, metrics_of, number_of
 from .region_schema import OpenValueSpec, OpenVariantSpec
 
@@ -394,7 +394,7 @@ def _shown(runs: Runs, key: str, names: Iterable[str]) -> tuple[str, float]:
     unit = runs.unit(key)
     if one.times:
         own = runs.own(key, names)
-        return (unit, own.pop()) if len(own) == 1 else ("× as chosen", 1.0)
+        return (unit, own.pop()) if len(own) == 1 else (TIMES, 1.0)
     if one.unit is None:
         return unit, 1.0
     return one.unit, 1.0 / number_of(one, Level(1.0, ""), unit)

@@ -84,6 +84,7 @@ def verdict_columns(findings: Findings) -> list[Column]:
         Column("without result", "int64", [region and region.without_result for region in regions]),
         Column("flips by", "string", [flip and flip.open_value for flip in flips]),
         Column("flips at", "string", [flip and flip.words for flip in flips]),
+        Column("chosen", "string", [(flip and flip.chosen) or None for flip in flips]),
         Column("robust", "string", [region and text_of(region.robust) for region in regions]),
     ]
 

@@ -110,12 +110,25 @@ def region_words(judgement: Judgement) -> list[str]:
     region = judgement.region
     if region is None:
         return []
-    failed = f", {region.without_result} without a result" if region.without_result else ""
     flip = region.flip
     return [
-        f"holds in {100 * region.holding / len(region.points):.0f} % of {len(region.points)} points{failed}",
-        f"flips at {flip.says} {flip.words}" if flip else "no flip along any open value",
+        held_words(region.holding, len(region.points), region.without_result),
+        flip_words(flip.says, flip.words, flip.chosen) if flip else NO_FLIP,
     ]
+
+
+NO_FLIP = "no flip along any open value"
+
+
+def held_words(holding: int, points: int, without_result: int = 0) -> str:
+    """Return at which part of the points a claim holds."""
+    failed = f", {without_result} without a result" if without_result else ""
+    return f"holds in {100 * holding / points:.0f} % of {points} points{failed}"
+
+
+def flip_words(says: str, level: str, chosen: str = "") -> str:
+    """Return where a verdict becomes another: what is varied, the level, and the one chosen if it is told."""
+    return f"flips at {says} {level}" + (f" (chosen: {chosen})" if chosen else "")
 
 
 def counts_of(judgements: Sequence[Judgement], group: str) -> dict[str, int]:
@@ -216,7 +229,7 @@ def region_table(findings: Findings) -> Table:
     rows: list[list[Cell]] = []
     for name, one in region.open_values.items():
         line, levels = lines.get(name), levels_of(one.stepped)
-        unit = one.unit or (line.unit if line and not one.times else "")
+        unit = one.unit or (line.unit if line and line.unit != "1" and not one.times else "")
         ends = [levels[0].words, levels[-1].words] if one.start is not None else [one.words for one in levels]
         words = " to ".join(ends) if one.start is not None else ", ".join(ends)
         chosen = line.words(line.chosen.place) if line and line.chosen.place is not None else None

@@ -130,9 +130,17 @@ def plans_of(findings: Findings) -> list[tuple[Job, tuple[Scenario, Plan]]]:
 
 
 def conclusions(findings: Findings) -> list[dict[str, Any]]:
-    """Return the claims and checks that do not hold or are undecided, what was measured in words."""
+    """Return what an overview tells: claims and checks that do not hold or are undecided.
+
+    Over a region claims that hold are told, too, and robust verdicts come first.
+    """
     every = [(one, "claims") for one in findings.claims] + [(one, "checks") for one in findings.checks]
-    return [judged(one, group) for one, group in every if verdict(one, group) != HOLDS]
+    told = [
+        judged(one, group)
+        for one, group in every
+        if verdict(one, group) != HOLDS or (group == "claims" and one.region)
+    ]
+    return sorted(told, key=lambda one: not one["robust"])
 
 
 def judged(one: Judgement, group: str) -> dict[str, Any]:

@@ -99,7 +99,7 @@ def test_a_flip_lies_where_the_closed_form_has_it_and_is_named_in_the_units_of_t
     assert ratio.flip.place == pytest.approx(1 - 0.5 * (1 / 6) / (1 / 6 - worse))
     assert ratio.margins == (pytest.approx(worse), pytest.approx((0.06 - 0.025) / 0.06))
     assert below.region.flip == ratio.flip  # a fifth of its range against 0.067 of it
-    assert region_words(below)[1] == "flips at ratio 0.900"
+    assert region_words(below)[1] == "flips at ratio 0.900 (chosen: 1.00)"
 
 
 def test_the_share_of_a_latin_hypercube_along_one_value_is_that_of_the_closed_form(judged):

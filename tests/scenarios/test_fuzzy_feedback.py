@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import pytest
 
-from orchestrator.experiments.verdicts import share
 from tests.studies import judge_all, judge_some, verdicts
 
 STUDY = Path(__file__).parents[2] / "scenarios" / "fuzzy_feedback" / "study.yaml"
@@ -84,20 +82,3 @@ def test_the_readme_tells_what_becomes_of_what_the_controller_does_not_know(whol
     unknown = [run for run in whole["runs"] if run.startswith("unknown/")]
     rms, path = (max(100 * metric_of_all(run, name) for run in unknown) for name in ("rms", "path"))
     assert f"({rms:.1f} % at most), but the path leaves its own (up to {path:.0f} %)" in TOLD
-
-
-@pytest.mark.exhaustive
-def test_the_readme_tells_how_far_the_verdicts_carry(whole):
-    folder = judge_all(STUDY, whole["folder"])["folder"]
-    with (folder / "verdicts.csv").open(encoding="utf-8") as file:
-        found = {row["says"]: row for row in csv.DictReader(file)}
-    table = [line for line in SECTION.splitlines() if line.startswith("| With")]
-    assert len(table) >= 4
-    for line in table:
-        says, verdict, margin, region, flip = (cell.strip() for cell in line.strip("|").split("|"))
-        row = found[says]
-        assert (verdict, margin) == (row["verdict"], share(float(row["margin [1]"])))
-        held = 100 * int(row["holds at"]) / int(row["points"])
-        assert region == f"holds in {held:.0f} % of {row['points']} points"
-        flips = f"flips at {row['flips by']} {row['flips at']}"
-        assert flip == (flips if row["flips by"] else "no flip along any open value")

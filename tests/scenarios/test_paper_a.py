@@ -11,6 +11,7 @@ from orchestrator.experiments.findings import judge_results
 from orchestrator.experiments.verdicts import run_tables
 from orchestrator.figures.display import shown
 from tests.studies import check_figures, judge_all, judge_some, verdicts
+from tests.verdicts import recorded
 
 STUDY = Path(__file__).parents[2] / "scenarios" / "fnn_sideslip" / "study.yaml"
 SPEEDS = (15, 25, 40)
@@ -105,7 +106,7 @@ def rows(text):
 
 
 README = (STUDY.parents[2] / "README.md").read_text(encoding="utf-8")
-PROSE = " ".join(README.partition("What comes out")[2].partition("###")[0].split())
+PROSE = " ".join(README.partition("### Paper A")[2].partition("###")[0].split())
 
 
 def test_the_readme_tells_what_the_study_found(study, metric):
@@ -114,7 +115,12 @@ def test_the_readme_tells_what_the_study_found(study, metric):
     told = rows(README)
     assert len(told) == 9
     found = [[cell.removesuffix(" †") for cell in row] for row in first.text()]
-    assert told == [[row[0], row[1], row[2].partition(" (")[0], row[3], row[4], row[-1]] for row in found]
+    assert [[*row[:3], row[-1]] for row in told] == [
+        [row[0], row[1], row[2].partition(" (")[0], row[-1]] for row in found
+    ]
+    of_runs = [claim.says for claim in experiment.spec.claims if claim.short]
+    carries = [list(row[1:]) for row in recorded()[experiment.spec.title] if row.says in of_runs]
+    assert [row[3:-1] for row in told] == carries
     learning, frozen = (
         [f"{100 * metric(f'three_periods/15mps/{run}', f'period_{k}'):.1f}" for k in (1, 3)]
         for run in ("learning_true", "learning_false")

@@ -1,0 +1,72 @@
+"""What the docs and the README tell of how far the verdicts on the papers carry."""
+
+from __future__ import annotations
+
+import os
+import shutil
+
+import pytest
+
+from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.journal import FILE as JOURNAL
+from orchestrator.results.naming import default_folder
+from tests.checkout import ROOT
+from tests.evidence import RECORD
+from tests.studies import judge_all
+from tests.verdicts import FILE, UNDECIDED, page, recorded, rows_of, studies, summary, table_in
+
+FILES = (
+    "fnn_sideslip/study", "fuzzy_sliding_mode/study", "fuzzy_sliding_mode/distribution", "fuzzy_pid/study",
+    "fuzzy_feedback/study",
+)  # fmt: skip
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("name", FILES)
+def test_the_page_tells_what_becomes_of_every_claim_over_the_region(name, tmp_path):
+    file = ROOT / "scenarios" / f"{name}.yaml"
+    made = ROOT / default_folder(file) / JOURNAL
+    if made.is_file():  # by `make report`: each run is known by the hash of all that it follows from
+        shutil.copyfile(made, tmp_path / JOURNAL)
+    judge_all(file, tmp_path)
+    title = load_experiment(file).spec.title
+    found = rows_of(tmp_path / "verdicts.csv")
+    if os.environ.get(RECORD):
+        order = list(studies())
+        every = recorded() | {title: found}
+        FILE.write_text(page({one: every[one] for one in order if one in every}), encoding="utf-8")
+    assert recorded()[title] == found, f"{RECORD}=1 writes {FILE.name} anew"
+
+
+def test_the_page_has_every_claim_of_every_study_and_sums_them_up():
+    found = recorded()
+    assert {title: file.relative_to(ROOT / "scenarios").with_suffix("").as_posix()
+            for title, file in studies().items()} == dict(zip(found, FILES, strict=True))  # fmt: skip
+    for title, file in studies().items():
+        assert [row.says for row in found[title]] == [one.says for one in load_experiment(file).spec.claims]
+    assert FILE.read_text(encoding="utf-8") == page(found)
+
+
+def test_the_readme_tells_of_verdicts_what_the_page_does():
+    section = (ROOT / "README.md").read_text(encoding="utf-8").partition("### How far the verdicts")[2]
+    told = table_in(section.partition("\n##")[0])
+    found = {title.partition(":")[0]: rows for title, rows in recorded().items()}
+    assert [tuple(row) for row in told[1 : 1 + len(found)]] == summary(found)
+    decided = [
+        [paper.removeprefix("Paper "), *row]
+        for paper, rows in found.items()
+        for row in rows
+        if row.kind != UNDECIDED
+    ]
+    assert told[2 + len(found) :] == decided
+    total = sum(map(len, found.values()))
+    assert "Most of what the papers say thus hangs on values" in section
+    assert total - len(decided) > total / 2
+
+
+def test_the_readme_tells_how_far_the_best_of_26_carries():
+    title = next(title for title in recorded() if "table 3" in title)
+    (best,) = (row for row in recorded()[title] if row.says.startswith("In proportion to load is the best"))
+    section = (ROOT / "README.md").read_text(encoding="utf-8").partition("### Paper B")[2]
+    told = " ".join(section.partition("\n###")[0].split())
+    assert f"the best of 26, by {best.margin}. That is {best.kind}: it {best.region}, {best.flip}" in told

@@ -1,0 +1,127 @@
+"""How far the verdicts on the papers carry, as docs/verdicts.md tells it.
+
+The page is the record: a test makes all runs and compares; with `YAWBENCH_RECORD=1` in the environment it
+writes the page anew. What the README tells of verdicts is held against the page, which takes no runs.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.verdicts import (
+    FAILS,
+    HOLDS,
+    NO_FLIP,
+    UNDECIDED,
+    flip_words,
+    held_words,
+    share,
+)
+from orchestrator.pages.report import found_studies
+from orchestrator.wording import listed
+from tests.checkout import ROOT
+
+FILE = ROOT / "docs" / "verdicts.md"
+HEAD = """# Every verdict, and how far it carries
+
+All claims of the four papers, judged over the values that each of them leaves open. A verdict in **bold** is
+robust: nothing flips it, no point of the region and no open value by itself.
+[How far a verdict carries](regions.md) says what is run and what the columns mean; the ranges of the open
+values, and the reason for each, stand in the study files and in `results/report.html`.
+
+*A test makes all these runs and holds this page to them.*
+"""
+KINDS = (HOLDS, UNDECIDED, FAILS["claims"])
+
+
+class Row(NamedTuple):
+    """A claim as a reader finds it."""
+
+    says: str
+    verdict: str
+    margin: str
+    region: str
+    flip: str
+
+    @property
+    def robust(self) -> bool:
+        """Whether nothing flips the verdict."""
+        return self.verdict.startswith("**")
+
+    @property
+    def kind(self) -> str:
+        """The verdict without emphasis."""
+        return self.verdict.strip("*")
+
+
+def studies() -> dict[str, Path]:
+    """Return title -> file of all studies with a region, in the order of the report."""
+    found = {file: load_experiment(file).spec for file in found_studies(ROOT / "scenarios")}
+    return {spec.title: file for file, spec in found.items() if spec.region}
+
+
+def rows_of(file: Path) -> list[Row]:
+    """Return the claims of a study from the `verdicts.csv` that it has left."""
+    with file.open(encoding="utf-8") as text:
+        return [_row(one) for one in csv.DictReader(text) if one["group"] == "claims"]
+
+
+def _row(one: Mapping[str, str]) -> Row:
+    mark = "**" if one["robust"] == "true" else ""
+    return Row(
+        one["says"],
+        f"{mark}{one['verdict']}{mark}",
+        share(float(one["margin [1]"])),
+        held_words(int(one["holds at"]), int(one["points"]), int(one["without result"])),
+        flip_words(one["flips by"], one["flips at"], one["chosen"]) if one["flips by"] else NO_FLIP,
+    )
+
+
+def table_in(text: str) -> list[list[str]]:
+    """Return the cells of all rows of the Markdown tables in a text, without the rules below headings."""
+    lines = [line.strip("|").split("|") for line in text.splitlines() if line.startswith("|")]
+    return [[cell.strip() for cell in line] for line in lines if not set(line[0].strip()) <= {"-", ":"}]
+
+
+def recorded() -> dict[str, list[Row]]:
+    """Return title of a study -> its claims, as the page tells them."""
+    parts = re.split(r"^## ", FILE.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+    return {part.partition("\n")[0]: [Row(*cells) for cells in table_in(part)[1:]] for part in parts}
+
+
+def page(found: Mapping[str, list[Row]]) -> str:
+    """Return the page."""
+    files = studies()
+    parts = [HEAD, _lines(("study", "claims", "robust", *KINDS), summary(found))]
+    for title, rows in found.items():
+        spec = load_experiment(files[title]).spec
+        assert spec.region
+        where = files[title].relative_to(ROOT)
+        parts.append(
+            f"## {title}\n\n`yawbench study {where}`; {spec.region.points} points over "
+            f"{listed(spec.region.open_values, last='and')}.\n"
+        )
+        parts.append(_lines(("the paper says", "verdict", "margin", "region", "nearest flip"), rows))
+    return "\n".join(parts)
+
+
+def summary(found: Mapping[str, list[Row]]) -> list[tuple[str, ...]]:
+    """Return how many claims of each study have which verdict."""
+    return [
+        (
+            title, str(len(rows)), str(sum(row.robust for row in rows)),
+            *(str(sum(row.kind == kind for row in rows)) for kind in KINDS),
+        )
+        for title, rows in found.items()
+    ]  # fmt: skip
+
+
+def _lines(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    head = [*head]
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
