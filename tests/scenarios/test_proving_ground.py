@@ -9,6 +9,7 @@ import pytest
 import yawbench as yb
 from orchestrator.evaluation.dwell_run import evaluate_dwell
 from orchestrator.evaluation.judgement import Judgement, Verdict
+from orchestrator.evaluation.lane_change_run import evaluate_lane_change
 from orchestrator.evaluation.slow_steer import evaluate_slow_steer
 from orchestrator.evaluation.trace import trace_of
 from orchestrator.plan import Change
@@ -63,3 +64,11 @@ def test_left_and_right_are_mirrors():
     left, right = dwell(179.5), dwell(-179.5)
     for key in ("ratio_1000", "ratio_1750", "displacement", "sideslip"):
         assert left[key] == pytest.approx(right[key], abs=1e-6), key
+
+
+def test_hard_takes_iso_3888_2_at_60_km_per_h_clean_with_fuzzy_pid_and_not_without_control():
+    """Without control it is clean up to 59.0 km/h, with fuzzy PID up to 61.6."""
+    settings = {"step_size": 0.002, "controller.step_size": 0.004, "allocator.step_size": 0.004}
+    for controller, verdict in (("off", Verdict.FAILED), ("fuzzy_pid", Verdict.PASSED)):
+        run = scenario("iso_3888_2", "hard").swap(controller=f"controller_{controller}").set(settings).run()
+        assert evaluate_lane_change(trace_of(run.results)).rulings["clean"].verdict is verdict
