@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -86,10 +85,10 @@ def load(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def findings(load, fmus):
+def findings(load, fmus, tmp_path_factory):
     """What the study comes to."""
     loaded = load()
-    planned = plan_experiment(loaded, jobs_of(loaded, Path("runs"), fmus, keep=False))
+    planned = plan_experiment(loaded, jobs_of(loaded, tmp_path_factory.mktemp("runs"), fmus, keep=False))
     records = {job.key: run_job(job).record for job in {job.key: job for job in planned.jobs}.values()}
     assert len(records) == 2 + 2 * 4  # what the axis does not change is made once
     return judge_records(planned, records)
