@@ -36,7 +36,14 @@ FILES, FILES_EACH = 32, 4
 processes; each takes a pipe for its report and one that tells of its end."""
 TRIES = 2
 """Times that a run is begun whose process dies; chosen: a kill from outside strikes seldom twice."""
-NEEDED = ("orchestrator.wiring.make_plan", "orchestrator.master.simulate", "matplotlib.backends.backend_agg")
+NEEDED = (
+    "orchestrator.wiring.make_plan",
+    "orchestrator.master.simulate",
+    "orchestrator.experiments.figures",
+    "matplotlib.backends.backend_agg",
+    "matplotlib.backends.backend_svg",
+    "matplotlib.mathtext",
+)
 """Modules that take long to import."""
 FOR_TESTS = ("scipy.signal", "orchestrator.evaluation.dwell_run")
 """Likewise, where runs are judged by a standard test."""
