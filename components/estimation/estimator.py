@@ -9,12 +9,15 @@ Common to all, in this order:
 
     zero points of gyro and a_y      learned straight ahead                        `estimation.zero_points`
     a_y = (f_y - zero) / (1 + phi_g)        phi_g: roll angle at 1 g               roll compensation
+    delta                            made as old as what inertial sensors say      `mathematics.low_pass`
     v_x                              from wheels and a_x                       `estimation.reference_speed`
     beta, dbeta/dt                   atan2(v_y, v_x), (v_x dv_y - v_y dv_x) / (v_x^2 + v_y^2)
     slips, velocities of wheels      kinematics                                 `cars.wheel_kinematics`
     loads                            quasi-static from a_x, a_y                  `cars.load_transfer`
 
-v_x and v_y are carried on by their rates over `signal_delay`, since messages are late and filtered. The body
+Gyro and accelerometers have a low pass and the hand wheel has none, so the steer angle is put through the
+same one to be of their time; otherwise a model steered too early would lay the difference in a_y at sideslip
+and friction. v_x and v_y, which are of that time, are carried on by their rates over `signal_delay`. The body
 leans by g phi_g per a_y / g, which adds phi_g a_y to what the accelerometer feels.
 
 There is no output `friction_*`: by its name it would drive the tyres of a scenario, and what an estimator
@@ -31,6 +34,7 @@ from ..cars.load_transfer import quasi_static_loads
 from ..cars.wheel_kinematics import slip_angle, slip_ratio, wheel_velocities
 from ..fmi.component import Component
 from ..fmi.variables import output
+from ..mathematics.low_pass import LowPass
 from .reference_speed import ReferenceSpeed
 from .zero_points import ZeroPoints
 
@@ -73,6 +77,8 @@ class Estimator(Component):
         self.zeros = ZeroPoints(self.p)
         self.speed = ReferenceSpeed(u[4:8], self.p)
         self.v_y = 0.0
+        self.steered = u[3]
+        self.steering = LowPass(self.p.inertial_bandwidth, u[3]) if self.p.inertial_bandwidth else None
         self.begin()
         self._conclude(u, 0.0, 0.0)
 
@@ -82,6 +88,7 @@ class Estimator(Component):
         felt_r, a_x, felt_y, delta = u[:4]
         zeros = self.zeros
         zeros.see(h, r=felt_r, a_y=felt_y, delta=delta)
+        delta = self._steered(h, delta)
         r = felt_r - zeros.yaw_rate
         a_y = (felt_y - zeros.acceleration) / (1.0 + self.p.roll_at_1_g)
         self.speed.see(u[4:8], h, r=r, v_y=self.v_y, delta=delta, a_x=a_x)
@@ -90,6 +97,14 @@ class Estimator(Component):
 
     def output(self, t: float, u: list[float]) -> list[float]:
         return self.known
+
+    def _steered(self, h: float, delta: float) -> float:
+        """Return the steer angle [rad] at the time of what the inertial sensors say."""
+        if self.steering is None:
+            return delta
+        self.steering.advance(h, self.steered, delta)
+        self.steered = delta
+        return self.steering.x
 
     def _conclude(self, u: list[float], a_y: float, rate: float) -> None:
         """Set what is known of the car now, from a_y and dv_y/dt [m/s2]."""

@@ -28,6 +28,13 @@ class EstimatorParameters:
         "chosen: between dry tyres of 15 and 25",
         minimum=1.0,
     )
+    inertial_bandwidth: float = parameter(
+        21.0,
+        "Hz",
+        "Low pass (-3 dB) of gyro and accelerometers, 0: none",
+        "Bosch, SMI700 product sheet: 21 Hz",
+        minimum=0.0,
+    )
     signal_delay: float = parameter(
         0.02,
         "s",

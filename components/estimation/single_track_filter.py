@@ -69,10 +69,10 @@ class FilterParameters(EstimatorParameters):
         0.5, "1", "Share of the measured a_y in the prediction", _TUNED, minimum=0.0, maximum=1.0
     )
     velocity_wander: float = parameter(
-        0.2, "m/s2", "Random walk of v_y, m/s per root of a second", _TUNED, minimum=0.0
+        0.1, "m/s2", "Random walk of v_y, m/s per root of a second", _TUNED, minimum=0.0
     )
     friction_wander: float = parameter(
-        0.5, "1", "Random walk of friction, per root of a second", _TUNED, minimum=0.0
+        0.3, "1", "Random walk of friction, per root of a second", _TUNED, minimum=0.0
     )
     acceleration_deviation: float = parameter(
         0.5, "m/s2", "How far the model's a_y is from the measured one", _TUNED, minimum=0.001

@@ -1,13 +1,13 @@
 """One channel of a sensor: from a true signal to the messages that a control unit receives.
 
-    low pass    x'' + sqrt(2) w x' + w^2 x = w^2 u           w = 2 pi bandwidth, -3 dB there     (1)
+    low pass    x'' + sqrt(2) w x' + w^2 x = w^2 u           w = 2 pi bandwidth                  (1)
     measured    y_k = gain x(t_k) + bias + drift (t_k - t_0) + noise N_k       t_k = t_0 + k T    (2)
     message     m_k = round(limit(y_k) / quantum) quantum                                        (3)
     received    m_k from t_k + latency until the next message is there                            (4)
 
 A bandwidth, noise, range, quantum or latency of zero is none of it, not a zero; without sample time T every
 communication point is a message. The signal runs in a straight line from one communication point to the
-next and the low pass is solved exactly for that (`mathematics.oscillator`), so messages fall at their own
+next and the low pass (`mathematics.low_pass`) is solved exactly for that, so messages fall at their own
 times, whatever the step. N_k is counted, not drawn one after the other (`sensing.noise`). Until the first
 message arrives, its value is there already; a low pass starts settled.
 """
@@ -15,9 +15,8 @@ message arrives, its value is there already; a low pass starts settled.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi, sqrt
 
-from ..mathematics.oscillator import transition
+from ..mathematics.low_pass import LowPass
 from . import noise
 
 SLACK = 1e-9
@@ -62,33 +61,6 @@ class Figures:
         if self.quantum:
             y = round(y / self.quantum) * self.quantum
         return y
-
-
-class LowPass:
-    """Equation (1) for a signal that runs in straight lines.
-
-    Args:
-        bandwidth: [Hz], positive.
-        value: of the signal at the start, where the filter has settled.
-    """
-
-    def __init__(self, bandwidth: float, value: float) -> None:
-        self.w = 2.0 * pi * bandwidth
-        self.x, self.dx = value, 0.0
-        self.h = 0.0
-        self.phi = (1.0, 0.0, 0.0, 1.0)
-
-    def advance(self, h: float, begin: float, end: float) -> None:
-        """Take the filter over `h` > 0 [s], the signal running from `begin` to `end`."""
-        if h != self.h:
-            self.h = h
-            self.phi = transition(self.w / sqrt(2.0), self.w * self.w, h)
-        slope = (end - begin) / h
-        behind = slope * sqrt(2.0) / self.w  # the settled filter follows a ramp that far behind
-        x, dx = self.x - (begin - behind), self.dx - slope
-        t_11, t_12, t_21, t_22 = self.phi
-        self.x = end - behind + (t_11 * x + t_12 * dx)
-        self.dx = slope + (t_21 * x + t_22 * dx)
 
 
 class Channel:

@@ -10,6 +10,7 @@ from components.estimation.dugoff_axle import axle_force
 from components.estimators.kinematic import Kinematic
 from components.estimators.observer import Observer
 from components.estimators.told import Told
+from components.mathematics.low_pass import LowPass
 from components.tyres.dugoff import dugoff
 from vocabulary.wheels import WHEELS
 
@@ -52,6 +53,35 @@ def test_in_a_steady_turn_with_grip_the_sideslip_is_that_of_the_single_track_and
     assert y["friction"] == pytest.approx(0.6, abs=0.01)
     assert y["velocity_x"] == pytest.approx(V, rel=1e-3)
     assert abs(y["sideslip_rate"]) < 1e-3
+
+
+def weave(**parameters: float) -> float:
+    """Return the largest error of v_y [m/s] in a weave with grip that inertial sensors tell 11 ms late."""
+    a, b, m, i_z, c_f, c_r = 1.04, 1.56, 1350.0, 1343.1, *AXLES.values()
+    stand = Stand(Observer, initial_friction=1.2, **parameters)
+    stand.start(**ROLLING)
+    filters = LowPass(21.0, 0.0), LowPass(21.0, 0.0)
+    beta = r = last_r = last_a = worst = 0.0
+    for k in range(1, 300):
+        for j in range(20):
+            delta = 0.02 * sin(6.0 * (k - 1 + j / 20) * 0.01)
+            front, rear = c_f * (delta - beta - a * r / V), c_r * (b * r / V - beta)
+            a_y = (front + rear) / m
+            beta, r = beta + 5e-4 * (a_y / V - r), r + 5e-4 * (a * front - b * rear) / i_z
+        for low, before, now in zip(filters, (last_r, last_a), (r, a_y), strict=True):
+            low.advance(0.01, before, now)
+        last_r, last_a = r, a_y
+        felt = {"yaw_rate": filters[0].x, "acceleration_y": filters[1].x}
+        y = stand.step(0.01, steer_angle=0.02 * sin(0.06 * k), **felt, **turning(r))
+        worst = max(worst, abs(y["velocity_y"] - V * beta))
+    return worst
+
+
+def test_signals_of_one_time_tell_the_sideslip_better_than_a_hand_wheel_ahead_of_the_others():
+    believing = {"signal_delay": 0.0107, "velocity_wander": 2.0}  # a_y, as it is measured
+    aligned, ahead = weave(**believing), weave(**believing, inertial_bandwidth=0.0)
+    assert aligned < 0.4 * ahead
+    assert aligned < 0.015
 
 
 @pytest.mark.parametrize("begin", [0.5, 0.8])

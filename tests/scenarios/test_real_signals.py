@@ -84,6 +84,7 @@ def test_the_documentation_has_what_the_studies_measure(name, rows, page, tmp_pa
         main(["study", str(ROOT / f"scenarios/real_signals/{name}.yaml"), "--out", str(tmp_path)])
     assert not exit_.value.code
     study = json.loads((tmp_path / "experiment.json").read_text("utf-8"))
+    assert {check["verdict"] for check in study["checks"]} <= {"holds"}
     written = (ROOT / "docs" / f"{page}.md").read_text("utf-8")
     assert [row for row in rows(study) if row not in written] == []
 
