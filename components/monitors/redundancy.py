@@ -38,12 +38,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from vocabulary.gravity import G
+from vocabulary.wheels import wheels
 
 from ..cars.published_cars import PaperB
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
 
 GYRO, ACCELEROMETER, HAND_WHEEL, WHEEL = 1.0, 2.0, 3.0, 4.0
+INPUTS = ("yaw_rate", "acceleration_y", "steer_angle", "wheel_speed_*", "friction")
+SEEN = (*INPUTS[:3], *wheels("wheel_speed_*"), "friction")
+"""What is watched, of which any step may show a fault."""
 SLOWEST = 3.0
 """Speed below which nothing is judged [m/s]; chosen: a_y / v is noise there."""
 SLOW = 10.0
@@ -109,13 +113,17 @@ class Redundancy(Component):
     Parameters = RedundancyParameters
     sampled = True
     inputs = (
-        *("yaw_rate", "acceleration_y", "steer_angle", "wheel_speed_*", "friction"),
+        *INPUTS,
         signal("yaw_moment_wanted", "N.m", "Yaw moment that the controller asks for"),
     )
     outputs = (
         output("yaw_moment", "yaw_moment_wanted"),
-        output("fault", unit="1", text="0: none; 1: gyro, 2: accelerometer, 3: hand wheel, 4: wheel speed"),
-        output("implied_sideslip", unit="rad", text="Sideslip angle that gyro and accelerometer imply"),
+        output(
+            "fault", *SEEN, unit="1", text="0: none; 1: gyro, 2: accelerometer, 3: hand wheel, 4: wheel speed"
+        ),
+        output(
+            "implied_sideslip", *SEEN, unit="rad", text="Sideslip angle that gyro and accelerometer imply"
+        ),
     )
 
     def configure(self) -> None:

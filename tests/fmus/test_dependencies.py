@@ -24,7 +24,13 @@ COMPONENTS = find_components()
 FORCES = {"steer_angle", "yaw_moment", "slope", "bank", "wind_force_y", "wind_moment_z"} | {
     f"tyre_{signal}_{wheel}" for signal in ("force_x", "force_y", "moment_z") for wheel in WHEELS
 }
-SLOW = {"estimator_kinematic", "estimator_observer", "sensor_poor", "sensor_production"}
+SLOW = {
+    "estimator_kinematic",
+    "estimator_observer",
+    "monitor_redundancy",
+    "sensor_poor",
+    "sensor_production",
+}
 GIVEN = {
     "road_patchwork": {
         "patches": "y > 0; 0.3: 40 < x < 60",
