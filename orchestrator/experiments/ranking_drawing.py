@@ -15,7 +15,6 @@ from .ranking import SERIES
 from .standings import Cell, Standing
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from .ranking_course import Ranked
@@ -103,12 +102,16 @@ def draw_pareto(ranked: Ranked, note: str) -> Figure:
     ]
     with new_figure() as figure:
         axes = figure.subplots()
-        front = sorted(best, key=lambda point: point[0])
+        front = sorted(best, key=lambda point: point[:2])
         axes.plot([x for x, _, _ in front], [y for _, y, _ in front], color=QUIET, linewidth=1.0, zorder=1)
-        for x, y, one in points:
+        for x, y, one in points[::-1]:
             marker, colour = TUNED[one.spec.gains]
-            axes.plot([x], [y], marker, color=colour, markersize=6, zorder=3)
-        _label(axes, points)
+            axes.plot([x], [y], marker, color=colour, markersize=12, zorder=3, markeredgecolor="white")
+            axes.text(
+                x, y, str(one.place), color="white", fontsize=7, weight="bold", ha="center", va="center"
+            )
+        for x, y, one in front:
+            axes.annotate(literal(one.spec.title), (x, y), (0, 10), textcoords="offset points", ha="center")
         axes.set_xlabel("Intervention: ∫|torque| dt of the wheel that gets most, mean [kN·m·s]")
         axes.set_title("Stability margin: points of per cent below the limits, least of each condition, mean")
         handles = [
@@ -117,26 +120,8 @@ def draw_pareto(ranked: Ranked, note: str) -> Figure:
             if any(one.spec.gains == whose for _, _, one in points)
         ]
         handles.append(Line2D([], [], color=QUIET, linewidth=1.0, label="none is better in both"))
-        frame(figure, 4.6, handles, "Stability over intervention", note)
+        frame(figure, 4.6, handles, "Stability over intervention; numbers are places", note)
     return figure
-
-
-def _label(axes: Axes, points: list[tuple[float, float, Standing]]) -> None:
-    """Write names beside points, upwards to the right, each clear of those before."""
-    xs, ys = [x for x, _, _ in points], [y for _, y, _ in points]
-    wide, high = max(xs) - min(xs) or 1.0, max(ys) - min(ys) or 1.0
-    axes.set_xlim(min(xs) - 0.05 * wide, max(xs) + 0.22 * wide)
-    axes.set_ylim(min(ys) - 0.08 * high, max(ys) + 0.1 * high)
-    taken: list[tuple[float, float]] = []
-    for x, y, one in sorted(points, key=lambda point: -point[1]):
-        at = y
-        while any(abs(x - other) < 0.2 * wide and abs(at - beside) < 0.045 * high for other, beside in taken):
-            at -= 0.015 * high
-        taken.append((x, at))
-        axes.annotate(
-            literal(one.spec.title), (x, y), (x + 0.018 * wide, at), va="center", fontsize=8,
-            arrowprops={"arrowstyle": "-", "color": "#BBBBBB", "linewidth": 0.6} if at != y else None,
-        )  # fmt: skip
 
 
 def draw_run(folder: Path, angle: float, again: bool = False) -> None:

@@ -39,6 +39,11 @@ def points(number: float | None) -> Words:
     return None if number is None else digits_of(number, 2)
 
 
+def step_time(seconds: float | None) -> str | None:
+    """Return the processor time of a step in microseconds."""
+    return None if seconds is None else f"{digits_of(1e6 * seconds)} µs"
+
+
 def spread(one: Interval | None, words: Callable[[float], str]) -> str | None:
     """Return a mean over repeats with the half width of its confidence interval, if it has one."""
     if one is None:
@@ -49,7 +54,7 @@ def spread(one: Interval | None, words: Callable[[float], str]) -> str | None:
 def table_of(ranked: Ranked, *left_out: str) -> Table:
     """Return the table of controllers, the first place first; `left_out`: headings."""
     kept = [k for k, heading in enumerate(HEADINGS) if heading not in left_out]
-    title, numbers = ranked.ranking.spec.title, {kept.index(k) for k in (0, 3, 4, 6) if k in kept}
+    title, numbers = ranked.ranking.spec.title, {kept.index(k) for k in (0, 3, 4, 6, 11) if k in kept}
     rows = [row_of(one) for one in ranked.standings]
     return Table(
         title, [HEADINGS[k] for k in kept], [[row[k] for k in kept] for row in rows], [RULE], numbers
@@ -72,7 +77,7 @@ def row_of(one: Standing) -> list[Words]:
         value(one.mean("speed_lost"), "m/s"),
         value(one.mean("intervention"), "N.m.s"),
         value(one.mean("chatter"), "N.m/s"),
-        value(one.step_time, "s"),
+        step_time(one.step_time),
     ]
 
 

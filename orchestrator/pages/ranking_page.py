@@ -16,7 +16,16 @@ from ..experiments.jobs import STEP_TIME
 from ..experiments.ranking_course import Ranked
 from ..experiments.ranking_drawing import RUN, place_words, words_of
 from ..experiments.ranking_schema import EntrySpec
-from ..experiments.ranking_tables import HEADINGS, RULE, row_of, runs_table, spread, table_of, value
+from ..experiments.ranking_tables import (
+    HEADINGS,
+    RULE,
+    row_of,
+    runs_table,
+    spread,
+    step_time,
+    table_of,
+    value,
+)
 from ..experiments.standings import Cell, Standing
 from ..experiments.tables import Table
 from ..plan import FAULTS, Change
@@ -120,7 +129,7 @@ def _cell(ranked: Ranked, one: Standing, cell: Cell, folder: Path) -> dict[str, 
         ("speed lost", _text(cell.mean("speed_lost"), "m/s")),
         ("intervention", _text(cell.mean("intervention"), "N.m.s")),
         ("chatter", _text(cell.mean("chatter"), "N.m/s")),
-        ("time per step", _text(cell.mean(STEP_TIME), "s")),
+        ("time per step", step_time(cell.mean(STEP_TIME))),
     ]
     return {
         "id": _id(cell),

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import csv
+import re
+import subprocess
+import sys
 from math import radians
 from pathlib import Path
 
@@ -155,6 +158,33 @@ def test_a_small_matrix_is_driven_goes_on_where_it_was_and_shows_what_is_missing
     drawn = next(out.glob("runs/*/sine_with_dwell.svg"))
     assert f'href="{drawn.relative_to(out).as_posix()}"' in page
     assert "drive sine-with-dwell" in page
+
+
+@pytest.mark.exhaustive
+def test_a_ranking_that_was_killed_goes_on_where_it_was(tmp_path, capsys):
+    file, out = tmp_path / "small.yaml", tmp_path / "out"
+    file.write_text(SMALL)
+    program = "import sys; from orchestrator.cli import main; main(sys.argv[1:])"
+    command = [sys.executable, "-c", program, "rank", str(file), "--out", str(out), "--jobs", "1"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT) as process:
+        assert process.stderr is not None
+        next(line for line in process.stderr if line.startswith("[1/4]"))
+        process.kill()
+    assert not (out / "table.csv").exists()
+    assert call("rank", file, "--out", out) == 0
+    told = capsys.readouterr().err
+    assert re.search(r"small: 4 runs, [123] finished before", told), told
+    assert [one["missing"] for one in rows(out / "table.csv")] == ["0", "0"]
+
+
+@pytest.mark.exhaustive
+def test_noisy_sensors_give_a_margin_with_its_confidence(tmp_path):
+    options = ("--condition", "saloon75_sensors", "--quick", "--only", "sliding_mode", "--out", tmp_path)
+    assert call("rank", GROUND / "ranking.yaml", *options) == 0
+    cell = next(row for row in rows(tmp_path / "cells.csv") if row["entry"] == "sliding_mode")
+    assert int(cell["runs"]) == 5  # seeds
+    assert 0 < float(cell["sideslip_half_width [rad]"]) < radians(1.0)
+    assert "95 % confidence of the mean over 5 seeds" in (tmp_path / "report.html").read_text()
 
 
 @pytest.mark.parametrize(
