@@ -83,18 +83,22 @@ def draw_matrix(ranked: Ranked, note: str) -> Figure:
 def draw_pareto(ranked: Ranked, note: str) -> Figure:
     """Return stability over intervention, a point per controller; those that none betters are joined.
 
+    Who asks for no moment at all is told of below: a car without control is far from all others.
+
     Raises:
         ResultsError: there is no controller to draw.
     """
     from matplotlib.lines import Line2D
 
-    points = [
+    every = [
         (1e-3 * x, y, one)
         for one in ranked.standings
         if (x := one.mean("intervention")) is not None and (y := one.mean("margin")) is not None
     ]
+    points = [point for point in every if point[2].mean("effort")]
+    left_out = [f"{one.spec.title}: {y:.0f} points" for _, y, one in every if not one.mean("effort")]
     if not points:
-        raise ResultsError("nothing to draw: no controller has all of its runs.")
+        raise ResultsError("nothing to draw: no controller that acts has all of its runs.")
     best = [
         point
         for point in points
@@ -106,7 +110,7 @@ def draw_pareto(ranked: Ranked, note: str) -> Figure:
         axes.plot([x for x, _, _ in front], [y for _, y, _ in front], color=QUIET, linewidth=1.0, zorder=1)
         for x, y, one in points[::-1]:
             marker, colour = TUNED[one.spec.gains]
-            axes.plot([x], [y], marker, color=colour, markersize=12, zorder=3, markeredgecolor="white")
+            axes.plot([x], [y], marker, color=colour, markersize=11, zorder=3, markeredgecolor="white")
             axes.text(
                 x, y, str(one.place), color="white", fontsize=7, weight="bold", ha="center", va="center"
             )
@@ -120,7 +124,13 @@ def draw_pareto(ranked: Ranked, note: str) -> Figure:
             if any(one.spec.gains == whose for _, _, one in points)
         ]
         handles.append(Line2D([], [], color=QUIET, linewidth=1.0, label="none is better in both"))
-        frame(figure, 4.6, handles, "Stability over intervention; numbers are places", note)
+        frame(
+            figure,
+            4.9,
+            handles,
+            "Stability over intervention; numbers are places",
+            " · ".join([*left_out, note]),
+        )
     return figure
 
 
