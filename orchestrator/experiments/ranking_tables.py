@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from ..evaluation.dwell_run import percent
 from ..figures.display import digits_of
 from ..metrics.run_metrics import Value
 from .jobs import STEP_TIME
@@ -90,7 +91,7 @@ def runs_table(cell: Cell) -> Table:
         "COS + 1 s", "COS + 1.75 s", "displacement", "sideslip", "speed lost", "intervention", "chatter",
         "verdict",
     ]  # fmt: skip
-    table = Table("", headings, numbers={0, 1})
+    table = Table("", headings, numbers={0, 1, headings.index("COS + 1 s"), headings.index("COS + 1.75 s")})
     for one in cell.runs:
         drive = one.drive
         table.rows.append(
@@ -108,7 +109,7 @@ def runs_table(cell: Cell) -> Table:
 
 def _ratio(run: Driven, key: str) -> Words:
     found = run[key]
-    return None if found is None else f"{100 * found + 0.0:.1f} %"
+    return None if found is None else percent(found)
 
 
 def columns_of_entries(ranked: Ranked) -> list[Column]:

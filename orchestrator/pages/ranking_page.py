@@ -142,14 +142,27 @@ def _cell(ranked: Ranked, one: Standing, cell: Cell, folder: Path) -> dict[str, 
         "picture": picture,
         "amplitude": f"{math.degrees(kept.amplitude):.1f}°" if kept else "",
         "command": series_command(ranked, cell),
-        "again": shlex.join(["yawbench", "rank", str(ranked.ranking.path), "--only", cell.entry,
-                             "--condition", cell.condition, "--fresh"]),
+        "again": again_command(ranked, cell, folder),
     }  # fmt: skip
 
 
 def _text(number: float | None, unit: str) -> str | None:
     found = Table("", ["", ""], [["", value(number, unit)]]).text()[0][1]
     return None if number is None else found
+
+
+def again_command(ranked: Ranked, cell: Cell, folder: Path) -> str:
+    """Return the command that makes a cell's runs again, beside those that are there."""
+    words = [
+        "yawbench",
+        "rank",
+        str(ranked.ranking.path),
+        "--only",
+        cell.entry,
+        "--condition",
+        cell.condition,
+    ]
+    return shlex.join([*words, "--out", str(folder / "again")])
 
 
 def series_command(ranked: Ranked, cell: Cell) -> str:
