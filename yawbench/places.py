@@ -144,7 +144,12 @@ def _open(programs: dict[Path, Program], unit: Any, log: Any, corrupted: set[Pat
 
 @dataclass(frozen=True)
 class Places:
-    """Where controllers stand; made by `rank`."""
+    """Where controllers stand; made by `rank`.
+
+    >>> places = yb.rank(against=["none"], conditions=["hard"], quick=True)
+    >>> places.cells[["entry", "condition", "state"]].values.tolist()
+    [['none', 'hard', 'failed']]
+    """
 
     ranked: Ranked
 
