@@ -59,7 +59,7 @@ def rank(
     isolate: Isolate = False,
     call_limit: CallLimit = None,
 ) -> None:
-    """Rank controllers: who holds which car under which conditions, by sine with dwell.
+    """Rank controllers by sine with dwell.
 
     Begin with report.html. Without --out, results go to results/<folder of the ranking>/<its name>. Runs that
     have been made already, of the same scenario, FMUs and program, are not made again; an entry that lacks

@@ -51,7 +51,7 @@ def in_one_sentence(said, arguments, words):
         (("run", "fuzy_pid/sine"), [f"{KNOWN} 'fuzzy_pid/sine'?"]),
         (("run", FILE.replace("single", "singel")), ["no such scenario file", KNOWN, "single_sine.yaml"]),
         (("run", "scenarios/fuzzy_feedback/study.yaml"), ["a study file, not a scenario", "yawbench study"]),
-        (("study", FILE), ["a scenario, not a tuning file, a sweep file or a study file", "`yawbench run`"]),
+        (("study", FILE), ["a scenario, not a tuning file, a study file or a sweep file", "`yawbench run`"]),
         (("run", "scenarios/vehicles/esp_saloon.yaml"), ["a scenario names it under 'vehicle'"]),
         (("run", "empty.yaml"), ["empty.yaml: this scenario file is empty"]),
         (("run", "tabs.yaml"), ["tabs.yaml:3: not valid YAML", "indent with spaces, not tabs"]),
