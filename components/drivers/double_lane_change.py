@@ -25,9 +25,9 @@ from math import cos, sin
 from ..cars.published_cars import PaperC
 from ..cars.single_track_car import SingleTrackCar
 from ..driving.speed_holding import HeldSpeedParameters, SpeedHold
-from ..driving.track import LaneChangeParameters, Track
+from ..driving.track import TRACK_OUTPUTS, LaneChangeParameters, Track
 from ..fmi.component import Component
-from ..fmi.variables import like, output, parameter
+from ..fmi.variables import like, parameter
 from ..mathematics.first_order_lag import Stage
 
 
@@ -82,15 +82,7 @@ class DoubleLaneChange(Component):
         "steer_angle",
         "drive_force",
         "steering_wheel_angle",
-        output(
-            "path_offset", "position_x", "position_y", unit="m", text="Distance from the path, positive left"
-        ),
-        output(
-            "cone_overrun",
-            *("position_x", "position_y", "yaw_angle"),
-            unit="m",
-            text="How far the car's outline is beyond the cones, 0 inside",
-        ),
+        *TRACK_OUTPUTS,
     )
 
     def configure(self) -> None:

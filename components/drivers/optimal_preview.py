@@ -39,9 +39,9 @@ from ..cars.published_cars import PaperC
 from ..cars.single_track_car import SingleTrackCar
 from ..driving.lane_path import LanePath
 from ..driving.speed_holding import HeldSpeedParameters, SpeedHold
-from ..driving.track import LaneChangeParameters, Track
+from ..driving.track import TRACK_OUTPUTS, LaneChangeParameters, Track
 from ..fmi.component import Component
-from ..fmi.variables import like, output, parameter
+from ..fmi.variables import like, parameter
 from ..mathematics.preview_control import discrete, tracking_gains
 from .double_lane_change import DoubleLaneChangeParameters
 
@@ -134,15 +134,7 @@ class OptimalPreview(Component):
         "steer_angle",
         "drive_force",
         "steering_wheel_angle",
-        output(
-            "path_offset", "position_x", "position_y", unit="m", text="Distance from the path, positive left"
-        ),
-        output(
-            "cone_overrun",
-            *("position_x", "position_y", "yaw_angle"),
-            unit="m",
-            text="How far the car's outline is beyond the cones, 0 inside",
-        ),
+        *TRACK_OUTPUTS,
     )
 
     def configure(self) -> None:

@@ -14,7 +14,18 @@ from typing import NamedTuple
 
 from vocabulary.lane_change import PART_1, PART_2, lanes
 
-from ..fmi.variables import parameter
+from ..fmi.variables import output, parameter
+
+TRACK_OUTPUTS = (
+    output("path_offset", "position_x", "position_y", unit="m", text="Distance from the path, positive left"),
+    output(
+        "cone_overrun",
+        *("position_x", "position_y", "yaw_angle"),
+        unit="m",
+        text="How far the car's outline is beyond the cones, 0 inside",
+    ),
+)
+"""What a driver tells of his way through the track."""
 
 
 class Outline(NamedTuple):
