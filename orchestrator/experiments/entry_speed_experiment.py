@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..errors import ScenarioError
-from ..evaluation.judgement import Verdict
+from ..evaluation.judgement import Judgement, Verdict
 from ..evaluation.lane_change_run import evaluate_lane_change
 from ..evaluation.lane_change_series import CLEAN, EntrySpeedSeries, highest_clean, judge_entry_speeds
 from ..evaluation.trace import Trace, trace_of
@@ -88,14 +88,16 @@ class EntrySpeedExperiment:
             ResultsError: a run has not recorded what it needs.
         """
         traces: list[Trace] = []
+        judged: list[Judgement] = []
 
         def clean(speed: float) -> bool:
             job = self.at(speed, once)
             if not make(job):
                 return False
             traces.append(replace(trace_of(load_results(job.out)), label=f"{job.label} km/h"))
-            return evaluate_lane_change(traces[-1]).rulings[CLEAN].verdict is Verdict.PASSED
+            judged.append(evaluate_lane_change(traces[-1]))
+            return judged[-1].rulings[CLEAN].verdict is Verdict.PASSED
 
         first, _ = self.first(once)
         highest_clean(clean, first=first, step=STEP, resolution=RESOLUTION, least=LEAST, most=MOST)
-        return traces, judge_entry_speeds([evaluate_lane_change(trace) for trace in traces])
+        return traces, judge_entry_speeds(judged)
