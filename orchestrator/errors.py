@@ -54,6 +54,8 @@ class Problem(str):
 class YawbenchError(Exception):
     """Base of all errors; `problems` are its sentences, each with its file and line if it has any.
 
+    `file` and `line` are those of the first problem that has them, None where none has.
+
     >>> try:
     ...     yb.load("fnn_sideslip/26mps")
     ... except yb.YawbenchError as error:
@@ -66,6 +68,9 @@ class YawbenchError(Exception):
     def __init__(self, problems: str | Iterable[str]) -> None:
         given = [problems] if isinstance(problems, str) else problems
         self.problems = [one if isinstance(one, Problem) else Problem(one) for one in given]
+        placed = next((one for one in self.problems if one.file), None)
+        self.file = placed.file if placed else None
+        self.line = placed.line if placed else None
         super().__init__("\n".join(self.problems))
 
 

@@ -1,4 +1,5 @@
-"""Processes of the standard library's multiprocessing that leave modules in the working folder alone."""
+"""Processes of the standard library's multiprocessing that run neither the caller's script once more nor
+modules in the working folder."""
 
 from __future__ import annotations
 
@@ -6,9 +7,9 @@ import contextlib
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from multiprocessing import util
-from multiprocessing.context import SpawnContext, SpawnProcess
+from multiprocessing import context, util
 from multiprocessing.process import BaseProcess
+from types import ModuleType
 from typing import Any
 
 SAFE_PATH = "PYTHONSAFEPATH"
@@ -44,16 +45,47 @@ def _off_path(command: Sequence[str]) -> list[str]:
     return [*command[:at], f"import sys; del sys.path[0]; {command[at]}", *command[at + 1 :]]
 
 
-class SafeSpawnProcess(SpawnProcess):
+@contextlib.contextmanager
+def no_script() -> Iterator[None]:
+    """Let processes that multiprocessing starts meanwhile leave the program's script alone.
+
+    They would run it once more, which needs `if __name__ == "__main__":` there; what they do is
+    importable from elsewhere.
+    """
+    script = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script
+
+
+class SafeSpawnProcess(context.SpawnProcess):
     """A process that starts afresh."""
 
     @staticmethod
     def _Popen(process: BaseProcess) -> Any:
-        with safe_path():
-            return SpawnProcess._Popen(process)  # type: ignore[attr-defined]
+        with safe_path(), no_script():
+            return context.SpawnProcess._Popen(process)  # type: ignore[attr-defined]
 
 
-class SafeSpawnContext(SpawnContext):
+class SafeSpawnContext(context.SpawnContext):
     """What starts such processes."""
 
     Process = SafeSpawnProcess
+
+
+if hasattr(context, "ForkServerContext"):  # not on Windows
+
+    class SafeForkServerProcess(context.ForkServerProcess):
+        """A process that a server starts, which has imported what it needs."""
+
+        @staticmethod
+        def _Popen(process: BaseProcess) -> Any:
+            with no_script():
+                return context.ForkServerProcess._Popen(process)  # type: ignore[attr-defined]
+
+    class SafeForkServerContext(context.ForkServerContext):
+        """What starts such processes."""
+
+        Process = SafeForkServerProcess

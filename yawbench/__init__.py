@@ -16,7 +16,8 @@ proved itself:
     yb.load("fnn_sideslip/25mps").swap(controller=proportional).run().metric("peak(sideslip)")
 
 Scenarios never change: `swap` and `set` give new ones. Nothing is written, and nothing is printed,
-unless asked for. Errors are of one tree; each has `problems`, sentences that know their `file` and `line`:
+unless asked for. Errors are of one tree; each has `problems`, sentences that know their `file` and `line`,
+and is itself at those of the first:
 
     YawbenchError
     ├── ScenarioError             the scenario or a change of it is wrong

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 def experiment(
-    base: Scenario, axes: Mapping[str, Sequence[Any]], *, metrics: Iterable[str] = ()
+    base: Scenario, axes: Mapping[str, Iterable[Any]], *, metrics: str | Iterable[str] = ()
 ) -> Experiment:
     """Return the runs of a scenario at every combination of levels, to be made by `run`.
 
@@ -55,6 +55,8 @@ def experiment(
     given: dict[str, Any] = {}
     changed = base
     for name, levels in axes.items():
+        if isinstance(levels, str) or not isinstance(levels, Iterable):
+            raise ScenarioError(f"{name}: give a list of levels (got {levels!r})")
         if name in base.loaded.units:
             variants = {}
             for level in levels:
@@ -69,7 +71,8 @@ def experiment(
             given[name] = {"variants": variants}
         else:
             given[name] = {"vary": name, **_values(name, levels)}
-    spec = {"scenario": base.path.name, "axes": given, "metrics": {one: {"metric": one} for one in metrics}}
+    wanted = [metrics] if isinstance(metrics, str) else metrics
+    spec = {"scenario": base.path.name, "axes": given, "metrics": {one: {"metric": one} for one in wanted}}
     made = _checked(ExperimentSpec, {"title": base.title or base.path.stem, **spec})
     run = NamedRun("", "", "", base.path, ())
     return Experiment(changed, Design(base.path, made, {"": run}, (), base.changes))
@@ -84,7 +87,7 @@ def _checked(model: type[Model], given: dict[str, Any]) -> Model:
     return made
 
 
-def _values(name: str, levels: Sequence[Any]) -> dict[str, Any]:
+def _values(name: str, levels: Iterable[Any]) -> dict[str, Any]:
     """Return levels as an axis has them: numbers apart from the unit that they share."""
     split = [number_and_unit(level) if isinstance(level, str) else None for level in levels]
     units = {one[1] for one in split if one}

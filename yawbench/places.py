@@ -66,8 +66,7 @@ def rank(
         quick: the last amplitude of few conditions.
         ranking: a name in a folder of scenarios, or the path of a file.
         out: folder that keeps finished runs, such as that of `yawbench rank`; default: none is kept.
-        workers: processes at a time; default: one per core. Plain Python is run in this one. A script has
-            to call this below `if __name__ == "__main__":`, as for all that starts processes.
+        workers: processes at a time; default: one per core. Plain Python is run in this one.
 
     Raises:
         YawbenchError: the controller is none, or a run cannot start.

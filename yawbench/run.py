@@ -17,7 +17,7 @@ from orchestrator.errors import ResultsError, ScenarioError
 from orchestrator.evaluation.judgement import Judgement
 from orchestrator.evaluation.standard_tests import TESTS
 from orchestrator.evaluation.trace import trace_of
-from orchestrator.metrics.run_metrics import STANDARD, Value, evaluate, evaluate_all, metric
+from orchestrator.metrics.run_metrics import STANDARD, Value, evaluate, evaluate_all, metric, why_none
 from orchestrator.results.read import Results, load_results
 from orchestrator.wording import hint
 
@@ -121,9 +121,11 @@ class Run:
             ScenarioError: there is no such measure.
             ResultsError: the run has not recorded what it needs, or does not last for the window.
         """
-        value = evaluate(self.results, metric(name), window)
+        chosen = metric(name)
+        value = evaluate(self.results, chosen, window)
         if value is None:
-            raise ResultsError(f"{name}: this run gives no number; it has recorded {', '.join(self)}.")
+            why = why_none(self.results, chosen, window or chosen.window, self.time[-1])
+            raise ResultsError(why or f"{name}: this run gives no number")
         return value.number
 
     def metrics(self) -> dict[str, Value]:

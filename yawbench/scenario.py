@@ -9,7 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from orchestrator.errors import ScenarioError, SimulationError
+from orchestrator.errors import Problem, ScenarioError, SimulationError
 from orchestrator.fmu.opener import Opener
 from orchestrator.master.opening import open_unit
 from orchestrator.master.simulate import simulate_in_memory
@@ -89,9 +89,8 @@ class Scenario:
         changes, programs = [*self.changes], dict(self.programs)
         for unit, wanted in units.items():
             if unit not in given:
-                raise ScenarioError(
-                    f"{self.path}: there is no unit {unit!r}{hint(unit, given, lead='units')}"
-                )
+                text = f"there is no unit {unit!r}{hint(unit, given, lead='units')}"
+                raise ScenarioError([Problem(text, file=self.path)])
             if isinstance(wanted, (str, Path)):
                 path = Path(wanted).absolute() if Path(wanted).suffix == ".fmu" else wanted
                 changes.append(Change(unit, str(path), "swap"))

@@ -20,7 +20,7 @@ from typing import Any
 
 from ..errors import YawbenchError
 from ..master.interrupts import StopFlag, interrupts
-from ..spawning import SAFE_PATH, SafeSpawnContext, safe_path
+from ..spawning import SAFE_PATH, SafeSpawnContext, no_script, safe_path
 from .jobs import Job, Outcome, run_job
 
 GRACE = 5.0
@@ -130,11 +130,13 @@ def _context(workers: int, needed: Sequence[str] = ()) -> Any:
     _require_files(FILES + FILES_EACH * max(workers, default_workers()))
     if "forkserver" not in multiprocessing.get_all_start_methods() or not _has_place_for_sockets():
         return SafeSpawnContext()
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["__main__", *NEEDED, *needed])
+    from ..spawning import SafeForkServerContext
+
+    context = SafeForkServerContext()
+    context.set_forkserver_preload([*NEEDED, *needed])
     # Ctrl-C is for the caller, who ends its processes: the server must not get it, nor any that it starts,
     # not even while they import what they need
-    with safe_path():
+    with safe_path(), no_script():
         resource_tracker.ensure_running()
         earlier = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:

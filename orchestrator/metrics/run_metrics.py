@@ -289,26 +289,27 @@ def check_metrics(plan: Plan, chosen: Iterable[Metric]) -> None:
     Raises:
         ScenarioError: with a sentence for each metric that it will not.
     """
-    results = results_to_be(plan)
-    names = fold(list(dict.fromkeys(variable_of(column) for column in results)))
-    problems = []
-    end = plan.time(plan.n_steps)
-    for one in chosen:
-        if one.window is not None and not 0.0 <= one.window[0] <= one.window[1] <= end:
-            problems.append(f"{one.name}: the run lasts from 0 to {end:g} s")
-        missing = [s for s in filter(None, (one.signal, one.other)) if not columns_of(results, s)]
-        if missing:
-            whole = list(results) if "." in missing[0] else names
-            unknown = f"no {missing[0]!r} is recorded{hint(missing[0], whole, lead='there are')}"
-            seen = [c for c in results if variable_of(c) in wheels(missing[0]) and _is_seen(results, c)]
-            if seen:
-                named = listed(fold(seen), last="or")
-                unknown = f"{missing[0]} is recorded only as it is seen, name it so: {named}"
-            problems.append(f"{one.name}: {unknown}")
-        elif unit_in(results, one) is None:
-            problems.append(f"{one.name}: {_unfit(results, one)}")
-    if problems:
+    results, end = results_to_be(plan), plan.time(plan.n_steps)
+    if problems := [why for one in chosen if (why := why_none(results, one, one.window, end))]:
         raise ScenarioError(problems)
+
+
+def why_none(results: Results, one: Metric, window: Window | None, end: float) -> str:
+    """Return why there is no such metric of a run that lasts until `end` [s], "" if there is one."""
+    missing = [s for s in filter(None, (one.signal, one.other)) if not columns_of(results, s)]
+    if missing:
+        names = fold(list(dict.fromkeys(variable_of(column) for column in results)))
+        whole = list(results) if "." in missing[0] else names
+        seen = [c for c in results if variable_of(c) in wheels(missing[0]) and _is_seen(results, c)]
+        if seen:
+            named = listed(fold(seen), last="or")
+            return f"{one.name}: {missing[0]} is recorded only as it is seen, name it so: {named}"
+        return f"{one.name}: no {missing[0]!r} is recorded{hint(missing[0], whole, lead='there are')}"
+    if unit_in(results, one) is None:
+        return f"{one.name}: {_unfit(results, one)}"
+    if window is not None and not 0.0 <= window[0] <= window[1] <= end:
+        return f"{one.name}: the run lasts from 0 to {end:g} s"
+    return ""
 
 
 def _unfit(results: Results, one: Metric) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import ResultsError
 from ..files import check_regular, reads, reason
 from ..scenario.measurement_units import conversion, measure_of
-from ..wording import listed, short
+from ..wording import fold, listed, short
 from .digest import checksum
 from .folder import COMPLETED, FILES, RESULTS_FILE, RUN_FILE
 from .formats import source_of
@@ -119,7 +119,7 @@ class Results:
         of = f" of a {role}" if role else ""
         short = {name.partition(".")[2]: name for name in self.columns}
         close = get_close_matches(variable, [*self.columns, *short], n=1)
-        hint = f"; did you mean '{close[0]}'?" if close else f"; recorded: {', '.join(self.columns)}."
+        hint = f"; did you mean '{close[0]}'?" if close else f"; recorded: {', '.join(fold([*self]))}."
         return f"{self.file}: no column '{variable}'{of} was recorded{hint}"
 
 

@@ -172,10 +172,9 @@ def test_runs_start_where_the_path_of_temporary_files_is_too_long_for_sockets(fa
         "from pathlib import Path\n"
         "from orchestrator.experiments import jobs, workers\n"
         f"workers.SHORT_FOLDER = {fallback!r}\n"
-        "if __name__ == '__main__':\n"
-        "    job = jobs.Job('a', Path('a.yaml'), Path('out'))\n"
-        "    (outcome,) = workers.execute([job], run=print)\n"
-        "    print(outcome.problems)\n"
+        "job = jobs.Job('a', Path('a.yaml'), Path('out'))\n"
+        "(outcome,) = workers.execute([job], run=print)\n"
+        "print(outcome.problems)\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", script],

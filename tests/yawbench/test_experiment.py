@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pytest
 
 import yawbench as yb
@@ -74,9 +77,25 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_others_are_made(base)
         ({"driver.amplitude": ["1 deg", 2]}, "driver.amplitude: give all levels in one unit, or none"),
         ({"driver.amplitude": ["1.2.3 deg"]}, "'1.2.3 deg': give plain numbers, and their unit"),
         ({"driver.amplitde": [1, 2]}, "has no parameter 'amplitde'; did you mean 'amplitude'"),
+        ({"driver.amplitude": 1}, r"driver.amplitude: give a list of levels \(got 1\)"),
+        ({"controller": "controller_off"}, "controller: give a list of levels"),
         ({"controller": [Proportional(), Proportional()]}, "controller: two levels are called Proportional"),
     ],
 )
 def test_what_is_wrong_is_said_before_any_run_is_made(base, axes, said):
     with pytest.raises(yb.ScenarioError, match=said):
         yb.experiment(base, axes).run()
+
+
+def test_a_script_runs_an_experiment_without_a_guard_and_only_once(tmp_path):
+    script = tmp_path / "mine.py"
+    script.write_text(
+        "import yawbench as yb\n"
+        "print('begun')\n"
+        "base = yb.load('fnn_sideslip/25mps').set({'stop_time': 0.01})\n"
+        "runs = yb.experiment(base, {'plant.initial_speed': [20, 25]}, metrics='final(velocity_x)').run()\n"
+        "print(runs.table['final(velocity_x)'].round().tolist())\n"
+    )
+    done = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("begun\n[20.0, 25.0]\n", "")
+    assert list(tmp_path.iterdir()) == [script]

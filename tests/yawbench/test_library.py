@@ -110,8 +110,10 @@ def test_metrics_are_those_of_the_command_line(run):
     assert run.metric("peak(sideslip)") == np.max(np.abs(run["sideslip"]))
     late = run.time >= 1.2
     assert run.metric("peak(sideslip)", window=(1.2, 1.6)) == np.max(np.abs(run["sideslip"][late]))
-    with pytest.raises(yb.ResultsError, match="no number"):
+    with pytest.raises(yb.ResultsError, match=r"peak\(sideslip\): the run lasts from 0 to 1.6 s"):
         run.metric("peak(sideslip)", window=(1, 60))
+    with pytest.raises(yb.ResultsError, match=r"no 'sidslip' is recorded; did you mean 'sideslip'"):
+        run.metric("peak(sidslip)")
     with pytest.raises(yb.ScenarioError, match=r"did you mean 'peak'"):
         run.metric("peek(sideslip)")
 
@@ -186,8 +188,9 @@ def test_what_cannot_stand_for_a_controller_is_refused_in_a_sentence(base, given
 
 
 def test_unknown_units_places_and_scenarios_are_refused_with_a_guess(base):
-    with pytest.raises(yb.ScenarioError, match="did you mean 'controller'"):
+    with pytest.raises(yb.ScenarioError, match="did you mean 'controller'") as caught:
         base.swap(controler="controller_off")
+    assert (caught.value.file, caught.value.line) == (base.path, None)
     with pytest.raises(yb.YawbenchError, match="did you mean 'mass'"):
         base.set({"plant.mas": 3}).plan()
     with pytest.raises(yb.ScenarioError, match="did you mean 'fnn_sideslip/25mps'"):
@@ -220,3 +223,11 @@ def test_what_a_run_cannot_be_evaluated_with_is_said_in_a_sentence(run, test, an
     with pytest.raises(yb.ScenarioError) as raised:
         run.evaluate(test, angle=angle)
     assert str(raised.value) == sentence
+
+
+def test_an_error_is_at_the_file_and_line_of_its_first_problem(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text("stop_time: 1\nstep_size: 0.001\nunits:\n  plant: {fmu: plant_seven_dof, setp_size: 1}\n")
+    with pytest.raises(yb.ScenarioError, match="did you mean 'step_size'") as caught:
+        yb.load(file)
+    assert (caught.value.file, caught.value.line) == (file, 4)
