@@ -1,12 +1,11 @@
-"""What all figures over axes share: which runs a panel holds, what axes and levels are called."""
+"""What all figures over axes share: which runs a panel holds, what axes and levels are called, their look."""
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, Literal
 
-from ..figures.style import QUIET, literal
+from ..figures.style import QUIET, line_style, literal
 from ..metrics.symbols import variable_of, words
 from .design import Level
 from .experiment import RUN, Case
@@ -15,19 +14,28 @@ from .numbers import text_of
 from .schema import FigureSpec
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FAILED: dict[str, Any] = {"marker": "x", "color": "#111111", "linestyle": "", "markersize": 6}
+MARKERS = "os^Dv<>"
+FAILED: dict[str, Any] = {
+    "marker": "x",
+    "markersize": 6,
+    "linestyle": "",
+    "color": "#111111",
+    "label": "no number: failed, or never",
+}
 """A run that gives no number: a cross, never a gap that could pass for nothing."""
-PLAIN = "{x:g}"
-"""How numbers stand at an axis, logarithmic ones too."""
 GUIDE: dict[str, Any] = {"color": QUIET, "linewidth": 0.9, "linestyle": (0, (4, 2))}
 
 
 class Drawing:
-    """A figure over axes: `fill` draws a panel, `finish` what panels share, `handles` explain."""
+    """A figure over axes: `fill` draws a panel, `finish` what panels share; what has a label is explained."""
+
+    what = ""
+    """What is drawn, without its unit."""
+    upwards = ""
+    """What stands beside the panels on the left."""
 
     def __init__(self, findings: Findings, spec: FigureSpec) -> None:
         self.findings = findings
@@ -42,22 +50,13 @@ class Drawing:
             for run in findings.experiment.first_cases
             if all(text_of(self.at(run, axis).value) in values for axis, values in only.items())
         ]
-        self.what = ""  # what is drawn, without its unit
-        self.failed = False  # whether a cross has been drawn
 
     def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
         """Draw the runs of a panel."""
         raise NotImplementedError
 
-    def finish(self, figure: Figure, drawn: Sequence[Axes], left: Sequence[Axes]) -> None:
-        """Set what all panels share; `left` are those with a scale of their own."""
-        raise NotImplementedError
-
-    def handles(self) -> list[Artist]:
-        """Return what the legend explains."""
-        from matplotlib.lines import Line2D
-
-        return [Line2D([], [], label="no number: failed, or never", **FAILED)] if self.failed else []
+    def finish(self, figure: Figure, drawn: Sequence[Axes]) -> None:
+        """Set what all panels share."""
 
     def panels(self) -> list[tuple[str, list[Case]]]:
         """Return the heading and the runs of each panel."""
@@ -71,6 +70,14 @@ class Drawing:
             )
             for level in self.levels(self.spec.panel_axis)
         ]
+
+    def lines(self) -> Iterator[tuple[Level | None, dict[str, Any]]]:
+        """Yield the levels that have a line each, with its look; None for a single line."""
+        levels = self.levels(self.spec.lines) if self.spec.lines else []
+        for number, level in enumerate(levels):
+            yield level, {**style_of(number), "label": self.name_of(self.spec.lines, level)}
+        if not levels:
+            yield None, style_of(0)
 
     def at(self, run: Case, axis: str) -> Level:
         """Return where a run stands on an axis; "run" is that of its names."""
@@ -111,17 +118,27 @@ class Drawing:
             return level.words
         return f"{self.axes[axis].says or axis} {level.words} {self.unit_of(axis)}".strip()
 
-    def name_y(self, left: Sequence[Axes], text: str) -> None:
-        """Write what stands upwards beside the panels on the left, broken to their height."""
-        for axes in left:
-            axes.set_ylabel(literal("\n".join(textwrap.wrap(text, 34))))
-
     def scale_x(self, axes: Axes) -> None:
         """Set the scale and, for an axis of names, the ticks of x."""
-        if not self.numeric(self.spec.x):
-            every = self.levels(self.spec.x)
-            axes.set_xticks(range(len(every)), [literal(level.words) for level in every])
-            axes.set_xlim(-0.5, len(every) - 0.5)
-        elif self.axes[self.spec.x].spacing == "log":
-            axes.set_xscale("log")
-            axes.xaxis.set_major_formatter(PLAIN)
+        if self.numeric(self.spec.x):
+            set_scale(axes, "x", self.axes[self.spec.x].spacing)
+        else:
+            name_ticks(axes, [level.words for level in self.levels(self.spec.x)])
+
+
+def set_scale(axes: Axes, which: Literal["x", "y"], scale: str) -> None:
+    """Set the scale of an axis; a logarithmic one has plain numbers, too."""
+    if scale == "log":
+        axes.set(**{f"{which}scale": "log"})  # type: ignore[arg-type]
+        getattr(axes, f"{which}axis").set_major_formatter("{x:g}")
+
+
+def name_ticks(axes: Axes, names: Sequence[str]) -> None:
+    """Make x an axis of names, at 0, 1, 2."""
+    axes.set_xticks(range(len(names)), [literal(name) for name in names])
+    axes.set_xlim(-0.5, len(names) - 0.5)
+
+
+def style_of(number: int) -> dict[str, Any]:
+    """Return colour, dash and marker of a line."""
+    return {**line_style(number), "marker": MARKERS[number % len(MARKERS)], "markersize": 4.5}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import textwrap
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +13,7 @@ from ..figures.panels import Run
 from ..figures.plots import draw
 from ..figures.style import ROW, frame, literal, new_figure, save
 from ..titles import changed
-from .drawing import Drawing
+from .drawing import FAILED, Drawing
 from .experiment import FIGURES
 from .findings import Each, Findings
 from .limit_drawing import Limits
@@ -19,6 +21,8 @@ from .metric_drawing import Curves, GridLines, Map
 from .schema import FigureSpec
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 KINDS: dict[str, type[Drawing]] = {"curve": Curves, "map": Map, "limit": Limits, "grid": GridLines}
@@ -89,17 +93,27 @@ def draw_over_axes(findings: Findings, spec: FigureSpec) -> Figure:
         drawn = list(grid.flat[: len(panels)])
         for axes in grid.flat[len(panels) :]:
             axes.remove()
-        for axes, (heading, runs) in zip(drawn, panels, strict=True):
+        for k, (axes, (heading, runs)) in enumerate(zip(drawn, panels, strict=True)):
             drawing.fill(axes, runs)
             axes.set_title(literal(heading))
-        for k, axes in enumerate(drawn):
             if k + columns >= len(drawn):  # none stands below
                 axes.set_xlabel(literal(drawing.label(spec.x)) if spec.x else "")
                 axes.tick_params(labelbottom=True)
-        drawing.finish(figure, drawn, drawn[::columns])
+            if k % columns == 0:
+                axes.set_ylabel(literal("\n".join(textwrap.wrap(drawing.upwards, 34))))
+        drawing.finish(figure, drawn)
         options = changed(findings.experiment.by_options)
-        frame(figure, height, drawing.handles(), spec.title or drawing.what, _provenance(findings), options)
+        frame(figure, height, _legend(drawn), spec.title or drawing.what, _provenance(findings), options)
     return figure
+
+
+def _legend(drawn: Sequence[Axes]) -> list[Artist]:
+    """Return one of each that has a label in any panel, runs without a number last."""
+    found: dict[str, Artist] = {}
+    for axes in drawn:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    return sorted(found.values(), key=lambda handle: handle.get_label() == FAILED["label"])
 
 
 def _provenance(findings: Findings) -> str:

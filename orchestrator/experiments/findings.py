@@ -139,6 +139,11 @@ class Findings:
         """Numbers derived from several runs, as `values`."""
         return next(iter(self.derived_at.values()))
 
+    @property
+    def values_of_grids(self) -> Values:
+        """What cells of grids may show: metrics of runs, and derived numbers as those of a run ""."""
+        return {**self.values, **{("", key): value for key, value in self.derived.items()}}
+
     @cached_property
     def claims(self) -> list[Judgement]:
         """What the paper says, judged."""

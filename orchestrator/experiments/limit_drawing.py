@@ -4,27 +4,24 @@ first that do not."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from ..figures.style import QUIET, line_style
+from ..figures.style import QUIET
 from .drawing import Drawing
 from .experiment import Case
 from .findings import Findings
-from .limits import Limit, limits_of
-from .metric_drawing import MARKERS
+from .limits import limits_of
 from .schema import FigureSpec
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 HATCHES = ("", "///", "...", "\\\\\\", "xxx")
 """Of the bands, so that they differ in grey print."""
-NONE_HOLDS: dict[str, Any] = {"marker": "v", "mfc": "white", "markersize": 8, "linestyle": ""}
-ALL_HOLD: dict[str, Any] = {"marker": "^", "mfc": "white", "markersize": 8, "linestyle": ""}
+END: dict[str, Any] = {"mfc": "white", "markersize": 8, "linestyle": ""}
+"""The mark of a line where all values tried hold, or none."""
 
 
 class Limits(Drawing):
@@ -32,66 +29,37 @@ class Limits(Drawing):
 
     def __init__(self, findings: Findings, spec: FigureSpec) -> None:
         super().__init__(findings, spec)
-        self.limit = findings.spec.limits[spec.limit]
-        self.what = self.limit.says
-        self._found = limits_of(findings, self.limit)
-        self._others = list(self._found[0].others)
-        tried = [float(level.value) for level in self.levels(self.limit.of)]
+        limit = findings.spec.limits[spec.limit]
+        self.what, self.upwards = limit.says, self.label(limit.of)
+        self._found = limits_of(findings, limit)
+        tried = [float(level.value) for level in self.levels(limit.of)]
         self._smallest, self._largest = min(tried), max(tried)
-        self._none = self._all = False  # whether such marks have been drawn
 
     def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
-        settings = [{axis: self.at(run, axis) for axis in self._others} for run in runs]
-        mine = [limit for limit in self._found if limit.others in settings]
-        for number, level in enumerate(self.levels(self.spec.lines) if self.spec.lines else [None]):
-            self._line(
-                axes, [one for one in mine if level is None or one.others[self.spec.lines] == level], number
-            )
+        settings = [{axis: self.at(run, axis) for axis in self._found[0].others} for run in runs]
+        limits = [limit for limit in self._found if limit.others in settings]
+        ends = []
+        for (level, style), hatch in zip(self.lines(), cycle(HATCHES), strict=False):
+            mine = [one for one in limits if level is None or one.others[self.spec.lines] == level]
+            placed = {self.place(one.others[self.spec.x], self.spec.x): one for one in mine}
+            x = sorted(placed)
+            low = [self._smallest if (last := placed[at].largest) is None else last for at in x]
+            high = [self._largest if (first := placed[at].beyond) is None else first for at in x]
+            axes.fill_between(x, low, high, color=style["color"], alpha=0.16, linewidth=0.0, hatch=hatch)
+            axes.plot(x, low, **style)
+            for at, end in zip(x, low, strict=True):
+                if placed[at].beyond is None:
+                    ends.append((at, end, "^", style["color"], "all values tried hold"))
+                if placed[at].largest is None:
+                    ends.append((at, end, "v", style["color"], "none holds"))
+        axes.fill_between(
+            [], [], color=QUIET, alpha=0.25, linewidth=0.0, label="up to the first value that fails"
+        )
+        for at, end, marker, colour, says in sorted(ends, key=lambda end: end[2]):
+            axes.plot([at], [end], marker, color=colour, **END)
+            axes.plot([], [], marker, color=QUIET, label=says, **END)
         self.scale_x(axes)
 
-    def _line(self, axes: Axes, limits: Sequence[Limit], number: int) -> None:
-        placed = sorted(
-            ((self.place(one.others[self.spec.x], self.spec.x), one) for one in limits), key=lambda p: p[0]
-        )
-        x = np.array([place for place, _ in placed])
-        low = np.array([self._smallest if one.largest is None else one.largest for _, one in placed])
-        high = np.array([self._largest if one.beyond is None else one.beyond for _, one in placed])
-        style = self._style(number)
-        band = {
-            "color": style["color"],
-            "alpha": 0.16,
-            "linewidth": 0.0,
-            "hatch": HATCHES[number % len(HATCHES)],
-        }
-        axes.fill_between(x, low, high, **band)
-        axes.plot(x, low, **style)
-        none, every = (np.array([end is None for end in ends]) for ends in (
-            [one.largest for _, one in placed], [one.beyond for _, one in placed],
-        ))  # fmt: skip
-        self._none, self._all = self._none or bool(none.any()), self._all or bool(every.any())
-        for mark, chosen in ((NONE_HOLDS, none), (ALL_HOLD, every)):
-            axes.plot(x[chosen], low[chosen], color=style["color"], **mark)
-
-    def _style(self, number: int) -> dict[str, Any]:
-        return {**line_style(number), "marker": MARKERS[number % len(MARKERS)], "markersize": 4.5}
-
-    def finish(self, figure: Figure, drawn: Sequence[Axes], left: Sequence[Axes]) -> None:
-        self.name_y(left, self.label(self.limit.of))
+    def finish(self, figure: Figure, drawn: Sequence[Axes]) -> None:
         margin = 0.06 * (self._largest - self._smallest) or 1.0
         drawn[0].set_ylim(self._smallest - margin, self._largest + margin)
-
-    def handles(self) -> list[Artist]:
-        from matplotlib.lines import Line2D
-        from matplotlib.patches import Patch
-
-        levels = self.levels(self.spec.lines) if self.spec.lines else []
-        found: list[Artist] = [
-            Line2D([], [], label=self.name_of(self.spec.lines, level), **self._style(number))
-            for number, level in enumerate(levels)
-        ]
-        found.append(Patch(color=QUIET, alpha=0.25, linewidth=0.0, label="up to the first value that fails"))
-        if self._all:
-            found.append(Line2D([], [], color=QUIET, label="all values tried hold", **ALL_HOLD))
-        if self._none:
-            found.append(Line2D([], [], color=QUIET, label="none holds", **NONE_HOLDS))
-        return found

@@ -48,7 +48,6 @@ def limit_tables(findings: Findings) -> list[Table]:
 
 def _grid_table(findings: Findings, grid: GridSpec) -> Table:
     """Return a grid with what is said of its cells."""
-    values = {**findings.values, **{("", key): value for key, value in findings.derived.items()}}
     signs: dict[tuple[str, str], str] = {}
     for group, judged in (("claims", findings.claims), ("checks", findings.checks)) if grid.holds else ():
         for one in judged:
@@ -59,7 +58,7 @@ def _grid_table(findings: Findings, grid: GridSpec) -> Table:
                 signs[key] = signs.get(key) or (
                     "" if word == HOLDS else "✗" if word in FAILS.values() else "?"
                 )
-    return grid_table(grid, values, signs)
+    return grid_table(grid, findings.values_of_grids, signs)
 
 
 def derived_tables(findings: Findings) -> list[Table]:
