@@ -28,7 +28,7 @@ ROW = 0.235
 """Height of a row of the matrix [inches]."""
 
 
-def words_of(cell: Cell) -> str:
+def sign_of(cell: Cell) -> str:
     """Return what stands in the cell of a controller in a condition: a sign, or how many of its runs pass."""
     if cell.state == "missing":
         return "–"
@@ -49,6 +49,8 @@ def draw_matrix(ranked: Ranked, note: str) -> Figure:
 
     rows = ranked.standings
     conditions = ranked.ranking.conditions
+    wide = len(conditions)
+    beside = ((-5.1, "right", "place"), (wide + 0.15, "left", "passed"), (wide + 2.05, "right", "runs"))
     with new_figure() as figure:
         axes = figure.subplots()
         for i, one in enumerate(rows):
@@ -56,20 +58,18 @@ def draw_matrix(ranked: Ranked, note: str) -> Figure:
                 cell = one.cells[name]
                 colour = COLOURS[cell.state]
                 axes.add_patch(Rectangle((k, i), 1, 1, facecolor=colour, edgecolor="white", linewidth=1.2))
-                axes.text(k + 0.5, i + 0.52, words_of(cell), ha="center", va="center", fontsize=7.5)
-            counted = f"{one.count('passed')} of {len(conditions)}" if one.place else f"{one.missing} missing"
-            axes.text(len(conditions) + 0.15, i + 0.52, counted, va="center", fontsize=8)
-            share = f"{100 * one.share:.0f} %" if one.place else ""
-            axes.text(len(conditions) + 2.05, i + 0.52, share, va="center", ha="right", fontsize=8)
+                axes.text(k + 0.5, i + 0.52, sign_of(cell), ha="center", va="center", fontsize=7.5)
             axes.text(-0.15, i + 0.52, literal(one.spec.title), va="center", ha="right", fontsize=8.5)
-            axes.text(-5.1, i + 0.52, place_words(one), va="center", ha="right", fontsize=8.5, weight="bold")
+            counted = f"{one.count('passed')} of {wide}" if one.place else f"{one.missing} missing"
+            share = f"{100 * one.share:.0f} %" if one.place else ""
+            for (x, side, _), text in zip(beside, (place_words(one), counted, share), strict=True):
+                weight = "bold" if x < 0 else "normal"
+                axes.text(x, i + 0.52, text, va="center", ha=side, fontsize=8, weight=weight)
         for k, spec in enumerate(conditions.values()):
-            axes.text(k + 0.35, -0.15, literal(spec.heading), rotation=40, va="bottom", ha="left",
-                      fontsize=8)  # fmt: skip
-        axes.text(-5.1, -0.15, "place", ha="right", va="bottom", fontsize=8, color=QUIET)
-        axes.text(len(conditions) + 0.15, -0.15, "passed", va="bottom", fontsize=8, color=QUIET)
-        axes.text(len(conditions) + 2.05, -0.15, "runs", va="bottom", ha="right", fontsize=8, color=QUIET)
-        axes.set(xlim=(-5.5, len(conditions) + 2.2), ylim=(len(rows) + 0.1, -4.2))
+            axes.text(k + 0.35, -0.15, literal(spec.heading), rotation=40, va="bottom", fontsize=8)
+        for x, side, text in beside:
+            axes.text(x, -0.15, text, ha=side, va="bottom", fontsize=8, color=QUIET)
+        axes.set(xlim=(-5.5, wide + 2.2), ylim=(len(rows) + 0.1, -4.2))
         axes.set_axis_off()
         handles = [
             Patch(facecolor=COLOURS["passed"], label="passed: all runs pass"),
@@ -88,8 +88,6 @@ def draw_pareto(ranked: Ranked, note: str) -> Figure:
     Raises:
         ResultsError: there is no controller to draw.
     """
-    from matplotlib.lines import Line2D
-
     every = [
         (1e-3 * x, y, one)
         for one in ranked.standings
@@ -99,38 +97,32 @@ def draw_pareto(ranked: Ranked, note: str) -> Figure:
     left_out = [f"{one.spec.title}: {y:.0f} points" for _, y, one in every if not one.mean("effort")]
     if not points:
         raise ResultsError("nothing to draw: no controller that acts has all of its runs.")
-    best = [
+    front = [
         point
-        for point in points
+        for point in sorted(points, key=lambda point: point[:2])
         if not any(x <= point[0] and y >= point[1] and (x, y) != point[:2] for x, y, _ in points)
     ]
     with new_figure() as figure:
         axes = figure.subplots()
-        front = sorted(best, key=lambda point: point[:2])
-        axes.plot([x for x, _, _ in front], [y for _, y, _ in front], color=QUIET, linewidth=1.0, zorder=1)
         for x, y, one in points[::-1]:
             marker, colour = TUNED[one.spec.gains]
-            axes.plot([x], [y], marker, color=colour, markersize=11, zorder=3, markeredgecolor="white")
+            axes.plot(
+                [x], [y], marker, color=colour, markersize=13, zorder=3, markeredgecolor="white",
+                label=f"gains: {one.spec.gains}",
+            )  # fmt: skip
             axes.text(
-                x, y, str(one.place), color="white", fontsize=7, weight="bold", ha="center", va="center"
-            )
-        for x, y, one in front:
-            axes.annotate(literal(one.spec.title), (x, y), (0, 10), textcoords="offset points", ha="center")
+                x, y, str(one.place), color="white", fontsize=7, weight="bold", ha="center", va="center",
+                zorder=3,
+            )  # fmt: skip
+        best = [x for x, *_ in front], [y for _, y, _ in front]
+        axes.plot(*best, color=QUIET, linewidth=1.0, zorder=1, label="none is better in both:")
+        for _, _, one in front:
+            axes.plot([], [], " ", label=f"{one.place}  {one.spec.title}")
         axes.set_xlabel("Intervention: ∫|torque| dt of the wheel that gets most, mean [kN·m·s]")
         axes.set_title("Stability margin: points of per cent below the limits, least of each condition, mean")
-        handles = [
-            Line2D([], [], linestyle="", marker=marker, color=colour, label=f"gains: {whose}")
-            for whose, (marker, colour) in TUNED.items()
-            if any(one.spec.gains == whose for _, _, one in points)
-        ]
-        handles.append(Line2D([], [], color=QUIET, linewidth=1.0, label="none is better in both"))
-        frame(
-            figure,
-            4.9,
-            handles,
-            "Stability over intervention; numbers are places",
-            " · ".join([*left_out, note]),
-        )
+        handles = {str(line.get_label()): line for line in axes.get_lines()}
+        title = "Stability over intervention; numbers are places"
+        frame(figure, 4.9, list(handles.values()), title, " · ".join([*left_out, note]))
     return figure
 
 

@@ -36,8 +36,11 @@ class Driven:
     record: Record | None
 
     def __getitem__(self, key: str) -> float | None:
-        found = self.record.values.get(key) if self.record else None
-        return found[0] if found else None
+        if key in ("margin", "speed_lost"):
+            found: float | None = getattr(self, key)
+            return found
+        measured = self.record.values.get(key) if self.record else None
+        return measured[0] if measured else None
 
     @property
     def met(self) -> bool:
@@ -136,19 +139,18 @@ class Cell:
         asked = [one for one in self.runs if one.drive.multiple >= FROM * (1.0 - SLIGHT)]
         return min((x for one in asked if (x := one["displacement"]) is not None), default=None)
 
-    def mean(self, key: str) -> float | None:
-        """Return the mean of a number over all runs that have it; `key` is also `speed_lost`."""
-        found = [x for one in self.runs if (x := _number(one, key)) is not None]
+    def number(self, key: str) -> float | None:
+        """Return the margin, the sideslip, or the mean of another number over all runs that have it."""
+        if key in ("margin", "sideslip"):
+            over: Interval | None = getattr(self, key)
+            return over.mean if over else None
+        found = [x for one in self.runs if (x := one[key]) is not None]
         return sum(found) / len(found) if found else None
-
-
-def _number(run: Driven, key: str) -> float | None:
-    return getattr(run, key) if key in ("margin", "speed_lost") else run[key]
 
 
 def _known(runs: Sequence[Driven], key: str, lost: float) -> Iterator[float]:
     """Yield a number of all runs; `lost` stands for that of one that failed."""
-    return (lost if (x := _number(one, key)) is None else x for one in runs)
+    return (lost if (x := one[key]) is None else x for one in runs)
 
 
 @dataclass(frozen=True)
@@ -176,21 +178,14 @@ class Standing:
 
     def mean(self, key: str) -> float | None:
         """Return the mean over conditions of a number of cells; None if one lacks it."""
-        found = [self._of_cell(cell, key) for cell in self.cells.values()]
+        found = [cell.number(key) for cell in self.cells.values()]
         known = [x for x in found if x is not None]
         return sum(known) / len(known) if known and len(known) == len(found) else None
-
-    @staticmethod
-    def _of_cell(cell: Cell, key: str) -> float | None:
-        if key in ("margin", "sideslip"):
-            one: Interval | None = getattr(cell, key)
-            return one.mean if one else None
-        return cell.mean(key)
 
     @property
     def step_time(self) -> float | None:
         """Processor time of a step of the controller [s]: the middle of all cells'."""
-        found = sorted(x for cell in self.cells.values() if (x := cell.mean(STEP_TIME)) is not None)
+        found = sorted(x for cell in self.cells.values() if (x := cell.number(STEP_TIME)) is not None)
         return found[len(found) // 2] if found else None
 
     @property
@@ -213,13 +208,10 @@ def standings(ranking: Ranking, drives: Sequence[Drive], records: Mapping[str, R
         dry = ranking.spec.conditions[drive.condition].dry
         driven = Driven(drive, dry, records.get(drive.key))
         runs.setdefault((drive.entry, drive.condition), []).append(driven)
-    every = [
-        Standing(
-            name, spec,
-            {key: Cell(name, key, runs[name, key]) for key in ranking.conditions},
-        )
-        for name, (spec, _) in ranking.entries.items()
-    ]  # fmt: skip
+    every = []
+    for name, (spec, _) in ranking.entries.items():
+        cells = {key: Cell(name, key, runs[name, key]) for key in ranking.conditions}
+        every.append(Standing(name, spec, cells))
     return placed(every)
 
 

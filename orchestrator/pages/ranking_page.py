@@ -14,17 +14,16 @@ from markupsafe import Markup
 from ..experiments.experiment import FIGURES
 from ..experiments.jobs import STEP_TIME
 from ..experiments.ranking_course import Ranked
-from ..experiments.ranking_drawing import RUN, place_words, words_of
+from ..experiments.ranking_drawing import RUN, degrees, place_words, sign_of
 from ..experiments.ranking_schema import EntrySpec
 from ..experiments.ranking_tables import (
-    HEADINGS,
     RULE,
+    UNITS,
     row_of,
     runs_table,
     spread,
-    step_time,
     table_of,
-    value,
+    words_of,
 )
 from ..experiments.standings import Cell, Standing
 from ..experiments.tables import Table
@@ -40,6 +39,8 @@ STATES = {
     "failed": "failed",
     "missing": "runs are missing in this build",
 }
+OTHERS = ("speed_lost", "intervention", "chatter")
+"""Numbers of a cell that are told beside margin and sideslip."""
 
 
 def ranking_page(ranked: Ranked, folder: Path, command: str) -> str:
@@ -51,10 +52,7 @@ def ranking_page(ranked: Ranked, folder: Path, command: str) -> str:
         command: that makes it.
     """
     ranking = ranked.ranking
-    head = ["place", "controller", "passed", "runs"]
-    after = [
-        heading for heading in HEADINGS if heading in ("margin", "sideslip", "intervention", "time per step")
-    ]
+    after = ["margin", "sideslip", "intervention", "time per step"]
     return render(
         "ranking.html.j2",
         title=ranking.spec.title,
@@ -63,7 +61,7 @@ def ranking_page(ranked: Ranked, folder: Path, command: str) -> str:
         notes=ranking.spec.notes,
         quick=ranking.quick,
         missing=[one.spec.title for one in ranked.standings if one.missing],
-        first=head,
+        first=["place", "controller", "passed", "runs"],
         after=after,
         conditions=[
             {"name": name, "short": one.heading, "title": one.title}
@@ -90,7 +88,8 @@ def _image(file: Path, title: str) -> Image | None:
 
 def _row(ranked: Ranked, one: Standing, after: list[str]) -> dict[str, Any]:
     """Return a controller's row of the first table."""
-    texts = dict(zip(HEADINGS, Table("", HEADINGS, [row_of(one)]).text()[0], strict=True))
+    row = row_of(one)
+    texts = Table("", after, [[row[heading] for heading in after]]).text()[0]
     return {
         "place": place_words(one),
         "title": one.spec.title,
@@ -101,12 +100,12 @@ def _row(ranked: Ranked, one: Standing, after: list[str]) -> dict[str, Any]:
             {
                 "id": _id(cell),
                 "state": cell.state,
-                "words": words_of(cell),
+                "words": sign_of(cell),
                 "says": f"{one.spec.title}, {ranked.ranking.conditions[name].title}: {STATES[cell.state]}",
             }
             for name, cell in one.cells.items()
         ],
-        "after": [texts[heading].replace("-", "–") if one.place else "–" for heading in after],
+        "after": [text.replace("-", "–") if one.place else "–" for text in texts],
     }
 
 
@@ -121,48 +120,37 @@ def _cell(ranked: Ranked, one: Standing, cell: Cell, folder: Path) -> dict[str, 
     picture = None
     if kept and kept.job and (kept.job.out / f"{RUN}.svg").is_file():
         picture = Path(os.path.relpath(kept.job.out / f"{RUN}.svg", folder)).as_posix()
-    sums: list[tuple[str, str | None]] = [
-        ("runs that pass", f"{sum(run.passed for run in cell.runs)} of {len(cell.runs)}"),
-        ("stability margin", spread(cell.margin, lambda x: f"{x:.1f} points")),
-        ("peak sideslip", spread(cell.sideslip, lambda x: f"{math.degrees(x):.1f}°")),
-        ("displacement", _text(cell.displacement, "m")),
-        ("speed lost", _text(cell.mean("speed_lost"), "m/s")),
-        ("intervention", _text(cell.mean("intervention"), "N.m.s")),
-        ("chatter", _text(cell.mean("chatter"), "N.m/s")),
-        ("time per step", step_time(cell.mean(STEP_TIME))),
-    ]
+    sums = {
+        "runs that pass": f"{sum(run.passed for run in cell.runs)} of {len(cell.runs)}",
+        "stability margin": spread(cell.margin, lambda x: f"{x:.1f} points"),
+        "peak sideslip": spread(cell.sideslip, lambda x: f"{math.degrees(x):.1f}°"),
+        "displacement": _text(cell.displacement, "m"),
+        **{key.replace("_", " "): _text(cell.number(key), UNITS[key]) for key in OTHERS},
+        "time per step": _text(cell.number(STEP_TIME), "s"),
+    }
     return {
         "id": _id(cell),
         "title": f"{one.spec.title}: {condition.title}",
         "state": cell.state,
         "says": STATES[cell.state],
-        "sums": [(name, text) for name, text in sums if text is not None],
+        "sums": [(name, text) for name, text in sums.items() if text is not None],
         "repeats": len({run.drive.repeat for run in cell.runs}),
         "table": runs_table(cell),
         "picture": picture,
-        "amplitude": f"{math.degrees(kept.amplitude):.1f}°" if kept else "",
+        "amplitude": degrees(kept.amplitude) if kept else "",
         "command": series_command(ranked, cell),
         "again": again_command(ranked, cell, folder),
     }  # fmt: skip
 
 
 def _text(number: float | None, unit: str) -> str | None:
-    found = Table("", ["", ""], [["", value(number, unit)]]).text()[0][1]
-    return None if number is None else found
+    return None if number is None else Table("", [""], [[words_of(number, unit)]]).text()[0][0]
 
 
 def again_command(ranked: Ranked, cell: Cell, folder: Path) -> str:
     """Return the command that makes a cell's runs again, beside those that are there."""
-    words = [
-        "yawbench",
-        "rank",
-        str(ranked.ranking.path),
-        "--only",
-        cell.entry,
-        "--condition",
-        cell.condition,
-    ]
-    return shlex.join([*words, "--out", str(folder / "again")])
+    chosen = ["--only", cell.entry, "--condition", cell.condition, "--out", str(folder / "again")]
+    return shlex.join(["yawbench", "rank", str(ranked.ranking.path), *chosen])
 
 
 def series_command(ranked: Ranked, cell: Cell) -> str:
@@ -194,20 +182,16 @@ def _option(change: Change) -> list[str]:
 def _conditions(ranked: Ranked) -> Table:
     """Return what the conditions are."""
     ranking = ranked.ranking
-    table = Table(
-        "", ["condition", "car", "A", "scenario", "changed", "runs of a controller", "responsiveness"]
-    )
+    headings = ["condition", "car", "A", "scenario", "changed", "runs of a controller", "responsiveness"]
+    table = Table("", headings)
     for name, one in ranking.conditions.items():
         runs = sum(drive.condition == name for drive in ranked.drives) // max(1, len(ranking.entries))
         own = ranking.changes_of_condition(name)
         told = [change for change in own if change.place not in ("vehicle", "step_size", "stop_time")]
-        table.rows.append(
-            [
-                one.title, ranking.spec.cars[one.car].title, f"{math.degrees(ranked.angles[one.car]):.1f}°",
-                one.scenario, changed(told) or None, str(runs),
-                "asked" if one.dry else "no dry road: not asked",
-            ]
-        )  # fmt: skip
+        table.rows.append([
+            one.title, ranking.spec.cars[one.car].title, degrees(ranked.angles[one.car]), one.scenario,
+            changed(told) or None, str(runs), "asked" if one.dry else "no dry road: not asked",
+        ])  # fmt: skip
     return table
 
 
