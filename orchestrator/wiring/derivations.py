@@ -1,4 +1,4 @@
-"""What follows from a vehicle file's values: one table of name, formula, inputs.
+"""What follows from a vehicle file's values: one table of names and formulas.
 
 A car is described once, by what is known of it; every unit takes what it declares. What the file does not
 give is derived where a formula here has all that it needs, also from what was derived before; the first that
@@ -28,7 +28,7 @@ class Derivation(NamedTuple):
 
     name: str
     formula: str
-    """In the names of the quantities, as people read it."""
+    """As people read it."""
     inputs: tuple[str, ...]
     value: Callable[..., float]
 
@@ -40,175 +40,83 @@ def in_series(stiffness: float, bar: float, track: float, tyre: float) -> tuple[
     return springs * part, part
 
 
-def _roll_stiffness(axle: str) -> Derivation:
-    return Derivation(
-        f"roll_stiffness_{axle}",
-        "springs and anti-roll bar in series with the tyres, d^2/2 (k + 2 s) k_t / (k + 2 s + k_t)",
-        (f"spring_stiffness_{axle}", f"anti_roll_stiffness_{axle}", "track_width", "tyre_vertical_stiffness"),
-        lambda k, s, d, k_t: in_series(k, s, d, k_t)[0],
-    )
-
-
-def _roll_damping(axle: str) -> Derivation:
-    return Derivation(
-        f"roll_damping_{axle}",
-        "dampers in series with the tyres, d^2/2 c (k_t / (k + 2 s + k_t))^2",
-        (
-            f"spring_stiffness_{axle}",
-            f"anti_roll_stiffness_{axle}",
-            "track_width",
-            "tyre_vertical_stiffness",
-            f"damping_{axle}",
-        ),
-        lambda k, s, d, k_t, c: 0.5 * d * d * c * in_series(k, s, d, k_t)[1] ** 2,
-    )
-
-
-def _wheels(m_u: float, share: float, a: float, b: float, d: float) -> float:
+def of_points(mass: float, share: float, a: float, b: float, track: float) -> float:
     """Return the yaw inertia [kg.m2] of four point masses at the wheels about the car's centre of mass."""
-    return m_u * (share * a * a + (1.0 - share) * b * b + 0.25 * d * d)
+    return mass * (share * a * a + (1.0 - share) * b * b + 0.25 * track * track)
+
+
+def _follows(name: str, expression: str, words: str = "") -> Derivation:
+    """Return the derivation of a quantity by an expression in the names of others.
+
+    `words` stand for the formula where that is more than people want to read.
+    """
+    known = {"g": G, "in_series": in_series, "of_points": of_points}
+    inputs = tuple(one for one in compile(expression, name, "eval").co_names if one not in known)
+    return Derivation(
+        name, words or expression, inputs, eval(f"lambda {', '.join(inputs)}: {expression}", known)
+    )
+
+
+def _on_tyres(axle: str) -> tuple[Derivation, Derivation]:
+    """Return the roll stiffness and damping of an axle."""
+    springs = f"spring_stiffness_{axle}, anti_roll_stiffness_{axle}, track_width, tyre_vertical_stiffness"
+    return (
+        _follows(
+            f"roll_stiffness_{axle}",
+            f"in_series({springs})[0]",
+            "springs and anti-roll bar in series with the tyres, d^2/2 (k + 2 s) k_t / (k + 2 s + k_t)",
+        ),
+        _follows(
+            f"roll_damping_{axle}",
+            f"0.5 * track_width * track_width * damping_{axle} * in_series({springs})[1] ** 2",
+            "dampers in series with the tyres, d^2/2 c (k_t / (k + 2 s + k_t))^2",
+        ),
+    )
 
 
 DERIVATIONS = (
-    Derivation(
-        "unsprung_mass",
-        "unsprung_mass_front + unsprung_mass_rear",
-        ("unsprung_mass_front", "unsprung_mass_rear"),
-        lambda f, r: f + r,
-    ),
-    Derivation("mass", "sprung_mass + unsprung_mass", ("sprung_mass", "unsprung_mass"), lambda s, u: s + u),
-    Derivation("unsprung_mass", "mass - sprung_mass", ("mass", "sprung_mass"), lambda m, m_s: m - m_s),
-    Derivation("sprung_mass", "mass - unsprung_mass", ("mass", "unsprung_mass"), lambda m, u: m - u),
-    Derivation(
-        "unsprung_mass_front",
-        "unsprung_mass - unsprung_mass_rear",
-        ("unsprung_mass", "unsprung_mass_rear"),
-        lambda u, r: u - r,
-    ),
-    Derivation(
-        "front_unsprung_share",
-        "unsprung_mass_front / unsprung_mass",
-        ("unsprung_mass_front", "unsprung_mass"),
-        lambda f, u: f / u,
-    ),
-    Derivation(
-        "wheelbase",
-        "cg_to_front_axle + cg_to_rear_axle",
-        ("cg_to_front_axle", "cg_to_rear_axle"),
-        lambda a, b: a + b,
-    ),
-    Derivation(
-        "cg_to_front_axle",
-        "(1 - front_load_share) wheelbase",
-        ("front_load_share", "wheelbase"),
-        lambda share, wheelbase: (1.0 - share) * wheelbase,
-    ),
-    Derivation(
-        "cg_to_front_axle",
-        "wheelbase - cg_to_rear_axle",
-        ("wheelbase", "cg_to_rear_axle"),
-        lambda wheelbase, b: wheelbase - b,
-    ),
-    Derivation(
-        "cg_to_rear_axle",
-        "wheelbase - cg_to_front_axle",
-        ("wheelbase", "cg_to_front_axle"),
-        lambda wheelbase, a: wheelbase - a,
-    ),
-    Derivation(
-        "track_width",
-        "mean of track_width_front and track_width_rear",
-        ("track_width_front", "track_width_rear"),
-        lambda f, r: 0.5 * (f + r),
-    ),
-    Derivation(
-        "cg_height",
-        "(sprung_mass sprung_cg_height + unsprung_mass unsprung_height) / mass",
-        ("sprung_mass", "sprung_cg_height", "unsprung_mass", "unsprung_height", "mass"),
-        lambda m_s, h_s, m_u, h_u, m: (m_s * h_s + m_u * h_u) / m,
-    ),
-    Derivation(
-        "sprung_cg_height",
-        "(mass cg_height - unsprung_mass unsprung_height) / sprung_mass",
-        ("mass", "cg_height", "unsprung_mass", "unsprung_height", "sprung_mass"),
-        lambda m, h, m_u, h_u, m_s: (m * h - m_u * h_u) / m_s,
-    ),
-    Derivation(
+    _follows("unsprung_mass", "unsprung_mass_front + unsprung_mass_rear"),
+    _follows("mass", "sprung_mass + unsprung_mass"),
+    _follows("unsprung_mass", "mass - sprung_mass"),
+    _follows("sprung_mass", "mass - unsprung_mass"),
+    _follows("unsprung_mass_front", "unsprung_mass - unsprung_mass_rear"),
+    _follows("front_unsprung_share", "unsprung_mass_front / unsprung_mass"),
+    _follows("wheelbase", "cg_to_front_axle + cg_to_rear_axle"),
+    _follows("cg_to_front_axle", "(1 - front_load_share) * wheelbase"),
+    _follows("cg_to_front_axle", "wheelbase - cg_to_rear_axle"),
+    _follows("cg_to_rear_axle", "wheelbase - cg_to_front_axle"),
+    _follows("track_width", "0.5 * (track_width_front + track_width_rear)"),
+    _follows("cg_height", "(sprung_mass * sprung_cg_height + unsprung_mass * unsprung_height) / mass"),
+    _follows("sprung_cg_height", "(mass * cg_height - unsprung_mass * unsprung_height) / sprung_mass"),
+    _follows(
         "sprung_cg_offset",
-        "(unsprung_mass_rear cg_to_rear_axle - unsprung_mass_front cg_to_front_axle) / sprung_mass",
-        ("unsprung_mass", "front_unsprung_share", "cg_to_front_axle", "cg_to_rear_axle", "sprung_mass"),
-        lambda m_u, share, a, b, m_s: m_u * ((1.0 - share) * b - share * a) / m_s,
+        "unsprung_mass * ((1 - front_unsprung_share) * cg_to_rear_axle"
+        " - front_unsprung_share * cg_to_front_axle) / sprung_mass",
+        "(unsprung_mass_rear * cg_to_rear_axle - unsprung_mass_front * cg_to_front_axle) / sprung_mass",
     ),
-    Derivation(
+    _follows(
         "yaw_inertia",
+        "sprung_yaw_inertia + sprung_mass * sprung_cg_offset * sprung_cg_offset"
+        " + of_points(unsprung_mass, front_unsprung_share, cg_to_front_axle, cg_to_rear_axle, track_width)",
         "sprung_yaw_inertia + wheels and sprung mass at their distances from the centre of mass",
-        (
-            *("sprung_yaw_inertia", "sprung_mass", "sprung_cg_offset"),
-            *("unsprung_mass", "front_unsprung_share", "cg_to_front_axle", "cg_to_rear_axle", "track_width"),
-        ),
-        lambda i, m_s, e, *wheels: i + m_s * e * e + _wheels(*wheels),
     ),
-    Derivation(
+    _follows(
         "roll_axis_height",
+        "((cg_to_rear_axle + sprung_cg_offset) * roll_centre_height_front"
+        " + (cg_to_front_axle - sprung_cg_offset) * roll_centre_height_rear)"
+        " / (cg_to_front_axle + cg_to_rear_axle)",
         "between the roll centres, below the centre of the sprung mass",
-        (
-            *("roll_centre_height_front", "roll_centre_height_rear"),
-            *("cg_to_front_axle", "cg_to_rear_axle", "sprung_cg_offset"),
-        ),
-        lambda f, r, a, b, e: ((b + e) * f + (a - e) * r) / (a + b),
     ),
-    Derivation(
-        "roll_arm",
-        "sprung_cg_height - roll_axis_height",
-        ("sprung_cg_height", "roll_axis_height"),
-        lambda h_s, axis: h_s - axis,
-    ),
-    Derivation(
-        "roll_inertia",
-        "sprung_roll_inertia + sprung_mass roll_arm^2",
-        ("sprung_roll_inertia", "sprung_mass", "roll_arm"),
-        lambda i, m_s, arm: i + m_s * arm * arm,
-    ),
-    Derivation(
-        "sprung_roll_inertia",
-        "roll_inertia - sprung_mass roll_arm^2",
-        ("roll_inertia", "sprung_mass", "roll_arm"),
-        lambda i, m_s, arm: i - m_s * arm * arm,
-    ),
-    _roll_stiffness("front"),
-    _roll_stiffness("rear"),
-    Derivation(
-        "roll_stiffness",
-        "roll_stiffness_front + roll_stiffness_rear, each in series with its tyres",
-        ("roll_stiffness_front", "roll_stiffness_rear"),
-        lambda f, r: f + r,
-    ),
-    Derivation(
-        "front_roll_share",
-        "roll_stiffness_front / (roll_stiffness_front + roll_stiffness_rear)",
-        ("roll_stiffness_front", "roll_stiffness_rear"),
-        lambda f, r: f / (f + r),
-    ),
-    _roll_damping("front"),
-    _roll_damping("rear"),
-    Derivation(
-        "roll_damping",
-        "roll_damping_front + roll_damping_rear, each in series with its tyres",
-        ("roll_damping_front", "roll_damping_rear"),
-        lambda f, r: f + r,
-    ),
-    Derivation(
-        "static_load_front",
-        "mass g cg_to_rear_axle / (2 wheelbase)",
-        ("mass", "cg_to_rear_axle", "wheelbase"),
-        lambda m, b, wheelbase: 0.5 * m * G * b / wheelbase,
-    ),
-    Derivation(
-        "static_load_rear",
-        "mass g cg_to_front_axle / (2 wheelbase)",
-        ("mass", "cg_to_front_axle", "wheelbase"),
-        lambda m, a, wheelbase: 0.5 * m * G * a / wheelbase,
-    ),
+    _follows("roll_arm", "sprung_cg_height - roll_axis_height"),
+    _follows("roll_inertia", "sprung_roll_inertia + sprung_mass * roll_arm * roll_arm"),
+    _follows("sprung_roll_inertia", "roll_inertia - sprung_mass * roll_arm * roll_arm"),
+    *_on_tyres("front"),
+    *_on_tyres("rear"),
+    _follows("roll_stiffness", "roll_stiffness_front + roll_stiffness_rear"),
+    _follows("front_roll_share", "roll_stiffness_front / (roll_stiffness_front + roll_stiffness_rear)"),
+    _follows("roll_damping", "roll_damping_front + roll_damping_rear"),
+    _follows("static_load_front", "0.5 * mass * g * cg_to_rear_axle / wheelbase"),
+    _follows("static_load_rear", "0.5 * mass * g * cg_to_front_axle / wheelbase"),
 )
 NEUTRAL = {"front_unsprung_share": 0.5}
 """What a formula takes where nothing gives a quantity: as the plants have it, equal wheels."""
