@@ -19,11 +19,12 @@ noted, not refused.
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter, deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from heapq import heapify, heappop, heappush
+from graphlib import CycleError, TopologicalSorter
+from itertools import chain
 
 from ..plan import Fmu, Wire
 from ..wording import star
@@ -71,15 +72,15 @@ class _Following:
             for name in output.depends_on or ():
                 self.said.setdefault(name, []).append(output.name)
 
-    def passes_on(self, name: str) -> bool:
-        """Return whether any output may follow an input."""
-        return bool(self.unsaid) or name in self.said
+    def outputs(self, name: str) -> Iterator[str]:
+        """Yield the outputs that may follow an input."""
+        return chain(self.unsaid, self.said.get(name, ()))
 
 
 def evaluate(fmus: Mapping[str, Fmu], wires: Sequence[Wire]) -> Evaluation:
     """Find the evaluation order of the units `fmus`, given in the order of the scenario."""
     following = {unit: _Following(fmu) for unit, fmu in fmus.items()}
-    direct = [wire for wire in wires if following[wire.target].passes_on(wire.input)]
+    direct = [wire for wire in wires if any(following[wire.target].outputs(wire.input))]
     weights = _weights(following, wires, direct)
     cycles = _cycles(list(fmus), weights)
     group = {name: i for i, cycle in enumerate(cycles) for name in cycle}
@@ -112,82 +113,63 @@ def _loops(graph: Graph, most: int) -> list[str]:
 
     The graph is used up.
     """
-    before: dict[Node, list[Node]] = {}
-    for node, followers in graph.items():
-        for follower in followers:
-            before.setdefault(follower, []).append(node)
-    _remove([node for node in before if not graph.get(node)], graph, before)
     texts: dict[str, str] = {}
     effort = EFFORT
-    while graph and len(texts) < most:
-        loop, effort = _shortest_loop(graph, effort)
-        names = [f"{unit}.{name}" for unit, name in loop]
+    while len(texts) < most:
+        try:
+            TopologicalSorter(graph).prepare()
+            break
+        except CycleError as error:
+            loop = error.args[1][::-1]  # the sorter has it against the direction of the wires
+        shortest, effort = _shortest_loop(graph, effort)
+        loop = shortest or loop
+        names = [f"{unit}.{name}" for unit, name in loop if name != UNSAID]
         if len(names) > LONGEST:
             names[LONGEST - 2 : -1] = [f"{len(names) - LONGEST + 1} more"]
         text = " -> ".join(names)
         texts.setdefault(star(text), text)
-        _remove(loop, graph, before)
+        for node in loop:
+            graph.pop(node, None)
     return list(texts.values())
 
 
-def _remove(nodes: Iterable[Node], graph: Graph, before: Mapping[Node, Sequence[Node]]) -> None:
-    """Take nodes out of a graph, then all that lead nowhere: none is left if there is no cycle."""
-    waiting = list(nodes)
-    while waiting:
-        node = waiting.pop()
-        graph.pop(node, None)
-        for earlier in before.get(node, ()):
-            followers = graph.get(earlier, {})
-            if node in followers:
-                del followers[node]
-                if not followers:
-                    waiting.append(earlier)
-
-
 def _shortest_loop(graph: Graph, effort: int) -> tuple[list[Node], int]:
-    """Return the shortest loop of a graph in which all nodes lead to one, and what is left of the effort.
+    """Return the shortest loop as far as the effort reaches, and what is left of that.
 
-    The loop has its first node at both ends.
+    The loop has its first node at both ends; it is empty if none was found.
     """
     best: list[Node] = []
     for start in (node for node in graph if node[1] != UNSAID):
-        found, looked_at = _way_back(graph, start, shorter_than=len(best))
-        best, effort = found or best, effort - looked_at
-        if best and effort <= 0:
+        if effort <= 0:
             break
-    return best, max(effort, 0)
+        found, looked_at = _way_back(graph, start)
+        effort -= looked_at
+        if found and (not best or len(found) < len(best)):
+            best = found
+    return best, effort
 
 
-def _way_back(graph: Graph, start: Node, *, shorter_than: int) -> tuple[list[Node], int]:
+def _way_back(graph: Graph, start: Node) -> tuple[list[Node], int]:
     """Return the shortest path from a node to itself, both ends included, and how many edges it took.
 
-    It is empty if there is none, or none shorter (0: any); outputs of which nothing is said count once.
+    It is empty if there is none.
     """
     came_from: dict[Node, Node] = {}
-    length = {start: 1}
     queue = deque([start])
     looked_at = 0
-    while queue:
+    while queue and start not in came_from:
         node = queue.popleft()
-        if shorter_than and length[node] + 1 >= shorter_than:
-            break
-        looked_at += len(graph[node])
-        for follower in graph[node]:
-            if follower == start:
-                path = [start, node]
-                while path[-1] != start:
-                    path.append(came_from[path[-1]])
-                return [one for one in reversed(path) if one[1] != UNSAID], looked_at
-            if follower in length or follower not in graph:
-                continue
-            came_from[follower] = node
-            if follower[1] == UNSAID:  # no step of its own
-                length[follower] = length[node]
-                queue.appendleft(follower)
-            else:
-                length[follower] = length[node] + 1
+        looked_at += len(graph.get(node, ()))
+        for follower in graph.get(node, ()):
+            if follower not in came_from:
+                came_from[follower] = node
                 queue.append(follower)
-    return [], looked_at
+    if start not in came_from:
+        return [], looked_at
+    path = [start, came_from[start]]
+    while path[-1] != start:
+        path.append(came_from[path[-1]])
+    return path[::-1], looked_at
 
 
 def _weights(
@@ -195,19 +177,11 @@ def _weights(
 ) -> dict[Edge, int]:
     """Return what it costs to have source after target: wires whose followers feed a unit, then wires."""
     used = {(wire.source, wire.output) for wire in wires}
-    passed_on: set[Node] = set()  # inputs that an output follows which feeds a unit
-    of_all = set()  # units all of whose inputs do
-    for unit, known in following.items():
-        if any((unit, name) in used for name in known.unsaid):
-            of_all.add(unit)
-        passed_on.update(
-            (unit, name) for name, outputs in known.said.items() if any((unit, o) in used for o in outputs)
-        )
-    weights: dict[Edge, int] = {}
+    weights: Counter[Edge] = Counter()
     for wire in direct:
-        counts = wire.target in of_all or (wire.target, wire.input) in passed_on
-        edge = (wire.source, wire.target)
-        weights[edge] = weights.get(edge, 0) + (10_000 if counts else 0) + 1
+        followers = following[wire.target].outputs(wire.input)
+        counts = any((wire.target, output) in used for output in followers)
+        weights[wire.source, wire.target] += (10_000 if counts else 0) + 1
     return weights
 
 
@@ -215,73 +189,61 @@ def _unit_order(
     names: Sequence[str], weights: Mapping[Edge, int], cycles: Iterable[Sequence[str]]
 ) -> list[str]:
     """Return the units so that sources stand before targets, else as the scenario lists them."""
-    edges = set(weights)
-    for group in cycles:
-        rank = {name: i for i, name in enumerate(_cheapest_order(group, weights))}
-        edges = {(a, b) for a, b in edges if a not in rank or b not in rank or rank[a] < rank[b]}
-    after, before = _neighbours(names, edges)
+    rank = {name: i for group in cycles for i, name in enumerate(_cheapest_order(group, weights))}
+    group = {name: i for i, cycle in enumerate(cycles) for name in cycle}
+    sorter = TopologicalSorter({name: () for name in names})
+    for source, target in weights:
+        if source not in group or group[source] != group.get(target) or rank[source] < rank[target]:
+            sorter.add(target, source)
+    sorter.prepare()
     place = {name: i for i, name in enumerate(names)}
-    waits_for = {name: len(before[name]) for name in names}
-    ready = [place[name] for name in names if not waits_for[name]]
-    heapify(ready)
+    ready: list[str] = []
     order: list[str] = []
-    while ready:
-        name = names[heappop(ready)]
-        order.append(name)
-        for target in after[name]:
-            waits_for[target] -= 1
-            if not waits_for[target]:
-                heappush(ready, place[target])
+    while sorter.is_active():
+        ready += sorter.get_ready()
+        order.append(min(ready, key=place.__getitem__))
+        ready.remove(order[-1])
+        sorter.done(order[-1])
     return order
-
-
-def _neighbours(
-    names: Iterable[str], edges: Iterable[Edge]
-) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
-    """Return the targets and the sources of every unit."""
-    after: dict[str, list[str]] = {name: [] for name in names}
-    before: dict[str, list[str]] = {name: [] for name in names}
-    for source, target in edges:
-        after[source].append(target)
-        before[target].append(source)
-    return after, before
 
 
 def _cycles(names: Sequence[str], edges: Iterable[Edge]) -> list[list[str]]:
     """Return the groups of units that reach each other."""
-    after, before = _neighbours(names, edges)
-    groups: list[list[str]] = []
-    grouped: set[str] = set()
-    for name in names:
-        if name in grouped:
-            continue
-        group = _reached(name, after) & _reached(name, before)
-        if group:
-            groups.append([other for other in names if other in group])
-            grouped |= group
-    return groups
+    after: dict[str, list[str]] = {name: [] for name in names}
+    for source, target in edges:
+        after[source].append(target)
+    reached = {name: _reached(name, after) for name in names}
+    groups = {
+        tuple(other for other in names if other in reached[name] and name in reached[other]): None
+        for name in names
+    }
+    return [list(group) for group in groups if group]
 
 
-def _reached(name: str, neighbours: Mapping[str, Sequence[str]]) -> set[str]:
+def _reached(name: str, after: Mapping[str, Sequence[str]]) -> set[str]:
     """Return all that can be reached from a unit; itself only if a cycle leads back."""
     found: set[str] = set()
-    waiting = list(neighbours[name])
+    waiting = list(after[name])
     while waiting:
         other = waiting.pop()
         if other not in found:
             found.add(other)
-            waiting += neighbours[other]
+            waiting += after[other]
     return found
 
 
 def _cheapest_order(group: Sequence[str], weights: Mapping[Edge, int]) -> list[str]:
-    """Return the order of a cycle's units that costs least; of equals, the scenario's."""
-    members = set(group)
-    inner = {edge: cost for edge, cost in weights.items() if members.issuperset(edge)}
-    after, before = _neighbours(group, inner)
+    """Return the order of a cycle's units that costs least; of equals, the scenario's.
+
+    Of a large cycle it is a good order: each unit the one that costs least at its place.
+    """
+    sources: dict[str, dict[str, int]] = {name: {} for name in group}
+    for (source, target), cost in weights.items():
+        if source in sources and target in sources:
+            sources[target][source] = cost
 
     def backward(name: str, placed: frozenset[str]) -> int:
-        return sum(inner[other, name] for other in before[name] if other not in placed)
+        return sum(cost for source, cost in sources[name].items() if source not in placed)
 
     @cache
     def cost_of_rest(placed: frozenset[str]) -> int:
@@ -289,17 +251,10 @@ def _cheapest_order(group: Sequence[str], weights: Mapping[Edge, int]) -> list[s
         return min((backward(n, placed) + cost_of_rest(placed | {n}) for n in rest), default=0)
 
     order: list[str] = []
-    cost = {name: backward(name, frozenset()) for name in group}
-    while cost:
+    while len(order) < len(group):
+        placed = frozenset(order)
+        total = {name: backward(name, placed) for name in group if name not in placed}
         if len(group) <= EXACT_UP_TO:
-            placed = frozenset(order)
-            total = {name: cost[name] + cost_of_rest(placed | {name}) for name in cost}
-            chosen = min(total, key=total.__getitem__)
-        else:
-            chosen = min(cost, key=cost.__getitem__)
-        order.append(chosen)
-        del cost[chosen]
-        for target in after[chosen]:
-            if target in cost:
-                cost[target] -= inner[chosen, target]
+            total = {name: cost + cost_of_rest(placed | {name}) for name, cost in total.items()}
+        order.append(min(total, key=total.__getitem__))
     return order
