@@ -11,39 +11,26 @@ from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import replace
 from itertools import pairwise
 
-from vocabulary.wheels import WHEELS
-
-from ..plan import DEFAULT, Fmu, Series, Value, ValueOrigin, Variable, Wire
-from ..scenario.load import Connection, Endpoint, Scenario
-from ..scenario.yaml_lines import PROBLEMS, Key, dotted
-from ..wording import fold, fold_sentences, hint, listed
+from ..plan import DEFAULT, Series, Value, Variable, Wire
+from ..scenario.load import Connection, Endpoint
+from ..scenario.yaml_lines import Key, dotted
+from ..wording import fold, hint, listed
 from .constants import Constant, Input, constants
 from .fitting import alike, contradicts_its_name, conversion_between, difference, fits
-from .patterns import Replaced, had, matching
+from .opened_system import System
+from .patterns import matching
 
 
 class Connector:
-    """Finds every input's source.
+    """Finds every input's source."""
 
-    Problems go to the scenario's document, remarks to `notes`, where constants come from to `origins`.
-    """
-
-    def __init__(
-        self,
-        scenario: Scenario,
-        fmus: Mapping[str, Fmu],
-        replaced: Replaced,
-        notes: list[str],
-        origins: Mapping[str, dict[str, ValueOrigin]],
-    ) -> None:
-        self._scenario = scenario
-        self._fmus = fmus
-        self._replaced = replaced
-        self._notes = notes
-        self._origins = origins
-        self._found: list[tuple[Key, str]] = []
-        self._outputs = {unit: {v.name: v for v in fmu.of("output")} for unit, fmu in fmus.items()}
-        self._inputs = {unit: {v.name: v for v in fmu.of("input")} for unit, fmu in fmus.items()}
+    def __init__(self, system: System) -> None:
+        self._system = system
+        self._scenario = system.scenario
+        self._fmus = system.fmus
+        self._outputs, self._inputs = system.outputs, system.inputs
+        self._notes = system.notes
+        self._report = system.report
         self._having: dict[str, list[str]] = {}  # name of an output -> units that have it
         for unit, outputs in self._outputs.items():
             for name in outputs:
@@ -57,14 +44,14 @@ class Connector:
         """Return all wires, and each unit's constants and time series."""
         wires = self._by_connections()
         self._put_in_order()
-        given = constants(self._scenario, self._fmus, self._replaced, self._notes, self._found)
+        given = constants(self._system)
         own = {target for target, constant in given.items() if constant.of_unit}
         self._note_overruled(own - wires.keys())
         ambiguous = self._by_names(wires, own | self._refused)
         values: dict[Input, Value | Series] = {}
         for target, constant in self._given(given, wires).items():
             values[target] = constant.value
-            self._origins[target[0]][target[1]] = constant.origin
+            self._system.origins[target[0]][target[1]] = constant.origin
         fed = wires.keys() | given.keys() | ambiguous
         for unit, inputs in self._inputs.items():
             for name, variable in inputs.items():
@@ -72,12 +59,11 @@ class Connector:
                     continue
                 if (variable.optional or self._explicit(unit)) and variable.start is not None:
                     values[(unit, name)] = variable.start
-                    self._origins[unit][name] = DEFAULT
+                    self._system.origins[unit][name] = DEFAULT
                 else:
                     self._report(("units", unit), self._undriven(unit, variable))
         fitted = [self._fitted(wire, key) for wire, key in wires.values()]
         self._note_units(wire for wire, key in wires.values() if self._scale(key) is None)
-        self._tell()
         by_unit: dict[str, dict[str, Value | Series]] = {unit: {} for unit in self._fmus}
         for (unit, name), value in values.items():
             by_unit[unit][name] = value
@@ -97,16 +83,6 @@ class Connector:
     def _explicit(self, unit: str) -> bool:
         """Return whether only the scenario's connections count for the inputs of a unit."""
         return self._scenario.explicit and unit not in self._scenario.replaced
-
-    def _report(self, key: Key, sentence: str) -> None:
-        self._found.append((key, sentence))
-        if len(self._found) >= len(WHEELS) * PROBLEMS:
-            self._tell()
-
-    def _tell(self) -> None:
-        for key, sentence in fold_sentences(self._found):
-            self._scenario.document.report(key, sentence)
-        self._found.clear()
 
     def _by_connections(self) -> dict[Input, tuple[Wire, Key]]:
         """Return the wires that the scenario names, each with the key it comes from."""
@@ -200,7 +176,7 @@ class Connector:
 
     def _no_such(self, key: Key, unit: str, pattern: str, kind: str) -> None:
         """Report a pattern without a match, or note it if the FMU that was replaced has one."""
-        if had(self._scenario, self._replaced, [unit], pattern, kind):
+        if self._system.had([unit], pattern, kind):
             self._notes.append(f"{dotted(key[:2])} is left out: {unit} has no {kind} {pattern!r} any more")
             return
         variable = self._fmus[unit].variables.get(pattern)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from ..plan import Fmu, Series, Value, ValueOrigin, Variable
-from ..scenario.load import Scenario
+from ..plan import Series, Value, ValueOrigin
 from ..scenario.scenario_schema import SeriesSpec
 from ..scenario.yaml_lines import Key
 from ..wording import fold, hint
+from .opened_system import System
 from .parameters import origin, value_for
-from .patterns import Replaced, had, matching
+from .patterns import matching
 from .shared_facts import facts_of
 
 Input = tuple[str, str]  # unit, variable
@@ -43,21 +43,15 @@ class Constant:
         return self.level in (FACT, CHANGED_FACT)
 
 
-def constants(
-    scenario: Scenario,
-    fmus: Mapping[str, Fmu],
-    replaced: Replaced,
-    notes: list[str],
-    problems: list[tuple[Key, str]],
-) -> dict[Input, Constant]:
-    """Return what `inputs` and facts give to each input; problems and remarks go to the two lists."""
+def constants(system: System) -> dict[Input, Constant]:
+    """Return what `inputs` and facts give to each input."""
+    scenario, fmus, inputs = system.scenario, system.fmus, system.inputs
     read = None
     if any(isinstance(raw, SeriesSpec) for raw in scenario.inputs.values()):
         from .series import series_reader  # needs numpy, which takes long to import
 
         read = series_reader(scenario)
-    inputs = {unit: {v.name: v for v in fmu.of("input")} for unit, fmu in fmus.items()}
-    found = dict(_of_facts(scenario, inputs, replaced, notes, problems))
+    found = dict(_of_facts(system))
     fact_changed = any(one.level == CHANGED_FACT for one in found.values())
     for pattern, raw in scenario.inputs.items():
         key: Key = ("inputs", pattern)
@@ -65,12 +59,13 @@ def constants(
         of_unit = prefix in fmus
         units, name_pattern = ([prefix], rest) if of_unit else (list(fmus), pattern)
         parts = {(u, name): part for u in units for part, name in matching(name_pattern, inputs[u]).items()}
-        if not parts and had(scenario, replaced, units, name_pattern, "input"):
-            notes.append(f"inputs.{pattern} is left out: no unit has such an input after the swap")
+        if not parts and system.had(units, name_pattern, "input"):
+            system.notes.append(f"inputs.{pattern} is left out: no unit has such an input after the swap")
         elif not parts:
-            problems.append((key, f"no input matches{_alike(name_pattern, units, fmus)}"))
+            names = fold(list(dict.fromkeys(name for unit in units for name in inputs[unit])))
+            system.report(key, f"no input matches{hint(name_pattern, names, lead='there are')}")
         for (unit, name), part in parts.items():
-            variable = fmus[unit].variables[name]
+            variable = inputs[unit][name]
             value: Value | Series = 0
             try:
                 if isinstance(raw, SeriesSpec):
@@ -79,7 +74,7 @@ def constants(
                 else:
                     value = value_for(variable, raw)
             except ValueError as error:
-                problems.append((key, f"{error}, for {unit}.{name}"))
+                system.report(key, f"{error}, for {unit}.{name}")
             level = CHANGED_INPUTS if fact_changed and scenario.document.override(key) else INPUTS
             given_by = origin(scenario.document, key)
             one = Constant(value, key, given_by, of_unit, "*" not in pattern, level)
@@ -89,28 +84,21 @@ def constants(
             elif other.of_fact and of_unit:  # the changed fact stands where a constant of the unit did
                 found[unit, name] = replace(other, of_unit=True)
             elif other.rank == one.rank and other is not one:
-                problems.append(
-                    (key, f"{unit}.{name} has another constant already, by inputs.{other.key[1]}")
-                )
+                system.report(key, f"{unit}.{name} has another constant already, by inputs.{other.key[1]}")
     return found
 
 
-def _of_facts(
-    scenario: Scenario,
-    known: Mapping[str, Mapping[str, Variable]],
-    replaced: Replaced,
-    notes: list[str],
-    problems: list[tuple[Key, str]],
-) -> Iterator[tuple[Input, Constant]]:
+def _of_facts(system: System) -> Iterator[tuple[Input, Constant]]:
     """Yield what facts give to inputs."""
+    scenario, known = system.scenario, system.inputs
     for name, fact, raw, changed in facts_of(scenario):
         key: Key = (name,)
         takers = [(unit, one) for unit, inputs in known.items() for one in fact.inputs if one in inputs]
         if fact.inputs and not takers:
-            if not changed and any(had(scenario, replaced, known, one, "input") for one in fact.inputs):
-                notes.append(f"{name} is left out: no unit has such an input after the swap")
+            if not changed and any(system.had(known, one, "input") for one in fact.inputs):
+                system.notes.append(f"{name} is left out: no unit has such an input after the swap")
             else:
-                problems.append((key, f"no unit has an input {name}"))
+                system.report(key, f"no unit has an input {name}")
         refused: dict[str, list[str]] = {}
         for unit, one in takers:
             value = raw
@@ -122,9 +110,5 @@ def _of_facts(
             yield (unit, one), Constant(value, key, origin(scenario.document, key), False, True, level)
         everywhere = [len(inputs) for inputs in refused.values()] == [len(takers)]
         for sentence, inputs in refused.items():
-            problems += [(key, sentence if everywhere else f"{sentence}, for {one}") for one in inputs]
-
-
-def _alike(pattern: str, units: Iterable[str], fmus: Mapping[str, Fmu]) -> str:
-    names = fold(list(dict.fromkeys(v.name for unit in units for v in fmus[unit].of("input"))))
-    return hint(pattern, names, lead="there are")
+            for one in inputs:
+                system.report(key, sentence if everywhere else f"{sentence}, for {one}")

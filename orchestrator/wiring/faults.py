@@ -4,47 +4,44 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
-from ..plan import Fault, Fmu, Variable, Wire
+from ..plan import Fault, Variable, Wire
 from ..scenario.fault_schema import EVERY, KINDS, FaultSpec, Place
 from ..scenario.load import Scenario
 from ..scenario.quantities import convert
 from ..scenario.yaml_lines import Key, dotted
 from ..wording import fold, hint, listed
-from .patterns import Replaced, had, match, matching
+from .opened_system import System
+from .patterns import match, matching
 
 
-def faults_of(
-    scenario: Scenario,
-    fmus: Mapping[str, Fmu],
-    replaced: Replaced,
-    wires: Sequence[Wire],
-    record: Iterable[tuple[str, str]],
-    notes: list[str],
-) -> tuple[Fault, ...]:
-    """Return the faults of a scenario; problems go to its document, remarks to `notes`."""
+def faults_of(system: System, wires: Sequence[Wire], record: Iterable[tuple[str, str]]) -> tuple[Fault, ...]:
+    """Return the faults of a scenario."""
+    scenario = system.scenario
     found: list[Fault] = []
     record = set(record)
     for i, spec in enumerate(scenario.faults):
         key: Key = ("faults", i)
-        at = _Finder(scenario, fmus, replaced, wires, record, notes, key).at(spec)
+        at = _Finder(system, wires, record, key).at(spec)
         for unit, name, of_output in at:
-            variable = fmus[unit].variables[name]
+            variable = system.fmus[unit].variables[name]
             if variable.type != "Real":
-                sentence = f"{unit}.{name} is {variable.type}: faults are for Real"
-                scenario.document.report((*key, "on"), sentence)
+                system.report((*key, "on"), f"{unit}.{name} is {variable.type}: faults are for Real")
                 continue
             try:
                 value = _value(spec, variable)
             except ValueError as error:
-                scenario.document.report((*key, "value"), f"{unit}.{name}: {error}")
+                system.report((*key, "value"), f"{unit}.{name}: {error}")
                 continue
             before = sum((f.unit, f.variable, f.of_output) == (unit, name, of_output) for f in found)
             found.append(_fault(spec, unit, name, of_output, value, before))
         if at and spec.begin is not None and spec.begin >= scenario.stop_time:
             ends = f"the run ends at {float(scenario.stop_time):g} s"
-            notes.append(f"{_said(scenario, key)} never acts: it begins at {float(spec.begin):g} s, {ends}")
+            system.notes.append(
+                f"{_said(scenario, key)} never acts: it begins at {float(spec.begin):g} s, {ends}"
+            )
     return tuple(found)
 
 
@@ -92,65 +89,53 @@ def _said(scenario: Scenario, key: Key) -> str:
     return str(change) if change else f"{dotted(key)} ({scenario.faults[key[1]].on})"  # type: ignore[index]
 
 
+@dataclass
 class _Finder:
     """Finds what a fault acts on."""
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        fmus: Mapping[str, Fmu],
-        replaced: Replaced,
-        wires: Sequence[Wire],
-        record: set[tuple[str, str]],
-        notes: list[str],
-        key: Key,
-    ) -> None:
-        self._scenario = scenario
-        self._fmus = fmus
-        self._replaced = replaced
-        self._wires = wires
-        self._record = record
-        self._notes = notes
-        self._key = key
+    system: System
+    wires: Sequence[Wire]
+    record: set[tuple[str, str]]
+    key: Key
 
     def at(self, spec: FaultSpec) -> list[tuple[str, str, bool]]:
         """Return unit, variable and whether it is an output of all that the fault acts on."""
         place = spec.on
         for unit in filter(None, (place.unit, place.target)):
-            if unit not in self._fmus:
-                self._report(f"there is no unit {unit!r}{hint(unit, self._fmus, lead='units')}")
+            if unit not in self.system.fmus:
+                self._report(f"there is no unit {unit!r}{hint(unit, self.system.fmus, lead='units')}")
                 return []
         if place.target:
             return self._on_wires(spec)
         return self._on_outputs(place.unit, place.variable) or self._on_inputs(place.unit, place.variable)
 
     def _on_outputs(self, unit: str, pattern: str) -> list[tuple[str, str, bool]]:
-        names = matching(pattern, [v.name for v in self._fmus[unit].of("output")]).values()
-        used = {(w.source, w.output) for w in self._wires} | self._record
+        names = matching(pattern, self.system.outputs[unit]).values()
+        used = {(w.source, w.output) for w in self.wires} | self.record
         if names and not any((unit, name) in used for name in names):
             self._report(f"{unit}.{pattern} is neither recorded nor on a wire")
         return [(unit, name, True) for name in names if (unit, name) in used or "*" not in pattern]
 
     def _on_inputs(self, unit: str, pattern: str) -> list[tuple[str, str, bool]]:
-        names = matching(pattern, [v.name for v in self._fmus[unit].of("input")]).values()
-        driven = {w.input for w in self._wires if w.target == unit}
+        names = matching(pattern, self.system.inputs[unit]).values()
+        driven = {w.input for w in self.wires if w.target == unit}
         if names and not driven & set(names):
             self._report(
                 f"{unit}.{pattern} is on no wire: a fault of an input is one of what a unit gives it"
             )
-        if not names and not matching(pattern, [v.name for v in self._fmus[unit].of("output")]):
+        if not names and not matching(pattern, self.system.outputs[unit]):
             self._no_such(unit, pattern)
         return [(unit, name, False) for name in names if name in driven]
 
     def _on_wires(self, spec: FaultSpec) -> list[tuple[str, str, bool]]:
         place = spec.on
-        between = [w for w in self._wires if (w.source, w.target) == (place.unit, place.target)]
+        between = [w for w in self.wires if (w.source, w.target) == (place.unit, place.target)]
         found = [
             w for w in between
             if match(place.variable, w.output) is not None and match(place.input, w.input) is not None
         ]  # fmt: skip
         if not found:
-            if {place.unit, place.target} & self._scenario.replaced.keys():
+            if {place.unit, place.target} & self.system.scenario.replaced.keys():
                 self._left_out()
                 return []
             self._report(
@@ -160,24 +145,23 @@ class _Finder:
 
     def _way(self, place: Place) -> str:
         """Return what there is in place of a wire from a place to its target."""
-        of = [w for w in self._wires if w.source == place.unit]
+        of = [w for w in self.wires if w.source == place.unit]
         if targets := dict.fromkeys(w.target for w in of if match(place.variable, w.output) is not None):
             return f"; it goes to {listed(targets)}"
         there = fold([w.output for w in of if w.target == place.target])
         return hint(place.variable, there, lead="there are") if there else "; nothing goes there"
 
     def _no_such(self, unit: str, pattern: str) -> None:
-        if had(self._scenario, self._replaced, [unit], pattern):
+        if self.system.had([unit], pattern):
             self._left_out()
             return
-        names = fold([v.name for kind in ("output", "input") for v in self._fmus[unit].of(kind)])
+        names = fold([*self.system.outputs[unit], *self.system.inputs[unit]])
         guess = hint(pattern, names, lead="it has")
         self._report(f"{unit} has neither an output nor an input {pattern!r}{guess}")
 
     def _left_out(self) -> None:
-        self._notes.append(
-            f"{_said(self._scenario, self._key)} is left out: there is no such signal any more"
-        )
+        said = _said(self.system.scenario, self.key)
+        self.system.notes.append(f"{said} is left out: there is no such signal any more")
 
     def _report(self, sentence: str) -> None:
-        self._scenario.document.report((*self._key, "on"), sentence)
+        self.system.report((*self.key, "on"), sentence)

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from fractions import Fraction
 from functools import cache
 from pathlib import Path
 
@@ -33,6 +32,7 @@ from .agreement import remarks
 from .connections import Connector
 from .faults import faults_of
 from .functions import missing_functions
+from .opened_system import System
 from .order import evaluate
 from .parameters import STATIC_LOADS, STIFFNESSES, Parameters
 from .recording import recorded
@@ -68,18 +68,17 @@ def make_plan(
         WiringError: everything that is wrong with parameters and connections.
     """
     scenario = scenario.afresh()
-    opened, replaced = _open_all(scenario, fmus, opener or Opener())
-    notes: list[str] = [*scenario.document.notes, *stale_fmus(opened.values()), *host_needs(opened.values())]
-    origins: dict[str, dict[str, ValueOrigin]] = {name: {} for name in opened}
-    distributed = Parameters(scenario, opened, replaced, notes, origins)
+    system = _open_all(scenario, fmus, opener or Opener())
+    opened, notes = system.fmus, system.notes
+    notes += [*scenario.document.notes, *stale_fmus(opened.values()), *host_needs(opened.values())]
+    distributed = Parameters(system)
     parameters = distributed.of_units()
-    connector = Connector(scenario, opened, replaced, notes, origins)
-    wires, values = connector.connect()
-    constants, series = _divided(values, float(scenario.start_time))
-    record = recorded(scenario, opened, replaced, notes)
-    faults = faults_of(scenario, opened, replaced, wires, record, notes)
+    wires, values = Connector(system).connect()
+    record = recorded(system)
+    faults = faults_of(system, wires, record)
     if not isolated:
-        _check_instances(scenario, opened)
+        _check_instances(system)
+    system.tell()
     evaluation = evaluate(opened, wires)
     problems = scenario.document.sentences()
     problems += scenario.vehicle_document.sentences()
@@ -89,14 +88,7 @@ def make_plan(
         "one of these units has to give an output that does not follow its input directly"
         for loop in evaluation.loops
     ]
-    units = {
-        name: Unit(
-            name, fmu, _period(scenario, name), parameters[name],
-            constants[name],
-            origins[name], tolerance=scenario.units[name].tolerance, series=series[name],
-        )
-        for name, fmu in opened.items()
-    }  # fmt: skip
+    units = {name: _unit(system, name, parameters[name], values[name]) for name in opened}
     if not problems and not of_all:  # all variables are known
         of_all = missing_functions(units.values(), wires, record)
     if not problems and not of_all:
@@ -162,19 +154,25 @@ def _take_from_tyres(
     return []
 
 
-def _divided(
-    values: Mapping[str, Mapping[str, Value | Series]], start: float
-) -> tuple[dict[str, dict[str, Value]], dict[str, dict[str, Series]]]:
-    """Return what each unit's inputs begin with at `start` [s], and the time series of some of them."""
-    first = {
-        unit: {name: v.first(start) if isinstance(v, Series) else v for name, v in given.items()}
-        for unit, given in values.items()
-    }
-    series = {
-        unit: {name: v for name, v in given.items() if isinstance(v, Series)}
-        for unit, given in values.items()
-    }
-    return first, series
+def _unit(
+    system: System, name: str, parameters: dict[str, Value], inputs: Mapping[str, Value | Series]
+) -> Unit:
+    """Return a unit with the values of its parameters and of the inputs that no unit drives."""
+    spec, step, start = (
+        system.scenario.units[name],
+        system.scenario.step_size,
+        float(system.scenario.start_time),
+    )
+    return Unit(
+        name,
+        system.fmus[name],
+        period=int((spec.step_size or step) / step),
+        parameters=parameters,
+        constants={key: v.first(start) if isinstance(v, Series) else v for key, v in inputs.items()},
+        origins=system.origins[name],
+        tolerance=spec.tolerance,
+        series={key: v for key, v in inputs.items() if isinstance(v, Series)},
+    )
 
 
 def _misplaced(scenario: Scenario) -> list[str]:
@@ -188,10 +186,8 @@ def _misplaced(scenario: Scenario) -> list[str]:
     return found
 
 
-def _open_all(
-    scenario: Scenario, fmus: Path | None, opener: Opener
-) -> tuple[dict[str, Fmu], Callable[[str], Fmu | None]]:
-    """Return the FMU of each unit, and a function that gives the one a swap has replaced, if it is there."""
+def _open_all(scenario: Scenario, fmus: Path | None, opener: Opener) -> System:
+    """Return a scenario with the FMU of each unit."""
     document = scenario.document
     problems: dict[Problem, None] = {}
     folder = fmus or Path()
@@ -224,26 +220,20 @@ def _open_all(
         raise BuildError(not_built)
     if problems:
         raise ModelDescriptionError(problems)
-    return found, replaced
+    return System(scenario, found, replaced)
 
 
-def _check_instances(scenario: Scenario, fmus: Mapping[str, Fmu]) -> None:
+def _check_instances(system: System) -> None:
     """Report an FMU used by two units though it allows one instance per process."""
     first: dict[str, str] = {}
-    for name, fmu in fmus.items():
+    for name, fmu in system.fmus.items():
         other = first.setdefault(fmu.sha256, name)
         if fmu.once_per_process and other != name:
-            scenario.document.report(
+            system.report(
                 ("units", name, "fmu"),
                 f"{fmu.name} can be instantiated only once per process, and {other} uses it already; "
                 "with --isolate each unit has a process of its own",
             )
-
-
-def _period(scenario: Scenario, name: str) -> int:
-    """Return a unit's step in communication steps."""
-    step = scenario.units[name].step_size or scenario.step_size
-    return int(Fraction(step) / scenario.step_size)
 
 
 def _sorted(wires: Sequence[Wire], order: Sequence[str], fmus: Mapping[str, Fmu]) -> tuple[Wire, ...]:

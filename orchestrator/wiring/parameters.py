@@ -9,22 +9,22 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 from vocabulary.friction_table import table_of
 from vocabulary.patches import patches_of
 from vocabulary.vehicle import CAR
 
+from ..files import TEXT, read_bytes
 from ..fmu.binary import integer_limits
 from ..plan import DEFAULT, Fmu, Value, ValueOrigin, Variable
 from ..scenario import quantities
-from ..scenario.load import Scenario
 from ..scenario.scenario_schema import TextSpec
 from ..scenario.yaml_lines import Document, Key
 from ..wording import closest, fold, hint, listed, short
 from .derivations import Car, car_of, contradictions
-from .patterns import had
+from .opened_system import System
 from .shared_facts import facts_of
-from .text_file import text_of
 
 STIFFNESSES = ("cornering_stiffness_front", "cornering_stiffness_rear")
 STATIC_LOADS = ("static_load_front", "static_load_rear")
@@ -103,128 +103,116 @@ def origin(document: Document, key: Key) -> ValueOrigin:
 
 
 class Parameters:
-    """The parameters of all units: their own, then the vehicle's for those that declare them.
+    """The parameters of all units: their own, then the vehicle's for those that declare them."""
 
-    Problems go to the documents of the scenario, where values come from to `origins`, what was left out
-    after a swap to `notes`: a value meant for the FMU that was replaced is no mistake if that FMU
-    declares it.
-    """
-
-    def __init__(
-        self,
-        scenario: Scenario,
-        fmus: Mapping[str, Fmu],
-        replaced: Callable[[str], Fmu | None],
-        notes: list[str],
-        origins: Mapping[str, dict[str, ValueOrigin]],
-    ) -> None:
-        self._scenario = scenario
-        self._fmus = fmus
-        self._replaced = replaced
-        self._notes = notes
-        self._origins = origins
+    def __init__(self, system: System) -> None:
+        self._system = system
+        self._scenario = system.scenario
+        self._fmus = system.fmus
+        self._given: dict[str, dict[str, Value]] = {unit: {} for unit in system.fmus}
         self.car = Car({})
         self.lacking: dict[str, list[str]] = {}
         """Unit -> those of `STIFFNESSES` that only the tyres at their static loads can tell it."""
 
     def of_units(self) -> dict[str, dict[str, Value]]:
         """Return each unit's values."""
-        given: dict[str, dict[str, Value]] = {unit: {} for unit in self._fmus}
         for unit, fmu in self._fmus.items():
-            self._origins[unit].update((variable.name, DEFAULT) for variable in fmu.of("parameter"))
-        self._from_tyre_files(given)
-        self._from_vehicle(given)
-        by_change = self._from_facts(given)
-        for unit, fmu in self._fmus.items():
+            self._system.origins[unit].update((variable.name, DEFAULT) for variable in fmu.of("parameter"))
+        self._from_tyre_files()
+        self._from_vehicle()
+        by_change = self._from_facts()
+        for unit in self._fmus:
             for name, raw in self._scenario.units[unit].parameters.items():
                 key = ("units", unit, "parameters", name)
-                if (unit, name) in by_change and not self._scenario.document.override(key):
-                    continue
-                if _is_parameter(fmu, name):
-                    self._put_own(given, unit, name, raw, key)
-                elif self._left_out(unit, name, key):
-                    self._notes.append(f"{unit}.{name} is left out: {fmu.name} has no such parameter")
-                else:
-                    sentence = _unknown(unit, fmu, name)
-                    self._scenario.document.report(key, sentence)
-        self._refuse_half_a_car(given)
-        return given
+                if (unit, name) not in by_change or self._scenario.document.override(key):
+                    self._give_own(unit, name, raw, key)
+        self._refuse_half_a_car()
+        return self._given
 
-    def _put_own(
-        self, given: dict[str, dict[str, Value]], unit: str, name: str, raw: Value | TextSpec, key: Key
+    def _give(
+        self,
+        unit: str,
+        name: str,
+        raw: Value,
+        place: tuple[Document, Key],
+        came: ValueOrigin | None = None,
+        says: str = "",
     ) -> None:
-        """Give a unit's own value, or the text of a file."""
-        document = self._scenario.document
-        if not isinstance(raw, TextSpec):
-            self._put(given, unit, name, raw, document, key)
-            return
-        variable = self._fmus[unit].variables[name]
+        """Give a unit a value; what is wrong with it is reported at its place, behind what it says."""
+        document, key = place
         try:
-            text = text_of(raw, self._scenario.path.parent, variable)
+            self._given[unit][name] = value_for(self._fmus[unit].variables[name], raw)
         except ValueError as error:
-            document.report(key, str(error))
-            return
-        try:
-            given[unit][name] = value_for(variable, text)
-        except ValueError as error:
-            document.report(key, f"{raw.file}: {error}")
-        self._origins[unit][name] = ValueOrigin("file", raw.file)
+            document.report(key, f"{says}{error}")
+        self._system.origins[unit][name] = came or origin(document, key)
 
-    def _from_facts(self, given: dict[str, dict[str, Value]]) -> set[tuple[str, str]]:
+    def _takers(self, name: str) -> list[str]:
+        return [unit for unit, fmu in self._fmus.items() if _is_parameter(fmu, name)]
+
+    def _give_own(self, unit: str, name: str, raw: Value | TextSpec, key: Key) -> None:
+        """Give a unit its own value, or the text of a file."""
+        fmu, place = self._fmus[unit], (self._scenario.document, key)
+        if not _is_parameter(fmu, name):
+            if self._is_left_out(unit, name, key):
+                self._system.notes.append(f"{unit}.{name} is left out: {fmu.name} has no such parameter")
+            else:
+                self._system.report(key, _unknown(unit, fmu, name))
+        elif not isinstance(raw, TextSpec):
+            self._give(unit, name, raw, place)
+        elif fmu.variables[name].type != "String":
+            self._system.report(key, "takes a value: only parameters that are text take a file")
+        else:
+            try:
+                text = _text_of(self._scenario.path.parent / raw.file)
+            except ValueError as error:
+                self._system.report(key, f"{raw.file}: {error}")
+            else:
+                self._give(unit, name, text, place, ValueOrigin("file", raw.file), f"{raw.file}: ")
+
+    def _from_facts(self) -> set[tuple[str, str]]:
         """Give what facts tell; return the (unit, parameter) whose fact was changed."""
         by_change: set[tuple[str, str]] = set()
         for fact_name, fact, raw, changed in facts_of(self._scenario):
-            takers = [
-                (unit, name)
-                for unit, fmu in self._fmus.items()
-                for name in fact.parameters
-                if _is_parameter(fmu, name)
-            ]
+            takers = [(unit, name) for name in fact.parameters for unit in self._takers(name)]
             for unit, name in takers:
-                self._put(given, unit, name, raw, self._scenario.document, (fact_name,))
+                self._give(unit, name, raw, (self._scenario.document, (fact_name,)))
             by_change.update(takers if changed else ())
             if not fact.parameters or fact.inputs or takers:
                 continue  # a fact with inputs is judged by these
-            before = [
-                had(self._scenario, self._replaced, self._fmus, name, "parameter") for name in fact.parameters
-            ]
-            if any(before) and not changed:
-                self._notes.append(f"{fact_name} is left out: no unit has such a parameter after the swap")
+            before = any(self._system.had(self._fmus, name, "parameter") for name in fact.parameters)
+            if before and not changed:
+                self._system.notes.append(
+                    f"{fact_name} is left out: no unit has such a parameter after the swap"
+                )
             else:
                 sentence = f"no unit has a parameter {listed(fact.parameters, last='or')}"
-                self._scenario.document.report((fact_name,), sentence)
+                self._system.report((fact_name,), sentence)
         return by_change
 
-    def _from_tyre_files(self, given: dict[str, dict[str, Value]]) -> None:
+    def _from_tyre_files(self) -> None:
         """Give the coefficients of tyre property files to every unit that declares them."""
-        document, key = self._scenario.tyres_place
+        place = self._scenario.tyres_place
         for axle, file in self._scenario.tyre_files.items():
-            for unit, fmu in self._fmus.items():
-                for name, value in file.values.items():
-                    parameter = f"{name}_{axle}"
-                    if not _is_parameter(fmu, parameter):
-                        continue
-                    try:
-                        given[unit][parameter] = value_for(fmu.variables[parameter], value)
-                    except ValueError as error:
-                        document.report(key, f"{file.path}: {name.upper()}: {error}")
-                    self._origins[unit][parameter] = ValueOrigin("file", file.path.name)
+            came = ValueOrigin("file", file.path.name)
+            for name, value in file.values.items():
+                for unit in self._takers(f"{name}_{axle}"):
+                    self._give(unit, f"{name}_{axle}", value, place, came, f"{file.path}: {name.upper()}: ")
         if self._scenario.tyre_files and not any(map(_takes_tyre_files, self._fmus.values())):
-            before = (self._replaced(unit) for unit in self._scenario.replaced)
-            if any(fmu is not None and _takes_tyre_files(fmu) for fmu in before):
-                self._notes.append("tyres are left out: no tyre takes such files after the swap")
+            if any(map(_takes_tyre_files, self._system.before())):
+                self._system.notes.append("tyres are left out: no tyre takes such files after the swap")
             else:
+                document, key = place
                 document.report(key, "no unit is a tyre that takes such files; tyre_magic_formula_62 does")
 
-    def _from_vehicle(self, given: dict[str, dict[str, Value]]) -> None:
+    def _from_vehicle(self) -> None:
         document = self._scenario.vehicle_document
         numbers: dict[str, float] = {}
         idle: list[str] = []
         for name, raw in self._scenario.vehicle_parameters.items():
             key = ("parameters", name)
-            takers = [unit for unit, fmu in self._fmus.items() if _is_parameter(fmu, name)]
+            takers = self._takers(name)
             for unit in takers:
-                self._put(given, unit, name, raw, document, key)
+                self._give(unit, name, raw, (document, key))
             if name in CAR:
                 try:
                     numbers[name] = float(value_for(_quantity(name), raw))
@@ -233,37 +221,29 @@ class Parameters:
                         document.report(key, str(error))
             if takers or name in CAR:
                 idle += [] if takers else [name]
-                continue
-            before = (self._replaced(unit) for unit in self._scenario.replaced)
-            if any(fmu is not None and _is_parameter(fmu, name) for fmu in before):
-                self._notes.append(f"vehicle.{name} is left out: no unit has such a parameter after the swap")
-                continue
-            known = {v.name for fmu in self._fmus.values() for v in fmu.of("parameter")}
-            likely = closest(name, sorted(known | CAR.keys()))
-            guess = f"; did you mean {likely!r}?" if likely else ""
-            document.report(key, f"no unit has a parameter {name!r}{guess}")
+            elif any(_is_parameter(fmu, name) for fmu in self._system.before()):
+                self._system.notes.append(
+                    f"vehicle.{name} is left out: no unit has such a parameter after the swap"
+                )
+            else:
+                known = {v.name for fmu in self._fmus.values() for v in fmu.of("parameter")}
+                likely = closest(name, sorted(known | CAR.keys()))
+                guess = f"; did you mean {likely!r}?" if likely else ""
+                document.report(key, f"no unit has a parameter {name!r}{guess}")
         for name, sentence in contradictions(numbers):
             document.report(("parameters", name), sentence)
         self.car = car_of(numbers)
-        self._derive(given)
+        for name, formula in self.car.formulas.items():
+            for unit in self._takers(name):
+                came, says = ValueOrigin("derived", formula), f"{unit}.{name} = {formula}: "
+                self._give(unit, name, self.car.values[name], (document, ("parameters",)), came, says)
         for name in idle:
             if name not in self.car.used and document.override(("parameters", name)):
-                self._notes.append(f"vehicle.{name} changes nothing: no unit here takes it or what follows")
+                self._system.notes.append(
+                    f"vehicle.{name} changes nothing: no unit here takes it or what follows"
+                )
 
-    def _derive(self, given: dict[str, dict[str, Value]]) -> None:
-        """Give every unit what it declares of the car and the file does not say."""
-        for name, formula in self.car.formulas.items():
-            for unit, fmu in self._fmus.items():
-                if not _is_parameter(fmu, name):
-                    continue
-                try:
-                    given[unit][name] = value_for(fmu.variables[name], self.car.values[name])
-                except ValueError as error:
-                    place = ("parameters",)
-                    self._scenario.vehicle_document.report(place, f"{unit}.{name} = {formula}: {error}")
-                self._origins[unit][name] = ValueOrigin("derived", formula)
-
-    def _refuse_half_a_car(self, given: Mapping[str, Mapping[str, Value]]) -> None:
+    def _refuse_half_a_car(self) -> None:
         """Report units that the vehicle file gives part of a car; note what tyres have to tell.
 
         A file that not even static loads follow from is no car, but some values for the FMUs' own.
@@ -271,39 +251,39 @@ class Parameters:
         if self._scenario.vehicle_document.problems or not self.car.values.keys() >= {*STATIC_LOADS}:
             return
         for unit, fmu in self._fmus.items():
-            lacks = [v.name for v in fmu.of("parameter") if v.name in CAR and v.name not in given[unit]]
+            given = self._given[unit]
+            lacks = [v.name for v in fmu.of("parameter") if v.name in CAR and v.name not in given]
             if of_tyres := [name for name in lacks if name in STIFFNESSES]:
                 self.lacking[unit] = of_tyres
             needed = [name for name in lacks if CAR[name].needed]
-            if needed and any(name in self.car.values for name in given[unit]):
-                self._scenario.document.report(
+            if needed and any(name in self.car.values for name in given):
+                self._system.report(
                     ("units", unit),
                     f"{fmu.name} takes its car from the vehicle file, which gives neither "
                     f"{listed(needed, last='nor')} nor what {'they' if len(needed) > 1 else 'it'} would "
                     "follow from: give them there, or to this unit",
                 )
 
-    def _left_out(self, unit: str, name: str, key: Key) -> bool:
+    def _is_left_out(self, unit: str, name: str, key: Key) -> bool:
         """Return whether a value was meant for the FMU that an option has replaced."""
         if unit not in self._scenario.replaced or self._scenario.document.override(key):
             return False
-        before = self._replaced(unit)
+        before = self._system.replaced(unit)
         return before is None or _is_parameter(before, name)
 
-    def _put(
-        self,
-        given: dict[str, dict[str, Value]],
-        unit: str,
-        name: str,
-        raw: Value,
-        document: Document,
-        key: Key,
-    ) -> None:
-        try:
-            given[unit][name] = value_for(self._fmus[unit].variables[name], raw)
-        except ValueError as error:
-            document.report(key, str(error))
-        self._origins[unit][name] = origin(document, key)
+
+def _text_of(path: Path) -> str:
+    """Return the text of a file that stands in place of a value.
+
+    Raises:
+        ValueError: why it cannot be read.
+    """
+    try:
+        return read_bytes(path, largest=TEXT).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise ValueError("the file is not UTF-8") from None
+    except OSError as error:
+        raise ValueError((error.strerror or "cannot be read").lower()) from None
 
 
 def known_car(given: Mapping[str, Value]) -> Car:

@@ -1,14 +1,8 @@
-"""Which variables a pattern with a `*` means, now and before a swap."""
+"""Which names a pattern with a `*` means."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
-
-from ..plan import Fmu
-from ..scenario.load import Scenario
-
-Replaced = Callable[[str], Fmu | None]
-"""Returns the FMU of a unit that a change has replaced, None if it is not there."""
+from collections.abc import Collection
 
 
 def match(pattern: str, name: str) -> str | None:
@@ -25,20 +19,3 @@ def matching(pattern: str, names: Collection[str]) -> dict[str, str]:
     if "*" not in pattern:
         return {"": pattern} if pattern in names else {}
     return {part: name for name in names if (part := match(pattern, name)) is not None}
-
-
-def had(
-    scenario: Scenario, replaced: Replaced, units: Iterable[str], pattern: str, causality: str | None = None
-) -> bool:
-    """Return whether an FMU that a change has replaced in one of the units has such a variable.
-
-    Args:
-        causality: of the variable; None: any.
-    """
-    before = (replaced(unit) for unit in units if unit in scenario.replaced)
-    return any(
-        match(pattern, v.name) is not None and causality in (None, v.causality)
-        for fmu in before
-        if fmu is not None
-        for v in fmu.variables.values()
-    )

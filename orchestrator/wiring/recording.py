@@ -5,36 +5,34 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 
 from ..plan import Fmu, Variable
-from ..scenario.load import Scenario
 from ..wording import closest, fold, hint
-from .patterns import Replaced, had, match
+from .opened_system import System
+from .patterns import match
 
 
-def recorded(
-    scenario: Scenario, fmus: Mapping[str, Fmu], replaced: Replaced, notes: list[str]
-) -> tuple[tuple[str, str], ...]:
+def recorded(system: System) -> tuple[tuple[str, str], ...]:
     """Return (unit, variable) of each column, in the order of the scenario's list or units.
 
-    Without a list these are all outputs but text. Problems go to the scenario's document, what was
-    left out after a swap to `notes`.
+    Without a list these are all outputs but text.
     """
-    if scenario.record is None:
+    fmus, record = system.fmus, system.scenario.record
+    if record is None:
         return tuple((unit, v.name) for unit, fmu in fmus.items() for v in _usual(fmu))
     chosen: dict[tuple[str, str], None] = {}
-    for i, (unit, pattern) in enumerate(scenario.record):
+    for i, (unit, pattern) in enumerate(record):
         units = list(fmus) if unit == "*" else [unit]
         found = _matching(units, fmus, pattern, _usual) or _matching(units, fmus, pattern, _all)
         chosen.update(dict.fromkeys(found))
         if found:
             continue
-        if had(scenario, replaced, units, pattern):
-            notes.append(f"record[{i}] is left out: {unit} has no variable {pattern!r} any more")
+        if system.had(units, pattern):
+            system.notes.append(f"record[{i}] is left out: {unit} has no variable {pattern!r} any more")
             continue
         usual, every = ([v.name for u in units for v in of(fmus[u])] for of in (_usual, _all))
         names = every if closest(pattern, usual) is None and closest(pattern, every) else usual
         who = "no unit has a" if unit == "*" else f"{unit} has no"
         more = hint(pattern, fold(list(dict.fromkeys(names))), lead="its outputs are")
-        scenario.document.report(("record", i), f"{who} variable {pattern!r} to record{more}")
+        system.report(("record", i), f"{who} variable {pattern!r} to record{more}")
     return tuple(chosen)
 
 
