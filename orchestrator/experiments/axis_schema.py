@@ -9,8 +9,8 @@ from pydantic import Field, PlainValidator, model_validator
 from ..plan import FACTS, FAULTS, OF_RUN, TYRES, Algorithm
 from ..scenario.fault_schema import FaultSpec
 from ..scenario.measurement_units import parse_unit
-from ..scenario.scenario_schema import Scalar, Time
-from ..scenario.strict import Strict
+from ..scenario.scenario_schema import Scalar
+from ..scenario.strict import Strict, Time
 from ..wording import short
 from .judged_schema import Patterns
 from .numbers import Number, is_finite, text_of

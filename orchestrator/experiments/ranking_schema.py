@@ -24,8 +24,8 @@ from typing import Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from ..scenario.scenario_schema import Scalar, Time
-from ..scenario.strict import Strict
+from ..scenario.scenario_schema import Scalar
+from ..scenario.strict import Strict, Time
 from .axis_schema import Changes
 
 UNIT = "controller"

@@ -19,12 +19,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
-from pydantic import Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
+from pydantic import Field, PlainSerializer, PlainValidator, model_validator
 
 from ..plan import FAULT_WORDS, NO_FAULTS, Faults, Value, fault_line
 from ..wording import short
 from . import quantities, yaml_lines
-from .strict import Strict
+from .strict import Instant, Strict, Time
 
 EVERY = Fraction(1, 100)
 """Time from one message to the next [s]. Chosen: what the buses of cars have."""
@@ -136,16 +136,9 @@ def _share(value: object) -> float:
     return float(value)
 
 
-_TIME = {"type": ["number", "string"]}
-Instant = Annotated[
-    Fraction, PlainValidator(quantities.instant), PlainSerializer(float), WithJsonSchema(_TIME)
-]
-Span = Annotated[Fraction, PlainValidator(quantities.seconds), PlainSerializer(float), WithJsonSchema(_TIME)]
-PlaceText = Annotated[
-    Place, PlainValidator(place_of), PlainSerializer(str), WithJsonSchema({"type": "string"})
-]
-FaultValue = Annotated[float | str, PlainValidator(_value), WithJsonSchema({"type": ["number", "string"]})]
-Share = Annotated[float, PlainValidator(_share), WithJsonSchema({"type": "number"})]
+PlaceText = Annotated[Place, PlainValidator(place_of), PlainSerializer(str)]
+FaultValue = Annotated[float | str, PlainValidator(_value)]
+Share = Annotated[float, PlainValidator(_share)]
 
 
 class FaultSpec(Strict):
@@ -159,7 +152,7 @@ class FaultSpec(Strict):
     kind: KindName = Field(description="What becomes of the signal")
     value: FaultValue | None = Field(None, description="As the kind has it, with its unit or in the signal's")
     share: Share | None = Field(None, description="Of the messages, of dropout and outlier")
-    every: Span | None = Field(
+    every: Time | None = Field(
         None, description="Time from one message to the next, of what is random; default: 10 ms"
     )
     seed: int | None = Field(None, ge=0, description="Of random numbers; default: 0")

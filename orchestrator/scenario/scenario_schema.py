@@ -13,23 +13,13 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import (
-    AfterValidator,
-    Discriminator,
-    Field,
-    PlainSerializer,
-    PlainValidator,
-    PrivateAttr,
-    Tag,
-    WithJsonSchema,
-    model_validator,
-)
+from pydantic import AfterValidator, Discriminator, Field, PlainValidator, PrivateAttr, Tag, model_validator
 
 from ..plan import Algorithm, Change, Value
 from ..wording import short
-from . import overrides, quantities
+from . import overrides
 from .fault_schema import FaultSpec
-from .strict import Strict
+from .strict import Instant, Strict, Time
 from .tir import TyreFile
 from .yaml_lines import Document, Key
 
@@ -74,12 +64,6 @@ def _plain(value: object) -> Value:
     raise ValueError("has no value" if value is None else f"must be one value (got {short(value)})")
 
 
-def _number(value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ValueError(f"must be a number (got {short(value)})")
-    return float(value)
-
-
 def _end(value: object) -> Endpoint | list[str]:
     if not isinstance(value, list):
         return endpoint(value)
@@ -111,23 +95,12 @@ def _tolerance(value: object) -> float:
     return float(value)
 
 
-_SCALAR_SCHEMA = {"type": ["number", "boolean", "string"]}
-_TIME_SCHEMA = {"type": ["number", "string"]}
-Scalar = Annotated[Value, PlainValidator(_plain), WithJsonSchema(_SCALAR_SCHEMA)]
-Number = Annotated[float, PlainValidator(_number), WithJsonSchema({"type": "number"})]
-Tolerance = Annotated[float, PlainValidator(_tolerance), WithJsonSchema({"type": "number"})]
-Time = Annotated[
-    Fraction, PlainValidator(quantities.seconds), PlainSerializer(float), WithJsonSchema(_TIME_SCHEMA)
-]
-Instant = Annotated[
-    Fraction, PlainValidator(quantities.instant), PlainSerializer(float), WithJsonSchema(_TIME_SCHEMA)
-]
-Tyres = Annotated[
-    dict[str, str],
-    PlainValidator(_tyres),
-    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "object"}]}),
-]
-Variables = Annotated[Endpoint, PlainValidator(endpoint), WithJsonSchema({"type": "string"})]
+Scalar = Annotated[Value, PlainValidator(_plain)]
+Tolerance = Annotated[float, PlainValidator(_tolerance)]
+Tyres = Annotated[dict[str, str], PlainValidator(_tyres)]
+Variables = Annotated[Endpoint, PlainValidator(endpoint)]
+Source = Annotated[Endpoint | list[str] | None, PlainValidator(_source)]
+Target = Annotated[Endpoint | list[str], PlainValidator(_end)]
 UnitName = Annotated[str, AfterValidator(_unit_name)]
 
 
@@ -137,12 +110,12 @@ class TextSpec(Strict):
     file: str = Field(description="Path, relative to the scenario", min_length=1)
 
 
-def _is_text(value: object) -> str:
-    return "text" if isinstance(value, dict) else "value"
+def _form(value: object) -> str:
+    return "of file" if isinstance(value, dict) else "value"
 
 
 ParameterValue = Annotated[
-    Annotated[Scalar, Tag("value")] | Annotated[TextSpec, Tag("text")], Discriminator(_is_text)
+    Annotated[Scalar, Tag("value")] | Annotated[TextSpec, Tag("of file")], Discriminator(_form)
 ]
 
 
@@ -158,12 +131,6 @@ class UnitSpec(Strict):
     validate_: bool = Field(
         True, alias="validate", description="Refuse an FMU whose description is formally wrong; false: warn"
     )
-
-
-_END_SCHEMA = {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}
-_SOURCE_SCHEMA = {"anyOf": [*_END_SCHEMA["anyOf"], {"type": "null"}]}
-Source = Annotated[Endpoint | list[str] | None, PlainValidator(_source), WithJsonSchema(_SOURCE_SCHEMA)]
-Target = Annotated[Endpoint | list[str], PlainValidator(_end), WithJsonSchema(_END_SCHEMA)]
 
 
 class SeriesSpec(Strict):
@@ -188,12 +155,8 @@ class SeriesSpec(Strict):
     )
 
 
-def _is_series(value: object) -> str:
-    return "series" if isinstance(value, dict) else "value"
-
-
 InputValue = Annotated[
-    Annotated[Scalar, Tag("value")] | Annotated[SeriesSpec, Tag("series")], Discriminator(_is_series)
+    Annotated[Scalar, Tag("value")] | Annotated[SeriesSpec, Tag("of file")], Discriminator(_form)
 ]
 
 
@@ -213,8 +176,8 @@ class Connection(Strict):
 
     source: Source = Field(alias="from", description="unit.output, or units in order, or null")
     target: Target = Field(alias="to", description="unit.input, or units")
-    gain: Number | None = Field(None, description="Factor in place of the conversion of units")
-    offset: Number | None = Field(None, description="Added after the factor")
+    gain: float | None = Field(None, description="Factor in place of the conversion of units")
+    offset: float | None = Field(None, description="Added after the factor")
 
     @model_validator(mode="after")
     def _check_ends(self) -> Connection:

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import types
 import typing
-from typing import Any, TypeVar
+from fractions import Fraction
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, PlainSerializer, PlainValidator, ValidationError
 
 from ..wording import closest, listed, short
+from .quantities import instant, seconds
 from .yaml_lines import Document, Key
 
 Model = TypeVar("Model", bound=BaseModel)
+Instant = Annotated[Fraction, PlainValidator(instant), PlainSerializer(float)]
+Time = Annotated[Fraction, PlainValidator(seconds), PlainSerializer(float)]
+"""Above zero."""
 
 
 class Strict(BaseModel):
