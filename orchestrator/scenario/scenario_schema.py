@@ -250,12 +250,6 @@ class Scenario(Strict):
     _changes: tuple[Change, ...] = PrivateAttr(default=())
     _explicit: bool = PrivateAttr(default=False)
 
-    def afresh(self) -> Scenario:
-        """Return the scenario with documents that know of no problems; what is found later stays apart."""
-        made = self.model_copy()
-        made._document, made._vehicle_document = self._document.afresh(), self._vehicle_document.afresh()
-        return made
-
     @property
     def path(self) -> Path:
         """The scenario file."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from ..errors import Problem, ScenarioError
 from ..files import TEXT, read_bytes, reason
@@ -22,7 +22,6 @@ ALIASED = 100_000
 """Values that the aliases of a file may repeat: aliases of aliases multiply, and a few lines could fill
 the memory. Chosen: a hundred times what a study of a hundred runs needs."""
 
-T = TypeVar("T")
 Key = tuple[str | int, ...]
 """Where a value stands: ('connections', 3, 'from')."""
 
@@ -77,28 +76,18 @@ class Document:
         for part in key:
             holder = holder[part]
         del holder[i]
-        self.lines, self.overrides = _moved_up(self.lines, key, i), _moved_up(self.overrides, key, i)
+        n = len(key)
+        of_both: tuple[dict[Key, Any], ...] = (self.lines, self.overrides)
+        for kept in of_both:
+            for place in [place for place in kept if place[:n] == key and place[n:] >= (i,)]:
+                value, at = kept.pop(place), place[n]
+                if isinstance(at, int) and at > i:
+                    moved = (*key, at - 1, *place[n + 1 :])
+                    kept[moved] = value
 
     def sentences(self) -> list[Problem]:
         """Return all problems, first those of changes, then the file's from top to bottom."""
         return sorted(self.problems, key=lambda problem: problem.line or 0)
-
-    def afresh(self) -> Document:
-        """Return the document without problems, and with notes of its own."""
-        return replace(self, problems={}, notes=[*self.notes])
-
-
-def _moved_up(kept: dict[Key, T], key: Key, i: int) -> dict[Key, T]:
-    """Return what is kept of places once item `i` of the list at `key` is gone."""
-    n, moved = len(key), {}
-    for place, value in kept.items():
-        at = place[n] if place[:n] == key and len(place) > n else None
-        if isinstance(at, int) and at >= i:
-            if at == i:
-                continue
-            place = (*key, at - 1, *place[n + 1 :])
-        moved[place] = value
-    return moved
 
 
 def dotted(key: Key) -> str:

@@ -7,8 +7,9 @@ nothing is connected by equal names.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import replace
+from graphlib import CycleError
 from itertools import pairwise
 
 from ..plan import DEFAULT, Series, Value, Variable, Wire
@@ -18,6 +19,7 @@ from ..wording import fold, hint, listed
 from .constants import Constant, Input, constants
 from .fitting import alike, contradicts_its_name, conversion_between, difference, fits
 from .opened_system import System
+from .order import in_order
 from .patterns import matching
 
 
@@ -162,17 +164,20 @@ class Connector:
     def _put_in_order(self) -> None:
         """Put the sources that a unit prefers in the one order that agrees with every list of them."""
         for unit, lists in self._preferring.items():
-            keys = {source: key for sources, key in reversed(lists) for source in sources}
-            left = list(dict.fromkeys(source for sources, _ in lists for source in sources))
-            order = self._preferred.setdefault(unit, [])
-            while left:
-                behind = {s for sources, _ in lists for s in [one for one in sources if one in left][1:]}
-                first = next((s for s in left if s not in behind), None)
-                if first is None:
-                    self._report(lists[-1][1], f"{unit} cannot prefer {_in_a_circle(lists, left)}")
-                    first = left[0]  # so that nothing else is reported of it
-                left.remove(first)
-                order.append((first, keys[first]))
+            keys: dict[str, Key] = {}
+            edges: dict[tuple[str, str], Key] = {}
+            for sources, key in lists:
+                for source in sources:
+                    keys.setdefault(source, key)
+                for pair in pairwise(dict.fromkeys(sources)):
+                    edges.setdefault(pair, key)
+            try:
+                order = in_order(keys, edges)
+            except CycleError as error:
+                order = list(keys)  # so that nothing else is reported of it
+                circle = [f"{a} to {b} ({dotted(edges[a, b])})" for a, b in pairwise(error.args[1])]
+                self._report(lists[-1][1], f"{unit} cannot prefer {listed(circle)}")
+            self._preferred[unit] = [(source, keys[source]) for source in order]
 
     def _no_such(self, key: Key, unit: str, pattern: str, kind: str) -> None:
         """Report a pattern without a match, or note it if the FMU that was replaced has one."""
@@ -308,16 +313,3 @@ class Connector:
         for unit, measure in odd:
             who = f"{unit} ({self._fmus[unit].name})"
             self._notes.append(f"{who} defines {measure} otherwise than usual: taken as it defines it")
-
-
-def _in_a_circle(lists: Sequence[tuple[list[str], Key]], left: Sequence[str]) -> str:
-    """Return in words the preferences of lists that lead in a circle, all of them among the units `left`."""
-    before: dict[str, tuple[str, Key]] = {}
-    for sources, key in lists:
-        for one, other in pairwise([s for s in sources if s in left]):
-            before.setdefault(other, (one, key))
-    path = [left[0]]
-    while path[-1] not in path[:-1]:
-        path.append(before[path[-1]][0])
-    circle = path[path.index(path[-1]) :]
-    return listed(f"{before[b][0]} to {b} ({dotted(before[b][1])})" for b in circle[:-1])

@@ -67,7 +67,6 @@ def make_plan(
         BuildError: FMUs that are stale and cannot be built.
         WiringError: everything that is wrong with parameters and connections.
     """
-    scenario = scenario.afresh()
     system = _open_all(scenario, fmus, opener or Opener())
     opened, notes = system.fmus, system.notes
     notes += [*scenario.document.notes, *stale_fmus(opened.values()), *host_needs(opened.values())]
@@ -78,10 +77,8 @@ def make_plan(
     faults = faults_of(system, wires, record)
     if not isolated:
         _check_instances(system)
-    system.tell()
     evaluation = evaluate(opened, wires)
-    problems = scenario.document.sentences()
-    problems += scenario.vehicle_document.sentences()
+    problems = system.problems()
     of_all = shadowed_modules(opened, isolated=isolated)
     of_all += [
         f"algebraic loop: {loop}; these values would define each other at one instant, so "

@@ -8,9 +8,10 @@ from functools import cached_property
 
 from vocabulary.wheels import WHEELS
 
+from ..errors import Problem, WiringError
 from ..plan import Fmu, ValueOrigin, Variable
 from ..scenario.load import Scenario
-from ..scenario.yaml_lines import PROBLEMS, Key
+from ..scenario.yaml_lines import PROBLEMS, Document, Key
 from ..wording import fold_sentences
 from .patterns import match
 
@@ -32,7 +33,8 @@ class System:
     """Returns the FMU of a unit that a change has replaced, None if it is not there."""
     notes: list[str] = field(default_factory=list)
     """Remarks on what is no mistake, for the plan."""
-    _found: list[tuple[Key, str]] = field(default_factory=list)
+    found: list[tuple[tuple[bool, Key], str]] = field(default_factory=list)
+    """What is wrong, with its key and whether that is one of the vehicle file."""
 
     @cached_property
     def origins(self) -> dict[str, dict[str, ValueOrigin]]:
@@ -69,18 +71,21 @@ class System:
             for variable in fmu.variables.values()
         )
 
-    def report(self, key: Key, sentence: str) -> None:
-        """Report a problem with what the scenario says at `key`."""
-        self._found.append((key, sentence))
-        if len(self._found) >= len(WHEELS) * PROBLEMS:
-            self.tell()
-
-    def tell(self) -> None:
-        """Enter all problems into the scenario's document, those that are alike for four wheels once.
+    def report(self, key: Key, sentence: str, document: Document | None = None) -> None:
+        """Report a problem with what the scenario says at `key`, or the vehicle file if that is the document.
 
         Raises:
-            ScenarioError: they are very many.
+            WiringError: problems have become very many.
         """
-        for key, sentence in fold_sentences(self._found):
-            self.scenario.document.report(key, sentence)
-        self._found.clear()
+        self.found.append(((document is self.scenario.vehicle_document, key), sentence))
+        if len(self.found) >= len(WHEELS) * PROBLEMS:
+            raise WiringError(self.problems())
+
+    def problems(self) -> list[Problem]:
+        """Return all problems from top to bottom of the files, those that are alike for four wheels once."""
+        problems: list[Problem] = []
+        folded = fold_sentences(self.found)
+        for of_vehicle, document in enumerate((self.scenario.document, self.scenario.vehicle_document)):
+            told = [document.problem(key, text) for (which, key), text in folded if which == of_vehicle]
+            problems += sorted(dict.fromkeys(told), key=lambda problem: problem.line or 0)
+        return problems

@@ -191,12 +191,25 @@ def _unit_order(
     """Return the units so that sources stand before targets, else as the scenario lists them."""
     rank = {name: i for group in cycles for i, name in enumerate(_cheapest_order(group, weights))}
     group = {name: i for i, cycle in enumerate(cycles) for name in cycle}
-    sorter = TopologicalSorter({name: () for name in names})
-    for source, target in weights:
-        if source not in group or group[source] != group.get(target) or rank[source] < rank[target]:
-            sorter.add(target, source)
-    sorter.prepare()
+    edges = [
+        (source, target)
+        for source, target in weights
+        if source not in group or group[source] != group.get(target) or rank[source] < rank[target]
+    ]
+    return in_order(names, edges)
+
+
+def in_order(names: Iterable[str], edges: Iterable[Edge]) -> list[str]:
+    """Return names so that the first of every edge stands before the second, else in the order given.
+
+    Raises:
+        CycleError: the edges lead in a circle.
+    """
     place = {name: i for i, name in enumerate(names)}
+    sorter: TopologicalSorter[str] = TopologicalSorter({name: () for name in place})
+    for first, second in edges:
+        sorter.add(second, first)
+    sorter.prepare()
     ready: list[str] = []
     order: list[str] = []
     while sorter.is_active():

@@ -143,7 +143,7 @@ class Parameters:
         try:
             self._given[unit][name] = value_for(self._fmus[unit].variables[name], raw)
         except ValueError as error:
-            document.report(key, f"{says}{error}")
+            self._system.report(key, f"{says}{error}", document)
         self._system.origins[unit][name] = came or origin(document, key)
 
     def _takers(self, name: str) -> list[str]:
@@ -202,7 +202,8 @@ class Parameters:
                 self._system.notes.append("tyres are left out: no tyre takes such files after the swap")
             else:
                 document, key = place
-                document.report(key, "no unit is a tyre that takes such files; tyre_magic_formula_62 does")
+                sentence = "no unit is a tyre that takes such files; tyre_magic_formula_62 does"
+                self._system.report(key, sentence, document)
 
     def _from_vehicle(self) -> None:
         document = self._scenario.vehicle_document
@@ -218,7 +219,7 @@ class Parameters:
                     numbers[name] = float(value_for(_quantity(name), raw))
                 except ValueError as error:
                     if not takers:
-                        document.report(key, str(error))
+                        self._system.report(key, str(error), document)
             if takers or name in CAR:
                 idle += [] if takers else [name]
             elif any(_is_parameter(fmu, name) for fmu in self._system.before()):
@@ -229,9 +230,9 @@ class Parameters:
                 known = {v.name for fmu in self._fmus.values() for v in fmu.of("parameter")}
                 likely = closest(name, sorted(known | CAR.keys()))
                 guess = f"; did you mean {likely!r}?" if likely else ""
-                document.report(key, f"no unit has a parameter {name!r}{guess}")
+                self._system.report(key, f"no unit has a parameter {name!r}{guess}", document)
         for name, sentence in contradictions(numbers):
-            document.report(("parameters", name), sentence)
+            self._system.report(("parameters", name), sentence, document)
         self.car = car_of(numbers)
         for name, formula in self.car.formulas.items():
             for unit in self._takers(name):
@@ -248,7 +249,8 @@ class Parameters:
 
         A file that not even static loads follow from is no car, but some values for the FMUs' own.
         """
-        if self._scenario.vehicle_document.problems or not self.car.values.keys() >= {*STATIC_LOADS}:
+        wrong = any(of_vehicle for (of_vehicle, _), _ in self._system.found)
+        if wrong or not self.car.values.keys() >= {*STATIC_LOADS}:
             return
         for unit, fmu in self._fmus.items():
             given = self._given[unit]

@@ -847,8 +847,8 @@ def test_lists_that_prefer_in_a_circle_are_an_error_that_names_it(folder: Path) 
     rest += "  - {from: [road, driver], to: [tyre, controller]}\n"
     rest += "  - {from: [driver, estimator], to: [controller]}\n"
     said = (
-        "a.yaml:14: connections[3]: controller cannot prefer driver to estimator (connections[3]), "
-        "road to driver (connections[2]) and estimator to road (connections[1])"
+        "a.yaml:14: connections[3]: controller cannot prefer estimator to road (connections[1]), "
+        "road to driver (connections[2]) and driver to estimator (connections[3])"
     )
     assert problems(scenario(estimators(folder), rest)) == [said]
 
