@@ -14,7 +14,7 @@ from orchestrator.cli import main
 from orchestrator.experiments.execution import left_to_do
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.findings import judge_results
-from orchestrator.experiments.planning import jobs_of, plan_experiment
+from orchestrator.experiments.planning import plan_experiment
 from orchestrator.experiments.record import RECORD, write_findings
 from orchestrator.experiments.workers import execute
 
@@ -29,7 +29,7 @@ def judge_some(file: Path, out: Path, *runs: str) -> dict[str, Any]:
     """
     build_all(FMUS)
     experiment = load_experiment(file)
-    planned = plan_experiment(experiment, jobs_of(experiment, out, FMUS))
+    planned = plan_experiment(experiment, out, fmus=FMUS)
     named = {run.name for run in experiment.matching(runs)}
     outcomes = execute([job for job in left_to_do(planned.jobs, {}) if job.label in named])
     assert [outcome.problems for outcome in outcomes if not outcome.ok] == []

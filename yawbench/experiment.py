@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.errors import Problem, ScenarioError, YawbenchError
+from orchestrator.experiments.expansion import NamedRun
 from orchestrator.experiments.experiment import Experiment as Design
-from orchestrator.experiments.experiment import NamedRun
 from orchestrator.experiments.figures import draw_over_axes
 from orchestrator.experiments.findings import Findings
 from orchestrator.experiments.jobs import Job, Once, Outcome, Record, measured
-from orchestrator.experiments.planning import jobs_of, metrics_of, plan_experiment
+from orchestrator.experiments.planning import metrics_of, plan_experiment
 from orchestrator.experiments.schema import ExperimentSpec, FigureSpec
 from orchestrator.experiments.table import columns_of, to_pandas
 from orchestrator.experiments.workers import execute
@@ -135,7 +135,7 @@ class Experiment:
         """
         programs = self.base.programs
         once = Once(**self.base._opening())
-        planned = plan_experiment(self.design, jobs_of(self.design, self.base.path.parent), once=once)
+        planned = plan_experiment(self.design, self.base.path.parent, once=once)
         metrics = metrics_of(planned.experiment)
         outcomes: dict[int, Outcome] = {}
         here: list[tuple[int, Job]] = []

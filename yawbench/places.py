@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from components.fmi.component import Component
 from orchestrator.errors import ScenarioError, YawbenchError
 from orchestrator.experiments.execution import finish, left_to_do
-from orchestrator.experiments.jobs import Job, Made, Once, Outcome, Told, run_job
+from orchestrator.experiments.jobs import Job, Once, Outcome, Told, run_job
 from orchestrator.experiments.journal import Journal
 from orchestrator.experiments.ranking import load_ranking
 from orchestrator.experiments.ranking_course import Ranked, drive_ranking
@@ -98,8 +98,8 @@ def rank(
         def make(_: str, jobs: Sequence[Job]) -> None:
             finish(left_to_do(jobs, journal.records), journal, runner=runner)
 
-        of_jobs: dict[str, Any] = {} if out else {"keep": False}
-        return Places(drive_ranking(loaded, folder, journal, once, make, **of_jobs))
+        base = Job("", loaded.path, folder, format="parquet", keep=out is not None)
+        return Places(drive_ranking(loaded, base, journal, once, make))
 
 
 def _entry(given: Any, name: str) -> tuple[dict[str, EntrySpec], dict[Path, Program]]:
@@ -128,7 +128,7 @@ def _program_of(job: Job, programs: dict[Path, Program]) -> Program | None:
 def _made_here(job: Job, programs: dict[Path, Program]) -> Outcome:
     """Make a run of plain Python in this process."""
     try:
-        made: Made = run_job(job, opener=lambda unit, log, corrupted: _open(programs, unit, log, corrupted))
+        made = run_job(job, opener=lambda unit, log, corrupted: _open(programs, unit, log, corrupted))
         return Outcome(job, value=made)
     except YawbenchError as error:
         return Outcome(job, tuple(error.problems), error.exit_status)

@@ -1,4 +1,4 @@
-"""What the commands that make several runs share: an option, progress, tables on the terminal."""
+"""What the commands that make several runs share: progress, tables on the terminal."""
 
 from __future__ import annotations
 
@@ -6,24 +6,25 @@ import contextlib
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from ..wording import printable
+from ..wording import counted, printable
 
 if TYPE_CHECKING:
-    from ..experiments.jobs import Outcome
+    from ..experiments.findings import Each
+    from ..experiments.jobs import Job, Outcome
+    from ..experiments.journal import Journal
     from ..experiments.tables import Table
+    from .options import Wishes
 
-Jobs = Annotated[
-    int | None,
-    typer.Option("--jobs", metavar="N", min=1, help="Runs at a time; default: one per processor core."),
-]
 WIDTH = 140
 """Of tables that go into a file or a pipe."""
+SHOWN = 10
+"""Failed runs named on the terminal; all are in the table."""
 
 
 def say(text: str) -> None:
@@ -42,6 +43,17 @@ def hold(context: typer.Context, *folders: Path) -> None:
     context.with_resource(writing(*folders))
 
 
+def pooled(context: typer.Context, wishes: Wishes) -> Each:
+    """Return a `map` that spreads work over processes until this command has ended.
+
+    Raises:
+        YawbenchError: this process may not open as many files as that takes.
+    """
+    from ..experiments.workers import pool
+
+    return context.with_resource(pool(wishes.jobs)).map
+
+
 @contextlib.contextmanager
 def stoppable(folder: Path) -> Iterator[None]:
     """Let Ctrl-C end the command with a word on what has been recorded."""
@@ -50,6 +62,51 @@ def stoppable(folder: Path) -> Iterator[None]:
     except KeyboardInterrupt:
         say(f"Interrupted; what was recorded until then: {folder}")
         raise typer.Exit(1) from None
+
+
+def make(title: str, jobs: Sequence[Job], wishes: Wishes, journal: Journal | None = None) -> list[Outcome]:
+    """Make those of some runs that are left, tell of them, and return what became of them.
+
+    Args:
+        title: what they are.
+        jobs: with plans and keys.
+        wishes: of the user.
+        journal: knows what is finished, and notes what ends; without one the results on disk tell, and every
+            run has a line of its own.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C.
+        YawbenchError: the journal cannot be written, or there is no such cluster.
+    """
+    from ..experiments.execution import finish, left_to_do, runner_of
+
+    if wishes.no_run and journal is None:
+        return []
+    again = wishes.fresh and journal is None
+    left = list(jobs) if again else left_to_do(jobs, journal.records if journal else {})
+    total = len({(job.key, job.out) for job in jobs})
+    done = total - len(left)
+    before = "" if not done else ", all finished before" if done == total else f", {done} finished before"
+    say(f"{title}: {counted(len(jobs), 'run')}{before}")
+    outcomes: list[Outcome] = []
+    if wishes.no_run:
+        return outcomes
+    with reported("runs", total, done, each=journal is None) as told:
+
+        def ended(outcome: Outcome) -> None:
+            outcomes.append(outcome)
+            told(outcome)
+
+        finish(left, journal, runner=runner_of(wishes.jobs, wishes.scheduler), told=ended)
+    return outcomes
+
+
+def say_failed(failed: Mapping[str, str]) -> None:
+    """Say which runs failed; `failed`: words for each -> why."""
+    for words, why in list(failed.items())[:SHOWN]:
+        say(f"{words} failed: {why}")
+    if len(failed) > SHOWN:
+        say(f"{len(failed) - SHOWN} more failed")
 
 
 @contextlib.contextmanager

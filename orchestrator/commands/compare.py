@@ -2,26 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from .batch import Jobs, hold, print_tables
-from .experiment import Wishes, chapter_of, command_of, conduct, write_page
-from .options import (
-    CallLimit,
-    Fault,
-    Fmus,
-    Format,
-    Fresh,
-    Isolate,
-    NoBuild,
-    Out,
-    ScenarioFile,
-    Set,
-    isolation,
-)
+from .batch import hold, pooled, print_tables
+from .experiment import chapter_of, command_of, conduct, write_page
+from .options import MAKING, ScenarioFile, Wishes, takes
 
 Swaps = Annotated[
     list[str],
@@ -34,21 +21,8 @@ Swaps = Annotated[
 ]
 
 
-def compare(
-    context: typer.Context,
-    scenario: ScenarioFile,
-    swap: Swaps,
-    set_: Set = None,
-    fault: Fault = None,
-    out: Out = None,
-    fmus: Fmus = None,
-    no_build: NoBuild = False,
-    jobs: Jobs = None,
-    format_: Format = "csv",
-    fresh: Fresh = False,
-    isolate: Isolate = False,
-    call_limit: CallLimit = None,
-) -> None:
+@takes("set_", "fault", *MAKING, "jobs", "format_", "fresh")
+def compare(context: typer.Context, scenario: ScenarioFile, swap: Swaps, wishes: Wishes) -> None:
     """Run a scenario with several FMUs for a unit.
 
     report.html, which needs no server, begins with what the runs come to, side by side, and the signals
@@ -59,19 +33,15 @@ def compare(
     """
     from ..experiments.compare import comparison, comparison_table
     from ..pages.comparison import comparison_facts
-    from ..results.formats import check_format
     from ..results.naming import default_folder
-    from ..scenario.overrides import read_changes
 
-    for_each = read_changes(settings=set_ or (), faults=fault or ())
-    folder: Path = out or default_folder(scenario, for_each, suffix="-compare")
-    check_format(format_)
+    folder = wishes.out or default_folder(scenario, wishes.changes, suffix="-compare")
     hold(context, folder)
-    wishes = Wishes(fmus, not no_build, jobs, None, format_, isolation(isolate, call_limit), fresh=fresh)
-    findings = conduct(comparison(scenario, swap, for_each), folder, wishes)
+    each = pooled(context, wishes)
+    findings = conduct(comparison(scenario, swap, wishes.changes), folder, wishes, each)
     print_tables([comparison_table(findings)])
-    command = command_of("compare", scenario, swap=swap, set=set_, fault=fault)
+    command = command_of("compare", scenario, **wishes.changing | {"swap": swap})
     facts = {"comparison": comparison_facts(findings)}
-    write_page([chapter_of(findings, folder, command, shown_in=folder, **facts)], folder)
+    write_page([chapter_of(findings, folder, command, each, shown_in=folder, **facts)], folder)
     if findings.failed:
         raise typer.Exit(1)

@@ -7,9 +7,9 @@ from typing import Annotated
 import typer
 
 from ..plan import Algorithm
-from .batch import hold, print_tables
-from .experiment import Wishes, chapter_of, command_of, conduct, write_page
-from .options import CallLimit, Fault, Fmus, Isolate, NoBuild, Out, ScenarioFile, Set, Swap, isolation
+from .batch import hold, pooled, print_tables
+from .experiment import chapter_of, command_of, conduct, write_page
+from .options import CHANGES, MAKING, ScenarioFile, Wishes, takes
 
 Halvings = Annotated[
     int, typer.Option("--halvings", metavar="N", min=2, max=10, help="How often the step is halved.")
@@ -26,20 +26,14 @@ Algorithms = Annotated[
 ]
 
 
+@takes(*CHANGES, *MAKING)
 def converge(
     context: typer.Context,
     scenario: ScenarioFile,
+    wishes: Wishes,
     halvings: Halvings = 3,
     signal: Signal = "plant.yaw_rate",
     algorithm: Algorithms = None,
-    swap: Swap = None,
-    set_: Set = None,
-    fault: Fault = None,
-    out: Out = None,
-    fmus: Fmus = None,
-    no_build: NoBuild = False,
-    isolate: Isolate = False,
-    call_limit: CallLimit = None,
 ) -> None:
     """Halve the step size again and again; show error and order.
 
@@ -47,6 +41,7 @@ def converge(
     follow each other, so that their wall times can be compared. Without --out, results go to
     results/<folder of the scenario>/<its name>-converge.
     """
+    from dataclasses import replace
     from typing import get_args
 
     from ..errors import ScenarioError
@@ -55,7 +50,6 @@ def converge(
     from ..figures.style import save
     from ..pages.panel_images import image_of
     from ..results.naming import default_folder
-    from ..scenario.overrides import read_changes
     from ..wording import hint
     from ..writing import write_whole
 
@@ -63,18 +57,18 @@ def converge(
         if name not in get_args(Algorithm):
             guess = hint(name, get_args(Algorithm), lead="there are")
             raise ScenarioError(f"--algorithm {name}: no such algorithm{guess}")
-    given = read_changes(swap or (), set_ or (), fault or ())
-    folder = out or default_folder(scenario, given, suffix="-converge")
+    folder = wishes.out or default_folder(scenario, wishes.changes, suffix="-converge")
     hold(context, folder)
+    wishes = replace(wishes, jobs=1, fresh=True)
+    each = pooled(context, wishes)
     experiment = refinements(
         scenario,
         halvings=halvings,
         signal=signal,
         algorithms=algorithm or (),  # type: ignore[arg-type]
-        changes=given,
+        changes=wishes.changes,
     )
-    wishes = Wishes(fmus, not no_build, 1, call_limit=isolation(isolate, call_limit), fresh=True)
-    findings = conduct(experiment, folder, wishes, record=(signal,))
+    findings = conduct(experiment, folder, wishes, each, record=(signal,))
     rows = measure(findings, signal)
     table = convergence_table(rows, experiment.spec.title)
     write_whole(folder / "converge.csv", to_csv(columns_of(rows)))
@@ -85,9 +79,7 @@ def converge(
         halvings=[halvings],
         signal=[signal],
         algorithm=algorithm,
-        swap=swap,
-        set=set_,
-        fault=fault,
+        **wishes.changing,
     )
     charts = []
     if any(row.error for row in rows):
@@ -96,6 +88,6 @@ def converge(
         save(figure, folder / "converge")
         charts = [image_of(folder / "converge.svg", experiment.spec.title)]
     facts = {"results": [table], "charts": charts}
-    write_page([chapter_of(findings, folder, command, shown_in=folder, **facts)], folder)
+    write_page([chapter_of(findings, folder, command, each, shown_in=folder, **facts)], folder)
     if any(row.failed for row in rows):
         raise typer.Exit(1)

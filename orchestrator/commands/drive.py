@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .batch import Jobs
-from .options import CallLimit, Fault, Fmus, Fresh, Isolate, NoBuild, Out, Set, Swap, isolation
+from .batch import hold, make, say, stoppable
+from .options import CHANGES, MAKING, Wishes, takes
 
 if TYPE_CHECKING:
-    from ..experiments.dwell_experiment import DwellExperiment
-    from ..experiments.entry_speed_experiment import EntrySpeedExperiment
     from ..experiments.jobs import Job, Once
     from ..plan import Change
-
-    Make = Callable[[str, Sequence[Job]], int]
-    """Makes runs that have not been made, under a title; returns the exit status."""
 
 GROUND = "proving_ground"
 """Folder of the scenarios of standard tests."""
@@ -59,24 +55,16 @@ Angle = Annotated[
 Figures = Annotated[bool, typer.Option("--figures", help="Draw every run, not the series alone.")]
 
 
+@takes(*CHANGES, *MAKING, "jobs", "fresh")
 def drive(
     context: typer.Context,
     test: Which,
-    swap: Swap = None,
-    set_: Set = None,
-    fault: Fault = None,
+    wishes: Wishes,
     vehicle: Vehicle = None,
     scenario: Scenario = None,
     slow_steer: Slow = None,
     angle: Angle = None,
-    out: Out = None,
-    fmus: Fmus = None,
-    no_build: NoBuild = False,
-    jobs: Jobs = None,
     figures: Figures = False,
-    fresh: Fresh = False,
-    isolate: Isolate = False,
-    call_limit: CallLimit = None,
 ) -> None:
     """Drive a standard test with all its runs and evaluate it.
 
@@ -89,40 +77,36 @@ def drive(
     kilometre per hour, from the scenario's own speed in steps and halves.
     """
     from ..errors import ScenarioError
-    from ..experiments.dwell_experiment import DwellExperiment
-    from ..experiments.entry_speed_experiment import EntrySpeedExperiment
-    from ..experiments.jobs import Once
+    from ..experiments.driven_series import AMPLITUDE, SPEED
+    from ..experiments.jobs import Job, Once
     from ..results.naming import default_folder
     from ..scenario import catalogue
-    from ..scenario.overrides import read_changes
-    from .batch import hold
 
-    changes = (*_vehicle(vehicle), *read_changes(swap or (), set_ or (), fault or ()))
+    changes = (*_vehicle(vehicle), *wishes.changes)
     one_run = catalogue.find(scenario or f"{GROUND}/{test.name}", "a scenario")
-    folder = out or default_folder(one_run, changes, suffix="_series")
-    limit = isolation(isolate, call_limit)
-    if test is not Driven.sine_with_dwell and (angle or slow_steer):
-        raise ScenarioError(f"{test.value} needs no A: leave --angle and --slow-steer away")
-
-    def make(title: str, runs: Sequence[Job]) -> int:
-        return _make(title, runs, folder, jobs, fresh=fresh)
-
-    once = Once(build=not no_build)
+    folder = wishes.out or default_folder(one_run, changes, suffix="_series")
+    base = Job("", one_run, folder, changes, **wishes.of_jobs | {"format": "parquet", "keep": True})
+    once = Once(build=wishes.build)
+    given = {change.place for change in changes}
     if test is Driven.sine_with_dwell:
+        if AMPLITUDE in given:
+            raise ScenarioError(f"{AMPLITUDE}: the series itself says which amplitudes are driven")
         slow = catalogue.find(slow_steer or f"{GROUND}/slowly_increasing_steer", "a scenario")
-        dwell = DwellExperiment(one_run, slow, folder, changes, fmus, call_limit=limit)
         hold(context, folder)
-        status = _drive_dwell(dwell, once, angle, make, figures=figures)
+        status = _drive_dwell(base, slow, once, angle, wishes, figures=figures)
     else:
-        speeds = EntrySpeedExperiment(one_run, folder, changes, fmus, call_limit=limit)
+        if angle or slow_steer:
+            raise ScenarioError(f"{test.value} needs no A: leave --angle and --slow-steer away")
+        if given & {SPEED, "stop_time"}:
+            raise ScenarioError(f"{SPEED} and stop_time: the series itself says at what speeds is driven")
         hold(context, folder)
-        status = _drive_lane_change(speeds, once, make, figures=figures)
+        status = _drive_lane_change(base, once, wishes, figures=figures)
     if status:
         raise typer.Exit(status)
 
 
 def _drive_dwell(
-    experiment: DwellExperiment, once: Once, angle: str | None, make: Make, *, figures: bool
+    base: Job, slow: Path, once: Once, angle: str | None, wishes: Wishes, *, figures: bool
 ) -> int:
     """Make and evaluate the series of sine with dwell; return the exit status.
 
@@ -135,47 +119,48 @@ def _drive_dwell(
     from ..errors import ResultsError
     from ..evaluation.dwell_series import judge_series
     from ..evaluation.judgement import NotJudged
-    from ..evaluation.slow_steer import characteristic_angle
+    from ..evaluation.slow_steer import characteristic_angle, evaluate_slow_steer
     from ..evaluation.standard_tests import TESTS
-    from ..experiments.dwell_experiment import slow_steer_of, traces
-    from .batch import say
+    from ..experiments.driven_series import dwell_jobs, slow_steer_jobs, traces
     from .evaluate import angle_of, conclude
 
     chosen = TESTS[Driven.sine_with_dwell.value]
     known = angle_of(angle)
     if known is None:
-        found = experiment.slow_steer_jobs(once)
-        if status := make("slowly increasing steer", found):
+        name = "slowly_increasing_steer"
+        found = slow_steer_jobs(replace(base, label=name, scenario=slow, out=base.out / name), once)
+        if status := _make("slowly increasing steer", found, base, wishes):
             raise typer.Exit(status)
         try:
-            known = characteristic_angle(slow_steer_of(found))
+            known = characteristic_angle([evaluate_slow_steer(trace) for trace in traces(found)])
         except NotJudged as why:
             raise ResultsError(str(why)) from None
-    ladder = experiment.ladder(known, once)
-    say(f"A = {math.degrees(known):.1f} degrees: {len(ladder)} runs")
-    status = make("sine with dwell", ladder)
+    say(f"A = {math.degrees(known):.1f} degrees")
+    ladder = dwell_jobs(base, known, once)
+    status = _make("sine with dwell", ladder, base, wishes)
     evaluated = [chosen.evaluate(trace, known) for trace in traces(ladder)]
     series = judge_series([one.judged for one in evaluated], known)
-    conclude(chosen, evaluated, series, known, experiment.folder, each=figures)
+    conclude(chosen, evaluated, series, known, base.out, each=figures)
     return status
 
 
-def _drive_lane_change(experiment: EntrySpeedExperiment, once: Once, make: Make, *, figures: bool) -> int:
+def _drive_lane_change(base: Job, once: Once, wishes: Wishes, *, figures: bool) -> int:
     """Make and evaluate the runs to the highest clean entry speed; return the exit status."""
     from ..evaluation.standard_tests import TESTS
+    from ..experiments.driven_series import entry_speeds
     from .evaluate import conclude
 
     chosen = TESTS["lane-change"]
     failed: list[int] = []
 
     def made(job: Job) -> bool:
-        status = make(f"{job.label} km/h", [job])
+        status = _make(f"{job.label} km/h", [job], base, wishes)
         failed.extend([status] if status else [])
         return not status
 
-    traces, series = experiment.driven(once, made)
+    traces, series = entry_speeds(base, once, made)
     evaluated = [chosen.evaluate(trace, None) for trace in traces]
-    conclude(chosen, evaluated, series, None, experiment.folder, each=figures)
+    conclude(chosen, evaluated, series, None, base.out, each=figures)
     return max(failed, default=0)
 
 
@@ -193,19 +178,12 @@ def _vehicle(given: str | None) -> tuple[Change, ...]:
     return (Change("vehicle", str(catalogue.find(given, "a vehicle file").resolve()), "--vehicle"),)
 
 
-def _make(title: str, jobs: Sequence[Job], folder: Path, workers: int | None, *, fresh: bool) -> int:
+def _make(title: str, jobs: Sequence[Job], base: Job, wishes: Wishes) -> int:
     """Make the runs that are left; return the exit status, not 0 if one of them failed.
 
     Raises:
         typer.Exit: Ctrl-C.
     """
-    from ..experiments.execution import left_to_do
-    from ..experiments.workers import execute
-    from .batch import reported, say, stoppable
-
-    left = jobs if fresh else left_to_do(jobs, {})
-    if done := len(jobs) - len(left):
-        say(f"{title}: {done} of {len(jobs)} runs finished before")
-    with stoppable(folder), reported(title, len(left)) as told:
-        outcomes = execute(left, workers=workers, done=told)
+    with stoppable(base.out):
+        outcomes = make(title, jobs, wishes)
     return max((one.exit_status for one in outcomes if not one.ok), default=0)

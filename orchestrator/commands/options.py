@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from ..plan import Change
 
 
 def named(kind: str, **told: Any) -> Any:
@@ -56,6 +63,13 @@ Fault = Annotated[
         "unit.output, unit.output -> unit or unit.input; kind: bias, gain, drift, noise, freeze, value, "
         "dropout, outlier, delay, saturation, loss, stuck; none takes away the scenario's own. Repeatable.",
     ),
+]
+Jobs = Annotated[
+    int | None,
+    typer.Option("--jobs", metavar="N", min=1, help="Runs at a time; default: one per processor core."),
+]
+Keep = Annotated[
+    bool, typer.Option("--keep", help="Keep the results of every run, in runs/<its key in the table>.")
 ]
 Fresh = Annotated[
     bool,
@@ -143,3 +157,89 @@ def isolation(isolate: bool, call_limit: str | None) -> float | None:
         return float(seconds(int(call_limit) if call_limit.isdecimal() else call_limit))
     except ValueError as error:
         raise ScenarioError(f"--call-limit: {error}") from None
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What a command is asked for by the options that it `takes`; the others stay as they are here.
+
+    Raises:
+        ScenarioError: two of them contradict each other, or there is no such format.
+    """
+
+    swap: Swap = None
+    set_: Set = None
+    fault: Fault = None
+    out: Out = None
+    fmus: Fmus = None
+    no_build: NoBuild = False
+    jobs: Jobs = None
+    scheduler: Scheduler = None
+    keep: Keep = False
+    format_: Format = "csv"
+    quick: Quick = False
+    fresh: Fresh = False
+    no_run: NoRun = False
+    isolate: Isolate = False
+    call_limit: CallLimit = None
+
+    def __post_init__(self) -> None:
+        from ..errors import ScenarioError
+        from ..results.formats import check_format
+
+        if self.fresh and self.no_run:
+            raise ScenarioError("--fresh and --no-run contradict each other")
+        check_format(self.format_)
+
+    @property
+    def build(self) -> bool:
+        """Whether FMUs that are stale are built."""
+        return not (self.no_build or self.no_run)
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """What is changed in all runs.
+
+        Raises:
+            ScenarioError: an option is not as it is to be written.
+        """
+        from ..scenario.overrides import read_changes
+
+        return read_changes(self.swap or (), self.set_ or (), self.fault or ())
+
+    @property
+    def changing(self) -> dict[str, Any]:
+        """The options that change all runs, as they were given."""
+        return {"swap": self.swap, "set": self.set_, "fault": self.fault}
+
+    @property
+    def of_jobs(self) -> dict[str, Any]:
+        """Fields of jobs."""
+        limit = isolation(self.isolate, self.call_limit)
+        return {"fmus": self.fmus, "call_limit": limit, "format": self.format_, "keep": self.keep}
+
+
+def takes(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Let a command take options of `Wishes` behind its own, and hand them to it as `wishes`."""
+    shared = inspect.signature(Wishes, eval_str=True).parameters
+
+    def taking(command: Callable[..., None]) -> Callable[..., None]:
+        own = inspect.signature(command, eval_str=True).parameters
+
+        @functools.wraps(command)
+        def called(**given: Any) -> None:
+            wishes = Wishes(**{name: given.pop(name) for name in names})
+            command(**given, wishes=wishes)
+
+        every = [one for name, one in own.items() if name != "wishes"]
+        every += [one for name, one in shared.items() if name in names]
+        called.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
+        return called
+
+    return taking
+
+
+CHANGES = ("swap", "set_", "fault")
+"""Options of commands that change a scenario."""
+MAKING = ("out", "fmus", "no_build", "isolate", "call_limit")
+"""Options of commands that make runs."""

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .batch import Jobs
-from .options import CallLimit, Fmus, Fresh, Isolate, NoBuild, NoRun, Out, Scheduler, isolation, named
+from .batch import bar, hold, make, pooled, print_tables, say, stoppable
+from .experiment import command_of
+from .options import MAKING, Wishes, named, takes
 
 if TYPE_CHECKING:
-    from ..experiments.jobs import Job
+    from ..experiments.findings import Each
     from ..experiments.ranking_course import Ranked
     from ..experiments.ranking_schema import EntrySpec
 
@@ -42,22 +42,15 @@ Quick = Annotated[
 ]
 
 
+@takes(*MAKING, "jobs", "scheduler", "fresh", "no_run")
 def rank(
     context: typer.Context,
+    wishes: Wishes,
     file: RankingFile = Path("proving_ground/ranking"),
     controller: Controller = None,
     only: Only = None,
     condition: Condition = None,
     quick: Quick = False,
-    out: Out = None,
-    fmus: Fmus = None,
-    no_build: NoBuild = False,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    fresh: Fresh = False,
-    no_run: NoRun = False,
-    isolate: Isolate = False,
-    call_limit: CallLimit = None,
 ) -> None:
     """Rank controllers by sine with dwell.
 
@@ -68,53 +61,35 @@ def rank(
     import contextlib
 
     from ..errors import ScenarioError
-    from ..experiments.execution import finish, left_to_do, runner_of
-    from ..experiments.jobs import Once
+    from ..experiments.jobs import Job, Once
     from ..experiments.journal import Journal
     from ..experiments.ranking import load_ranking
     from ..experiments.ranking_course import drive_ranking
     from ..experiments.ranking_tables import table_of
     from ..results.naming import default_folder
     from ..wording import hint
-    from .batch import bar, hold, print_tables, reported, say, stoppable
 
-    if fresh and no_run:
-        raise ScenarioError("--fresh and --no-run contradict each other")
     more = dict(map(_entry, controller or ()))
     ranking = load_ranking(file, more=more, quick=quick, chosen=condition or ())
     for name in only or ():
         if name not in ranking.entries:
-            from ..wording import hint
-
             raise ScenarioError(
                 f"--only {name}: there is no such entry{hint(name, ranking.entries, lead='known')}"
             )
-    folder = out or default_folder(file)
+    folder = wishes.out or default_folder(file)
     hold(context, folder)
-    once = Once(build=not (no_build or no_run))
-    limit = isolation(isolate, call_limit)
+    base = Job("", file, folder, **wishes.of_jobs | {"format": "parquet", "keep": True})
     with (
         stoppable(folder),
-        contextlib.closing(Journal(folder, ranking.identity, fresh=fresh)) as journal,
+        contextlib.closing(Journal(folder, ranking.identity, fresh=wishes.fresh)) as journal,
     ):
-
-        def make(title: str, wanted: Sequence[Job]) -> None:
-            keys = {job.key for job in wanted}
-            left = left_to_do(wanted, journal.records)
-            if no_run or not left:
-                return
-            used = {u.fmu.sha256: u.fmu for job in left if job.plan for u in job.plan.units}
-            runner = runner_of(used, jobs, scheduler)
-            done = len(keys) - len(left)
-            say(f"{title}: {len(keys)} runs{f', {done} finished before' if done else ''}")
-            with reported("runs", len(keys), done, each=False) as told:
-                finish(left, journal, runner=runner, told=told)
-
         ranked = drive_ranking(
-            ranking, folder, journal, once, make, only=only or (),
-            planning=lambda total: bar("planning", total, quiet=True), fmus=fmus, call_limit=limit,
+            ranking, base, journal, Once(build=wishes.build),
+            lambda title, jobs: make(title, jobs, wishes, journal),
+            only=only or (), planning=lambda total: bar("planning", total, quiet=True),
         )  # fmt: skip
-        _write(ranked, folder, _command(file, controller, condition, quick=quick))
+        command = command_of("rank", file, quick=quick, controller=controller, condition=condition)
+        _write(ranked, folder, command, pooled(context, wishes))
     print_tables([table_of(ranked, "gains", "speed lost", "chatter")])
     if lacking := [one.entry for one in ranked.standings if one.missing]:
         say(f"without a place, as runs are missing: {', '.join(lacking)}")
@@ -142,33 +117,22 @@ def _entry(given: str) -> tuple[str, EntrySpec]:
     return words.replace(", ", "-").replace(" ", "="), spec
 
 
-def _command(
-    file: Path, controllers: Sequence[str] | None, conditions: Sequence[str] | None, *, quick: bool
-) -> str:
-    from .experiment import command_of
-
-    return command_of("rank", file, quick=quick, controller=controllers, condition=conditions)
-
-
-def _write(ranked: Ranked, folder: Path, command: str) -> None:
+def _write(ranked: Ranked, folder: Path, command: str, each: Each) -> None:
     """Draw the pictures, write tables and page, and say where it is."""
     from ..errors import ResultsError
-    from ..experiments.experiment import FIGURES
+    from ..experiments.expansion import FIGURES
     from ..experiments.ranking_drawing import draw_matrix, draw_pareto, draw_run
     from ..experiments.ranking_tables import columns_of_cells, columns_of_entries, columns_of_runs
     from ..experiments.table import to_csv
-    from ..experiments.workers import pool
     from ..figures.style import save
     from ..pages.ranking_page import ranking_page
     from ..pages.report import PAGE
     from ..writing import write_whole
-    from .batch import say
 
     kept = [
         (one.job.out, one.angle) for one in ranked.drives if one.job and one.job.keep and one.job.out.is_dir()
     ]
-    with pool() as workers:
-        list(workers.map(draw_run, *zip(*kept, strict=True)) if kept else ())
+    list(each(draw_run, *zip(*kept, strict=True)) if kept else ())
     for name, columns in (
         ("table", columns_of_entries),
         ("cells", columns_of_cells),

@@ -7,22 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .batch import Jobs, hold, print_tables
-from .experiment import Wishes, chapter_of, command_of, conduct, write_page
-from .options import (
-    CallLimit,
-    Fault,
-    Fmus,
-    Fresh,
-    Isolate,
-    NoBuild,
-    Out,
-    Scheduler,
-    Set,
-    Swap,
-    isolation,
-    named,
-)
+from .batch import hold, pooled, print_tables
+from .experiment import chapter_of, command_of, conduct, write_page
+from .options import CHANGES, MAKING, Wishes, named, takes
 
 if TYPE_CHECKING:
     from ..experiments.experiment import Experiment
@@ -33,21 +20,8 @@ TuningFile = Annotated[
 ]
 
 
-def tune(
-    context: typer.Context,
-    file: TuningFile,
-    swap: Swap = None,
-    set_: Set = None,
-    fault: Fault = None,
-    out: Out = None,
-    fmus: Fmus = None,
-    no_build: NoBuild = False,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    fresh: Fresh = False,
-    isolate: Isolate = False,
-    call_limit: CallLimit = None,
-) -> None:
+@takes(*CHANGES, *MAKING, "jobs", "scheduler", "fresh")
+def tune(context: typer.Context, file: TuningFile, wishes: Wishes) -> None:
     """Seek the parameters that minimize an objective.
 
     Every law of the file has the same objective, search (differential evolution) and budget. Without
@@ -73,20 +47,16 @@ def tune(
     from ..figures.style import save
     from ..pages.panel_images import image_of
     from ..results.naming import default_folder
-    from ..scenario.overrides import read_changes
     from ..writing import write_whole
 
-    changes = read_changes(swap or (), set_ or (), fault or ())
-    experiment = load_experiment(file, changes=changes)
-    folder = out or default_folder(file, changes)
+    experiment = load_experiment(file, changes=wishes.changes)
+    folder = wishes.out or default_folder(file, wishes.changes)
     hold(context, folder)
-    wishes = Wishes(
-        fmus, not no_build, jobs, scheduler, call_limit=isolation(isolate, call_limit), fresh=fresh
-    )
+    each = pooled(context, wishes)
 
     def judged(trials: Experiment) -> Findings:
         nonlocal wishes
-        findings = conduct(trials, folder, wishes)
+        findings = conduct(trials, folder, wishes, each)
         wishes = replace(wishes, fresh=False)
         return findings
 
@@ -95,10 +65,10 @@ def tune(
     table = tuning_table(experiment, found)
     write_whole(folder / "trials.csv", to_csv(columns_of(found)))
     print_tables([table])
-    command = command_of("tune", file, swap=swap, set=set_, fault=fault)
+    command = command_of("tune", file, **wishes.changing)
     if tuning_of(experiment).entries:
         write_whole(folder / ENTRIES, entries_text(entries_of(experiment, found), command))
     save(history_figure(experiment, found, command), folder / "history")
     charts = [image_of(folder / "history.svg", experiment.spec.title)]
     facts = {"results": [table], "charts": charts}
-    write_page([chapter_of(findings, folder, command, shown_in=folder, **facts)], folder)
+    write_page([chapter_of(findings, folder, command, each, shown_in=folder, **facts)], folder)

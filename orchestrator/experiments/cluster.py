@@ -17,7 +17,7 @@ import platform
 import signal
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -27,7 +27,7 @@ import distributed
 
 from ..errors import ResultsError, ScenarioError
 from ..fmu.archive import open_fmu, read_archive
-from ..plan import Fmu, Plan
+from ..plan import Plan
 from ..sources import OF_METRICS, sources_hash
 from ..wording import listed
 from .jobs import Job, Outcome, Told
@@ -42,20 +42,20 @@ _LOCAL: dict[str, Path] = {}
 """On a worker: hash of an FMU -> where it is unpacked."""
 
 
-def run_on_cluster(jobs: Sequence[Job], done: Told, *, scheduler: str, fmus: Mapping[str, Fmu]) -> None:
+def run_on_cluster(jobs: Sequence[Job], done: Told, *, scheduler: str) -> None:
     """Make all runs on the workers of a Dask scheduler.
 
     Args:
         jobs: what to run.
         done: called with every outcome as it comes.
         scheduler: its address, tcp://host:port.
-        fmus: hash -> FMU, of all that the jobs use.
 
     Raises:
         ScenarioError: no scheduler answers, or its workers do not fit.
         ResultsError: the cluster was lost on the way.
         KeyboardInterrupt: Ctrl-C or SIGTERM.
     """
+    fmus = {unit.fmu.sha256: unit.fmu for job in jobs if job.plan for unit in job.plan.units}
     with _connected(scheduler) as client, _told_to_end():
         threads = _check_workers(client, scheduler)
         client.register_plugin(_Archives({digest: read_archive(fmu.path) for digest, fmu in fmus.items()}))

@@ -13,7 +13,8 @@ from ..plan import Change
 from ..scenario.load import load_scenario
 from ..scenario.overrides import is_path, swap_of
 from ..titles import changed
-from .experiment import Experiment, NamedRun
+from .expansion import NamedRun
+from .experiment import Experiment
 from .findings import Findings
 from .numbers import text_of
 from .schema import ExperimentSpec

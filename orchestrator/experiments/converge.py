@@ -28,7 +28,8 @@ from ..results.read import Results
 from ..scenario.load import load_scenario
 from ..titles import with_changes
 from .compare import of_runs
-from .experiment import Experiment, NamedRun
+from .expansion import NamedRun
+from .experiment import Experiment
 from .findings import Findings
 from .table import Column
 from .tables import Cell, Table

@@ -17,6 +17,8 @@ from .axis_schema import AxisSpec
 if TYPE_CHECKING:
     from .schema import ExperimentSpec
 
+RUN = "run"
+"""What figures and tables along axes call the axis of named runs."""
 Point = tuple["Level", ...]
 """One level per axis, in the order of the axes."""
 

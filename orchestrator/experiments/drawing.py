@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ..figures.style import QUIET, line_style, literal
 from ..metrics.symbols import variable_of, words
-from .design import Level
-from .experiment import RUN, Case
+from .design import RUN, Level
+from .experiment import Case
 from .findings import Findings
 from .numbers import text_of
 from .schema import FigureSpec

@@ -6,8 +6,7 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from ..errors import KEPT, ResultsError, ScenarioError
-from ..plan import Fmu
+from ..errors import ResultsError, ScenarioError
 from ..results.freshness import staleness
 from .jobs import Job, Outcome, Record, Told, read_back
 from .journal import Journal
@@ -43,8 +42,10 @@ def left_to_do(jobs: Sequence[Job], records: Mapping[str, Record]) -> list[Job]:
     return list(left.values())
 
 
-def finish(left: Sequence[Job], journal: Journal, *, runner: Runner, told: Told = lambda _: None) -> None:
-    """Make runs and note each in the journal as it ends.
+def finish(
+    left: Sequence[Job], journal: Journal | None, *, runner: Runner, told: Told = lambda _: None
+) -> None:
+    """Make runs and note each in the journal, if there is one, as it ends.
 
     Raises:
         KeyboardInterrupt: Ctrl-C; what is finished is in the journal.
@@ -53,25 +54,19 @@ def finish(left: Sequence[Job], journal: Journal, *, runner: Runner, told: Told 
 
     def done(outcome: Outcome) -> None:
         final = outcome.ok or (outcome.exit_status == 1 and not outcome.died)  # else it may go well next time
-        journal.add(outcome.job.key, record_of(outcome), last=final)
+        if journal:
+            journal.add(outcome.job.key, outcome.record, last=final)
         told(outcome)
 
     runner(left, done)
-    if any(job.key not in journal.records for job in left):
+    if journal and any(job.key not in journal.records for job in left):
         raise ResultsError(f"{journal.folder}: not all runs were made; start it again.")
 
 
-def record_of(outcome: Outcome) -> Record:
-    """Return what became of a run, as its process says."""
-    problems = tuple(text for text in outcome.problems if getattr(text, "kind", "") != KEPT)
-    return Record({}, problems) if problems else outcome.value.record
-
-
-def runner_of(fmus: Mapping[str, Fmu], workers: int | None, scheduler: str | None) -> Runner:
+def runner_of(workers: int | None, scheduler: str | None) -> Runner:
     """Return what makes runs: processes of this machine (see `execute`), or a Dask cluster.
 
     Args:
-        fmus: hash -> FMU, of all that the runs use.
         workers: processes at a time; None: one per core.
         scheduler: of the cluster.
 
@@ -86,4 +81,4 @@ def runner_of(fmus: Mapping[str, Fmu], workers: int | None, scheduler: str | Non
         raise ScenarioError(
             "--scheduler needs the package distributed: pip install 'yawbench[cluster]'"
         ) from None
-    return functools.partial(run_on_cluster, scheduler=scheduler, fmus=fmus)
+    return functools.partial(run_on_cluster, scheduler=scheduler)

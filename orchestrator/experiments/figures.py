@@ -14,7 +14,7 @@ from ..figures.plots import draw
 from ..figures.style import ROW, frame, literal, new_figure, save
 from ..titles import changed
 from .drawing import FAILED, Drawing
-from .experiment import FIGURES
+from .expansion import FIGURES
 from .findings import Each, Findings
 from .limit_drawing import Limits
 from .metric_drawing import Curves, GridLines, Map

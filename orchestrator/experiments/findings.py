@@ -15,7 +15,8 @@ from ..wording import counted
 from .confidence import interval
 from .derived import calculate
 from .design import Point
-from .experiment import Case, Experiment, NamedRun
+from .expansion import NamedRun
+from .experiment import Case, Experiment
 from .grids import correlation
 from .jobs import Outcome, Record, measured, read_back
 from .judged_schema import Claim

@@ -6,9 +6,9 @@ import copy
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from ..errors import BuildError, ResultsError, ScenarioError, YawbenchError
+from ..errors import KEPT, BuildError, ResultsError, ScenarioError, YawbenchError
 from ..metrics.plausibility import findings_in
 from ..metrics.run_metrics import evaluate, metric
 from ..plan import Change, Plan
@@ -64,6 +64,7 @@ class Record:
     problems: tuple[str, ...] = ()
     findings: tuple[str, ...] = ()  # kinds of what was remarkable in its course
     ended: str | None = None  # why a unit has ended it early
+    id: str | None = None  # of its results on disk, just made
 
     @property
     def ok(self) -> bool:
@@ -80,13 +81,6 @@ class Record:
         return "; ".join(self.problems) or self.ended
 
 
-class Made(NamedTuple):
-    """What a process hands back that has made a run."""
-
-    id: str | None  # of the results on disk
-    record: Record
-
-
 @dataclass(frozen=True)
 class Outcome:
     """What became of a job: `problems` is empty if it ran to the end."""
@@ -95,7 +89,7 @@ class Outcome:
     problems: tuple[str, ...] = ()
     exit_status: int = 0
     seconds: float = 0.0  # of the process, start to end
-    value: Any = None  # what the process returned
+    value: Any = None  # what the process returned, of `run_job` the record of the run
     died: bool = False  # the process ended without a word, or because it was told to
 
     @property
@@ -108,9 +102,10 @@ class Outcome:
         return "; ".join(self.problems)
 
     @property
-    def results(self) -> Results | str:
-        """The results on disk, or why there are none."""
-        return self.reason or read_back(self.job.out, self.value.id if isinstance(self.value, Made) else None)
+    def record(self) -> Record:
+        """What became of the run, as its process says."""
+        problems = tuple(text for text in self.problems if getattr(text, "kind", "") != KEPT)
+        return Record({}, problems) if problems else self.value
 
 
 Told = Callable[[Outcome], None]
@@ -205,7 +200,7 @@ def keyed(job: Job, metrics: Metrics = ()) -> Job:
     return replace(job, metrics=metrics, key=key_of(job.plan, also))
 
 
-def run_job(job: Job, opener: Opener | None = None) -> Made:
+def run_job(job: Job, opener: Opener | None = None) -> Record:
     """Make one run in this process; `opener`: makes its instances, in place of what opens FMUs.
 
     Raises:
@@ -223,13 +218,14 @@ def run_job(job: Job, opener: Opener | None = None) -> Made:
             apart = timed is own  # a clock counts in this process, and plain Python is at home there
             run = simulate(plan, job.out, opener=timed, format=job.format, apart=apart).id
             if not (job.metrics or job.test):
-                return Made(run, Record({}))
-            record = measured(load_results(job.out), job.metrics, job.test)
+                return Record({}, id=run)
+            results = load_results(job.out)
         else:
-            record = measured(simulate_in_memory(plan, opener=timed), job.metrics, job.test)
+            results = simulate_in_memory(plan, opener=timed)
+        record = measured(results, job.metrics, job.test)
     if clock.steps:
         record.values[STEP_TIME] = (clock.mean, "s")
-    return Made(run, record)
+    return replace(record, id=run)
 
 
 def measured(results: Results, metrics: Metrics, test: Test | None = None) -> Record:

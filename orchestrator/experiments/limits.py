@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..figures.display import digits_of
-from .design import Level
-from .experiment import RUN, Case
+from .design import RUN, Level
+from .experiment import Case
 from .findings import Findings
 from .judged_schema import LimitSpec
 from .judging import judge

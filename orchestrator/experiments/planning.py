@@ -6,6 +6,7 @@ from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Any
 
 from ..errors import ScenarioError
 from ..metrics.run_metrics import STANDARD, metric, results_to_be, unit_in
@@ -62,30 +63,20 @@ def metrics_of(experiment: Experiment) -> Metrics:
     return tuple((key, spec.metric, spec.window) for key, spec in experiment.spec.metrics.items())
 
 
-def jobs_of(
-    experiment: Experiment,
-    out: Path,
-    fmus: Path | None = None,
-    *,
-    keep: bool = True,
-    format: str = "csv",
-    call_limit: float | None = None,
-) -> list[Job]:
+def jobs_of(experiment: Experiment, out: Path, *, keep: bool = True, **of_jobs: Any) -> list[Job]:
     """Return a job for every case; runs along axes hand back metrics, named runs keep their results.
 
     Args:
         experiment: as loaded.
         out: its folder of results.
-        fmus: folder of FMUs given by name.
         keep: whether runs along axes keep their results, too.
-        format: of results that are kept.
-        call_limit: of a call of an FMU [s], in a process per unit; None: units share one.
+        of_jobs: other fields of all jobs.
     """
     axes = bool(experiment.spec.axes)
     return [
         Job(
-            case.label, case.run.scenario, out / (RUNS if axes else case.run.name), case.changes, fmus,
-            format=format, call_limit=call_limit, keep=keep or not axes,
+            case.label, case.run.scenario, out / (RUNS if axes else case.run.name), case.changes,
+            keep=keep or not axes, **of_jobs,
         )
         for case in experiment.cases
     ]  # fmt: skip
@@ -93,12 +84,20 @@ def jobs_of(
 
 def plan_experiment(
     experiment: Experiment,
-    jobs: list[Job],
+    out: Path,
     *,
     once: Once | None = None,
     progress: Callable[[int], None] = lambda done: None,
+    **of_jobs: Any,
 ) -> Planned:
     """Plan all cases (see `ready`); without metrics the experiment gets the standard ones that runs record.
+
+    Args:
+        experiment: as loaded.
+        out: its folder of results.
+        once: reads files and opens FMUs.
+        progress: told how many cases are planned.
+        of_jobs: see `jobs_of`.
 
     Raises:
         BuildError: FMUs that are stale and cannot be built.
@@ -110,7 +109,7 @@ def plan_experiment(
         axis = experiment.axis_of(getattr(problem, "place", ""))
         return (axis, f"{experiment.path}: axes.{axis[0]}: {problem}") if axis else (problem, problem)
 
-    jobs = ready(jobs, once=once, progress=progress, place=place)
+    jobs = ready(jobs_of(experiment, out, **of_jobs), once=once, progress=progress, place=place)
     plans = [job.plan for job in jobs if job.plan]
     made_up = [*{tuple(plan.record): results_to_be(plan) for plan in plans}.values()]
     if not experiment.spec.metrics:

@@ -24,8 +24,8 @@ from ..scenario import overrides, yaml_lines
 from ..scenario.strict import validate
 from ..wording import hint
 from .axis_schema import Changes
-from .dwell_experiment import PLACE, SIDES, amplitude_of, planned_alike
-from .experiment import changes_of_file
+from .changes import changes_of_file
+from .driven_series import SIDES, slow_steer_jobs, steered
 from .jobs import Job, Metrics, Once, Record, keyed, ready
 from .ranking_schema import UNIT, ConditionSpec, EntriesSpec, EntrySpec, RankingSpec
 
@@ -142,8 +142,8 @@ def load_ranking(
     return Ranking(path, spec, entries, quick, tuple(chosen))
 
 
-def slow_steer_jobs(ranking: Ranking, folder: Path, once: Once, **of_jobs: object) -> dict[str, list[Job]]:
-    """Return car -> the runs of slowly increasing steer that A follows from, to both sides.
+def jobs_for_angles(ranking: Ranking, base: Job, once: Once) -> dict[str, list[Job]]:
+    """Return car -> the runs of slowly increasing steer that A follows from; `base`: as in `plan_drives`.
 
     Raises:
         ScenarioError: they cannot start.
@@ -151,13 +151,11 @@ def slow_steer_jobs(ranking: Ranking, folder: Path, once: Once, **of_jobs: objec
     found = {}
     for name in ranking.cars:
         car = ranking.spec.cars[name]
-        scenario = ranking.path.parent / car.slow_steer
-        changes = ranking.changes(car, stop=False)
-        asis = Job(f"{name}, A", scenario, folder / RUNS, changes, test=(SLOW, None), keep=False)
-        asis = replace(asis, **of_jobs)  # type: ignore[arg-type]
-        given = amplitude_of(planned_alike([asis], once)[0])
-        sides = [Change(PLACE, sign * abs(given), "slowly increasing steer") for _, sign in SIDES]
-        found[name] = planned_alike([replace(asis, changes=(*changes, side)) for side in sides], once)
+        asis = replace(
+            base, label=name, scenario=ranking.path.parent / car.slow_steer, test=(SLOW, None), keep=False,
+            changes=ranking.changes(car, stop=False),
+        )  # fmt: skip
+        found[name] = slow_steer_jobs(asis, once)
     return found
 
 
@@ -223,12 +221,11 @@ def drives_of(ranking: Ranking, angles: Mapping[str, float]) -> list[Drive]:
 def plan_drives(
     ranking: Ranking,
     drives: Sequence[Drive],
-    folder: Path,
+    base: Job,
     once: Once,
     progress: Callable[[int], None] = lambda done: None,
-    **of_jobs: object,
 ) -> list[Drive]:
-    """Return runs with their jobs.
+    """Return runs with their jobs; `base` holds what all jobs share, and the folder of all results.
 
     Raises:
         ScenarioError: with everything that is wrong with any of them, each problem once.
@@ -242,18 +239,18 @@ def plan_drives(
             *ranking.changes_of_condition(drive.condition),
             *ranking.changes_of_entry(drive.entry),
             *repeated,
-            Change(PLACE, drive.amplitude, "ranking"),
+            steered(drive.amplitude, "ranking"),
         )
         first = drive.repeat is None or drive.repeat == next(iter(condition.repeats.values()))[0]
-        job = Job(
-            f"{drive.entry}, {drive.condition}, {math.degrees(drive.amplitude):.1f} deg",
-            ranking.path.parent / condition.scenario, folder / RUNS, changes, format="parquet",
-            test=(SERIES, drive.angle), timed=UNIT, keep=drive.last and first and drive.amplitude > 0,
-        )  # fmt: skip
-        jobs.append(replace(job, **of_jobs))  # type: ignore[arg-type]
-    planned = ready(jobs, once=once, progress=progress, place=lambda problem: (str(problem), problem))
+        jobs.append(replace(
+            base, label=f"{drive.entry}, {drive.condition}, {math.degrees(drive.amplitude):.1f} deg",
+            scenario=ranking.path.parent / condition.scenario, changes=changes,
+            test=(SERIES, drive.angle), timed=UNIT,
+            keep=base.keep and drive.last and first and drive.amplitude > 0,
+        ))  # fmt: skip
+    planned = ready(jobs, once=once, progress=progress)
     made = [keyed(replace(job, plan=_lean(job.plan)), METRICS) for job in planned]
-    made = [replace(job, out=job.out / job.key[:12]) for job in made]
+    made = [replace(job, out=base.out / RUNS / job.key[:12]) for job in made]
     return [replace(drive, job=job) for drive, job in zip(drives, made, strict=True)]
 
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from pathlib import Path
 
 from ..errors import ResultsError
 from .jobs import Job, Once
 from .journal import Journal
-from .ranking import Drive, Ranking, angle_of, drives_of, plan_drives, slow_steer_jobs
+from .ranking import Drive, Ranking, angle_of, drives_of, jobs_for_angles, plan_drives
 from .standings import Standing, standings
 
-Make = Callable[[str, Sequence[Job]], None]
+Make = Callable[[str, Sequence[Job]], object]
 """Makes those of some runs that are left, under a title, and notes them in the journal."""
 Planning = Callable[[int], AbstractContextManager[Callable[[int], None]]]
 """Shows how many of so many runs are planned."""
@@ -31,40 +30,38 @@ class Ranked:
 
 def drive_ranking(
     ranking: Ranking,
-    folder: Path,
+    base: Job,
     journal: Journal,
     once: Once,
     make: Make,
     *,
     only: Collection[str] = (),
     planning: Planning = lambda total: nullcontext(lambda done: None),
-    **of_jobs: object,
 ) -> Ranked:
     """Make the runs that are left and return where everybody stands.
 
     Args:
         ranking: as loaded.
-        folder: of its results.
+        base: what all jobs share; results go to its folder.
         journal: of finished runs.
         once: reads files and opens FMUs.
         make: makes runs.
         only: entries whose runs are made; none: of all. The others stand with what is there.
         planning: shows how many of so many runs are planned.
-        of_jobs: fields of all jobs in place of their defaults.
 
     Raises:
         YawbenchError: a run cannot start, or A cannot be found.
     """
-    slow = slow_steer_jobs(ranking, folder, once, **of_jobs)
+    slow = jobs_for_angles(ranking, base, once)
     make("A, the angle at 0.3 g", [job for jobs in slow.values() for job in jobs])
     angles = {}
     for car, jobs in slow.items():
         if any(job.key not in journal.records for job in jobs):
-            raise ResultsError(f"{folder}: holds no A of {car!r} of this build; rank without --no-run")
+            raise ResultsError(f"{base.out}: holds no A of {car!r} of this build; rank without --no-run")
         angles[car] = angle_of([journal.records[job.key] for job in jobs], car)
     drives = drives_of(ranking, angles)
     with planning(len(drives)) as progress:
-        drives = plan_drives(ranking, drives, folder, once, progress, **of_jobs)
+        drives = plan_drives(ranking, drives, base, once, progress)
     wanted = [one.job for one in drives if one.job and (not only or one.entry in only)]
     make(ranking.spec.title, wanted)
     return Ranked(ranking, angles, drives, standings(ranking, drives, journal.records))

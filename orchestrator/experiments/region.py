@@ -19,8 +19,10 @@ from ..plan import DEFAULT, OF_RUN, TYRES, Change, Plan, Unit, Variable
 from ..plan import Value as Given
 from ..wiring.shared_facts import FACTS
 from ..wording import hint, listed
+from .changes import changes_at
 from .design import Level, latin_hypercube, levels_of
-from .experiment import RUNS, Experiment, NamedRun, changes_at
+from .expansion import NamedRun
+from .experiment import RUNS, Experiment
 from .findings import Findings, derive
 from .grids import ranked
 from .jobs import Job, Once, Record, keyed, ready

@@ -255,6 +255,12 @@ class FigureSpec(Strict):
         """The axis with a panel per value, "" if there is none."""
         return self.panels if isinstance(self.panels, str) else ""
 
+    @property
+    def axes(self) -> dict[str, str]:
+        """Key -> axis, of those that are given."""
+        given = {"x": self.x, "y": self.y, "lines": self.lines, "panels": self.panel_axis}
+        return {key: axis for key, axis in given.items() if axis}
+
     @model_validator(mode="after")
     def _complete(self) -> FigureSpec:
         if self.kind == "overlay":
@@ -279,8 +285,7 @@ class FigureSpec(Strict):
             raise ValueError("a map needs y" if self.kind == "map" else f"a {self.kind} has no y")
         if self.kind == "map" and self.lines:
             raise ValueError("a map has no lines; use panels")
-        used = [axis for axis in (self.x, self.y, self.lines, self.panel_axis) if axis]
-        if len(set(used)) < len(used):
+        if len(set(self.axes.values())) < len(self.axes):
             raise ValueError("x, y, lines and panels must be different axes")
         if self.mark is not None and self.kind == "limit":
             raise ValueError("a limit has no mark")
@@ -343,13 +348,15 @@ class ExperimentSpec(Changes):
             raise ValueError(f"{number} runs; at most {MOST} are taken")
         return self
 
+    def said(self) -> Iterator[tuple[str, int, Claim]]:
+        """Yield every claim and check, with its place in the file."""
+        for group, said in (("claims", self.claims), ("checks", self.checks)):
+            for i, one in enumerate(said):
+                yield group, one.number(i), one
+
     def conditions(self) -> Iterator[tuple[Key, Condition]]:
         """Yield every condition of claims, checks and limits, with its place in the file."""
-        judged: list[tuple[str, str | int, Judged]] = [
-            (group, one.number(i), one)
-            for group, said in (("claims", self.claims), ("checks", self.checks))
-            for i, one in enumerate(said)
-        ]
+        judged: list[tuple[str, str | int, Judged]] = [*self.said()]
         judged += [("limits", name, limit) for name, limit in self.limits.items()]
         for group, which, one in judged:
             for k, condition in enumerate(one.holds_if):

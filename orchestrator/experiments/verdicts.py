@@ -10,7 +10,7 @@ from ..figures.display import shown
 from ..metrics.run_metrics import Value, metric
 from ..titles import changed
 from .design import levels_of
-from .experiment import NamedRun
+from .expansion import NamedRun
 from .findings import Findings
 from .grids import cells, grid_table
 from .judged_schema import Claim, GridSpec, MetricSpec, Reference

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..experiments.confidence import LEVEL
-from ..experiments.experiment import FIGURES
+from ..experiments.expansion import FIGURES
 from ..experiments.figures import runs_of, title_of
 from ..experiments.findings import Each, Findings
 from ..experiments.jobs import Job, Once

@@ -11,7 +11,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from ..experiments.experiment import FIGURES
+from ..experiments.expansion import FIGURES
 from ..experiments.jobs import STEP_TIME
 from ..experiments.ranking_course import Ranked
 from ..experiments.ranking_drawing import RUN, degrees, place_words, sign_of

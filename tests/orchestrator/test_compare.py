@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from orchestrator.commands.recorded import distinct
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.compare import FIGURES, comparison_table, of_runs, variants
-from orchestrator.experiments.experiment import NamedRun
+from orchestrator.experiments.expansion import NamedRun
 from orchestrator.experiments.figures import draw_all
 from orchestrator.experiments.findings import judge_results
 from orchestrator.experiments.jobs import Job, Outcome

@@ -18,7 +18,7 @@ from orchestrator.experiments.converge import (
     measure,
     refinements,
 )
-from orchestrator.experiments.experiment import NamedRun
+from orchestrator.experiments.expansion import NamedRun
 from orchestrator.experiments.findings import judge_results
 from orchestrator.experiments.jobs import Job, Outcome
 from orchestrator.experiments.table import to_csv

@@ -15,7 +15,7 @@ from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.findings import Findings
 from orchestrator.experiments.jobs import Once, Record
 from orchestrator.experiments.margins import Gap, Region, Spot, margin
-from orchestrator.experiments.planning import jobs_of, plan_experiment
+from orchestrator.experiments.planning import plan_experiment
 from orchestrator.experiments.region import judge_region, plan_region, runs_of
 from orchestrator.experiments.verdicts import region_words, verdict
 from tests.checkout import ROOT
@@ -73,7 +73,7 @@ def judged(tmp_path, fmus):
         (tmp_path / "double.yaml").write_text(SCENARIO.replace("0.05", "0.1"))
         experiment = load_experiment(tmp_path / "study.yaml")
         once = Once()
-        planned = plan_experiment(experiment, jobs_of(experiment, tmp_path / "o", fmus), once=once)
+        planned = plan_experiment(experiment, tmp_path / "o", fmus=fmus, once=once)
 
         def record(job) -> Record:
             own = job.plan.units[0].parameters

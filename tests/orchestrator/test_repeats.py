@@ -13,7 +13,7 @@ from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.figures import draw_over_axes
 from orchestrator.experiments.findings import judge_records
 from orchestrator.experiments.jobs import run_job
-from orchestrator.experiments.planning import jobs_of, plan_experiment
+from orchestrator.experiments.planning import plan_experiment
 from orchestrator.experiments.verdicts import HOLDS, UNDECIDED, limit_tables, run_tables, verdict
 from orchestrator.metrics.run_metrics import Value
 
@@ -88,8 +88,8 @@ def load(tmp_path_factory):
 def findings(load, fmus, tmp_path_factory):
     """What the study comes to."""
     loaded = load()
-    planned = plan_experiment(loaded, jobs_of(loaded, tmp_path_factory.mktemp("runs"), fmus, keep=False))
-    records = {job.key: run_job(job).record for job in {job.key: job for job in planned.jobs}.values()}
+    planned = plan_experiment(loaded, tmp_path_factory.mktemp("runs"), fmus=fmus, keep=False)
+    records = {job.key: run_job(job) for job in {job.key: job for job in planned.jobs}.values()}
     assert len(records) == 2 + 2 * 4  # what the axis does not change is made once
     return judge_records(planned, records)
 

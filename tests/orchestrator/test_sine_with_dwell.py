@@ -341,7 +341,7 @@ def test_a_series_is_driven_from_a_and_goes_on_where_it_was(tmp_path, capsys):
     assert (series / "sine_with_dwell_series.png").is_file()
     assert call("drive", "sine-with-dwell", *settings) == 0
     again = capsys.readouterr()
-    assert "4 of 4 runs finished before" in again.err
+    assert "sine with dwell: 4 runs, all finished before" in again.err
     assert again.out == first.out
 
 
@@ -398,4 +398,4 @@ def test_a_series_of_lane_changes_finds_the_highest_clean_speed_and_goes_on_wher
     assert call("drive", "iso-3888-2", *settings) == 0
     again = capsys.readouterr()
     assert again.out == first.out
-    assert "1 of 1 runs finished before" in again.err
+    assert "km/h: 1 run, all finished before" in again.err

@@ -14,7 +14,7 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.experiments.execution import left_to_do
 from orchestrator.experiments.experiment import load_experiment
-from orchestrator.experiments.planning import jobs_of, plan_experiment
+from orchestrator.experiments.planning import plan_experiment
 
 from .test_sweep import UNITS, moods, rows, yawbench  # noqa: F401
 
@@ -61,7 +61,7 @@ def test_a_worker_that_is_killed_costs_no_run(moods, fmus, cluster, tmp_path):  
     from orchestrator.experiments.cluster import run_on_cluster
 
     experiment = load_experiment(moods(1, 2, 3, 4, 5, 6))
-    planned = plan_experiment(experiment, jobs_of(experiment, tmp_path, fmus, keep=False))
+    planned = plan_experiment(experiment, tmp_path, fmus=fmus, keep=False)
     told = []
 
     def done(outcome):
@@ -72,7 +72,7 @@ def test_a_worker_that_is_killed_costs_no_run(moods, fmus, cluster, tmp_path):  
         told.append(outcome)
 
     left = left_to_do(planned.jobs, {})
-    run_on_cluster(left, done, scheduler=cluster.scheduler_address, fmus=planned.fmus)
+    run_on_cluster(left, done, scheduler=cluster.scheduler_address)
     assert sorted(outcome.job.key for outcome in told) == sorted(job.key for job in left)
     assert all(outcome.ok for outcome in told)
 
@@ -83,7 +83,7 @@ def test_a_cluster_that_dies_is_one_sentence_and_keeps_what_is_finished(moods, f
     from orchestrator.experiments.cluster import run_on_cluster
 
     experiment = load_experiment(moods(1, 2, 3, 4, 5, 6))
-    planned = plan_experiment(experiment, jobs_of(experiment, tmp_path, fmus, keep=False))
+    planned = plan_experiment(experiment, tmp_path, fmus=fmus, keep=False)
     told, file = [], str(tmp_path / "scheduler.json")
     with _dask("scheduler", file, "--host", "127.0.0.1", "--port", "0") as scheduler, _dask("worker", file):
         with distributed.Client(scheduler_file=file, set_as_default=False) as client:
@@ -95,7 +95,7 @@ def test_a_cluster_that_dies_is_one_sentence_and_keeps_what_is_finished(moods, f
             told.append(logging.getLogger("distributed.client").isEnabledFor(logging.ERROR))
 
         with pytest.raises(ResultsError, match="the cluster was lost; what it had finished is kept"):
-            run_on_cluster(left_to_do(planned.jobs, {}), done, scheduler=address, fmus=planned.fmus)
+            run_on_cluster(left_to_do(planned.jobs, {}), done, scheduler=address)
     assert 1 <= len(told) < len(planned.jobs)
     assert not any(told)  # Dask would log tracebacks
     assert "Traceback" not in capfd.readouterr().err

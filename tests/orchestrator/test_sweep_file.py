@@ -12,13 +12,13 @@ from orchestrator.errors import ScenarioError
 from orchestrator.experiments.axis_schema import AxisSpec
 from orchestrator.experiments.design import level_at
 from orchestrator.experiments.experiment import load_experiment
-from orchestrator.experiments.planning import jobs_of, plan_experiment
+from orchestrator.experiments.planning import plan_experiment
 from tests.changed import changed
 
 
 def planned_of(experiment, fmus):
     """Return an experiment with all cases planned."""
-    return plan_experiment(experiment, jobs_of(experiment, Path("runs"), fmus))
+    return plan_experiment(experiment, Path("runs"), fmus=fmus)
 
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")

@@ -115,12 +115,12 @@ def test_the_figure_of_a_sweep_names_what_options_changed(yawbench, fmus, tmp_pa
     from orchestrator.experiments.experiment import load_experiment
     from orchestrator.experiments.findings import judge_records
     from orchestrator.experiments.jobs import Record
-    from orchestrator.experiments.planning import jobs_of, plan_experiment
+    from orchestrator.experiments.planning import plan_experiment
     from tests.changed import changed as given
 
     (tmp_path / "sweep.yaml").write_text(SWEEP)
     sweep = load_experiment(tmp_path / "sweep.yaml", changes=given(settings=["inputs.friction*=0.3"]))
-    planned = plan_experiment(sweep, jobs_of(sweep, tmp_path, fmus))
+    planned = plan_experiment(sweep, tmp_path, fmus=fmus)
     records = {job.key: Record({"sideslip": (0.1, "rad")}) for job in planned.jobs}
     figure = sweep_figures.draw_over_axes(judge_records(planned, records), sweep.spec.figures[0])
     assert "changed: inputs.friction* = 0.3" in texts(figure)

@@ -12,7 +12,7 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError, WiringError
 from orchestrator.experiments.experiment import load_experiment
-from orchestrator.experiments.planning import jobs_of, plan_experiment
+from orchestrator.experiments.planning import plan_experiment
 from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.results.key import key_of
 from orchestrator.results.naming import default_folder
@@ -109,7 +109,7 @@ def test_tyres_are_an_axis_of_experiments_relative_to_their_file(folder, fmus):
         "metrics:\n  slip: {metric: peak(slip_ratio_fl)}\n"
     )
     loaded = load_experiment(sweep)
-    planned = plan_experiment(loaded, jobs_of(loaded, folder / "runs", fmus))
+    planned = plan_experiment(loaded, folder / "runs", fmus=fmus)
     made = [parameters(job.plan) for job in planned.jobs]
     assert [(one["pky1_front"], one["pky1_rear"]) for one in made] == [
         (-12.0, -12.0), (-12.0, -17.0), (-17.0, -12.0), (-17.0, -17.0),

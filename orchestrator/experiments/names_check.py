@@ -1,0 +1,198 @@
+"""Whether all that a file of an experiment names is there: runs, metrics, axes, numbers, grids."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from ..scenario.yaml_lines import Document, Key
+from ..wording import hint
+from .design import RUN, levels_of
+from .grids import cells
+from .judged_schema import Reference
+from .numbers import text_of
+from .schema import ExperimentSpec, FigureSpec
+
+if TYPE_CHECKING:
+    from .experiment import Experiment
+
+COLUMNS = (RUN, "status", "reason", "findings", "key")
+"""Columns of the table beside the axes and the metrics."""
+
+
+def check_axes(spec: ExperimentSpec, document: Document) -> None:
+    """Report a place that two axes, or an axis and `set` or `swap`, would both give a value."""
+    seen: dict[str, str] = dict.fromkeys(spec.places, "set and swap")
+    for name, axis in spec.axes.items():
+        for place in axis.places:
+            if place in seen:
+                also = f"axis {seen[place]!r}" if seen[place] in spec.axes else "set or swap"
+                document.report(("axes", name), f"{place} is given by {also} already")
+            seen[place] = name
+    for group, names in (("axes", spec.axes), ("metrics", spec.metrics)):
+        for name in names:
+            if name in COLUMNS or (group == "axes" and name in spec.metrics):
+                document.report((group, name), f"{name!r} is the name of another column of the table")
+
+
+def check_names(experiment: Experiment, document: Document) -> None:
+    """Report every name of a run, metric, axis or number that does not exist, or not there."""
+    spec, runs = experiment.spec, experiment.runs
+    known: dict[str, tuple[Mapping[str, object], str]] = {
+        "run": (runs, "runs"),
+        "metric": (spec.metrics, "metrics"),
+        "axis": (spec.axes, "axes"),
+        "derived number": (spec.derived, "there are"),
+        "grid": (spec.grids, "grids"),
+        "limit": (spec.limits, "limits"),
+        "open value": (spec.region.open_values if spec.region else {}, "open values"),
+    }
+    for what, name, key in itertools.chain(_names(spec), _names_of_conditions(experiment, document)):
+        names, lead = known[what]
+        if name not in names:
+            document.report(key, f"there is no {what} {name!r}{hint(name, names, lead=lead)}")
+    for patterns, key in _patterns(spec):
+        for k, pattern in enumerate(patterns):
+            if not experiment.matching([pattern]):
+                sentence = f"no run is named {pattern!r}{hint(pattern, runs, lead='runs')}"
+                document.report((*key, "runs", k), sentence)
+    _check_correlations(spec, document)
+    _check_limits(spec, document)
+    for i, figure in enumerate(spec.figures):
+        if figure.name in [one.name for one in spec.figures[:i]]:
+            document.report(("figures", i, "name"), f"there is already a figure {figure.name!r}")
+        if figure.kind == "overlay" and spec.axes:
+            document.report(("figures", i, "kind"), "runs along axes are drawn as curve, map or limit")
+        _check_levels(spec, document, i, figure)
+        if figure.kind not in ("overlay", "grid"):
+            _check_places(spec, document, i, figure)
+
+
+def _names(spec: ExperimentSpec) -> Iterator[tuple[str, str, Key]]:
+    """Yield (what, its name, where) of all that is named, but for patterns of runs."""
+    for i, table in enumerate(spec.tables):
+        for k, name in enumerate(table.metrics):
+            yield "metric", name, ("tables", i, "metrics", k)
+    for name, grid in spec.grids.items():
+        for cell in cells(grid):
+            what, named = ("derived number", cell.metric) if grid.derived else ("run", cell.run)
+            yield what, named, ("grids", name)
+        if grid.metric:
+            yield "metric", grid.metric, ("grids", name, "metric")
+    for name, number in spec.derived.items():
+        for word, source in number.of.items():
+            yield "run", source.run, ("derived", name, "of", word, "run")
+            yield "metric", source.metric, ("derived", name, "of", word, "metric")
+        if number.rank_correlation is not None:
+            yield "grid", number.rank_correlation, ("derived", name, "rank_correlation")
+    for group, i, claim in spec.said():
+        for k, name in enumerate(claim.open_values or ()):
+            yield "open value", name, (group, i, "open_values", k)
+    if spec.tuning:
+        yield "derived number", spec.tuning.objective, ("tuning", "objective")
+    for name, limit in spec.limits.items():
+        yield "axis", limit.of, ("limits", name, "of")
+    for i, figure in enumerate(spec.figures):
+        for name, axis in figure.axes.items():
+            if axis != RUN or not spec.runs:
+                yield "axis", axis, ("figures", i, name)
+        for axis in figure.only:
+            yield "axis", axis, ("figures", i, "only", axis)
+        for what in ("metric", "limit", "grid"):
+            if name := getattr(figure, what):
+                yield what, name, ("figures", i, what)
+
+
+def _names_of_conditions(experiment: Experiment, document: Document) -> Iterator[tuple[str, str, Key]]:
+    """Yield the names in conditions likewise; report one that lacks its run."""
+    for key, condition in experiment.spec.conditions():
+        if condition.derived:
+            yield "derived number", condition.derived, (*key, "derived")
+            continue
+        if not condition.run and experiment.spec.runs and key[0] != "limits":
+            document.report(key, "needs run and metric, or derived in place of both")
+            continue
+        if condition.run and not experiment.matching([condition.run]):
+            yield "run", condition.run, (*key, "run")
+        yield "metric", condition.metric, (*key, "metric")
+        if isinstance(condition.bound, Reference):
+            yield "run", condition.bound.run, (*key, condition.operator, "run")
+            yield "metric", condition.bound.metric, (*key, condition.operator, "metric")
+
+
+def _patterns(spec: ExperimentSpec) -> Iterator[tuple[Sequence[str], Key]]:
+    """Yield (patterns of runs, what has them)."""
+    for name, axis in spec.axes.items():
+        yield axis.runs, ("axes", name)
+    for i, table in enumerate(spec.tables):
+        yield table.runs, ("tables", i)
+    for name, one in spec.region.open_values.items() if spec.region else ():
+        yield one.runs, ("region", "open_values", name)
+    if spec.tuning:
+        yield spec.tuning.runs, ("tuning",)
+    for i, figure in enumerate(spec.figures):
+        yield figure.runs, ("figures", i)
+
+
+def _check_correlations(spec: ExperimentSpec, document: Document) -> None:
+    """Report what a grid does not have that a rank correlation asks for."""
+    for name, number in spec.derived.items():
+        grid = spec.grids.get(number.rank_correlation or "")
+        if grid is None:
+            continue
+        axes = {**grid.rows, **grid.columns}
+        for axis, counted in number.only.items():
+            where: Key = ("derived", name, "only", axis)
+            if axis not in axes:
+                document.report(where, f"there is no axis {axis!r}{hint(axis, axes, lead='the grid has')}")
+                continue
+            for part in (part for part in counted if part not in axes[axis]):
+                guess = hint(part, axes[axis], lead=f"{axis} has")
+                document.report(where, f"there is no value {part!r}{guess}")
+        if all(cell.published is None for cell in cells(grid)):
+            sentence = f"grid {number.rank_correlation!r} has no published numbers to compare with"
+            document.report(("derived", name, "rank_correlation"), sentence)
+
+
+def _check_limits(spec: ExperimentSpec, document: Document) -> None:
+    """Report a limit of an axis that can have none."""
+    for name, limit in spec.limits.items():
+        if limit.of in spec.axes and not spec.axes[limit.of].numeric:
+            document.report(("limits", name, "of"), f"the values of {limit.of!r} are no numbers")
+        if limit.of in spec.repeats:
+            document.report(("limits", name, "of"), f"numbers are means over {limit.of!r}")
+        if spec.design != "grid":
+            document.report(("limits", name), "limits need a grid")
+
+
+def _check_levels(spec: ExperimentSpec, document: Document, i: int, figure: FigureSpec) -> None:
+    """Report values of an axis that are to be drawn and that it does not have."""
+    for axis, chosen in figure.only.items():
+        if axis not in spec.axes or (spec.design == "latin_hypercube" and spec.axes[axis].numeric):
+            continue
+        known = [text_of(level.value) for level in levels_of(spec.axes[axis])]
+        for value in (value for value in chosen if text_of(value) not in known):
+            sentence = f"{axis} has no value {value!r}{hint(text_of(value), known, lead='it has')}"
+            document.report(("figures", i, "only", axis), sentence)
+
+
+def _check_places(spec: ExperimentSpec, document: Document, i: int, figure: FigureSpec) -> None:
+    """Report an axis of a grid that has no place in a figure, or two places."""
+    used = {*figure.axes.values()}
+    for name, axis in figure.axes.items():
+        if axis in spec.repeats:
+            document.report(("figures", i, name), f"numbers are means over {axis!r}")
+        if name in "xy" and axis in spec.axes and figure.kind == "map" and not spec.axes[axis].numeric:
+            document.report(("figures", i), f"the values of {axis!r} are no numbers")
+    if figure.limit in spec.limits:
+        of = spec.limits[figure.limit].of
+        if of in used:
+            document.report(("figures", i), f"{of!r} is what the limit {figure.limit!r} is of")
+        used.add(of)
+    left = [
+        name for name in (*spec.axes, *([RUN] if spec.runs else [])) if name not in used | {*spec.repeats}
+    ]
+    if spec.design == "grid" and left and not document.problems:
+        sentence = f"the axis {left[0]!r} has no place in this figure: make it lines or panels"
+        document.report(("figures", i), sentence)
