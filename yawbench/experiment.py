@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.errors import Problem, ScenarioError, YawbenchError
+from orchestrator.errors import Problem, ScenarioError
 from orchestrator.experiments.expansion import NamedRun
 from orchestrator.experiments.experiment import Experiment as Design
 from orchestrator.experiments.figures import draw_over_axes
@@ -18,7 +18,8 @@ from orchestrator.experiments.jobs import Job, Once, Outcome, Record, measured
 from orchestrator.experiments.planning import metrics_of, plan_experiment
 from orchestrator.experiments.schema import ExperimentSpec, FigureSpec
 from orchestrator.experiments.table import columns_of, to_pandas
-from orchestrator.experiments.workers import execute
+from orchestrator.master.course import Opener
+from orchestrator.master.opening import open_unit
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.results.read import Results
 from orchestrator.scenario.quantities import number_and_unit
@@ -26,6 +27,7 @@ from orchestrator.scenario.strict import Model, validate
 from orchestrator.scenario.yaml_lines import Document
 from orchestrator.wording import hint
 
+from .making import make_all
 from .run import Run, shown_in_notebooks
 from .scenario import Scenario
 
@@ -133,41 +135,19 @@ class Experiment:
         Raises:
             YawbenchError: a run cannot start; none has been made.
         """
-        programs = self.base.programs
         once = Once(**self.base._opening())
         planned = plan_experiment(self.design, self.base.path.parent, once=once)
         metrics = metrics_of(planned.experiment)
-        outcomes: dict[int, Outcome] = {}
-        here: list[tuple[int, Job]] = []
-        apart: list[tuple[int, Job]] = []
-        for number, job in enumerate(planned.jobs):
-            plain = any(unit.fmu.path in programs for unit in job.plan.units) if job.plan else False
-            (here if plain else apart).append((number, job))
         with _bar(self.design.spec.title, len(self), shown=progress) as told:
-            made = execute([job for _, job in apart], workers=workers, done=told, run=_in_memory)
-            outcomes |= zip((number for number, _ in apart), made, strict=True)
-            for number, job in here:
-                outcomes[number] = self._here(job)
-                told(outcomes[number])
-        results = [outcomes[number].value for number in range(len(self))]
-        records = [
-            measured(one, metrics) if isinstance(one, Results) else Record({}, outcomes[number].problems)
-            for number, one in enumerate(results)
-        ]
-        runs = [Run(one) if isinstance(one, Results) else None for one in results] if keep else None
+            outcomes = make_all(planned.jobs, self.base.programs, workers=workers, done=told, run=_in_memory)
+        records = [measured(one.value, metrics) if one.ok else Record({}, one.problems) for one in outcomes]
+        runs = [Run(one.value) if one.ok else None for one in outcomes] if keep else None
         return Runs(Findings(planned.experiment, records, {}, planned), runs)
 
-    def _here(self, job: Job) -> Outcome:
-        assert job.plan is not None
-        try:
-            return Outcome(job, value=self.base._simulate(job.plan))
-        except YawbenchError as error:
-            return Outcome(job, tuple(error.problems), error.exit_status)
 
-
-def _in_memory(job: Job) -> Results:
+def _in_memory(job: Job, opener: Opener = open_unit) -> Results:
     assert job.plan is not None
-    return simulate_in_memory(job.plan)
+    return simulate_in_memory(job.plan, opener=opener)
 
 
 @dataclass(frozen=True)

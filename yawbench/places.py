@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from components.fmi.component import Component
-from orchestrator.errors import ScenarioError, YawbenchError
+from orchestrator.errors import ScenarioError
 from orchestrator.experiments.execution import finish, left_to_do
-from orchestrator.experiments.jobs import Job, Once, Outcome, Told, run_job
+from orchestrator.experiments.jobs import Job, Once, Told, run_job
 from orchestrator.experiments.journal import Journal
 from orchestrator.experiments.ranking import load_ranking
 from orchestrator.experiments.ranking_course import Ranked, drive_ranking
@@ -21,11 +21,11 @@ from orchestrator.experiments.ranking_drawing import draw_matrix, draw_pareto
 from orchestrator.experiments.ranking_schema import UNIT, EntrySpec
 from orchestrator.experiments.ranking_tables import columns_of_cells, columns_of_entries
 from orchestrator.experiments.table import to_pandas
-from orchestrator.experiments.workers import execute
 from orchestrator.results.lock import writing
 from orchestrator.scenario import catalogue
 from orchestrator.wording import hint
 
+from .making import make_all
 from .program import Program
 from .run import shown_in_notebooks
 
@@ -90,10 +90,7 @@ def rank(
         journal = stack.enter_context(contextlib.closing(Journal(folder, loaded.identity)))
 
         def runner(jobs: Sequence[Job], told: Told) -> None:
-            here = [job for job in jobs if _program_of(job, programs)]
-            execute([job for job in jobs if job not in here], workers=workers, done=told)
-            for job in here:
-                told(_made_here(job, programs))
+            make_all(jobs, programs, workers=workers, done=told, run=run_job)
 
         def make(_: str, jobs: Sequence[Job]) -> None:
             finish(left_to_do(jobs, journal.records), journal, runner=runner)
@@ -118,27 +115,6 @@ def _entry(given: Any, name: str) -> tuple[dict[str, EntrySpec], dict[Path, Prog
 
 def _spec(name: str, fmu: str) -> EntrySpec:
     return EntrySpec(title=name, fmu=fmu, parameters={}, source="given to rank", gains="authors")
-
-
-def _program_of(job: Job, programs: dict[Path, Program]) -> Program | None:
-    units = job.plan.units if job.plan else ()
-    return next((programs[unit.fmu.path] for unit in units if unit.fmu.path in programs), None)
-
-
-def _made_here(job: Job, programs: dict[Path, Program]) -> Outcome:
-    """Make a run of plain Python in this process."""
-    try:
-        made = run_job(job, opener=lambda unit, log, corrupted: _open(programs, unit, log, corrupted))
-        return Outcome(job, value=made)
-    except YawbenchError as error:
-        return Outcome(job, tuple(error.problems), error.exit_status)
-
-
-def _open(programs: dict[Path, Program], unit: Any, log: Any, corrupted: set[Path]) -> Any:
-    from orchestrator.master.opening import open_unit
-
-    program = programs.get(unit.fmu.path)
-    return program.open(unit, log) if program else open_unit(unit, log, corrupted)
 
 
 @dataclass(frozen=True)

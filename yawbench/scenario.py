@@ -11,10 +11,9 @@ from typing import Any
 
 from orchestrator.errors import Problem, ScenarioError, SimulationError
 from orchestrator.fmu.opener import Opener
-from orchestrator.master.opening import open_unit
+from orchestrator.master.log import Log
 from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.plan import FAULTS, Change, Faults, Plan, Value
-from orchestrator.results.read import Results
+from orchestrator.plan import FAULTS, Change, Faults, Plan, Unit, Value
 from orchestrator.scenario import catalogue, scenario_schema
 from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import setting, spelled
@@ -22,6 +21,7 @@ from orchestrator.tyres.axle_stiffness import cornering_stiffness
 from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wording import hint
 
+from .making import opener_of
 from .program import Program
 from .run import Run
 
@@ -194,20 +194,15 @@ class Scenario:
         Raises:
             SimulationError: a unit failed; what Python code raised is its `__cause__`.
         """
-        return Run(self._simulate(self.plan(), progress=progress))
-
-    def _simulate(self, plan: Plan, *, progress: Callable[[int, int], None] | None = None) -> Results:
-        """Return the results of a plan of this scenario, whose plain Python runs here; see `run`."""
         opened: list[Any] = []
+        make = opener_of(self.programs)
 
-        def opener(unit: Any, log: Any, corrupted: set[Path]) -> Any:
-            program = self.programs.get(unit.fmu.path)
-            slave = program.open(unit, log) if program else open_unit(unit, log, corrupted)
-            opened.append(slave)
-            return slave
+        def opener(unit: Unit, log: Log, corrupted: set[Path]) -> Any:
+            opened.append(make(unit, log, corrupted))
+            return opened[-1]
 
         try:
-            return simulate_in_memory(plan, opener=opener, progress=progress)
+            return Run(simulate_in_memory(self.plan(), opener=opener, progress=progress))
         except SimulationError as error:
             causes = [getattr(slave, "error", None) for slave in opened if slave.name == error.unit]
             raise error from next(iter(causes), None)

@@ -4,23 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
-from enum import Enum
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Literal
 
 import typer
 
-if TYPE_CHECKING:
-    from ..fmu.kept import Entry
-
-
-class Action(str, Enum):
-    """What to do with the cache."""
-
-    show = "show"
-    verify = "verify"
-    clear = "clear"
-
-
+Action = Literal["show", "verify", "clear"]
 What = Annotated[
     Action,
     typer.Argument(
@@ -30,7 +18,7 @@ What = Annotated[
 ]
 
 
-def cache(action: What = Action.show) -> None:
+def cache(action: What = "show") -> None:
     """Show, verify or clear the cache.
 
     Unpacked FMUs, the compiled launcher, keys of sources, and FMUs whose own folder cannot be
@@ -46,16 +34,13 @@ def cache(action: What = Action.show) -> None:
         print(folder)
         for kind, entries in kept_in(folder).items():
             size = sum(entry.size for entry in entries)
-            deleted = [entry for entry in entries if _is_to_go(entry, action)]
+            deleted = [
+                one for one in entries if action == "clear" or (action == "verify" and not one.whole())
+            ]
             for entry in deleted:
                 remove(entry.path)
             damaged += len(deleted)
-            print(
-                f"  {kind}: {len(entries)}, {size / 1e6:.1f} MB" + f", {len(deleted)} deleted" * bool(deleted)
-            )
-    if action is Action.verify:
+            also = f", {len(deleted)} deleted" if deleted else ""
+            print(f"  {kind}: {len(entries)}, {size / 1e6:.1f} MB{also}")
+    if action == "verify":
         print(f"damaged: {damaged}" if damaged else "everything is whole", file=sys.stderr)
-
-
-def _is_to_go(entry: Entry, action: Action) -> bool:
-    return action is Action.clear or (action is Action.verify and not entry.whole())

@@ -5,13 +5,13 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
 from vocabulary.wheels import WHEELS, wheels
 
-from ..plan import DEFAULT, OF_RUN, ValueOrigin
+from ..plan import DEFAULT, ValueOrigin
 from ..wording import cut, printable
 from .batch import say
 from .options import Fault, Fmus, NoBuild, NoValidate, ScenarioFile, Set, Swap
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 All = Annotated[
     bool, typer.Option("--all", help="Show every value, including those left at the defaults of the FMUs.")
 ]
+K = TypeVar("K")
+V = TypeVar("V")
 CAMBER = wheels("inclination_angle_*")
 """What plants give by their roll camber."""
 PIPE_WIDTH = 140
@@ -135,49 +137,36 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
     """Return a row for every value with its origin, and how many defaults are left out that do not matter."""
     from ..wording import fold
 
-    given = {change.place: change.origin for change in plan.changes}
-    in_file = {name: "scenario" if name in plan.scenario else "default" for name in OF_RUN}
-    run = {
-        **({"start_time": f"{_number(plan.start)} s"} if plan.start else {}),
-        "stop_time": f"{_number(plan.time(plan.n_steps))} s",
-        "step_size": f"{_number(plan.step)} s",
-        "algorithm": plan.algorithm,
-    }
-    rows: list[Sequence[str]] = [
-        (name, value, given.get(name, in_file[name]), "all") for name, value in run.items()
-    ]
     files = plan.scenario.get("tyre_files", {})
-    for axle, file in files.items():
-        by_file = ValueOrigin("file", Path(file["file"]).name)
-        takes = [
-            unit.name
-            for unit in plan.units
-            if any(n.endswith(f"_{axle}") and origin == by_file for n, origin in unit.origins.items())
-        ]
-        rows.append((f"tyres, {axle}", f"{file['kind']}, {file['side']}", str(by_file), ", ".join(takes)))
-    of_tyres = {ValueOrigin("file", Path(file["file"]).name) for file in files.values()}
-    takers: dict[tuple[str, str, str], list[str]] = {}
+    of_tyres = {axle: ValueOrigin("file", Path(file["file"]).name) for axle, file in files.items()}
     sources: dict[tuple[str, str, str], str] = {}
+    takers: list[tuple[tuple[str, str, str], str]] = []
     hidden = 0
     cambered = {wire.source for wire in plan.wires if wire.output in CAMBER}
     for unit in plan.units:
         own = {v.name: unit.parameters.get(v.name, v.start) for v in unit.fmu.of("parameter")}
-        alike: dict[tuple[str, str], list[str]] = {}
         constants = {name: value for name, value in unit.constants.items() if name not in unit.series}
+        shown: list[tuple[tuple[str, str], str]] = []
         for name, value in {**own, **constants}.items():
             source = unit.origins.get(name, DEFAULT)
-            origin = source.detail if source.kind == "file" else source.kind
             matters = _matters(unit, name) or (unit.name in cambered and name.startswith("roll_camber"))
-            if not defaults and (source in of_tyres or (source == DEFAULT and not matters)):
+            if not defaults and (source in of_tyres.values() or (source == DEFAULT and not matters)):
                 hidden += 1
-            else:
-                alike.setdefault((_shown(value, unit.fmu.variables[name].unit), origin), []).append(name)
-        for (value_text, origin), names in alike.items():
+                continue
+            origin = source.detail if source.kind == "file" else source.kind
+            shown.append(((_shown(value, unit.fmu.variables[name].unit), origin), name))
+        for (text, origin), names in _grouped(shown).items():
             for name in fold(names):
-                takers.setdefault((name, value_text, origin), []).append(unit.name)
+                takers.append(((name, text, origin), unit.name))
                 if defaults and origin == "default" and name in own:
-                    sources.setdefault((name, value_text, origin), unit.fmu.variables[name].source)
-    rows += [(*key, ", ".join(units), *filter(None, [sources.get(key)])) for key, units in takers.items()]
+                    sources.setdefault((name, text, origin), unit.fmu.variables[name].source)
+    rows = [*_run_rows(plan)]
+    for axle, origin_of_file in of_tyres.items():
+        takes = [unit.name for unit in plan.units if origin_of_file in unit.origins.values()]
+        what = f"{files[axle]['kind']}, {files[axle]['side']}"
+        rows.append((f"tyres, {axle}", what, str(origin_of_file), ", ".join(takes)))
+    for key, units in _grouped(takers).items():
+        rows.append((*key, ", ".join(units), *filter(None, [sources.get(key)])))
     for unit in plan.units:
         for name, series in unit.series.items():
             how = "held" if series.held else "linear"
@@ -185,13 +174,27 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
     return rows, hidden
 
 
+def _run_rows(plan: Plan) -> Iterable[Sequence[str]]:
+    """Yield the values that hold for the whole run."""
+    given = {change.place: change.origin for change in plan.changes}
+    run = {
+        **({"start_time": f"{_number(plan.start)} s"} if plan.start else {}),
+        "stop_time": f"{_number(plan.time(plan.n_steps))} s",
+        "step_size": f"{_number(plan.step)} s",
+        "algorithm": plan.algorithm,
+    }
+    for name, value in run.items():
+        yield name, value, given.get(name, "scenario" if name in plan.scenario else "default"), "all"
+
+
 def _derived(plan: Plan) -> Iterable[Sequence[str]]:
     """Return what was derived of the car, each with its formula."""
-    takers: dict[tuple[str, str], list[str]] = {}
-    for unit in plan.units:
-        for name, origin in unit.origins.items():
-            if origin.kind == "derived":
-                takers.setdefault((name, origin.detail), []).append(unit.name)
+    takers = _grouped(
+        ((name, origin.detail), unit.name)
+        for unit in plan.units
+        for name, origin in unit.origins.items()
+        if origin.kind == "derived"
+    )
     return [(*key, ", ".join(units)) for key, units in takers.items()]
 
 
@@ -202,11 +205,12 @@ def _beside_tyres(plan: Plan) -> Iterable[Sequence[str]]:
     from ..wiring.make_plan import TYRE_FORCES
     from ..wiring.parameters import STATIC_LOADS, STIFFNESSES, known_car
 
-    takers: dict[tuple[str, float], list[str]] = {}
-    for unit in plan.units:
-        for name in STIFFNESSES:
-            if name in unit.parameters and unit.origins[name].kind not in ("derived", "default"):
-                takers.setdefault((name, float(unit.parameters[name])), []).append(unit.name)
+    takers = _grouped(
+        ((name, float(unit.parameters[name])), unit.name)
+        for unit in plan.units
+        for name in STIFFNESSES
+        if name in unit.parameters and unit.origins[name].kind not in ("derived", "default")
+    )
     tyres = [u for u in plan.units if {v.name for v in u.fmu.of("output")} >= {*TYRE_FORCES}]
     car = known_car(plan.scenario.get("vehicle_parameters", {})) if takers and len(tyres) == 1 else None
     if car is None or not car.values.keys() >= {*STATIC_LOADS}:
@@ -249,7 +253,7 @@ def _wire_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
     from ..wording import fold_wires, star
 
     units = {unit.name: unit.fmu.variables for unit in plan.units}
-    for (source, target), wires in _grouped(plan.wires).items():
+    for (source, target), wires in _grouped(((w.source, w.target), w) for w in plan.wires).items():
         shown = []
         examples = {name: w for w in reversed(wires) for name in (w.input, star(w.input))}
         for output, name in fold_wires([(w.output, w.input) for w in wires]):
@@ -276,33 +280,33 @@ def _scaled(wire: Wire) -> str:
     return f"x {wire.gain:.6g}{offset}"
 
 
-def _grouped(wires: Iterable[Wire]) -> dict[tuple[str, str], list[Wire]]:
-    groups: dict[tuple[str, str], list[Wire]] = {}
-    for wire in wires:
-        groups.setdefault((wire.source, wire.target), []).append(wire)
+def _grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
+    """Return the values of each key, both in their order."""
+    groups: dict[K, list[V]] = {}
+    for key, value in pairs:
+        groups.setdefault(key, []).append(value)
     return groups
 
 
 def _order_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]]:
     from ..wording import fold
 
-    position = {unit.name: i for i, unit in enumerate(plan.units)}
-    forward: dict[str, list[Wire]] = {}
-    for wire in direct:
-        if position[wire.source] < position[wire.target]:
-            forward.setdefault(wire.target, []).append(wire)
+    before = _grouped((w.target, w) for w in direct if not _is_backward(w, plan))
     for unit in plan.units:
-        before = forward.get(unit.name, [])
-        sources = list(dict.fromkeys(w.source for w in before))
-        names = fold([w.input for w in before])
-        if before:
-            yield unit.name, ", ".join(sources), ", ".join(names)
+        if wires := before.get(unit.name):
+            sources = dict.fromkeys(wire.source for wire in wires)
+            yield unit.name, ", ".join(sources), ", ".join(fold([wire.input for wire in wires]))
 
 
 def _backward_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]]:
     from ..wording import fold
 
-    position = {unit.name: i for i, unit in enumerate(plan.units)}
-    backward = [w for w in direct if position[w.source] >= position[w.target]]
-    for (source, target), wires in _grouped(backward).items():
+    backward = _grouped(((w.source, w.target), w) for w in direct if _is_backward(w, plan))
+    for (source, target), wires in backward.items():
         yield source, target, ", ".join(fold([w.output for w in wires]))
+
+
+def _is_backward(wire: Wire, plan: Plan) -> bool:
+    """Return whether a wire leads to a unit that is evaluated before its source, or to the source itself."""
+    order = [unit.name for unit in plan.units]
+    return order.index(wire.source) >= order.index(wire.target)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -20,16 +19,9 @@ if TYPE_CHECKING:
 GROUND = "proving_ground"
 """Folder of the scenarios of standard tests."""
 
-
-class Driven(str, Enum):
-    """Tests of many runs."""
-
-    sine_with_dwell = "sine-with-dwell"
-    iso_3888_1 = "iso-3888-1"
-    iso_3888_2 = "iso-3888-2"
-
-
-Which = Annotated[Driven, typer.Argument(help="The test.", metavar="TEST")]
+Which = Annotated[
+    Literal["sine-with-dwell", "iso-3888-1", "iso-3888-2"], typer.Argument(help="The test.", metavar="TEST")
+]
 Scenario = Annotated[
     str | None,
     typer.Option(
@@ -83,12 +75,12 @@ def drive(
     from ..scenario import catalogue
 
     changes = (*_vehicle(vehicle), *wishes.changes)
-    one_run = catalogue.find(scenario or f"{GROUND}/{test.name}", "a scenario")
+    one_run = catalogue.find(scenario or f"{GROUND}/{test.replace('-', '_')}", "a scenario")
     folder = wishes.out or default_folder(one_run, changes, suffix="_series")
     base = Job("", one_run, folder, changes, **wishes.of_jobs | {"format": "parquet", "keep": True})
     once = Once(build=wishes.build)
     given = {change.place for change in changes}
-    if test is Driven.sine_with_dwell:
+    if test == "sine-with-dwell":
         if AMPLITUDE in given:
             raise ScenarioError(f"{AMPLITUDE}: the series itself says which amplitudes are driven")
         slow = catalogue.find(slow_steer or f"{GROUND}/slowly_increasing_steer", "a scenario")
@@ -96,7 +88,7 @@ def drive(
         status = _drive_dwell(base, slow, once, angle, wishes, figures=figures)
     else:
         if angle or slow_steer:
-            raise ScenarioError(f"{test.value} needs no A: leave --angle and --slow-steer away")
+            raise ScenarioError(f"{test} needs no A: leave --angle and --slow-steer away")
         if given & {SPEED, "stop_time"}:
             raise ScenarioError(f"{SPEED} and stop_time: the series itself says at what speeds is driven")
         hold(context, folder)
@@ -122,9 +114,9 @@ def _drive_dwell(
     from ..evaluation.slow_steer import characteristic_angle, evaluate_slow_steer
     from ..evaluation.standard_tests import TESTS
     from ..experiments.driven_series import dwell_jobs, slow_steer_jobs, traces
-    from .evaluate import angle_of, conclude
+    from .evaluate import Evaluation, angle_of
 
-    chosen = TESTS[Driven.sine_with_dwell.value]
+    chosen = TESTS["sine-with-dwell"]
     known = angle_of(angle)
     if known is None:
         name = "slowly_increasing_steer"
@@ -140,7 +132,7 @@ def _drive_dwell(
     status = _make("sine with dwell", ladder, base, wishes)
     evaluated = [chosen.evaluate(trace, known) for trace in traces(ladder)]
     series = judge_series([one.judged for one in evaluated], known)
-    conclude(chosen, evaluated, series, known, base.out, each=figures)
+    Evaluation(chosen, evaluated, series, known, base.out).conclude(each=figures)
     return status
 
 
@@ -148,7 +140,7 @@ def _drive_lane_change(base: Job, once: Once, wishes: Wishes, *, figures: bool) 
     """Make and evaluate the runs to the highest clean entry speed; return the exit status."""
     from ..evaluation.standard_tests import TESTS
     from ..experiments.driven_series import entry_speeds
-    from .evaluate import conclude
+    from .evaluate import Evaluation
 
     chosen = TESTS["lane-change"]
     failed: list[int] = []
@@ -160,7 +152,7 @@ def _drive_lane_change(base: Job, once: Once, wishes: Wishes, *, figures: bool) 
 
     traces, series = entry_speeds(base, once, made)
     evaluated = [chosen.evaluate(trace, None) for trace in traces]
-    conclude(chosen, evaluated, series, None, base.out, each=figures)
+    Evaluation(chosen, evaluated, series, None, base.out).conclude(each=figures)
     return max(failed, default=0)
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from enum import Enum
+import json
+import math
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -14,10 +16,8 @@ if TYPE_CHECKING:
     from ..evaluation.judgement import Series
     from ..evaluation.standard_tests import Evaluated, StandardTest
     from ..evaluation.trace import MappingSpec
-    from ..experiments.tables import Table
 
-Test = Enum("Test", {name.replace("-", "_"): name for name in TESTS}, type=str)  # type: ignore[misc]
-
+Test = Literal[tuple(TESTS)]  # type: ignore[valid-type]
 Which = Annotated[Test, typer.Argument(help="The test.", metavar="TEST")]  # type: ignore[valid-type]
 Sources = Annotated[
     list[Path],
@@ -48,6 +48,8 @@ OutFile = Annotated[
     ),
 ]
 
+FILE = "evaluation.json"
+
 
 def evaluate(
     test: Which,
@@ -68,7 +70,7 @@ def evaluate(
     from ..evaluation.trace import load_mapping, load_trace
     from .recorded import distinct, folder_of_all
 
-    chosen = TESTS[test.value]  # type: ignore[attr-defined]
+    chosen = TESTS[test]
     mapping = load_mapping(signals) if signals else None
     places = [place for source in sources for place in _runs(source, mapping)]
     labels = distinct(places) if len(places) > 1 else [str(places[0])]
@@ -79,41 +81,65 @@ def evaluate(
     series = judge_series(judged, known) if known and is_series(judged) else None
     recorded_here = all(place.is_dir() for place in places)
     folder = out or (folder_of_all(places) if recorded_here else Path("results") / "evaluation")
-    conclude(chosen, evaluated, series, known, folder, each=figures, together=out is not None)
+    Evaluation(chosen, evaluated, series, known, folder).conclude(each=figures, together=out is not None)
 
 
-def conclude(
-    test: StandardTest,
-    evaluated: list[Evaluated],
-    series: Series | None,
-    angle: float | None,
-    folder: Path,
-    *,
-    each: bool,
-    together: bool = False,
-) -> None:
-    """Draw, write and print what the runs of a test come to.
+@dataclass(frozen=True)
+class Evaluation:
+    """What the runs of a test come to, one by one and together."""
 
-    Args:
-        test: the test.
-        evaluated: its runs.
-        series: what they come to together.
-        angle: A [rad].
-        folder: of evaluation.json and of the figure of the series.
-        each: draw every run, too.
-        together: into that folder, not beside its results.
-    """
-    from ..wording import counted
-    from .batch import print_tables, say
+    test: StandardTest
+    evaluated: list[Evaluated]
+    series: Series | None
+    angle: float | None  # A [rad]
+    folder: Path  # of evaluation.json and of the figure of the series
 
-    drawn = _draw(test, evaluated if each else [], series, folder, together=together)
-    _write(test, evaluated, series, angle, folder)
-    print_tables(_tables(test, evaluated, series))
-    also = f", {counted(drawn, 'figure')}" if drawn else ""
-    say(f"{folder / FILE}{also}")
+    def conclude(self, *, each: bool, together: bool = False) -> None:
+        """Draw, write and print it.
 
+        Args:
+            each: draw every run, too.
+            together: into the folder, not beside its results.
+        """
+        from ..experiments.evaluated_tables import run_table, runs_table
+        from ..wording import counted
+        from ..writing import write_whole
+        from .batch import print_tables, say
 
-FILE = "evaluation.json"
+        drawn = self._draw(self.evaluated if each else [], together=together)
+        judged = [one.judged for one in self.evaluated]
+        data = {
+            "test": self.test.name,
+            "A": self.angle,
+            "runs": [one.as_data() for one in judged],
+            "series": self.series.as_data() if self.series else None,
+        }
+        write_whole(self.folder / FILE, json.dumps(data, indent=1))
+        if len(judged) == 1:
+            table = run_table(judged[0], self.test.says)
+        else:
+            table = runs_table(self.series.runs if self.series else judged, self.test, self.series)
+        print_tables([table])
+        also = f", {counted(drawn, 'figure')}" if drawn else ""
+        say(f"{self.folder / FILE}{also}")
+
+    def _draw(self, evaluated: list[Evaluated], *, together: bool) -> int:
+        """Draw runs, beside their results or together, and the series; return how many figures."""
+        from ..figures.style import save
+
+        stem = self.test.name.replace("-", "_")
+        count = 0
+        for number, one in enumerate(evaluated, start=1):
+            if one.draw is None:
+                continue
+            beside = None if together else one.trace.folder
+            name = stem if beside or len(evaluated) == 1 else f"{stem}_{number}"
+            save(one.draw(), (beside or self.folder) / name)
+            count += 1
+        if self.series and self.test.draw_series:
+            save(self.test.draw_series(self.series, str(self.folder)), self.folder / f"{stem}_series")
+            count += 1
+        return count
 
 
 def _runs(source: Path, mapping: MappingSpec | None) -> list[Path]:
@@ -138,8 +164,6 @@ def angle_of(given: str | None) -> float | None:
     Raises:
         ScenarioError: it is no such angle.
     """
-    import math
-
     from ..errors import ScenarioError
     from ..scenario.quantities import convert
 
@@ -158,8 +182,6 @@ def _angle(
     given: str | None, slow_steer: list[Path] | None, mapping: MappingSpec | None, test: StandardTest
 ) -> float | None:
     """Return A [rad], None if it is neither given nor needed."""
-    import math
-
     from ..errors import ResultsError, ScenarioError
     from ..evaluation.judgement import NotJudged
     from ..evaluation.slow_steer import characteristic_angle, evaluate_slow_steer
@@ -179,53 +201,3 @@ def _angle(
         raise ResultsError(str(why)) from None
     say(f"A = {math.degrees(angle):.1f} degrees, from {len(places)} of slowly increasing steer")
     return angle
-
-
-def _draw(
-    test: StandardTest, evaluated: list[Evaluated], series: Series | None, folder: Path, *, together: bool
-) -> int:
-    """Draw runs, beside their results or together in a folder, and the series; return how many figures."""
-    from ..figures.style import save
-
-    stem = test.name.replace("-", "_")
-    count = 0
-    for number, one in enumerate(evaluated):
-        if one.draw is None:
-            continue
-        beside = None if together else one.trace.folder
-        name = stem if beside or len(evaluated) == 1 else f"{stem}_{number + 1}"
-        save(one.draw(), (beside or folder) / name)
-        count += 1
-    if series and test.draw_series:
-        save(test.draw_series(series, str(folder)), folder / f"{stem}_series")
-        count += 1
-    return count
-
-
-def _write(
-    test: StandardTest,
-    evaluated: list[Evaluated],
-    series: Series | None,
-    angle: float | None,
-    folder: Path,
-) -> None:
-    import json
-
-    from ..writing import write_whole
-
-    data = {
-        "test": test.name,
-        "A": angle,
-        "runs": [one.judged.as_data() for one in evaluated],
-        "series": series.as_data() if series else None,
-    }
-    write_whole(folder / FILE, json.dumps(data, indent=1))
-
-
-def _tables(test: StandardTest, evaluated: list[Evaluated], series: Series | None) -> list[Table]:
-    from ..experiments.evaluated_tables import run_table, runs_table
-
-    if len(evaluated) == 1:
-        return [run_table(evaluated[0].judged, test.says)]
-    runs = series.runs if series else [one.judged for one in evaluated]
-    return [runs_table(runs, test, series)]

@@ -2,29 +2,16 @@
 
 from __future__ import annotations
 
-from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from .options import Fmus
 from .planning import plan_of_scenario
 
-
-class What(str, Enum):
-    """What can be listed."""
-
-    runs = "runs"
-    scenarios = "scenarios"
-    fmus = "fmus"
-    vehicles = "vehicles"
-    signals = "signals"
-    metrics = "metrics"
-
-
 Wanted = Annotated[
-    What | None,
+    Literal["runs", "scenarios", "fmus", "vehicles", "signals", "metrics"] | None,
     typer.Argument(help="What to list; default: scenarios and vehicles.", metavar="WHAT"),
 ]
 SCENARIOS = ("a scenario", "a study file", "a sweep file")
@@ -55,21 +42,21 @@ def list(what: Wanted = None, place: Place = None, fmus: Fmus = None) -> None:
         tables[-1].notes.append("'yawbench list' also lists runs, fmus, signals and metrics.")
         print_tables(tables)
         return
-    if what is What.runs:
+    if what == "runs":
         table = listing.runs_table(found_runs(place or Path("results")))
-    elif what is What.scenarios:
+    elif what == "scenarios":
         table = listing.files_table(place, SCENARIOS)
-    elif what is What.vehicles:
+    elif what == "vehicles":
         table = listing.files_table(place, VEHICLES)
-    elif what is What.metrics:
+    elif what == "metrics":
         table = listing.metrics_table()
-    elif what is What.signals and place is not None:
+    elif what == "signals" and place is not None:
         scenario = catalogue.find(place, "a scenario")
         table = listing.recorded_table(plan_of_scenario(scenario, None, None, fmus=fmus, build=True))
     else:
         found, problems = listing.fmus_in(_folder_of_fmus(place or fmus))
         table = listing.fmus_table(found, problems)
-        if what is What.signals:
+        if what == "signals":
             table = listing.signals_table(found)
     print_tables([table])
 

@@ -7,9 +7,8 @@ import os
 import shlex
 import shutil
 import sys
-from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -17,31 +16,12 @@ if TYPE_CHECKING:
     from ..scaffold.beginnings import Beginning
 
 
-class Kind(str, Enum):
-    """What can be begun with."""
-
-    controller = "controller"
-    driver = "driver"
-    reference = "reference"
-    tyre = "tyre"
-    plant = "plant"
-    road = "road"
-    vehicle = "vehicle"
-    scenario = "scenario"
-    study = "study"
-    sweep = "sweep"
-
-
-class Language(str, Enum):
-    """What its source is written in."""
-
-    python = "python"
-    c = "c"
-
-
+Kind = Literal[
+    "controller", "driver", "reference", "tyre", "plant", "road", "vehicle", "scenario", "study", "sweep"
+]
 What = Annotated[Kind, typer.Argument(help="What to write.", metavar="KIND")]
 Name = Annotated[str, typer.Argument(help="Its name: lower-case letters, digits and _.", metavar="NAME")]
-Written = Annotated[Language, typer.Option("--language", help="Language of a controller.")]
+Written = Annotated[Literal["python", "c"], typer.Option("--language", help="Language of a controller.")]
 Project = Annotated[
     Path | None,
     typer.Option(
@@ -52,7 +32,7 @@ Project = Annotated[
 ]
 
 
-def new(kind: What, name: Name, language: Written = Language.python, out: Project = None) -> None:
+def new(kind: What, name: Name, language: Written = "python", out: Project = None) -> None:
     """Write a starting point that works as it stands.
 
     KIND is a unit (controller, driver, reference, tyre, plant, road), written with its test and a scenario
@@ -67,21 +47,21 @@ def new(kind: What, name: Name, language: Written = Language.python, out: Projec
     from ..scaffold.names import check_name
     from .batch import say
 
-    check_name(name, role=kind.value, taken=set(find_recipes()))
-    if language is Language.c and kind is not Kind.controller:
+    check_name(name, role=kind, taken=set(find_recipes()))
+    if language == "c" and kind != "controller":
         raise ScenarioError("--language c: only a controller can be begun in C")
     root = COMPONENTS.parent
     checkout = root if (root / "scenarios").is_dir() else None  # None: installed without them
     here = checkout is not None and Path.cwd().resolve().is_relative_to(checkout)
     folder = out or (checkout if checkout is not None and here else Path())
     in_checkout = folder.resolve() == checkout
-    beginning = begin(kind.value, name, language.value, in_checkout=in_checkout)
+    beginning = begin(kind, name, language, in_checkout=in_checkout)
     also = [beginning.source] if beginning.source else []
     write_new(beginning.files, folder, also=also)
     for path in beginning.files:
         say(f"wrote {_shown(folder / path)}")
     say("Next:")
-    for command in _next(kind.value, name, beginning, folder, in_checkout):
+    for command in _next(kind, name, beginning, folder, in_checkout):
         print(shlex.join(command))
 
 

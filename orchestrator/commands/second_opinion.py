@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .batch import say
+from .batch import print_tables, say
 from .options import Fault, Fmus, NoBuild, ScenarioFile, Set, Swap
 from .planning import plan_of_scenario
 
@@ -75,31 +74,25 @@ def second_opinion(
 
 def show(opinions: list[Opinion]) -> None:
     """Print the differences by signal, the times per step, and what has to be known."""
-    from rich.console import Console
-    from rich.table import Table
+    from ..experiments.tables import Table
+    from ..wording import printable
 
-    console = Console(highlight=False, markup=False, emoji=False, width=None if sys.stdout.isatty() else 140)
     found = [one for one in opinions if not one.problem]
     if found:
-        table = Table("largest difference / range", box=None, pad_edge=False, header_style="bold")
-        for one in found:
-            table.add_column(one.master.title, justify="right")
+        names = [one.master.title for one in found]
+        columns = set(range(1, len(found) + 1))
+        apart = Table("Largest difference / range", ["signal", *names], numbers=columns)
         for signal in found[0].differences:
-            table.add_row(signal, *(f"{one.differences[signal]:.1e}" for one in found))
-        table.add_row("largest", *(f"{one.largest:.1e}" for one in found), style="bold")
-        console.print(table)
-        times = Table("us per communication step", box=None, pad_edge=False, header_style="bold")
+            apart.rows.append([signal, *(f"{one.differences[signal]:.1e}" for one in found)])
+        apart.rows.append(["largest", *(f"{one.largest:.1e}" for one in found)])
         keys = list(found[0].seconds)
-        for key in keys:
-            times.add_column(key, justify="right")
+        times = Table("us per communication step", ["master", *keys], numbers=set(range(1, len(keys) + 1)))
         for one in found:
-            times.add_row(one.master.title, *(f"{1e6 * one.seconds[key]:.0f}" for key in keys))
-        console.print()
-        console.print(times)
-        console.print()
+            times.rows.append([one.master.title, *(f"{1e6 * one.seconds[key]:.0f}" for key in keys)])
+        print_tables([apart, times])
     for one in opinions:
         if one.problem:
-            console.print(f"{one.master.title}: {one.problem}")
+            print(printable(f"{one.master.title}: {one.problem}"))
         elif one.one_step or one.master.note:
             step = "compared with one step for all units: " if one.one_step else ""
-            console.print(f"{one.master.title}: {step}{one.master.note}")
+            print(printable(f"{one.master.title}: {step}{one.master.note}"))

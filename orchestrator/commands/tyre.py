@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from .options import Fmus, NoBuild
 
-
-class Action(str, Enum):
-    """What to do with a tyre."""
-
-    show = "show"
-
-
-What = Annotated[Action, typer.Argument(help="show: draw its forces, moments, stiffnesses, relaxation.")]
+What = Annotated[
+    Literal["show"], typer.Argument(help="show: draw its forces, moments, stiffnesses, relaxation.")
+]
 Source = Annotated[
     str,
     typer.Argument(metavar="FILE|FMU", help="Tyre property file (.tir), or a tyre FMU: its name or path."),

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -14,14 +13,7 @@ if TYPE_CHECKING:
     from ..experiments.tables import Table
     from ..vehicles.handling import Handling
 
-
-class Deed(str, Enum):
-    """What to do with a car."""
-
-    show = "show"
-
-
-What = Annotated[Deed, typer.Argument(help="show: drive it, and tell what that comes to.")]
+What = Annotated[Literal["show"], typer.Argument(help="show: drive it, and tell what that comes to.")]
 Source = Annotated[
     Path, typer.Argument(metavar="FILE", help="Vehicle file; a name is looked for as in list.")
 ]

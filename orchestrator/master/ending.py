@@ -14,8 +14,8 @@ from typing import Any
 from ..errors import KEPT, Problem, ResultsError, SimulationError, YawbenchError
 from ..metrics.plausibility import Watch
 from ..plan import Plan
+from ..results.columnar import MemoryRecorder
 from ..results.folder import COMPLETED, RUNNING
-from ..results.in_memory import MemoryRecorder
 from ..results.key import key_of
 from ..results.recorder import Recorder
 from ..results.run_record import run_record

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..plan import Finding, Plan
+from ..results.columnar import MemoryRecorder
 from ..results.formats import recorder_of
-from ..results.in_memory import MemoryRecorder
 from ..results.read import Results
 from .apart import can_be_apart
 from .course import Opener, Progress

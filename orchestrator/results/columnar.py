@@ -1,13 +1,17 @@
-"""Recording by columns, in memory, for formats that write columns."""
+"""Recording by columns, in memory: for good, or for formats that write columns."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..plan import Value
-from .recorder import Recorder
+from .formats import plain
+from .read import Results
+from .recorder import Block, Recorder
 
 
 class Columns:
@@ -50,6 +54,38 @@ class Columns:
         return np.array(values) if values else np.empty(0)
 
 
+class MemoryRecorder(Block):
+    """A run's results in memory alone, as if they had been written and read back."""
+
+    folder = place = None
+
+    def __init__(
+        self, columns: Sequence[str], real: Sequence[bool], units: Mapping[str, str | None] | None = None
+    ) -> None:
+        super().__init__(columns, real)
+        self.units = dict(units or {})
+        self.results: Results | None = None
+        self._columns = Columns(self._order, self._block.shape[1])
+
+    def _take(self, block: np.ndarray, others: list[list[Value]]) -> None:
+        self._columns.add(block, others)
+
+    def finish(self, run: dict[str, Any]) -> None:
+        """Make `results` of what has been written."""
+        time, *values = (plain(array) for array in self._columns.arrays())
+        units = {name: self.units.get(name) or "" for name in ("time", *self.columns)}
+        record = {**run, "rows": self.written, **self.extremes()}
+        self.results = Results(Path(), time, dict(zip(self.columns, values, strict=True)), units, record)
+
+    def announce(self, run: dict[str, Any]) -> None:
+        """Nothing: there are no files."""
+
+    def close(self, run: dict[str, Any] | None = None) -> None:
+        """Add to the record what has changed in it since `finish`."""
+        if self.results is not None:
+            self.results.run.update(run or {})
+
+
 class ColumnRecorder(Recorder):
     """A recorder that keeps rows until there are `CHUNK` of them, or until the run ends."""
 
@@ -59,13 +95,8 @@ class ColumnRecorder(Recorder):
     def _begin(self) -> None:
         self._columns = Columns(self._order, self._block.shape[1])
 
-    def write(self, count: int) -> None:
-        if count <= 0:
-            return
-        self._look_at(self._block[:count])
-        self._columns.add(self._block[:count], self.others[:count])
-        self.others.clear()
-        self.written += count
+    def _take(self, block: np.ndarray, others: list[list[Value]]) -> None:
+        self._columns.add(block, others)
         if self.CHUNK is not None and self._columns.rows >= self.CHUNK:
             self._pass_on()
 
@@ -75,8 +106,3 @@ class ColumnRecorder(Recorder):
 
     def _make_room(self, needed: int) -> bool:
         return False  # half a file of columns is no use
-
-
-def plain(array: np.ndarray) -> np.ndarray:
-    """Return a column as `load_results` gives it: float64, or text."""
-    return array.astype(str) if array.dtype.kind in "OSU" else array.astype(float)

@@ -21,13 +21,10 @@ from typing import Any
 from ..errors import ResultsError
 from ..files import read_bytes, reason
 from ..writing import NEW
+from .formats import FILES, RESULTS_FILE
 from .lock import Lock, holder_of
 
-RESULTS_FILE = "results.csv"
 RUN_FILE = "run.json"
-
-FILES = {"csv": RESULTS_FILE, "parquet": "results.parquet", "mf4": "results.mf4"}
-"""Format -> name of its file. CSV is the default: every program reads it, and it survives a kill."""
 
 PART = ".part"
 """What the names of a run's files end in while it goes on."""

@@ -4,19 +4,40 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from ..errors import ScenarioError
+from ..errors import ResultsError, ScenarioError
 from ..wording import hint
-from .folder import FILES
 
 if TYPE_CHECKING:
     from .recorder import Recorder
 
-_RECORDERS = {"csv": "recorder.Recorder", "parquet": "parquet.ParquetRecorder", "mf4": "mdf.MdfRecorder"}
+RESULTS_FILE = "results.csv"
+
+
+@dataclass(frozen=True)
+class Format:
+    """One format."""
+
+    file: str
+    recorder: str  # module here and class: what writes it
+    source: str  # likewise: what reads it, given its path and which columns hold text
+    bytes: int  # per value, measured on one run of each of the papers A to D and rounded
+
+
+FORMATS = {
+    "csv": Format(RESULTS_FILE, "recorder.Recorder", "csv_file.CsvFile", 17),
+    "parquet": Format("results.parquet", "parquet.ParquetRecorder", "parquet.ParquetFile", 7),
+    "mf4": Format("results.mf4", "mdf.MdfRecorder", "mdf.MdfFile", 5),
+}
+"""CSV is the default: every program reads it, and it survives a kill."""
+FILES = {name: one.file for name, one in FORMATS.items()}
+"""Format -> name of its file."""
 
 
 def check_format(name: str) -> str:
@@ -25,19 +46,31 @@ def check_format(name: str) -> str:
     Raises:
         ScenarioError: there is no such format, or a package that it needs is missing.
     """
-    if name not in FILES:
-        raise ScenarioError(f"--format {name}: no such format{hint(name, FILES, lead='there are')}")
+    if name not in FORMATS:
+        raise ScenarioError(f"--format {name}: no such format{hint(name, FORMATS, lead='there are')}")
     if name == "mf4":
-        from .mdf import asammdf
-
         asammdf()
     return name
 
 
+def asammdf() -> ModuleType:
+    """Return the package that reads and writes MDF.
+
+    Raises:
+        ResultsError: it is not installed.
+    """
+    try:
+        import asammdf
+    except ImportError:
+        raise ResultsError(
+            "results as ASAM MDF need the package asammdf: pip install 'yawbench[mdf]'"
+        ) from None
+    return asammdf
+
+
 def recorder_of(name: str) -> type[Recorder]:
     """Return what writes a format: a subclass of `Recorder`."""
-    module, _, kind = _RECORDERS[check_format(name)].partition(".")
-    return getattr(importlib.import_module(f".{module}", __package__), kind)
+    return _class(FORMATS[check_format(name)].recorder)
 
 
 def source_of(path: Path, texts: Sequence[str] | None = None) -> Source:
@@ -51,17 +84,13 @@ def source_of(path: Path, texts: Sequence[str] | None = None) -> Source:
         OSError, ValueError: it is not what a run writes.
         ResultsError: a package that the format needs is missing.
     """
-    if path.name == FILES["csv"]:
-        from .csv_file import CsvFile
+    (source,) = (one.source for one in FORMATS.values() if one.file == path.name)
+    return _class(source)(path, texts)
 
-        return CsvFile(path, texts)
-    if path.name == FILES["parquet"]:
-        from .parquet import ParquetFile
 
-        return ParquetFile(path)
-    from .mdf import MdfFile
-
-    return MdfFile(path)
+def _class(place: str) -> Any:
+    module, _, name = place.partition(".")
+    return getattr(importlib.import_module(f".{module}", __package__), name)
 
 
 class Source(Protocol):
@@ -74,4 +103,9 @@ class Source(Protocol):
     """Of all columns, `time` first."""
 
     def blocks(self, columns: Sequence[str]) -> Iterator[list[np.ndarray]]:
-        """Yield some rows after the other of chosen columns: float64, or text."""
+        """Yield some rows after the other of chosen columns, each `plain`."""
+
+
+def plain(array: np.ndarray) -> np.ndarray:
+    """Return a column as results have it: float64, or text."""
+    return array.astype(str) if array.dtype.kind in "OSU" else array.astype(float, copy=False)

@@ -11,7 +11,8 @@ from typing import Any
 from ..errors import ResultsError
 from ..plan import Plan
 from .digest import checksum
-from .folder import COMPLETED, RESULTS_FILE, RUN_FILE, is_dead
+from .folder import COMPLETED, RUN_FILE, is_dead
+from .formats import RESULTS_FILE
 from .key import key_of
 from .read import load_results
 from .record_file import load_record

@@ -7,30 +7,14 @@ import io
 from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from ..errors import ResultsError
 from ..titles import changes_in, with_changes
-from .columnar import ColumnRecorder, plain
-from .folder import FILES
-
-
-def asammdf() -> ModuleType:
-    """Return the package that reads and writes MDF.
-
-    Raises:
-        ResultsError: it is not installed.
-    """
-    try:
-        import asammdf
-    except ImportError:
-        raise ResultsError(
-            "results as ASAM MDF need the package asammdf: pip install 'yawbench[mdf]'"
-        ) from None
-    return asammdf
+from .columnar import ColumnRecorder
+from .formats import FILES, asammdf, plain
 
 
 class MdfRecorder(ColumnRecorder):
@@ -76,7 +60,7 @@ class MdfFile:
     ROWS = 200_000
     """Read at a time; chosen: a column of them is no more than some megabytes."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, texts: Sequence[str] | None = None) -> None:
         self._path = path
         with self._open() as mdf:
             (group,) = mdf.groups

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..errors import ResultsError
-from .columnar import ColumnRecorder, plain
-from .folder import FILES
-
-if TYPE_CHECKING:
-    import pyarrow as pa
+from .columnar import ColumnRecorder
+from .formats import FILES, plain
 
 UNIT = b"unit"
 """Key of the measurement unit in a field's metadata."""
@@ -38,8 +35,10 @@ class ParquetRecorder(ColumnRecorder):
         self._columns.clear()
         if self._writer is None:
             names = ["time", *self.columns]
-            fields = [_field(n, a, self.units.get(n)) for n, a in zip(names, arrays, strict=True)]
-            self._schema = pa.schema(fields)
+            self._schema = pa.schema(
+                pa.field(name, array.type, metadata={UNIT: self.units.get(name) or ""})
+                for name, array in zip(names, arrays, strict=True)
+            )
             sink = pa.PythonFile(_Sink(self._append), mode="w")
             self._writer = pq.ParquetWriter(sink, self._schema, compression="zstd")
         try:
@@ -75,16 +74,10 @@ class _Sink:
         """Nothing: the recorder closes its file."""
 
 
-def _field(name: str, array: pa.Array, unit: str | None) -> pa.Field:
-    import pyarrow as pa
-
-    return pa.field(name, array.type, metadata={UNIT: unit or ""})
-
-
 class ParquetFile:
     """A Parquet file of results (see `formats.Source`)."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, texts: Sequence[str] | None = None) -> None:
         import pyarrow.parquet as pq
 
         self._file = pq.ParquetFile(path)  # by itself, whatever the folder above is called

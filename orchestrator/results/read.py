@@ -16,12 +16,10 @@ from ..files import check_regular, reads, reason
 from ..scenario.measurement_units import conversion, measure_of
 from ..wording import fold, listed, short
 from .digest import checksum
-from .folder import COMPLETED, FILES, RESULTS_FILE, RUN_FILE
-from .formats import source_of
+from .folder import COMPLETED, RUN_FILE
+from .formats import FILES, RESULTS_FILE, source_of
 from .record_file import load_record
 from .thinning import thinned
-
-__all__ = ["RESULTS_FILE", "RUN_FILE", "Results", "load_results"]
 
 
 @dataclass(frozen=True)
@@ -225,14 +223,11 @@ def _in_order(blocks: Iterator[list[np.ndarray]]) -> Iterator[list[np.ndarray]]:
 
 
 def _joined(blocks: Iterable[list[np.ndarray]], columns: int) -> list[np.ndarray]:
-    """Return the columns of all blocks: float64, or text."""
+    """Return the columns of all blocks."""
     parts = list(blocks)
-    if not parts:
-        return [np.empty(0) for _ in range(columns)]
     found = []
     for k in range(columns):
-        column = np.concatenate([part[k] for part in parts])
-        found.append(column.astype(str) if column.dtype.kind in "OSU" else column.astype(float, copy=False))
+        found.append(np.concatenate([part[k] for part in parts]) if parts else np.empty(0))
         for part in parts:
             part[k] = np.empty(0)  # a long run would need twice the memory
     return found

@@ -11,7 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, ValidationErr
 from ..errors import ResultsError
 from ..files import read_bytes, reading, reason
 from ..wording import short
-from .folder import FAILED, FILES, LARGEST, RUN_FILE, settle
+from .folder import FAILED, LARGEST, RUN_FILE, settle
+from .formats import FILES
 
 
 class _Part(BaseModel):

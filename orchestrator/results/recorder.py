@@ -27,7 +27,8 @@ from ..files import reason
 from ..plan import Value
 from ..writing import write_whole
 from .digest import checksum, shown
-from .folder import PART, RESULTS_FILE, RUN_FILE, RUNNING, put_in_place, tidy
+from .folder import PART, RUN_FILE, RUNNING, put_in_place, tidy
+from .formats import RESULTS_FILE
 from .lock import Lock
 
 BLOCK = 512
@@ -59,6 +60,16 @@ class Block:
 
     def write(self, count: int) -> None:
         """Take over the first `count` of `rows`; they are then free again."""
+        if count <= 0:
+            return
+        self._look_at(self._block[:count])
+        others = self.others[:count]
+        self.others.clear()
+        self._take(self._block[:count], others)
+        self.written += count
+
+    def _take(self, block: np.ndarray, others: list[list[Value]]) -> None:
+        """Keep rows that will be overwritten."""
         raise NotImplementedError
 
     def extremes(self) -> dict[str, dict[str, float]]:
@@ -137,26 +148,20 @@ class Recorder(Block):
         csv.writer(header, lineterminator="\n").writerow(["time", *self.columns])
         self._append(header.getvalue().encode())
 
-    def write(self, count: int) -> None:
-        """Write the first `count` of `rows`; they are then free again."""
-        if count <= 0:
-            return
-        self._look_at(self._block[:count])
-        values = self._block[:count].tolist()
+    def _take(self, block: np.ndarray, others: list[list[Value]]) -> None:
+        values = block.tolist()
         if len(self._order) == self._block.shape[1]:
             # the text of a list of lists is the fastest way to many shortest decimal numbers
             text = repr(values)[2:-2].replace("], [", "\n").replace(", ", ",") + "\n"
         else:
-            text = self._mixed(values, count)
-        self.others.clear()
+            text = self._mixed(values, others)
         self._append(text.encode())
-        self.written += count
 
-    def _mixed(self, values: list[list[float]], count: int) -> str:
+    def _mixed(self, values: list[list[float]], others: list[list[Value]]) -> str:
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        for row, others in zip(values, self.others[:count], strict=True):
-            cells = [*row, *(int(v) if isinstance(v, bool) else v for v in others)]
+        for row, more in zip(values, others, strict=True):
+            cells = [*row, *(int(v) if isinstance(v, bool) else v for v in more)]
             writer.writerow([cells[i] for i in self._order])
         return text.getvalue()
 

@@ -11,7 +11,8 @@ from ..files import open_regular, reason
 from ..writing import write_whole
 from .csv_file import CsvFile
 from .digest import checksum
-from .folder import DIED, FILES, PART, RESULTS_FILE, RUN_FILE, is_dead, put_in_place, tidy, unfinished
+from .folder import DIED, PART, RUN_FILE, is_dead, put_in_place, tidy, unfinished
+from .formats import FILES, RESULTS_FILE
 from .lock import Lock
 
 WHY = "the process of this run ended without a word"

@@ -7,17 +7,15 @@ import shutil
 from pathlib import Path
 
 from ..plan import Plan
-from .folder import FILES
+from .formats import FORMATS
 
-BYTES = {"csv": 17, "parquet": 7, "mf4": 5}
-"""Bytes per value, measured on one run of each of the papers A to D and rounded."""
 HUGE = 2e9
 """Bytes from which on a run says so before it starts; chosen: what takes a minute to read back."""
 
 
 def expected_size(plan: Plan, format: str) -> int:
     """Return about how many bytes the results of a run will take in a format."""
-    return (plan.n_steps + 1) * (len(plan.record) + 1) * BYTES[format]
+    return (plan.n_steps + 1) * (len(plan.record) + 1) * FORMATS[format].bytes
 
 
 def size_note(plan: Plan, folder: Path, format: str) -> str | None:
@@ -26,7 +24,7 @@ def size_note(plan: Plan, folder: Path, format: str) -> str | None:
     if size < HUGE and size <= free:
         return None
     note = (
-        f"{folder / FILES[format]} will take about {_shown(size)} "
+        f"{folder / FORMATS[format].file} will take about {_shown(size)} "
         f"({plan.n_steps + 1} rows of {len(plan.record)} variables)"
     )
     if size > free:

@@ -15,9 +15,8 @@ from orchestrator.cli import main
 from orchestrator.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
 from orchestrator.master.simulate import simulate, simulate_in_memory
 from orchestrator.results import parquet
-from orchestrator.results.folder import FILES
-from orchestrator.results.formats import recorder_of
-from orchestrator.results.in_memory import MemoryRecorder
+from orchestrator.results.columnar import MemoryRecorder
+from orchestrator.results.formats import FILES, recorder_of
 from orchestrator.results.read import load_results
 from orchestrator.results.recorder import BLOCK
 from tests.fmu_copies import put_fmus
@@ -74,11 +73,17 @@ def test_every_format_reads_back_as_csv_does_to_the_last_bit(rows, name, tmp_pat
 def test_results_in_memory_are_those_on_disk(tmp_path):
     expected = record(tmp_path, 700, "csv")
     memory = MemoryRecorder(COLUMNS, REAL, UNITS)
+    seen = []
+    memory.looks.append(lambda rows: seen.append(len(rows)))
     fill(memory, 700)
-    memory.finish({"status": "completed"})
-    memory.close()
+    memory.finish({"status": "completed", "units_freed": False})
+    memory.close({"units_freed": True})
     alike(memory.results, expected)
-    assert memory.results.run == {"status": "completed", "rows": 700}
+    said = memory.results.run
+    assert (said["status"], said["rows"], said["units_freed"]) == ("completed", 700, True)
+    for end in ("smallest", "largest"):
+        assert said[end] == {name: float(value) for name, value in expected.run[end].items()}
+    assert seen == [BLOCK, 700 - BLOCK]
 
 
 def test_parquet_files_carry_units_and_row_groups(tmp_path, monkeypatch):

@@ -9,8 +9,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.results import size
-from orchestrator.results.folder import FILES
-from orchestrator.results.size import BYTES, expected_size, size_note
+from orchestrator.results.size import expected_size, size_note
 from tests.fmu_copies import put_fmus
 
 from .fakes import Clock, make_plan
@@ -23,10 +22,6 @@ def plan_of():
     """A plan of so many steps that records nine variables."""
     clock = Clock(**{f"y{n}": float for n in range(9)})
     return lambda n_steps: make_plan({"a": clock}, [], step="1/1000", n_steps=n_steps)
-
-
-def test_every_format_has_an_expected_size():
-    assert set(BYTES) == set(FILES)
 
 
 def test_the_expected_size_counts_time_and_the_first_row(plan_of):

@@ -23,7 +23,8 @@ from pathlib import Path
 
 from fmus.build import build_all
 from orchestrator.errors import ResultsError
-from orchestrator.results.folder import FILES, PART, RUN_FILE
+from orchestrator.results.folder import PART, RUN_FILE
+from orchestrator.results.formats import FILES
 from orchestrator.results.lock import LOCK_FILE
 from orchestrator.results.read import load_results
 from orchestrator.writing import NEW
