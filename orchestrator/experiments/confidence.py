@@ -17,29 +17,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 LEVEL = 0.95
 """Share of such intervals that hold the true mean; chosen: what is usual."""
 
 
-@dataclass(frozen=True)
-class Interval:
+class Interval(NamedTuple):
     """The mean over repeats, and half the width of its confidence interval, in the unit of the numbers."""
 
     mean: float
     half: float
-
-    @property
-    def low(self) -> float:
-        """The lower end."""
-        return self.mean - self.half
-
-    @property
-    def high(self) -> float:
-        """The upper end."""
-        return self.mean + self.half
 
 
 def interval(numbers: Sequence[float], level: float = LEVEL) -> Interval | None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ResultsError
-from ..figures.panels import Run
+from ..figures.display import Run
 from ..figures.plots import draw
 from ..figures.style import ROW, frame, literal, new_figure, save
 from ..titles import changed

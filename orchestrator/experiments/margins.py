@@ -117,16 +117,14 @@ class Line:
         if self.chosen.place is None:
             return Flip(self.open_value, self.says, others[0].words, None, 1.0)
         start = self.chosen.place
-        places = [start, *(one.place for one in known if one.place is not None)]
-        found = []
-        for side in (1, -1):
-            way = [one for one in known if one.place is not None and side * (one.place - start) > 0]
-            way.sort(key=lambda one: side * (one.place or 0.0))
-            steps = pairwise([self.chosen, *way])
-            step = next(((a, b) for a, b in steps if a.spot.holds != b.spot.holds), None)
-            if step:
-                found.append(_between(*step))
-        place = min(found, key=lambda one: abs(one - start))
+        way = sorted((self.chosen, *known), key=lambda one: one.place or 0.0)
+        flips = []
+        for pair in pairwise(way):
+            near, far = sorted(pair, key=lambda one: abs((one.place or 0.0) - start))
+            if near.spot.holds != far.spot.holds:
+                flips.append(_between(near, far))
+        place = min(flips, key=lambda one: abs(one - start))
+        places = [one.place or 0.0 for one in way]
         distance = abs(place - start) / (max(places) - min(places))
         chosen = "" if self.unit == TIMES else self.words(start)
         return Flip(self.open_value, self.says, self.words(place), place, distance, chosen)

@@ -229,9 +229,8 @@ class Asked:
 
     claim: Claim
     runs: tuple[str, ...]
-    open_values: tuple[str, ...]
-    points: tuple[Place, ...]  # of the Latin hypercube
-    lines: dict[str, tuple[Place, ...]]  # open value -> its levels
+    points: list[Place]  # of the Latin hypercube
+    lines: dict[str, list[Level]]  # open value that it depends on -> its levels
 
 
 @dataclass(frozen=True)
@@ -244,7 +243,8 @@ class RegionPlan:
 
     def cells(self, asked: Asked) -> Iterator[Cell]:
         """Yield every run at every point that a claim is judged at."""
-        for place in itertools.chain(asked.points, *asked.lines.values()):
+        along = (((key, level),) for key, levels in asked.lines.items() for level in levels)
+        for place in itertools.chain(asked.points, along):
             yield from (self.runs.cell(run, place) for run in asked.runs)
 
 
@@ -295,30 +295,21 @@ def plan_region(
     known = {
         key: one
         for key, one in asked.items()
-        if one.open_values and all(cell in wanted for cell in plan.cells(one) if cell[1])
+        if one.lines and all(cell in wanted for cell in plan.cells(one) if cell[1])
     }
     return RegionPlan(runs, known, dict(zip(wanted, made, strict=True)))
 
 
 def _asked(runs: Runs, claim: Claim, hypercube: list[tuple[Level, ...]]) -> Asked:
     names = runs_of(runs.experiment, claim)
-    open_values = tuple(
-        key
-        for key in runs.open_values
+    lines = {
+        key: levels_of(one.stepped)
+        for key, one in runs.open_values.items()
         if (claim.open_values is None or key in claim.open_values)
         and any(name in runs.touched[key] for name in names)
-    )
+    }
     points = (zip(runs.open_values, point, strict=True) for point in hypercube)
-    return Asked(
-        claim,
-        names,
-        open_values,
-        tuple(tuple(one for one in point if one[0] in open_values) for point in points),
-        {
-            key: tuple(((key, level),) for level in levels_of(runs.open_values[key].stepped))
-            for key in open_values
-        },
-    )  # fmt: skip
+    return Asked(claim, names, [tuple(one for one in point if one[0] in lines) for point in points], lines)
 
 
 def runs_of(experiment: Experiment, claim: Claim) -> tuple[str, ...]:
@@ -347,8 +338,10 @@ def judge_region(plan: RegionPlan, findings: Findings, records: Mapping[str, Rec
         records: key of a run -> what became of it.
     """
     chosen = {"claims": findings.claims, "checks": findings.checks}
-    return {key: _judged(plan, one, chosen[key[0]][key[1]], findings, records)
-            for key, one in plan.asked.items()}  # fmt: skip
+    return {
+        (group, number): _judged(plan, one, chosen[group][number], findings, records)
+        for (group, number), one in plan.asked.items()
+    }
 
 
 def _judged(
@@ -372,11 +365,11 @@ def _judged(
 
     here = Spot(chosen.holds, chosen.margin)
     lines = []
-    for key, places in asked.lines.items():
+    for key, levels in asked.lines.items():
         one = runs.open_values[key]
         stops = []
-        for place in places:
-            level = place[0][1]
+        for level in levels:
+            place = ((key, level),)
             if any(runs.cell(name, place)[1] for name in asked.runs):  # else it is the chosen level
                 number = runs.number(key, level) if one.numeric else None
                 stops.append(Stop(level.words, number, spot(place)))

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from vocabulary.units import SHOWN
 
 from ..metrics.symbols import si_of, symbol, variable_of
+from ..results.read import Results
 
 RESOLUTION = 1e-3
 """Of angles and their rates, as shown [°, °/s, °/s²]; chosen: less than any sensor of a car can tell."""
+
+
+class Run(NamedTuple):
+    """A run and what the legend calls it."""
+
+    label: str
+    results: Results
 
 
 def in_formula(signal: str) -> str:

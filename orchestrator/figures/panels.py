@@ -10,19 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vocabulary.wheels import WHEEL_NAMES
+from vocabulary.wheels import WHEEL_NAMES, wheels
 
 from ..errors import ScenarioError
 from ..metrics.run_metrics import columns_of, reference_of
 from ..metrics.symbols import variable_of, words
-from ..results.read import Results
 from ..wording import cut, fold, hint
-from .display import digits_of, in_formula, shown_unit
+from .display import Run, digits_of, in_formula, shown_unit
 from .portrait import curves_of, draw_portrait, signals_of
 from .spans import Span, mark, spans_of
 from .style import REFERENCE, ROW, WIDTH, line_style, literal, note_above
@@ -41,14 +41,6 @@ PATH_ROOM = (ROW - 0.75) / (WIDTH - 1.0)
 
 SEEN_ERROR = 0.02
 """An error, relative to the reference's peak, that need not be magnified further."""
-
-
-@dataclass(frozen=True)
-class Run:
-    """A run and what the legend calls it."""
-
-    label: str
-    results: Results
 
 
 @dataclass(frozen=True)
@@ -76,35 +68,29 @@ def panels_of(runs: Sequence[Run], name: str, *, whole: bool = False) -> list[Pa
         drawn = [run for run in runs if _path_columns(run)]
         return [Panel(name, True, lambda axes: draw_path(axes, runs), over_time=False)] if drawn else []
     if signals := signals_of(name):
-        named = [(run.label, run.results) for run in runs]
-        if not curves_of(named, *signals):
+        if not curves_of(runs, *signals):
             return []
-        return [
-            Panel(name, False, lambda axes: draw_portrait(axes, named, *signals), over_time=False, rows=2)
-        ]
+        return [Panel(name, False, lambda axes: draw_portrait(axes, runs, *signals), over_time=False, rows=2)]
     if name.endswith("_error"):
         signal = name.removesuffix("_error")
         if all(_error(run, signal) is None for run in runs):
             return []
         return [Panel(name, False, lambda axes: _draw_error(axes, runs, signal, whole))]
-    columns = [columns_of(run.results, name) for run in runs]
-    if not any(columns):
+    if not any(columns_of(run.results, name) for run in runs):
         return []
-    if "*" not in name:
-        return [Panel(name, False, lambda axes: _draw_signal(axes, runs, name, whole))]
-    if len(runs) == 1:
+    if "*" in name and len(runs) == 1:
         return [Panel(name, False, lambda axes: _draw_wheels(axes, runs[0], name))]
-    four = []
-    for k, wheel in enumerate(WHEEL_NAMES):
-        heading = f"{literal(words(name))}, {WHEEL_NAMES[wheel]},"
-        four.append(Panel(name.replace("*", wheel), False, _one_wheel(runs, name, k, heading), name))
-    return four
+    scale = name if "*" in name else ""
+    return [
+        Panel(one, False, partial(_draw_signal, runs=runs, name=one, whole=whole), scale)
+        for one in wheels(name)
+    ]
 
 
 def shown_by(runs: Sequence[Run], names: Sequence[str], *, whole: bool = False) -> list[Panel]:
     """Return all panels that the names stand for, in order (see `panels_of`)."""
     panels = [panel for name in names for panel in panels_of(runs, name, whole=whole)]
-    spans = spans_of([(run.label, run.results) for run in runs])
+    spans = spans_of(runs)
     if not spans:
         return panels
     return [replace(panel, draw=_marked(panel.draw, spans)) if panel.over_time else panel for panel in panels]
@@ -136,19 +122,6 @@ def check_panels(runs: Sequence[Run], names: Sequence[str]) -> None:
         raise ScenarioError(problems)
 
 
-def _one_wheel(runs: Sequence[Run], name: str, k: int, heading: str) -> Callable[[Axes], None]:
-    def fill(axes: Axes) -> None:
-        unit = ""
-        for number, run in enumerate(runs):
-            columns = columns_of(run.results, name)
-            if columns:
-                unit = run.results.units[columns[k]]
-                _line(axes, run.results.time, run.results[columns[k]], unit, line_style(number))
-        _finish(axes, heading, unit)
-
-    return fill
-
-
 def _draw_signal(axes: Axes, runs: Sequence[Run], name: str, whole: bool) -> None:
     """Draw a signal of all runs over its reference, and limit the axes to what can be read."""
     lines = []
@@ -170,7 +143,7 @@ def _draw_signal(axes: Axes, runs: Sequence[Run], name: str, whole: bool) -> Non
     for number, run, column, _ in lines:
         unit = run.results.units[column]
         _line(axes, run.results.time, run.results[column], unit, line_style(number))
-    _finish(axes, f"{literal(words(name))} {in_formula(name)}", unit)
+    _finish(axes, name, unit)
     if references and not whole:
         peaks = [(run.label, _peak(run.results[column])) for _, run, column, _ in lines]
         wanted = max(_peak(reference) for reference in references)
@@ -200,7 +173,7 @@ def _draw_error(axes: Axes, runs: Sequence[Run], signal: str, whole: bool) -> No
         if error is not None:
             _line(axes, run.results.time, error, "%", line_style(number))
             peaks.append((run.label, _peak(error)))
-    _finish(axes, f"{literal(words(signal))}, error in % of max|{in_formula(signal + '_ref')}|", "")
+    _finish(axes, signal, "", f", error in % of max|{in_formula(signal + '_ref')}|")
     if not whole:
         _limit(axes, max(SEEN_ERROR, min(peak for _, peak in peaks)), peaks, "%")
 
@@ -219,7 +192,7 @@ def _draw_wheels(axes: Axes, run: Run, name: str) -> None:
     unit = run.results.units[columns[0]]
     for k, (column, wheel) in enumerate(zip(columns, WHEEL_NAMES, strict=True)):
         _line(axes, run.results.time, run.results[column], unit, {**line_style(k), "label": wheel})
-    _finish(axes, f"{literal(words(name))} {in_formula(name)}", unit)
+    _finish(axes, name, unit)
     axes.legend(
         loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, handlelength=2.4,
         columnspacing=1.2, borderpad=0.2,
@@ -283,9 +256,13 @@ def thinned(t: np.ndarray, x: np.ndarray, buckets: int = POINTS) -> tuple[np.nda
     return t[chosen], x[chosen]
 
 
-def _finish(axes: Axes, heading: str, unit: str) -> None:
+def _finish(axes: Axes, signal: str, unit: str, more: str = "") -> None:
+    """Write the heading of a panel over time: what it shows, its symbol, its unit, and perhaps more."""
     text = shown_unit(unit)[0]
-    axes.set_title(f"{heading} in {literal(text)}" if text else heading.rstrip(","))
+    formula = in_formula(signal)
+    heading = literal(words(signal)) + (more or f" {formula}".rstrip())
+    comma = "" if formula or "," not in heading else ","
+    axes.set_title(f"{heading}{comma} in {literal(text)}" if text else heading)
     axes.set_xlabel("$t$ in s")
     axes.locator_params(axis="x", nbins=9, steps=[1, 2, 5, 10])
     axes.margins(x=0.01)

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 from ..errors import ResultsError
 from ..titles import changed_each, changes_in
-from .display import digits_of
-from .panels import Panel, Run, shown_by
+from .display import Run, digits_of
+from .panels import Panel, shown_by
 from .spans import FAULTY, in_legend, spans_of
 from .style import REFERENCE, ROW, frame, line_style, new_figure, reference_words
 
@@ -119,7 +119,7 @@ def _legend(figure: Figure, runs: Sequence[Run]) -> list[Artist]:
     ]
     if says := reference_words(line for axes in figure.axes for line in axes.get_lines()):
         handles.append(Line2D([], [], label=says, **REFERENCE))
-    spans = spans_of([(run.label, run.results) for run in runs])
+    spans = spans_of(runs)
     return [*handles, *(Patch(facecolor=FAULTY, label=says) for says in in_legend(spans))]
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from ..metrics.run_metrics import columns_of, reference_of
 from ..metrics.symbols import words
 from ..results.read import Results
-from .display import digits_of, in_formula, shown_unit
+from .display import Run, digits_of, in_formula, shown_unit
 from .style import REFERENCE, line_style, literal, note_above
 
 if TYPE_CHECKING:
@@ -47,8 +47,8 @@ def signals_of(name: str) -> tuple[str, str] | None:
     return (match[2], match[1]) if match else None
 
 
-def curves_of(runs: Sequence[tuple[str, Results]], x: str, y: str) -> list[Curve]:
-    """Return the curves of the runs (label, results) that recorded both signals."""
+def curves_of(runs: Sequence[Run], x: str, y: str) -> list[Curve]:
+    """Return the curves of the runs that recorded both signals."""
     curves = []
     for number, (label, results) in enumerate(runs):
         across, up = columns_of(results, x), columns_of(results, y)
@@ -68,7 +68,7 @@ def _shown(results: Results, column: str) -> np.ndarray:
     return kept * shown_unit(results.units[column])[1]
 
 
-def draw_portrait(axes: Axes, runs: Sequence[tuple[str, Results]], x: str, y: str) -> None:
+def draw_portrait(axes: Axes, runs: Sequence[Run], x: str, y: str) -> None:
     """Draw y over x of all runs."""
     curves = curves_of(runs, x, y)
     drawn: list[tuple[np.ndarray, np.ndarray]] = []

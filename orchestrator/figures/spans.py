@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..results.read import Results
 from ..titles import fault_in
+from .display import Run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,8 +25,8 @@ class Span(NamedTuple):
     says: str
 
 
-def spans_of(runs: Sequence[tuple[str, Results]]) -> list[Span]:
-    """Return the faults of runs (label, results), each once; that not all have is said with the label."""
+def spans_of(runs: Sequence[Run]) -> list[Span]:
+    """Return the faults of runs, each once; that not all have is said with the label."""
     found: dict[Span, list[str]] = {}
     for label, results in runs:
         for fault in results.run.get("faults", ()) if results.time.size else ():

@@ -64,17 +64,6 @@ AT_A_TIME = "value"
 Window = tuple[float, float]
 """From, to [s]; equal: a point of time."""
 
-_PER_SECOND = {
-    "1": "1/s",
-    "m": "m/s",
-    "m/s": "m/s2",
-    "m/s2": "m/s3",
-    "rad": "rad/s",
-    "rad/s": "rad/s2",
-    "rad/s2": "rad/s3",
-}
-_TIMES_SECOND = {"1": "s", "m/s": "m", "m/s2": "m/s", "rad/s": "rad", "rad/s2": "rad/s"}
-
 
 @dataclass(frozen=True)
 class Metric:
@@ -114,17 +103,22 @@ class Metric:
 
     def unit(self, signal_unit: str) -> str:
         """Return the metric's unit for a signal in `signal_unit`."""
-        form, x = self.measure.unit, signal_unit or "1"
-        if form == "{x}/s":
-            return _PER_SECOND.get(x, f"{x}/s")
-        if form == "{x}/s2":
-            once = _PER_SECOND.get(x, f"{x}/s")
-            return _PER_SECOND.get(once, f"{x}/s2")
-        if form == "{x}2/s":
+        x = signal_unit or "1"
+        if self.measure.unit == "{x}2/s":
             return f"{x}2/s" if x.isalpha() else f"({x})2/s"
-        if form == "{x}.s":
-            return _TIMES_SECOND.get(x, f"{x}.s")
-        return form.replace("{x}", x)
+        powers = {"{x}/s": -1, "{x}/s2": -2, "{x}.s": 1}
+        if self.measure.unit in powers:
+            return _times_seconds(x, powers[self.measure.unit])
+        return self.measure.unit.replace("{x}", x)
+
+
+def _times_seconds(unit: str, power: int) -> str:
+    """Return a unit times a power of a second: "m/s3" for "m/s" and -2."""
+    base, _, of_time = unit.partition("/s")
+    total = power - (int(of_time or 1) if "/s" in unit else 0)
+    if total > 0:
+        return "s" if base == "1" else f"{base}.s"
+    return base if total == 0 else f"{base}/s{-total if total < -1 else ''}"
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from vocabulary.signals import SIGNALS
+from vocabulary.wheels import WHEEL_NAMES
 
 from ..scenario.measurement_units import conversion, measure_of, parse_unit
 
@@ -37,7 +38,9 @@ def symbol(signal: str) -> str:
 
 
 def words(signal: str) -> str:
-    """Return the signal in words, with a capital."""
+    """Return the signal in words, with a capital; of one wheel with that: "Wheel torque, front left"."""
     name = variable_of(signal)
+    if name[-2:] in WHEEL_NAMES and name[-3:-2] == "_":
+        return f"{words(f'{name[:-2]}*')}, {WHEEL_NAMES[name[-2:]]}"
     known = SIGNALS[name].words if name in SIGNALS else ""
     return known or name.replace("_*", "").replace("_", " ").capitalize()

@@ -9,7 +9,6 @@ What is drawn is what was recorded, thinned; between two moments kept the browse
 from __future__ import annotations
 
 import base64
-import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from importlib.resources import files
@@ -26,7 +25,6 @@ from ..figures.style import LINES, line_style
 from ..results.read import Results
 from ..wording import listed
 from .animation_frames import Frames, frames_of
-from .ground import Piece
 from .rendering import render
 
 SCRIPTS = ("frames", "draw", "scene", "close_up", "strip", "player")
@@ -117,16 +115,7 @@ def data_of(runs: Sequence[tuple[str, Frames]]) -> dict[str, Any]:
     every = [frames for _, frames in runs]
     end = max(frames.channels["time"][-1] for frames in every)
     return {
-        "runs": [
-            _run(
-                number,
-                label,
-                frames,
-                end,
-                () if frames.ground in [f.ground for f in every[:number]] else frames.ground,
-            )
-            for number, (label, frames) in enumerate(runs)
-        ],
+        "runs": [_run(number, *run, end, every[:number]) for number, run in enumerate(runs)],
         "still": still_of(every),
         "metres_per_newton": force_scale(every),
         "readouts": [
@@ -139,8 +128,9 @@ def data_of(runs: Sequence[tuple[str, Frames]]) -> dict[str, Any]:
     }
 
 
-def _run(number: int, label: str, frames: Frames, end: float, ground: Sequence[Piece]) -> dict[str, Any]:
-    """Return one run; `end` [s] is that of the longest, `ground` what it adds to that of the runs before."""
+def _run(number: int, label: str, frames: Frames, end: float, before: Sequence[Frames]) -> dict[str, Any]:
+    """Return one run, with its ground unless one `before` has the same; `end` [s] is that of the longest."""
+    ground = () if frames.ground in [other.ground for other in before] else frames.ground
     last = frames.channels["time"][-1]
     early = [f"this run ends at {last:.2f} s"] if last < end - 1e-6 and not frames.failed else []
     style = line_style(number)
@@ -170,11 +160,11 @@ def still_of(runs: Sequence[Frames]) -> float:
     for name in STRIP[:2]:
         peaks = []
         for frames in runs:
-            size = np.nan_to_num(np.abs(frames.channels.get(name, np.zeros(0))), posinf=0.0)
-            if size.size and size.max() > 0:
-                peaks.append((float(size.max()), float(frames.channels["time"][np.argmax(size)])))
-        if peaks:
-            return max(peaks, key=lambda peak: (peak[0], -peak[1]))[1]
+            size = np.nan_to_num(np.abs(frames.channels.get(name, np.zeros(1))), posinf=0.0)
+            peaks.append((size.max(), -frames.channels["time"][np.argmax(size)]))
+        largest, before = max(peaks)
+        if largest > 0:
+            return float(-before)
     time = runs[0].channels["time"]
     return float(0.5 * (time[0] + time[-1]))
 
@@ -186,18 +176,17 @@ def force_scale(runs: Sequence[Frames]) -> float:
     """
     largest = 0.0
     for frames in runs:
-        channels, track = frames.channels, frames.car.track
-        for left, right in (WHEELS[:2], WHEELS[2:]):
-            if f"grip_{left}" in channels:
-                pair = channels[f"grip_{left}"] + channels[f"grip_{right}"]
-                largest = max(largest, _peak(pair) / (0.96 * track))
-        if "grip_fl" not in channels:
-            for wheel in WHEELS if "force_x_fl" in channels else ():
-                force = np.hypot(channels[f"force_x_{wheel}"], channels[f"force_y_{wheel}"])
-                largest = max(largest, _peak(force) / (0.5 * track))
-    return 1 / largest if largest > 0 and math.isfinite(largest) else 0.0
-
-
-def _peak(values: np.ndarray) -> float:
-    finite = values[np.isfinite(values)]
-    return float(finite.max()) if finite.size else 0.0
+        known, track = frames.channels, frames.car.track
+        if "grip_fl" in known:
+            forces = [
+                known[f"grip_{left}"] + known[f"grip_{right}"] for left, right in (WHEELS[:2], WHEELS[2:])
+            ]
+            room = 0.96 * track
+        else:
+            wheels = WHEELS if "force_x_fl" in known else ()
+            forces = [np.hypot(known[f"force_x_{wheel}"], known[f"force_y_{wheel}"]) for wheel in wheels]
+            room = 0.5 * track
+        largest = max(
+            largest, *(np.max(one, initial=0.0, where=np.isfinite(one)) / room for one in forces), 0.0
+        )
+    return float(1 / largest) if largest > 0 else 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +18,8 @@ from ..results.read import Results
 from ..wording import listed
 from .ground import Piece, ground_of
 
+STANDS = 0.5
+"""Speed below which a car goes nowhere and its sideslip angle tells nothing [m/s]; chosen: below any walk."""
 FRAMES = 600
 """Moments kept of a run; chosen: 75 per second of an 8 s manoeuvre, more than a screen shows."""
 OVERHANG_FRONT, OVERHANG_REAR = 0.85, 1.0
@@ -28,7 +30,9 @@ USUAL = {"cg_to_front_axle": 1.3, "cg_to_rear_axle": 1.4, "track_width": 1.55}
 """The car of a plant that tells no sizes [m]; chosen: a mid-size car."""
 
 POSE = ("position_x", "position_y", "yaw_angle")
-SIGNALS = ("sideslip", "yaw_rate", "steer_angle", "yaw_moment", "cone_overrun")
+ROUNDABOUT = ("velocity_x", "velocity_y", "path_offset")
+"""Signals that are not shown as they are."""
+SIGNALS = ("sideslip", "yaw_rate", "steer_angle", "yaw_moment", "cone_overrun", *ROUNDABOUT)
 
 
 @dataclass(frozen=True)
@@ -66,23 +70,25 @@ def frames_of(results: Results) -> Frames:
     Raises:
         ResultsError: the position or the yaw angle was not recorded, or of no moment at all.
     """
-    time, pose = _pose(results)
+    time, (x, y, yaw) = _pose(results)
     kept = thinned(time)
-    x, y, yaw = (values[kept] for values in pose)
-    channels = {"time": time[kept], "x": x, "y": y, "yaw": yaw}
-    found = {name: values[kept] for name in SIGNALS if (values := _signal(results, name)) is not None}
-    if (speed := _speed(results)) is not None:
-        channels["speed"] = speed[kept]
-    channels |= found
-    if (offset := _signal(results, "path_offset")) is not None:
-        channels["path_y"] = y - offset[kept]
-    steer = found.get("steer_angle", np.zeros(kept.size))
-    forces = _forces(results, kept, steer)
+    time, x, y, yaw = time[kept], x[kept], y[kept], yaw[kept]
+    channels = {"time": time, "x": x, "y": y, "yaw": yaw}
+    others = {name: values[kept] for name in SIGNALS if (values := _signal(results, name)) is not None}
+    if (along := others.get("velocity_x")) is not None:
+        channels["speed"] = np.hypot(along, others["velocity_y"]) if "velocity_y" in others else along
+        if "sideslip" in others:
+            stands = np.abs(channels["speed"]) < STANDS
+            others["sideslip"] = np.where(stands, math.nan, others["sideslip"])
+    if "path_offset" in others:
+        channels["path_y"] = y - others["path_offset"]
+    channels |= {name: values for name, values in others.items() if name not in ROUNDABOUT}
+    forces = _forces(results, kept, others.get("steer_angle", np.zeros(kept.size)))
     grip = _grip(results, kept)
     notes = []
     if not forces:
         notes.append("tyre forces were not recorded")
-    elif "steer_angle" not in found:
+    elif "steer_angle" not in others:
         notes.append("the steer angle was not recorded: the front wheels are drawn straight")
     if forces and not grip:
         notes.append("friction or vertical loads were not recorded: no friction circles")
@@ -93,8 +99,11 @@ def frames_of(results: Results) -> Frames:
         notes.append(f"the run did not end as planned; shown until {time[-1]:.2f} s")
     elif results.ended:
         notes.append(results.ended)
-    ground = tuple(_ground(results, x, y))
-    return Frames(car, channels | forces | grip, tuple(_lanes(results)), ground, tuple(notes), failed)
+    lanes = next(filter(None, map(lanes_of, _parameters(results, "driver"))), [])
+    ranges = [(float(values.min()), float(values.max())) for values in (x, y)]
+    grounds = (ground_of(road, *ranges) for road in _parameters(results, "road"))
+    ground = next(filter(None, grounds), [])
+    return Frames(car, channels | forces | grip, tuple(lanes), tuple(ground), tuple(notes), failed)
 
 
 def thinned(time: np.ndarray, most: int = FRAMES) -> np.ndarray:
@@ -138,11 +147,6 @@ def _signal(results: Results, name: str) -> np.ndarray | None:
     return results.columns[columns[0]] if columns else None
 
 
-def _speed(results: Results) -> np.ndarray | None:
-    along, across = _signal(results, "velocity_x"), _signal(results, "velocity_y")
-    return along if along is None or across is None else np.hypot(along, across)
-
-
 def _forces(results: Results, kept: np.ndarray, steer: np.ndarray) -> dict[str, np.ndarray]:
     """Return the tyre forces in vehicle axes, N."""
     along, across = columns_of(results, "tyre_force_x_*"), columns_of(results, "tyre_force_y_*")
@@ -180,41 +184,27 @@ def _friction(results: Results, wheel: str, *, tyre: str) -> np.ndarray | float 
     return float(friction) if isinstance(friction, (int, float)) else None
 
 
-def _parameters(results: Results, unit: str) -> Mapping[str, Any]:
-    fmu = results.run["fmus"][unit]
-    return {**fmu.get("defaults", {}), **fmu.get("parameters", {})}
+def _parameters(results: Results, role: str) -> Iterator[Mapping[str, Any]]:
+    """Yield the parameters of the units of a role."""
+    for unit in results.units_of_role(role):
+        fmu = results.run["fmus"][unit]
+        yield {**fmu.get("defaults", {}), **fmu.get("parameters", {})}
 
 
 def _car(results: Results) -> tuple[Car, bool]:
     """Return the car's sizes, and False if the plant tells none of them."""
     told: dict[str, float] = {}
-    for unit in results.units_of_role("plant"):
+    for known in _parameters(results, "plant"):
         told |= {
             name: float(value)
-            for name, value in _parameters(results, unit).items()
+            for name, value in known.items()
             if name in USUAL and isinstance(value, (int, float)) and math.isfinite(value) and value > 0
         }
     front, rear, track = (told.get(name, usual) for name, usual in USUAL.items())
     ends = {"front": front + OVERHANG_FRONT, "rear": rear + OVERHANG_REAR, "width": track + BESIDE}
-    for unit in results.units_of_role("driver"):  # whom the cones are measured with
-        known = _parameters(results, unit)
+    for known in _parameters(results, "driver"):  # whom the cones are measured with
         if lanes_of(known):
             ends["width"] = float(known["vehicle_width"])
             ends["front"] = float(known.get("cg_to_front_end", ends["front"]))
             ends["rear"] = float(known.get("cg_to_rear_end", ends["rear"]))
     return Car(front, rear, track, ends["front"], ends["rear"], ends["width"]), bool(told)
-
-
-def _lanes(results: Results) -> list[Lane]:
-    for unit in results.units_of_role("driver"):
-        if lanes := lanes_of(_parameters(results, unit)):
-            return lanes
-    return []
-
-
-def _ground(results: Results, x: np.ndarray, y: np.ndarray) -> list[Piece]:
-    ranges = [(float(values.min()), float(values.max())) for values in (x, y)]
-    for unit in results.units_of_role("road"):
-        if ground := ground_of(_parameters(results, unit), *ranges):
-            return ground
-    return []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -175,8 +176,7 @@ def animation(findings: Findings) -> dict[str, Any] | None:
         runs = runs_of(findings, figure)
         if "path" in figure.panels and runs:
             ends = [runs[0], *runs[-1:]] if len(runs) > 1 else runs
-            pair = [(run.label, run.results) for run in ends]
-            seen = animation_of(pair, " and ".join(label for label, _ in pair))
+            seen = animation_of(ends, " and ".join(run.label for run in ends))
             if seen is not None:
                 return {"title": figure.title or plots.title_of(ends), "drawing": seen}
     return None
@@ -225,51 +225,38 @@ def _apart(tables: Sequence[Table]) -> list[Table]:
 
 def definitions(findings: Findings) -> list[dict[str, str]]:
     """Return how every metric of the study is defined."""
-    found = []
-    for spec in findings.spec.metrics.values():
-        chosen = metric(spec.metric)
-        found.append(
-            {
-                "heading": heading(spec),
-                "definition": f"{chosen.definition}{spec.during('from ')}",
-                "formula": chosen.formula,
-            }
-        )
-    return found
+    every = [(spec, metric(spec.metric)) for spec in findings.spec.metrics.values()]
+    return [
+        {
+            "heading": heading(spec),
+            "definition": f"{chosen.definition}{spec.during('from ')}",
+            "formula": chosen.formula,
+        }
+        for spec, chosen in every
+    ]
 
 
 def settings(findings: Findings) -> Table:
     """Return how every run differs from its scenario."""
-    rows: list[Sequence[Cell]] = [
-        [
-            run.name,
-            run.scenario.name,
-            changed(run.changes) or None,
-            _faults(findings.results.get(run.name)),
-        ]
-        for run in findings.experiment.runs.values()
-    ]
     headings = ["run", "scenario", "changed", "faults"]
+    rows: list[list[Cell]] = []
+    for run in findings.experiment.runs.values():
+        results = findings.results.get(run.name)
+        faults = "; ".join(map(fault_in, results.run.get("faults", []))) if results else ""
+        rows.append([run.name, run.scenario.name, changed(run.changes) or None, faults or None])
     kept = [k for k in range(len(headings)) if any(row[k] is not None for row in rows)]
     return Table("", [headings[k] for k in kept], [[row[k] for k in kept] for row in rows])
 
 
-def _faults(results: Results | None) -> str | None:
-    """Return the faults of a run in words, None if it had none."""
-    had = results.run.get("faults", []) if results else []
-    return "; ".join(map(fault_in, had)) or None
-
-
 def grid_of_times(runs: Iterable[Plan | Results]) -> list[str]:
     """Return algorithm, step and end of the runs, each combination once, as plans or records say."""
-    found: dict[str, int] = {}
+    found: Counter[str] = Counter()
     for one in runs:
         if isinstance(one, Plan):
             algorithm, step, end = one.algorithm, float(one.step), one.time(one.n_steps)
         else:
             algorithm, step, end = (one.run.get(key, 0) for key in ("algorithm", "step_size", "stop_time"))
-        text = f"{algorithm}, {1000 * step:g} ms, until {end:g} s"
-        found[text] = found.get(text, 0) + 1
+        found[f"{algorithm}, {1000 * step:g} ms, until {end:g} s"] += 1
     return [f"{text} ({counted(count, 'run')})" for text, count in found.items()]
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..experiments.findings import Findings
-from ..experiments.tables import Cell, Table, marked, remarks
-from ..figures.display import digits_of, shown, shown_unit
-from ..figures.panels import Run
+from ..experiments.tables import Table, marked, remarks
+from ..figures.display import Run, digits_of, shown, shown_unit
 from ..metrics.run_metrics import Value, metric
 from ..metrics.symbols import variable_of
 from .divergence import SAME, SEEN, Divergence, Parting, divergence
@@ -30,22 +29,12 @@ LESS_IS_BETTER = (
 """Measures of which the least is the best; of others, such as a path's displacement, that depends."""
 
 
-@dataclass(frozen=True)
-class MetricCell:
+class MetricCell(NamedTuple):
     """A value and its difference from the first run's, as text, empty if there is none."""
 
     value: str
     difference: str
     best: bool
-
-
-@dataclass(frozen=True)
-class MetricRow:
-    """A metric of all runs."""
-
-    title: str
-    formula: str
-    cells: list[MetricCell]
 
 
 def comparison_facts(findings: Findings) -> dict[str, Any] | None:
@@ -60,34 +49,32 @@ def comparison_facts(findings: Findings) -> dict[str, Any] | None:
     first, *others = runs
     found = [divergence(first.results, other.results) for other in others]
     return {
-        "labels": [marked(run.label, run.results) for run in runs],
+        "labels": [marked(*run) for run in runs],
         "rows": metric_rows(findings),
-        "remarks": remarks((run.label, run.results) for run in runs),
+        "remarks": remarks(runs),
         "most": _most_different(runs, found),
         "partings": [_parted(run.label, first.label, one) for run, one in zip(others, found, strict=True)],
         "rule": RULE,
     }
 
 
-def metric_rows(findings: Findings) -> list[MetricRow]:
+def metric_rows(findings: Findings) -> list[dict[str, Any]]:
     """Return the metrics of all runs with results, each with its difference from the first."""
     rows = []
     for key, spec in findings.spec.metrics.items():
         chosen = metric(spec.metric)
         values = [findings.values.get((name, key)) for name in findings.results]
-        known = [value.number for value in values if value is not None]
-        least = (
-            min(known) if chosen.name.partition("(")[0] in LESS_IS_BETTER and len(set(known)) > 1 else None
-        )
+        known = {value.number for value in values if value is not None}
+        ranked = chosen.name.partition("(")[0] in LESS_IS_BETTER and len(known) > 1
         cells = [
             MetricCell(
                 shown(value.number, value.unit) if value else "",
                 difference(values[0], value) if k else "",
-                value is not None and value.number == least,
+                ranked and value is not None and value.number == min(known),
             )
             for k, value in enumerate(values)
         ]
-        rows.append(MetricRow(chosen.title, chosen.formula, cells))
+        rows.append({"title": chosen.title, "formula": chosen.formula, "cells": cells})
     return rows
 
 
@@ -107,7 +94,7 @@ def difference(first: Value | None, other: Value | None) -> str:
     if first is None or other is None:
         return ""
     apart = other.number - first.number
-    if apart != apart or abs(apart) == float("inf"):
+    if not math.isfinite(apart):
         return ""
     unit, factor = shown_unit(other.unit)
     if apart == 0:
@@ -136,32 +123,28 @@ def parting_summary(found: Divergence) -> str:
         )
         return f"{which} the same throughout."
     first = found.partings[0]
-    together = [one.signal for one in found.partings if one.first == first.first]
-    others = f", then {', '.join(together[1:4])}{' and others' if len(together) > 4 else ''} in the same step"
-    seen = [one for one in found.partings if one.seen is not None]
-    visible = min(seen, key=lambda one: one.seen or 0.0, default=None)
-    told = (
-        f" Curves can be told apart from {visible.seen:g} s on, first {visible.signal}."
-        if visible is not None
-        else " In no curve can it be seen."
-    )
-    others = others if len(together) > 1 else ""
-    return f"The first to differ is {first.signal}, at {first.first:g} s{others}.{told}"
+    others = [one.signal for one in found.partings if one.first == first.first][1:]
+    more = " and others" if len(others) > 3 else ""
+    then = f", then {', '.join(others[:3])}{more} in the same step" if others else ""
+    seen = [(one.seen, one.signal) for one in found.partings if one.seen is not None]
+    told = "In no curve can it be seen."
+    if seen:
+        at, signal = min(seen, key=lambda one: one[0])
+        told = f"Curves can be told apart from {at:g} s on, first {signal}."
+    return f"The first to differ is {first.signal}, at {first.first:g} s{then}. {told}"
 
 
 def parting_table(partings: Sequence[Parting]) -> Table:
     """Return a table of signals that differ, in the order in which they part."""
     headings = ["signal", "goes to", "differs from", "seen from", "largest difference", "at"]
-    rows: list[Sequence[Cell]] = [_parting_row(one) for one in partings]
-    return Table("", headings, rows, numbers={2, 3, 4, 5} if rows else set())
-
-
-def _parting_row(one: Parting) -> list[Cell]:
-    return [
-        one.signal,
-        ", ".join(one.targets) or "recorded only",
-        f"{one.first:g} s",
-        None if one.seen is None else f"{one.seen:g} s",
-        None if one.largest != one.largest else shown(one.largest, one.unit),
-        f"{one.largest_at:g} s",
-    ]
+    table = Table("", headings, numbers={2, 3, 4, 5} if partings else set())
+    for one in partings:
+        table.rows.append([
+            one.signal,
+            ", ".join(one.targets) or "recorded only",
+            f"{one.first:g} s",
+            None if one.seen is None else f"{one.seen:g} s",
+            None if math.isnan(one.largest) else shown(one.largest, one.unit),
+            f"{one.largest_at:g} s",
+        ])  # fmt: skip
+    return table

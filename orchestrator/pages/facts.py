@@ -10,7 +10,7 @@ from datetime import datetime, timezone
 from markupsafe import Markup
 
 from ..errors import ResultsError
-from ..figures.panels import Run
+from ..figures.display import Run
 from ..results.read import Results
 from ..results.run_record import versions
 from .animation import fragment
@@ -49,8 +49,8 @@ def figure_of(
     return Figure(name, title, images, legend, files) if images else None
 
 
-def animation_of(runs: Sequence[tuple[str, Results]], title: str) -> Markup | None:
-    """Return the animation of one or two runs (label, results); None if they recorded no positions."""
+def animation_of(runs: Sequence[Run], title: str) -> Markup | None:
+    """Return the animation of one or two runs; None if they recorded no positions."""
     try:
         return fragment(runs, title=title)
     except ResultsError:

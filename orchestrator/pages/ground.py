@@ -7,6 +7,8 @@ from itertools import chain, pairwise, product
 from math import floor
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from vocabulary.friction_table import FrictionTable, table_of
 from vocabulary.patches import Patch, Point, Span, patches_of
 
@@ -62,9 +64,8 @@ def _of_table(table: FrictionTable | None, box: Sequence[Interval]) -> Iterator[
 def _around(places: Sequence[float], within: Interval) -> list[tuple[int, Interval]]:
     """Return (number, from middle to middle) of the places whose surroundings reach into an interval."""
     middles = [0.5 * (a + b) for a, b in pairwise(places)]
-    found = enumerate(zip((places[0], *middles), (*middles, places[-1]), strict=True))
-    cut = ((i, (max(a, within[0]), min(b, within[1]))) for i, (a, b) in found)
-    return [(i, (a, b)) for i, (a, b) in cut if a < b]
+    edges = np.clip([places[0], *middles, places[-1]], *within).tolist()
+    return [(i, (a, b)) for i, (a, b) in enumerate(pairwise(edges)) if a < b]
 
 
 def _of_patches(patches: Iterable[Patch], otherwise: float, box: Sequence[Interval]) -> Iterator[Piece]:
@@ -105,15 +106,10 @@ def _rectangle(x: Interval, y: Interval) -> tuple[Point, ...]:
 
 
 def clipped(corners: Sequence[Point], x: Interval, y: Interval) -> tuple[Point, ...]:
-    """Return the part of a polygon within a rectangle (the algorithm of Sutherland and Hodgman)."""
-    for axis, bound, side in ((0, x[0], 1.0), (0, x[1], -1.0), (1, y[0], 1.0), (1, y[1], -1.0)):
-        kept: list[Point] = []
-        for before, point in zip((*corners[-1:], *corners[:-1]), corners, strict=True):
-            inside, was = (side * (p[axis] - bound) >= 0.0 for p in (point, before))
-            if inside != was:
-                part = (bound - before[axis]) / (point[axis] - before[axis])
-                kept.append(tuple(b + part * (p - b) for b, p in zip(before, point, strict=True)))  # type: ignore[arg-type]
-            if inside:
-                kept.append(point)
-        corners = kept
-    return tuple(corners)
+    """Return the part of a polygon within a rectangle."""
+    from matplotlib.path import Path
+    from matplotlib.transforms import Bbox
+
+    closed = Path([*corners, corners[0]], closed=True)
+    inside = closed.clip_to_bbox(Bbox.from_extents(x[0], y[0], x[1], y[1]))
+    return tuple((a, b) for a, b in np.asarray(inside.vertices)[:-1].tolist())

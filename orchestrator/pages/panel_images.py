@@ -16,7 +16,8 @@ from urllib.parse import quote
 
 from markupsafe import Markup
 
-from ..figures.panels import Panel, Run, draw_path, shown_by, thinned
+from ..figures.display import Run
+from ..figures.panels import Panel, draw_path, shown_by, thinned
 from ..figures.spans import FAULTY, in_legend, spans_of
 from ..figures.style import RC, REFERENCE, line_style, reference_words
 
@@ -43,7 +44,6 @@ class PanelImage:
     name: str
     heading: Markup
     address: Markup
-    tall: bool
 
 
 @dataclass(frozen=True)
@@ -69,14 +69,17 @@ def panel_images(
     with matplotlib.rc_context(LOOK):
         drawn = [_draw(panel) for panel in panels]
         for scale in {panel.scale for panel in panels if panel.scale}:
-            _share(
-                [figure.axes[0] for panel, figure in zip(panels, drawn, strict=True) if panel.scale == scale]
-            )
+            alike = [
+                figure.axes[0] for panel, figure in zip(panels, drawn, strict=True) if panel.scale == scale
+            ]
+            low, high = zip(*(axes.get_ylim() for axes in alike), strict=True)
+            for axes in alike:
+                axes.set_ylim(min(low), max(high))
         legend = _legend(runs, drawn)
         headings = [_take_title(figure.axes[0]) for figure in drawn]
         _align(drawn)
         images = [
-            PanelImage(panel.name, heading, _address(figure), panel.rows > 1)
+            PanelImage(panel.name, heading, _address(figure))
             for panel, heading, figure in zip(panels, headings, drawn, strict=True)
         ]
     return images, legend
@@ -107,13 +110,6 @@ def _draw(panel: Panel) -> Figure:
     return figure
 
 
-def _share(every: Sequence[Axes]) -> None:
-    """Give axes the same limits."""
-    limits = [axes.get_ylim() for axes in every]
-    for axes in every:
-        axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
-
-
 def _align(drawn: Sequence[Figure]) -> None:
     """Give the axes of all panels the same left and right ends."""
     for figure in drawn:
@@ -131,7 +127,7 @@ def _legend(runs: Sequence[Run], drawn: Sequence[Figure]) -> list[LegendEntry]:
     entries = [_entry(run.label, line_style(k)) for k, run in enumerate(runs) if len(runs) > 1]
     if says := reference_words(line for figure in drawn for line in figure.axes[0].get_lines()):
         entries.append(_entry(says, REFERENCE))
-    spans = spans_of([(run.label, run.results) for run in runs])
+    spans = spans_of(runs)
     return [*entries, *(LegendEntry(says, FAULTY, BROAD, "") for says in in_legend(spans))]
 
 

@@ -7,14 +7,16 @@ the scenario or vehicle file, or in that file's `source`. The first word of a so
 
 from __future__ import annotations
 
+import linecache
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from vocabulary.wheels import WHEEL_NAMES, WHEELS
 
-from ..plan import DEFAULT, Plan, Unit, Value
+from ..plan import DEFAULT, Plan, Unit, Value, Variable
 from ..scenario.load import Scenario
 from ..scenario.yaml_lines import Document, Key
 from ..wiring.shared_facts import facts_of
@@ -48,19 +50,11 @@ class Parameter:
     given: Origin | None = None  # of the value that the scenario or the vehicle file gives
     set_by_study: bool = False
     values: dict[str, None] = field(default_factory=dict)  # as text, each once
-    takers: dict[str, None] = field(default_factory=dict)  # units that take it
 
     @property
     def origin(self) -> Origin:
         """Where the value comes from that stands where the study sets no other."""
         return self.given or self.default
-
-    def note(self, origin: Origin | None) -> None:
-        """Note where the value of one run comes from."""
-        if origin is not None and origin.kind == VARIED:
-            self.set_by_study = True
-        else:
-            self.given = self.given or origin
 
 
 @dataclass
@@ -70,6 +64,16 @@ class Group:
     title: str
     below: str
     parameters: dict[str, Parameter] = field(default_factory=dict)
+
+    def note(self, name: str, variable: Variable, meaning: str, value: str, origin: Origin | None) -> None:
+        """Note the value of a variable in one run, and where that comes from; None: from the FMU."""
+        default = origin_of(variable.source)
+        row = self.parameters.setdefault(name, Parameter(name, meaning, variable.unit or "", default))
+        row.values[value] = None
+        if origin is not None and origin.kind == VARIED:
+            row.set_by_study = True
+        else:
+            row.given = row.given or origin
 
 
 def origin_of(source: str, otherwise: str = "") -> Origin:
@@ -95,8 +99,8 @@ def groups_of(runs: Sequence[tuple[Scenario, Plan]]) -> list[Group]:
     units: dict[tuple[str, str], Group] = {}
     constants = Group("Constant inputs", "no unit gives them")
     order: dict[str, None] = {}
+    linecache.checkcache()
     for scenario, plan in runs:
-        comments = _Comments()
         by_name = {unit.name: unit for unit in plan.units}
         for name in [name for name in scenario.units if name in by_name]:
             order[name] = None
@@ -110,20 +114,12 @@ def groups_of(runs: Sequence[tuple[Scenario, Plan]]) -> list[Group]:
                     and variable.name not in scenario.units[name].parameters
                 )
                 value = unit.parameters.get(variable.name, variable.start)
-                group, origin = own, _origin(scenario, unit, variable.name, comments)
+                group, origin = own, _origin(scenario, unit, variable.name)
                 if from_vehicle:
                     file = scenario.vehicle_document.path
                     group = vehicles.setdefault(str(file), _vehicle_group(scenario, file))
-                row = group.parameters.setdefault(
-                    variable.name,
-                    Parameter(
-                        variable.name, variable.description, variable.unit or "", origin_of(variable.source)
-                    ),
-                )
-                row.note(origin)
-                row.values[text_of(value)] = None
-                row.takers[name] = None
-            _constants(constants, scenario, unit, comments)
+                group.note(variable.name, variable, variable.description, text_of(value), origin)
+            _constants(constants, scenario, unit)
     ordered = [units[key] for name in order for key in units if key[0] == name]
     return [group for group in (*vehicles.values(), *ordered, constants) if group.parameters]
 
@@ -133,54 +129,47 @@ def _vehicle_group(scenario: Scenario, file: Path) -> Group:
     return Group(f"The car: {vehicle.title or file.stem}", f"{file.name}; {vehicle.source}")
 
 
-def _constants(group: Group, scenario: Scenario, unit: Unit, comments: _Comments) -> None:
+def _constants(group: Group, scenario: Scenario, unit: Unit) -> None:
+    """Note the constants of a unit; four wheels that are alike as one name that ends with `*`."""
     alike: dict[str, list[str]] = {}
     for name, value in unit.constants.items():
         series = unit.series.get(name)
         alike.setdefault(f"{series.file}: {series.column}" if series else text_of(value), []).append(name)
     for value_text, names in alike.items():
         for name in fold(names):
-            _constant(group, scenario, unit, comments, name, value_text)
+            first = name.removesuffix("*") + WHEELS[0] if name.endswith("*") else name
+            variable = unit.fmu.variables[first]
+            meaning = variable.description
+            if first != name:
+                meaning = meaning.removesuffix(f", {WHEEL_NAMES[WHEELS[0]]}")
+            origin = _origin_of_constant(scenario, unit, first)
+            group.note(f"{unit.name}.{name}", variable, meaning, value_text, origin)
 
 
-def _constant(
-    group: Group, scenario: Scenario, unit: Unit, comments: _Comments, name: str, value: str
-) -> None:
-    """Note a constant, or one of four wheels that are alike: their name ends with `*`."""
-    first = name.removesuffix("*") + WHEELS[0] if name.endswith("*") else name
-    variable = unit.fmu.variables[first]
-    meaning, default = variable.description, origin_of(variable.source)
-    if first != name:
-        meaning = meaning.removesuffix(f", {WHEEL_NAMES[WHEELS[0]]}")
-    said: Origin | None = None
-    given = [pattern for pattern in scenario.inputs if _names(pattern, unit.name, first)]
-    origin = unit.origins.get(first, DEFAULT)
+def _origin_of_constant(scenario: Scenario, unit: Unit, name: str) -> Origin | None:
+    """Return where the value of an input comes from, None if its FMU gives it."""
+    origin = unit.origins.get(name, DEFAULT)
     if origin.kind == "scenario":
-        by_name: Key = ("inputs", max(given, key=lambda one: ("*" not in one, "." in one))) if given else ()
-        said = _said(scenario, by_name or (_fact(scenario, first),), comments)
-    elif origin != DEFAULT:
-        said = VARIED_BY_STUDY
-    row = group.parameters.setdefault(
-        f"{unit.name}.{name}", Parameter(f"{unit.name}.{name}", meaning, variable.unit or "", default)
-    )
-    row.note(said)
-    row.values[value] = None
+        given = [pattern for pattern in scenario.inputs if _names(pattern, unit.name, name)]
+        exact = max(given, key=lambda one: ("*" not in one, "." in one), default=None)
+        return _said(scenario, ("inputs", exact) if exact else (_fact(scenario, name),))
+    return None if origin == DEFAULT else VARIED_BY_STUDY
 
 
 def _names(pattern: str, unit: str, name: str) -> bool:
     """Return whether a pattern of the scenario's inputs, `[unit.]name` with a `*`, means an input."""
     whole = f"{unit}.{name}" if "." in pattern else name
-    return re.fullmatch(re.escape(pattern).replace(r"\*", ".*"), whole) is not None
+    return fnmatchcase(whole, pattern)
 
 
-def _origin(scenario: Scenario, unit: Unit, name: str, comments: _Comments) -> Origin | None:
+def _origin(scenario: Scenario, unit: Unit, name: str) -> Origin | None:
     """Return where a value comes from if the scenario or the vehicle gives it, None if the FMU does."""
     origin = unit.origins.get(name, DEFAULT)
     if origin == DEFAULT:
         return None
     if origin.kind == "vehicle":
         measure = unit.fmu.variables[name].unit or "1"
-        words = comments.beside(scenario.vehicle_document, ("parameters", name))
+        words = _beside(scenario.vehicle_document, ("parameters", name))
         words = re.sub(rf"^{re.escape(measure)}(?![\w/.])[,;]?\s*", "", words)
         return said_in(words, scenario._vehicle.source)
     if origin.kind == "derived":
@@ -188,18 +177,18 @@ def _origin(scenario: Scenario, unit: Unit, name: str, comments: _Comments) -> O
     if origin.kind == "scenario":
         own = name in scenario.units[unit.name].parameters
         key: Key = ("units", unit.name, "parameters", name) if own else (_fact(scenario, name),)
-        return _said(scenario, key, comments)
+        return _said(scenario, key)
     if origin.kind == "file":
         of_tyres = any(origin.detail == file.path.name for file in scenario.tyre_files.values())
         return Origin(LITERATURE, f"{'tyre property ' if of_tyres else ''}file {origin}")
     return VARIED_BY_STUDY
 
 
-def _said(scenario: Scenario, key: Key, comments: _Comments) -> Origin:
+def _said(scenario: Scenario, key: Key) -> Origin:
     """Return what the scenario says of a value where it stands, beside it or above its unit."""
-    words = comments.beside(scenario.document, key)
+    words = _beside(scenario.document, key)
     if key[0] == "units":
-        words = words or comments.above(scenario.document, key[:2])
+        words = words or _above(scenario.document, key[:2])
     return said_in(words or scenario.source, scenario.source)
 
 
@@ -209,38 +198,20 @@ def _fact(scenario: Scenario, name: str) -> str:
     return next(facts, "")
 
 
-class _Comments:
-    """The comments of YAML files."""
+def _beside(document: Document, key: Key) -> str:
+    """Return the comment in the line of a value, nothing if there is none."""
+    match = _COMMENT.search(linecache.getline(str(document.path), document.lines.get(key, 0)))
+    return match[1] if match else ""
 
-    def __init__(self) -> None:
-        self._lines: dict[Path, list[str]] = {}
 
-    def beside(self, document: Document, key: Key) -> str:
-        """Return the comment in the line of a value, nothing if there is none."""
-        return self._of(document, document.lines.get(key, 0))
-
-    def above(self, document: Document, key: Key) -> str:
-        """Return the comment lines right above a key."""
-        number = document.lines.get(key, 1) - 1
-        lines = self._read(document.path)
-        found: list[str] = []
-        while 1 <= number <= len(lines) and lines[number - 1].lstrip().startswith("#"):
-            found.insert(0, lines[number - 1].lstrip().lstrip("# ").rstrip())
-            number -= 1
-        return " ".join(found)
-
-    def _of(self, document: Document, number: int) -> str:
-        lines = self._read(document.path)
-        match = _COMMENT.search(lines[number - 1]) if 0 < number <= len(lines) else None
-        return match[1] if match else ""
-
-    def _read(self, path: Path) -> list[str]:
-        if path not in self._lines:
-            try:
-                self._lines[path] = path.read_text(encoding="utf-8").splitlines()
-            except (OSError, ValueError):  # an SSP archive
-                self._lines[path] = []
-        return self._lines[path]
+def _above(document: Document, key: Key) -> str:
+    """Return the comment lines right above a key."""
+    number = document.lines.get(key, 1) - 1
+    found: list[str] = []
+    while (line := linecache.getline(str(document.path), number).strip()).startswith("#"):
+        found.insert(0, line.lstrip("# "))
+        number -= 1
+    return " ".join(found)
 
 
 def text_of(value: Value | None) -> str:

@@ -176,11 +176,11 @@ def test_a_run_that_failed_is_named_and_the_others_are_drawn(findings, tmp_path)
 
 def test_the_page_marks_the_best_and_tells_differences_from_the_first(findings):
     facts = comparison_facts(findings)
-    error = facts["rows"][0].cells
+    error = facts["rows"][0]["cells"]
     assert [cell.value for cell in error] == ["140 %", "2.00 %"]
     assert [cell.best for cell in error] == [False, True]
     assert [cell.difference for cell in error] == ["", "−138 points"]
-    assert not any(cell.best for cell in facts["rows"][1].cells)  # less speed is not better as such
+    assert not any(cell.best for cell in facts["rows"][1]["cells"])  # less speed is not better as such
 
 
 def test_no_run_leaves_the_axes_of_the_signals_that_differ_most(tmp_path):

@@ -198,6 +198,16 @@ def test_lanes_path_and_outline_come_from_the_recorded_driver():
     np.testing.assert_allclose(frames.channels["path_y"], frames.channels["y"] - 0.25)
 
 
+def test_a_car_that_stands_has_no_sideslip_angle():
+    recorded = whole_car()
+    recorded.columns["plant.velocity_x"][400:] = 0.01
+    recorded.columns["plant.velocity_y"] = np.zeros(recorded.time.size)
+    channels = frames_of(recorded).channels
+    stands = channels["time"] >= recorded.time[400]
+    np.testing.assert_array_equal(np.isnan(channels["sideslip"]), stands)
+    assert still_of([frames_of(recorded)]) < recorded.time[400]
+
+
 def test_labels_cannot_break_out_of_the_page():
     nasty = '</script><img src=x onerror="boom()">'
     html = page([(nasty, whole_car())], title=nasty)

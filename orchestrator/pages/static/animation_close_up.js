@@ -1,7 +1,5 @@
 // One car with its front up: steered wheels, friction circles, the force and its share of the grip at each.
 
-const STANDS = 0.05; // below it a car moves nowhere that could be shown [m/s]
-
 function utilisation(state, wheel) {
   const grip = state['grip_' + wheel];
   return grip > 0 ? Math.hypot(state['force_x_' + wheel], state['force_y_' + wheel]) / grip : NaN;
@@ -26,7 +24,7 @@ function drawCloseUp(canvas, density, run, number, state, scale, strongest) {
   wheels(c, car, state.steer);
   circles(c, run, state, scale, px);
   forces(c, run, state, scale, INK, 2.2, px);
-  if ('sideslip' in state && !(Math.abs(state.speed) < STANDS)) motion(c, state, car, run, px);
+  if (Number.isFinite(state.sideslip)) motion(c, state, car, run, px);
   if ('yaw_moment' in state && strongest > 0) moment(c, state.yaw_moment / strongest, px);
   c.restore();
   if ('grip_fl' in state && 'force_x_fl' in state) {

@@ -18,7 +18,8 @@ function drawStrip(canvas, density, runs, states, channel, readout, from, to, t)
     const values = run.channels[channel];
     const [times, heights] = [run.channels.time.map(across), values.map(up)];
     for (let first = 0, i = 1; i <= values.length; i++) {
-      if (i < values.length && !turns(channel, values[i] - values[i - 1])) continue;
+      const step = i < values.length ? values[i] - values[i - 1] : NaN; // NaN: where there is no value, too
+      if (!Number.isNaN(step) && !turns(channel, step)) continue;
       polyline(c, times, heights, first, i - 1);
       stroke(c, run.colour, 1.6, 1, run.dash);
       first = i;
