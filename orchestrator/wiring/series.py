@@ -82,20 +82,16 @@ def _numbers(column: np.ndarray, what: str) -> np.ndarray:
     try:
         numbers = column.astype(float)
     except (TypeError, ValueError):
-        row = next(i for i, cell in enumerate(column, start=1) if not _is_number(cell))
-        raise ValueError(f"{what}: value {row} is no number ({column[row - 1]!r})") from None
+        for row, cell in enumerate(column, start=1):
+            try:
+                float(cell)
+            except (TypeError, ValueError):  # noqa: PERF203 - it is the first
+                raise ValueError(f"{what}: value {row} is no number ({cell!r})") from None
+        raise
     bad = np.flatnonzero(~np.isfinite(numbers))
     if bad.size:
         raise ValueError(f"{what}: value {bad[0] + 1} is not finite ({numbers[bad[0]]:g})")
     return numbers
-
-
-def _is_number(cell: Any) -> bool:
-    try:
-        float(cell)
-    except (TypeError, ValueError):
-        return False
-    return True
 
 
 def _values(column: np.ndarray, unit: str | None, name: str, variable: Variable) -> np.ndarray:

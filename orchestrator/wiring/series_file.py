@@ -12,10 +12,9 @@ import io
 import itertools
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,14 +27,22 @@ BESIDE = "run.json"
 _HEADER = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*")
 
 
-@dataclass(frozen=True)
-class Column:
+class Column(NamedTuple):
     """A column as it stands in the file, and the times of its values."""
 
     times: np.ndarray  # shape (rows,) [time_unit]
     values: np.ndarray  # shape (rows,), numbers or text
     time_unit: str | None
     unit: str | None
+
+
+class _Table(NamedTuple):
+    """Columns as a kind of file has them; their functions take the number of a column."""
+
+    headers: list[str]
+    units: Sequence[str | None]  # beside the headers
+    values: Callable[[int], np.ndarray]
+    times: Callable[[int], np.ndarray] | None = None  # if every column has its own, in s
 
 
 class SeriesFile:
@@ -53,43 +60,31 @@ class SeriesFile:
         if path.suffix.lower() not in kinds:
             raise ValueError(f"must be a file of type {', '.join(kinds)}")
         self._table = kinds[path.suffix.lower()](raw)
-        self._beside = _units_beside(path)
+        self._names: list[str] = []
+        self._units: list[str | None] = []
+        beside = _units_beside(path)
+        for header, unit in zip(self._table.headers, self._table.units, strict=True):
+            found = _HEADER.fullmatch(header)
+            name = found["name"] if found else header.strip()
+            self._names.append(name)
+            self._units.append((found and found["unit"].strip()) or unit or beside.get(name))
 
     def column(self, name: str, time: str) -> Column:
         """Return a column and the one of its times, which in MDF every channel has of its own."""
-        at = self._find(name)
-        own = self._table.times(at) if self._table.times else None
-        if own is not None:
-            return Column(own, self._table.values(at), "s", self._unit(at))
+        table, at = self._table, self._find(name)
+        if table.times:
+            return Column(table.times(at), table.values(at), "s", self._units[at])
         clock = self._find(time)
-        return Column(self._table.values(clock), self._table.values(at), self._unit(clock), self._unit(at))
+        return Column(table.values(clock), table.values(at), self._units[clock], self._units[at])
 
     def _find(self, name: str) -> int:
-        names = self._table.names
-        found = [i for i, one in enumerate(names) if one == name] or [
-            i for i, one in enumerate(self._table.headers) if one == name
-        ]
-        if len(found) > 1:
-            raise ValueError(f"{len(found)} columns are called {name!r}")
-        if not found:
-            raise ValueError(f"has no column {name!r}{hint(name, names, lead='it has')}")
-        return found[0]
-
-    def _unit(self, at: int) -> str | None:
-        return self._table.units[at] or self._beside.get(self._table.names[at]) or None
-
-
-class _Table:
-    """Headers, and a function that gives the values of a column by its number."""
-
-    times: Callable[[int], np.ndarray] | None = None
-
-    def __init__(self, headers: list[str], values: Callable[[int], np.ndarray]) -> None:
-        matches = [_HEADER.fullmatch(header) for header in headers]
-        self.headers = headers
-        self.names = [m["name"] if m else h.strip() for m, h in zip(matches, headers, strict=True)]
-        self.units: list[str | None] = [m["unit"].strip() if m else None for m in matches]
-        self.values = values
+        for names in (self._names, self._table.headers):
+            found = [i for i, one in enumerate(names) if one == name]
+            if len(found) > 1:
+                raise ValueError(f"{len(found)} columns are called {name!r}")
+            if found:
+                return found[0]
+        raise ValueError(f"has no column {name!r}{hint(name, self._names, lead='it has')}")
 
 
 def _csv(raw: bytes) -> _Table:
@@ -117,7 +112,7 @@ def _csv(raw: bytes) -> _Table:
         raise ValueError("is not UTF-8") from None
     if number < 2:
         raise ValueError("has no rows")
-    return _Table(headers, values)
+    return _Table(headers, [None] * len(headers), values)
 
 
 def _parquet(raw: bytes) -> _Table:
@@ -128,10 +123,8 @@ def _parquet(raw: bytes) -> _Table:
         table = pq.read_table(pa.BufferReader(raw))
     except pa.ArrowInvalid as error:
         raise ValueError(f"is no Parquet file, or damaged: {error}") from None
-    made = _Table(table.column_names, lambda at: table.column(at).to_numpy())
-    for at, field in enumerate(table.schema):
-        made.units[at] = made.units[at] or (field.metadata or {}).get(b"unit", b"").decode()
-    return made
+    units = [(field.metadata or {}).get(b"unit", b"").decode() for field in table.schema]
+    return _Table(table.column_names, units, lambda at: table.column(at).to_numpy())
 
 
 def _mdf(raw: bytes) -> _Table:
@@ -142,7 +135,7 @@ def _mdf(raw: bytes) -> _Table:
     try:
         mdf: Any = asammdf.MDF(io.BytesIO(raw))
         places = [
-            (group, index, channel)
+            (group, index, channel.name, channel.unit)
             for group, one in enumerate(mdf.groups)
             for index, channel in enumerate(one.channels)
             if index != mdf.masters_db.get(group)
@@ -151,17 +144,15 @@ def _mdf(raw: bytes) -> _Table:
         raise ValueError(f"is no MDF file, or damaged: {' '.join(str(error).split())}") from None
 
     def signal(at: int) -> Any:
-        group, index, _ = places[at]
+        group, index, *_ = places[at]
         return mdf.get(group=group, index=index)
 
     def values(at: int) -> np.ndarray:
         samples = signal(at).samples
         return np.char.decode(samples, "utf-8").astype(object) if samples.dtype.kind == "S" else samples
 
-    made = _Table([channel.name for _, _, channel in places], values)
-    made.times = lambda at: signal(at).timestamps
-    made.units = [channel.unit for _, _, channel in places]
-    return made
+    headers, units = [name for _, _, name, _ in places], [unit for *_, unit in places]
+    return _Table(headers, units, values, times=lambda at: signal(at).timestamps)
 
 
 def _units_beside(path: Path) -> Mapping[str, str]:
