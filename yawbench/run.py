@@ -156,7 +156,7 @@ class Run:
             raise ScenarioError(f"{test} needs no angle: leave it away")
         if angle is not None and not (isinstance(angle, Real) and 0.0 < angle < 2.0 * math.pi):
             raise ScenarioError(f"angle: must be a number between 0 and 2 pi rad (got {angle!r})")
-        return TESTS[test].evaluate(trace_of(self.results, self.title), angle).judged
+        return TESTS[test].evaluate(trace_of(self.results, self.title), angle)
 
     def plot(self, *panels: str, title: str | None = None) -> Figure:
         """Return a figure, drawn as `yawbench plot` draws it.

@@ -130,9 +130,10 @@ def _drive_dwell(
     say(f"A = {math.degrees(known):.1f} degrees")
     ladder = dwell_jobs(base, known, once)
     status = _make("sine with dwell", ladder, base, wishes)
-    evaluated = [chosen.evaluate(trace, known) for trace in traces(ladder)]
-    series = judge_series([one.judged for one in evaluated], known)
-    Evaluation(chosen, evaluated, series, known, base.out).conclude(each=figures)
+    recorded = traces(ladder)
+    judged = [chosen.evaluate(trace, known) for trace in recorded]
+    series = judge_series(judged, known)
+    Evaluation(chosen, recorded, judged, series, known, base.out).conclude(each=figures)
     return status
 
 
@@ -151,8 +152,8 @@ def _drive_lane_change(base: Job, once: Once, wishes: Wishes, *, figures: bool) 
         return not status
 
     traces, series = entry_speeds(base, once, made)
-    evaluated = [chosen.evaluate(trace, None) for trace in traces]
-    Evaluation(chosen, evaluated, series, None, base.out).conclude(each=figures)
+    judged = [chosen.evaluate(trace) for trace in traces]
+    Evaluation(chosen, traces, judged, series, None, base.out).conclude(each=figures)
     return max(failed, default=0)
 
 

@@ -13,9 +13,9 @@ import typer
 from ..evaluation.standard_tests import TESTS
 
 if TYPE_CHECKING:
-    from ..evaluation.judgement import Series
-    from ..evaluation.standard_tests import Evaluated, StandardTest
-    from ..evaluation.trace import MappingSpec
+    from ..evaluation.judgement import Judgement, Series
+    from ..evaluation.standard_tests import StandardTest
+    from ..evaluation.trace import MappingSpec, Trace
 
 Test = Literal[tuple(TESTS)]  # type: ignore[valid-type]
 Which = Annotated[Test, typer.Argument(help="The test.", metavar="TEST")]  # type: ignore[valid-type]
@@ -75,13 +75,12 @@ def evaluate(
     places = [place for source in sources for place in _runs(source, mapping)]
     labels = distinct(places) if len(places) > 1 else [str(places[0])]
     known = _angle(angle, slow_steer, mapping, chosen)
-    pairs = zip(places, labels, strict=True)
-    evaluated = [chosen.evaluate(load_trace(place, mapping, label), known) for place, label in pairs]
-    judged = [one.judged for one in evaluated]
+    traces = [load_trace(place, mapping, label) for place, label in zip(places, labels, strict=True)]
+    judged = [chosen.evaluate(trace, known) for trace in traces]
     series = judge_series(judged, known) if known and is_series(judged) else None
     recorded_here = all(place.is_dir() for place in places)
     folder = out or (folder_of_all(places) if recorded_here else Path("results") / "evaluation")
-    Evaluation(chosen, evaluated, series, known, folder).conclude(each=figures, together=out is not None)
+    Evaluation(chosen, traces, judged, series, known, folder).conclude(each=figures, together=out is not None)
 
 
 @dataclass(frozen=True)
@@ -89,7 +88,8 @@ class Evaluation:
     """What the runs of a test come to, one by one and together."""
 
     test: StandardTest
-    evaluated: list[Evaluated]
+    traces: list[Trace]
+    judged: list[Judgement]
     series: Series | None
     angle: float | None  # A [rad]
     folder: Path  # of evaluation.json and of the figure of the series
@@ -106,37 +106,37 @@ class Evaluation:
         from ..writing import write_whole
         from .batch import print_tables, say
 
-        drawn = self._draw(self.evaluated if each else [], together=together)
-        judged = [one.judged for one in self.evaluated]
+        drawn = self._draw(each=each, together=together)
         data = {
             "test": self.test.name,
             "A": self.angle,
-            "runs": [one.as_data() for one in judged],
-            "series": self.series.as_data() if self.series else None,
+            "runs": [one.as_data() for one in self.judged],
+            "series": self.series.found if self.series else None,
         }
         write_whole(self.folder / FILE, json.dumps(data, indent=1))
-        if len(judged) == 1:
-            table = run_table(judged[0], self.test.says)
+        if len(self.judged) == 1:
+            table = run_table(self.judged[0], self.test.says)
         else:
-            table = runs_table(self.series.runs if self.series else judged, self.test, self.series)
+            table = runs_table(self.series.runs if self.series else self.judged, self.test, self.series)
         print_tables([table])
         also = f", {counted(drawn, 'figure')}" if drawn else ""
         say(f"{self.folder / FILE}{also}")
 
-    def _draw(self, evaluated: list[Evaluated], *, together: bool) -> int:
+    def _draw(self, *, each: bool, together: bool) -> int:
         """Draw runs, beside their results or together, and the series; return how many figures."""
         from ..figures.style import save
 
         stem = self.test.name.replace("-", "_")
         count = 0
-        for number, one in enumerate(evaluated, start=1):
-            if one.draw is None:
+        for number, (trace, judged) in enumerate(zip(self.traces, self.judged, strict=True), start=1):
+            figure = self.test.draw(trace, judged) if each else None
+            if figure is None:
                 continue
-            beside = None if together else one.trace.folder
-            name = stem if beside or len(evaluated) == 1 else f"{stem}_{number}"
-            save(one.draw(), (beside or self.folder) / name)
+            beside = None if together else trace.folder
+            name = stem if beside or len(self.traces) == 1 else f"{stem}_{number}"
+            save(figure, (beside or self.folder) / name)
             count += 1
-        if self.series and self.test.draw_series:
+        if self.series and self.test.drawing:
             save(self.test.draw_series(self.series, str(self.folder)), self.folder / f"{stem}_series")
             count += 1
         return count

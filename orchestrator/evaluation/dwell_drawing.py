@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..figures.style import CHANGED, QUIET, frame, line_style, new_figure
-from .dwell_run import AT, FAR, FAR_HEAVY, HEAVY, RATIOS, DwellCourse, percent
-from .dwell_series import DwellSeries
+from .dwell_run import AT, FAR, FAR_HEAVY, HEAVY, RATIOS, DwellCourse, course_of, percent
 from .filters import at
-from .judgement import Judgement, Verdict
+from .judgement import Judgement, NotJudged, Series, Verdict
 from .trace import Trace
 
 if TYPE_CHECKING:
@@ -23,8 +22,15 @@ MARKS = {Verdict.PASSED: "#009E73", Verdict.FAILED: "#D55E00", Verdict.NOT_JUDGE
 RESPONSE = "responsiveness"
 
 
-def draw_dwell(trace: Trace, judged: Judgement, course: DwellCourse) -> Figure:
-    """Return the figure of a run: hand wheel, yaw rate with its ratios, displacement, sideslip."""
+def draw_run(trace: Trace, judged: Judgement) -> Figure | None:
+    """Return the figure of a run: hand wheel, yaw rate with its ratios, displacement, sideslip.
+
+    None where nothing can be judged.
+    """
+    try:
+        course = course_of(trace)
+    except NotJudged:
+        return None
     with new_figure() as figure:
         names = ["hand wheel", "yaw rate", "displacement", *(["sideslip"] if "sideslip" in trace else [])]
         heights = [1.0, 1.7, 1.0, 1.0][: len(names)]
@@ -125,7 +131,7 @@ def _displaced(axes: Axes, course: DwellCourse, judged: Judgement, trace: Trace)
         _label(axes, instant + 0.35, least, f"at least {least:g} m", (4, -3), color=CHANGED)
 
 
-def draw_series(series: DwellSeries, note: str) -> Figure:
+def draw_series(series: Series, note: str) -> Figure:
     """Return the figure of a series: ratios and displacement over the amplitude, both directions."""
     from matplotlib.lines import Line2D
 
@@ -171,8 +177,7 @@ def draw_series(series: DwellSeries, note: str) -> Figure:
             for k, name in enumerate(("left first", "right first"))
         ]
         said = "; ".join(f"{name} {one.verdict.value}: {one.why}" for name, one in series.rulings.items())
-        title = (
-            f"Sine with dwell, A = {math.degrees(series.angle):.1f}°: the series has {series.verdict.value}"
-        )
+        angle, verdict = math.degrees(series.found["A"]), series.found["verdict"].value
+        title = f"Sine with dwell, A = {angle:.1f}°: the series has {verdict}"
         frame(figure, 5.0, handles, title, f"{said} · {note}")
     return figure

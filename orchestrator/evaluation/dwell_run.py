@@ -24,9 +24,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..metrics.measures import running_integral
-from .dwell_signals import prepared
-from .filters import at, first_crossing, running_mean
-from .judgement import Judgement, NotJudged
+from .filters import at, first_crossing, prepared, running_mean
+from .judgement import Judgement, NotJudged, evaluation
 from .trace import Trace
 
 RATE, LASTS, MEAN = math.radians(75.0), 0.2, 0.1
@@ -166,23 +165,15 @@ def percent(ratio: float) -> str:
     return f"{round(100 * ratio, 1) + 0.0:.1f} %"
 
 
-def evaluate_dwell(trace: Trace, angle: float | None = None) -> tuple[Judgement, DwellCourse | None]:
-    """Return what a run comes to, and its course if there is one.
-
-    Args:
-        trace: of the run.
-        angle: A [rad], from slowly increasing steer; without it responsiveness is not judged.
-
-    Raises:
-        ResultsError: a signal is missing.
-    """
-    judged = Judgement(trace.label)
+@evaluation
+def evaluate_dwell(judged: Judgement, trace: Trace, angle: float | None = None) -> None:
+    """Return what a run comes to; without A [rad] in `angle` responsiveness is not judged."""
     try:
         course = course_of(trace)
     except NotJudged as why:
         for criterion in ("stability", "responsiveness"):
             judged.rule(criterion, None, str(why))
-        return judged, None
+        return
     judged.notes += course.notes
     steered = np.abs(trace["steering_wheel_angle"] - _zero_of(trace, course))
     amplitude = float(steered.max())
@@ -197,7 +188,6 @@ def evaluate_dwell(trace: Trace, angle: float | None = None) -> tuple[Judgement,
     _stability(judged, course)
     _responsiveness(judged, course, trace, angle, amplitude)
     _beside(judged, course, trace)
-    return judged, course
 
 
 def _zero_of(trace: Trace, course: DwellCourse) -> float:

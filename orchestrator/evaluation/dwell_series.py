@@ -13,8 +13,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import asdict
 
 from ..figures.display import shown
 from .judgement import Judgement, Ruling, Series, Verdict
@@ -45,56 +44,46 @@ def amplitudes(angle: float) -> list[float]:
     return [math.radians(round(x, 6)) for x in found]
 
 
-@dataclass
-class DwellSeries(Series):
-    """What all runs of a series come to."""
-
-    angle: float = 0.0  # A [rad]
-
-    @property
-    def summary(self) -> str:
-        return f"A = {shown(self.angle, 'rad')}; the series has {self.verdict.value}."
-
-    def as_data(self) -> dict[str, Any]:
-        return {"A": self.angle, **super().as_data()}
-
-
 def is_series(runs: Sequence[Judgement]) -> bool:
     """Return whether runs can be a series: several, no two of the same amplitude."""
     found = sorted(_of(run) for run in runs if run["amplitude"] is not None)
     return len(runs) > 1 and all(b - a > SAME for a, b in itertools.pairwise(found))
 
 
-def judge_series(runs: Sequence[Judgement], angle: float) -> DwellSeries:
-    """Return the verdict over all runs, in the order of their amplitudes; `angle`: A [rad]."""
+def judge_series(runs: Sequence[Judgement], angle: float) -> Series:
+    """Return what all runs come to, in the order of their amplitudes; `angle`: A [rad]."""
     ordered = sorted(runs, key=lambda run: (-math.copysign(1.0, _of(run)), abs(_of(run))))
-    series = DwellSeries(ordered, angle=angle)
     missing = [
         math.degrees(side * wanted)
         for side in (1.0, -1.0)
         for wanted in amplitudes(angle)
         if not any(abs(_of(run) - side * wanted) <= NEAR for run in runs)
     ]
-    for criterion in CRITERIA:
-        asked = [run for run in ordered if criterion in run.rulings]
-        by_verdict = {
-            verdict: [run for run in asked if run.rulings[criterion].verdict is verdict]
-            for verdict in Verdict
-        }
-        failed, open_ = by_verdict[Verdict.FAILED], by_verdict[Verdict.NOT_JUDGED]
-        if failed:
-            said = f"{len(failed)} of {len(asked)} runs fail, {_span(failed)}"
-            series.rulings[criterion] = Ruling(Verdict.FAILED, said)
-        elif open_:
-            said = f"{len(open_)} of {len(asked)} runs are not judged: {open_[0].rulings[criterion].why}"
-            series.rulings[criterion] = Ruling(Verdict.NOT_JUDGED, said)
-        elif missing or not asked:
-            lacking = ", ".join(f"{x:+.1f}" for x in missing)
-            said = f"{len(missing)} runs are missing, of {lacking} degrees" if missing else "no run is asked"
-            series.rulings[criterion] = Ruling(Verdict.NOT_JUDGED, said)
-        else:
-            series.rulings[criterion] = Ruling(Verdict.PASSED, f"all {len(asked)} runs pass")
-    return series
+    rulings = {criterion: _ruling(criterion, ordered, missing) for criterion in CRITERIA}
+    passed = all(ruling.verdict is Verdict.PASSED for ruling in rulings.values())
+    verdict = Verdict.PASSED if passed else Verdict.FAILED
+    criteria = {name: asdict(ruling) for name, ruling in rulings.items()}
+    found = {"A": angle, "verdict": verdict, "criteria": criteria}
+    return Series(ordered, f"A = {shown(angle, 'rad')}; the series has {verdict.value}.", found, rulings)
+
+
+def _ruling(criterion: str, runs: Sequence[Judgement], missing: Sequence[float]) -> Ruling:
+    """Return the verdict of a criterion over all runs; amplitudes [deg] may be missing."""
+    asked = [run for run in runs if criterion in run.rulings]
+    failed = [run for run in asked if run.rulings[criterion].verdict is Verdict.FAILED]
+    if failed:
+        return Ruling(Verdict.FAILED, f"{len(failed)} of {len(asked)} runs fail, {_span(failed)}")
+    reasons = [one.why for run in asked if (one := run.rulings[criterion]).verdict is Verdict.NOT_JUDGED]
+    if reasons:
+        said = f"{len(reasons)} of {len(asked)} runs are not judged: {reasons[0]}"
+    elif missing:
+        lacking = ", ".join(f"{x:+.1f}" for x in missing)
+        said = f"{len(missing)} runs are missing, of {lacking} degrees"
+    elif not asked:
+        said = "no run is asked"
+    else:
+        return Ruling(Verdict.PASSED, f"all {len(asked)} runs pass")
+    return Ruling(Verdict.NOT_JUDGED, said)
 
 
 def _of(run: Judgement) -> float:

@@ -2,14 +2,27 @@
 
 Low pass: a Butterworth filter of sixth order, forth and back, which has twelve poles and no phase (at the
 cut-off frequency the amplitude is halved). GTR 8 names "a 12-pole phaseless Butterworth filter"; that its
-twelve poles are those of both directions together is our reading.
+twelve poles are those of both directions together is our reading. Unfiltered signals change a yaw-rate ratio
+of sine with dwell by up to 0.8 points, another order or cut-off by 0.1 points at most.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+from .judgement import NotJudged
+
+if TYPE_CHECKING:
+    from .trace import Trace
+
 ORDER = 6
+CUT_OFF = {"steering_wheel_angle": 10.0, "yaw_rate": 6.0, "acceleration_y": 6.0}
+"""Of the low pass [Hz]: GTR 8."""
+SHORTEST = 1.0
+"""Record without which there is nothing to filter [s]."""
 SLOWEST = 50.0
 """Sampling rate below which nothing is judged [Hz]. Chosen: 2.5 times what a low pass of 10 Hz must have."""
 UNEVEN = 1e-6
@@ -32,6 +45,23 @@ def resample(grid: np.ndarray, time: np.ndarray, x: np.ndarray) -> np.ndarray:
     from scipy.interpolate import PchipInterpolator
 
     return np.asarray(PchipInterpolator(time, x)(grid))
+
+
+def prepared(trace: Trace, names: Iterable[str]) -> dict[str, np.ndarray]:
+    """Return the signals of a trace behind their filters, and `time`.
+
+    Raises:
+        NotJudged: the record is too short or too coarse.
+        ResultsError: a signal is missing.
+    """
+    wanted = [(name, trace[name]) for name in names]
+    if trace.time.size < 2 or trace.time[-1] - trace.time[0] < SHORTEST:
+        raise NotJudged(f"the record is shorter than {SHORTEST:g} s")
+    if trace.rate < SLOWEST:
+        raise NotJudged(f"sampled at {trace.rate:.3g} Hz; at least {SLOWEST:g} Hz are needed")
+    even = trace.even
+    filtered = {name: low_pass(even[name], CUT_OFF[name], even.rate) for name, _ in wanted}
+    return {"time": even.time, **filtered}
 
 
 def low_pass(x: np.ndarray, cut_off: float, rate: float) -> np.ndarray:

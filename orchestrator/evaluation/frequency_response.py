@@ -17,7 +17,7 @@ import math
 import numpy as np
 
 from .filters import SLOWEST
-from .judgement import Judgement, NotJudged
+from .judgement import Judgement, NotJudged, evaluation
 from .trace import Trace
 
 FREQUENCIES = (0.2, 0.5, 1.0, 1.5, 2.0)
@@ -48,19 +48,11 @@ def response(trace: Trace, answer: str) -> np.ndarray:
     return np.where(known, cross / np.where(known, power, 1.0), np.nan)
 
 
-def evaluate_sweep(trace: Trace) -> Judgement:
-    """Return gains, phases, largest gain and bandwidth.
-
-    Raises:
-        ResultsError: a signal is missing.
-    """
-    judged = Judgement(trace.label)
+@evaluation
+def evaluate_sweep(judged: Judgement, trace: Trace) -> None:
+    """Return gains, phases, largest gain and bandwidth."""
     for key, (name, unit) in ANSWERS.items():
-        try:
-            found = response(trace, key)
-        except NotJudged as why:
-            judged.notes.append(str(why))
-            return judged
+        found = response(trace, key)
         gain, phase = np.abs(found), np.angle(found)
         for f in FREQUENCIES:
             k = int(np.argmin(np.abs(GRID - f)))
@@ -81,4 +73,3 @@ def evaluate_sweep(trace: Trace) -> Judgement:
         judged.add(
             f"{key}_bandwidth", f"bandwidth of the {name}", width, "Hz", "70.7 % of the gain at 0.2 Hz"
         )
-    return judged

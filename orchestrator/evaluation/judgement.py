@@ -6,10 +6,16 @@ without a number, and a criterion that needs it is not judged, never passed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass, field
 from enum import Enum
-from typing import Any
+from functools import wraps
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec
+
+if TYPE_CHECKING:
+    from .trace import Trace
+
+P = ParamSpec("P")
 
 
 class Verdict(str, Enum):
@@ -36,10 +42,6 @@ class Ruling:
 
     verdict: Verdict
     why: str
-
-    def as_data(self) -> dict[str, str]:
-        """Return it as plain data, for files."""
-        return {"verdict": self.verdict.value, "why": self.why}
 
     def __str__(self) -> str:
         return f"{self.verdict.value}. {self.why}"
@@ -78,42 +80,44 @@ class Judgement:
 
     def as_data(self) -> dict[str, Any]:
         """Return it as plain data, for files."""
+        said = asdict(self)
         return {
             "label": self.label,
-            "verdict": self.verdict and self.verdict.value,
-            "quantities": {
-                key: {"name": one.name, "value": one.value, "unit": one.unit, "reading": one.reading}
-                for key, one in self.quantities.items()
-            },
-            "criteria": {name: one.as_data() for name, one in self.rulings.items()},
-            "notes": list(self.notes),
+            "verdict": self.verdict,
+            "quantities": said["quantities"],
+            "criteria": said["rulings"],
+            "notes": self.notes,
         }
+
+
+def evaluation(
+    fill: Callable[Concatenate[Judgement, Trace, P], None],
+) -> Callable[Concatenate[Trace, P], Judgement]:
+    """Make a function that fills in the judgement of a run return it; NotJudged becomes a note.
+
+    All of them raise ResultsError if the trace lacks a signal that the test needs.
+    """
+
+    @wraps(fill)
+    def evaluate(trace: Trace, *args: P.args, **kwargs: P.kwargs) -> Judgement:
+        judged = Judgement(trace.label)
+        try:
+            fill(judged, trace, *args, **kwargs)
+        except NotJudged as why:
+            judged.notes.append(str(why))
+        return judged
+
+    return evaluate
 
 
 @dataclass
 class Series:
     """What all runs of a test come to together."""
 
-    runs: list[Judgement]
+    runs: list[Judgement]  # in their order
+    summary: str  # in a sentence
+    found: dict[str, Any]  # plain data, for files
     rulings: dict[str, Ruling] = field(default_factory=dict)
-
-    @property
-    def verdict(self) -> Verdict:
-        """Passed if all criteria are."""
-        found = overall(ruling.verdict for ruling in self.rulings.values())
-        return Verdict.PASSED if found is Verdict.PASSED else Verdict.FAILED
-
-    @property
-    def summary(self) -> str:
-        """What they come to, in a sentence."""
-        return f"The series has {self.verdict.value}."
-
-    def as_data(self) -> dict[str, Any]:
-        """Return it as plain data, for files."""
-        return {
-            "verdict": self.verdict.value,
-            "criteria": {name: one.as_data() for name, one in self.rulings.items()},
-        }
 
 
 def overall(verdicts: Iterable[Verdict]) -> Verdict | None:

@@ -10,8 +10,8 @@ from vocabulary.lane_change import Lane, lanes_of
 
 from ..figures.style import CHANGED, QUIET, frame, line_style, new_figure
 from .dwell_drawing import MARKS
-from .judgement import Judgement, Verdict
-from .lane_change_series import CLEAN, EntrySpeedSeries
+from .judgement import Judgement, Series, Verdict
+from .lane_change_series import CLEAN
 from .trace import Trace
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ AROUND = 12.0
 """Shown before the first cones and behind the last ones [m]."""
 
 
-def draw_lane_change(trace: Trace, judged: Judgement) -> Figure:
+def draw_run(trace: Trace, judged: Judgement) -> Figure:
     """Return the figure of a run: the car between its cones, hand wheel, lateral acceleration, sideslip."""
     track = lanes_of(trace.facts)
     x = trace["position_x"]
@@ -91,7 +91,7 @@ def _from_above(axes: Axes, trace: Trace, track: list[Lane], start: float) -> No
     axes.set_ylim(max(lowest, -12.0) - 0.8, min(highest, 12.0) + 0.8)
 
 
-def draw_entry_speeds(series: EntrySpeedSeries, note: str) -> Figure:
+def draw_series(series: Series, note: str) -> Figure:
     """Return the figure of a series: what is beyond the cones, and how hard the car is driven."""
     panels: list[tuple[str, str, float]] = [
         ("overrun", "Largest distance beyond the cones [m]", 1.0),
@@ -109,8 +109,8 @@ def draw_entry_speeds(series: EntrySpeedSeries, note: str) -> Figure:
                 style: dict[str, Any] = {"color": MARKS[verdict], "markersize": 6.0, "linestyle": ""}
                 axes.plot([v for v, _ in shown], [value for _, value in shown], marker=marker, **style)
             axes.set_title(says)
-            if series.highest is not None:
-                axes.axvline(3.6 * series.highest, color=CHANGED, linewidth=1.2)
+            if (highest := series.found["highest_clean_entry_speed"]) is not None:
+                axes.axvline(3.6 * highest, color=CHANGED, linewidth=1.2)
         grid[0, 0].set_yscale("symlog", linthresh=0.1, linscale=0.5)
         grid[0, 0].set_ylim(-0.02, 2.0 * max([0.1, *(run["overrun"] or 0.0 for run in series.runs)]))
         grid[0, 0].set_yticks([0.0, 0.1, 1.0, 10.0][: 3 if grid[0, 0].get_ylim()[1] < 10.0 else 4])

@@ -14,20 +14,16 @@ import numpy as np
 from vocabulary.lane_change import lanes_of
 
 from .filters import at, first_crossing
-from .judgement import Judgement
+from .judgement import Judgement, evaluation
 from .trace import Trace
 
 TOUCH = 1e-9
 """Overrun above which a cone is hit [m]."""
 
 
-def evaluate_lane_change(trace: Trace) -> Judgement:
-    """Return speeds, largest overrun, sideslip and lateral acceleration, and whether it was clean.
-
-    Raises:
-        ResultsError: a signal is missing.
-    """
-    judged = Judgement(trace.label)
+@evaluation
+def evaluate_lane_change(judged: Judgement, trace: Trace) -> None:
+    """Return speeds, largest overrun, sideslip and lateral acceleration, and whether it was clean."""
     t, over, x = trace.time, trace["cone_overrun"], trace["position_x"]
     track = lanes_of(trace.facts)
     start = track[0].start if track else trace.facts.get("track_start")
@@ -63,4 +59,3 @@ def evaluate_lane_change(trace: Trace) -> Judgement:
     if "steering_wheel_angle" in trace:
         hand = float(np.abs(trace["steering_wheel_angle"]).max())
         judged.add("hand", "largest hand-wheel angle", hand, "rad")
-    return judged

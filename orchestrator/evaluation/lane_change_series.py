@@ -9,9 +9,8 @@ Source: ISO 3888-2 leaves the score to who drives; the highest clean entry speed
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
 
 from .judgement import Judgement, Series, Verdict
 
@@ -51,32 +50,20 @@ def highest_clean(
     return good, bad
 
 
-@dataclass
-class EntrySpeedSeries(Series):
-    """What the runs of a track come to, in the order of their speeds."""
-
-    highest: float | None = None  # entry speed that was clean, below all that were not [m/s]
-    touched: float | None = None  # lowest that was not [m/s]
-
-    @property
-    def summary(self) -> str:
-        if self.highest is None:
-            return "No run is clean."
-        above = "" if self.touched is None else f"; not clean at {3.6 * self.touched:.1f} km/h"
-        return f"Highest clean entry speed: {3.6 * self.highest:.1f} km/h{above}."
-
-    def as_data(self) -> dict[str, Any]:
-        return {"highest_clean_entry_speed": self.highest, "lowest_not_clean": self.touched}
-
-
-def judge_entry_speeds(runs: Sequence[Judgement]) -> EntrySpeedSeries:
+def judge_entry_speeds(runs: Sequence[Judgement]) -> Series:
     """Return the highest clean entry speed of runs, with no run below it that is not clean."""
-    reached = [run for run in runs if run["entry"] is not None]
-    series = EntrySpeedSeries(sorted(reached, key=lambda run: run["entry"] or 0.0))
-    for run in series.runs:
-        ruling = run.rulings.get(CLEAN)
-        if ruling is None or ruling.verdict is not Verdict.PASSED:
-            series.touched = run["entry"]
-            break
-        series.highest = run["entry"]
-    return series
+    ordered = sorted((run for run in runs if run["entry"] is not None), key=lambda run: run["entry"] or 0.0)
+    clean = list(itertools.takewhile(is_clean, ordered))
+    highest = clean[-1]["entry"] if clean else None
+    touched = ordered[len(clean)]["entry"] if len(clean) < len(ordered) else None
+    said = "No run is clean."
+    if highest is not None:
+        above = "" if touched is None else f"; not clean at {3.6 * touched:.1f} km/h"
+        said = f"Highest clean entry speed: {3.6 * highest:.1f} km/h{above}."
+    return Series(ordered, said, {"highest_clean_entry_speed": highest, "lowest_not_clean": touched})
+
+
+def is_clean(run: Judgement) -> bool:
+    """Return whether a run was driven without touching a cone."""
+    ruling = run.rulings.get(CLEAN)
+    return ruling is not None and ruling.verdict is Verdict.PASSED

@@ -21,7 +21,7 @@ import math
 import numpy as np
 
 from .filters import at
-from .judgement import Judgement, NotJudged
+from .judgement import Judgement, NotJudged, evaluation
 from .trace import Trace
 
 AFTER, BEFORE = 2.0, 0.5
@@ -30,26 +30,18 @@ HELD = math.radians(1.0)
 """Range of the hand wheel beyond which it is not held [rad]; chosen: a loose grip."""
 
 
-def evaluate_side_wind(trace: Trace) -> Judgement:
-    """Return what a gust does to a car within 2 s.
-
-    Raises:
-        ResultsError: a signal is missing.
-    """
-    judged = Judgement(trace.label)
+@evaluation
+def evaluate_side_wind(judged: Judgement, trace: Trace) -> None:
+    """Return what a gust does to a car within 2 s."""
     t, wind = trace.time, trace["wind_force_y"]
     x, y, psi = trace["position_x"], trace["position_y"], trace["yaw_angle"]
-    try:
-        blown = np.flatnonzero(wind != 0.0)
-        if not blown.size:
-            raise NotJudged("no wind blows")
-        begin = float(t[blown[0]])
-        before = (t >= begin - BEFORE) & (t < begin)
-        if begin - BEFORE < t[0] or begin + AFTER > t[-1] or np.count_nonzero(before) < 5:
-            raise NotJudged(f"the record has no {BEFORE:g} s before and {AFTER:g} s after {begin:.2f} s")
-    except NotJudged as why:
-        judged.notes.append(str(why))
-        return judged
+    blown = np.flatnonzero(wind != 0.0)
+    if not blown.size:
+        raise NotJudged("no wind blows")
+    begin = float(t[blown[0]])
+    before = (t >= begin - BEFORE) & (t < begin)
+    if begin - BEFORE < t[0] or begin + AFTER > t[-1] or np.count_nonzero(before) < 5:
+        raise NotJudged(f"the record has no {BEFORE:g} s before and {AFTER:g} s after {begin:.2f} s")
     during = (t >= begin) & (t <= begin + AFTER)
     judged.add("begin", "the wind's beginning", begin, "s")
     judged.add("speed", "speed there", at(t, trace["velocity_x"], begin), "m/s")
@@ -76,4 +68,3 @@ def evaluate_side_wind(trace: Trace) -> Judgement:
     if "steering_wheel_angle" in trace and np.ptp(trace["steering_wheel_angle"][during]) > HELD:
         turned_by = math.degrees(float(np.ptp(trace["steering_wheel_angle"][during])))
         judged.notes.append(f"the hand wheel is not held: it moves by {turned_by:.0f} degrees")
-    return judged

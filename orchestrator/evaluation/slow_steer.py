@@ -16,8 +16,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .dwell_signals import prepared
-from .judgement import Judgement, NotJudged
+from .filters import prepared
+from .judgement import Judgement, NotJudged, evaluation
 from .trace import Trace
 
 G = 9.80665
@@ -28,27 +28,23 @@ FEWEST = 20
 """Samples in the window. Chosen: a tenth of a second at 200 Hz."""
 
 
-def evaluate_slow_steer(trace: Trace) -> Judgement:
+@evaluation
+def evaluate_slow_steer(judged: Judgement, trace: Trace) -> None:
     """Return the angle at 0.3 g, `angle` [rad], and the line that it lies on."""
-    judged = Judgement(trace.label)
-    try:
-        signals = prepared(trace, ("steering_wheel_angle", "acceleration_y"))
-        angle, acceleration = signals["steering_wheel_angle"], signals["acceleration_y"]
-        side = math.copysign(1.0, float(angle[np.argmax(np.abs(angle))]))
-        a_y, delta = side * acceleration, side * angle
-        beyond = np.flatnonzero(a_y > WINDOW[1])
-        if not beyond.size:
-            raise NotJudged(f"lateral acceleration reaches {a_y.max() / G:.3f} g, not {WINDOW[1] / G:g} g")
-        end = int(beyond[0])
-        before = np.flatnonzero(a_y[:end] < WINDOW[0])
-        begin = int(before[-1]) + 1 if before.size else 0
-        if end - begin < FEWEST:
-            raise NotJudged(f"{end - begin} samples between {WINDOW[0] / G:g} and {WINDOW[1] / G:g} g")
-        slope, intercept = np.polyfit(a_y[begin:end], delta[begin:end], 1)
-    except NotJudged as why:
-        judged.notes.append(str(why))
-        judged.add("angle", "hand-wheel angle at 0.3 g", None, "rad")
-        return judged
+    judged.add("angle", "hand-wheel angle at 0.3 g", None, "rad")
+    signals = prepared(trace, ("steering_wheel_angle", "acceleration_y"))
+    angle, acceleration = signals["steering_wheel_angle"], signals["acceleration_y"]
+    side = math.copysign(1.0, float(angle[np.argmax(np.abs(angle))]))
+    a_y, delta = side * acceleration, side * angle
+    beyond = np.flatnonzero(a_y > WINDOW[1])
+    if not beyond.size:
+        raise NotJudged(f"lateral acceleration reaches {a_y.max() / G:.3f} g, not {WINDOW[1] / G:g} g")
+    end = int(beyond[0])
+    before = np.flatnonzero(a_y[:end] < WINDOW[0])
+    begin = int(before[-1]) + 1 if before.size else 0
+    if end - begin < FEWEST:
+        raise NotJudged(f"{end - begin} samples between {WINDOW[0] / G:g} and {WINDOW[1] / G:g} g")
+    slope, intercept = np.polyfit(a_y[begin:end], delta[begin:end], 1)
     found = math.radians(round(math.degrees(intercept + slope * LEVEL), 1))
     reading = "straight line through 0.1 to 0.375 g, rounded to 0.1 degrees"
     judged.add("angle", "hand-wheel angle at 0.3 g", side * found, "rad", reading)
@@ -58,7 +54,6 @@ def evaluate_slow_steer(trace: Trace) -> Judgement:
     if "velocity_x" in trace:
         speed = trace.even["velocity_x"][: end + 1]
         judged.add("speed", "lowest speed up to 0.375 g", float(speed.min()), "m/s")
-    return judged
 
 
 def characteristic_angle(judged: Sequence[Judgement]) -> float:

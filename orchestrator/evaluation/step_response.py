@@ -19,7 +19,7 @@ import math
 import numpy as np
 
 from .filters import at, first_crossing
-from .judgement import Judgement, NotJudged
+from .judgement import Judgement, NotJudged, evaluation
 from .trace import Trace
 
 STEADY = 1.0
@@ -32,29 +32,21 @@ ANSWERS = {"yaw_rate": ("yaw rate", "rad/s"), "acceleration_y": ("lateral accele
 _GAINS = {"yaw_rate": "1/s", "acceleration_y": "m/(s2.rad)"}
 
 
-def evaluate_step(trace: Trace) -> Judgement:
-    """Return gains, response times, overshoots of a step steer.
-
-    Raises:
-        ResultsError: a signal is missing.
-    """
-    judged = Judgement(trace.label)
+@evaluation
+def evaluate_step(judged: Judgement, trace: Trace) -> None:
+    """Return gains, response times, overshoots of a step steer."""
     t = trace.time
     hand = trace["steering_wheel_angle"]
-    try:
-        if t.size < 3 or t[-1] - t[0] < 2.0 * STEADY:
-            raise NotJudged(f"the record is shorter than {2.0 * STEADY:g} s")
-        end = t >= t[-1] - STEADY
-        step = float(hand[end].mean()) - float(hand[0])
-        if abs(step) < math.radians(0.1):
-            raise NotJudged("the hand wheel is not turned")
-        side = math.copysign(1.0, step)
-        zero = first_crossing(t, side * (hand - hand[0]), 0.5 * abs(step), float(t[0]))
-        if zero is None or np.ptp(hand[end]) > SETTLED * abs(step):
-            raise NotJudged("the hand wheel is still turned at the end of the record")
-    except NotJudged as why:
-        judged.notes.append(str(why))
-        return judged
+    if t.size < 3 or t[-1] - t[0] < 2.0 * STEADY:
+        raise NotJudged(f"the record is shorter than {2.0 * STEADY:g} s")
+    end = t >= t[-1] - STEADY
+    step = float(hand[end].mean()) - float(hand[0])
+    if abs(step) < math.radians(0.1):
+        raise NotJudged("the hand wheel is not turned")
+    side = math.copysign(1.0, step)
+    zero = first_crossing(t, side * (hand - hand[0]), 0.5 * abs(step), float(t[0]))
+    if zero is None or np.ptp(hand[end]) > SETTLED * abs(step):
+        raise NotJudged("the hand wheel is still turned at the end of the record")
     judged.add("step", "final hand-wheel angle", step, "rad")
     judged.add("zero", "time zero", zero, "s", "half of the final hand-wheel angle")
     if "velocity_x" in trace:
@@ -81,7 +73,6 @@ def evaluate_step(trace: Trace) -> Judgement:
         judged.add("sideslip_steady", "steady sideslip", sideslip, "rad")
         peak = judged["yaw_rate_peak"]
         judged.add("t_beta", "T_beta", None if peak is None else peak * abs(sideslip), "rad.s")
-    return judged
 
 
 def _since(instant: float | None, zero: float) -> float | None:

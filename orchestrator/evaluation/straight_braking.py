@@ -30,7 +30,7 @@ import numpy as np
 
 from ..metrics.measures import running_integral
 from .filters import at, first_crossing, running_mean
-from .judgement import Judgement, NotJudged
+from .judgement import Judgement, NotJudged, evaluation
 from .trace import Trace
 
 BRAKED = 1.0
@@ -49,20 +49,12 @@ BEFORE, LATE, LATER, ADAPTED = 0.5, 0.5, 1.0, 0.9
 """Stretches before and after a jump [s], and the share of the change at which brakes have adapted."""
 
 
-def evaluate_braking(trace: Trace) -> Judgement:
-    """Return stopping distance, decelerations, yaw, correction by the hand wheel; those of a jump.
-
-    Raises:
-        ResultsError: a signal is missing.
-    """
-    judged = Judgement(trace.label)
+@evaluation
+def evaluate_braking(judged: Judgement, trace: Trace) -> None:
+    """Return stopping distance, decelerations, yaw, correction by the hand wheel; those of a jump."""
     t, v_x, r = trace.time, trace["velocity_x"], trace["yaw_rate"]
     speed = np.hypot(v_x, trace["velocity_y"]) if "velocity_y" in trace else v_x
-    try:
-        begin = _begin(trace)
-    except NotJudged as why:
-        judged.notes.append(str(why))
-        return judged
+    begin = _begin(trace)
     way = running_integral(t, speed)
     way = way - at(t, way, begin)
     v_0 = at(t, speed, begin)
@@ -95,7 +87,6 @@ def evaluate_braking(trace: Trace) -> Judgement:
         fast = during & (speed > SLOW)
         judged.add("sideslip", "peak sideslip", _most(trace["sideslip"], fast), "rad", "above 10 km/h")
     _add_jump(judged, trace, begin, end)
-    return judged
 
 
 def _begin(trace: Trace) -> float:

@@ -14,15 +14,14 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from vocabulary.signals import SIGNALS
 
@@ -32,10 +31,11 @@ from ..metrics.run_metrics import columns_of
 from ..metrics.symbols import si_of
 from ..results.read import Results, load_results
 from ..scenario import yaml_lines
-from ..scenario.measurement_units import conversion, measure_of
+from ..scenario.measurement_units import measure_of, parse_unit
 from ..scenario.quantities import convert
 from ..scenario.strict import Strict, validate
 from ..titles import changes_in, with_changes
+from ..wiring.series import SECOND, numbers_in, reading_series
 from ..wiring.series_file import SeriesFile
 from ..wording import hint
 from .filters import even_grid, resample
@@ -73,7 +73,7 @@ class Trace:
         """The same sampled evenly, itself if it is."""
         grid = even_grid(self.time)
         signals = {name: resample(grid, self.time, x) for name, x in self.signals.items()}
-        return Trace(self.label, grid, signals, self.mass, self.friction, self.facts, self.folder, self.title)
+        return replace(self, time=grid, signals=signals)
 
     @property
     def rate(self) -> float:
@@ -81,7 +81,7 @@ class Trace:
         return 1.0 / float(np.median(np.diff(self.time)))
 
 
-def trace_of(results: Results, label: str = "", mass: float | None = None) -> Trace:
+def trace_of(results: Results, label: str = "") -> Trace:
     """Return what a run has recorded of the vocabulary; mass and friction as its units were told."""
     signals = {}
     for name in SIGNALS:
@@ -95,65 +95,62 @@ def trace_of(results: Results, label: str = "", mass: float | None = None) -> Tr
         name = column.partition(".")[2]
         if name not in signals and own[name] == 1 and np.issubdtype(values.dtype, np.number):
             signals[name] = values
-    fmus = results.run.get("fmus", {})
-    facts = {name: value for fmu in fmus.values() for name, value in _parameters(fmu).items()}
-    for role in ("driver", "plant"):  # of the test and of the car they know best
-        for unit in results.units_of_role(role):
-            facts |= _parameters(fmus.get(unit))
-    mass = mass if mass is not None else _of_plant(results, "mass")
+    fmus = {unit: fmu for unit, fmu in results.run.get("fmus", {}).items() if isinstance(fmu, dict)}
+    told = {unit: {**fmu.get("defaults", {}), **fmu.get("parameters", {})} for unit, fmu in fmus.items()}
+    best = [unit for role in ("driver", "plant") for unit in results.units_of_role(role)]  # of test and car
+    facts = {name: value for unit in (*told, *best) for name, value in told.get(unit, {}).items()}
+    mass = facts.get("mass")
     return Trace(
         label or str(results.folder),
         results.time,
         signals,
-        mass,
-        _friction(results),
+        float(mass) if isinstance(mass, (int, float)) else None,
+        _friction(results, fmus, told),
         facts,
         results.folder,
         with_changes(str(results.run.get("title") or ""), changes_in(results.run)),
     )
 
 
-def _parameters(fmu: Any) -> dict[str, Any]:
-    return {**fmu.get("defaults", {}), **fmu.get("parameters", {})} if isinstance(fmu, dict) else {}
-
-
-def _constants(fmu: Any) -> Iterator[tuple[str, float]]:
-    given = fmu.get("constants", {}) if isinstance(fmu, dict) else {}
-    return ((name, value) for name, value in given.items() if isinstance(value, (int, float)))
-
-
-def _friction(results: Results) -> float | None:
+def _friction(results: Results, fmus: Mapping[str, Any], told: Mapping[str, Any]) -> float | None:
     """Return the lowest friction that any wheel met: as recorded, else as roads or tyres were told."""
     if columns := columns_of(results, "friction_*"):
         return float(min(results.columns[column].min() for column in columns))
-    fmus = results.run.get("fmus", {})
-    roads = (_parameters(fmus.get(unit)).get("base_friction") for unit in results.units_of_role("road"))
-    told = [float(value) for value in roads if isinstance(value, (int, float))]
-    told += [
-        value for fmu in fmus.values() for name, value in _constants(fmu) if name.startswith("friction_")
-    ]
-    return min(told, default=None)
+    found = [told.get(unit, {}).get("base_friction") for unit in results.units_of_role("road")]
+    for fmu in fmus.values():
+        constants = fmu.get("constants", {}).items()
+        found += [value for name, value in constants if name.startswith("friction_")]
+    return min((float(value) for value in found if isinstance(value, (int, float))), default=None)
 
 
-def _of_plant(results: Results, name: str) -> float | None:
-    fmus = results.run.get("fmus", {})
-    for unit in results.units_of_role("plant"):
-        value = _parameters(fmus.get(unit)).get(name)
-        if isinstance(value, (int, float)):
-            return float(value)
-    return None
+def _unit(text: str) -> str:
+    parse_unit(text)
+    return text
+
+
+def _signal(name: str) -> str:
+    known = [one for one in SIGNALS if "*" not in one]
+    if name not in known:
+        raise ValueError(f"{name!r} is no signal{hint(name, known, lead='known')}")
+    return name
+
+
+def _kilograms(value: object) -> object:
+    return float(convert(value, "kg")) if isinstance(value, str) else value
+
+
+def _column(value: object) -> object:
+    return {"column": value} if isinstance(value, str) else value
 
 
 class ColumnSpec(Strict):
     """Where a signal stands in a file."""
 
     column: str = Field(min_length=1, description="Its header, without the unit")
-    unit: str | None = Field(None, description="Of its numbers; left out: as the header says")
+    unit: Annotated[str, AfterValidator(_unit)] | None = Field(
+        None, description="Of its numbers; left out: as the header says"
+    )
     sign: Literal[1, -1] = Field(1, description="-1: positive where ISO 8855 is negative")
-
-
-def _column(value: object) -> object:
-    return {"column": value} if isinstance(value, str) else value
 
 
 AnyColumn = Annotated[ColumnSpec, BeforeValidator(_column)]
@@ -163,8 +160,12 @@ class MappingSpec(Strict):
     """Which columns of a measurement are which signals."""
 
     time: AnyColumn = Field(ColumnSpec(column="time", unit=None, sign=1), description="Column of times")
-    signals: dict[str, AnyColumn] = Field(min_length=1, description="Signal -> column")
-    mass: str | None = Field(None, description="Of the car, with its unit")
+    signals: dict[Annotated[str, AfterValidator(_signal)], AnyColumn] = Field(
+        min_length=1, description="Signal -> column"
+    )
+    mass: Annotated[float, BeforeValidator(_kilograms)] | None = Field(
+        None, description="Of the car, with its unit"
+    )
     friction: float | None = Field(None, gt=0, description="Of the road")
 
 
@@ -177,20 +178,7 @@ def load_mapping(path: Path | str) -> MappingSpec:
     """
     document = yaml_lines.read(Path(path), what="mapping of signals")
     spec = validate(MappingSpec, document)
-    if spec is not None:
-        for name in spec.signals:
-            if name not in SIGNALS or "*" in name:
-                known = [one for one in SIGNALS if "*" not in one]
-                document.report(("signals", name), f"{name!r} is no signal{hint(name, known, lead='known')}")
-        for key, column in (("time", spec.time), *((f"signals.{n}", c) for n, c in spec.signals.items())):
-            if column.unit is not None and measure_of(column.unit) is None:
-                document.report(tuple(key.split(".")), f"{column.unit!r} is not a unit")
-        if spec.mass is not None:
-            try:
-                convert(spec.mass, "kg")
-            except ValueError as error:
-                document.report(("mass",), str(error))
-    if spec is None or document.problems:
+    if spec is None:
         raise ScenarioError(document.sentences())
     return spec
 
@@ -201,50 +189,29 @@ def measured(path: Path, mapping: MappingSpec, label: str = "") -> Trace:
     Raises:
         ResultsError: it cannot be read, lacks a column, or a unit does not fit.
     """
-    with _sentences(path):
-        file = SeriesFile(path)
-        signals, clock = {}, None
-        for name, spec in mapping.signals.items():
-            column = file.column(spec.column, mapping.time.column)
-            times = _si(column.times, mapping.time.unit or column.time_unit, "s", "time")
-            if clock is None:
-                clock = times
-                if len(clock) < 2 or not np.all(np.diff(clock) > 0):
-                    raise ValueError("times must increase from row to row")
-            values = _si(column.values, spec.unit or column.unit, SIGNALS[name].unit, spec.column)
-            if times is not clock and (times.shape != clock.shape or np.any(times != clock)):
-                values = np.interp(clock, times, values)  # channels of MDF have clocks of their own
-            signals[name] = spec.sign * values
-    assert clock is not None
-    mass = None if mapping.mass is None else float(convert(mapping.mass, "kg"))
-    return Trace(label or path.name, clock, signals, mass, mapping.friction, {}, None, path.stem)
-
-
-@contextmanager
-def _sentences(path: Path) -> Iterator[None]:
     try:
-        yield
+        with reading_series(path):
+            return _measured(SeriesFile(path), mapping, label or path.name, path.stem)
     except ValueError as error:
-        raise ResultsError(f"{path}: {error}") from None
-    except OSError as error:
-        raise ResultsError(f"{path}: cannot be read: {error.strerror or error}") from None
+        raise ResultsError(str(error)) from None
 
 
-def _si(values: np.ndarray, unit: str | None, wanted: str, name: str) -> np.ndarray:
-    """Return a column in the unit that is wanted; without a unit it is in that already."""
-    try:
-        numbers = values.astype(float)
-    except (TypeError, ValueError):
-        raise ValueError(f"column {name!r} holds what is no number") from None
-    if not np.all(np.isfinite(numbers)):
-        raise ValueError(f"column {name!r}: value {int(np.argmin(np.isfinite(numbers))) + 1} is not finite")
-    if unit is None or unit == wanted:
-        return numbers
-    source, target = measure_of(unit), measure_of(wanted)
-    factors = conversion(source, target) if source and target else None
-    if factors is None:
-        raise ValueError(f"column {name!r}: its unit {unit!r} does not fit: {wanted} is wanted")
-    return factors[0] * numbers + factors[1]
+def _measured(file: SeriesFile, mapping: MappingSpec, label: str, title: str) -> Trace:
+    signals: dict[str, np.ndarray] = {}
+    clock = np.zeros(0)
+    for name, spec in mapping.signals.items():
+        column = file.column(spec.column, mapping.time.column)
+        times = numbers_in(column.times, mapping.time.unit or column.time_unit, SECOND, "s", "time")
+        if not signals:
+            clock = times
+            if len(clock) < 2 or not np.all(np.diff(clock) > 0):
+                raise ValueError("times must increase from row to row")
+        unit, wanted = spec.unit or column.unit, SIGNALS[name].unit
+        values = numbers_in(column.values, unit, measure_of(wanted), wanted, f"column {spec.column!r}")
+        if not np.array_equal(times, clock):
+            values = np.interp(clock, times, values)  # channels of MDF have clocks of their own
+        signals[name] = spec.sign * values
+    return Trace(label, clock, signals, mapping.mass, mapping.friction, title=title)
 
 
 def load_trace(path: Path, mapping: MappingSpec | None, label: str = "") -> Trace:

@@ -20,7 +20,7 @@ import math
 import numpy as np
 
 from .filters import at
-from .judgement import Judgement, NotJudged
+from .judgement import Judgement, NotJudged, evaluation
 from .trace import Trace
 
 BEFORE, AFTER = 0.5, 1.0
@@ -29,28 +29,20 @@ STEADY = 0.03
 """Range of the yaw rate over that stretch, over its mean, beyond which it is no steady turn; chosen."""
 
 
-def evaluate_turn(trace: Trace, action: float | None = None) -> Judgement:
-    """Return the ratios at 1 s after the action [s], by default that which the driver unit tells.
-
-    Raises:
-        ResultsError: a signal is missing.
-    """
-    judged = Judgement(trace.label)
+@evaluation
+def evaluate_turn(judged: Judgement, trace: Trace, action: float | None = None) -> None:
+    """Return the ratios at 1 s after the action [s], by default that which the driver unit tells."""
     t, v, r, a_y = trace.time, trace["velocity_x"], trace["yaw_rate"], trace["acceleration_y"]
     told = trace.facts.get("action_time") if action is None else action
-    try:
-        if not isinstance(told, (int, float)):
-            raise NotJudged("the run does not tell action_time, when the pedals change")
-        now = float(told)
-        before = (t >= now - BEFORE) & (t <= now)
-        if now - BEFORE < t[0] or now + AFTER > t[-1] or np.count_nonzero(before) < 5:
-            raise NotJudged(f"the record has no {BEFORE:g} s before and {AFTER:g} s after {now:g} s")
-        v_0, r_0 = float(v[before].mean()), float(r[before].mean())
-        if abs(r_0) < 1e-3 or np.ptp(r[before]) > STEADY * abs(r_0):
-            raise NotJudged(f"the turn is not steady before {now:g} s")
-    except NotJudged as why:
-        judged.notes.append(str(why))
-        return judged
+    if not isinstance(told, (int, float)):
+        raise NotJudged("the run does not tell action_time, when the pedals change")
+    now = float(told)
+    before = (t >= now - BEFORE) & (t <= now)
+    if now - BEFORE < t[0] or now + AFTER > t[-1] or np.count_nonzero(before) < 5:
+        raise NotJudged(f"the record has no {BEFORE:g} s before and {AFTER:g} s after {now:g} s")
+    v_0, r_0 = float(v[before].mean()), float(r[before].mean())
+    if abs(r_0) < 1e-3 or np.ptp(r[before]) > STEADY * abs(r_0):
+        raise NotJudged(f"the turn is not steady before {now:g} s")
     side, radius = math.copysign(1.0, r_0), v_0 / abs(r_0)
     judged.add("radius", "radius of the steady turn", side * radius, "m", "v / r, positive: to the left")
     judged.add("speed", "speed of the steady turn", v_0, "m/s")
@@ -70,4 +62,3 @@ def evaluate_turn(trace: Trace, action: float | None = None) -> Judgement:
         judged.add("sideslip", f"change of sideslip after {AFTER:g} s", change, "rad")
         peak = float(np.abs(trace["sideslip"][t >= now]).max())
         judged.add("sideslip_peak", "peak sideslip from the action on", peak, "rad")
-    return judged

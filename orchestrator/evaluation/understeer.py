@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 
-from .judgement import Judgement, NotJudged
+from .judgement import Judgement, NotJudged, evaluation
 from .trace import Trace
 
 WINDOW = (0.5, 2.0)
@@ -32,7 +32,8 @@ FEWEST = 20
 UNIT = "rad.s2/m"
 
 
-def evaluate_understeer(trace: Trace) -> Judgement:
+@evaluation
+def evaluate_understeer(judged: Judgement, trace: Trace) -> None:
     """Return understeer gradients at the road wheels.
 
     The run has to tell `steering_ratio` and the wheelbase, `cg_to_front_axle` and `cg_to_rear_axle`.
@@ -40,26 +41,19 @@ def evaluate_understeer(trace: Trace) -> Judgement:
     Raises:
         ResultsError: a signal is missing.
     """
-    judged = Judgement(trace.label)
     signals = [trace[name] for name in ("steering_wheel_angle", "yaw_rate", "velocity_x", "acceleration_y")]
-    try:
-        ratio, front, rear = (
-            _told(trace, n) for n in ("steering_ratio", "cg_to_front_axle", "cg_to_rear_axle")
+    ratio, front, rear = (_told(trace, n) for n in ("steering_ratio", "cg_to_front_axle", "cg_to_rear_axle"))
+    hand, r, v, a_y = signals
+    side = math.copysign(1.0, float(a_y[np.argmax(np.abs(a_y))]))
+    a_y = side * a_y
+    extra = side * (hand / ratio - (front + rear) * r / np.maximum(v, 0.1))
+    last = int(np.argmax(a_y))  # what comes after is not the slow rise any more
+    a_y, extra = a_y[: last + 1], extra[: last + 1]
+    gradient = slope(a_y, extra, *WINDOW, cubic=True)
+    if gradient is None:
+        raise NotJudged(
+            f"lateral acceleration does not rise slowly through {WINDOW[0]:g} to {WINDOW[1]:g} m/s2"
         )
-        hand, r, v, a_y = signals
-        side = math.copysign(1.0, float(a_y[np.argmax(np.abs(a_y))]))
-        a_y = side * a_y
-        extra = side * (hand / ratio - (front + rear) * r / np.maximum(v, 0.1))
-        last = int(np.argmax(a_y))  # what comes after is not the slow rise any more
-        a_y, extra = a_y[: last + 1], extra[: last + 1]
-        gradient = slope(a_y, extra, *WINDOW, cubic=True)
-        if gradient is None:
-            raise NotJudged(
-                f"lateral acceleration does not rise slowly through {WINDOW[0]:g} to {WINDOW[1]:g} m/s2"
-            )
-    except NotJudged as why:
-        judged.notes.append(str(why))
-        return judged
     reading = f"at zero of a cubic through {WINDOW[0]:g} to {WINDOW[1]:g} m/s2"
     judged.add("gradient", "understeer gradient at the road wheels", gradient, UNIT, reading)
     judged.add("gradient_hand", "understeer gradient at the hand wheel", gradient * ratio, UNIT, reading)
@@ -76,7 +70,6 @@ def evaluate_understeer(trace: Trace) -> Judgement:
             "straight line over 1 m/s2",
         )
     judged.add("largest", "largest lateral acceleration", float(a_y.max()), "m/s2")
-    return judged
 
 
 def slope(

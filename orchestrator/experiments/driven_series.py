@@ -12,9 +12,9 @@ from dataclasses import replace
 
 from ..errors import ScenarioError
 from ..evaluation.dwell_series import amplitudes
-from ..evaluation.judgement import Judgement, Verdict
+from ..evaluation.judgement import Judgement, Series, Verdict
 from ..evaluation.lane_change_run import evaluate_lane_change
-from ..evaluation.lane_change_series import CLEAN, EntrySpeedSeries, highest_clean, judge_entry_speeds
+from ..evaluation.lane_change_series import CLEAN, highest_clean, judge_entry_speeds
 from ..evaluation.trace import Trace, trace_of
 from ..plan import Change
 from ..results.read import load_results
@@ -65,7 +65,7 @@ def steered(amplitude: float, origin: str) -> Change:
     return Change(AMPLITUDE, amplitude, origin)
 
 
-def entry_speeds(base: Job, once: Once, make: Callable[[Job], bool]) -> tuple[list[Trace], EntrySpeedSeries]:
+def entry_speeds(base: Job, once: Once, make: Callable[[Job], bool]) -> tuple[list[Trace], Series]:
     """Make the runs that lead to the highest clean entry speed; return them and what they come to.
 
     Args:

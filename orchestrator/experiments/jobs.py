@@ -246,7 +246,7 @@ def _judged(results: Results, name: str, angle: float | None) -> Measured:
     from ..evaluation.standard_tests import TESTS
     from ..evaluation.trace import trace_of
 
-    judged = TESTS[name].evaluate(trace_of(results, name), angle).judged
+    judged = TESTS[name].evaluate(trace_of(results, name), angle)
     quantities = {
         key: None if one.value is None else (one.value, one.unit) for key, one in judged.quantities.items()
     }

@@ -134,11 +134,12 @@ def draw_run(folder: Path, angle: float, again: bool = False) -> None:
     if not again and (folder / f"{RUN}.svg").is_file():
         return
     try:
-        evaluated = TESTS[SERIES].evaluate(trace_of(load_results(folder)), angle)
+        trace = trace_of(load_results(folder))
+        figure = TESTS[SERIES].draw(trace, TESTS[SERIES].evaluate(trace, angle))
     except ResultsError:
         return
-    if evaluated.draw:
-        save(evaluated.draw(), folder / RUN)
+    if figure:
+        save(figure, folder / RUN)
 
 
 def degrees(amplitude: float) -> str:

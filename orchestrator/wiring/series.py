@@ -23,7 +23,7 @@ from .series_file import SeriesFile
 Reader = Callable[[SeriesSpec, str, Variable], Series]
 """Gives an input what a specification says, for what the `*` of its key stands for ("" without one)."""
 
-_SECOND, _ONE = measure_of("s"), measure_of("1")
+SECOND = measure_of("s")
 
 
 def series_reader(scenario: Scenario) -> Reader:
@@ -36,15 +36,15 @@ def series_reader(scenario: Scenario) -> Reader:
     @cache
     def opened(file: str) -> SeriesFile:
         path = Path(os.path.normpath(scenario.path.parent / file))
-        with _reading(path):
+        with reading_series(path):
             return SeriesFile(path)
 
     def read(spec: SeriesSpec, part: str, variable: Variable) -> Series:
         file = opened(spec.file)
         name = (spec.column or variable.name).replace("*", part)
-        with _reading(spec.file):
+        with reading_series(spec.file):
             column = file.column(name, spec.time)
-            times = _numbers(column.times, f"time {spec.time!r}") * _gain(column.time_unit, _SECOND)[0]
+            times = numbers_in(column.times, column.time_unit, SECOND, "s", f"time {spec.time!r}")
             values = _values(column.values, column.unit, name, variable)
             _check_times(times, scenario, spec)
         held = spec.interpolation == "held" or variable.type != "Real"
@@ -54,8 +54,8 @@ def series_reader(scenario: Scenario) -> Reader:
 
 
 @contextlib.contextmanager
-def _reading(path: Path | str) -> Iterator[None]:
-    """As `files.reading`, with ValueError for every sentence."""
+def reading_series(path: Path | str) -> Iterator[None]:
+    """As `files.reading` a file of time series, with ValueError for every sentence."""
     try:
         with reading("file of time series", path, ScenarioError):
             try:
@@ -66,15 +66,29 @@ def _reading(path: Path | str) -> Iterator[None]:
         raise ValueError(error.problems[0]) from error.__cause__
 
 
-def _gain(unit: str | None, target: Measure | None) -> tuple[float, float]:
-    """Return gain and offset from a column's unit."""
-    if unit is None or target is None:
-        return 1.0, 0.0
+def numbers_in(
+    column: np.ndarray, unit: str | None, wanted: Measure | None, says: str, what: str
+) -> np.ndarray:
+    """Return a column as finite numbers in the unit that is wanted; without one of its own it is in that.
+
+    Args:
+        column: numbers or text.
+        unit: of the column.
+        wanted, says: the unit that is wanted, and in words.
+        what: the column is, for sentences.
+
+    Raises:
+        ValueError: a sentence.
+    """
+    numbers = _numbers(column, what)
+    if unit is None or wanted is None:
+        return numbers
     source = measure_of(unit)
-    between = None if source is None else conversion(source, target)
+    between = None if source is None else conversion(source, wanted)
     if between is None:
-        raise ValueError(f"its unit {unit!r} does not fit")
-    return between
+        raise ValueError(f"{what}: its unit {unit!r} does not fit: {says} is wanted")
+    gain, offset = between
+    return numbers if between == (1.0, 0.0) else gain * numbers + offset
 
 
 def _numbers(column: np.ndarray, what: str) -> np.ndarray:
@@ -97,12 +111,8 @@ def _numbers(column: np.ndarray, what: str) -> np.ndarray:
 def _values(column: np.ndarray, unit: str | None, name: str, variable: Variable) -> np.ndarray:
     """Return a column's values as the variable takes them."""
     if variable.type == "Real":
-        try:
-            gain, offset = _gain(unit, measure_of(variable.unit, variable.definition))
-        except ValueError as error:
-            raise ValueError(f"column {name!r}: {error}: {variable.unit or 'none'} is wanted") from None
-        numbers = _numbers(column, f"column {name!r}")
-        numbers = numbers if (gain, offset) == (1.0, 0.0) else gain * numbers + offset
+        wanted = measure_of(variable.unit, variable.definition)
+        numbers = numbers_in(column, unit, wanted, variable.unit or "none", f"column {name!r}")
         for extreme in (numbers.min(), numbers.max()):
             value_for(variable, float(extreme))
         return numbers

@@ -69,8 +69,7 @@ def verdicts(judged: Judgement) -> dict[str, str]:
 @as_sampled
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_instants_ratios_and_displacement_are_those_of_the_closed_forms(sampling, side):
-    judged, course = evaluate_dwell(trace(side * radians(270.0), sampling=sampling, offset=0.01), A)
-    assert course.side == side
+    judged = evaluate_dwell(trace(side * radians(270.0), sampling=sampling, offset=0.01), A)
     assert judged["amplitude"] == pytest.approx(side * radians(270.0), abs=radians(0.02))
     assert judged["begin"] == pytest.approx(START, abs=0.004)
     # the corner at the end of the steering, behind the low pass of 10 Hz
@@ -100,7 +99,7 @@ def test_the_limit_of_35_per_cent_decides(width, verdict):
     def yaw_rate(t):
         return fall(t, width) * 0.5 * (1.0 - np.tanh((t - END - 1.4) / 0.1))  # good at 1.75 s
 
-    judged, _ = evaluate_dwell(trace(yaw_rate=yaw_rate), A)
+    judged = evaluate_dwell(trace(yaw_rate=yaw_rate), A)
     assert judged.rulings["stability"].verdict.value == verdict
     assert (judged["ratio_1000"] > 0.35) == (verdict == "failed")
 
@@ -109,14 +108,14 @@ def test_the_limit_of_20_per_cent_decides_at_1_75_seconds():
     def yaw_rate(t):
         return fall(t, FALL) - 0.21 * PEAK * np.exp(-(((t - END - 1.75) / 0.25) ** 2))
 
-    judged, _ = evaluate_dwell(trace(yaw_rate=yaw_rate), A)
+    judged = evaluate_dwell(trace(yaw_rate=yaw_rate), A)
     assert judged["ratio_1000"] < 0.35 < 1.0
     assert judged["ratio_1750"] > 0.20
     assert judged.rulings["stability"].verdict is Verdict.FAILED
 
 
 def test_a_yaw_rate_that_never_falls_has_no_second_peak_and_is_unstable():
-    judged, _ = evaluate_dwell(trace(yaw_rate=lambda t: -PEAK * 0.5 * (1 + np.tanh(t - PEAK_AT))), A)
+    judged = evaluate_dwell(trace(yaw_rate=lambda t: -PEAK * 0.5 * (1 + np.tanh(t - PEAK_AT))), A)
     assert judged["peak"] is None
     assert judged.rulings["stability"].verdict is Verdict.FAILED
     assert "no second peak" in judged.rulings["stability"].why
@@ -125,7 +124,7 @@ def test_a_yaw_rate_that_never_falls_has_no_second_peak_and_is_unstable():
 def test_a_ratio_is_signed_and_a_spin_that_passes_is_flagged():
     made = trace(yaw_rate=lambda t: PEAK * np.tanh((t - END) / 0.3) * (t > START) * np.exp(-((t - END) ** 2)))
     made.signals["sideslip"][made.time > END] = radians(60.0)
-    judged, _ = evaluate_dwell(made, A)
+    judged = evaluate_dwell(made, A)
     assert judged["ratio_1000"] < 0.0
     assert judged.rulings["stability"].verdict is Verdict.PASSED
     assert judged["sideslip"] == radians(60.0)
@@ -134,8 +133,8 @@ def test_a_ratio_is_signed_and_a_spin_that_passes_is_flagged():
 
 def test_below_26_8_degrees_the_zeroing_range_ends_at_the_first_instant_above_75_degrees_per_second():
     """A 2 pi 0.7 Hz cos(2 pi 0.7 Hz 0.2 s) = 75 deg/s at 26.8 degrees."""
-    low, _ = evaluate_dwell(trace(radians(26.0)), radians(17.0))
-    high, _ = evaluate_dwell(trace(radians(30.0)), radians(17.0))
+    low = evaluate_dwell(trace(radians(26.0)), radians(17.0))
+    high = evaluate_dwell(trace(radians(30.0)), radians(17.0))
     assert any("does not stay above it for 200 ms" in note for note in low.notes)
     assert high.notes == []
     assert low["end"] == pytest.approx(END + 0.0143, abs=0.001)  # the zero holds the first degrees, too
@@ -153,32 +152,32 @@ def test_below_26_8_degrees_the_zeroing_range_ends_at_the_first_instant_above_75
     ids=["short", "no end", "late", "coarse", "slow"],
 )
 def test_what_cannot_be_judged_says_why_and_passes_nothing(changes, why):
-    judged, _ = evaluate_dwell(trace(**changes), radians(4.0))
+    judged = evaluate_dwell(trace(**changes), radians(4.0))
     assert judged.rulings["stability"].verdict is Verdict.NOT_JUDGED
     assert why in judged.rulings["stability"].why
     assert judged.verdict is Verdict.NOT_JUDGED
 
 
 def test_responsiveness_is_asked_from_5_a_on_a_dry_road_at_80_km_h():
-    assert "responsiveness" not in evaluate_dwell(trace(4.99 * A), A)[0].rulings
-    assert verdicts(evaluate_dwell(trace(5.0 * A), A)[0])["responsiveness"] == "passed"
-    assert verdicts(evaluate_dwell(trace(friction=0.4), A)[0]) == {
+    assert "responsiveness" not in evaluate_dwell(trace(4.99 * A), A).rulings
+    assert verdicts(evaluate_dwell(trace(5.0 * A), A))["responsiveness"] == "passed"
+    assert verdicts(evaluate_dwell(trace(friction=0.4), A)) == {
         "stability": "passed",
         "responsiveness": "not judged",
     }
-    assert verdicts(evaluate_dwell(trace(), None)[0])["responsiveness"] == "not judged"
+    assert verdicts(evaluate_dwell(trace(), None))["responsiveness"] == "not judged"
     slow = trace()
     slow.signals["velocity_x"][:] = 77.0 / 3.6
-    assert set(verdicts(evaluate_dwell(slow, A)[0]).values()) == {"not judged"}
+    assert set(verdicts(evaluate_dwell(slow, A)).values()) == {"not judged"}
 
 
 def test_a_heavy_car_may_be_slower():
     made = trace()
     made.signals["acceleration_y"] *= 1.65 / 2.91  # between 1.52 and 1.83 m
     heavy = Trace("heavy", made.time, made.signals, mass=3501.0)
-    assert 1.52 < evaluate_dwell(made, A)[0]["displacement"] < 1.83
-    assert verdicts(evaluate_dwell(made, A)[0])["responsiveness"] == "failed"
-    assert verdicts(evaluate_dwell(heavy, A)[0])["responsiveness"] == "passed"
+    assert 1.52 < evaluate_dwell(made, A)["displacement"] < 1.83
+    assert verdicts(evaluate_dwell(made, A))["responsiveness"] == "failed"
+    assert verdicts(evaluate_dwell(heavy, A))["responsiveness"] == "passed"
 
 
 @pytest.mark.parametrize(
@@ -211,19 +210,19 @@ def test_a_series_passes_only_if_no_run_is_missing_fails_or_is_not_judged():
             made[5].rule("stability", spoil[0], spoil[1])
         return [one for k, one in enumerate(made) if k != without]
 
-    assert judge_series(runs(), A).verdict is Verdict.PASSED
+    assert judge_series(runs(), A).found["verdict"] is Verdict.PASSED
     missing = judge_series(runs(without=3), A)
-    assert missing.verdict is Verdict.FAILED
+    assert missing.found["verdict"] is Verdict.FAILED
     assert missing.rulings["stability"].why == "1 runs are missing, of +108.0 degrees"
     failed = judge_series(runs(spoil=(False, "")), A)
     assert (
         failed.rulings["stability"].why == "1 of 26 runs fail, left first: 1, the smallest of 144.0 degrees"
     )
-    assert judge_series(runs(spoil=(None, "too short")), A).verdict is Verdict.FAILED
+    assert judge_series(runs(spoil=(None, "too short")), A).found["verdict"] is Verdict.FAILED
 
 
 def test_runs_of_one_amplitude_are_no_series():
-    left, right, other = (evaluate_dwell(trace(x), A)[0] for x in (LARGE, -LARGE, LARGE))
+    left, right, other = (evaluate_dwell(trace(x), A) for x in (LARGE, -LARGE, LARGE))
     assert is_series([left, right])
     assert not is_series([left, right, other])
     assert not is_series([left])
@@ -298,7 +297,7 @@ def test_measured_columns_under_other_names_units_and_signs_give_the_same(tmp_pa
                  "--out", "out", "--no-figures")  # fmt: skip
     assert ended == 0
     found = json.loads((tmp_path / "out/evaluation.json").read_text())["runs"][0]
-    exact, _ = evaluate_dwell(made, A)
+    exact = evaluate_dwell(made, A)
     assert found["verdict"] == "passed"
     for key, one in found["quantities"].items():
         assert one["value"] == pytest.approx(exact[key], rel=1e-8), key

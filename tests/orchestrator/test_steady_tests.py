@@ -198,7 +198,7 @@ def test_a_series_counts_no_clean_run_above_one_that_was_not():
         return judged
 
     series = judge_entry_speeds([run(18.0, True), run(16.0, True), run(17.0, None), run(15.0, True)])
-    assert (series.highest, series.touched) == (16.0, 17.0)
+    assert series.found == {"highest_clean_entry_speed": 16.0, "lowest_not_clean": 17.0}
     assert series.summary == "Highest clean entry speed: 57.6 km/h; not clean at 61.2 km/h."
     assert judge_entry_speeds([run(15.0, False)]).summary == "No run is clean."
 

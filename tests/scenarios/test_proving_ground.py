@@ -32,7 +32,7 @@ def dwell(amplitude: float, controller: str = "off", **settings: object) -> Judg
     """Return what saloon75 comes to with an amplitude [deg]."""
     made = scenario("sine_with_dwell", "saloon75").swap(controller=f"controller_{controller}")
     run = made.set({"driver.amplitude": radians(amplitude), **settings}).run()
-    judged, _ = evaluate_dwell(trace_of(run.results), radians(A["saloon75"]))
+    judged = evaluate_dwell(trace_of(run.results), radians(A["saloon75"]))
     return judged
 
 
