@@ -64,7 +64,6 @@ class DwellCourse:
     begin: float  # BOS
     end: float  # COS
     peak: float | None  # instant of the second peak
-    first_peak: float
     side: float  # 1: left first
     notes: list[str] = field(default_factory=list)
 
@@ -107,7 +106,6 @@ def course_of(trace: Trace) -> DwellCourse:
         begin,
         end,
         _second_peak(t, r, reversed_),
-        float(t[np.argmax(np.where((t >= begin) & (t <= end), r, -np.inf))]),
         side,
         notes,
     )

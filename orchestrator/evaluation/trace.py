@@ -39,6 +39,7 @@ from ..wiring.series import SECOND, numbers_in, reading_series
 from ..wiring.series_file import SeriesFile
 from ..wording import hint
 from .filters import even_grid, resample
+from .judgement import NotJudged
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,17 @@ class Trace:
             have = ", ".join(self.signals) or "nothing"
             raise ResultsError(f"{self.label}: has no signal {name!r}, which this test needs; it has {have}")
         return self.signals[name]
+
+    def told(self, name: str, meaning: str = "") -> float:
+        """Return a number that a run tells of its units.
+
+        Raises:
+            NotJudged: it does not; `meaning` says what that would be.
+        """
+        value = self.facts.get(name)
+        if not isinstance(value, (int, float)) or isinstance(value, bool):
+            raise NotJudged(f"the run does not tell {name}{f', {meaning}' if meaning else ''}")
+        return float(value)
 
     @cached_property
     def even(self) -> Trace:

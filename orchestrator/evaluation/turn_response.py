@@ -33,10 +33,7 @@ STEADY = 0.03
 def evaluate_turn(judged: Judgement, trace: Trace, action: float | None = None) -> None:
     """Return the ratios at 1 s after the action [s], by default that which the driver unit tells."""
     t, v, r, a_y = trace.time, trace["velocity_x"], trace["yaw_rate"], trace["acceleration_y"]
-    told = trace.facts.get("action_time") if action is None else action
-    if not isinstance(told, (int, float)):
-        raise NotJudged("the run does not tell action_time, when the pedals change")
-    now = float(told)
+    now = trace.told("action_time", "when the pedals change") if action is None else action
     before = (t >= now - BEFORE) & (t <= now)
     if now - BEFORE < t[0] or now + AFTER > t[-1] or np.count_nonzero(before) < 5:
         raise NotJudged(f"the record has no {BEFORE:g} s before and {AFTER:g} s after {now:g} s")

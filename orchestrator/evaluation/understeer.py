@@ -37,19 +37,17 @@ def evaluate_understeer(judged: Judgement, trace: Trace) -> None:
     """Return understeer gradients at the road wheels.
 
     The run has to tell `steering_ratio` and the wheelbase, `cg_to_front_axle` and `cg_to_rear_axle`.
-
-    Raises:
-        ResultsError: a signal is missing.
     """
-    signals = [trace[name] for name in ("steering_wheel_angle", "yaw_rate", "velocity_x", "acceleration_y")]
-    ratio, front, rear = (_told(trace, n) for n in ("steering_ratio", "cg_to_front_axle", "cg_to_rear_axle"))
-    hand, r, v, a_y = signals
+    names = ("steering_wheel_angle", "yaw_rate", "velocity_x", "acceleration_y")
+    hand, r, v, a_y = (trace[name] for name in names)
+    ratio, front, rear = map(trace.told, ("steering_ratio", "cg_to_front_axle", "cg_to_rear_axle"))
     side = math.copysign(1.0, float(a_y[np.argmax(np.abs(a_y))]))
     a_y = side * a_y
     extra = side * (hand / ratio - (front + rear) * r / np.maximum(v, 0.1))
     last = int(np.argmax(a_y))  # what comes after is not the slow rise any more
     a_y, extra = a_y[: last + 1], extra[: last + 1]
-    gradient = slope(a_y, extra, *WINDOW, cubic=True)
+    found = gradients(a_y, extra)
+    gradient = found.pop(0.0)
     if gradient is None:
         raise NotJudged(
             f"lateral acceleration does not rise slowly through {WINDOW[0]:g} to {WINDOW[1]:g} m/s2"
@@ -60,39 +58,28 @@ def evaluate_understeer(judged: Judgement, trace: Trace) -> None:
     if gradient > 0:
         speed = math.sqrt((front + rear) / gradient)
         judged.add("characteristic_speed", "characteristic speed", speed, "m/s", "sqrt(L / K_us)")
-    for level in LEVELS:
-        local = slope(a_y, extra, level - HALF, level + HALF)
-        judged.add(
-            f"gradient_{level:g}",
-            f"understeer gradient at {level:g} m/s2",
-            local,
-            UNIT,
-            "straight line over 1 m/s2",
-        )
+    reading = f"straight line over {2 * HALF:g} m/s2"
+    for level, local in found.items():
+        judged.add(f"gradient_{level:g}", f"understeer gradient at {level:g} m/s2", local, UNIT, reading)
     judged.add("largest", "largest lateral acceleration", float(a_y.max()), "m/s2")
 
 
-def slope(
-    a_y: np.ndarray, extra: np.ndarray, low: float, high: float, *, cubic: bool = False
-) -> float | None:
-    """Return d extra / d a_y [rad.s2/m] from what lies between two a_y [m/s2]; None if that is too little.
+def gradients(a_y: np.ndarray, extra: np.ndarray) -> dict[float, float | None]:
+    """Return lateral acceleration [m/s2] -> understeer gradient there [rad.s2/m], at 0 of the linear range.
+
+    Where there is too little to tell, it is None.
 
     Args:
         a_y: rising [m/s2].
         extra: delta - L r / v_x [rad].
-        low, high: of the straight line, or of the cubic whose slope at zero is meant.
-        cubic: which of the two.
     """
-    inside = (a_y >= low) & (a_y <= high)
-    if a_y.max() < high or np.count_nonzero(inside) < FEWEST:
-        return None
-    a = a_y[inside]
-    terms = [a, np.ones_like(a), *([a**3] if cubic else [])]
-    return float(np.linalg.lstsq(np.column_stack(terms), extra[inside], rcond=None)[0][0])
 
+    def slope(low: float, high: float, *powers: int) -> float | None:
+        inside = (a_y >= low) & (a_y <= high)
+        if a_y.max() < high or np.count_nonzero(inside) < FEWEST:
+            return None
+        terms = np.column_stack([a_y[inside] ** power for power in powers])
+        return float(np.linalg.lstsq(terms, extra[inside], rcond=None)[0][0])
 
-def _told(trace: Trace, name: str) -> float:
-    value = trace.facts.get(name)
-    if not isinstance(value, (int, float)) or isinstance(value, bool):
-        raise NotJudged(f"the run does not tell {name}")
-    return float(value)
+    local = {level: slope(level - HALF, level + HALF, 1, 0) for level in LEVELS}
+    return {0.0: slope(*WINDOW, 1, 0, 3), **local}

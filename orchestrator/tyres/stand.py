@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,21 +14,23 @@ from ..errors import ScenarioError
 from ..fmu.opener import Opener
 from ..fmu.search import find_fmu, find_folder
 from ..master.simulate import simulate_in_memory
-from ..plan import Plan, Series, Unit, Value
+from ..plan import Fmu, Plan, Series, Unit, Value
+from ..scenario import yaml_lines
 from ..scenario.load import load_scenario
 from ..scenario.overrides import is_path
 from ..scenario.yaml_lines import Document
 from ..wiring.make_plan import make_plan
+from ..wording import listed
 
 FOR_FILES = "tyre_magic_formula_62_transient"
 """The FMU on which a tyre property file is looked at: it tells relaxation lengths, too."""
 SPEED = 20.0
 """At which the wheel travels [m/s]."""
 WHEEL = "fl"
+KNOWN_BY = ("tyre_force_x_fl", "tyre_force_y_fl", "slip_angle_fl", "vertical_load_fl")
+"""Variables of a tyre."""
 RADIUS = 0.3
 """Of the wheel [m], for tyres that want its speed and have none of their own."""
-
-
 SMALL = 1e-4
 """Slip [1] and slip angle [rad] to each side of zero for stiffnesses."""
 
@@ -125,27 +127,49 @@ def put_on_stand(source: str, *, friction: float, fmus: Path | None, build: bool
     file = source.lower().endswith(".tir")
     place = Path(source).parent / "stand"
     opener = Opener(build=build)
-    name = FOR_FILES if file else os.path.abspath(source) if is_path(source) else source
-    folder = Path() if is_path(name) else fmus or find_folder(place, opener=opener)
-    path = find_fmu(name, scenario=place, fmus=folder, opener=opener)
-    inputs = [variable.name for variable in opener.open(path).of("input")]
+    fmu = open_given(FOR_FILES if file else source, "tyre", KNOWN_BY, place=place, fmus=fmus, opener=opener)
+    inputs = [variable.name for variable in fmu.of("input")]
     data = {
         "title": Path(source).name,
         "step_size": 1.0,  # s: far beyond any relaxation length
         "stop_time": 1.0,
         "algorithm": "jacobi",
-        "units": {"tyre": {"fmu": str(path.absolute())}},
+        "units": {"tyre": {"fmu": str(fmu.path.absolute())}},
         "inputs": {name: friction if name.startswith("friction") else 0.0 for name in inputs},
         **({"tyres": os.path.abspath(source)} if file else {}),
     }
-    plan = make_plan(load_scenario(place, read=lambda path, what: Document(path, data=data)), opener=opener)
-    variables = plan.units[0].fmu.variables
-    wanted = (
-        f"tyre_force_x_{WHEEL}",
-        f"tyre_force_y_{WHEEL}",
-        f"slip_angle_{WHEEL}",
-        f"vertical_load_{WHEEL}",
-    )
-    if missing := [name for name in wanted if name not in variables]:
-        raise ScenarioError(f"{source}: this is no tyre: it has no {', '.join(missing)}")
-    return Stand(plan)
+    return Stand(make_plan(load_scenario(place, read=reader_of(data)), opener=opener))
+
+
+def open_given(
+    fmu: str, role: str, known_by: Iterable[str], *, place: Path, fmus: Path | None, opener: Opener
+) -> Fmu:
+    """Return the FMU that somebody names for a role, by a path from here or its name in a folder.
+
+    Args:
+        fmu: path or name.
+        role: it is to have.
+        known_by: variables that it then has.
+        place: from where the folder is looked for.
+        fmus: the folder; None: the nearest.
+        opener: opens it.
+
+    Raises:
+        YawbenchError: there is none, or it is something else.
+    """
+    path = is_path(fmu)
+    folder = Path() if path else fmus or find_folder(place, opener=opener)
+    name = os.path.abspath(fmu) if path else fmu
+    found = opener.open(find_fmu(name, scenario=place, fmus=folder, opener=opener))
+    if missing := [variable for variable in known_by if variable not in found.variables]:
+        raise ScenarioError(f"{fmu}: this is no {role}: it has no {listed(missing)}")
+    return found
+
+
+def reader_of(data: dict[str, Any]) -> Callable[..., Document]:
+    """Return what reads a scenario that is no file, and the files that it names."""
+
+    def read(path: Path, *, what: str) -> Document:
+        return Document(path, data=data) if what == "scenario file" else yaml_lines.read(path, what=what)
+
+    return read

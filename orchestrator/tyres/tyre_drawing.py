@@ -44,21 +44,21 @@ def draw_tyre(stand: Stand, title: str, note: str) -> Figure:
         names = [f"F_z = {load / 1e3:.3g} kN" for load in loads]
         degrees = np.degrees(angles)
         _curves(axes[0], degrees, [y["tyre_force_y"] / 1e3 for y in over_angle], names)
-        _label(axes[0], "Lateral force", "slip angle [°]", "F_y [kN]")
+        axes[0].set(title="Lateral force", xlabel="slip angle [°]", ylabel="F_y [kN]")
         if "aligning_moment" in over_angle[0]:
             _curves(axes[1], degrees, [y["aligning_moment"] for y in over_angle], names)
         else:
             _nothing(axes[1], "this tyre tells no aligning moment")
-        _label(axes[1], "Aligning moment", "slip angle [°]", "M_z [N·m]")
+        axes[1].set(title="Aligning moment", xlabel="slip angle [°]", ylabel="M_z [N·m]")
         _curves(axes[2], slips, [y["tyre_force_x"] / 1e3 for y in over_slip], names)
-        _label(axes[2], "Longitudinal force", "slip κ [1]", "F_x [kN]")
+        axes[2].set(title="Longitudinal force", xlabel="slip κ [1]", ylabel="F_x [kN]")
         for number, angle in enumerate(ANGLES):
             y = stand.measure([State(np.radians(angle), kappa, nominal) for kappa in around])
             style = line_style(number)
             axes[3].plot(y["tyre_force_x"] / 1e3, -y["tyre_force_y"] / 1e3, **style, label=f"{angle:g}°")
         inside: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 0.17), "ncols": 3}
         axes[3].legend(title="slip angle", fontsize=7.5, title_fontsize=7.5, **inside)
-        _label(axes[3], f"Combined slip at {nominal / 1e3:.3g} kN", "F_x [kN]", "-F_y [kN]")
+        axes[3].set(title=f"Combined slip at {nominal / 1e3:.3g} kN", xlabel="F_x [kN]", ylabel="-F_y [kN]")
         _over_load(stand, axes[4], axes[5], np.linspace(0.05, OF_NOMINAL[-1], 60) * nominal)
         handles = [axes[0].plot([], [], **line_style(i), label=name)[0] for i, name in enumerate(names)]
         frame(figure, 3 * 1.25 * ROW, handles, title, note)
@@ -70,7 +70,7 @@ def _over_load(stand: Stand, left: Axes, right: Axes, loads: np.ndarray) -> None
     left.plot(loads / 1e3, k_x / 1e3, **line_style(0), label="∂F_x/∂κ [kN]")
     left.plot(loads / 1e3, k_y / 1e3, **line_style(1), label="-∂F_y/∂α [kN/rad]")
     left.legend(fontsize=7.5, loc="upper left")
-    _label(left, "Stiffnesses at zero slip", "load F_z [kN]", "")
+    left.set(title="Stiffnesses at zero slip", xlabel="load F_z [kN]", ylabel="")
     at_rest = stand.measure([State(0.0, 0.0, load) for load in loads])
     lengths = [(f"relaxation_length_{axis}", f"σ_{axis}") for axis in "xy"]
     for number, (name, label) in enumerate(lengths):
@@ -81,18 +81,12 @@ def _over_load(stand: Stand, left: Axes, right: Axes, loads: np.ndarray) -> None
         right.set_ylim(bottom=0.0)
     else:
         _nothing(right, "this tyre's forces do not lag")
-    _label(right, "Relaxation lengths", "load F_z [kN]", "σ [m]")
+    right.set(title="Relaxation lengths", xlabel="load F_z [kN]", ylabel="σ [m]")
 
 
 def _curves(axes: Axes, x: np.ndarray, every: Sequence[np.ndarray], names: Sequence[str]) -> None:
     for number, (y, name) in enumerate(zip(every, names, strict=True)):
         axes.plot(x, y, **line_style(number), label=name)
-
-
-def _label(axes: Axes, title: str, across: str, up: str) -> None:
-    axes.set_title(title)
-    axes.set_xlabel(across)
-    axes.set_ylabel(up)
 
 
 def _nothing(axes: Axes, why: str) -> None:

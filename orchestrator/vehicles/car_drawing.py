@@ -11,7 +11,6 @@ from ..figures.style import QUIET, ROW, frame, line_style, new_figure
 from .handling import Handling
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -30,24 +29,22 @@ def draw_cars(cars: Sequence[Handling], title: str, note: str) -> Figure:
             frequencies = [mode.frequency for mode in car.yaw.values()]
             axes[3].plot(speeds, frequencies, **style)
             axes[3].plot(speeds, [mode.damping for mode in car.yaw.values()], **style | {"alpha": 0.5})
-        _label(axes[0], "Steering beyond geometry at 80 km/h", "a_y [m/s²]", "δ - L r / v_x [°]")
-        _label(axes[1], "Steady yaw gain", "speed [km/h]", "r / δ [1/s]")
-        _label(axes[2], "Roll at 80 km/h", "a_y [m/s²]", "φ [°]")
+        axes[0].set(
+            title="Steering beyond geometry at 80 km/h", xlabel="a_y [m/s²]", ylabel="δ - L r / v_x [°]"
+        )
+        axes[1].set(title="Steady yaw gain", xlabel="speed [km/h]", ylabel="r / δ [1/s]")
+        axes[2].set(title="Roll at 80 km/h", xlabel="a_y [m/s²]", ylabel="φ [°]")
         if not axes[2].get_lines():
             axes[2].text(
                 0.5, 0.5, "no roll angle here", transform=axes[2].transAxes, ha="center", color=QUIET
             )
-        _label(
-            axes[3], "Yaw mode: natural frequency, damping ratio (pale)", "speed [km/h]", "f_n [Hz], ζ [1]"
+        axes[3].set(
+            title="Yaw mode: natural frequency, damping ratio (pale)",
+            xlabel="speed [km/h]",
+            ylabel="f_n [Hz], ζ [1]",
         )
         for one in axes:
             one.set_ylim(bottom=0.0)
         handles = [axes[0].plot([], [], **line_style(i), label=car.plant)[0] for i, car in enumerate(cars)]
         frame(figure, 2 * 1.4 * ROW, handles, title, note)
     return figure
-
-
-def _label(axes: Axes, title: str, across: str, up: str) -> None:
-    axes.set_title(title)
-    axes.set_xlabel(across)
-    axes.set_ylabel(up)

@@ -19,7 +19,7 @@ import numpy as np
 from vocabulary.wheels import WHEELS
 
 from ..errors import SimulationError
-from ..evaluation.understeer import HALF, LEVELS, WINDOW, slope
+from ..evaluation.understeer import gradients
 from .proving import STEP, TORQUES, TestTrack
 
 SPEEDS = tuple(v / 3.6 for v in (40.0, 60.0, 80.0, 100.0, 120.0, 140.0))
@@ -172,9 +172,7 @@ def _turn(track: TestTrack, found: Handling) -> None:
     rate, speed = results["plant.yaw_rate"][after], results["plant.velocity_x"][after]
     extra = results["driver.steer_angle"][after] - found.wheelbase * rate / speed
     found.curve = a_y, extra
-    gradients = {level: slope(a_y, extra, level - HALF, level + HALF) for level in LEVELS}
-    gradients = {0.0: slope(a_y, extra, *WINDOW, cubic=True), **gradients}
-    found.steering = {level: gradient for level, gradient in gradients.items() if gradient is not None}
+    found.steering = {level: one for level, one in gradients(a_y, extra).items() if one is not None}
     if track.has(BODY[0]):
         found.roll = roll = results["plant.roll_angle"][after]
         low = a_y < 4.0

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ..errors import ScenarioError, WiringError
+from ..errors import WiringError
 from ..fmu.opener import Opener
-from ..fmu.search import find_fmu, find_folder
 from ..master.simulate import simulate_in_memory
 from ..plan import Fmu, Plan
 from ..results.read import Results
+from ..scenario import yaml_lines
 from ..scenario.load import load_scenario
 from ..scenario.overrides import is_path
-from ..scenario.yaml_lines import Document
 from ..tyres.axle_stiffness import cornering_stiffness
+from ..tyres.stand import KNOWN_BY, open_given, reader_of
 from ..wiring.make_plan import make_plan
-from ..wording import listed
 
 PLANTS = ("plant_fourteen_dof", "plant_eight_dof", "plant_seven_dof", "plant_two_dof")
 """In the order in which one is looked for that a file describes a car for."""
@@ -28,11 +27,8 @@ STEP = 0.002
 """Communication step [s]. Chosen: steady turns and yaw differ by less than 1e-4 from those at 1 ms."""
 TORQUES = "wheel_torque_fl"
 """An input of plants whose wheels are driven and braked."""
-
-
-OF_PLANTS = ("velocity_y", "yaw_rate", "acceleration_y", "vertical_load_fl", "slip_angle_fl")
-OF_TYRES = ("tyre_force_x_fl", "tyre_force_y_fl")
-"""Outputs by which they are known."""
+PLANT_KNOWN_BY = ("velocity_y", "yaw_rate", "acceleration_y", "vertical_load_fl", "slip_angle_fl")
+"""Variables of a plant."""
 
 
 @dataclass(frozen=True)
@@ -65,16 +61,9 @@ class TestTrack:
     @cached_property
     def plant_fmu(self) -> Fmu:
         """The plant's FMU."""
-        return self._opened(self.plant, "plant", OF_PLANTS)
-
-    def _opened(self, fmu: str, role: str, outputs: Iterable[str]) -> Fmu:
-        """Return an FMU that has to have some outputs."""
-        folder = Path() if is_path(fmu) else self.fmus or find_folder(self.place, opener=self.opener)
-        path = find_fmu(self._named(fmu), scenario=self.place, fmus=folder, opener=self.opener)
-        found = self.opener.open(path)
-        if missing := sorted({*outputs} - {variable.name for variable in found.of("output")}):
-            raise ScenarioError(f"{fmu}: this is no {role}: it has no output {listed(missing)}")
-        return found
+        return open_given(
+            self.plant, "plant", PLANT_KNOWN_BY, place=self.place, fmus=self.fmus, opener=self.opener
+        )
 
     def has(self, variable: str) -> bool:
         """Return whether the plant has a variable."""
@@ -83,8 +72,6 @@ class TestTrack:
     @cached_property
     def tyres(self) -> str:
         """The tyres' FMU: as told, or that which takes the file's tyre property files or stiffness."""
-        from ..scenario import yaml_lines
-
         data = yaml_lines.read(self.vehicle, what="vehicle file").data
         given = data if isinstance(data, dict) else {}
         if self.tyre or given.get("tyres"):
@@ -104,7 +91,7 @@ class TestTrack:
         Raises:
             YawbenchError: the file, the plant or the tyres are none, or do not go together.
         """
-        self._opened(self.tyres, "tyre", OF_TYRES)
+        open_given(self.tyres, "tyre", KNOWN_BY, place=self.place, fmus=self.fmus, opener=self.opener)
         units: dict[str, Any] = {"driver": dict(driver)}
         plant: dict[str, Any] = {"fmu": self._named(self.plant), "parameters": of_plant}
         inputs: dict[str, Any] = {}
@@ -128,7 +115,7 @@ class TestTrack:
             "inputs": inputs,
             "connections": connections,
         }
-        loaded = load_scenario(self.place, read=self._read(data))
+        loaded = load_scenario(self.place, read=reader_of(data))
         return make_plan(loaded, fmus=self.fmus, opener=self.opener, measure=cornering_stiffness)
 
     def drive(self, driver: Mapping[str, Any], speed: float, stop_time: float, **of_plant: float) -> Results:
@@ -141,14 +128,6 @@ class TestTrack:
 
     def _named(self, fmu: str) -> str:
         return os.path.abspath(fmu) if is_path(fmu) else fmu
-
-    def _read(self, data: dict[str, Any]) -> Any:
-        from ..scenario import yaml_lines
-
-        def read(path: Path, *, what: str) -> Document:
-            return yaml_lines.read(path, what=what) if what == "vehicle file" else Document(path, data=data)
-
-        return read
 
 
 def fitting_plant(vehicle: Path, tyre: str, fmus: Path | None, opener: Opener) -> str:

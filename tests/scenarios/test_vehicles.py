@@ -189,9 +189,12 @@ def test_the_command_prints_tables_and_draws_one_figure(fmus, tmp_path, capsys):
         ((str(file("mid_size")), "--plant", "plant_nine_dof"), "no FMU 'plant_nine_dof'"),
         (
             (str(file("mid_size")), "--plant", "tyre_dugoff"),
-            "tyre_dugoff: this is no plant: it has no output",
+            "tyre_dugoff: this is no plant: it has no velocity_y",
         ),
-        ((str(file("mid_size")), "--tyre", "driver_sine"), "driver_sine: this is no tyre: it has no output"),
+        (
+            (str(file("mid_size")), "--tyre", "driver_sine"),
+            "driver_sine: this is no tyre: it has no tyre_force_x_fl",
+        ),
         (
             (str(file("esp_saloon")), "--plant", "plant_fourteen_dof"),
             "takes its car from the vehicle file, which",
