@@ -27,11 +27,13 @@ from .compiler import compile_launcher
 from .mark import Mark, read_mark
 from .packing import to_bytes
 from .presentation import CREDITS, presented
-from .recipe import TOOL, PythonRecipe, Recipe, natural_name
+from .recipe import TOOL, PythonRecipe, natural_name
 
 HERE = Path(__file__).resolve().parent
 COMPONENTS = HERE.parent / "components"
 
+Recipe = PythonRecipe | CRecipe
+"""One FMU that can be built."""
 Progress = Callable[[str, str], None]
 """Called with the name of an FMU and what became of it: built, current, removed or failed."""
 

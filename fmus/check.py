@@ -102,25 +102,17 @@ def _defects(fmu: str, *modules: str) -> list[str]:
 
 
 def _load(description: Any, folder: str) -> list[str]:
-    from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+    from fmpy import instantiate_fmu
 
     messages: list[str] = []
 
     def log(environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
         if status >= 3:
-            messages.append(message.decode(errors="replace").replace("%%", "%"))
+            messages.append(message.decode(errors="replace"))
 
-    callbacks = fmi2CallbackFunctions()
-    callbacks.logger = fmi2CallbackLoggerTYPE(log)
     wrong: list[str] = []
     try:
-        unit = FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=folder,
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName=description.modelName,
-        )
-        unit.instantiate(callbacks=callbacks)
+        unit = instantiate_fmu(folder, description, "CoSimulation", logger=log)
         unit.setupExperiment()
         getters: dict[str, tuple[Callable, Callable]] = {
             "Real": (unit.getReal, float),

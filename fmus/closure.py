@@ -33,6 +33,8 @@ PYTHONFMU = Path(pythonfmu.__file__).resolve().parent
 """Folder of the installed PythonFMU."""
 BESIDE = {"pythonfmu": PYTHONFMU, "vocabulary": Path(vocabulary.__file__).resolve().parent}
 """Package that an FMU carries a copy of beside the components -> its folder."""
+_ABSOLUTE = re.compile(rf"\bfrom\s+(?:components\b\.?|(?=(?:{'|'.join(BESIDE)})\.))")
+"""How an import begins that is made relative."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +152,8 @@ class Sources:
                 outside += [(top, where)] if (top := _outside(node.module or "", where)) else []
                 continue
             if node.level == 0:
-                _make_relative(lines, node, levels=len(package) + 1)
+                dots = "." * (len(package) + 1)  # relative, in the line as it stands
+                lines[node.lineno - 1] = _ABSOLUTE.sub(f"from {dots}", lines[node.lineno - 1], 1)
             modules = [base] + [(*base, a.name) for a in node.names if self.file((*base, a.name)).exists()]
             imports += [(module, f"{where}: ") for module in modules]
         return _Module(
@@ -214,22 +217,13 @@ def _outside(name: str, where: str) -> str | None:
 def _declared_packages(tree: ast.Module) -> tuple[str, ...]:
     """Return what the classes of a module declare as `host_packages`, which must be written out."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None:
-            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            if any(isinstance(target, ast.Name) and target.id == "host_packages" for target in targets):
+        match node:
+            case ast.Assign([ast.Name("host_packages")], value) | ast.AnnAssign(
+                ast.Name("host_packages"), _, ast.expr() as value
+            ):
                 with contextlib.suppress(ValueError, TypeError):
-                    return tuple(map(str, ast.literal_eval(node.value)))
+                    return tuple(map(str, ast.literal_eval(value)))
     return ()
-
-
-def _make_relative(lines: list[str], node: ast.ImportFrom, *, levels: int) -> None:
-    """Rewrite `from components.fmi.x` or `from pythonfmu.x` in place, keeping the line."""
-    line = lines[node.lineno - 1].encode()
-    head, tail = line[: node.col_offset].decode(), line[node.col_offset :].decode()
-    dots = "." * levels
-    tail = re.sub(r"^from\s+components(\.|\b)", f"from {dots}", tail)
-    tail = re.sub(rf"^from\s+({'|'.join(BESIDE)})\.", rf"from {dots}\1.", tail)
-    lines[node.lineno - 1] = head + tail
 
 
 def _shown(file: Path) -> str:

@@ -1,4 +1,4 @@
-"""The launcher as a binary: compiled by cc once per source and compiler, then kept in a cache."""
+"""C sources as shared libraries; the launcher is kept in a cache, once per source and compiler."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
 from orchestrator.cache import keep, recall
+from orchestrator.errors import BuildError
 
 HERE = Path(__file__).resolve().parent
 SOURCES = ("launcher.c", "fmi2.h", "find_python.h", "text.h")
@@ -33,6 +35,46 @@ def compiler_tools() -> tuple[str, str]:
     return "env:CC", f"tool:{compiler_command()[0]}"
 
 
+def compiler_version(command: Sequence[str]) -> str:
+    """Return what a compiler says of itself.
+
+    Raises:
+        BuildError: there is none.
+    """
+    if shutil.which(command[0]) is None:
+        raise BuildError(f"there is no C compiler ({command[0]}); CC can name one")
+    return subprocess.run([*command, "--version"], capture_output=True, text=True, check=False).stdout
+
+
+def compile_library(command: Sequence[str], sources: Mapping[str, bytes], *arguments: str) -> bytes:
+    """Return the shared library made of files; what the compiler warns of goes to stderr.
+
+    Args:
+        command: how the compiler is called.
+        sources: name -> content. Names are relative: bytes must not depend on where the files stand.
+        arguments: what is compiled, and how.
+
+    Raises:
+        BuildError: what the compiler says is wrong.
+    """
+    with tempfile.TemporaryDirectory(prefix="yawbench_") as temporary:
+        for name, content in sources.items():
+            Path(temporary, name).write_bytes(content)
+        done = subprocess.run(
+            [*command, *arguments, "-o", "made.so"],
+            cwd=temporary,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if done.returncode != 0:
+            lines = [line for line in done.stderr.splitlines() if "error" in line or "undefined" in line]
+            raise BuildError(lines or [f"the C compiler failed: exit status {done.returncode}"])
+        if done.stderr:
+            print(done.stderr.rstrip(), file=sys.stderr)
+        return Path(temporary, "made.so").read_bytes()
+
+
 def compile_launcher() -> tuple[bytes | None, str]:
     """Return the launcher for this machine, or None with the reason why there is none.
 
@@ -45,30 +87,14 @@ def compile_launcher() -> tuple[bytes | None, str]:
 def _launcher(command: tuple[str, ...]) -> tuple[bytes | None, str]:
     if sys.platform != "linux" or platform.machine() != "x86_64":
         return None, f"it is for Linux on x86-64, this is {platform.system()} on {platform.machine()}"
-    compiler = shutil.which(command[0])
-    if compiler is None:
-        return None, f"there is no C compiler ({command[0]})"
-    version = subprocess.run([*command, "--version"], capture_output=True, text=True, check=False).stdout
-    content = hashlib.sha256("\0".join([*command, version, *FLAGS, *LIBRARIES]).encode())
-    for name in SOURCES:
-        content.update((HERE / name).read_bytes())
-    key = content.hexdigest()[:16]
-    kept = recall(STORE, key)
-    if kept is not None:
-        return kept, ""
-    with tempfile.TemporaryDirectory() as temporary:
-        made = Path(temporary) / "launcher.so"
-        # Relative names: what the compiler writes must not depend on where the sources stand.
-        done = subprocess.run(
-            [*command, *FLAGS, "launcher.c", "-o", str(made), *LIBRARIES],
-            cwd=HERE,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        if done.returncode != 0:
-            lines = [line for line in done.stderr.splitlines() if "error" in line]
-            return None, f"the C compiler failed: {(lines or [f'exit status {done.returncode}'])[0]}"
-        binary = made.read_bytes()
-    keep(STORE, key, binary)
+    sources = {name: (HERE / name).read_bytes() for name in SOURCES}
+    try:
+        said = "\0".join([*command, compiler_version(command), *FLAGS, *LIBRARIES])
+        key = hashlib.sha256(b"".join([said.encode(), *sources.values()])).hexdigest()[:16]
+        binary = recall(STORE, key)
+        if binary is None:
+            binary = compile_library(command, sources, *FLAGS, SOURCES[0], *LIBRARIES)
+            keep(STORE, key, binary)
+    except BuildError as error:
+        return None, error.problems[0]
     return binary, ""

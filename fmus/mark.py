@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
+import zipfile
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -12,12 +12,6 @@ from typing import Any
 from orchestrator.files import check_regular
 
 _SIGN = b"yawbench "
-_END = b"PK\5\6"
-"""Of a zip archive: signature of the record that its comment belongs to."""
-_COMMENT = 18
-"""Bytes of that record between its signature and the comment."""
-_LONGEST = len(_END) + _COMMENT + 0xFFFF
-"""Bytes of that record with the longest comment."""
 
 
 @dataclass(frozen=True)
@@ -47,14 +41,11 @@ def read_mark(fmu: Path) -> Mark | None:
     """Return the mark of an FMU that was built here, None for any other file, and for none."""
     try:
         check_regular(fmu)
-        with open(fmu, "rb", buffering=0) as file:
-            file.seek(max(0, os.fstat(file.fileno()).st_size - _LONGEST))
-            end = file.read()
-    except (OSError, ValueError):
+        with zipfile.ZipFile(fmu) as archive:
+            comment = archive.comment
+    except Exception:  # zipfile raises whatever it meets in what is no archive
         return None
-    _, found, record = end.rpartition(_END)  # zipfile would read the whole directory
-    comment = record[_COMMENT:]
-    if not found or not comment.startswith(_SIGN):
+    if not comment.startswith(_SIGN):
         return None
     try:
         return Mark(**json.loads(comment[len(_SIGN) :]))

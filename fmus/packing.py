@@ -1,4 +1,4 @@
-"""From what PythonFMU's builder made to the archive that is an FMU: complete, minimal, reproducible.
+"""The archive that is an FMU: complete, minimal, reproducible.
 
 The same sources give the same bytes, wherever and whenever they are built: files in sorted order,
 stored without compression (compressors differ), with one date and one set of permissions. The GUID
@@ -12,48 +12,48 @@ import io
 import uuid
 import zipfile
 from collections.abc import Mapping
-from pathlib import Path
 from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
+from .closure import PYTHONFMU
 from .mark import Mark
 
+DESCRIPTION = "modelDescription.xml"
 _DATE = (1980, 1, 1, 0, 0, 0)
+LIBRARIES = sorted(PYTHONFMU.glob("resources/binaries/*/*"))
+"""PythonFMU's, in a folder for each platform."""
 PYTHONFMU_LIBRARY = "libpythonfmu-export.so"
 """Name of PythonFMU's library beside the launcher; the launcher opens it by this name."""
 
 
-def pack(built: Path, *, name: str, version: str, launcher: bytes | None) -> dict[str, bytes]:
-    """Return path -> content of the FMU `name` from the archive that PythonFMU's builder wrote.
+def pack(
+    resources: Mapping[str, str], description: Element, *, name: str, version: str, launcher: bytes | None
+) -> dict[str, bytes]:
+    """Return path -> content of the FMU `name`.
 
-    The builder's own copy of PythonFMU is left out: the package of the component carries what it
-    needs under a name of its own. With a `launcher`, it becomes the binary for Linux.
+    Args:
+        resources: path -> text of what is for Python.
+        description: the model description.
+        name: of the FMU.
+        version: of the FMU.
+        launcher: the binary for Linux in place of PythonFMU's library, which it opens.
     """
-    files: dict[str, bytes] = {}
-    with zipfile.ZipFile(built) as archive:
-        for path in archive.namelist():
-            if not path.startswith("resources/pythonfmu/"):
-                files[path] = archive.read(path)
-    binary = f"binaries/linux64/{name}.so"
+    files = {f"resources/{path}": text.encode() for path, text in sorted(resources.items())}
+    description.set("version", version)
+    description.set("guid", "")
+    content = hashlib.sha256(ElementTree.tostring(description))
+    for path, data in files.items():
+        content.update(path.encode() + b"\0" + hashlib.sha256(data).digest())
+    description.set("guid", f"{{{uuid.UUID(bytes=content.digest()[:16])}}}")
+    ElementTree.indent(description)
+    files[DESCRIPTION] = ElementTree.tostring(description, encoding="UTF-8", xml_declaration=True) + b"\n"
+    for library in LIBRARIES:
+        files[f"binaries/{library.parent.name}/{name}{library.suffix}"] = library.read_bytes()
     if launcher is not None:
+        binary = f"binaries/linux64/{name}.so"
         files[f"binaries/linux64/{PYTHONFMU_LIBRARY}"] = files[binary]
         files[binary] = launcher
-    files["modelDescription.xml"] = _description(files, version)
     return files
-
-
-def _description(files: Mapping[str, bytes], version: str) -> bytes:
-    root = ElementTree.fromstring(files["modelDescription.xml"])
-    for element in root.iter():  # the builder has indented already, differently in each Python
-        element.text = element.tail = None
-    root.set("version", version)
-    root.set("guid", "")
-    content = hashlib.sha256(ElementTree.tostring(root))
-    for path, data in sorted(files.items()):
-        if path.startswith("resources/"):
-            content.update(path.encode() + b"\0" + hashlib.sha256(data).digest())
-    root.set("guid", f"{{{uuid.UUID(bytes=content.digest()[:16])}}}")
-    ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
 
 
 def to_bytes(files: Mapping[str, bytes], mark: Mark) -> bytes:

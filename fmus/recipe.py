@@ -1,4 +1,4 @@
-"""Recipes: how one unit, in Python or in C, becomes the files of an FMU."""
+"""How a component in Python becomes the files of an FMU; `c.c_recipe` is its like for units in C."""
 
 from __future__ import annotations
 
@@ -9,53 +9,25 @@ from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from components.fmi.roles import ROLES
 from orchestrator.errors import BuildError
 
-from .closure import PYTHONFMU, Parts, Sources
+from .closure import Parts, Sources
 from .compiler import compile_launcher, compiler_tools
 from .evidence import Looks
-from .packing import pack
-from .presentation import icon
-from .staging import missing_signals, staged, variant
+from .packing import LIBRARIES, pack
+from .presentation import PAGE, icon
+from .staging import entry_module, missing_signals, staged, variant
 
 TOOL = f"yawbench {version('yawbench')}, pythonfmu {version('pythonfmu')}"
 HERE = Path(__file__).resolve().parent
 
 
-class Recipe(Protocol):
-    """One FMU that can be built. All raise BuildError with what is wrong with the sources."""
-
-    @property
-    def name(self) -> str:
-        """Name of the FMU."""
-
-    @property
-    def source(self) -> Path:
-        """The file, or the folder of a unit in C."""
-
-    @property
-    def role(self) -> str:
-        """Such as "controller"."""
-
-    def listing(self) -> dict[str, str]:
-        """Return path -> text of what somebody has written for it alone."""
-
-    def key(self) -> str:
-        """Return a hash of all that decides what the FMU's bytes are."""
-
-    def evidence(self) -> dict[str, str]:
-        """Return what the key follows from, cheap to look at (see `evidence`)."""
-
-    def make(self) -> tuple[dict[str, bytes], tuple[str, ...]]:
-        """Return the files of the archive, and the names of the Python modules among them."""
-
-
 @dataclass(frozen=True)
 class PythonRecipe:
-    """A component."""
+    """A component. All raise BuildError with what is wrong with the sources."""
 
     name: str
     module: Parts
@@ -71,6 +43,7 @@ class PythonRecipe:
         return ROLES[self.module[0]].name
 
     def listing(self) -> dict[str, str]:
+        """Return path -> text of what somebody has written for it alone."""
         path = "/".join(self.module) + ".py"
         return {path: self._files[path]}
 
@@ -79,34 +52,41 @@ class PythonRecipe:
         return self.sources.closure(self.module)
 
     def key(self) -> str:
+        """Return a hash of all that decides what the FMU's bytes are."""
         parts = [self.name, ".".join(self.module), json.dumps(dict(self.defaults)), _builder(self.role)]
         parts += [hashlib.sha256(compile_launcher()[0] or b"").hexdigest(), _hash(self._files)]
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
     def evidence(self) -> dict[str, str]:
+        """Return what the key follows from, cheap to look at (see `evidence`)."""
         self._files  # noqa: B018 - found once, with its evidence
-        tools = [f"tool:{file}" for file in _from_pythonfmu()]
+        tools = [f"tool:{file}" for file in LIBRARIES]
         return self.sources.evidence[self.module] | Looks().evidence(
             [*sorted(HERE.glob("*.[pch]*")), *icon(self.role), *tools, *compiler_tools()]
         )
 
     def make(self) -> tuple[dict[str, bytes], tuple[str, ...]]:
+        """Return the files of the archive, and the names of the Python modules among them."""
         module, files = self.module, self._files
         if self.defaults or self.name != natural_name(module):
-            with staged(files, "yawbench_variant", "yawbench_variant_entry") as stage:
+            with staged(files, "yawbench_variant") as stage:
                 text = variant(stage.component(module), self.name, self.defaults)
             module = (*module[:-1], f"{module[-1]}_variant")
             files = files | {"/".join(module) + ".py": text}
         digest = _hash(files)[:12]
         package, entry = f"yawbench_{digest}", f"{self.name}_{digest}"
-        with staged(files, package, entry) as stage:
+        with staged(files, package) as stage:
             component = stage.component(module)
             problems = missing_signals(ROLES[module[0]], component.variables)
             if problems:
                 raise BuildError(problems)
-            built = stage.build(self.name, component)
-            launcher, _ = compile_launcher()
-            return pack(built, name=self.name, version=digest, launcher=launcher), (package, entry)
+            description = stage.description(component)
+        resources = {f"{package}/{path}": text for path, text in files.items()}
+        resources[f"{entry}.py"] = entry_module(self.name, component)
+        resources["slavemodule.txt"] = entry
+        launcher, _ = compile_launcher()
+        packed = pack(resources, description, name=self.name, version=digest, launcher=launcher)
+        return packed, (package, entry)
 
 
 def natural_name(module: Parts) -> str:
@@ -118,13 +98,9 @@ def natural_name(module: Parts) -> str:
 def _builder(role: str) -> str:
     """Return a hash of this builder, of what it takes from PythonFMU, and of the icon of a role."""
     content = hashlib.sha256(TOOL.encode())
-    for file in [*sorted(HERE.glob("*.py")), *_from_pythonfmu(), *icon(role)]:
+    for file in [*sorted(HERE.glob("*.py")), PAGE, *LIBRARIES, *icon(role)]:
         content.update(file.read_bytes())
     return content.hexdigest()
-
-
-def _from_pythonfmu() -> list[Path]:
-    return [*sorted(PYTHONFMU.glob("resources/binaries/*/*")), PYTHONFMU / "builder.py"]
 
 
 def _hash(files: Mapping[str, str]) -> str:

@@ -1,6 +1,6 @@
 """A component's sources as a package of its own, imported apart from everything else.
 
-Building imports the component, because PythonFMU asks the class for its model description. Its
+Building imports the component, because its class gives the model description. Its
 modules carry the name `yawbench_<hash>`, are taken out of `sys.modules` again afterwards, and
 modules of the same name that are in use (an FMU that is loaded in this process) are put back.
 """
@@ -13,10 +13,10 @@ import tempfile
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-from pythonfmu import FmuBuilder
+from xml.etree.ElementTree import Element
 
 from components.fmi.roles import Role
 from orchestrator.errors import BuildError
@@ -96,13 +96,12 @@ def apart(*packages: str) -> Iterator[None]:
         sys.modules.update(in_use)
 
 
+@dataclass(frozen=True)
 class Stage:
     """A folder with the package of one component, for as long as the context lasts."""
 
-    def __init__(self, folder: Path, package: str, entry: str) -> None:
-        self.folder = folder
-        self.package = package
-        self.entry = entry
+    folder: Path
+    package: str
 
     def component(self, module: Parts) -> type[Any]:
         """Return the component class that a module of the package defines.
@@ -127,27 +126,17 @@ class Stage:
             raise BuildError(f"defines {'components ' + names if names else 'no component'}; one is right")
         return final[0]
 
-    def build(self, name: str, component: type[Any]) -> Path:
-        """Let PythonFMU's builder write the FMU `name`; return its path."""
-        script = self.folder / f"{self.entry}.py"
-        module = component.__module__.partition(".")[2]
-        packages = component.host_packages
-        script.write_text(
-            ENTRY.format(
-                name=name,
-                package=self.package,
-                module=module,
-                component=component.__name__,
-                needs=NEEDS.format(name=name, packages=packages) if packages else "",
-            ),
-            "utf-8",
-        )
+    def description(self, component: type[Any]) -> Element:
+        """Return the model description of a component.
+
+        Raises:
+            BuildError: it cannot be made.
+        """
         try:
-            return FmuBuilder.build_FMU(
-                script, dest=self.folder / "built", project_files=[self.folder / self.package]
-            )
+            made: Element = component(instance_name="described", resources=str(self.folder)).to_xml()
         except (Exception, SystemExit) as error:
             raise BuildError(self.explain(error)) from None
+        return made
 
     def explain(self, error: BaseException) -> str:
         """Return an exception as one sentence with the file and line of the package it came from."""
@@ -166,13 +155,9 @@ _MACHINERY = ("fmi/component.py", "fmi/variables.py")
 
 
 @contextmanager
-def staged(files: Mapping[str, str], package: str, entry: str) -> Iterator[Stage]:
-    """Write `files` as the package `package` into a temporary folder that can be imported from.
-
-    The package's own copy of PythonFMU stands in for the installed one here, so that PythonFMU's
-    builder recognises the component.
-    """
-    with tempfile.TemporaryDirectory(prefix="yawbench_") as temporary, apart(package, entry):
+def staged(files: Mapping[str, str], package: str) -> Iterator[Stage]:
+    """Write `files` as the package `package` into a temporary folder that can be imported from."""
+    with tempfile.TemporaryDirectory(prefix="yawbench_") as temporary, apart(package):
         folder = Path(temporary).resolve()
         for path, text in files.items():
             file = folder / package / path
@@ -180,9 +165,15 @@ def staged(files: Mapping[str, str], package: str, entry: str) -> Iterator[Stage
             file.write_bytes(text.encode())
         sys.path.insert(0, str(folder))
         importlib.invalidate_caches()
-        for name in [name for name in sys.modules if name.partition(".")[0] == "pythonfmu"]:
-            sys.modules[f"{package}.{name}"] = sys.modules[name]
-        yield Stage(folder, package, entry)
+        yield Stage(folder, package)
+
+
+def entry_module(name: str, component: type[Any]) -> str:
+    """Return the source of the module that PythonFMU's library loads in the FMU `name`."""
+    package, _, module = component.__module__.partition(".")
+    packages = component.host_packages
+    needs = NEEDS.format(name=name, packages=packages) if packages else ""
+    return ENTRY.format(name=name, package=package, module=module, component=component.__name__, needs=needs)
 
 
 def variant(component: type[Any], name: str, defaults: Mapping[str, Any]) -> str:

@@ -25,7 +25,7 @@ from .evidence import Looks, content_digest
 from .mark import Mark, read_mark
 
 if TYPE_CHECKING:
-    from .recipe import Recipe
+    from .build import Recipe
 
 HERE = Path(__file__).resolve().parent
 KEYS = "keys"
@@ -94,10 +94,7 @@ class Upkeep:
 
     def _recipe(self, archive: Path, mark: Mark) -> Recipe | None:
         """Return how an FMU is built, None if its source is not here."""
-        from .build import (  # takes a tenth of a second; nobody waits if all is current
-            find_recipes,
-            recipe_of,
-        )
+        from .build import find_recipes, recipe_of  # slow to import, and not needed if all is current
 
         if mark.is_component:
             if not mark.source and not _is_at_home(archive, mark):

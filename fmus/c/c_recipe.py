@@ -9,11 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-import subprocess
 import sys
-import tempfile
 import uuid
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
@@ -22,10 +19,11 @@ from components.fmi.roles import ROLES
 from orchestrator.errors import BuildError
 from orchestrator.fmu.binary import platform
 
-from ..compiler import compiler_command, compiler_tools
+from ..compiler import compile_library, compiler_command, compiler_tools, compiler_version
 from ..evidence import Looks
-from ..presentation import icon
-from .declaration import DESCRIPTION, header, read_declaration
+from ..packing import DESCRIPTION
+from ..presentation import PAGE, icon
+from .declaration import header, read_declaration
 
 HERE = Path(__file__).resolve().parent
 SHARED = (
@@ -33,8 +31,10 @@ SHARED = (
     HERE / "declaration.py",
     HERE / "unit.h",
     HERE.parent / "fmi2.h",
+    HERE.parent / "compiler.py",
     HERE.parent / "packing.py",
     HERE.parent / "presentation.py",
+    PAGE,
 )
 """What has a say in the FMU of every unit in C."""
 FLAGS = ("-std=c11", "-O2", "-Wall", "-Wextra", "-Wno-unused-parameter", "-fPIC", "-shared")
@@ -83,8 +83,9 @@ class CRecipe:
         return {file.name: file.read_text("utf-8", "replace") for file in self._files()[1:]}
 
     def key(self) -> str:
-        compiler = _compiler()
-        versions = [_version(compiler), _version([TO_WINDOWS]) if _reaches_windows() else "", *WINDOWS]
+        compiler = compiler_command()
+        to_windows = compiler_version([TO_WINDOWS]) if _reaches_windows() else ""
+        versions = [compiler_version(compiler), to_windows, *WINDOWS]
         content = hashlib.sha256("\0".join([self.name, *compiler, *versions, *FLAGS, *EXACT]).encode())
         for file in [*SHARED, *icon(self.role), *self._files()]:
             data = file.read_bytes()
@@ -115,40 +116,32 @@ class CRecipe:
         if self._twin.exists():
             folder = self.source
             raise BuildError(f"there are both {folder.name}.py and {folder.name}/ in {folder.parent}")
-        compiler = _compiler()
         description, *code = self._files()
         sources = {file.name: file.read_bytes() for file in code}
-        if not any(source.endswith(".c") for source in sources):
+        units = [name for name in sources if name.endswith(".c")]
+        if not units:
             raise BuildError(f"{self.source} holds no C file")
         role = ROLES[self.source.parent.name]
         root, variables = read_declaration(description.read_bytes(), self.name, role)
         root.set("guid", _guid(root, sources))
-        declared = header(variables, root.get("guid", ""))
+        sources["variables.h"] = header(variables, root.get("guid", "")).encode()
+        common = [*FLAGS, *EXACT, "-I.", f"-I{HERE}", f"-I{HERE.parent}", *units, "-lm"]
         system, suffix = platform()
+        own = LINUX if sys.platform == "linux" else ()
         files = {
             DESCRIPTION: ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n",
-            f"binaries/{system}/{self.name}{suffix}": _compile(
-                compiler, sources, declared, LINUX if sys.platform == "linux" else ()
+            f"binaries/{system}/{self.name}{suffix}": compile_library(
+                compiler_command(), sources, *own, *common
             ),
         }
         if _reaches_windows():
-            files[f"binaries/win64/{self.name}.dll"] = _compile([TO_WINDOWS], sources, declared, WINDOWS)
+            library = compile_library([TO_WINDOWS], sources, *WINDOWS, *common)
+            files[f"binaries/win64/{self.name}.dll"] = library
         return files, ()
 
 
 def _reaches_windows() -> bool:
     return sys.platform == "linux" and shutil.which(TO_WINDOWS) is not None
-
-
-def _version(compiler: Sequence[str]) -> str:
-    return subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False).stdout
-
-
-def _compiler() -> list[str]:
-    command = compiler_command()
-    if shutil.which(command[0]) is None:
-        raise BuildError(f"there is no C compiler ({command[0]}); CC can name one")
-    return command
 
 
 def _guid(root: ElementTree.Element, sources: dict[str, bytes]) -> str:
@@ -157,24 +150,3 @@ def _guid(root: ElementTree.Element, sources: dict[str, bytes]) -> str:
     for name, data in sources.items():
         content.update(name.encode() + b"\0" + hashlib.sha256(data).digest())
     return f"{{{uuid.UUID(bytes=content.digest()[:16])}}}"
-
-
-def _compile(
-    compiler: list[str], sources: dict[str, bytes], header: str, system_flags: Sequence[str]
-) -> bytes:
-    """Return the shared library; what the compiler warns of goes to stderr."""
-    flags = [*FLAGS, *EXACT, *system_flags]
-    with tempfile.TemporaryDirectory(prefix="yawbench_") as temporary:
-        for name, data in sources.items():  # relative names: bytes must not depend on where they stand
-            Path(temporary, name).write_bytes(data)
-        Path(temporary, "variables.h").write_text(header, encoding="utf-8")
-        files = [name for name in sources if name.endswith(".c")]
-        includes = ["-I.", f"-I{HERE}", f"-I{HERE.parent}"]
-        command = [*compiler, *flags, *includes, *files, "-o", "unit.so", "-lm"]
-        done = subprocess.run(command, cwd=temporary, capture_output=True, text=True, check=False)
-        if done.returncode != 0:
-            lines = [line for line in done.stderr.splitlines() if "error" in line or "undefined" in line]
-            raise BuildError(lines or [f"the C compiler failed with exit status {done.returncode}"])
-        if done.stderr:
-            print(done.stderr.rstrip(), file=sys.stderr)
-        return Path(temporary, "unit.so").read_bytes()

@@ -8,9 +8,8 @@ from xml.etree import ElementTree
 from components.fmi.roles import Role
 from orchestrator.errors import BuildError
 
+from ..packing import DESCRIPTION
 from ..staging import missing_signals
-
-DESCRIPTION = "modelDescription.xml"
 
 
 @dataclass(frozen=True)
