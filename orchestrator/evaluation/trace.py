@@ -155,14 +155,17 @@ def _column(value: object) -> object:
     return {"column": value} if isinstance(value, str) else value
 
 
+Unit = Annotated[str, AfterValidator(_unit)]
+SignalName = Annotated[str, AfterValidator(_signal)]
+Kilograms = Annotated[float, BeforeValidator(_kilograms)]
+
+
 class ColumnSpec(Strict):
     """Where a signal stands in a file."""
 
-    column: str = Field(min_length=1, description="Its header, without the unit")
-    unit: Annotated[str, AfterValidator(_unit)] | None = Field(
-        None, description="Of its numbers; left out: as the header says"
-    )
-    sign: Literal[1, -1] = Field(1, description="-1: positive where ISO 8855 is negative")
+    column: str = Field(min_length=1)  # its header, without the unit
+    unit: Unit | None = None  # of its numbers; left out: as the header says
+    sign: Literal[1, -1] = 1  # -1: positive where ISO 8855 is negative
 
 
 AnyColumn = Annotated[ColumnSpec, BeforeValidator(_column)]
@@ -171,14 +174,10 @@ AnyColumn = Annotated[ColumnSpec, BeforeValidator(_column)]
 class MappingSpec(Strict):
     """Which columns of a measurement are which signals."""
 
-    time: AnyColumn = Field(ColumnSpec(column="time", unit=None, sign=1), description="Column of times")
-    signals: dict[Annotated[str, AfterValidator(_signal)], AnyColumn] = Field(
-        min_length=1, description="Signal -> column"
-    )
-    mass: Annotated[float, BeforeValidator(_kilograms)] | None = Field(
-        None, description="Of the car, with its unit"
-    )
-    friction: float | None = Field(None, gt=0, description="Of the road")
+    time: AnyColumn = ColumnSpec(column="time")
+    signals: dict[SignalName, AnyColumn] = Field(min_length=1)
+    mass: Kilograms | None = None  # of the car, with its unit
+    friction: float | None = Field(None, gt=0)  # of the road
 
 
 @reads("mapping of signals", ScenarioError)
@@ -195,12 +194,18 @@ def load_mapping(path: Path | str) -> MappingSpec:
     return spec
 
 
-def measured(path: Path, mapping: MappingSpec, label: str = "") -> Trace:
-    """Return what a file of measured columns holds, CSV, Parquet or ASAM MDF 4.
+def load_trace(path: Path, mapping: MappingSpec | None, label: str = "") -> Trace:
+    """Return what a folder of results holds, or a file of measured columns: CSV, Parquet or ASAM MDF 4.
 
     Raises:
-        ResultsError: it cannot be read, lacks a column, or a unit does not fit.
+        ResultsError: it cannot be read, lacks a column, a unit does not fit, or no mapping is given.
     """
+    if os.path.isdir(path):
+        return trace_of(load_results(path), label)
+    if mapping is None:
+        raise ResultsError(
+            f"{path}: is no folder of results; of a file of columns --signals says what is what"
+        )
     try:
         with reading_series(path):
             return _measured(SeriesFile(path), mapping, label or path.name, path.stem)
@@ -224,18 +229,3 @@ def _measured(file: SeriesFile, mapping: MappingSpec, label: str, title: str) ->
             values = np.interp(clock, times, values)  # channels of MDF have clocks of their own
         signals[name] = spec.sign * values
     return Trace(label, clock, signals, mapping.mass, mapping.friction, title=title)
-
-
-def load_trace(path: Path, mapping: MappingSpec | None, label: str = "") -> Trace:
-    """Return what a folder of results or a file of measured columns holds.
-
-    Raises:
-        ResultsError: it cannot be read, or is a file and no mapping is given.
-    """
-    if os.path.isdir(path):
-        return trace_of(load_results(path), label)
-    if mapping is None:
-        raise ResultsError(
-            f"{path}: is no folder of results; of a file of columns --signals says what is what"
-        )
-    return measured(path, mapping, label)
