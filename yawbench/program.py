@@ -123,8 +123,6 @@ class ProgramSlave:
         values = get_values([place.reference for place in places])
         return self._status(), values
 
-    look = fetch
-
     def setup(self, experiment: Experiment) -> Status:
         self._component.setup_experiment(experiment.start, experiment.stop, experiment.tolerance)
         return self._status()

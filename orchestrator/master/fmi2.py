@@ -5,11 +5,9 @@ from __future__ import annotations
 import ctypes
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 from fmpy import calloc, free
 from fmpy.fmi2 import (
     FMU2Slave,
@@ -22,10 +20,10 @@ from fmpy.fmi2 import (
     fmi2Terminated,
 )
 
-from ..plan import Place, Unit
-from .log import ERROR, OK, listen, receive
-from .slave import Buffers, Calls, Experiment, Status
-from .unit import FmuSlave, nothing_to_do
+from ..plan import Unit
+from .log import OK, listen, receive
+from .slave import Experiment, Status
+from .unit import FmuSlave
 
 
 class Fmi2Slave(FmuSlave):
@@ -55,42 +53,18 @@ class Fmi2Slave(FmuSlave):
             True,  # PythonFMU passes on no message at all without
         )
 
-    def connect(self, buffers: Buffers) -> Calls:
-        inputs, input_places, outputs, output_places, time, step = buffers
+    def _stepping(self, time: ctypes.c_double, step: ctypes.c_double) -> Callable[[], Status]:
         component = ctypes.c_void_p(self._component)
-        return Calls(
-            self._fast("SetReal", component, input_places, inputs),
-            functools.partial(self._raw("DoStep"), component, time, step, ctypes.c_int(1)),
-            self._fast("GetReal", component, output_places, outputs),
-        )
-
-    def _fast(
-        self, function: str, component: ctypes.c_void_p, places: Sequence[Place], values: np.ndarray
-    ) -> Callable[[], Status]:
-        if not places:
-            return nothing_to_do
-        buffer = (ctypes.c_double * len(places)).from_buffer(values.data)
-        count = ctypes.c_size_t(len(places))
-        return functools.partial(self._raw(function), component, _references(places), count, buffer)
-
-    def _exchange(self, verb: str, places: Sequence[Place], given: Sequence[Any]) -> tuple[Status, list[Any]]:
-        kind = places[0].type
-        buffer = (self.c_types[kind] * len(places))(*given)
-        function = self._function(verb + kind)
-        return function(self._component, _references(places), len(places), buffer), list(buffer)
+        return functools.partial(self._raw("DoStep"), component, time, step, ctypes.c_int(1))
 
     def setup(self, experiment: Experiment) -> Status:
         start, stop, tolerance = experiment
-        status = self.note(
-            self._function("SetupExperiment")(
-                self._component, tolerance is not None, tolerance or 0.0, start, True, stop
-            )
-        )
-        self._may_terminate = status < ERROR
-        return status
+        setup = self._function("SetupExperiment")
+        self._may_terminate = True
+        return setup(self._component, tolerance is not None, tolerance or 0.0, start, True, stop)
 
     def enter(self) -> Status:
-        return self.note(self._function("EnterInitializationMode")(self._component))
+        return self._function("EnterInitializationMode")(self._component)
 
     def ended(self) -> float | None:
         """Return how far the FMU has gone if it has answered Discard because it wants to end."""
@@ -103,10 +77,6 @@ class Fmi2Slave(FmuSlave):
         if self._has("GetRealStatus"):
             self._function("GetRealStatus")(self._component, fmi2LastSuccessfulTime, ctypes.byref(last))
         return last.value
-
-
-def _references(places: Sequence[Place]) -> Any:
-    return (ctypes.c_uint * len(places))(*(place.reference for place in places))
 
 
 def _log(environment, instance, status, category, text):

@@ -19,7 +19,7 @@ import numpy as np
 from ..errors import SimulationError
 from ..plan import Value, Variable, Wire
 from ..wording import listed
-from .log import FATAL, STATUS, WARNING, Log
+from .log import FATAL, STATUS, WARNING, Log, known
 from .memory import Memory, Station
 from .slave import Experiment, Status
 
@@ -161,8 +161,8 @@ def _read_back(
     """Yield variables of one type, the status of reading them, and their values."""
     for chosen in _by_type(station.unit.fmu.variables[name] for name in names):
         with log.deaf():
-            status, values = station.slave.look([v.place for v in chosen])
-        if status >= FATAL:
+            status, values = station.slave.fetch([v.place for v in chosen])
+        if known(status) >= FATAL:
             check(station.name, "reading back what was set", status)
         yield chosen, status, values
 

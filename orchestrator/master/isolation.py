@@ -20,7 +20,7 @@ import numpy as np
 from ..errors import ModelDescriptionError, SimulationError
 from ..plan import Place, Plan, Unit, Value
 from .exchange import GET, SET, STEP, Board, Garbled
-from .log import FATAL, OK, PROCESS, WARNING, Log
+from .log import FATAL, OK, PROCESS, WARNING, Log, known
 from .opening import SLAVES, open_unit
 from .process import Lost, UnitProcess
 from .slave import Buffers, Calls, Experiment, Slave, Status
@@ -150,17 +150,11 @@ class IsolatedSlave:
         if status > WARNING:
             return status
         function = f"{self._prefix}Set{places[0].type}"
-        return max(status, self._ask(function, FATAL, "put", list(places), list(values)))
+        return max(status, known(self._ask(function, FATAL, "put", list(places), list(values))))
 
     def fetch(self, places: Sequence[Place]) -> tuple[Status, list[Value]]:
-        return self._get("fetch", places)
-
-    def look(self, places: Sequence[Place]) -> tuple[Status, list[Value]]:
-        return self._get("look", places)
-
-    def _get(self, request: str, places: Sequence[Place]) -> tuple[Status, list[Value]]:
         failed: tuple[Status, list[Value]] = (FATAL, [0] * len(places))
-        return self._ask(f"{self._prefix}Get{places[0].type}", failed, request, list(places))
+        return self._ask(f"{self._prefix}Get{places[0].type}", failed, "fetch", list(places))
 
     def setup(self, experiment: Experiment) -> Status:
         return self._ask(f"{self._prefix}SetupExperiment", FATAL, "setup", experiment)
@@ -177,7 +171,7 @@ class IsolatedSlave:
         return self._ask(f"{self._prefix}GetBooleanStatus", None, "ended")
 
     def note(self, status: Status) -> Status:
-        return status  # the process has noted it
+        return self._ask("", status, "note", status)
 
     def _ask(self, function: str, failed: Any, request: str, *arguments: Any) -> Any:
         """Return the answer to a request, or `failed` if the process did not survive it."""

@@ -210,8 +210,8 @@ class Master:
         """Judge a call of the step from `k` - 1 to `k` that did not return OK."""
         operation = self.operation_of(k, call)
         station = self.memory.of[operation.unit]
-        status = station.slave.note(status)
         kind = station.slave.part(operation.kind)
+        status = station.slave.note(status)
         if status == WARNING:
             self._note_warning(operation.unit, WORDS[kind])
             return

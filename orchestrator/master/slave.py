@@ -57,9 +57,6 @@ class Slave(Protocol):
     def fetch(self, places: Sequence[Place]) -> tuple[Status, list[Value]]:
         """Return variables of one type."""
 
-    def look(self, places: Sequence[Place]) -> tuple[Status, list[Value]]:
-        """Return variables of one type; that the FMU refuses to tell them is not held against it."""
-
     def setup(self, experiment: Experiment) -> Status:
         """Tell the instance of the run."""
 
@@ -76,9 +73,9 @@ class Slave(Protocol):
         """
 
     def note(self, status: Status) -> Status:
-        """Remember a status, which decides how the instance may be ended, and return it.
+        """Remember what a call has returned, which decides how the instance may be ended, and return it.
 
-        A number that is no status comes back as UNKNOWN.
+        The master says so of every call that counts. A number that is no status comes back as UNKNOWN.
         """
 
     def free(self) -> None:

@@ -14,7 +14,7 @@ from ..errors import ModelDescriptionError, SimulationError
 from ..plan import Place, Unit
 from .exchange import FAILED, GET, REPLY, SET, STEP, Board, Channel
 from .guardian import stand_guard
-from .log import OK, WARNING
+from .log import OK, WARNING, known
 from .opening import open_unit
 from .relay import Relay
 from .slave import Buffers
@@ -63,13 +63,11 @@ class Worker:
             if not parts & part:
                 continue
             self._part.value = part
-            status = call()
-            if status != OK:
-                status = self._slave.note(status)
-                if status > answer % 16:
-                    answer = 16 * part + status
-                if status > WARNING:
-                    break
+            status = known(call())
+            if status > answer % 16:
+                answer = 16 * part + status
+            if status > WARNING:
+                break
         self._part.value = 0
         return answer
 

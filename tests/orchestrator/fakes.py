@@ -94,9 +94,6 @@ class FakeSlave:
 
     def fetch(self, places: Sequence[Place]) -> tuple[int, list[Any]]:
         self._refresh()
-        return self.look(places)
-
-    def look(self, places: Sequence[Place]) -> tuple[int, list[Any]]:
         return OK, [self.values[name] for name in self._named(places)]
 
     def setup(self, experiment: Experiment) -> int:
