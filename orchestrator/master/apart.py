@@ -15,18 +15,18 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import math
 import os
-import select
 import signal
 import sys
 import threading
 import time
+from functools import partial
 from typing import Any
 
 from .. import errors
 from ..errors import SimulationError
 from ..plan import Plan, Value
-from ..processes import how_it_ended
 from ..results.recorder import BLOCK, Block
 from ..wording import listed
 from .course import Opener, Progress, hand_over
@@ -35,11 +35,9 @@ from .interrupts import StopFlag, stop_requested_at
 from .log import MASTER, WARNING, Log
 from .master import Ended, Interrupted
 from .opening import open_unit
-from .process import CLOSING
+from .process import Lost, Process
 from .stepping import ENDED, FREE, PROGRESS, ROWS, TAKEN, WHERE, Shared, step_units
 
-LOOK_EVERY = 100
-"""Time between two looks whether the run is to stop [ms]."""
 ASK_AFTER, KILL_AFTER = 1.5, 3.0
 """Time after a wish to stop at which the process is asked where it is, and is killed [s]; chosen: a step is
 over long before."""
@@ -47,17 +45,15 @@ END_LIMIT = 10.0
 """Time that units may take to be terminated and freed [s]; the results are written by then."""
 
 
-class _Lost(Exception):
-    """The process has ended, or has been killed; the text says how, as "it died"."""
-
-
 def can_be_apart() -> bool:
     """Return whether a run can be stepped in a process of its own: signals are for the main thread."""
     return sys.platform == "linux" and threading.current_thread() is threading.main_thread()
 
 
-class CourseApart:
+class CourseApart(Process):
     """The course of one run in another process; arguments and methods are those of `course.Course`."""
+
+    unasked = (LOG, ROWS, PROGRESS, WHERE)
 
     def __init__(
         self,
@@ -81,6 +77,9 @@ class CourseApart:
         self._inputs: dict[str, Value] = {}
         self._where: tuple[str, str] | None = None
         self._process: int | None = None
+        self._status = 0
+        self._told_to_stop = False
+        self._deadline = math.inf
         self._suspects: list[str] = []  # units that may have ended the process
         self._told_end = False
         self._closed = False  # no more rows are written
@@ -92,11 +91,15 @@ class CourseApart:
     def go(self, opener: Opener) -> None:
         if opener is open_unit:
             self._suspects = [u.name for u in self.plan.units if u.fmu.compiled]
-        self._fork(opener)
+        asked, self._asking = os.pipe()
+        try:
+            self._process = self._start(partial(self._forked, opener, asked))
+        finally:
+            os.close(asked)
         try:
             self.passes, ending, failed = self._hear(ENDED)
-        except _Lost as lost:
-            raise self._death(str(lost)) from None
+        except Lost as lost:
+            raise self._death(lost) from None
         self._told_end = True
         if ending is not None:
             reason, unit, at = ending
@@ -105,46 +108,14 @@ class CourseApart:
             self._inputs = failed["inputs"]
             raise _rebuilt(failed)
 
-    def _fork(self, opener: Opener) -> None:
-        commands, writing = os.pipe()
-        reading, answers = os.pipe()
-        asked, self._asking = os.pipe()
+    def _forked(self, opener: Opener, asked: int, commands: int, answers: int) -> int:
         sys.stdout.flush()
         sys.stderr.flush()
         ctypes.CDLL(None).fflush(None)
-        self._process = os.fork()
-        if self._process == 0:
+        process = os.fork()
+        if process == 0:
             step_units(self.plan, opener, self._stop, self._shared, Channel(commands, answers), asked)
-        for descriptor in (commands, answers, asked):
-            os.close(descriptor)
-        self._channel = Channel(reading, writing, self._wait_for_more)
-        self._poll = select.poll()
-        self._poll.register(reading, select.POLLIN)
-        self._told_to_stop = False
-        self._deadline: float | None = None
-
-    def _hear(self, wanted: int) -> Any:
-        """Take what comes until it is the record that is wanted; return its content."""
-        try:
-            while True:
-                self._wait_for_more()
-                kind = self._channel.hear()
-                if kind is None:
-                    raise EOFError
-                if kind not in (LOG, ROWS, PROGRESS, WHERE, wanted):
-                    raise Garbled(f"byte {kind}")
-                content = self._channel.receive()
-                if kind == wanted:
-                    return content
-                self._take(kind, content)
-                self._check_time()
-        except EOFError:
-            raise _Lost(self._how_it_ended()) from None
-        except Garbled as error:
-            self._kill()
-            raise _Lost(
-                f"wrote into the pipe of the process of the run what is no message ({error})"
-            ) from None
+        return process
 
     def _take(self, kind: int, content: Any) -> None:
         match kind, content:
@@ -189,12 +160,6 @@ class CourseApart:
         self._record(min(count, BLOCK), others)
         self._closed = True
 
-    def _wait_for_more(self) -> None:
-        while not self._poll.poll(LOOK_EVERY):
-            self._check_time()
-            if self._has_ended() and not self._poll.poll(0):
-                raise EOFError  # something that a unit has started holds the pipe open
-
     def _check_time(self) -> None:
         """Tell the process to stop when that is wished; kill it if it does not, or takes too long to end."""
         now, asked = time.monotonic(), stop_requested_at()
@@ -204,46 +169,36 @@ class CourseApart:
         if asked is not None and now - asked > ASK_AFTER:
             with contextlib.suppress(OSError):
                 os.write(self._asking, b"?")
-        late = self._deadline is not None and now > self._deadline
-        if late or (asked is not None and now - asked > KILL_AFTER):
-            self._kill()
-            raise _Lost("did not come back")
+        if now > self._deadline or (asked is not None and now - asked > KILL_AFTER):
+            self.close()
+            raise Lost("did not come back")
 
     def _signal(self, number: int) -> None:
         if self._process is not None:
             with contextlib.suppress(OSError):
                 os.kill(self._process, number)
 
-    def _kill(self) -> int | None:
-        """Make sure that the process has ended, and return its status."""
-        if self._process is None:
-            return None
-        with contextlib.suppress(OSError):
-            os.killpg(self._process, signal.SIGKILL)  # with what units have started
-        self._signal(signal.SIGKILL)
-        _, status = os.waitpid(self._process, 0)
-        self._process = None
-        self._channel.close()
-        os.close(self._asking)
-        return os.waitstatus_to_exitcode(status)
-
-    def _has_ended(self) -> bool:
+    def _has_ended(self, within: float) -> bool:
         assert self._process is not None
-        return os.waitid(os.P_PID, self._process, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
-
-    def _how_it_ended(self) -> str:
-        """Return what the process did, which has closed its pipe."""
-        end = time.monotonic() + CLOSING
-        while not self._has_ended():
-            if time.monotonic() > end:
-                self._kill()
-                return "closed its pipe"
+        end = time.monotonic() + within
+        while os.waitid(os.P_PID, self._process, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
+            if time.monotonic() >= end:
+                return False
             time.sleep(0.001)
-        code = self._kill()
-        assert code is not None
-        return how_it_ended(code).rstrip(",")
+        return True
 
-    def _death(self, did: str) -> SimulationError:
+    def close(self) -> int:
+        if self._process is not None:
+            with contextlib.suppress(OSError):
+                os.killpg(self._process, signal.SIGKILL)  # with what units have started
+            self._signal(signal.SIGKILL)
+            _, status = os.waitpid(self._process, 0)
+            self._process, self._status = None, os.waitstatus_to_exitcode(status)
+            self._channel.close()
+            os.close(self._asking)
+        return self._status
+
+    def _death(self, lost: Lost) -> SimulationError:
         """Return what ends the run when its process did."""
         completed = self._shared.completed.value
         unit, doing = self._where or (None, "step" if completed >= 0 else "initialization")
@@ -251,7 +206,7 @@ class CourseApart:
             unit = self._suspects[0]
         period = next((u.period for u in self.plan.units if u.name == unit), 1)
         now = self.plan.time(max(0, completed + 1 - period if (completed + 1) % period == 0 else completed))
-        sentence = f"{doing} failed at t = {now:.9g} s: the process of the run {did}"
+        sentence = f"{doing} failed at t = {now:.9g} s: the process of the run {str(lost).rstrip(',')}"
         if unit is not None:
             sentence = f"{unit}: {sentence}"
         elif self._suspects:
@@ -272,19 +227,14 @@ class CourseApart:
                 self._hear(ENDED)
             self._channel.say(FREE)
             self._hear(REPLY)
-        except (_Lost, OSError) as lost:
+        except (Lost, OSError) as lost:
             unit = self._where[0] if self._where else ", ".join(self._suspects) or "the units"
             text = f"when units were terminated and freed, the process of the run {lost}"
             self._log.add(unit, WARNING, MASTER, text, self.plan.time(max(0, self._shared.completed.value)))
-        self._kill()
+        self.close()
 
 
 def _rebuilt(failed: dict[str, Any]) -> Exception:
     """Return the error that the other process has told of."""
-    if not failed["known"]:
-        return RuntimeError(failed["problems"][0])
-    if failed["kind"] == Interrupted.__name__:
-        return Interrupted(failed["problems"], unit=failed["unit"], time=failed["time"])
-    if failed["kind"] == SimulationError.__name__:
-        return SimulationError(failed["problems"], unit=failed["unit"], time=failed["time"])
-    return getattr(errors, failed["kind"])(failed["problems"])
+    kinds = {**vars(errors), Interrupted.__name__: Interrupted, RuntimeError.__name__: RuntimeError}
+    return kinds[failed["kind"]](failed["problems"], **failed["where"])

@@ -61,7 +61,7 @@ class IsolatedSlave:
             reason = lost.in_(f"{self._prefix}Instantiate or before")
             raise self._refused(f"{unit.name}: {unit.fmu.path} cannot be instantiated: {reason}") from None
         if failed is not None:
-            process.end()
+            process.close()
             kind, problems = failed
             if kind == ModelDescriptionError.__name__:
                 raise ModelDescriptionError(problems)
@@ -206,7 +206,7 @@ class IsolatedSlave:
                 lost.in_(f"{self._prefix}Terminate or {self._prefix}FreeInstance"),
             )
         else:
-            process.leave()
+            process.close()
 
 
 _BYTES = [bytes([parts]) for parts in range(SET + STEP + GET + 1)]
@@ -234,7 +234,7 @@ class Isolation:
 
     def __exit__(self, *error: object) -> None:
         for process in self._processes.values():
-            process.end()
+            process.close()
 
     def __call__(self, unit: Unit, log: Log, corrupted: set[Path]) -> Slave:
         """Return the unit's instance. One that returns Fatal spoils no other: they share nothing."""

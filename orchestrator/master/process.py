@@ -1,4 +1,7 @@
-"""The master's hold on the process of one isolated unit: started, asked, waited for, ended."""
+"""Processes at the other ends of two pipes: listened to, watched, ended.
+
+One is that of an isolated unit, here; the other that in which the units of a run are stepped (see `apart`).
+"""
 
 from __future__ import annotations
 
@@ -7,8 +10,9 @@ import os
 import select
 import subprocess
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 from ..processes import how_it_ended, python
 from .exchange import ANSWER, FAILED, LOG, REPLY, Channel, Garbled, shared_memory
@@ -16,27 +20,110 @@ from .interrupts import stop_requested_at
 
 START_LIMIT = 60.0
 """Time that a process may take to start [s]; chosen: Python is read from a slow disk in less."""
-LOOK_EVERY = 200
+LOOK_EVERY = 100
 """Time between two looks at the clock while an answer is waited for [ms]."""
 STOP_GRACE = 1.0
 """Time that a call may still take when the run is to stop [s]; chosen: as long as one likes to wait."""
 CLOSING = 1.0
 """Time in which a process that has closed its pipe is seen to end [s]."""
 GRACE = 5.0
-"""Time that it may take to end once the FMU has been freed [s]; it has nothing left to do."""
+"""Time that the process of a unit may take to end when nobody is left to ask it [s]."""
 
 
 class Lost(Exception):
-    """A process that gave no answer; it is gone, or has been ended because of that."""
+    """A process that gave no answer; it is gone, or has been ended because of that.
+
+    Args:
+        did: what it did, as "died of SIGSEGV".
+        late: it is the FMI function being called that did, or did not.
+    """
+
+    def __init__(self, did: str, *, late: bool = False) -> None:
+        super().__init__(did)
+        self._late = late
 
     def in_(self, function: str) -> str:
-        """Return what has happened, with the FMI function that was being called ("" for none)."""
-        where = f" in {function}" if function else " between two calls"
-        return str(self).format(where=where, function=function or "its process")
+        """Return what the process of a unit did, with the FMI function being called ("" for none)."""
+        if self._late:
+            return f"{function or 'its process'} {self}"
+        return f"its process {self}" + (f" in {function}" if function else " between two calls")
 
 
-class UnitProcess:
-    """The process of one unit. All calls that wait raise `Lost` if no answer comes."""
+class Process(ABC):
+    """The hold on a process. All calls that wait for it raise `Lost` if no answer comes."""
+
+    unasked: ClassVar[tuple[int, ...]]
+    """First bytes of the records that it may send at any time."""
+
+    def _start(self, start: Callable[[int, int], Any]) -> Any:
+        """Let `start` make it, given its ends of the pipes to read from and to write into."""
+        commands, writing = os.pipe()
+        reading, answers = os.pipe()
+        try:
+            return start(commands, answers)
+        finally:
+            os.close(commands)
+            os.close(answers)
+            self._channel = Channel(reading, writing, self._wait_for_more)
+            self._poll = select.poll()
+            self._poll.register(reading, select.POLLIN)
+
+    @abstractmethod
+    def _take(self, kind: int, content: Any) -> None:
+        """Take a record that came unasked; raise `Garbled` if it is none."""
+
+    @abstractmethod
+    def _check_time(self) -> None:
+        """Raise `Lost` if it has had time enough."""
+
+    @abstractmethod
+    def _has_ended(self, within: float) -> bool:
+        """Return whether it ends within a time [s]."""
+
+    @abstractmethod
+    def close(self) -> int:
+        """End it and all that it has started, whatever they are doing; return its exit status. Once."""
+
+    def _hear(self, wanted: int) -> Any:
+        """Take what comes until it is the record, or the answer of one byte, that is wanted; return it."""
+        try:
+            while True:
+                self._wait_for_more()
+                kind = self._channel.hear()
+                if kind is None:
+                    raise EOFError
+                if kind <= ANSWER and wanted == ANSWER:
+                    return kind
+                if kind != wanted and kind not in self.unasked:
+                    raise Garbled(f"byte {kind}")
+                content = self._channel.receive()
+                if kind == wanted:
+                    return content
+                self._take(kind, content)
+                self._check_time()
+        except EOFError:
+            ended = self._has_ended(CLOSING)
+            code = self.close()
+            raise Lost(how_it_ended(code) if ended else "closed the pipe to the master") from None
+        except Garbled as error:
+            raise self.garbled(str(error)) from None
+
+    def _wait_for_more(self) -> None:
+        while not self._poll.poll(LOOK_EVERY):
+            self._check_time()
+            if self._has_ended(0.0) and not self._poll.poll(0):
+                raise EOFError  # something that a unit has started holds the pipe open
+
+    def garbled(self, what: str) -> Lost:
+        """End it, for its answers can no longer be told from what else came; return what to raise."""
+        self.close()
+        return Lost(f"wrote into the pipe to the master what is no answer ({what})")
+
+
+class UnitProcess(Process):
+    """The process of one isolated unit."""
+
+    unasked = (LOG, FAILED)
 
     def __init__(self, values: int, limit: float) -> None:
         """Start it, without waiting for it.
@@ -48,24 +135,18 @@ class UnitProcess:
         self._limit = limit
         self.memory = shared_memory(values)
         self.log: Callable[[Any], None] = lambda content: None
-        commands, writing = os.pipe()
-        reading, answers = os.pipe()
-        theirs = (commands, answers, self.memory)
-        try:
-            self._popen = subprocess.Popen(
-                python("orchestrator.master.worker", *theirs),
-                stdin=subprocess.DEVNULL,
-                pass_fds=theirs,
-                start_new_session=True,  # Ctrl-C on the terminal is for the master
-            )
-        finally:
-            os.close(commands)
-            os.close(answers)
-        self._channel = Channel(reading, writing, self._wait_for_more)
-        self._poll = select.poll()
-        self._poll.register(reading, select.POLLIN)
         self._deadline = 0.0
-        self._ended = False
+        self._closed = False
+        self._popen = self._start(self._spawned)
+
+    def _spawned(self, commands: int, answers: int) -> subprocess.Popen[bytes]:
+        theirs = (commands, answers, self.memory)
+        return subprocess.Popen(
+            python("orchestrator.master.worker", *theirs),
+            stdin=subprocess.DEVNULL,
+            pass_fds=theirs,
+            start_new_session=True,  # Ctrl-C on the terminal is for the master
+        )
 
     def wait_until_ready(self) -> None:
         """Wait until it can be asked."""
@@ -85,77 +166,36 @@ class UnitProcess:
 
     def _answer(self, limit: float, wanted: int) -> Any:
         self._deadline = time.monotonic() + limit
-        try:
-            while True:
-                self._wait_for_more()
-                kind = self._channel.hear()
-                if kind is None:
-                    raise EOFError
-                if kind <= ANSWER and wanted == ANSWER:
-                    return kind
-                if kind not in (LOG, FAILED, wanted):
-                    raise Garbled(f"byte {kind}")
-                content = self._channel.receive()
-                if kind == wanted:
-                    return content
-                if kind == FAILED:
-                    raise self.lost(f"{content}{{where}}")
-                self.log(content)
-                self._check_time()
-        except EOFError:
-            raise Lost(self._death()) from None
-        except Garbled as error:
-            raise self.garbled(str(error)) from None
+        return self._hear(wanted)
 
-    def _wait_for_more(self) -> None:
-        """Wait for the pipe to hold something, until the deadline or, a while, after a wish to stop."""
-        while not self._poll.poll(LOOK_EVERY):
-            self._check_time()
+    def _take(self, kind: int, content: Any) -> None:
+        if kind == FAILED:
+            self.close()
+            raise Lost(f"failed: {content}")
+        self.log(content)
 
     def _check_time(self) -> None:
         now, asked = time.monotonic(), stop_requested_at()
         if asked is not None and now - asked > STOP_GRACE:
-            raise self.lost("{function} did not come back when the run was to stop")
+            self.close()
+            raise Lost("did not come back when the run was to stop", late=True)
         if now > self._deadline:
+            self.close()
             limit = f"{self._limit:g} s, the limit of a call (--call-limit)"
-            raise self.lost(f"{{function}} did not come back within {limit}")
+            raise Lost(f"did not come back within {limit}", late=True)
 
-    def garbled(self, what: str) -> Lost:
-        """End it, for its answers can no longer be told from what else came; return what to raise."""
-        return self.lost(f"its process wrote into the pipe to the master what is no answer{{where}} ({what})")
+    def _has_ended(self, within: float) -> bool:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._popen.wait(within)
+            return True
+        return False
 
-    def lost(self, sentence: str) -> Lost:
-        """End it; return what to raise."""
-        self.end()
-        return Lost(sentence)
-
-    def _death(self) -> str:
-        """Return a sentence on how the process has ended; it has closed its end of the pipe."""
-        code = self._wait(CLOSING)
-        self.end()
-        if code is None:
-            return "its process closed the pipe to the master{where}"
-        return f"its process {how_it_ended(code)}{{where}}"
-
-    def _wait(self, limit: float) -> int | None:
-        try:
-            return self._popen.wait(limit)
-        except subprocess.TimeoutExpired:
-            return None
-
-    def leave(self) -> None:
-        """Let it end by itself, which it does when nobody is left to ask it."""
-        self._channel.close()
-        self._wait(GRACE)
-        self.end()
-
-    def end(self) -> None:
-        """End it and all that it has started, whatever they are doing. Further calls do nothing."""
-        if self._ended:
-            return
-        self._ended = True
-        self._channel.close()  # its guardian wakes up
-        os.close(self.memory)
-        if self._wait(GRACE) is None:
-            self._popen.kill()
-            self._popen.wait()
+    def close(self) -> int:
+        if not self._closed:
+            self._closed = True
+            self._channel.close()  # its guardian wakes up
+            os.close(self.memory)
+            if not self._has_ended(GRACE):
+                self._popen.kill()
+                self._popen.wait()
+        return self._popen.returncode

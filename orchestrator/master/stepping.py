@@ -158,17 +158,13 @@ def _go(course: Course, opener: Opener) -> dict[str, Any] | None:
     """Open, initialize, step; return what there is to tell if that fails."""
     try:
         course.go(opener)
-    except BaseException as error:
-        known = isinstance(error, YawbenchError)
-        unit = getattr(error, "unit", None)
-        return {
-            "kind": type(error).__name__,
-            "problems": error.problems if known else ["".join(traceback.format_exception(error))],  # type: ignore[attr-defined]
-            "unit": unit,
-            "time": getattr(error, "time", None),
-            "inputs": course.inputs_of(unit) if unit else {},
-            "known": known,
-        }
+    except YawbenchError as error:
+        where = {name: value for name, value in vars(error).items() if name in ("unit", "time")}
+        unit = where.get("unit")
+        inputs = course.inputs_of(unit) if unit else {}
+        return {"kind": type(error).__name__, "problems": error.problems, "where": where, "inputs": inputs}
+    except BaseException:
+        return {"kind": "RuntimeError", "problems": traceback.format_exc(), "where": {}, "inputs": {}}
     return None
 
 

@@ -109,6 +109,6 @@ def main(*descriptors: str) -> None:
         Worker(channel, memory).serve()
     except Exception as error:
         with contextlib.suppress(OSError):
-            channel.send(FAILED, f"its process failed: {type(error).__name__}: {error}")
+            channel.send(FAILED, f"{type(error).__name__}: {error}")
         os._exit(1)
     os._exit(0)
