@@ -6,7 +6,8 @@ import hashlib
 import io
 import math
 from collections.abc import Mapping
-from pathlib import Path, PurePosixPath
+from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
@@ -14,6 +15,7 @@ from ..errors import ModelDescriptionError
 from ..plan import Fmu, UnitDefinition, Variable
 from .binary import binary_of, lacking
 from .scalars import scalars
+from .shadowing import hashes_of_modules
 
 SUPPORTED = "supported are FMI 2.0 and 3.0 for co-simulation"
 
@@ -113,26 +115,14 @@ def _python_modules(files: Mapping[str, bytes]) -> dict[str, str]:
     """
     if "resources/slavemodule.txt" not in files:
         return {}
-    hashes: dict[str, Any] = {}
-    for name in sorted(files):
-        parts = PurePosixPath(name).parts
-        if len(parts) < 2 or parts[0] != "resources" or not name.endswith(".py"):
-            continue
-        module = parts[1].removesuffix(".py")
-        digest = hashes.setdefault(module, hashlib.sha256())
-        digest.update("/".join(parts[1:]).encode() + b"\0" + files[name] + b"\0")
-    return {module: digest.hexdigest() for module, digest in hashes.items() if module != "pythonfmu"}
+    inside = {name.partition("/")[2]: files[name] for name in files if name.startswith("resources/")}
+    return {name: digest for name, digest in hashes_of_modules(inside).items() if name != "pythonfmu"}
 
 
 def to_record(fmu: Fmu) -> dict[str, Any]:
     """Return the description as JSON-ready data, without where archive and folder are."""
-    record = {key: value for key, value in vars(fmu).items() if key not in ("name", "path", "directory")}
-    return {**record, "variables": [_record(variable) for variable in fmu.variables.values()]}
-
-
-def _record(variable: Variable) -> dict[str, Any]:
-    definition = variable.definition
-    return {**vars(variable), "definition": None if definition is None else vars(definition)}
+    record = {key: value for key, value in asdict(fmu).items() if key not in ("name", "path", "directory")}
+    return {**record, "variables": list(record["variables"].values())}
 
 
 def from_record(record: dict[str, Any], *, path: Path, directory: Path) -> Fmu:

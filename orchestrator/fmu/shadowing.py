@@ -11,6 +11,7 @@ import hashlib
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from ..plan import Fmu
 
@@ -62,13 +63,20 @@ def _homes(module: str) -> list[Path]:
 
 
 def _content(home: Path, module: str) -> str | None:
-    """Return the hash of a module's files as `description` makes it; None if they cannot be read."""
+    """Return the hash of a module's files in a folder; None if they cannot be read."""
     package = home / module
     files = package.rglob("*.py") if package.is_dir() else [home / f"{module}.py"]
-    digest = hashlib.sha256()
     try:
-        for name, path in sorted((path.relative_to(home).as_posix(), path) for path in files):
-            digest.update(name.encode() + b"\0" + path.read_bytes() + b"\0")
+        return hashes_of_modules({f.relative_to(home).as_posix(): f.read_bytes() for f in files}).get(module)
     except OSError:
         return None
-    return digest.hexdigest()
+
+
+def hashes_of_modules(files: Mapping[str, bytes]) -> dict[str, str]:
+    """Return the top-level Python modules among files, by their paths, each with a hash of its content."""
+    hashes: dict[str, Any] = {}
+    for name in sorted(files):
+        if name.endswith(".py"):
+            digest = hashes.setdefault(name.partition("/")[0].removesuffix(".py"), hashlib.sha256())
+            digest.update(name.encode() + b"\0" + files[name] + b"\0")
+    return {module: digest.hexdigest() for module, digest in hashes.items()}

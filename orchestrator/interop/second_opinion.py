@@ -131,15 +131,20 @@ def second_opinion(
         if one_step not in ours:
             request = _request(plan, one_step, folder)
             said(f"yawbench{', one step for all units' if one_step else ''}")
-            found = {key: _run("own", at, folder) for key, at in _variants(request, pinned)}
-            for one in found.values():
-                if isinstance(one, str):
-                    raise RuntimeError(f"our own run of the archive has failed: {one}")
-            ours[one_step] = request, {k: r for k, r in found.items() if isinstance(r, Recording)}
+            made = _recordings("own", request, pinned, folder)
+            if isinstance(made, str):
+                raise RuntimeError(f"our own run of the archive has failed: {made}")
+            ours[one_step] = request, made
         request, own = ours[one_step]
         said(master.title)
-        theirs = {key: _run(master.module, at, folder) for key, at in _variants(request, pinned)}
-        opinions.append(_compare(master, one_step, request, own, theirs))
+        theirs = _recordings(master.module, request, pinned, folder)
+        if isinstance(theirs, str):
+            opinions.append(Opinion(master, one_step, theirs))
+            continue
+        seconds = {f"theirs{key}": recording.seconds for key, recording in theirs.items()}
+        seconds |= {f"ours{key}": recording.seconds for key, recording in own.items()}
+        gaps = differences(request, own[""].values, theirs[""].values)
+        opinions.append(Opinion(master, one_step, differences=gaps, seconds=seconds))
     return opinions
 
 
@@ -158,11 +163,18 @@ def _columns(plan: Plan) -> list[tuple[str, str]]:
     return [(u, name) for u, name in plan.record if units[u].variables[name].type == "Real"]
 
 
-def _variants(request: Request, pinned: bool) -> list[tuple[str, Request]]:
-    variants = [("", request)]
+def _recordings(module: str, request: Request, pinned: bool, folder: Path) -> dict[str, Recording] | str:
+    """Run one master, also on one core if asked; return a sentence if it has no result."""
+    variants = {"": request}
     if pinned and hasattr(os, "sched_getaffinity"):
-        variants.append((" on one core", replace(request, core=max(os.sched_getaffinity(0)))))
-    return variants
+        variants[" on one core"] = replace(request, core=max(os.sched_getaffinity(0)))
+    recordings = {}
+    for key, variant in variants.items():
+        recording = _run(module, variant, folder)
+        if isinstance(recording, str):
+            return recording
+        recordings[key] = recording
+    return recordings
 
 
 def _run(module: str, request: Request, folder: Path) -> Recording | str:
@@ -183,23 +195,6 @@ def _run(module: str, request: Request, folder: Path) -> Recording | str:
         before = f"; before that it said: {' '.join(lines[-2:])}" if lines else ""
         return f"it {how_it_ended(done.returncode).rstrip(',')}{before}"
     return lines[-1] if lines else f"it ended without a word, exit status {done.returncode}"
-
-
-def _compare(
-    master: OtherMaster,
-    one_step: bool,
-    request: Request,
-    own: dict[str, Recording],
-    theirs: dict[str, Recording | str],
-) -> Opinion:
-    seconds: dict[str, float] = {}
-    for key, recording in theirs.items():
-        if isinstance(recording, str):
-            return Opinion(master, one_step, recording)
-        seconds |= {f"theirs{key}": recording.seconds, f"ours{key}": own[key].seconds}
-    first = theirs[""]
-    assert isinstance(first, Recording)
-    return Opinion(master, one_step, "", differences(request, own[""].values, first.values), seconds)
 
 
 def differences(request: Request, own: np.ndarray, other: np.ndarray) -> dict[str, float]:

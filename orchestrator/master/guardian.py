@@ -65,26 +65,26 @@ def _watch(unit: int, reading: int, waking: int, others: Iterable[int]) -> None:
     events = select.poll()
     events.register(reading, 0)  # nothing is asked for, so what comes is the end of the pipe
     events.register(waking, select.POLLIN)
-    status: int | None = None
-    while status is None:
+    ended: dict[int, int] = {}
+    while unit not in ended:
         ready = [descriptor for descriptor, _ in events.poll()]
-        status = _reaped(unit)
+        _reap(ended)
         if reading in ready:
             break
         os.read(waking, 512)
-    status = _kill_all(unit, status)
-    if status is None or not os.WIFSIGNALED(status):
-        os._exit(0 if status is None else os.WEXITSTATUS(status))
-    number = os.WTERMSIG(status)
+    _kill_all(unit, ended)
+    code = os.waitstatus_to_exitcode(ended.get(unit, 0))
+    if code >= 0:
+        os._exit(code)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     with contextlib.suppress(OSError, ValueError):
-        signal.signal(number, signal.SIG_DFL)
-    os.kill(os.getpid(), number)
-    os._exit(128 + number)
+        signal.signal(-code, signal.SIG_DFL)
+    os.kill(os.getpid(), -code)
+    os._exit(128 - code)
 
 
-def _kill_all(unit: int, status: int | None) -> int | None:
-    """Kill the unit's process and all that it has started; return how it ended."""
+def _kill_all(unit: int, ended: dict[int, int]) -> None:
+    """Kill the unit's process and all that it has started."""
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
         with contextlib.suppress(OSError):
@@ -92,12 +92,9 @@ def _kill_all(unit: int, status: int | None) -> int | None:
         for child in _children():
             with contextlib.suppress(OSError):
                 os.kill(child, signal.SIGKILL)
-        found = _reaped(unit)
-        status = found if status is None else status
-        if not _has_children():
+        if not _reap(ended):
             break
         time.sleep(0.001)
-    return status
 
 
 def _children() -> list[int]:
@@ -107,22 +104,13 @@ def _children() -> list[int]:
         return []
 
 
-def _reaped(unit: int) -> int | None:
-    """Take note of all children that have ended; return how the unit's process did if it is among them."""
-    status = None
+def _reap(ended: dict[int, int]) -> bool:
+    """Note how children have ended that did; return whether there are more."""
     with contextlib.suppress(ChildProcessError):
-        while (ended := os.waitpid(-1, os.WNOHANG))[0]:
-            if ended[0] == unit:
-                status = ended[1]
-    return status
-
-
-def _has_children() -> bool:
-    try:
-        os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)
-    except ChildProcessError:
-        return False
-    return True
+        while (child := os.waitpid(-1, os.WNOHANG))[0]:
+            ended.setdefault(*child)
+        return True
+    return False
 
 
 def die_with_parent() -> None:

@@ -11,7 +11,7 @@ flickering in its last digits is accepted after `PASSES` passes if nothing moves
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,8 +19,9 @@ import numpy as np
 from ..errors import SimulationError
 from ..plan import Value, Variable, Wire
 from ..wording import listed
-from .log import FATAL, STATUS, WARNING, Log, known
-from .memory import Memory, Station
+from .log import FATAL, OK, STATUS, WARNING, Log, known
+from .memory import Memory, Station, by_type
+from .operations import getting
 from .slave import Experiment, Status
 
 PASSES = 100
@@ -92,16 +93,9 @@ def _put(station: Station, given: Mapping[str, Value], what: str, check: Check) 
     arrays = {variables[name].reference for name in given if variables[name].elements > 1}
     others = (v for v in variables.values() if v.reference in arrays) if arrays else ()
     values = {v.name: v.start for v in others if v.start is not None} | dict(given)
-    for chosen in _by_type(variables[name] for name in values):
+    for chosen in by_type(variables[name] for name in values):
         status = station.slave.put([v.place for v in chosen], [values[v.name] for v in chosen])
         check(station.name, what, status)
-
-
-def _by_type(variables: Iterable[Variable]) -> Iterable[list[Variable]]:
-    groups: dict[str, list[Variable]] = {}
-    for variable in variables:
-        groups.setdefault(variable.place.type, []).append(variable)
-    return groups.values()
 
 
 def _known_inputs(memory: Memory, station: Station) -> dict[str, Value]:
@@ -111,12 +105,7 @@ def _known_inputs(memory: Memory, station: Station) -> dict[str, Value]:
     for variable, wire, value in zip(station.inputs, station.wires, values, strict=True):
         if _comes_before(memory, wire, station) and np.isfinite(value):
             known[variable.name] = value
-    for variable, wire in station.other_inputs:
-        if wire is None:
-            known[variable.name] = station.unit.constants[variable.name]
-        elif (wire.source, wire.output) in memory.others:
-            known[variable.name] = memory.other(wire)
-    return known
+    return known | memory.given_others(station)
 
 
 def _check_parameters(station: Station, check: Check, log: Log) -> None:
@@ -124,21 +113,16 @@ def _check_parameters(station: Station, check: Check, log: Log) -> None:
 
     It is a warning if the FMU does not tell: so it may be that all is well.
     """
-    lost = []
-    for chosen, status, found in _read_back(station, station.unit.parameters, check, log):
+    told: list[str] = []
+    for chosen, status, lost in _read_back(station, station.unit.parameters, check, log):
         if status > WARNING:
             names = listed([v.name for v in chosen][:NAMED]) + (" and others" if len(chosen) > NAMED else "")
             text = f"whether {names} took the value that was set is not known: reading returned"
             log.add(station.name, WARNING, "", f"{text} {STATUS[status]}")
-            continue
-        lost += [(v, value) for v, value in zip(chosen, found, strict=True) if not _took(station, v, value)]
-    if lost:
-        told = [
-            f"{v.name} is {_shown(v, value)}, not {_shown(v, station.unit.parameters[v.name])}"
-            for v, value in lost
-        ]
-        more = f" and {len(lost) - NAMED} more" if len(lost) > NAMED else ""
-        what = "a parameter" if len(lost) == 1 else "parameters"
+        told += [f"{name} is {found}, not {asked}" for name, found, asked in lost]
+    if told:
+        more = f" and {len(told) - NAMED} more" if len(told) > NAMED else ""
+        what = "a parameter" if len(told) == 1 else "parameters"
         raise SimulationError(
             f"{station.name}: {what} did not take the value that was set: {listed(told[:NAMED])}{more}",
             unit=station.name, time=log.time.value,
@@ -147,28 +131,30 @@ def _check_parameters(station: Station, check: Check, log: Log) -> None:
 
 def _check_constants(station: Station, check: Check, log: Log) -> None:
     """Read constant inputs back; warn of others, for an FMU may rightly take inputs only when it steps."""
-    for chosen, status, found in _read_back(station, station.unit.constants, check, log):
-        for variable, value in zip(chosen, found, strict=True):
-            if status <= WARNING and not _took(station, variable, value):
-                asked = _shown(variable, station.unit.constants[variable.name])
-                text = f"the constant {variable.name} reads back as {_shown(variable, value)}, not {asked}"
-                log.add(station.name, WARNING, "", text)
+    for _, _, lost in _read_back(station, station.unit.constants, check, log):
+        for name, found, asked in lost:
+            log.add(station.name, WARNING, "", f"the constant {name} reads back as {found}, not {asked}")
 
 
 def _read_back(
-    station: Station, names: Iterable[str], check: Check, log: Log
-) -> Iterator[tuple[list[Variable], Status, list[Value]]]:
-    """Yield variables of one type, the status of reading them, and their values."""
-    for chosen in _by_type(station.unit.fmu.variables[name] for name in names):
+    station: Station, given: Mapping[str, Value], check: Check, log: Log
+) -> Iterator[tuple[list[Variable], Status, list[tuple[str, str, str]]]]:
+    """Yield variables of one type, the status of reading them, and which differ: name, found, asked."""
+    for chosen in by_type(station.unit.fmu.variables[name] for name in given):
         with log.deaf():
-            status, values = station.slave.fetch([v.place for v in chosen])
-        if known(status) >= FATAL:
+            raw, values = station.slave.fetch([v.place for v in chosen])
+        status = known(raw)
+        if status >= FATAL:
             check(station.name, "reading back what was set", status)
-        yield chosen, status, values
+        lost = []
+        for variable, found in zip(chosen, values, strict=True) if status <= WARNING else ():
+            asked = given[variable.name]
+            if not _took(variable, found, asked):
+                lost.append((variable.name, _shown(variable, found), _shown(variable, asked)))
+        yield chosen, status, lost
 
 
-def _took(station: Station, variable: Variable, found: Value) -> bool:
-    asked = (station.unit.parameters | station.unit.constants)[variable.name]
+def _took(variable: Variable, found: Value, asked: Value) -> bool:
     if variable.type == "Real":
         return math.isclose(asked, found, rel_tol=SINGLE)  # type: ignore[arg-type]
     return asked == found
@@ -212,9 +198,9 @@ def _renew(memory: Memory, s: Station, check: Check) -> list[Movement]:
 def _renew_others(memory: Memory, s: Station, check: Check, moving: list[Movement]) -> bool:
     """Do the same for what is not Real; add to `moving` and return whether anything has changed."""
     changed = set()
+    given = memory.given_others(s)
     for variable, wire in s.other_inputs:
-        value = s.unit.constants[variable.name] if wire is None else memory.other(wire)
-        old = memory.others.get((s.name, variable.name))
+        value, old = given[variable.name], memory.others.get((s.name, variable.name))
         if value == old:
             continue
         memory.others[s.name, variable.name] = value
@@ -223,20 +209,16 @@ def _renew_others(memory: Memory, s: Station, check: Check, moving: list[Movemen
             text = f"{wire.source}.{wire.output} -> {s.name}.{variable.name}"
             moving.append(Movement(text, "" if old is None else old, value))
     if changed:  # of an array all elements
-        given = [v.name for v, _ in s.other_inputs if v.place[:2] in changed]
-        _put(s, {name: memory.others[s.name, name] for name in given}, "setting inputs", check)
+        names = [v.name for v, _ in s.other_inputs if v.place[:2] in changed]
+        _put(s, {name: given[name] for name in names}, "setting inputs", check)
     return bool(changed)
 
 
 def _get(memory: Memory, s: Station, check: Check) -> None:
-    if s.outputs:
-        check(s.name, "reading outputs", s.calls.get())
-        if s.output_faults is not None:
-            s.output_faults.begin(s.y)
-    for chosen in _by_type(s.other_outputs):
-        status, values = s.slave.fetch([v.place for v in chosen])
-        memory.others.update(((s.name, v.name), value) for v, value in zip(chosen, values, strict=True))
-        check(s.name, "reading outputs", status)
+    for operation in getting(memory, s):
+        check(s.name, "reading outputs", operation.call() or OK)
+    if s.outputs and s.output_faults is not None:
+        s.output_faults.begin(s.y)
 
 
 def _unsettled(moving: list[Movement]) -> str:

@@ -22,10 +22,9 @@ import numpy as np
 from ..errors import SimulationError
 from ..plan import Plan, Value
 from ..wording import listed
-from .failure import describe
 from .initialization import initialize
 from .interrupts import StopFlag
-from .log import DISCARD, MASTER, OK, WARNING, Log
+from .log import DISCARD, MASTER, OK, WARNING, Log, describe
 from .memory import Memory
 from .operations import Operation, Programs
 from .slave import Buffers, Slave, Status
@@ -176,14 +175,8 @@ class Master:
     def inputs_of(self, unit: str) -> dict[str, Value]:
         """Return the inputs with which a unit was last stepped."""
         s = self.memory.of[unit]
-        values: dict[str, Value] = {v.name: float(u) for v, u in zip(s.inputs, s.u, strict=True)}
-        for variable, wire in s.other_inputs:
-            if wire is None:
-                constant = s.unit.constants[variable.name]
-                values[variable.name] = self.memory.others.get((unit, variable.name), constant)
-            elif (wire.source, wire.output) in self.memory.others:  # else its source has not been read yet
-                values[variable.name] = self.memory.other(wire)
-        return values
+        real = {v.name: float(u) for v, u in zip(s.inputs, s.u, strict=True)}
+        return real | self.memory.given_others(s)
 
     def operation_of(self, k: int, call: Callable[[], Status | None]) -> Operation:
         """Return the operation of the step to `k` that a call belongs to."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -153,6 +153,17 @@ class Memory:
             raise SimulationError(sentence, unit=wire.target, time=self.time.value)
         return number
 
+    def given_others(self, s: Station) -> dict[str, Value]:
+        """Return what a unit's inputs that are no Reals get, as far as their sources have been read."""
+        values = {}
+        for variable, wire in s.other_inputs:
+            if wire is None:
+                constant = s.unit.constants[variable.name]
+                values[variable.name] = self.others.get((s.name, variable.name), constant)
+            elif (wire.source, wire.output) in self.others:
+                values[variable.name] = self.other(wire)
+        return values
+
     def relation(self, target: Station, variable: Variable, wire: Wire) -> Relation:
         """Return what the weights of a wire depend on."""
         source = self.of[wire.source]
@@ -169,6 +180,14 @@ class Memory:
         self.pool[self.n_outputs : 2 * self.n_outputs] = self.now
         for s in self.stations:
             self.pool.take(s.sources, None, s.kept, "clip")
+
+
+def by_type(variables: Iterable[Variable]) -> Iterable[list[Variable]]:
+    """Return variables in groups that one call of an FMU can set or get."""
+    groups: dict[str, list[Variable]] = {}
+    for variable in variables:
+        groups.setdefault(variable.place.type, []).append(variable)
+    return groups.values()
 
 
 def _stations(plan: Plan, slaves: Mapping[str, Slave]) -> list[Station]:

@@ -19,7 +19,7 @@ from .coupling import Weights, weights
 from .faulting import Faulting
 from .feeding import feeding
 from .log import OK
-from .memory import Memory, Station
+from .memory import Memory, Station, by_type
 from .slave import Status
 
 KEPT = 1024
@@ -76,7 +76,7 @@ class Programs:
         operations += [op for s in beginning for op in self._of_inputs[s.name]]
         operations += [op for s in beginning for op in _setting(m, s)]
         for s in ending:
-            operations += [Operation(s.name, "step", s.calls.step), *_getting(m, s)]
+            operations += [Operation(s.name, "step", s.calls.step), *getting(m, s)]
             operations += self._of_outputs[s.name]
         return operations
 
@@ -91,7 +91,7 @@ class Programs:
                 operations.append(Operation(s.name, "step", s.calls.step))
                 if self._memory.plan.algorithm == "extrapolated" and s.outputs:
                     operations.append(Operation(s.name, "keep", _copy(s.y, s.y_before)))
-                operations += [*_getting(self._memory, s), *self._of_outputs[s.name]]
+                operations += [*getting(self._memory, s), *self._of_outputs[s.name]]
         return operations
 
     def _gathering(self, s: Station, k: int) -> list[Operation]:
@@ -194,25 +194,24 @@ def _setting(m: Memory, s: Station) -> list[Operation]:
         operations.append(Operation(s.name, "set", s.calls.set))
     moving = [v for v, wire in s.other_inputs if wire is not None or v.name in s.unit.series]
     driven = {v.place[:2] for v in moving}  # of an array all elements
-    others = [(v, wire) for v, wire in s.other_inputs if v.place[:2] in driven]
-    for kind in dict.fromkeys(v.place.type for v, _ in others):
-        chosen = [(v, wire) for v, wire in others if v.place.type == kind]
-        places = [v.place for v, _ in chosen]
+    wires = {v.name: wire for v, wire in s.other_inputs}
+    for chosen in by_type(v for v, _ in s.other_inputs if v.place[:2] in driven):
+        places, ends = [v.place for v in chosen], [((s.name, v.name), wires[v.name]) for v in chosen]
 
-        def put(places: list[Place] = places, chosen: list = chosen) -> Status:
-            values = [m.others[s.name, v.name] if wire is None else m.other(wire) for v, wire in chosen]
+        def put(places: list[Place] = places, ends: list = ends) -> Status:
+            values = [m.others[key] if wire is None else m.other(wire) for key, wire in ends]
             return s.slave.put(places, values)
 
         operations.append(Operation(s.name, "set", put))
     return operations
 
 
-def _getting(m: Memory, s: Station) -> list[Operation]:
+def getting(m: Memory, s: Station) -> list[Operation]:
+    """Return what reads a unit's outputs."""
     operations = []
     if s.outputs:
         operations.append(Operation(s.name, "get", s.calls.get))
-    for kind in dict.fromkeys(v.place.type for v in s.other_outputs):
-        chosen = [v for v in s.other_outputs if v.place.type == kind]
+    for chosen in by_type(s.other_outputs):
         places, keys = [v.place for v in chosen], [(s.name, v.name) for v in chosen]
 
         def fetch(places: list[Place] = places, keys: list = keys) -> Status:

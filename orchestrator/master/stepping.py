@@ -24,12 +24,11 @@ from ..errors import YawbenchError
 from ..plan import Plan, Value
 from ..results.recorder import BLOCK
 from .course import Course, Opener
-from .exchange import REPLY, Channel
+from .exchange import REPLY, Channel, Relay
 from .guardian import die_with_parent
 from .interrupts import StopFlag, interrupts
 from .log import Message
 from .master import WORDS, Master
-from .relay import Relay
 from .unit import FmuSlave
 
 ROWS, PROGRESS, ENDED, WHERE = 0x90, 0x91, 0x92, 0x93

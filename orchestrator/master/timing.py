@@ -11,7 +11,7 @@ from typing import Any
 from ..plan import Unit
 from .course import Opener
 from .log import Log
-from .slave import Buffers, Calls, Status
+from .slave import Calls, Status
 
 
 @dataclass
@@ -31,30 +31,20 @@ def timing(opener: Opener, unit: str, clock: Clock) -> Opener:
     """Return an opener whose instance of a unit is timed; the numbers of the run stay as they are."""
 
     def opened(one: Unit, log: Log, corrupted: set[Path]) -> Any:
-        slave = opener(one, log, corrupted)
-        return _Timed(slave, clock) if one.name == unit else slave
+        slave: Any = opener(one, log, corrupted)
+        if one.name == unit:
+            connect = slave.connect
+            slave.connect = lambda buffers: _timed(connect(buffers), clock)
+        return slave
 
     return opened
 
 
-class _Timed:
-    """An instance whose calls in a step are timed; all else it passes on."""
+def _timed(calls: Calls, clock: Clock) -> Calls:
+    """Return the calls of a step, timed."""
+    now = time.thread_time_ns
 
-    def __init__(self, slave: Any, clock: Clock) -> None:
-        self._slave = slave
-        self._clock = clock
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._slave, name)
-
-    def connect(self, buffers: Buffers) -> Calls:
-        """Return the calls of a step, timed."""
-        calls = self._slave.connect(buffers)
-        return Calls(self._timed(calls.set), self._timed(calls.step, 1), self._timed(calls.get))
-
-    def _timed(self, call: Callable[[], Status], steps: int = 0) -> Callable[[], Status]:
-        clock, now = self._clock, time.thread_time_ns
-
+    def around(call: Callable[[], Status], steps: int = 0) -> Callable[[], Status]:
         def timed() -> Status:
             begin = now()
             status = call()
@@ -63,3 +53,5 @@ class _Timed:
             return status
 
         return timed
+
+    return Calls(around(calls.set), around(calls.step, 1), around(calls.get))

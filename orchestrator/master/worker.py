@@ -12,11 +12,10 @@ from collections.abc import Sequence
 
 from ..errors import ModelDescriptionError, SimulationError
 from ..plan import Place, Unit
-from .exchange import FAILED, GET, REPLY, SET, STEP, Board, Channel
+from .exchange import FAILED, GET, REPLY, SET, STEP, Board, Channel, Relay
 from .guardian import stand_guard
 from .log import OK, WARNING, known
 from .opening import open_unit
-from .relay import Relay
 from .slave import Buffers
 from .surroundings import Surroundings
 from .unit import FmuSlave
