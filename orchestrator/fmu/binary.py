@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import platform as machine
 import re
-import sys
 
 from ..plan import Fmu
 from ..wording import listed, short
@@ -22,7 +20,6 @@ TYPES = {
 }
 """Major version of FMI -> types in the names of the functions that set and get values."""
 _FILE_NAME = re.compile(r"[^/\\:\x00-\x1f\x7f]{1,200}")
-_ARCHITECTURES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
 
 
 def integer_limits(kind: str) -> tuple[int, int]:
@@ -33,13 +30,9 @@ def integer_limits(kind: str) -> tuple[int, int]:
 
 def platform(fmi: int = 2) -> tuple[str, str]:
     """Return a version of FMI's name of this platform and the suffix of its binaries."""
-    names = {"win32": ("win", ".dll"), "cygwin": ("win", ".dll"), "darwin": ("darwin", ".dylib")}
-    system, suffix = names.get(sys.platform, ("linux", ".so"))
-    wide = sys.maxsize > 2**32
-    if fmi == 2:
-        return f"{system}{64 if wide else 32}", suffix
-    architecture = _ARCHITECTURES.get(machine.machine().lower(), "x86_64") if wide else "x86"
-    return f"{architecture}-{'windows' if system == 'win' else system}", suffix
+    import fmpy
+
+    return fmpy.platform if fmi == 2 else fmpy.platform_tuple, fmpy.sharedLibraryExtension
 
 
 def binary_of(fmi: int, identifier: str) -> str:

@@ -14,7 +14,6 @@ other, and `isolation` for the wall. It needs fork(), and is used on Linux alone
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import math
 import os
 import signal
@@ -24,23 +23,22 @@ import time
 from functools import partial
 from typing import Any
 
-from .. import errors
 from ..errors import SimulationError
 from ..plan import Plan, Value
 from ..results.recorder import BLOCK, Block
 from ..wording import listed
 from .course import Opener, Progress, hand_over
-from .exchange import LOG, REPLY, Channel, Garbled
+from .exchange import LOG, REPLY, Channel, Garbled, rebuilt
 from .interrupts import StopFlag, stop_requested_at
 from .log import MASTER, WARNING, Log
 from .master import Ended, Interrupted
 from .opening import open_unit
 from .process import Lost, Process
 from .stepping import ENDED, FREE, PROGRESS, ROWS, TAKEN, WHERE, Shared, step_units
+from .surroundings import flush_output
 
-ASK_AFTER, KILL_AFTER = 1.5, 3.0
-"""Time after a wish to stop at which the process is asked where it is, and is killed [s]; chosen: a step is
-over long before."""
+KILL_AFTER = 3.0
+"""Time after a wish to stop at which the process is killed [s]; chosen: a step is over long before."""
 END_LIMIT = 10.0
 """Time that units may take to be terminated and freed [s]; the results are written by then."""
 
@@ -78,7 +76,6 @@ class CourseApart(Process):
         self._where: tuple[str, str] | None = None
         self._process: int | None = None
         self._status = 0
-        self._told_to_stop = False
         self._deadline = math.inf
         self._suspects: list[str] = []  # units that may have ended the process
         self._told_end = False
@@ -106,12 +103,10 @@ class CourseApart(Process):
             self.ended = Ended(reason, unit=unit, time=at)
         if failed is not None:
             self._inputs = failed["inputs"]
-            raise _rebuilt(failed)
+            raise rebuilt(failed) if failed["kind"] else RuntimeError(failed["problems"])
 
     def _forked(self, opener: Opener, asked: int, commands: int, answers: int) -> int:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        ctypes.CDLL(None).fflush(None)
+        flush_output()
         process = os.fork()
         if process == 0:
             step_units(self.plan, opener, self._stop, self._shared, Channel(commands, answers), asked)
@@ -161,22 +156,18 @@ class CourseApart(Process):
         self._closed = True
 
     def _check_time(self) -> None:
-        """Tell the process to stop when that is wished; kill it if it does not, or takes too long to end."""
+        """Let the process stop when that is wished; kill it if it does not, or takes too long to end."""
         now, asked = time.monotonic(), stop_requested_at()
-        if asked is not None and not self._told_to_stop:
-            self._told_to_stop = True
-            self._signal(signal.SIGTERM)
-        if asked is not None and now - asked > ASK_AFTER:
-            with contextlib.suppress(OSError):
-                os.write(self._asking, b"?")
+        if asked is not None:
+            self._ask()
         if now > self._deadline or (asked is not None and now - asked > KILL_AFTER):
             self.close()
             raise Lost("did not come back")
 
-    def _signal(self, number: int) -> None:
-        if self._process is not None:
-            with contextlib.suppress(OSError):
-                os.kill(self._process, number)
+    def _ask(self) -> None:
+        """Let the process stop, and tell in which unit it is."""
+        with contextlib.suppress(OSError):
+            os.write(self._asking, b"?")
 
     def _has_ended(self, within: float) -> bool:
         assert self._process is not None
@@ -189,9 +180,9 @@ class CourseApart(Process):
 
     def close(self) -> int:
         if self._process is not None:
-            with contextlib.suppress(OSError):
-                os.killpg(self._process, signal.SIGKILL)  # with what units have started
-            self._signal(signal.SIGKILL)
+            for kill in (os.killpg, os.kill):  # with what units have started
+                with contextlib.suppress(OSError):
+                    kill(self._process, signal.SIGKILL)
             _, status = os.waitpid(self._process, 0)
             self._process, self._status = None, os.waitstatus_to_exitcode(status)
             self._channel.close()
@@ -223,7 +214,7 @@ class CourseApart(Process):
         self._deadline = time.monotonic() + END_LIMIT
         try:
             if not self._told_end:
-                self._signal(signal.SIGTERM)
+                self._ask()
                 self._hear(ENDED)
             self._channel.say(FREE)
             self._hear(REPLY)
@@ -232,9 +223,3 @@ class CourseApart(Process):
             text = f"when units were terminated and freed, the process of the run {lost}"
             self._log.add(unit, WARNING, MASTER, text, self.plan.time(max(0, self._shared.completed.value)))
         self.close()
-
-
-def _rebuilt(failed: dict[str, Any]) -> Exception:
-    """Return the error that the other process has told of."""
-    kinds = {**vars(errors), Interrupted.__name__: Interrupted, RuntimeError.__name__: RuntimeError}
-    return kinds[failed["kind"]](failed["problems"], **failed["where"])

@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import SimulationError, YawbenchError
 from .log import KEPT, Log, Message
 
 SET, STEP, GET = 1, 2, 4
@@ -163,6 +164,20 @@ class Channel:
         for descriptor in (self.reading, self.writing):
             with contextlib.suppress(OSError):
                 os.close(descriptor)
+
+
+def told(error: YawbenchError) -> dict[str, Any]:
+    """Return what there is to tell of an error to another process."""
+    where = {name: value for name, value in vars(error).items() if name in ("unit", "time")}
+    return {"kind": type(error).__name__, "problems": error.problems, "where": where}
+
+
+def rebuilt(told: dict[str, Any]) -> YawbenchError:
+    """Return the error that another process has told of."""
+    kinds = {
+        kind.__name__: kind for base in (YawbenchError, SimulationError) for kind in base.__subclasses__()
+    }
+    return kinds.get(told["kind"], YawbenchError)(told["problems"], **told["where"])
 
 
 class Relay(Log):

@@ -10,7 +10,6 @@ from pathlib import Path
 
 from fmpy import calloc, free
 from fmpy.fmi2 import (
-    FMU2Slave,
     fmi2CallbackAllocateMemoryTYPE,
     fmi2CallbackFreeMemoryTYPE,
     fmi2CallbackFunctions,
@@ -30,7 +29,6 @@ class Fmi2Slave(FmuSlave):
     """An instance of an FMI 2.0 co-simulation FMU."""
 
     prefix = "fmi2"
-    library = FMU2Slave
     version = 2
     real = "Real"
     c_types = {
@@ -43,7 +41,9 @@ class Fmi2Slave(FmuSlave):
     def _instantiate(self, unit: Unit) -> int | None:
         callbacks = _callbacks()
         callbacks.componentEnvironment = self._listener = listen(self._log, unit.name, callbacks)
-        return self._function("Instantiate")(
+        instantiate = self._function("Instantiate")
+        instantiate.restype = ctypes.c_void_p
+        return instantiate(
             unit.name.encode(),
             fmi2CoSimulation,
             unit.fmu.guid.encode(),
@@ -55,27 +55,23 @@ class Fmi2Slave(FmuSlave):
 
     def _stepping(self, time: ctypes.c_double, step: ctypes.c_double) -> Callable[[], Status]:
         component = ctypes.c_void_p(self._component)
-        return functools.partial(self._raw("DoStep"), component, time, step, ctypes.c_int(1))
+        return functools.partial(self._function("DoStep"), component, time, step, ctypes.c_int(1))
 
     def setup(self, experiment: Experiment) -> Status:
-        start, stop, tolerance = experiment
-        setup = self._function("SetupExperiment")
-        self._may_terminate = True
-        return setup(self._component, tolerance is not None, tolerance or 0.0, start, True, stop)
+        return self._announce("SetupExperiment", experiment)
 
     def enter(self) -> Status:
-        return self._function("EnterInitializationMode")(self._component)
+        return self._do("EnterInitializationMode")
 
     def ended(self) -> float | None:
         """Return how far the FMU has gone if it has answered Discard because it wants to end."""
         if not self._has("GetBooleanStatus"):
             return None
         wants, last = ctypes.c_int(0), ctypes.c_double(math.nan)
-        ask = self._function("GetBooleanStatus")
-        if ask(self._component, fmi2Terminated, ctypes.byref(wants)) != OK or not wants.value:
+        if self._do("GetBooleanStatus", fmi2Terminated, ctypes.byref(wants)) != OK or not wants.value:
             return None
         if self._has("GetRealStatus"):
-            self._function("GetRealStatus")(self._component, fmi2LastSuccessfulTime, ctypes.byref(last))
+            self._do("GetRealStatus", fmi2LastSuccessfulTime, ctypes.byref(last))
         return last.value
 
 

@@ -9,7 +9,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from fmpy.fmi3 import FMU3Slave, fmi3IntermediateUpdateCallback, fmi3LogMessageCallback
+from fmpy.fmi3 import fmi3IntermediateUpdateCallback, fmi3LogMessageCallback
 
 from ..fmu.binary import INTEGERS
 from ..plan import Unit
@@ -22,7 +22,6 @@ class Fmi3Slave(FmuSlave):
     """An instance of an FMI 3.0 co-simulation FMU."""
 
     prefix = "fmi3"
-    library = FMU3Slave
     version = 3
     real = "Float64"
     c_types = {
@@ -40,7 +39,9 @@ class Fmi3Slave(FmuSlave):
         self._reached = ctypes.c_double(math.nan)
         resources = str(Path(unit.fmu.directory, "resources").absolute()) + os.sep
         no, yes = False, True
-        return self._function("InstantiateCoSimulation")(
+        instantiate = self._function("InstantiateCoSimulation")
+        instantiate.restype = ctypes.c_void_p
+        return instantiate(
             unit.name.encode(),
             unit.fmu.guid.encode(),
             resources.encode(),
@@ -49,8 +50,8 @@ class Fmi3Slave(FmuSlave):
             no,  # event mode
             no,  # early return
             None,
-            0,
-            self._listener,
+            ctypes.c_size_t(0),
+            ctypes.c_void_p(self._listener),
             _logger,
             fmi3IntermediateUpdateCallback(),
         )
@@ -59,7 +60,7 @@ class Fmi3Slave(FmuSlave):
         component, yes = ctypes.c_void_p(self._component), ctypes.c_bool(True)
         event, early, ended, reached = ctypes.c_bool(), ctypes.c_bool(), self._ended, self._reached
         answers = [ctypes.byref(value) for value in (event, ended, early, reached)]
-        do_step = self._raw("DoStep")
+        do_step = self._function("DoStep")
         call = functools.partial(do_step, component, time, step, yes, *answers)
 
         def go_on(status: Status) -> Status:
@@ -89,10 +90,7 @@ class Fmi3Slave(FmuSlave):
         return OK
 
     def enter(self) -> Status:
-        start, stop, tolerance = self._experiment
-        enter = self._function("EnterInitializationMode")
-        self._may_terminate = True
-        return enter(self._component, tolerance is not None, tolerance or 0.0, start, True, stop)
+        return self._announce("EnterInitializationMode", self._experiment)
 
 
 def _log(environment, status, category, text):

@@ -23,6 +23,13 @@ class StopFlag:
         self.requested = False
 
 
+def request_stop(flag: StopFlag) -> None:
+    """Raise `flag`, and note when that was first wished."""
+    global _requested_at
+    flag.requested = True
+    _requested_at = _requested_at or time.monotonic()
+
+
 def stop_requested_at() -> float | None:
     """Return when this process was asked to stop, by `time.monotonic` [s]; None if it was not."""
     return _requested_at
@@ -36,11 +43,9 @@ def interrupts(flag: StopFlag, again: Callable[[], None]) -> Iterator[None]:
     """
 
     def handle(number: int, frame: FrameType | None) -> None:
-        global _requested_at
         if flag.requested:
             again()
-        flag.requested = True
-        _requested_at = _requested_at or time.monotonic()
+        request_stop(flag)
 
     if threading.current_thread() is not threading.main_thread():
         yield

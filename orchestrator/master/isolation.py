@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ModelDescriptionError, SimulationError
+from ..errors import SimulationError
 from ..plan import Place, Plan, Unit, Value
-from .exchange import GET, SET, STEP, Board, Garbled
+from .exchange import GET, SET, STEP, Board, Garbled, rebuilt
 from .log import FATAL, OK, PROCESS, WARNING, Log, known
 from .opening import SLAVES, open_unit
 from .process import Lost, UnitProcess
@@ -62,10 +62,7 @@ class IsolatedSlave:
             raise self._refused(f"{unit.name}: {unit.fmu.path} cannot be instantiated: {reason}") from None
         if failed is not None:
             process.close()
-            kind, problems = failed
-            if kind == ModelDescriptionError.__name__:
-                raise ModelDescriptionError(problems)
-            raise self._refused(problems[0])
+            raise rebuilt(failed)
 
     def _note_log(self, content: Any) -> None:
         """Keep what the FMU logs: a message, or how many more there were.

@@ -1,18 +1,32 @@
-"""One run, from a plan to results on disk."""
+"""One run, from a plan to results: what there is to write of it when it ends, however it ends."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import contextlib
+import os
+import sys
+import time
+import uuid
+from dataclasses import asdict, dataclass, field
+from datetime import datetime, timezone
 from pathlib import Path
+from typing import Any
 
+from ..errors import KEPT, Problem, ResultsError, SimulationError, YawbenchError
+from ..metrics.plausibility import Watch
 from ..plan import Finding, Plan
 from ..results.columnar import MemoryRecorder
+from ..results.folder import COMPLETED, RUNNING
 from ..results.formats import recorder_of
+from ..results.key import key_of
 from ..results.read import Results
-from .apart import can_be_apart
-from .course import Opener, Progress
-from .ending import Run
-from .log import Message
+from ..results.recorder import Recorder
+from ..results.run_record import run_record
+from .apart import CourseApart, can_be_apart
+from .course import Course, Opener, Progress
+from .interrupts import StopFlag, interrupts
+from .log import Log, Message
+from .master import Interrupted
 from .opening import open_unit
 
 
@@ -67,16 +81,15 @@ def simulate(
     recorder = recorder_of(format)(Path(out), *_columns(plan))
     run = Run(plan, recorder, progress, apart=apart and can_be_apart())
     run.make(opener)
-    warnings, ended = list(run.log.warnings()), None if run.ended is None else str(run.ended)
     return RunInfo(
         Path(out),
         recorder.written,
         len(plan.record),
         run.id,
         run.wall_time,
-        run.passes,
-        warnings,
-        ended,
+        run.course.passes,
+        list(run.log.warnings()),
+        None if run.course.ended is None else str(run.course.ended),
         run.watch.findings(),
     )
 
@@ -101,3 +114,128 @@ def _columns(plan: Plan) -> tuple[list[str], list[bool], dict[str, str | None]]:
     recorded = {f"{unit}.{name}": units[unit].fmu.variables[name] for unit, name in plan.record}
     units_of = {"time": "s", **{column: variable.unit for column, variable in recorded.items()}}
     return list(recorded), [variable.type == "Real" for variable in recorded.values()], units_of
+
+
+class Run:
+    """One run of a plan into a recorder.
+
+    Args:
+        apart: step the units in a process of their own (see `apart`).
+    """
+
+    def __init__(
+        self, plan: Plan, recorder: Recorder | MemoryRecorder, progress: Progress | None, *, apart: bool
+    ) -> None:
+        self.plan = plan
+        self.recorder = recorder
+        self.watch = Watch(plan)
+        recorder.looks.append(self.watch.look)
+        self.log = Log()
+        self.id = uuid.uuid4().hex[:12]
+        self._key = key_of(plan)
+        self._apart = apart
+        self._stop = StopFlag()
+        course = CourseApart if apart else Course
+        self.course: Course | CourseApart = course(plan, recorder, self.log, self._stop, progress)
+        self._saved = False
+        self._ended_by: str | None = None  # unit
+        self._started = datetime.now(timezone.utc)
+        self._began = time.perf_counter()
+        self._saving = False
+
+    @property
+    def wall_time(self) -> float:
+        return time.perf_counter() - self._began
+
+    def make(self, opener: Opener) -> None:
+        """Go from beginning to end; write what there is however it ends, before units are freed."""
+        with interrupts(self._stop, self._abandon):
+            try:
+                self.recorder.announce(self._recorded(RUNNING))
+                try:
+                    self.course.go(opener)
+                except BaseException as error:
+                    self._fail(error)
+                    raise
+                self._save(COMPLETED)
+            finally:
+                self._end()
+
+    def _fail(self, error: BaseException) -> None:
+        """Write what there is and why there is no more."""
+        with contextlib.suppress(SimulationError):  # the disk may be why; what fits has been kept
+            self.course.flush()
+        problems = error.problems if isinstance(error, YawbenchError) else []
+        if isinstance(error, SimulationError):
+            error.findings = self.watch.findings()
+        try:
+            self._save("interrupted" if isinstance(error, Interrupted) else "failed", error)
+        except ResultsError as lost:
+            problems += lost.problems
+        else:
+            if self.recorder.place is not None:
+                sentence = f"What was recorded until then: {self.recorder.place}"
+                problems.append(Problem(sentence, kind=KEPT))
+
+    def _abandon(self) -> None:
+        """Leave at once: somebody insists, perhaps because a unit never comes back."""
+        if (
+            self._saving or self.course.writing or self._apart
+        ):  # units that are apart are not waited for long anyway
+            return
+        doing = "while its units were freed" if self._saved else "inside a unit"
+        error = Interrupted(f"the run was interrupted {doing}", unit=None, time=self.log.time.value)
+        try:
+            if not self._saved:
+                self._fail(error)
+        finally:
+            where = "" if self.recorder.place is None else f"; results so far: {self.recorder.place}"
+            print(f"yawbench: {error}{where}", file=sys.stderr, flush=True)
+            os._exit(error.exit_status)
+
+    def _save(self, status: str, error: BaseException | None = None) -> None:
+        """Write the record of the run and put the results in place."""
+        self._saving = True
+        self._ended_by = getattr(error, "unit", None)
+        ended: dict[str, Any] = {
+            "wall_time": self.wall_time,
+            "error": self._explained(error),
+            "units_freed": False,
+            "findings": [asdict(one) for one in (*self.plan.findings, *self.watch.findings())],
+        }
+        if self.course.ended is not None:
+            ended["ended"] = {
+                "unit": self.course.ended.unit,
+                "time": self.course.ended.time,
+                "message": str(self.course.ended),
+            }
+        record = self._recorded(status) | self.log.record(self._ended_by) | ended
+        self.recorder.finish(record)
+        self._saved, self._saving = True, False
+
+    def _end(self) -> None:
+        """Terminate and free the units; add to the record, which is written by then, what they said."""
+        try:
+            self.course.end()
+        finally:
+            freed = {**self.log.record(self._ended_by), "units_freed": True}
+            self.recorder.close(freed if self._saved else None)
+
+    def _recorded(self, status: str) -> dict[str, Any]:
+        return {
+            "id": self.id,
+            "key": self._key,
+            **run_record(self.plan, status=status, started=self._started),
+        }
+
+    def _explained(self, error: BaseException | None) -> dict[str, Any] | None:
+        if error is None:
+            return None
+        unit = getattr(error, "unit", None)
+        return {
+            "message": str(error) or type(error).__name__,
+            "unit": unit,
+            "time": getattr(error, "time", None),
+            "inputs": self.course.inputs_of(unit) if unit else {},
+            "traceback": self.log.tracebacks(unit) if unit else [],
+        }

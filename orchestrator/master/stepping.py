@@ -24,11 +24,12 @@ from ..errors import YawbenchError
 from ..plan import Plan, Value
 from ..results.recorder import BLOCK
 from .course import Course, Opener
-from .exchange import REPLY, Channel, Relay
+from .exchange import REPLY, Channel, Relay, told
 from .guardian import die_with_parent
-from .interrupts import StopFlag, interrupts
+from .interrupts import StopFlag, request_stop
 from .log import Message
 from .master import WORDS, Master
+from .surroundings import flush_output
 from .unit import FmuSlave
 
 ROWS, PROGRESS, ENDED, WHERE = 0x90, 0x91, 0x92, 0x93
@@ -107,7 +108,7 @@ def step_units(
     """Make the run in this process, which has just been forked. Never returns.
 
     Args:
-        asking: pipe through which the other side asks in which unit the run is.
+        asking: pipe through which the other side says that the run is to stop, and asks in which unit it is.
     """
     try:
         die_with_parent()
@@ -116,8 +117,7 @@ def step_units(
             if descriptor > 2 and descriptor not in (channel.reading, channel.writing, asking):
                 with contextlib.suppress(OSError):  # that of the folder that has just been listed
                     os.close(descriptor)
-        with interrupts(stop, lambda: None):
-            _make(plan, opener, stop, shared, channel, asking)
+        _make(plan, opener, stop, shared, channel, asking)
     except OSError:
         os._exit(1)  # the other side is gone, or a unit has closed the pipe to it
     except BaseException:
@@ -135,7 +135,7 @@ def _make(plan: Plan, opener: Opener, stop: StopFlag, shared: Shared, channel: C
         channel.send(PROGRESS, (done, total))
 
     course = Course(plan, rows, log, stop, progress, shared.completed)
-    _tell_where(channel, asking)
+    _tell_where(channel, asking, stop)
     error = _go(course, opener)
     if os.getpid() != process:
         return  # a copy that an FMU has made of this process
@@ -147,9 +147,7 @@ def _make(plan: Plan, opener: Opener, stop: StopFlag, shared: Shared, channel: C
             return
     course.end()
     log.finish()
-    sys.stdout.flush()
-    sys.stderr.flush()
-    ctypes.CDLL(None).fflush(None)
+    flush_output()
     channel.send(REPLY, None)
 
 
@@ -158,12 +156,10 @@ def _go(course: Course, opener: Opener) -> dict[str, Any] | None:
     try:
         course.go(opener)
     except YawbenchError as error:
-        where = {name: value for name, value in vars(error).items() if name in ("unit", "time")}
-        unit = where.get("unit")
-        inputs = course.inputs_of(unit) if unit else {}
-        return {"kind": type(error).__name__, "problems": error.problems, "where": where, "inputs": inputs}
+        unit = getattr(error, "unit", None)
+        return {**told(error), "inputs": course.inputs_of(unit) if unit else {}}
     except BaseException:
-        return {"kind": "RuntimeError", "problems": traceback.format_exc(), "where": {}, "inputs": {}}
+        return {"kind": "", "problems": traceback.format_exc(), "inputs": {}}
     return None
 
 
@@ -171,13 +167,14 @@ def _complete(message: Message) -> tuple[Any, ...]:
     return message.unit, message.status, message.category, message.text, message.time
 
 
-def _tell_where(channel: Channel, asking: int) -> None:
-    """Answer, from a thread, in which unit the run is; also when an FMU calls exit()."""
+def _tell_where(channel: Channel, asking: int, stop: StopFlag) -> None:
+    """Answer, from a thread, in which unit the run is, and let it stop; also when an FMU calls exit()."""
     stepping, process = threading.get_ident(), os.getpid()
 
     def answer() -> None:
         with contextlib.suppress(OSError):  # the other side is gone
             while os.read(asking, 1):
+                request_stop(stop)
                 channel.send(WHERE, _whereabouts(stepping))
 
     threading.Thread(target=answer, daemon=True).start()

@@ -17,6 +17,7 @@ import os
 import platform
 import signal
 import struct
+import sys
 import threading
 from collections.abc import Iterator
 
@@ -68,6 +69,13 @@ class Surroundings:
             for number in _HANDLED:
                 if (handler := signal.getsignal(number)) is not None:  # Python's, whatever C has now
                     signal.signal(number, handler)
+
+
+def flush_output() -> None:
+    """Write what Python and C have still to print."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    _c.fflush(None)
 
 
 def _arithmetic() -> ctypes.Array[ctypes.c_char]:

@@ -1,9 +1,8 @@
-"""One FMU instance: loaded through fmpy, stepped without it.
+"""One FMU instance, loaded and stepped through ctypes.
 
-fmpy loads the library, declares its functions and frees it again. Of its wrappers the stepping
-loop uses nothing: a call is the raw C function with arguments that were made into C objects once
-(0.26 us instead of 0.64 us with fmpy's declared types, more with its logging wrappers), on buffers
-that belong to the master.
+A call of a step is the raw C function with arguments that were made into C objects once (0.26 us instead
+of 0.64 us with the types that fmpy declares, more with its logging wrappers), on buffers that belong to
+the master. And fmpy loads no library that lacks a function, though nobody may call it.
 
 To FMI 3.0 an array is one variable, to a scenario so many scalars. Most exchanges of a step are of
 scalars of the precision and in the order of the master's buffer, and go straight through it; others are
@@ -18,13 +17,13 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, ClassVar
 
+import fmpy
 import numpy as np
 
 from ..errors import ModelDescriptionError, SimulationError
-from ..fmu.binary import CORE, INTEGERS, binary_problem
+from ..fmu.binary import CORE, INTEGERS, binary_of, binary_problem
 from ..plan import Place, Unit, Value
 from ..wording import listed
 from .log import ERROR, FATAL, OK, STATUS, WARNING, Log, known, unlisten
@@ -36,8 +35,6 @@ class FmuSlave(ABC):
 
     prefix: ClassVar[str]
     """Of the names of the functions."""
-    library: ClassVar[type]
-    """fmpy's class that loads the library."""
     version: ClassVar[int]
     """Of FMI, the major one."""
     real: ClassVar[str]
@@ -64,11 +61,10 @@ class FmuSlave(ABC):
         self._worst = OK
         self._log = log
         self._listener = 0
-        self._fmu = self._load(unit)
-        self._library = self._fmu.dll
+        self._library = self._load(unit)
         if missing := [name for name in CORE[self.version] if not self._has(name)]:
             functions = listed(f"{self.prefix}{name}" for name in missing)
-            self._fmu.freeLibrary()
+            fmpy.freeLibrary(self._library._handle)
             raise ModelDescriptionError(f"{unit.name}: {unit.fmu.path}: its library lacks {functions}")
         self._component = self._instantiate(unit)
         if self._component is None:
@@ -81,21 +77,18 @@ class FmuSlave(ABC):
                 f"{unit.name}: {unit.fmu.path} cannot be instantiated: {reason}", unit=unit.name, time=0.0
             )
 
-    def _load(self, unit: Unit) -> Any:
-        """Return fmpy's object of the library, which may lack functions."""
-        here = os.getcwd()
-        try:
-            return _tolerant(self.library)(
-                guid=unit.fmu.guid,
-                modelIdentifier=unit.fmu.model_identifier,
-                unzipDirectory=str(unit.fmu.directory),
-                instanceName=unit.name,
-            )
-        except Exception as error:  # fmpy raises plain Exception here
-            problem = binary_problem(unit.fmu) or f"its library cannot be loaded: {error}"
-            raise ModelDescriptionError(f"{unit.name}: {unit.fmu.path}: {problem}") from None
-        finally:
-            os.chdir(here)  # fmpy goes to the library's folder and, if loading fails, stays there
+    def _load(self, unit: Unit) -> ctypes.CDLL:
+        problem, here = binary_problem(unit.fmu), os.getcwd()
+        if not problem:
+            file = (unit.fmu.directory / binary_of(self.version, unit.fmu.model_identifier)).absolute()
+            try:
+                os.chdir(file.parent)  # where some look for other libraries
+                return ctypes.CDLL(str(file))
+            except OSError as error:
+                problem = f"its library cannot be loaded: {error}"
+            finally:
+                os.chdir(here)
+        raise ModelDescriptionError(f"{unit.name}: {unit.fmu.path}: {problem}")
 
     @abstractmethod
     def _instantiate(self, unit: Unit) -> int | None:
@@ -151,7 +144,7 @@ class FmuSlave(ABC):
         counts = [ctypes.c_size_t(len(references)), buffer]
         if self.version > 2:
             counts.append(ctypes.c_size_t(len(buffer)))
-        return functools.partial(self._raw(name), ctypes.c_void_p(self._component), references, *counts)
+        return functools.partial(self._function(name), ctypes.c_void_p(self._component), references, *counts)
 
     def _access(self, verb: str, places: Sequence[Place], values: Sequence[Any]) -> tuple[Status, list[Any]]:
         """Set ("Set") or get ("Get") variables of one type; return status and values."""
@@ -182,19 +175,22 @@ class FmuSlave(ABC):
     @abstractmethod
     def ended(self) -> float | None: ...
 
-    def _function(self, name: str) -> Callable[..., Any]:
-        """Return a C function with declared argument types.
-
-        Raises:
-            AttributeError: the library lacks it.
-        """
-        return getattr(self._library, self.prefix + name)
-
-    def _raw(self, name: str) -> Any:
-        """Return a C function without declared argument types, for arguments that are C objects."""
+    def _function(self, name: str) -> Any:
+        """Return a C function, which takes C objects, and of Python's numbers only integers."""
         function = self._library[self.prefix + name]
         function.restype = ctypes.c_int
         return function
+
+    def _do(self, name: str, *arguments: Any) -> Status:
+        """Call a function of the instance."""
+        return self._function(name)(ctypes.c_void_p(self._component), *arguments)
+
+    def _announce(self, name: str, experiment: Experiment) -> Status:
+        """Call the function that is told of the run."""
+        start, stop, tolerance = experiment
+        times = ctypes.c_double(start), 1, ctypes.c_double(stop)
+        self._may_terminate = True
+        return self._do(name, int(tolerance is not None), ctypes.c_double(tolerance or 0.0), *times)
 
     def part(self, kind: str) -> str:
         return kind
@@ -213,7 +209,7 @@ class FmuSlave(ABC):
         return status, values
 
     def exit(self) -> Status:
-        return self._function("ExitInitializationMode")(self._component)
+        return self._do("ExitInitializationMode")
 
     def note(self, status: Status) -> Status:
         status = known(status)
@@ -223,20 +219,19 @@ class FmuSlave(ABC):
         return status
 
     def free(self) -> None:
-        component, self._component = self._component, None
         if self._freed or self._directory in self._corrupted:
             return  # after Fatal no function of any instance may be called (FMI 2.0.4, 2.1.3)
         self._freed = True
-        if component is not None:
+        if self._component is not None:
             if self._may_terminate and self._worst < ERROR and self._has("Terminate"):
-                status = self.note(self._function("Terminate")(component))
+                status = self.note(self._do("Terminate"))
                 if status != OK:
                     self._log.add(self.name, WARNING, "", f"{self.prefix}Terminate returned {STATUS[status]}")
                 if status >= FATAL:
                     return
-            self._function("FreeInstance")(component)
+            self._do("FreeInstance")
         unlisten(self._listener)
-        self._fmu.freeLibrary()
+        fmpy.freeLibrary(self._library._handle)
 
 
 def _layout(places: Sequence[Place]) -> tuple[Any, list[int], int]:
@@ -249,27 +244,6 @@ def _layout(places: Sequence[Place]) -> tuple[Any, list[int], int]:
             count += place.elements
     at = [first[place.reference] + place.element for place in places]
     return (ctypes.c_uint * len(first))(*first), at, count
-
-
-class _Passing:
-    """A library as fmpy is to see it: to a function that is missing, declarations are lost."""
-
-    def __init__(self, library: Any) -> None:
-        self._library = library
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._library, name, None) or SimpleNamespace()
-
-
-def _tolerant(library: type) -> type:
-    """Return fmpy's class as one that also loads libraries that lack functions."""
-
-    def load(self: Any) -> None:
-        complete, self.dll = self.dll, _Passing(self.dll)
-        library._loadFunctions(self)  # type: ignore[attr-defined]
-        self.dll = complete
-
-    return type(library.__name__, (library,), {"_loadFunctions": load})
 
 
 def nothing_to_do() -> Status:

@@ -6,18 +6,18 @@ It ends when the master does, and with it all that the FMU has started (see `gua
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import os
 from collections.abc import Sequence
+from typing import Any
 
-from ..errors import ModelDescriptionError, SimulationError
+from ..errors import YawbenchError
 from ..plan import Place, Unit
-from .exchange import FAILED, GET, REPLY, SET, STEP, Board, Channel, Relay
+from .exchange import FAILED, GET, REPLY, SET, STEP, Board, Channel, Relay, told
 from .guardian import stand_guard
 from .log import OK, WARNING, known
 from .opening import open_unit
 from .slave import Buffers
-from .surroundings import Surroundings
+from .surroundings import Surroundings, flush_output
 from .unit import FmuSlave
 
 
@@ -70,12 +70,12 @@ class Worker:
         self._part.value = 0
         return answer
 
-    def open(self, unit: Unit) -> tuple[str, list[str]] | None:
-        """Instantiate the FMU; return the name of an error and its sentences if that fails."""
+    def open(self, unit: Unit) -> dict[str, Any] | None:
+        """Instantiate the FMU; return what there is to tell if that fails."""
         try:
             self._slave = open_unit(unit, self._log, set())
-        except (ModelDescriptionError, SimulationError) as error:
-            return type(error).__name__, [*error.problems]
+        except YawbenchError as error:
+            return told(error)
         return None
 
     def connect(self, input_places: Sequence[Place], output_places: Sequence[Place]) -> None:
@@ -95,7 +95,7 @@ class Worker:
         """End the instance, and what its library has still to print."""
         self._slave.free()
         self._log.finish()
-        ctypes.CDLL(None).fflush(None)
+        flush_output()
 
 
 def main(*descriptors: str) -> None:

@@ -212,11 +212,12 @@ def test_a_limit_that_is_no_time_is_refused(option, says, capsys):
 NOBODY = """
 import os, threading
 from orchestrator.master.exchange import Channel
+from orchestrator.master.interrupts import StopFlag
 from orchestrator.master.stepping import _tell_where
 nobody, writing = os.pipe()
 os.close(nobody)
 asking, ask = os.pipe()
-_tell_where(Channel(asking, writing), asking)
+_tell_where(Channel(asking, writing), asking, StopFlag())
 (thread,) = set(threading.enumerate()) - {threading.main_thread()}
 os.write(ask, b"?")
 thread.join(10)
