@@ -28,7 +28,7 @@ from ..plan import Plan, Value
 from ..results.recorder import BLOCK, Block
 from ..wording import listed
 from .course import Opener, Progress, hand_over
-from .exchange import LOG, REPLY, Channel, Garbled, rebuilt
+from .exchange import REPLY, Channel, Garbled, rebuilt
 from .interrupts import StopFlag, stop_requested_at
 from .log import MASTER, WARNING, Log
 from .master import Ended, Interrupted
@@ -51,7 +51,7 @@ def can_be_apart() -> bool:
 class CourseApart(Process):
     """The course of one run in another process; arguments and methods are those of `course.Course`."""
 
-    unasked = (LOG, ROWS, PROGRESS, WHERE)
+    unasked = (ROWS, PROGRESS, WHERE)
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class CourseApart(Process):
         self._rows = rows
         self.writing = False
         self.ended: Ended | None = None
-        self._log = log
+        self.log = log
         self._stop = stop
         self._progress = progress or (lambda done, total: None)
         self._shared = Shared(len(rows.rows[0]))
@@ -127,12 +127,6 @@ class CourseApart(Process):
                 self._where = unit, what
             case _, None if kind == WHERE:
                 pass
-            case _, int() if kind == LOG:
-                self._log.drop(content)
-            case _, [str() as unit, int() as status, str() as category, str() as text, float() as at] if (
-                kind == LOG
-            ):
-                self._log.add(unit, status, category, text, at)
             case _:
                 raise Garbled(f"a record {kind}")
 
@@ -221,5 +215,5 @@ class CourseApart(Process):
         except (Lost, OSError) as lost:
             unit = self._where[0] if self._where else ", ".join(self._suspects) or "the units"
             text = f"when units were terminated and freed, the process of the run {lost}"
-            self._log.add(unit, WARNING, MASTER, text, self.plan.time(max(0, self._shared.completed.value)))
+            self.log.add(unit, WARNING, MASTER, text, self.plan.time(max(0, self._shared.completed.value)))
         self.close()

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import SimulationError, YawbenchError
-from .log import KEPT, Log, Message
+from .log import KEPT, Log
 
 SET, STEP, GET = 1, 2, 4
 """Parts of an exchange, in this order; a sum of them asks for several."""
@@ -184,20 +184,22 @@ class Relay(Log):
     """Passes on what FMUs log at once, for one may be about to crash; a flood it only counts.
 
     Args:
-        told: what is passed on of a message.
+        timed: it is known here what time the messages are of.
     """
 
-    def __init__(self, channel: Channel, told: Callable[[Message], tuple[Any, ...]]) -> None:
+    def __init__(self, channel: Channel, *, timed: bool) -> None:
         super().__init__()
         self._channel = channel
-        self._told = told
+        self._timed = timed
         self._untold = 0  # messages that were dropped
 
     def add(self, unit: str, status: int, category: str, text: str, time: float | None = None) -> None:
         kept = len(self.messages)
         super().add(unit, status, category, text, time)
         if len(self.messages) > kept:
-            self._channel.send(LOG, self._told(self.messages[-1]))
+            last = self.messages[-1]
+            at = last.time if self._timed else None
+            self._channel.send(LOG, (unit, last.status, category, last.text, at))
 
     def drop(self, count: int) -> None:
         super().drop(count)

@@ -74,30 +74,23 @@ class Faulting:
         return act
 
 
-def of_outputs(memory: Memory, s: Station) -> Faulting | None:
-    """Return the faults of a unit's outputs, None if it has none."""
-    places = {v.name: i for i, v in enumerate(s.outputs)}
-    faults = [f for f in memory.plan.faults if f.of_output and f.unit == s.name and f.variable in places]
-    held = {v.name: v.discrete for v in s.outputs}
-    ahead = 2 * s.unit.period
-    made = [(places[f.variable], ahead, disturbance(f, held=held[f.variable])) for f in faults]
-    return Faulting(memory.plan, s.unit.period, made) if made else None
-
-
-def of_inputs(memory: Memory, s: Station) -> Faulting | None:
-    """Return the faults of a unit's inputs, None if it has none."""
-    plan = memory.plan
+def faulting(memory: Memory, s: Station, *, of_output: bool) -> Faulting | None:
+    """Return the faults of a unit's outputs, or of its inputs, None if it has none."""
+    plan, period = memory.plan, s.unit.period
+    places = {v.name: (i, v) for i, v in enumerate(s.outputs if of_output else s.inputs)}
     made = []
     for fault in plan.faults:
-        if fault.of_output or fault.unit != s.name:
+        if (fault.unit, fault.of_output) != (s.name, of_output) or fault.variable not in places:
             continue
-        i, variable = next((i, v) for i, v in enumerate(s.inputs) if v.name == fault.variable)
-        wire = s.wires[i]
-        assert wire is not None
-        held = memory.of[wire.source].unit.fmu.variables[wire.output].discrete
-        ahead = halves_ahead(plan.algorithm, s.unit.period, direct=s.direct(variable))
+        i, variable = places[fault.variable]
+        ahead, held = 2 * period, variable.discrete
+        if not of_output:
+            wire = s.wires[i]
+            assert wire is not None
+            ahead = halves_ahead(plan.algorithm, period, direct=s.direct(variable))
+            held = memory.of[wire.source].unit.fmu.variables[wire.output].discrete
         made.append((i, ahead, disturbance(fault, held=held)))
-    return Faulting(plan, s.unit.period, made) if made else None
+    return Faulting(plan, period, made) if made else None
 
 
 def disturbance(fault: Fault, *, held: bool) -> Disturbance:

@@ -8,20 +8,18 @@ inputs waits for the step and outputs come back with it, so a unit costs one exc
 from __future__ import annotations
 
 import contextlib
-import functools
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..errors import SimulationError
 from ..plan import Place, Plan, Unit, Value
-from .exchange import GET, SET, STEP, Board, Garbled, rebuilt
+from .exchange import GET, SET, STEP, Board, rebuilt
 from .log import FATAL, OK, PROCESS, WARNING, Log, known
 from .opening import SLAVES, open_unit
+from .operations import copying
 from .process import Lost, UnitProcess
 from .slave import Buffers, Calls, Experiment, Slave, Status
 
@@ -49,7 +47,7 @@ class IsolatedSlave:
         self._part = ""
         self._answered = 0
         self._prefix, self._real = SLAVES[unit.fmu.fmi].prefix, SLAVES[unit.fmu.fmi].real
-        process.log = self._note_log
+        process.log = log
         try:
             process.wait_until_ready()
         except Lost as lost:
@@ -64,20 +62,6 @@ class IsolatedSlave:
             process.close()
             raise rebuilt(failed)
 
-    def _note_log(self, content: Any) -> None:
-        """Keep what the FMU logs: a message, or how many more there were.
-
-        Raises:
-            Garbled: it is neither.
-        """
-        match content:
-            case int():
-                self._log.drop(content)
-            case [int() as status, str() as category, str() as text]:
-                self._log.add(self.name, status, category, text)
-            case _:
-                raise Garbled("a message that is none")
-
     def _refused(self, sentence: str) -> SimulationError:
         return SimulationError(sentence, unit=self.name, time=0.0)
 
@@ -88,8 +72,8 @@ class IsolatedSlave:
         self._board = board
         self._ask("", None, "connect", list(input_places), list(output_places))
         board.step.value = step.value
-        give = _copy(inputs, board.inputs)
-        take = _copy(board.outputs, outputs)
+        give = copying(inputs, board.inputs)
+        take = copying(board.outputs, outputs)
         step_and_get = STEP | GET if len(outputs) else STEP
         waiting, fresh = 0, False
 
@@ -196,12 +180,8 @@ class IsolatedSlave:
         try:
             process.ask("free")
         except Lost as lost:  # the results are not the worse for it
-            self._log.add(
-                self.name,
-                WARNING,
-                PROCESS,
-                lost.in_(f"{self._prefix}Terminate or {self._prefix}FreeInstance"),
-            )
+            said = lost.in_(f"{self._prefix}Terminate or {self._prefix}FreeInstance")
+            self._log.add(self.name, WARNING, PROCESS, said)
         else:
             process.close()
 
@@ -209,11 +189,7 @@ class IsolatedSlave:
 _BYTES = [bytes([parts]) for parts in range(SET + STEP + GET + 1)]
 
 
-def _copy(source: np.ndarray, target: np.ndarray) -> Callable[[], None]:
-    return functools.partial(target.data.__setitem__, slice(None), source.data)
-
-
-class Isolation:
+class Isolation(contextlib.ExitStack):
     """Opens units (see `simulate.Opener`) in processes of their own; all end with the `with` block."""
 
     def __init__(self, units: Sequence[Unit], limit: float = CALL_LIMIT) -> None:
@@ -222,22 +198,17 @@ class Isolation:
         Args:
             limit: time that a call of an FMU may take [s].
         """
+        super().__init__()
         self._units = units
         self._limit = limit
         self._processes: dict[str, UnitProcess] = {}
-
-    def __enter__(self) -> Isolation:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        for process in self._processes.values():
-            process.close()
 
     def __call__(self, unit: Unit, log: Log, corrupted: set[Path]) -> Slave:
         """Return the unit's instance. One that returns Fatal spoils no other: they share nothing."""
         if not self._processes:
             for each in self._units:
-                self._processes[each.name] = UnitProcess(len(each.fmu.variables), self._limit)
+                self._processes[each.name] = process = UnitProcess(len(each.fmu.variables), self._limit)
+                self.callback(process.close)
         return IsolatedSlave(unit, log, self._processes[unit.name])
 
 

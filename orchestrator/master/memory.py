@@ -19,7 +19,7 @@ import numpy as np
 from ..errors import SimulationError
 from ..plan import Plan, Unit, Value, Variable, Wire
 from .coupling import Relation
-from .faulting import Faulting, of_inputs, of_outputs
+from .faulting import Faulting, faulting
 from .slave import Calls, Slave
 
 
@@ -102,7 +102,8 @@ class Memory:
         self._place_outputs()
         self._place_inputs(2 * n_out, 2 * n_out + n_in)
         for s in self.stations if plan.faults else ():
-            s.output_faults, s.input_faults = of_outputs(self, s), of_inputs(self, s)
+            s.output_faults = faulting(self, s, of_output=True)
+            s.input_faults = faulting(self, s, of_output=False)
 
     def _place_outputs(self) -> None:
         at = 0

@@ -90,7 +90,7 @@ class Programs:
                 operations += _setting(self._memory, s)
                 operations.append(Operation(s.name, "step", s.calls.step))
                 if self._memory.plan.algorithm == "extrapolated" and s.outputs:
-                    operations.append(Operation(s.name, "keep", _copy(s.y, s.y_before)))
+                    operations.append(Operation(s.name, "keep", copying(s.y, s.y_before)))
                 operations += [*getting(self._memory, s), *self._of_outputs[s.name]]
         return operations
 
@@ -184,7 +184,8 @@ def _acting(s: Station, faults: Faulting | None, values: np.ndarray) -> list[Ope
     return [] if faults is None else [Operation(s.name, "fault", faults.acting(values))]
 
 
-def _copy(source: np.ndarray, target: np.ndarray) -> Callable[[], None]:
+def copying(source: np.ndarray, target: np.ndarray) -> Callable[[], None]:
+    """Return the call that copies one buffer into another."""
     return functools.partial(target.data.__setitem__, slice(None), source.data)
 
 

@@ -17,6 +17,7 @@ from typing import Any, ClassVar
 from ..processes import how_it_ended, python
 from .exchange import ANSWER, FAILED, LOG, REPLY, Channel, Garbled, shared_memory
 from .interrupts import stop_requested_at
+from .log import Log
 
 START_LIMIT = 60.0
 """Time that a process may take to start [s]; chosen: Python is read from a slow disk in less."""
@@ -53,7 +54,8 @@ class Process(ABC):
     """The hold on a process. All calls that wait for it raise `Lost` if no answer comes."""
 
     unasked: ClassVar[tuple[int, ...]]
-    """First bytes of the records that it may send at any time."""
+    """First bytes of the records that it may send at any time, beside what is logged in it."""
+    log: Log
 
     def _start(self, start: Callable[[int, int], Any]) -> Any:
         """Let `start` make it, given its ends of the pipes to read from and to write into."""
@@ -94,12 +96,15 @@ class Process(ABC):
                     raise EOFError
                 if kind <= ANSWER and wanted == ANSWER:
                     return kind
-                if kind != wanted and kind not in self.unasked:
+                if kind not in (wanted, LOG, *self.unasked):
                     raise Garbled(f"byte {kind}")
                 content = self._channel.receive()
                 if kind == wanted:
                     return content
-                self._take(kind, content)
+                if kind == LOG:
+                    self._keep(content)
+                else:
+                    self._take(kind, content)
                 self._check_time()
         except EOFError:
             ended = self._has_ended(CLOSING)
@@ -107,6 +112,16 @@ class Process(ABC):
             raise Lost(how_it_ended(code) if ended else "closed the pipe to the master") from None
         except Garbled as error:
             raise self.garbled(str(error)) from None
+
+    def _keep(self, content: Any) -> None:
+        """Keep what a unit logs: a message, or how many more there were (see `exchange.Relay`)."""
+        match content:
+            case int():
+                self.log.drop(content)
+            case [str() as unit, int() as status, str() as category, str() as text, float() | None as time]:
+                self.log.add(unit, status, category, text, time)
+            case _:
+                raise Garbled("a message that is none")
 
     def _wait_for_more(self) -> None:
         while not self._poll.poll(LOOK_EVERY):
@@ -123,7 +138,7 @@ class Process(ABC):
 class UnitProcess(Process):
     """The process of one isolated unit."""
 
-    unasked = (LOG, FAILED)
+    unasked = (FAILED,)
 
     def __init__(self, values: int, limit: float) -> None:
         """Start it, without waiting for it.
@@ -134,7 +149,6 @@ class UnitProcess(Process):
         """
         self._limit = limit
         self.memory = shared_memory(values)
-        self.log: Callable[[Any], None] = lambda content: None
         self._deadline = 0.0
         self._closed = False
         self._popen = self._start(self._spawned)
@@ -169,10 +183,8 @@ class UnitProcess(Process):
         return self._hear(wanted)
 
     def _take(self, kind: int, content: Any) -> None:
-        if kind == FAILED:
-            self.close()
-            raise Lost(f"failed: {content}")
-        self.log(content)
+        self.close()
+        raise Lost(f"failed: {content}")
 
     def _check_time(self) -> None:
         now, asked = time.monotonic(), stop_requested_at()

@@ -27,7 +27,6 @@ from .course import Course, Opener
 from .exchange import REPLY, Channel, Relay, told
 from .guardian import die_with_parent
 from .interrupts import StopFlag, request_stop
-from .log import Message
 from .master import WORDS, Master
 from .surroundings import flush_output
 from .unit import FmuSlave
@@ -128,7 +127,7 @@ def step_units(
 
 def _make(plan: Plan, opener: Opener, stop: StopFlag, shared: Shared, channel: Channel, asking: int) -> None:
     process = os.getpid()
-    log = Relay(channel, _complete)
+    log = Relay(channel, timed=True)
     rows = _Rows(shared, channel)
 
     def progress(done: int, total: int) -> None:
@@ -161,10 +160,6 @@ def _go(course: Course, opener: Opener) -> dict[str, Any] | None:
     except BaseException:
         return {"kind": "", "problems": traceback.format_exc(), "inputs": {}}
     return None
-
-
-def _complete(message: Message) -> tuple[Any, ...]:
-    return message.unit, message.status, message.category, message.text, message.time
 
 
 def _tell_where(channel: Channel, asking: int, stop: StopFlag) -> None:

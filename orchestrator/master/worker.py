@@ -27,7 +27,7 @@ class Worker:
     def __init__(self, channel: Channel, memory: int) -> None:
         self._channel = channel
         self._memory = memory
-        self._log = Relay(channel, lambda message: (message.status, message.category, message.text))
+        self._log = Relay(channel, timed=False)
         self._surroundings: Surroundings | None = Surroundings()  # until it is stepped
         self._slave: FmuSlave
 

@@ -12,6 +12,7 @@ import pytest
 
 from orchestrator.master import process
 from orchestrator.master.exchange import FAILED, LOG, REPLY, Channel, Garbled
+from orchestrator.master.log import Log
 from orchestrator.master.process import Lost, UnitProcess
 
 from ..trials.hostile_fmus import Case, attack
@@ -84,7 +85,7 @@ def pretend(monkeypatch):
         monkeypatch.setattr(_Pretender, "stays", stays)
         monkeypatch.setattr(process, "LOOK_EVERY", 1)
         unit = UnitProcess(3, limit=0.01)
-        unit.log = lambda content: None
+        unit.log = Log()
         with pytest.raises(Lost) as lost:
             unit._answer(0.01, REPLY)
         return lost.value.in_("fmi2DoStep")
