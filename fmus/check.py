@@ -53,7 +53,7 @@ def _ask(what: str, *arguments: object) -> Any:
         answer = _checker.stdout.readline()  # type: ignore[union-attr]
     except BrokenPipeError:
         answer = ""
-    return json.loads(answer) if answer else how_it_ended(_checker.wait()).rstrip(",")
+    return json.loads(answer) if answer else how_it_ended(_checker.wait())
 
 
 def _end(checker: subprocess.Popen) -> None:

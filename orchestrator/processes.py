@@ -24,5 +24,4 @@ def how_it_ended(code: int) -> str:
         name = signal.Signals(-code).name
     except ValueError:
         name = f"signal {-code}"
-    cause = ", sent from outside or for want of memory," if name == "SIGKILL" else ""
-    return f"died of {name}{cause}"
+    return f"died of {name}" + (" (sent from outside or for want of memory)" if name == "SIGKILL" else "")

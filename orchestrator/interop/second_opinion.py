@@ -193,7 +193,7 @@ def _run(module: str, request: Request, folder: Path) -> Recording | str:
     lines = done.stderr.decode(errors="replace").strip().splitlines()
     if done.returncode < 0:
         before = f"; before that it said: {' '.join(lines[-2:])}" if lines else ""
-        return f"it {how_it_ended(done.returncode).rstrip(',')}{before}"
+        return f"it {how_it_ended(done.returncode)}{before}"
     return lines[-1] if lines else f"it ended without a word, exit status {done.returncode}"
 
 

@@ -191,7 +191,7 @@ class CourseApart(Process):
             unit = self._suspects[0]
         period = next((u.period for u in self.plan.units if u.name == unit), 1)
         now = self.plan.time(max(0, completed + 1 - period if (completed + 1) % period == 0 else completed))
-        sentence = f"{doing} failed at t = {now:.9g} s: the process of the run {str(lost).rstrip(',')}"
+        sentence = f"{doing} failed at t = {now:.9g} s: the process of the run {lost}"
         if unit is not None:
             sentence = f"{unit}: {sentence}"
         elif self._suspects:

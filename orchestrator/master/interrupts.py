@@ -22,12 +22,11 @@ class StopFlag:
     def __init__(self) -> None:
         self.requested = False
 
-
-def request_stop(flag: StopFlag) -> None:
-    """Raise `flag`, and note when that was first wished."""
-    global _requested_at
-    flag.requested = True
-    _requested_at = _requested_at or time.monotonic()
+    def request(self) -> None:
+        """Let it end."""
+        global _requested_at
+        self.requested = True
+        _requested_at = _requested_at or time.monotonic()
 
 
 def stop_requested_at() -> float | None:
@@ -45,7 +44,7 @@ def interrupts(flag: StopFlag, again: Callable[[], None]) -> Iterator[None]:
     def handle(number: int, frame: FrameType | None) -> None:
         if flag.requested:
             again()
-        request_stop(flag)
+        flag.request()
 
     if threading.current_thread() is not threading.main_thread():
         yield

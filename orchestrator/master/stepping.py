@@ -26,7 +26,7 @@ from ..results.recorder import BLOCK
 from .course import Course, Opener
 from .exchange import REPLY, Channel, Relay, told
 from .guardian import die_with_parent
-from .interrupts import StopFlag, request_stop
+from .interrupts import StopFlag
 from .master import WORDS, Master
 from .surroundings import flush_output
 from .unit import FmuSlave
@@ -169,7 +169,7 @@ def _tell_where(channel: Channel, asking: int, stop: StopFlag) -> None:
     def answer() -> None:
         with contextlib.suppress(OSError):  # the other side is gone
             while os.read(asking, 1):
-                request_stop(stop)
+                stop.request()
                 channel.send(WHERE, _whereabouts(stepping))
 
     threading.Thread(target=answer, daemon=True).start()
