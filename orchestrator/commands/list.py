@@ -67,8 +67,7 @@ def _folder_of_fmus(given: Path | None) -> Path:
     from fmus.upkeep import place_of
 
     from ..errors import ModelDescriptionError
-    from ..fmu.opener import HOME, Opener
-    from ..fmu.search import find_folder
+    from ..fmu.opener import HOME, Opener, find_folder
     from .build import tell_of_build
 
     if given is None:

@@ -27,7 +27,7 @@ from ..errors import SimulationError
 from ..plan import Plan, Value
 from ..results.recorder import BLOCK, Block
 from ..wording import listed
-from .course import Opener, Progress, hand_over
+from .course import Course, Opener, Progress
 from .exchange import REPLY, Channel, Garbled, rebuilt
 from .interrupts import StopFlag, stop_requested_at
 from .log import MASTER, WARNING, Log
@@ -48,28 +48,14 @@ def can_be_apart() -> bool:
     return sys.platform == "linux" and threading.current_thread() is threading.main_thread()
 
 
-class CourseApart(Process):
-    """The course of one run in another process; arguments and methods are those of `course.Course`."""
+class CourseApart(Course, Process):
+    """The course of one run in another process."""
 
     unasked = (ROWS, PROGRESS, WHERE)
 
-    def __init__(
-        self,
-        plan: Plan,
-        rows: Block,
-        log: Log,
-        stop: StopFlag,
-        progress: Progress | None = None,
-    ) -> None:
-        self.plan = plan
-        self.passes = 0
-        self.handed_over = 0
-        self._rows = rows
-        self.writing = False
-        self.ended: Ended | None = None
-        self.log = log
-        self._stop = stop
-        self._progress = progress or (lambda done, total: None)
+    def __init__(self, plan: Plan, rows: Block, log: Log, stop: StopFlag, progress: Progress | None) -> None:
+        super().__init__(plan, rows, log, stop, progress)
+        self._rows: Block = rows
         self._shared = Shared(len(rows.rows[0]))
         self._blocks = 0  # written
         self._inputs: dict[str, Value] = {}
@@ -122,7 +108,8 @@ class CourseApart(Process):
                 with contextlib.suppress(BrokenPipeError):
                     self._channel.say(TAKEN)
             case _, [int() as done, int() as total] if kind == PROGRESS:
-                self._progress(done, total)
+                if self._progress is not None:
+                    self._progress(done, total)
             case _, [str() as unit, str() as what] if kind == WHERE:
                 self._where = unit, what
             case _, None if kind == WHERE:
@@ -131,13 +118,14 @@ class CourseApart(Process):
                 raise Garbled(f"a record {kind}")
 
     def _record(self, count: int, others: list[list[Value]]) -> None:
-        self.handed_over += count
+        if self._closed:
+            self.handed_over += count
+            return
+        self._closed = True  # if this fails, what comes after it is no use
         self._rows.lay(self._shared.blocks[self._blocks % 2])
         self._rows.others[:] = others
-        self._closed, closed = True, self._closed  # if this fails, what comes after it is no use
-        if not closed:
-            hand_over(self._rows, count, self.plan.time(max(0, self.handed_over - 1)))
-            self._closed = False
+        self._hand_over(count)
+        self._closed = False
 
     def flush(self) -> None:
         """Write the rows that the process has left behind."""

@@ -39,20 +39,6 @@ REPORT_EVERY = 0.2
 """Time between two reports of progress [s], while a single step does not take longer."""
 
 
-def hand_over(rows: Rows, count: int, time: float) -> None:
-    """Let a recorder write rows, the last of which is of this time [s].
-
-    Raises:
-        SimulationError: it cannot.
-    """
-    try:
-        rows.write(count)
-    except ResultsError as error:
-        kept = "; the rows that fit are kept" if getattr(rows, "rows_stay", False) else ""
-        problem = f"{error.problems[0].rstrip('.')} (at t = {time:.9g} s){kept}."
-        raise SimulationError(problem, unit=None, time=time) from None
-
-
 class Course:
     """The course of one run in this process.
 
@@ -71,21 +57,17 @@ class Course:
         reached: ctypes.c_int64 | None = None,
     ) -> None:
         self.plan = plan
+        self.passes = 0  # of initialization
         self.handed_over = 0  # rows given away
         self.writing = False
         self.ended: Ended | None = None  # by a unit, before the plan's end
         self._rows = rows
-        self._log = log
+        self.log = log
         self._stop = stop
         self._progress = progress
         self._reached = reached
         self._master: Master | None = None
         self._slaves: dict[str, Slave] = {}
-
-    @property
-    def passes(self) -> int:
-        """Of initialization."""
-        return 0 if self._master is None else self._master.passes
 
     def inputs_of(self, unit: str) -> dict[str, Value]:
         """Return the inputs with which a unit was last stepped."""
@@ -96,11 +78,12 @@ class Course:
         corrupted: set[Path] = set()
         for unit in self.plan.units:
             for doubt in unit.fmu.doubts():
-                self._log.add(unit.name, WARNING, MASTER, doubt, self.plan.time(0))
-            self._slaves[unit.name] = opener(unit, self._log, corrupted)
-        self._master = Master(self.plan, self._slaves, self._log, self._stop, self._reached)
+                self.log.add(unit.name, WARNING, MASTER, doubt, self.plan.time(0))
+            self._slaves[unit.name] = opener(unit, self.log, corrupted)
+        self._master = Master(self.plan, self._slaves, self.log, self._stop, self._reached)
         with np.errstate(all="ignore"):  # what is not finite is found by looking, not by warning
             self._master.initialize(self._rows.rows[0], self._rows.others)
+            self.passes = self._master.passes
             try:
                 self._step(self._master)
             except Ended as ending:
@@ -137,11 +120,23 @@ class Course:
     def flush(self) -> None:
         """Hand over all whole rows."""
         completed = -1 if self._master is None else self._master.completed
-        count = completed + 1 - self.handed_over
+        self._hand_over(completed + 1 - self.handed_over)
+
+    def _hand_over(self, count: int) -> None:
+        """Let the recorder write rows.
+
+        Raises:
+            SimulationError: it cannot.
+        """
         self.handed_over += count
+        time = self.plan.time(max(0, self.handed_over - 1))
         self.writing = True
         try:
-            hand_over(self._rows, count, self.plan.time(max(0, self.handed_over - 1)))
+            self._rows.write(count)
+        except ResultsError as error:
+            kept = "; the rows that fit are kept" if getattr(self._rows, "rows_stay", False) else ""
+            problem = f"{error.problems[0].rstrip('.')} (at t = {time:.9g} s){kept}."
+            raise SimulationError(problem, unit=None, time=time) from None
         finally:
             self.writing = False
 

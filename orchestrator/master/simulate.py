@@ -136,7 +136,7 @@ class Run:
         self._apart = apart
         self._stop = StopFlag()
         course = CourseApart if apart else Course
-        self.course: Course | CourseApart = course(plan, recorder, self.log, self._stop, progress)
+        self.course: Course = course(plan, recorder, self.log, self._stop, progress)
         self._saved = False
         self._ended_by: str | None = None  # unit
         self._started = datetime.now(timezone.utc)

@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import ScenarioError
-from ..fmu.opener import Opener
-from ..fmu.search import find_fmu, find_folder
+from ..fmu.opener import Opener, find_fmu, find_folder
 from ..master.simulate import simulate_in_memory
 from ..plan import Fmu, Plan, Series, Unit, Value
 from ..scenario import yaml_lines

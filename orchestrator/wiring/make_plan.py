@@ -21,8 +21,7 @@ from pathlib import Path
 from vocabulary.wheels import WHEELS
 
 from ..errors import BuildError, ModelDescriptionError, Problem, WiringError, YawbenchError
-from ..fmu.opener import Opener, host_needs, stale_fmus
-from ..fmu.search import find_fmu, find_folder
+from ..fmu.opener import Opener, find_fmu, find_folder, host_needs, stale_fmus
 from ..fmu.shadowing import shadowed_modules
 from ..plan import Fmu, Plan, Series, Unit, Value, ValueOrigin, Wire
 from ..scenario.load import Scenario
