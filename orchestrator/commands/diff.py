@@ -18,8 +18,7 @@ def diff(one: One, other: Other) -> None:
     their results, signal by signal: from when on they differ, from when on a curve shows it (1 % of the
     signal's largest value), and by how much at most.
     """
-    from ..pages.divergence import divergence
-    from ..pages.run_differences import differences, differences_table, partings_table
+    from ..pages.divergence import differences, differences_table, divergence, partings_table
     from ..results.read import load_results
     from .batch import print_tables, say
     from .recorded import distinct

@@ -7,18 +7,17 @@ legend covers no data; the line at the bottom says where the figure comes from.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 from ..errors import ResultsError
 from ..titles import changed_each, changes_in
 from .display import Run, digits_of
 from .panels import Panel, shown_by
-from .spans import FAULTY, in_legend, spans_of
+from .spans import SPAN, in_legend, spans_of
 from .style import REFERENCE, ROW, frame, line_style, new_figure, reference_words
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -55,6 +54,8 @@ def draw(
     Raises:
         ResultsError: there is nothing to draw.
     """
+    from matplotlib.lines import Line2D
+
     if early := [run for run in runs if run.results.time.size < 2]:
         raise ResultsError(nothing_recorded(early[0]))
     found = shown_by(runs, panels)
@@ -82,7 +83,9 @@ def draw(
         foot = provenance(runs) if note is None else note
         if title is not None and changed is None and said:
             foot, said = f"{foot} · changed: {said}", ""
-        frame(figure, ROW * sum(heights), _legend(figure, runs), title or title_of(runs), foot, said)
+        legend = legend_of(runs, figure.axes)
+        handles = [Line2D([], [], label=label, **style) for label, style in legend]
+        frame(figure, ROW * sum(heights), handles, title or title_of(runs), foot, said)
     return figure
 
 
@@ -108,19 +111,12 @@ def _pair(left: Panel, right: Panel) -> bool:
     return not left.wide and not right.wide and left.over_time == right.over_time
 
 
-def _legend(figure: Figure, runs: Sequence[Run]) -> list[Artist]:
-    """Return what the legend shows: the runs if there are several, what the pale lines and the spans are."""
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    several = len(runs) > 1
-    handles: list[Artist] = [
-        Line2D([], [], label=run.label, **line_style(k)) for k, run in enumerate(runs) if several
-    ]
-    if says := reference_words(line for axes in figure.axes for line in axes.get_lines()):
-        handles.append(Line2D([], [], label=says, **REFERENCE))
-    spans = spans_of(runs)
-    return [*handles, *(Patch(facecolor=FAULTY, label=says) for says in in_legend(spans))]
+def legend_of(runs: Sequence[Run], drawn: Iterable[Axes]) -> list[tuple[str, dict[str, Any]]]:
+    """Return label and look of what a legend explains: the runs if there are several, pale lines, spans."""
+    styles = [(run.label, line_style(k)) for k, run in enumerate(runs) if len(runs) > 1]
+    if says := reference_words(line for axes in drawn for line in axes.get_lines()):
+        styles.append((says, REFERENCE))
+    return styles + [(says, SPAN) for says in in_legend(spans_of(runs))]
 
 
 def title_of(runs: Sequence[Run]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..titles import fault_in
 from .display import Run
@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 FAULTY = "#F7DDC8"
 """The colour of a span; pale enough for all lines and the grid."""
+SPAN: dict[str, Any] = {"color": FAULTY, "linewidth": 8.0, "linestyle": "-", "solid_capstyle": "butt"}
+"""How a legend shows it."""
 NAMED = 4
 """Faults that a legend names; of more it says how many there are. Chosen: a legend is no table."""
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -40,20 +41,8 @@ class Check:
     over_friction: bool = False  # the value is divided by the highest friction of the road
 
 
-def _size(x: Signals) -> np.ndarray:
-    return np.abs(x[0])
-
-
 def _degrees(x: Signals) -> np.ndarray:
     return np.degrees(np.abs(x[0]))
-
-
-def _plain(x: Signals) -> np.ndarray:
-    return x[0]
-
-
-def _gravities(x: Signals) -> np.ndarray:
-    return np.hypot(x[0], x[1]) / G
 
 
 CHECKS: tuple[Check, ...] = (
@@ -63,7 +52,7 @@ CHECKS: tuple[Check, ...] = (
         "chosen: more than front wheels can be steered against",
     ),
     Check(
-        "wheel lift", ("vertical_load_*",), _plain, 1.0,
+        "wheel lift", ("vertical_load_*",), itemgetter(0), 1.0,
         "the {wheel} wheel lifts off at {time} s",
         "chosen: a load of less than 1 N is none", below=True,
     ),
@@ -74,12 +63,12 @@ CHECKS: tuple[Check, ...] = (
         "chosen: bump stops, which the models leave out, are reached before it",
     ),
     Check(
-        "backwards", ("velocity_x",), _plain, -0.1,
+        "backwards", ("velocity_x",), itemgetter(0), -0.1,
         "the car rolls backwards from {time} s, at up to {size} m/s",
         "chosen: above the creep of a car that has stopped", below=True,
     ),
     Check(
-        "speed", ("velocity_x",), _size, 70.0,
+        "speed", ("velocity_x",), lambda x: np.abs(x[0]), 70.0,
         "the car is faster than {limit} m/s (252 km/h): {value} m/s at {time} s",
         "chosen: above the top speed of the cars that the papers speak of",
     ),
@@ -89,7 +78,7 @@ CHECKS: tuple[Check, ...] = (
         "chosen: above the steering lock of passenger cars, 35 to 50 degrees",
     ),
     Check(
-        "grip", ("acceleration_x", "acceleration_y"), _gravities, 1.5,
+        "grip", ("acceleration_x", "acceleration_y"), lambda x: np.hypot(*x) / G, 1.5,
         "the car accelerates by {value} times what the road's friction gives, from {time} s beyond {limit}",
         "chosen: tyres of the catalogue reach 1.2 of the friction they are told", over_friction=True,
     ),
@@ -102,18 +91,18 @@ class Watch:
 
     def __init__(self, plan: Plan, checks: Iterable[Check] = CHECKS) -> None:
         results = results_to_be(plan)
-        types = {f"{u.name}.{v.name}": v.type for u in plan.units for v in u.fmu.variables.values()}
-        reals = [f"{unit}.{name}" for unit, name in plan.record if types[f"{unit}.{name}"] == "Real"]
+        units = {unit.name: unit.fmu.variables for unit in plan.units}
+        reals = [f"{unit}.{name}" for unit, name in plan.record if units[unit][name].type == "Real"]
         place = {column: 1 + k for k, column in enumerate(reals)}
         friction = _highest_friction(plan)
         self._seen: list[_Seen] = []
         for check in (*checks, *_ranges(plan)):
             if check.over_friction and not friction:
                 continue
+            scale = 1 / friction if check.over_friction and friction else 1.0
             found = [columns_of(results, signal) for signal in check.signals]
             for columns in zip(*found, strict=False):
                 if all(column in place for column in columns):
-                    scale = 1 / friction if check.over_friction and friction else 1.0
                     self._seen.append(_Seen(check, columns, [place[c] for c in columns], scale))
 
     def look(self, rows: np.ndarray) -> None:
@@ -178,7 +167,7 @@ def _ranges(plan: Plan) -> Iterator[Check]:
                 says = "{column} is {value} at {time} s, beyond the {limit} that its model is valid for"
                 # a little beyond is rounding
                 margin = 1e-9 * max(1.0, abs(limit)) * (-1 if below else 1)
-                yield Check("range", (f"{unit}.{name}",), _plain, limit + margin, says, why, below)
+                yield Check("range", (f"{unit}.{name}",), itemgetter(0), limit + margin, says, why, below)
 
 
 def _highest_friction(plan: Plan) -> float | None:

@@ -233,23 +233,20 @@ def evaluate(results: Results, chosen: Metric, window: Window | None = None) -> 
 
     None if the run has no such signal or does not last for the window: part of it is another metric.
     """
+    time, signals = results.time, _signals(results, chosen)
+    if not time.size or not signals:
+        return None
     window = window or chosen.window
     first, last = window or (-math.inf, math.inf)
-    if (
-        window
-        and results.time.size
-        and not results.time[0] - 1e-9 <= first <= last <= results.time[-1] + 1e-9
-    ):
+    if window and not time[0] - 1e-9 <= first <= last <= time[-1] + 1e-9:
         return None
-    inside = (results.time >= first - 1e-9) & (results.time <= last + 1e-9)
-    t = results.time[inside]
-    signals = _signals(results, chosen)
-    if first == last and results.time.size:  # the nearest row, wherever the run has recorded one
-        inside = np.zeros(results.time.size, bool)
-        inside[np.argmin(np.abs(results.time - first))] = True
-        t = results.time[inside]
-    if (t.size < 2 and first != last) or not t.size or not signals:
-        return None
+    if first == last:  # the nearest row, wherever the run has recorded one
+        inside = np.array([np.argmin(np.abs(time - first))])
+    else:
+        inside = np.flatnonzero((time >= first - 1e-9) & (time <= last + 1e-9))
+        if inside.size < 2:
+            return None
+    t = time[inside]
     numbers = []
     for columns in signals:
         samples = [results.columns[c][inside] * si_of(results.units[c])[1] for c in columns]

@@ -7,7 +7,8 @@ diagonal to later units, below it back to earlier ones. Both drawings show the s
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from markupsafe import Markup
 
@@ -25,60 +26,60 @@ PAD, GAP = 7, 20
 ARROW = 7
 """Length of an arrow's head [px]."""
 
+BLOCK = {"rx": 5, "fill": "#eef4fa", "stroke": "#0072B2", "stroke_width": 1.6}
+LABEL = {"rx": 2, "fill": "#ffffff", "stroke": "#c9c9c9", "stroke_width": 0.8}
+BUS = "#555555"
+
 Parts = list[Markup]
+
+
+def _tag(name: str, content: str = "", **attributes: Any) -> Markup:
+    """Return an element of SVG; `_` in the name of an attribute stands for `-`."""
+    given = (
+        Markup(' {}="{}"').format(key.replace("_", "-"), round(one, 1) if isinstance(one, float) else one)
+        for key, one in attributes.items()
+    )
+    return Markup("<{0}{1}>{2}</{0}>").format(name, Markup("").join(given), content)
 
 
 def _width(texts: Sequence[str], size: float) -> float:
     return max((len(text) for text in texts), default=0) * size * WIDE
 
 
-def _text(x: float, y: float, text: str, size: float, extra: str = "") -> Markup:
-    return Markup('<text x="{:.1f}" y="{:.1f}" font-size="{}"{}>{}</text>').format(
-        x, y, size, Markup(extra), text
-    )
-
-
-def _lines(x: float, y: float, texts: Sequence[str], size: float, extra: str = "") -> Parts:
+def _lines(x: float, y: float, texts: Sequence[str], size: float, **look: Any) -> Parts:
     """Return lines of text from the top y on."""
-    return [_text(x, y + (i * LEADING + 0.95) * size, text, size, extra) for i, text in enumerate(texts)]
+    return [
+        _tag("text", text, x=x, y=y + (i * LEADING + 0.95) * size, font_size=size, **look)
+        for i, text in enumerate(texts)
+    ]
 
 
 def _arrow(x: float, y: float, dx: int, dy: int, colour: str) -> Markup:
     """Return an arrow's head with its tip at (x, y), pointing along (dx, dy)."""
     back_x, back_y, half = x - ARROW * dx, y - ARROW * dy, 0.5 * ARROW
-    points = (
-        f"{x:.1f},{y:.1f} {back_x + half * dy:.1f},{back_y + half * dx:.1f} "
-        f"{back_x - half * dy:.1f},{back_y - half * dx:.1f}"
-    )
-    return Markup('<polygon points="{}" fill="{}"/>').format(points, colour)
+    left, right = (back_x + half * dy, back_y + half * dx), (back_x - half * dy, back_y - half * dx)
+    return _tag("polygon", points=_places([(x, y), left, right]), fill=colour)
 
 
-def _line(points: Sequence[tuple[float, float]], colour: str, width: float = 1.3, dash: str = "") -> Markup:
-    return Markup('<polyline points="{}" fill="none" stroke="{}" stroke-width="{}"{}/>').format(
-        " ".join(f"{x:.1f},{y:.1f}" for x, y in points), colour, width, Markup(dash)
-    )
+def _line(points: Sequence[tuple[float, float]], colour: str, width: float = 1.3, **look: Any) -> Markup:
+    return _tag("polyline", points=_places(points), fill="none", stroke=colour, stroke_width=width, **look)
 
 
-def _rectangle(x: float, y: float, w: float, h: float, style: str) -> Markup:
-    return Markup('<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" {}/>').format(
-        x, y, w, h, Markup(style)
-    )
+def _places(points: Sequence[tuple[float, float]]) -> str:
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
+
+
+def _box(x: float, y: float, width: float, height: float, look: Mapping[str, Any]) -> Markup:
+    return _tag("rect", x=x, y=y, width=width, height=height, **look)
 
 
 def _svg(kind: str, width: float, height: float, title: str, parts: Parts) -> Markup:
-    head = Markup(
-        '<svg class="{}" viewBox="0 0 {:.0f} {:.0f}" style="max-width:{:.0f}px" role="img" '
-        'aria-label="{}" font-family="system-ui, sans-serif">'
-    ).format(kind, width, height, width, title)
-    return head + Markup("\n").join(parts) + Markup("</svg>")
+    frame = {"viewBox": f"0 0 {width:.0f} {height:.0f}", "style": f"max-width:{width:.0f}px", "class": kind}
+    about = {"role": "img", "aria_label": title, "font_family": "system-ui, sans-serif"}
+    return _tag("svg", Markup("\n").join(parts), **frame, **about)
 
 
-BLOCK = 'rx="5" fill="#eef4fa" stroke="#0072B2" stroke-width="1.6"'
-LABEL = 'rx="2" fill="#ffffff" stroke="#c9c9c9" stroke-width="0.8"'
-BUS = "#555555"
-
-
-def _block_lines(block: Block) -> tuple[float, float]:
+def _block_size(block: Block) -> tuple[float, float]:
     """Return the width and height of a block's text."""
     width = max(_width([block.name], NAME) * 1.05, _width(block.fmus, SMALL))
     return width, LEADING * (NAME + SMALL * len(block.fmus))
@@ -89,15 +90,11 @@ def diagonal(system: System, title: str) -> Markup:
     blocks, count = system.blocks, len(system.blocks)
     place = {block.name: i for i, block in enumerate(blocks)}
     cells = {(place[a], place[b]): names for (a, b), names in system.signals.items()}
-    sizes = [_block_lines(block) for block in blocks]
-    widths = [
-        2 * PAD + max(sizes[j][0], *(_width(cells.get((i, j), ()), SIGNAL) for i in range(count)))
-        for j in range(count)
-    ]
-    heights = [
-        2 * PAD + max(sizes[i][1], *(LEADING * SIGNAL * len(cells.get((i, j), ())) for j in range(count)))
-        for i in range(count)
-    ]
+    sizes = [_block_size(block) for block in blocks]
+    widths, heights = [2 * PAD + width for width, _ in sizes], [2 * PAD + height for _, height in sizes]
+    for (i, j), names in cells.items():
+        widths[j] = max(widths[j], 2 * PAD + _width(names, SIGNAL))
+        heights[i] = max(heights[i], 2 * PAD + LEADING * SIGNAL * len(names))
     left = [1 + sum(widths[:j]) + GAP * j for j in range(count)]
     top = [1 + sum(heights[:i]) + GAP * i for i in range(count)]
     middle_x = [x + w / 2 for x, w in zip(left, widths, strict=True)]
@@ -105,26 +102,23 @@ def diagonal(system: System, title: str) -> Markup:
     lines: Parts = []
     labels: Parts = []
     for (i, j), names in cells.items():
-        forward, loop = j > i, j == i
-        if loop:
+        if i == j:
             continue
+        forward = j > i
         start = left[i] + widths[i] if forward else left[i]
         end = top[j] if forward else top[j] + heights[j]
         corner = (middle_x[j], middle_y[i])
-        lines += [
-            _line([(start, middle_y[i]), corner, (middle_x[j], end)], BUS),
-            _arrow(middle_x[j], end, 0, 1 if forward else -1, BUS),
-        ]
+        lines.append(_line([(start, middle_y[i]), corner, (middle_x[j], end)], BUS))
+        lines.append(_arrow(middle_x[j], end, 0, 1 if forward else -1, BUS))
         high, wide = LEADING * SIGNAL * len(names) + 6, _width(names, SIGNAL) + 8
         y = middle_y[i] - high / 2
-        labels.append(_rectangle(middle_x[j] - wide / 2, y, wide, high, LABEL))
-        labels += _lines(middle_x[j], y + 2.5, names, SIGNAL, ' text-anchor="middle" fill="#222"')
+        labels.append(_box(middle_x[j] - wide / 2, y, wide, high, LABEL))
+        labels += _lines(middle_x[j], y + 2.5, names, SIGNAL, text_anchor="middle", fill="#222")
     for i, block in enumerate(blocks):
-        labels.append(_rectangle(left[i], top[i], widths[i], heights[i], BLOCK))
-        y = middle_y[i] - sizes[i][1] / 2
-        labels += _lines(middle_x[i], y, [block.name], NAME, ' text-anchor="middle" font-weight="600"')
-        fmus = _lines(middle_x[i], y + LEADING * NAME, block.fmus, SMALL, ' text-anchor="middle" fill="#444"')
-        labels += fmus
+        x, y = middle_x[i], middle_y[i] - sizes[i][1] / 2
+        labels.append(_box(left[i], top[i], widths[i], heights[i], BLOCK))
+        labels += _lines(x, y, [block.name], NAME, text_anchor="middle", font_weight=600)
+        labels += _lines(x, y + LEADING * NAME, block.fmus, SMALL, text_anchor="middle", fill="#444")
     return _svg("diagonal", left[-1] + widths[-1] + 1, top[-1] + heights[-1] + 1, title, lines + labels)
 
 
@@ -148,20 +142,20 @@ def stack(system: System, title: str) -> Markup:
     drawn: Parts = []
     y = 1.0
     for block in system.blocks:
-        content: list[tuple[str, float, str, str]] = [(block.name, NAME, ' font-weight="600"', "")]
+        content: list[tuple[str, float, dict[str, Any], str]] = []
+        content.append((block.name, NAME, {"font_weight": 600}, ""))
         fmus = textwrap.wrap(", ".join(block.fmus), characters, break_on_hyphens=False)
-        content += [(line, SMALL, ' fill="#444"', "") for line in fmus]
+        content += [(line, SMALL, {"fill": "#444"}, "") for line in fmus]
         for source in system.sources_of(block.name):
             said = f"{source}: {', '.join(system.signals[source, block.name])}"
             rows = textwrap.wrap(said, characters, subsequent_indent="  ", break_on_hyphens=False)
-            content += [(row, SIGNAL, "", source if k == 0 else "") for k, row in enumerate(rows)]
+            content += [(row, SIGNAL, {}, source if k == 0 else "") for k, row in enumerate(rows)]
         height = 2 * PAD + sum(LEADING * size for _, size, _, _ in content)
-        drawn.append(_rectangle(1, y, right - 1, height, BLOCK))
+        drawn.append(_box(1, y, right - 1, height, BLOCK))
         leaves[block.name] = y + PAD + 0.6 * NAME
         line_y = y + PAD
-        for text, size, extra, source in content:
-            indent = 10 if text.startswith(" ") else 0
-            drawn.append(_text(PAD + indent, line_y + 0.95 * size, text.strip(), size, extra))
+        for text, size, look, source in content:
+            drawn += _lines(PAD + 10 * text.startswith(" "), line_y, [text.strip()], size, **look)
             if source:
                 enters[source].append(line_y + 0.6 * size)
             line_y += LEADING * size
@@ -170,13 +164,11 @@ def stack(system: System, title: str) -> Markup:
     for k, name in enumerate(sources):
         style = line_style(k)
         dash = style["linestyle"][1] if isinstance(style["linestyle"], tuple) else ()
-        dashes = f' stroke-dasharray="{" ".join(str(2 * part) for part in dash)}"' if dash else ""
         x, colour, ends = lane[name], style["color"], [leaves[name], *enters[name]]
+        dashes = {"stroke_dasharray": " ".join(str(2 * part) for part in dash)} if dash else {}
         lines.append(_line([(right, leaves[name]), (x, leaves[name])], colour, 1.6))
-        lines.append(_line([(x, min(ends)), (x, max(ends))], colour, 1.6, dashes))
-        lines.append(
-            Markup('<circle cx="{:.1f}" cy="{:.1f}" r="2.6" fill="{}"/>').format(right, leaves[name], colour)
-        )
+        lines.append(_line([(x, min(ends)), (x, max(ends))], colour, 1.6, **dashes))
+        lines.append(_tag("circle", cx=right, cy=leaves[name], r=2.6, fill=colour))
         for end in enters[name]:
             lines.append(_line([(x, end), (right + ARROW - 1, end)], colour, 1.3))
             lines.append(_arrow(right + 0.8, end, -1, 0, colour))

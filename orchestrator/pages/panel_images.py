@@ -18,8 +18,8 @@ from markupsafe import Markup
 
 from ..figures.display import Run
 from ..figures.panels import Panel, draw_path, shown_by, thinned
-from ..figures.spans import FAULTY, in_legend, spans_of
-from ..figures.style import RC, REFERENCE, line_style, reference_words
+from ..figures.plots import legend_of
+from ..figures.style import RC
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
 WIDTH, ROW = 4.7, 2.15
 """Width of a panel and height of a row [inches]; chosen: 9 points of type stay 7 on a phone."""
-BROAD = 11.0
-"""Width of a span in a legend [px]."""
 BUCKETS = 450
 """Buckets that a line over time is thinned to; chosen: one per pixel of a panel."""
 CURLY = str.maketrans("'\"", "’”")
@@ -75,7 +73,8 @@ def panel_images(
             low, high = zip(*(axes.get_ylim() for axes in alike), strict=True)
             for axes in alike:
                 axes.set_ylim(min(low), max(high))
-        legend = _legend(runs, drawn)
+        explained = legend_of(runs, (figure.axes[0] for figure in drawn))
+        legend = [_entry(label, style) for label, style in explained]
         headings = [_take_title(figure.axes[0]) for figure in drawn]
         _align(drawn)
         images = [
@@ -121,14 +120,6 @@ def _align(drawn: Sequence[Figure]) -> None:
     right = min((place.x1 for place in places), default=1.0)
     for figure, place in zip(drawn, places, strict=True):
         figure.axes[0].set_position((left, place.y0, right - left, place.height))
-
-
-def _legend(runs: Sequence[Run], drawn: Sequence[Figure]) -> list[LegendEntry]:
-    entries = [_entry(run.label, line_style(k)) for k, run in enumerate(runs) if len(runs) > 1]
-    if says := reference_words(line for figure in drawn for line in figure.axes[0].get_lines()):
-        entries.append(_entry(says, REFERENCE))
-    spans = spans_of(runs)
-    return [*entries, *(LegendEntry(says, FAULTY, BROAD, "") for says in in_legend(spans))]
 
 
 def _entry(label: str, style: dict[str, Any]) -> LegendEntry:

@@ -6,7 +6,7 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.experiments.listing import runs_table
 from orchestrator.metrics.run_metrics import columns_for, evaluate_all
-from orchestrator.pages.run_differences import differences
+from orchestrator.pages.divergence import differences
 from orchestrator.results.read import load_results
 from orchestrator.results.runs import found_runs
 from tests.fmu_copies import put_fmus
