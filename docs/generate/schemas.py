@@ -27,7 +27,7 @@ def scenario_page() -> str:
     example = (
         f"## An example\n\n`scenarios/fnn_sideslip/25mps.yaml`:\n\n```yaml\n{EXAMPLE.read_text('utf-8')}```"
     )
-    return _page("Scenario files", scenario, [scenario.Scenario, scenario.Vehicle], example)
+    return _page("Scenario files", scenario, [scenario.ScenarioSpec, scenario.Vehicle], example)
 
 
 def experiment_page() -> str:

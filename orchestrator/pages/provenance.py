@@ -110,7 +110,7 @@ def groups_of(runs: Sequence[tuple[Scenario, Plan]]) -> list[Group]:
             )
             for variable in unit.fmu.of("parameter"):
                 from_vehicle = (
-                    variable.name in scenario.vehicle_parameters
+                    variable.name in scenario.vehicle_file.parameters
                     and variable.name not in scenario.units[name].parameters
                 )
                 value = unit.parameters.get(variable.name, variable.start)
@@ -125,7 +125,7 @@ def groups_of(runs: Sequence[tuple[Scenario, Plan]]) -> list[Group]:
 
 
 def _vehicle_group(scenario: Scenario, file: Path) -> Group:
-    vehicle = scenario._vehicle
+    vehicle = scenario.vehicle_file
     return Group(f"The car: {vehicle.title or file.stem}", f"{file.name}; {vehicle.source}")
 
 
@@ -171,7 +171,7 @@ def _origin(scenario: Scenario, unit: Unit, name: str) -> Origin | None:
         measure = unit.fmu.variables[name].unit or "1"
         words = _beside(scenario.vehicle_document, ("parameters", name))
         words = re.sub(rf"^{re.escape(measure)}(?![\w/.])[,;]?\s*", "", words)
-        return said_in(words, scenario._vehicle.source)
+        return said_in(words, scenario.vehicle_file.source)
     if origin.kind == "derived":
         return Origin(NEUTRAL, str(origin))
     if origin.kind == "scenario":

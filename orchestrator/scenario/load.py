@@ -12,11 +12,11 @@ from ..files import reads
 from ..plan import Change
 from ..wording import hint, listed
 from . import overrides, quantities, strict, yaml_lines
-from .scenario_schema import Connection, Endpoint, Scenario, UnitSpec, Vehicle, endpoint
+from .scenario_schema import Connection, Endpoint, Scenario, ScenarioSpec, Vehicle, endpoint
 from .tir import TyreFile, read_tir
 from .yaml_lines import Document, Key
 
-__all__ = ["Connection", "Endpoint", "Scenario", "UnitSpec", "Vehicle", "load_scenario"]
+__all__ = ["Connection", "Endpoint", "Scenario", "ScenarioSpec", "load_scenario"]
 
 
 @reads("scenario file", ScenarioError)
@@ -49,19 +49,25 @@ def load_scenario(
     if not validate:
         overrides.leave_unvalidated(document)
 
-    scenario = strict.validate(Scenario, document)
-    parameters = strict.validate(Vehicle, vehicle_document)
+    file = strict.validate(ScenarioSpec, document)
+    vehicle = strict.validate(Vehicle, vehicle_document)
     if isinstance(document.data, dict):
         _check_time_grid(document)
         _check_unit_names(document)
-    tyres = _read_tyres(scenario, parameters, document, vehicle_document)
+    tyres = _read_tyres(file, vehicle, document, vehicle_document)
     problems = document.sentences() + vehicle_document.sentences()
-    if problems or scenario is None or parameters is None:
+    if problems or file is None or vehicle is None:
         raise ScenarioError(problems)
-    scenario._document, scenario._vehicle_document = document, vehicle_document
-    scenario._vehicle, scenario._replaced, scenario._changes = parameters, replaced, effective
-    scenario._explicit, scenario._tyre_files = archive, tyres
-    return scenario
+    return Scenario.model_construct(
+        **dict(file),
+        document=document,
+        vehicle_document=vehicle_document,
+        vehicle_file=vehicle,
+        tyre_files=tyres,
+        replaced=replaced,
+        changes=effective,
+        explicit=archive,
+    )
 
 
 def _read_archive(path: Path) -> Document:
@@ -92,7 +98,7 @@ def _read_vehicle(document: Document, read: Callable[..., Document]) -> Document
 
 
 def _read_tyres(
-    scenario: Scenario | None, vehicle: Vehicle | None, document: Document, vehicle_document: Document
+    scenario: ScenarioSpec | None, vehicle: Vehicle | None, document: Document, vehicle_document: Document
 ) -> dict[str, TyreFile]:
     """Return the tyre property file of each axle; report what is wrong with it, note what is unusual."""
     if scenario is None or vehicle is None:

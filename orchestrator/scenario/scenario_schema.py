@@ -13,7 +13,16 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import AfterValidator, Discriminator, Field, PlainValidator, PrivateAttr, Tag, model_validator
+from pydantic import (
+    AfterValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    InstanceOf,
+    PlainValidator,
+    Tag,
+    model_validator,
+)
 
 from ..plan import Algorithm, Change, Value
 from ..wording import short
@@ -211,7 +220,7 @@ class Vehicle(Strict):
     parameters: dict[str, Scalar] = Field({}, description="Parameter name -> value")
 
 
-class Scenario(Strict):
+class ScenarioSpec(Strict):
     """A scenario file with all changes applied.
 
     Every input has one source: what `connections` names; else a constant whose key names the unit
@@ -242,70 +251,46 @@ class Scenario(Strict):
 
     faults: list[FaultSpec] = Field([], description="What goes wrong with signals, and when")
 
-    _document: Document = PrivateAttr()
-    _vehicle_document: Document = PrivateAttr()
-    _vehicle: Vehicle = PrivateAttr()
-    _tyre_files: dict[str, TyreFile] = PrivateAttr(default={})
-    _replaced: dict[str, str] = PrivateAttr()
-    _changes: tuple[Change, ...] = PrivateAttr(default=())
-    _explicit: bool = PrivateAttr(default=False)
+
+class Scenario(ScenarioSpec):
+    """A scenario as loaded: its file, what came with it, and where every value stands, for messages."""
+
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+
+    document: InstanceOf[Document]
+    vehicle_document: InstanceOf[Document]
+    vehicle_file: Vehicle
+    """Every unit takes the parameters that it declares; empty: none."""
+    tyre_files: dict[str, InstanceOf[TyreFile]]
+    """Axle -> its tyre property file; every unit takes the parameters it declares. Empty: none."""
+    replaced: dict[str, str]
+    """Unit -> the FMU that the file names, for units that are swapped."""
+    changes: tuple[InstanceOf[Change], ...]
+    """What is other than in the file."""
+    explicit: bool
+    """Whether only what `connections` names is connected, and start values stand for the rest.
+
+    So it is in SSP archives, but for units that are swapped.
+    """
 
     @property
     def path(self) -> Path:
         """The scenario file."""
-        return self._document.path
-
-    @property
-    def document(self) -> Document:
-        """Where every value stands, for messages."""
-        return self._document
-
-    @property
-    def vehicle_document(self) -> Document:
-        """Where every value of the vehicle file stands, for messages."""
-        return self._vehicle_document
-
-    @property
-    def vehicle_parameters(self) -> dict[str, Value]:
-        """Parameters of the vehicle file; every unit takes those it declares."""
-        return self._vehicle.parameters
-
-    @property
-    def tyre_files(self) -> dict[str, TyreFile]:
-        """Axle -> its tyre property file; every unit takes the parameters it declares. Empty: none."""
-        return self._tyre_files
+        return self.document.path
 
     @property
     def tyres_place(self) -> tuple[Document, Key]:
         """Where the tyre property files are named, for messages."""
-        return (self._vehicle_document if self.tyres is None else self._document), ("tyres",)
-
-    @property
-    def replaced(self) -> dict[str, str]:
-        """Unit -> the FMU that the file names, for units that are swapped."""
-        return self._replaced
-
-    @property
-    def changes(self) -> tuple[Change, ...]:
-        """What is other than in the file."""
-        return self._changes
-
-    @property
-    def explicit(self) -> bool:
-        """Whether only what `connections` names is connected, and start values stand for the rest.
-
-        So it is in SSP archives, but for units that are swapped.
-        """
-        return self._explicit
+        return (self.vehicle_document if self.tyres is None else self.document), ("tyres",)
 
     def as_run(self) -> dict[str, Any]:
         """Return everything that the file, the vehicle file and the changes say, as JSON-ready data."""
-        data = dict(self._document.data)
+        data = dict(self.document.data)
         times = {"stop_time": float(self.stop_time), "step_size": float(self.step_size)}
         if self.start_time:
             times["start_time"] = float(self.start_time)
-        tyres = {axle: file.record() for axle, file in self._tyre_files.items()}
+        tyres = {axle: file.record() for axle, file in self.tyre_files.items()}
         return {
-            **{"file": str(self.path), **data, **times, "vehicle_parameters": self.vehicle_parameters},
+            **{"file": str(self.path), **data, **times, "vehicle_parameters": self.vehicle_file.parameters},
             **({"tyre_files": tyres} if tyres else {}),
         }

@@ -153,7 +153,7 @@ def _other_cars(scenario: Scenario, units: Mapping[str, Unit]) -> Iterator[Findi
     """
     found = [
         one
-        for one in (_parameters(units.values()) if scenario.vehicle_parameters else ())
+        for one in (_parameters(units.values()) if scenario.vehicle_file.parameters else ())
         if one.name in OF_CAR and one.origin == "default" and one.value != 1
     ]
     if found:
@@ -167,7 +167,7 @@ def _slips(scenario: Scenario, units: Mapping[str, Unit]) -> Iterator[Finding]:
     """Yield a remark for every number that was probably meant in another unit."""
     for one in _parameters(units.values()):
         spec = scenario.units[one.unit].parameters.get(one.name)
-        raw = scenario.vehicle_parameters.get(one.name) if spec is None else spec
+        raw = scenario.vehicle_file.parameters.get(one.name) if spec is None else spec
         told = [getattr(scenario, name) for name, fact in FACTS.items() if one.name in fact.parameters]
         with_unit = any(isinstance(given, str) for given in (raw, *told))
         if one.origin == "default" or with_unit or not isinstance(one.value, float):

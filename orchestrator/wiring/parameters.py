@@ -209,7 +209,7 @@ class Parameters:
         document = self._scenario.vehicle_document
         numbers: dict[str, float] = {}
         idle: list[str] = []
-        for name, raw in self._scenario.vehicle_parameters.items():
+        for name, raw in self._scenario.vehicle_file.parameters.items():
             key = ("parameters", name)
             takers = self._takers(name)
             for unit in takers:

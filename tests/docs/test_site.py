@@ -18,7 +18,7 @@ from orchestrator.cli import _application
 from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.fmu.archive import open_fmu
 from orchestrator.metrics.measures import MEASURES
-from orchestrator.scenario.scenario_schema import Scenario
+from orchestrator.scenario.scenario_schema import ScenarioSpec
 from orchestrator.wording import fold
 from tests.checkout import ROOT
 from vocabulary.signals import SIGNALS
@@ -115,7 +115,7 @@ def test_the_reference_of_commands_tells_every_option(site):
                 assert parameter.opts[0] in section, f"{name} {parameter.opts[0]}"
 
 
-@pytest.mark.parametrize(("page", "root"), [("scenario", Scenario), ("experiment", ExperimentSpec)])
+@pytest.mark.parametrize(("page", "root"), [("scenario", ScenarioSpec), ("experiment", ExperimentSpec)])
 def test_the_references_of_files_tell_every_key(site, page, root):
     html = text_of(site, f"reference/{page}.html")
     models = schemas.reachable([root])

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from orchestrator.errors import ScenarioError
-from orchestrator.scenario.load import Endpoint, Scenario, load_scenario
+from orchestrator.scenario.load import Endpoint, ScenarioSpec, load_scenario
 from tests.changed import changed
 
 GOOD = """\
@@ -87,7 +87,7 @@ def test_a_scenario_as_run_is_plain_data_with_the_options_in_it(file: Path) -> N
 
 
 def test_the_schema_can_be_printed() -> None:
-    assert set(Scenario.model_json_schema()["properties"]) == set(Scenario.model_fields)
+    assert set(ScenarioSpec.model_json_schema()["properties"]) == set(ScenarioSpec.model_fields)
 
 
 @pytest.mark.parametrize(
@@ -252,7 +252,7 @@ def test_vehicle_parameters_come_from_beside_the_scenario(file: Path) -> None:
     Path("cars").mkdir()
     Path("cars/car.yaml").write_text("title: Car\nparameters: {mass: 1.1 t}\n")
     scenario = load_scenario(edited(("title:", "vehicle: cars/car.yaml\ntitle:")))
-    assert scenario.vehicle_parameters == {"mass": "1.1 t"}
+    assert scenario.vehicle_file.parameters == {"mass": "1.1 t"}
 
 
 def test_mistakes_in_the_vehicle_file_name_that_file(file: Path) -> None:
@@ -309,7 +309,7 @@ def test_settings_change_parameters_constants_and_the_vehicle(file: Path) -> Non
     assert scenario.units["driver"].parameters == {"amplitude": "2 deg", "mode": "lane change"}
     assert scenario.units["plant"].parameters == {"initial_speed": 25, "locked": True}
     assert scenario.inputs == {"friction*": 0.65, "friction_fl": 0.3}
-    assert scenario.vehicle_parameters == {"mass": "1200 kg"}
+    assert scenario.vehicle_file.parameters == {"mass": "1200 kg"}
 
 
 def test_settings_change_times_and_algorithm_of_the_run_and_steps_of_units(file: Path) -> None:
