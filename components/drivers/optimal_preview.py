@@ -141,7 +141,7 @@ class OptimalPreview(Component):
         self.track = Track(self.p)
         self.car = SingleTrackCar.of(self.p, self.p.yaw_inertia)
         self.steps = max(1, round(self.p.preview_time / STEP))
-        self.gains: dict[int, list[float]] = {}
+        self.gains: dict[int, tuple[float, ...]] = {}
         self.path = planned(self.p)
 
     def start(self, t: float, u: list[float]) -> None:
@@ -184,14 +184,11 @@ class OptimalPreview(Component):
         above = sum([gain * value for gain, value in zip(self._gains(lower + 1), seen, strict=True)])
         return rate + share * (above - rate)
 
-    def _gains(self, v: int) -> list[float]:
+    def _gains(self, v: int) -> tuple[float, ...]:
         """Return the gains of the state and of the path ahead at a whole speed [m/s]."""
         if v not in self.gains:
             p: OptimalPreviewParameters = self.p
-            phi, gamma = discrete(*lane_dynamics(self.car, float(v), p.steering_ratio), STEP)
-            first = (1.0, 0.0, 0.0, 0.0, 0.0)  # y
-            state, ahead = tracking_gains(phi, gamma, first, weight=p.offset_scale**-2, steps=self.steps)
-            self.gains[v] = state + ahead
+            self.gains[v] = preview_gains(v, self.car, p.steering_ratio, p.offset_scale, self.steps)
         return self.gains[v]
 
     def _hand(self, u: list[float]) -> float:
@@ -224,6 +221,17 @@ def lane_dynamics(
         [0.0, 0.0, a_43, a_44, a_45],
         [0.0, 0.0, 0.0, 0.0, 0.0],
     ], [0.0, 0.0, 0.0, 0.0, 1.0]  # fmt: skip
+
+
+@lru_cache(maxsize=256)
+def preview_gains(
+    v: int, car: SingleTrackCar, steering_ratio: float, offset_scale: float, steps: int
+) -> tuple[float, ...]:
+    """Return the gains of the state and of the path ahead at `v` [m/s], for `steps` of the preview."""
+    phi, gamma = discrete(*lane_dynamics(car, float(v), steering_ratio), STEP)
+    first = (1.0, 0.0, 0.0, 0.0, 0.0)  # y
+    state, ahead = tracking_gains(phi, gamma, first, weight=offset_scale**-2, steps=steps)
+    return (*state, *ahead)
 
 
 @lru_cache(maxsize=16)

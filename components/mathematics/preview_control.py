@@ -18,6 +18,7 @@ Source: R. S. Sharp, V. Valtetsiotis, Optimal preview car steering control, Vehi
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import mul
 
 from .quadratic_program import Rows
 
@@ -97,4 +98,4 @@ def _applied(matrix: Sequence[Sequence[float]], vector: Sequence[float]) -> list
 
 
 def _dot(one: Sequence[float], other: Sequence[float]) -> float:
-    return sum([x * y for x, y in zip(one, other, strict=True)])
+    return sum(map(mul, one, other))
