@@ -6,15 +6,22 @@ every parametrized test in the first tier, evenly spread; the others are marked 
 
 from __future__ import annotations
 
+import gc
 from pathlib import Path
 
 import pytest
 
+from orchestrator.experiments import workers
 from tests.fmu_copies import put_fmus
 
 TESTS = Path(__file__).parent
 LONGEST_FIRST = ("scenarios", "trials", "pages", "docs", "orchestrator", "yawbench", "fmus", "components")
 """Folders: files with long runs begin first, so that no worker is left alone with one at the end."""
+
+gc.set_threshold(50_000, 20, 20)
+"""Python looks for garbage less often: thousands of tests keep much, and leave little."""
+workers.NEEDED += workers.FOR_TESTS
+"""The first test that makes runs starts the server of processes for all others."""
 
 
 @pytest.hookimpl(tryfirst=True)

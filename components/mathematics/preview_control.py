@@ -98,4 +98,5 @@ def _applied(matrix: Sequence[Sequence[float]], vector: Sequence[float]) -> list
 
 
 def _dot(one: Sequence[float], other: Sequence[float]) -> float:
-    return sum(map(mul, one, other))
+    total: float = sum(map(mul, one, other))
+    return total

@@ -42,7 +42,9 @@ NEEDED = (
     "orchestrator.experiments.figures",
     "matplotlib.backends.backend_agg",
     "matplotlib.backends.backend_svg",
+    "matplotlib.figure",
     "matplotlib.mathtext",
+    "pyarrow.csv",
 )
 """Modules that take long to import."""
 FOR_TESTS = ("scipy.signal", "orchestrator.evaluation.dwell_run")

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..files import open_regular
 from ..wording import short
+from .arrow import values_of
 from .formats import plain
 
 BLOCK = 8_000_000
@@ -59,7 +60,7 @@ class CsvFile:
                     arrow.ParseOptions(newlines_in_values=bool(self._texts), ignore_empty_lines=False),
                     arrow.ConvertOptions(include_columns=columns, column_types=types, null_values=[]),
                 ):
-                    yield [plain(column.to_numpy(zero_copy_only=False)) for column in batch]
+                    yield [plain(values_of(column)) for column in batch]
             except pa.ArrowInvalid as error:
                 raise ValueError(self._fault() or " ".join(str(error).split())) from None
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ResultsError
+from .arrow import column_of, values_of
 from .columnar import ColumnRecorder
 from .formats import FILES, plain
 
@@ -31,7 +32,7 @@ class ParquetRecorder(ColumnRecorder):
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        arrays = [pa.array(array) for array in self._columns.arrays()]
+        arrays = [column_of(array) for array in self._columns.arrays()]
         self._columns.clear()
         if self._writer is None:
             names = ["time", *self.columns]
@@ -86,4 +87,4 @@ class ParquetFile:
     def blocks(self, columns: Sequence[str]) -> Iterator[list[np.ndarray]]:
         """Yield some rows after the other of chosen columns."""
         for batch in self._file.iter_batches(columns=list(columns)):
-            yield [plain(batch.column(name).to_numpy(zero_copy_only=False)) for name in columns]
+            yield [plain(values_of(batch.column(name))) for name in columns]

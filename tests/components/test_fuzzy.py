@@ -8,7 +8,6 @@ import random
 
 import numpy as np
 import pytest
-from skfuzzy import control, trimf
 
 from components.mathematics import fuzzy
 from components.mathematics.fuzzy import FIVE, SEVEN, Mamdani, Partition, clipped_pair, gaussian_grades
@@ -83,6 +82,7 @@ SYSTEMS = [standard_seven, standard_five, paper_b, paper_c, uneven]
 
 def scikit_fuzzy_surfaces(system: Mamdani, points: list[tuple[float, float]]) -> np.ndarray:
     """Evaluate the rules of `system` with scikit-fuzzy: shape (points, outputs)."""
+    from skfuzzy import control, trimf  # not at the top: it takes long, and one worker needs it
 
     def variable(kind, name, sets):
         universe = np.linspace(sets.peaks[0], sets.peaks[-1], 241)
@@ -238,6 +238,8 @@ def test_grades_are_a_partition_of_unity_and_one_at_the_peaks(sets):
 
 
 def test_grades_agree_with_scikit_fuzzy():
+    from skfuzzy import trimf
+
     sets = Partition("a b c d", [-2.0, -0.5, 1.0, 3.0])
     x = np.linspace(-2.0, 3.0, 101)
     ours = np.array([sets.grades(float(v)) for v in x])

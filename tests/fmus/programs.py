@@ -7,6 +7,7 @@ import random
 import re
 import shutil
 import subprocess
+from functools import lru_cache
 from pathlib import Path
 
 from tests.fmus.bare import Fmu, Unit
@@ -53,6 +54,7 @@ def host_outputs(done: subprocess.CompletedProcess[str], folder: Path) -> list[f
     return [values[fmu.reference[name]] for name in fmu.names("output")]
 
 
+@lru_cache
 def python_libraries() -> dict[str, str]:
     """Return version -> libpython of every Python of 3.10 to 3.13 on this machine.
 
