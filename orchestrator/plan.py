@@ -204,6 +204,11 @@ class Unit:
     series: dict[str, Series] = field(default_factory=dict)
     """Inputs that follow a time series."""
 
+    def parameter(self, name: str) -> Value | None:
+        """Return the value of a parameter, as given or the FMU's own; None without one of the name."""
+        variable = self.fmu.variables.get(name)
+        return None if variable is None else self.parameters.get(name, variable.start)
+
 
 @dataclass(frozen=True)
 class Wire:

@@ -144,7 +144,7 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
     hidden = 0
     cambered = {wire.source for wire in plan.wires if wire.output in CAMBER}
     for unit in plan.units:
-        own = {v.name: unit.parameters.get(v.name, v.start) for v in unit.fmu.of("parameter")}
+        own = {v.name: unit.parameter(v.name) for v in unit.fmu.of("parameter")}
         constants = {name: value for name, value in unit.constants.items() if name not in unit.series}
         shown: list[tuple[tuple[str, str], str]] = []
         for name, value in {**own, **constants}.items():

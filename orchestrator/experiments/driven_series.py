@@ -12,9 +12,9 @@ from dataclasses import replace
 
 from ..errors import ScenarioError
 from ..evaluation.dwell_series import amplitudes
-from ..evaluation.judgement import Judgement, Series, Verdict
+from ..evaluation.judgement import Judgement, Series
 from ..evaluation.lane_change_run import evaluate_lane_change
-from ..evaluation.lane_change_series import CLEAN, highest_clean, judge_entry_speeds
+from ..evaluation.lane_change_series import highest_clean, is_clean, judge_entry_speeds
 from ..evaluation.trace import Trace, trace_of
 from ..plan import Change
 from ..results.read import load_results
@@ -94,7 +94,7 @@ def entry_speeds(base: Job, once: Once, make: Callable[[Job], bool]) -> tuple[li
         driven.extend(traces([job]))
         driven[-1] = replace(driven[-1], label=f"{job.label} km/h")
         judged.append(evaluate_lane_change(driven[-1]))
-        return judged[-1].rulings[CLEAN].verdict is Verdict.PASSED
+        return is_clean(judged[-1])
 
     highest_clean(clean, first=first, step=STEP, resolution=RESOLUTION, least=LEAST, most=MOST)
     return driven, judge_entry_speeds(judged)
@@ -124,8 +124,7 @@ def _amplitude_of(job: Job, once: Once) -> float:
     _, plan = planned(job, once)
     unit, _, name = AMPLITUDE.partition(".")
     for one in plan.units:
-        if one.name == unit and name in one.fmu.variables:
-            value = one.parameters.get(name, one.fmu.variables[name].start)
-            if isinstance(value, (int, float)) and value != 0:
-                return abs(float(value))
+        value = one.parameter(name) if one.name == unit else None
+        if isinstance(value, (int, float)) and value != 0:
+            return abs(float(value))
     raise ScenarioError(f"{job.scenario}: {AMPLITUDE} is no amplitude of a hand wheel other than 0")

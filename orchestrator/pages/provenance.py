@@ -113,7 +113,7 @@ def groups_of(runs: Sequence[tuple[Scenario, Plan]]) -> list[Group]:
                     variable.name in scenario.vehicle_file.parameters
                     and variable.name not in scenario.units[name].parameters
                 )
-                value = unit.parameters.get(variable.name, variable.start)
+                value = unit.parameter(variable.name)
                 group, origin = own, _origin(scenario, unit, variable.name)
                 if from_vehicle:
                     file = scenario.vehicle_document.path

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import ScenarioError
 from ..fmu.opener import Opener, find_fmu, find_folder
 from ..master.simulate import simulate_in_memory
-from ..plan import Fmu, Plan, Series, Unit, Value
+from ..plan import Fmu, Plan, Series, Unit
 from ..scenario import yaml_lines
 from ..scenario.load import load_scenario
 from ..scenario.overrides import is_path
@@ -54,15 +54,10 @@ class Stand:
         """The tyre."""
         return self.plan.units[0]
 
-    def parameter(self, name: str) -> Value | None:
-        """Return the value of a parameter, None if there is none of the name."""
-        variable = self.unit.fmu.variables.get(name)
-        return None if variable is None else self.unit.parameters.get(name, variable.start)
-
     @property
     def nominal_load(self) -> float:
         """The tyre's own [N], or that of a passenger car's."""
-        given = self.parameter("fnomin_front") or self.parameter("nominal_load")
+        given = self.unit.parameter("fnomin_front") or self.unit.parameter("nominal_load")
         return float(given) if given else 4000.0
 
     def measure(self, states: Sequence[State]) -> dict[str, np.ndarray]:
@@ -75,7 +70,7 @@ class Stand:
         """
         alpha, kappa, load = (np.array(column, float) for column in zip(*states, strict=True))
         v = SPEED * np.cos(alpha)
-        radius = self.parameter("wheel_radius")
+        radius = self.unit.parameter("wheel_radius")
         rolling = np.where(kappa > 0.0, v / (1.0 - np.minimum(kappa, 0.999)), v * (1.0 + kappa))
         given = {
             "slip_angle": alpha,

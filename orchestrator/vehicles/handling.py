@@ -86,7 +86,7 @@ def handling_of(track: TestTrack) -> Handling:
     plan = track.plan({"fmu": "driver_sine"}, TURN_SPEED, STEP)
     known = next(unit for unit in plan.units if unit.name == "plant")
     axles = ("cg_to_front_axle", "cg_to_rear_axle")
-    found.wheelbase = sum(float(known.parameters.get(n, known.fmu.variables[n].start or 0.0)) for n in axles)
+    found.wheelbase = sum(float(known.parameter(name) or 0.0) for name in axles)
     for number, measure in enumerate((_modes, _turn, _bounce, _stop)):
         try:
             measure(track, found)

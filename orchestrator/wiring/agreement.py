@@ -118,7 +118,7 @@ def _differ(told: list[Told], *, start: bool = False) -> bool:
 def _parameters(units: Iterable[Unit]) -> Iterator[Told]:
     for unit in units:
         for variable in unit.fmu.of("parameter"):
-            value = unit.parameters.get(variable.name, variable.start)
+            value = unit.parameter(variable.name)
             if value is not None:
                 origin = unit.origins.get(variable.name, DEFAULT).kind
                 yield Told(unit.name, variable.name, value, origin, variable)

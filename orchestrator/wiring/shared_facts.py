@@ -34,9 +34,7 @@ class Fact:
         """Return whether a unit's parameter is one of the fact's, and not turned off."""
         if parameter not in self.parameters:
             return False
-        switch = self.parameters[parameter]
-        known = unit.fmu.variables.get(switch)
-        return known is None or unit.parameters.get(switch, known.start) != 0
+        return unit.parameter(self.parameters[parameter]) != 0
 
 
 FACTS = {
