@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import platform as machine
 import re
+import sys
 
 from ..plan import Fmu
 from ..wording import listed, short
@@ -21,6 +23,8 @@ TYPES = {
 """Major version of FMI -> types in the names of the functions that set and get values."""
 _FILE_NAME = re.compile(r"[^/\\:\x00-\x1f\x7f]{1,200}")
 
+_ARCHITECTURES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
+
 
 def integer_limits(kind: str) -> tuple[int, int]:
     """Return the smallest and the largest number of an integer type of FMI 3.0, such as "UInt8"."""
@@ -30,9 +34,13 @@ def integer_limits(kind: str) -> tuple[int, int]:
 
 def platform(fmi: int = 2) -> tuple[str, str]:
     """Return a version of FMI's name of this platform and the suffix of its binaries."""
-    import fmpy
-
-    return fmpy.platform if fmi == 2 else fmpy.platform_tuple, fmpy.sharedLibraryExtension
+    names = {"win32": ("win", ".dll"), "cygwin": ("win", ".dll"), "darwin": ("darwin", ".dylib")}
+    system, suffix = names.get(sys.platform, ("linux", ".so"))  # as fmpy says, which takes long to import
+    wide = sys.maxsize > 2**32
+    if fmi == 2:
+        return f"{system}{64 if wide else 32}", suffix
+    architecture = _ARCHITECTURES.get(machine.machine().lower(), "x86_64") if wide else "x86"
+    return f"{architecture}-{'windows' if system == 'win' else system}", suffix
 
 
 def binary_of(fmi: int, identifier: str) -> str:
