@@ -7,22 +7,14 @@ from typing import Annotated
 
 import typer
 
-from .options import Fault, Fmus, NoBuild, Set, Swap
+from .options import CHANGES, Wishes, takes
 from .recorded import Labels, Sources
 
 Page = Annotated[Path | None, typer.Option("--out", metavar="FILE.html", help="The page to write.")]
 
 
-def animate(
-    sources: Sources,
-    label: Labels = None,
-    swap: Swap = None,
-    set_: Set = None,
-    fault: Fault = None,
-    out: Page = None,
-    fmus: Fmus = None,
-    no_build: NoBuild = False,
-) -> None:
+@takes(*CHANGES, "fmus", "no_build")
+def animate(sources: Sources, wishes: Wishes, label: Labels = None, out: Page = None) -> None:
     """Write a page that animates runs seen from above.
 
     Cars, paths, lanes, patches of the road, steer angles, tyre forces and their friction circles; of at
@@ -34,7 +26,6 @@ def animate(
     from ..errors import ResultsError, ScenarioError
     from ..pages.animation import MOST, page
     from ..results.read import load_results
-    from ..scenario.overrides import read_changes
     from ..titles import changed_each, changes_in
     from ..writing import write_whole
     from .batch import say
@@ -42,9 +33,7 @@ def animate(
 
     if len(sources) > MOST:
         raise ScenarioError(f"an animation shows up to {MOST} runs, not {len(sources)}")
-    folders = recorded(
-        sources, read_changes(swap or (), set_ or (), fault or ()), fmus, None, build=not no_build
-    )
+    folders = recorded(sources, wishes)
     runs = list(zip(labels_of(folders, label), map(load_results, folders), strict=True))
     titles = [str(results.run.get("title") or name) for name, results in runs]
     changed = changed_each([(name, changes_in(results.run)) for name, results in runs])

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from .batch import say
-from .options import Fault, Fmus, NoBuild, ScenarioFile, Set, Swap
+from .options import CHANGES, ScenarioFile, Wishes, takes
 from .planning import plan_of_scenario
 
 Archive = Annotated[
@@ -23,16 +23,13 @@ For = Annotated[
 ]
 
 
+@takes(*CHANGES, "fmus", "no_build")
 def export_ssp(
     scenario: ScenarioFile,
-    swap: Swap = None,
-    set_: Set = None,
-    fault: Fault = None,
+    wishes: Wishes,
     out: Archive = None,
     for_: For = "all",
     standard: Standard = "1.0",
-    fmus: Fmus = None,
-    no_build: NoBuild = False,
 ) -> None:
     """Write a scenario and its FMUs as an SSP archive.
 
@@ -42,7 +39,7 @@ def export_ssp(
     from ..interop.ssp_write import write_ssp
     from ..titles import faults_of
 
-    plan = plan_of_scenario(scenario, swap, set_, fault, fmus=fmus, build=not no_build)
+    plan = plan_of_scenario(scenario, wishes)
     notes = list(plan.notes)
     if plan.faults:
         notes.append(f"faults are not part of the archive: {faults_of(plan)}")

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from .options import Fmus
+from .options import Wishes, takes
 from .planning import plan_of_scenario
 
 Wanted = Annotated[
@@ -26,7 +26,8 @@ Place = Annotated[
 ]
 
 
-def list(what: Wanted = None, place: Place = None, fmus: Fmus = None) -> None:
+@takes("fmus")
+def list(wishes: Wishes, what: Wanted = None, place: Place = None) -> None:
     """List runs, scenarios, FMUs, vehicles, signals or metrics.
 
     Runs are shown with when they began, their scenario, what was changed, how they ended, and the largest
@@ -52,9 +53,9 @@ def list(what: Wanted = None, place: Place = None, fmus: Fmus = None) -> None:
         table = listing.metrics_table()
     elif what == "signals" and place is not None:
         scenario = catalogue.find(place, "a scenario")
-        table = listing.recorded_table(plan_of_scenario(scenario, None, None, fmus=fmus, build=True))
+        table = listing.recorded_table(plan_of_scenario(scenario, wishes))
     else:
-        found, problems = listing.fmus_in(_folder_of_fmus(place or fmus))
+        found, problems = listing.fmus_in(_folder_of_fmus(place or wishes.fmus))
         table = listing.fmus_table(found, problems)
         if what == "signals":
             table = listing.signals_table(found)

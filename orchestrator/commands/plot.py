@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .options import CallLimit, Fault, Fmus, Isolate, NoBuild, Out, Set, Swap, isolation
+from .options import CHANGES, MAKING, Wishes, takes
 from .recorded import Labels, Sources
 
 Panels = Annotated[
@@ -21,19 +21,8 @@ Panels = Annotated[
 ]
 
 
-def plot(
-    sources: Sources,
-    label: Labels = None,
-    panel: Panels = None,
-    swap: Swap = None,
-    set_: Set = None,
-    fault: Fault = None,
-    out: Out = None,
-    fmus: Fmus = None,
-    no_build: NoBuild = False,
-    isolate: Isolate = False,
-    call_limit: CallLimit = None,
-) -> None:
+@takes(*CHANGES, *MAKING)
+def plot(sources: Sources, wishes: Wishes, label: Labels = None, panel: Panels = None) -> None:
     """Draw runs, one or several overlaid.
 
     Figures are written as SVG and PNG. A scenario is run first if its results (those of `yawbench
@@ -45,14 +34,10 @@ def plot(
     from ..figures.plots import OVERVIEW, draw
     from ..figures.style import save
     from ..results.read import load_results
-    from ..scenario.overrides import read_changes
     from .batch import say
     from .recorded import folder_of_all, labels_of, recorded
 
-    limit = isolation(isolate, call_limit)
-    folders = recorded(
-        sources, read_changes(swap or (), set_ or (), fault or ()), fmus, limit, build=not no_build
-    )
+    folders = recorded(sources, wishes)
     labels = labels_of(folders, label)
     runs = [Run(name, load_results(folder, thin=True)) for name, folder in zip(labels, folders, strict=True)]
     check_panels(runs, panel or ())
@@ -60,5 +45,5 @@ def plot(
     if len(runs) > 1 and not panel:
         figures = {name: panels for name, panels in FIGURES.items() if shown_by(runs, panels)}
     for name, panels in figures.items():
-        paths = save(draw(runs, panels), (out or folder_of_all(folders)) / name)
+        paths = save(draw(runs, panels), (wishes.out or folder_of_all(folders)) / name)
         say(f"{paths[0]}, {paths[1].name}")

@@ -6,12 +6,11 @@ import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    from ..plan import Change
+from .options import Wishes
 
 Sources = Annotated[
     list[Path],
@@ -23,14 +22,7 @@ Labels = Annotated[
 ]
 
 
-def recorded(
-    sources: Sequence[Path],
-    changes: tuple[Change, ...],
-    fmus: Path | None,
-    limit: float | None,
-    *,
-    build: bool,
-) -> list[Path]:
+def recorded(sources: Sequence[Path], wishes: Wishes) -> list[Path]:
     """Return the folders of all results, after making the runs of scenarios that have none.
 
     Raises:
@@ -47,11 +39,13 @@ def recorded(
 
     sources = [one if os.path.exists(one) else catalogue.named(one) or one for one in sources]
     scenarios = [one for one in sources if one.suffix in catalogue.ENDINGS and not os.path.isdir(one)]
+    changes = wishes.changes
     if changes and not scenarios:
         raise ScenarioError("--swap, --set and --fault change a scenario; only folders of results are given")
-    given = [Job(one.stem, one, Path(), changes, fmus, call_limit=limit) for one in scenarios]
+    of_jobs = wishes.of_jobs | {"keep": True}
+    given = [Job(one.stem, one, Path(), changes, **of_jobs) for one in scenarios]
     jobs = {}
-    for job in ready(given, once=Once(build=build)):
+    for job in ready(given, once=Once(build=wishes.build)):
         assert job.plan is not None
         jobs[job.scenario] = replace(job, out=default_folder(job.scenario, job.plan.changes))
     for note in stale_fmus(unit.fmu for job in jobs.values() if job.plan for unit in job.plan.units):

@@ -12,20 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .batch import say
-from .options import (
-    CallLimit,
-    Fault,
-    Fmus,
-    Format,
-    Isolate,
-    NoBuild,
-    NoValidate,
-    Out,
-    ScenarioFile,
-    Set,
-    Swap,
-    isolation,
-)
+from .options import CHANGES, MAKING, NoValidate, ScenarioFile, Wishes, isolation, takes
 from .planning import plan_of_scenario
 
 if TYPE_CHECKING:
@@ -53,19 +40,12 @@ BESIDE = 36
 """Columns of a terminal that the title leaves to the bar and its numbers."""
 
 
+@takes(*CHANGES, *MAKING, "format_")
 def run(
     scenario: ScenarioFile,
-    swap: Swap = None,
-    set_: Set = None,
-    fault: Fault = None,
-    out: Out = None,
+    wishes: Wishes,
     name: Name = None,
-    fmus: Fmus = None,
-    no_build: NoBuild = False,
-    format_: Format = "csv",
     metric: Metrics = None,
-    isolate: Isolate = False,
-    call_limit: CallLimit = None,
     no_validate: NoValidate = False,
 ) -> None:
     """Run a scenario and write results.csv and run.json.
@@ -78,27 +58,23 @@ def run(
     from ..master.isolation import opener_of
     from ..master.log import STATUS, WARNING
     from ..master.simulate import simulate
-    from ..results.formats import check_format
     from ..results.lock import refuse_below_others
     from ..results.naming import default_folder
     from ..results.size import size_note
     from ..titles import changed, with_changes
 
-    check_format(format_)
-    if out and name:
+    if wishes.out and name:
         raise ScenarioError("--out names the folder and --name a part of its path: give one of them")
     metrics = _metric_names(metric or ())
-    limit = isolation(isolate, call_limit)
-    plan = plan_of_scenario(
-        scenario, swap, set_, fault, fmus=fmus, build=not no_build, validate=not no_validate, isolated=isolate
-    )
+    limit = isolation(wishes.isolate, wishes.call_limit)
+    plan = plan_of_scenario(scenario, wishes, validate=not no_validate)
     if named := [name for name in metric or () if name != "standard"]:
         from ..metrics import run_metrics
 
         run_metrics.check_metrics(plan, map(run_metrics.metric, named))
-    folder = out or default_folder(scenario, plan.changes, name=name)
+    folder = wishes.out or default_folder(scenario, plan.changes, name=name)
     refuse_below_others(folder)
-    for note in (*plan.notes, size_note(plan, folder, format_)):
+    for note in (*plan.notes, size_note(plan, folder, wishes.format_)):
         if note:
             say(f"note: {note}")
     if plan.changes:
@@ -106,7 +82,7 @@ def run(
     title = with_changes(plan.title or scenario.stem, plan.changes)
     try:
         with _bar(title) as progress, opener_of(plan, limit) as opener:
-            info = simulate(plan, folder, progress=progress, opener=opener, format=format_, apart=True)
+            info = simulate(plan, folder, progress=progress, opener=opener, format=wishes.format_, apart=True)
     except SimulationError as error:
         _say_findings(error.findings)
         raise

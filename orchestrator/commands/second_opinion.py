@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .batch import print_tables, say
-from .options import Fault, Fmus, NoBuild, ScenarioFile, Set, Swap
+from .options import CHANGES, ScenarioFile, Wishes, takes
 from .planning import plan_of_scenario
 
 if TYPE_CHECKING:
@@ -24,15 +24,9 @@ Pinned = Annotated[
 ]
 
 
+@takes(*CHANGES, "fmus", "no_build")
 def second_opinion(
-    scenario: ScenarioFile,
-    swap: Swap = None,
-    set_: Set = None,
-    fault: Fault = None,
-    fmus: Fmus = None,
-    no_build: NoBuild = False,
-    master: Masters = None,
-    one_core: Pinned = True,
+    scenario: ScenarioFile, wishes: Wishes, master: Masters = None, one_core: Pinned = True
 ) -> None:
     """Run a scenario in libcosim, Ecos and fmpy, and compare.
 
@@ -49,7 +43,7 @@ def second_opinion(
         if name.lower() not in known:
             raise ScenarioError(f"--master {name}: there is no such master{hint(name, known, lead='known')}")
     chosen = [known[name.lower()] for name in master or known]
-    plan = plan_of_scenario(scenario, swap, set_, fault, fmus=fmus, build=not no_build)
+    plan = plan_of_scenario(scenario, wishes)
     if plan.faults:
         raise ScenarioError(f"{scenario}: other masters know nothing of faults; leave out {faults_of(plan)}")
     if plan.changes:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from .options import Fmus, NoBuild
+from .options import Wishes, takes
 
 What = Annotated[
     Literal["show"], typer.Argument(help="show: draw its forces, moments, stiffnesses, relaxation.")
@@ -26,13 +26,9 @@ Output = Annotated[
 Friction = Annotated[float, typer.Option(min=0.0, help="Coefficient of the road.")]
 
 
+@takes("fmus", "no_build")
 def tyre(
-    action: What,
-    source: Source,
-    output: Output = None,
-    friction: Friction = 1.0,
-    fmus: Fmus = None,
-    no_build: NoBuild = False,
+    action: What, source: Source, wishes: Wishes, output: Output = None, friction: Friction = 1.0
 ) -> None:
     """Show what a tyre is like, by stepping its FMU.
 
@@ -44,7 +40,7 @@ def tyre(
     from ..tyres.tyre_drawing import draw_tyre
     from .batch import say
 
-    stand = put_on_stand(source, friction=friction, fmus=fmus, build=not no_build)
+    stand = put_on_stand(source, friction=friction, fmus=wishes.fmus, build=wishes.build)
     name, fmu = Path(source).name, stand.unit.fmu
     kind, side = "", ""
     if file := stand.plan.scenario.get("tyre_files", {}).get("front"):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from .options import Fmus, NoBuild
+from .options import Wishes, takes
 
 if TYPE_CHECKING:
     from ..experiments.tables import Table
@@ -39,15 +39,15 @@ Output = Annotated[
 ]
 
 
+@takes("fmus", "no_build")
 def vehicle(
     action: What,
     file: Source,
+    wishes: Wishes,
     plant: Plants = None,
     tyre: Tyre = "",
     friction: Friction = 1.0,
     output: Output = None,
-    fmus: Fmus = None,
-    no_build: NoBuild = False,
 ) -> None:
     """Show what a car is like, by driving its FMUs.
 
@@ -66,9 +66,9 @@ def vehicle(
     file = catalogue.find(file, "a vehicle file")
     if problems := yaml_lines.read(file, what="vehicle file").sentences():
         raise ScenarioError(problems)
-    opener = Opener(build=not no_build)
-    names = plant.split(",") if plant else [fitting_plant(file, tyre, fmus, opener)]
-    tracks = [TestTrack(file, name.strip(), tyre, friction, fmus, opener) for name in names]
+    opener = Opener(build=wishes.build)
+    names = plant.split(",") if plant else [fitting_plant(file, tyre, wishes.fmus, opener)]
+    tracks = [TestTrack(file, name.strip(), tyre, friction, wishes.fmus, opener) for name in names]
     cars = [handling_of(track) for track in tracks]
     print_tables(_tables(cars))
     for car in cars:
