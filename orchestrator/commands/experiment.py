@@ -194,7 +194,7 @@ def of_files(context: typer.Context, files: Sequence[Path], wishes: Wishes) -> N
         failed = failed or bool(findings.failed)
         if len(files) == 1:
             print_tables(all_tables(findings))
-        counts = counts_of(findings.claims, "claims")
+        counts = counts_of(findings.claims)
         if verdicts := ", ".join(f"{word}: {count}" for word, count in counts.items()):
             say(f"{experiment.spec.title}: {verdicts}")
     write_page(chapters, page)

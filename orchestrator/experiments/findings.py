@@ -155,9 +155,16 @@ class Findings:
         """What this project asks, judged."""
         return self._all_judged("checks", self.spec.checks)
 
+    @property
+    def judgements(self) -> list[Judgement]:
+        """Claims and checks."""
+        return [*self.claims, *self.checks]
+
     def _all_judged(self, group: str, said: Sequence[Claim]) -> list[Judgement]:
-        every = enumerate(said)
-        return [replace(self.judged(one), region=self.regions.get((group, i))) for i, one in every]
+        return [
+            replace(self.judged(one), region=self.regions.get((group, i)), group=group)
+            for i, one in enumerate(said)
+        ]
 
     def judged(self, claim: Claim) -> Judgement:
         """Return whether a claim holds; along axes, whether it does at every setting of them."""

@@ -36,6 +36,7 @@ class Judgement:
     measured: tuple[str, ...]
     gaps: tuple[Gap | None, ...] = ()  # of every condition, of every run it names; None: no result
     region: Region | None = None
+    group: str = "claims"  # of a paper, or `checks`: our own
 
     @property
     def sure(self) -> bool:

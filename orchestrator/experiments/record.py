@@ -76,8 +76,8 @@ def _record(findings: Findings, drawn: dict[str, str]) -> dict[str, Any]:
             }
             for key, one in spec.derived.items()
         },
-        "claims": [_judgement(one, "claims") for one in findings.claims],
-        "checks": [_judgement(one, "checks") for one in findings.checks],
+        "claims": [_judgement(one) for one in findings.claims],
+        "checks": [_judgement(one) for one in findings.checks],
         "limits": {
             key: [
                 {
@@ -104,14 +104,14 @@ def _value(value: Value) -> dict[str, Any]:
     return {"value": number, "unit": si(value.unit), **half}
 
 
-def _judgement(one: Judgement, group: str) -> dict[str, Any]:
+def _judgement(one: Judgement) -> dict[str, Any]:
     return {
         "says": one.said.says,
         "source": one.said.source,
         "holds_if": [str(condition) for condition in one.said.holds_if],
         "measured": list(one.measured),
         "holds": one.holds,
-        "verdict": verdict(one, group),
+        "verdict": verdict(one),
         "margin": _finite(one.margin),
         "region": one.region and _region(one.region),
         "note": one.said.note,

@@ -69,15 +69,14 @@ def columns_of(findings: Findings) -> list[Column]:
 
 def verdict_columns(findings: Findings) -> list[Column]:
     """Return what was said, its verdict, margin and region: a row per claim and check."""
-    groups = ("claims", findings.claims), ("checks", findings.checks)
-    every = [(group, one) for group, judged in groups for one in judged]
-    regions = [one.region for _, one in every]
+    every = findings.judgements
+    regions = [one.region for one in every]
     flips = [region and region.flip for region in regions]
     return [
-        Column("group", "string", [group for group, _ in every]),
-        Column("says", "string", [one.said.says for _, one in every]),
-        Column("verdict", "string", [verdict(one, group) for group, one in every]),
-        Column("margin", "float64", [one.margin for _, one in every], {"unit": "1"}),
+        Column("group", "string", [one.group for one in every]),
+        Column("says", "string", [one.said.says for one in every]),
+        Column("verdict", "string", [verdict(one) for one in every]),
+        Column("margin", "float64", [one.margin for one in every], {"unit": "1"}),
         Column("spread", "float64", [region and region.spread for region in regions], {"unit": "1"}),
         Column("points", "int64", [region and len(region.points) for region in regions]),
         Column("holds at", "int64", [region and region.holding for region in regions]),

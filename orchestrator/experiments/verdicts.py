@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from ..figures.display import shown
 from ..metrics.run_metrics import Value, metric
@@ -49,15 +49,12 @@ def limit_tables(findings: Findings) -> list[Table]:
 def _grid_table(findings: Findings, grid: GridSpec) -> Table:
     """Return a grid with what is said of its cells."""
     signs: dict[tuple[str, str], str] = {}
-    for group, judged in (("claims", findings.claims), ("checks", findings.checks)) if grid.holds else ():
-        for one in judged:
-            about = {(c.run, c.derived or c.metric) for c in one.said.holds_if}
-            if len(about) == 1:
-                word = verdict(one, group)
-                (key,) = about
-                signs[key] = signs.get(key) or (
-                    "" if word == HOLDS else "✗" if word in FAILS.values() else "?"
-                )
+    for one in findings.judgements if grid.holds else ():
+        about = {(c.run, c.derived or c.metric) for c in one.said.holds_if}
+        if len(about) == 1:
+            word = verdict(one)
+            (key,) = about
+            signs[key] = signs.get(key) or ("" if word == HOLDS else "✗" if word in FAILS.values() else "?")
     return grid_table(grid, findings.values_of_grids, signs)
 
 
@@ -85,13 +82,13 @@ def heading(spec: MetricSpec) -> str:
     return f"{metric(spec.metric).formula}{spec.during()}"
 
 
-def verdict(judgement: Judgement, group: str) -> str:
-    """Return the verdict in plain words; `group` is "claims" (a paper's) or "checks" (our own)."""
+def verdict(judgement: Judgement) -> str:
+    """Return the verdict in plain words."""
     if judgement.holds is None:
         return NOT_JUDGED
     if not judgement.sure or (judgement.region and not judgement.region.decided):
         return UNDECIDED
-    return HOLDS if judgement.holds else FAILS[group]
+    return HOLDS if judgement.holds else FAILS[judgement.group]
 
 
 def margin_words(judgement: Judgement) -> str | None:
@@ -130,10 +127,11 @@ def flip_words(says: str, level: str, chosen: str = "") -> str:
     return f"flips at {says} {level}" + (f" (chosen: {chosen})" if chosen else "")
 
 
-def counts_of(judgements: Sequence[Judgement], group: str) -> dict[str, int]:
+def counts_of(judgements: Sequence[Judgement]) -> dict[str, int]:
     """Return how many judgements have each verdict, those that occur."""
-    words = [verdict(one, group) for one in judgements]
-    return {word: words.count(word) for word in (HOLDS, UNDECIDED, FAILS[group], NOT_JUDGED) if word in words}
+    words = [verdict(one) for one in judgements]
+    every = (HOLDS, UNDECIDED, *FAILS.values(), NOT_JUDGED)
+    return {word: words.count(word) for word in every if word in words}
 
 
 def run_tables(findings: Findings) -> list[Table]:
@@ -168,21 +166,21 @@ def _run_table(findings: Findings, spec: TableSpec) -> Table:
             if early := next(filter(None, ended), None):
                 table.notes.append(f"{row}: {early}; what is of the whole run, or later, has no result")
             if some:
-                judged = said[run.name]
-                words = "; ".join(f"{j.said.short} ({j.said.source})" for j in judged)
-                verdicts = "; ".join(verdict(j, "claims") for j in judged)
-                how_far = (_carries(j, len(carries)) for j in judged)
-                further = ("; ".join(filter(None, column)) or None for column in zip(*how_far, strict=True))
-                cells[1:1] = [
-                    words or None,
-                    verdicts or None,
-                    *(further if judged else [None] * len(carries)),
-                ]
-                table.notes += [f"{run.row}: {j.said.note}" for j in judged if j.said.note]
+                cells[1:1] = _beside(said[run.name], len(carries))
+                table.notes += [f"{run.row}: {j.said.note}" for j in said[run.name] if j.said.note]
         results = findings.results.get(run.name)
         table.rows.append([marked(row, results) if results else row, *cells])
         table.notes += remarks([(row, results)]) if results else []
     return table
+
+
+def _beside(judged: Sequence[Judgement], carries: int) -> list[Cell]:
+    """Return what a paper says of a run, the verdicts, and how far they carry; of several one cell each."""
+    rows = [
+        [f"{one.said.short} ({one.said.source})", verdict(one), *_carries(one, carries)] for one in judged
+    ]
+    columns: Iterable[Sequence[str | None]] = zip(*rows, strict=True) if rows else [()] * (2 + carries)
+    return ["; ".join(filter(None, column)) or None for column in columns]
 
 
 def _said_of(findings: Findings, run: NamedRun, table: TableSpec) -> list[Judgement]:
@@ -249,18 +247,18 @@ def claim_tables(findings: Findings) -> list[Table]:
         for judgement in _said_of(findings, run, table)
     }
     tables = []
-    for title, group, judged in (
-        ("What the paper says beyond single runs", "claims", findings.claims),
-        ("What this project asks of it", "checks", findings.checks),
+    for title, judged in (
+        ("What the paper says beyond single runs", findings.claims),
+        ("What this project asks of it", findings.checks),
     ):
-        rows: list[list[Cell]] = []
+        table = Table(
+            title, ["claim", "measured", "verdict", *(CARRIES if findings.regions else CARRIES[:1])]
+        )
         for one in judged:
             if id(one) not in beside:
                 says = f"{one.said.says} ({one.said.source})" if one.said.source else one.said.says
                 note = f"\n{one.said.note}" if one.said.note else ""
-                carries = _carries(one, len(CARRIES) if findings.regions else 1)
-                rows.append([f"{says}{note}", "\n".join(one.measured), verdict(one, group), *carries])
-        if rows:
-            headings = ["claim", "measured", "verdict", *CARRIES][: len(rows[0])]
-            tables.append(Table(title, headings, [*rows]))
+                carries = _carries(one, len(table.headings) - 3)
+                table.rows.append([f"{says}{note}", "\n".join(one.measured), verdict(one), *carries])
+        tables += [table] if table.rows else []
     return tables

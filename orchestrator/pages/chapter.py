@@ -75,10 +75,10 @@ def chapter(
         "title": spec.title,
         "source": spec.source,
         "changed": changed(experiment.by_options),
-        "counts": counts_of(findings.claims, "claims"),
+        "counts": counts_of(findings.claims),
         "conclusions": conclusions(findings),
-        "claims": [judged(one, "claims") for one in findings.claims],
-        "checks": [judged(one, "checks") for one in findings.checks],
+        "claims": [judged(one) for one in findings.claims],
+        "checks": [judged(one) for one in findings.checks],
         "region": region_table(findings) if findings.regions else None,
         "limits": limit_tables(findings),
         "systems": systems(plans, spec.title),
@@ -135,23 +135,22 @@ def conclusions(findings: Findings) -> list[dict[str, Any]]:
 
     Over a region claims that hold are told, too, and robust verdicts come first.
     """
-    every = [(one, "claims") for one in findings.claims] + [(one, "checks") for one in findings.checks]
     told = [
-        judged(one, group)
-        for one, group in every
-        if verdict(one, group) != HOLDS or (group == "claims" and one.region)
+        judged(one)
+        for one in findings.judgements
+        if verdict(one) != HOLDS or (one.group == "claims" and one.region)
     ]
     return sorted(told, key=lambda one: not one["robust"])
 
 
-def judged(one: Judgement, group: str) -> dict[str, Any]:
+def judged(one: Judgement) -> dict[str, Any]:
     """Return a claim with what was measured and its verdict."""
     return {
         "says": one.said.says,
         "source": one.said.source,
         "measured": one.measured,
         "conditions": [str(condition) for condition in one.said.holds_if],
-        "verdict": verdict(one, group),
+        "verdict": verdict(one),
         "margin": margin_words(one),
         "region": region_words(one),
         "agreeing": one.region and 100 * one.region.agreeing,

@@ -107,7 +107,7 @@ def test_the_share_of_a_latin_hypercube_along_one_value_is_that_of_the_closed_fo
     region = judged(only).claims[0].region
     assert region.holding == 14  # factors below 1.2 of 0.5 to 1.5, in 20 equal parts
     assert region.agreeing == pytest.approx(0.7)
-    assert verdict(judged(only).claims[0], "claims") == "undecided"
+    assert verdict(judged(only).claims[0]) == "undecided"
 
 
 def test_the_share_over_two_values_together_approaches_the_area(judged):
@@ -121,7 +121,7 @@ def test_a_claim_is_decided_exactly_if_its_margin_is_larger_than_the_spread(judg
     for one in (*findings.claims, *findings.checks):
         if one.region:
             assert one.region.decided == (abs(one.margin) > one.region.spread), one.said.says
-    verdicts = [verdict(one, "claims") for one in findings.claims]
+    verdicts = [verdict(one) for one in findings.claims]
     assert verdicts == ["undecided", "holds", "undecided", "undecided"]
 
 

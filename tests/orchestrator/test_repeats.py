@@ -115,7 +115,7 @@ def test_tables_have_a_row_for_all_repeats_together(findings):
 
 
 def test_a_threshold_within_confidence_leaves_the_verdict_open(load, findings):
-    assert [(one.said.says, verdict(one, "checks")) for one in findings.checks] == [
+    assert [(one.said.says, verdict(one)) for one in findings.checks] == [
         ("A weak gyro tells nine tenths where it is quiet.", "does not hold"),
         ("A weak gyro tells nine tenths where it is noisy.", "does not hold"),
         ("A gyro tells nine tenths where it is quiet.", HOLDS),
@@ -123,7 +123,7 @@ def test_a_threshold_within_confidence_leaves_the_verdict_open(load, findings):
     ]
     sure = load(("at_least: 90 %", "at_least: 75 %"))
     judged = replace(findings, experiment=sure).checks
-    assert [verdict(one, "checks") for one in judged] == ["does not hold", "does not hold", HOLDS, HOLDS]
+    assert [verdict(one) for one in judged] == ["does not hold", "does not hold", HOLDS, HOLDS]
 
 
 def test_a_grid_says_how_far_down_its_columns_hold(findings):
