@@ -88,17 +88,10 @@ def make(title: str, jobs: Sequence[Job], wishes: Wishes, journal: Journal | Non
     done = total - len(left)
     before = "" if not done else ", all finished before" if done == total else f", {done} finished before"
     say(f"{title}: {counted(len(jobs), 'run')}{before}")
-    outcomes: list[Outcome] = []
     if wishes.no_run:
-        return outcomes
+        return []
     with reported("runs", total, done, each=journal is None) as told:
-
-        def ended(outcome: Outcome) -> None:
-            outcomes.append(outcome)
-            told(outcome)
-
-        finish(left, journal, runner=runner_of(wishes.jobs, wishes.scheduler), told=ended)
-    return outcomes
+        return finish(left, journal, runner=runner_of(wishes.jobs, wishes.scheduler), told=told)
 
 
 def say_failed(failed: Mapping[str, str]) -> None:

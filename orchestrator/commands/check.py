@@ -14,7 +14,7 @@ from vocabulary.wheels import WHEELS, wheels
 from ..plan import DEFAULT, ValueOrigin
 from ..wording import cut, printable
 from .batch import say
-from .options import CHANGES, NoValidate, ScenarioFile, Wishes, takes
+from .options import CHANGES, ScenarioFile, Wishes, takes
 from .planning import plan_of_scenario
 
 if TYPE_CHECKING:
@@ -33,14 +33,14 @@ PIPE_WIDTH = 140
 """Columns of what goes into a pipe or a file."""
 
 
-@takes(*CHANGES, "fmus", "no_build")
-def check(scenario: ScenarioFile, wishes: Wishes, all_: All = False, no_validate: NoValidate = False) -> None:
+@takes(*CHANGES, "fmus", "no_build", "no_validate")
+def check(scenario: ScenarioFile, wishes: Wishes, all_: All = False) -> None:
     """Validate a scenario; show units, values, wires.
 
     Every value is shown with its origin, the units with the reason for their order, and what the
     control side sees as the truth, a measurement or an estimate.
     """
-    plan = plan_of_scenario(scenario, wishes, validate=not no_validate)
+    plan = plan_of_scenario(scenario, wishes)
     show(plan, scenario, defaults=all_)
     for note in plan.notes:
         say(f"note: {note}")

@@ -77,7 +77,7 @@ def drive(
     changes = (*_vehicle(vehicle), *wishes.changes)
     one_run = catalogue.find(scenario or f"{GROUND}/{test.replace('-', '_')}", "a scenario")
     folder = wishes.out or default_folder(one_run, changes, suffix="_series")
-    base = Job("", one_run, folder, changes, **wishes.of_jobs | {"format": "parquet", "keep": True})
+    base = Job("", one_run, folder, changes, **wishes.of_jobs | {"format": "parquet"})
     once = Once(build=wishes.build)
     given = {change.place for change in changes}
     if test == "sine-with-dwell":

@@ -54,8 +54,9 @@ def conduct(experiment: Experiment, folder: Path, wishes: Wishes, each: Each, **
         try:
             with bar("planning", len(experiment.cases), quiet=True) as planning:
                 planned = plan_experiment(
-                    experiment, folder, once=once, progress=planning, **wishes.of_jobs | of_jobs
-                )
+                    experiment, folder, once=once, progress=planning, keep=wishes.keep,
+                    **wishes.of_jobs | of_jobs,
+                )  # fmt: skip
         except YawbenchError:
             if not wishes.no_run or experiment.spec.axes:
                 raise  # else scenarios or FMUs are not here: results can be judged without them
@@ -112,12 +113,16 @@ def chapter_of(
     findings: Findings, folder: Path, command: str, each: Each, *, shown_in: Path, **more: Any
 ) -> dict[str, Any]:
     """Return the chapter of an experiment in a page that lies in a folder; `more`: facts of its own."""
-    from ..experiments.execution import stale
     from ..pages.chapter import chapter
     from ..results.folder import RUN_FILE
+    from ..results.freshness import staleness
 
     jobs = findings.planned.jobs if findings.planned and not findings.spec.axes else []
-    out_of_date = stale([job for job in jobs if (job.out / RUN_FILE).is_file()])
+    out_of_date = {
+        job.label: why
+        for job in jobs
+        if job.plan and (job.out / RUN_FILE).is_file() and (why := staleness(job.plan, job.out))
+    }
     with stoppable(folder):
         facts = chapter(
             findings, command=command, stale=out_of_date, folder=folder, shown_in=shown_in, each=each

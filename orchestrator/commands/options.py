@@ -41,122 +41,6 @@ ScenarioFile = Annotated[
         metavar="SCENARIO",
     ),
 ]
-Swap = Annotated[
-    list[str] | None,
-    typer.Option("--swap", metavar="UNIT=FMU", help="Replace a unit's FMU: a name or a path. Repeatable."),
-]
-Set = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="UNIT.PARAMETER=VALUE",
-        help="Set a parameter of a unit; also vehicle.NAME, inputs.NAME, UNIT.step_size, UNIT.validate, "
-        "start_time, stop_time, step_size, algorithm. Repeatable.",
-    ),
-]
-Fault = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--fault",
-        metavar="'PLACE: KIND VALUE'",
-        help="Let something go wrong, such as 'plant.yaw_rate -> sensor: freeze from 2 s until 3 s'; place: "
-        "unit.output, unit.output -> unit or unit.input; kind: bias, gain, drift, noise, freeze, value, "
-        "dropout, outlier, delay, saturation, loss, stuck; none takes away the scenario's own. Repeatable.",
-    ),
-]
-Jobs = Annotated[
-    int | None,
-    typer.Option("--jobs", metavar="N", min=1, help="Runs at a time; default: one per processor core."),
-]
-Keep = Annotated[
-    bool, typer.Option("--keep", help="Keep the results of every run, in runs/<its key in the table>.")
-]
-Fresh = Annotated[
-    bool,
-    typer.Option(
-        "--fresh", "--again", help="Make all runs anew, including those that have been made already."
-    ),
-]
-Quick = Annotated[
-    bool,
-    typer.Option(
-        "--quick", help="Judge claims at the chosen point alone, not over the region of the open values."
-    ),
-]
-NoRun = Annotated[
-    bool,
-    typer.Option("--no-run", help="Run and build nothing: judge and draw what is in the results folder."),
-]
-Scheduler = Annotated[
-    str | None,
-    typer.Option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster: tcp://host:port."),
-]
-Out = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results.")]
-Fmus = Annotated[
-    Path | None,
-    typer.Option("--fmus", metavar="DIR", help="Folder of the FMUs; default: the nearest fmus/ folder."),
-]
-NoBuild = Annotated[
-    bool,
-    typer.Option(
-        "--no-build",
-        envvar="YAWBENCH_NO_BUILD",
-        help="Use FMUs as they are, even if their sources have changed; by default they are rebuilt.",
-    ),
-]
-NoValidate = Annotated[
-    bool,
-    typer.Option(
-        "--no-validate",
-        help="Accept FMUs whose model descriptions are formally wrong, with a warning that says what is.",
-    ),
-]
-Format = Annotated[
-    str,
-    typer.Option(
-        "--format",
-        metavar="FORMAT",
-        help="Format of the results: csv; parquet or mf4 (ASAM MDF 4), which are smaller and hold units.",
-    ),
-]
-Isolate = Annotated[
-    bool,
-    typer.Option(
-        "--isolate",
-        help="Run each unit in a process of its own: if its FMU crashes or hangs, the run ends with "
-        "an error and the results so far. Same numbers; 30 to 70 µs more per unit and step.",
-    ),
-]
-CallLimit = Annotated[
-    str | None,
-    typer.Option(
-        "--call-limit",
-        metavar="TIME",
-        help="With --isolate: the longest that a call of an FMU may take, such as '500 ms'; default: 10 s.",
-    ),
-]
-
-
-def isolation(isolate: bool, call_limit: str | None) -> float | None:
-    """Return how long a call may take [s]; None if units are not isolated.
-
-    Raises:
-        ScenarioError: the time is none, or given without --isolate.
-    """
-    from ..errors import ScenarioError
-    from ..master.isolation import CALL_LIMIT
-    from ..scenario.quantities import seconds
-
-    if not isolate:
-        if call_limit is not None:
-            raise ScenarioError("--call-limit goes with --isolate: in one process no call can be ended")
-        return None
-    if call_limit is None:
-        return CALL_LIMIT
-    try:
-        return float(seconds(int(call_limit) if call_limit.isdecimal() else call_limit))
-    except ValueError as error:
-        raise ScenarioError(f"--call-limit: {error}") from None
 
 
 @dataclass(frozen=True)
@@ -164,45 +48,127 @@ class Wishes:
     """What a command is asked for by the options that it `takes`; the others stay as they are here.
 
     Raises:
-        ScenarioError: two of them contradict each other, or there is no such format.
+        ScenarioError: two of them contradict each other, or one is not as it is to be written.
     """
 
-    swap: Swap = None
-    set_: Set = None
-    fault: Fault = None
-    out: Out = None
-    fmus: Fmus = None
-    no_build: NoBuild = False
-    jobs: Jobs = None
-    scheduler: Scheduler = None
-    keep: Keep = False
-    format_: Format = "csv"
-    quick: Quick = False
-    fresh: Fresh = False
-    no_run: NoRun = False
-    isolate: Isolate = False
-    call_limit: CallLimit = None
+    swap: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--swap", metavar="UNIT=FMU", help="Replace a unit's FMU: a name or a path. Repeatable."
+        ),
+    ] = None
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="UNIT.PARAMETER=VALUE",
+            help="Set a parameter of a unit; also vehicle.NAME, inputs.NAME, UNIT.step_size, UNIT.validate, "
+            "start_time, stop_time, step_size, algorithm. Repeatable.",
+        ),
+    ] = None
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fault",
+            metavar="'PLACE: KIND VALUE'",
+            help="Let something go wrong, such as 'plant.yaw_rate -> sensor: freeze from 2 s until 3 s'; "
+            "place: unit.output, unit.output -> unit or unit.input; kind: bias, gain, drift, noise, freeze, "
+            "value, dropout, outlier, delay, saturation, loss, stuck; none takes away the scenario's own. "
+            "Repeatable.",
+        ),
+    ] = None
+    out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results.")] = None
+    fmus: Annotated[
+        Path | None,
+        typer.Option("--fmus", metavar="DIR", help="Folder of the FMUs; default: the nearest fmus/ folder."),
+    ] = None
+    no_build: Annotated[
+        bool,
+        typer.Option(
+            "--no-build",
+            envvar="YAWBENCH_NO_BUILD",
+            help="Use FMUs as they are, even if their sources have changed; by default they are rebuilt.",
+        ),
+    ] = False
+    jobs: Annotated[
+        int | None,
+        typer.Option("--jobs", metavar="N", min=1, help="Runs at a time; default: one per processor core."),
+    ] = None
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster: tcp://host:port."),
+    ] = None
+    keep: Annotated[
+        bool, typer.Option("--keep", help="Keep the results of every run, in runs/<its key in the table>.")
+    ] = False
+    format_: Annotated[
+        str,
+        typer.Option(
+            "--format",
+            metavar="FORMAT",
+            help="Format of the results: csv; parquet or mf4 (ASAM MDF 4), which are smaller and hold units.",
+        ),
+    ] = "csv"
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick", help="Judge claims at the chosen point alone, not over the region of the open values."
+        ),
+    ] = False
+    fresh: Annotated[
+        bool,
+        typer.Option(
+            "--fresh", "--again", help="Make all runs anew, including those that have been made already."
+        ),
+    ] = False
+    no_run: Annotated[
+        bool,
+        typer.Option("--no-run", help="Run and build nothing: judge and draw what is in the results folder."),
+    ] = False
+    isolate: Annotated[
+        bool,
+        typer.Option(
+            "--isolate",
+            help="Run each unit in a process of its own: if its FMU crashes or hangs, the run ends with "
+            "an error and the results so far. Same numbers; 30 to 70 µs more per unit and step.",
+        ),
+    ] = False
+    call_limit: Annotated[
+        str | None,
+        typer.Option(
+            "--call-limit",
+            metavar="TIME",
+            help="With --isolate: the longest that a call of an FMU may take, such as '500 ms'; default: "
+            "10 s.",
+        ),
+    ] = None
+    no_validate: Annotated[
+        bool,
+        typer.Option(
+            "--no-validate",
+            help="Accept FMUs whose model descriptions are formally wrong, with a warning that says what is.",
+        ),
+    ] = False
 
     def __post_init__(self) -> None:
         from ..errors import ScenarioError
-        from ..results.formats import check_format
 
         if self.fresh and self.no_run:
             raise ScenarioError("--fresh and --no-run contradict each other")
-        check_format(self.format_)
+        if self.format_ != "csv":  # what reads and checks others takes time to load
+            from ..results.formats import check_format
+
+            check_format(self.format_)
+        _ = self.limit, self.changes  # what is wrong with them is said before anything else
 
     @property
     def build(self) -> bool:
         """Whether FMUs that are stale are built."""
         return not (self.no_build or self.no_run)
 
-    @property
+    @functools.cached_property
     def changes(self) -> tuple[Change, ...]:
-        """What is changed in all runs.
-
-        Raises:
-            ScenarioError: an option is not as it is to be written.
-        """
+        """What is changed in all runs."""
         from ..scenario.overrides import read_changes
 
         return read_changes(self.swap or (), self.set_ or (), self.fault or ())
@@ -212,11 +178,30 @@ class Wishes:
         """The options that change all runs, as they were given."""
         return {"swap": self.swap, "set": self.set_, "fault": self.fault}
 
+    @functools.cached_property
+    def limit(self) -> float | None:
+        """How long a call of an FMU may take [s]; None if units are not isolated."""
+        from ..errors import ScenarioError
+
+        given = self.call_limit
+        if not self.isolate:
+            if given is not None:
+                raise ScenarioError("--call-limit goes with --isolate: in one process no call can be ended")
+            return None
+        from ..master.isolation import CALL_LIMIT
+        from ..scenario.quantities import seconds
+
+        if given is None:
+            return CALL_LIMIT
+        try:
+            return float(seconds(int(given) if given.isdecimal() else given))
+        except ValueError as error:
+            raise ScenarioError(f"--call-limit: {error}") from None
+
     @property
     def of_jobs(self) -> dict[str, Any]:
         """Fields of jobs."""
-        limit = isolation(self.isolate, self.call_limit)
-        return {"fmus": self.fmus, "call_limit": limit, "format": self.format_, "keep": self.keep}
+        return {"fmus": self.fmus, "call_limit": self.limit, "format": self.format_}
 
 
 def takes(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:

@@ -11,11 +11,8 @@ if TYPE_CHECKING:
     from ..plan import Plan
 
 
-def plan_of_scenario(scenario: Path, wishes: Wishes, *, validate: bool = True) -> Plan:
-    """Return the plan of a scenario file with all that options change in it.
-
-    Args:
-        validate: refuse FMUs whose model descriptions are formally wrong.
+def plan_of_scenario(scenario: Path, wishes: Wishes) -> Plan:
+    """Return the plan of a scenario with all that options change in it.
 
     Raises:
         YawbenchError: the scenario, an option or an FMU is wrong, or a component cannot be built.
@@ -25,7 +22,7 @@ def plan_of_scenario(scenario: Path, wishes: Wishes, *, validate: bool = True) -
     from ..tyres.axle_stiffness import cornering_stiffness
     from ..wiring.make_plan import make_plan
 
-    loaded = load_scenario(scenario, changes=wishes.changes, validate=validate)
+    loaded = load_scenario(scenario, changes=wishes.changes, validate=not wishes.no_validate)
     opener = Opener(build=wishes.build)
     return make_plan(
         loaded, fmus=wishes.fmus, opener=opener, isolated=wishes.isolate, measure=cornering_stiffness

@@ -78,7 +78,7 @@ def rank(
             )
     folder = wishes.out or default_folder(file)
     hold(context, folder)
-    base = Job("", file, folder, **wishes.of_jobs | {"format": "parquet", "keep": True})
+    base = Job("", file, folder, **wishes.of_jobs | {"format": "parquet"})
     with (
         stoppable(folder),
         contextlib.closing(Journal(folder, ranking.identity, fresh=wishes.fresh)) as journal,

@@ -39,11 +39,9 @@ def recorded(sources: Sequence[Path], wishes: Wishes) -> list[Path]:
 
     sources = [one if os.path.exists(one) else catalogue.named(one) or one for one in sources]
     scenarios = [one for one in sources if one.suffix in catalogue.ENDINGS and not os.path.isdir(one)]
-    changes = wishes.changes
-    if changes and not scenarios:
+    if wishes.changes and not scenarios:
         raise ScenarioError("--swap, --set and --fault change a scenario; only folders of results are given")
-    of_jobs = wishes.of_jobs | {"keep": True}
-    given = [Job(one.stem, one, Path(), changes, **of_jobs) for one in scenarios]
+    given = [Job(one.stem, one, Path(), wishes.changes, **wishes.of_jobs) for one in scenarios]
     jobs = {}
     for job in ready(given, once=Once(build=wishes.build)):
         assert job.plan is not None

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .batch import say
-from .options import CHANGES, MAKING, NoValidate, ScenarioFile, Wishes, isolation, takes
+from .options import CHANGES, MAKING, ScenarioFile, Wishes, takes
 from .planning import plan_of_scenario
 
 if TYPE_CHECKING:
@@ -40,14 +40,8 @@ BESIDE = 36
 """Columns of a terminal that the title leaves to the bar and its numbers."""
 
 
-@takes(*CHANGES, *MAKING, "format_")
-def run(
-    scenario: ScenarioFile,
-    wishes: Wishes,
-    name: Name = None,
-    metric: Metrics = None,
-    no_validate: NoValidate = False,
-) -> None:
+@takes(*CHANGES, *MAKING, "format_", "no_validate")
+def run(scenario: ScenarioFile, wishes: Wishes, name: Name = None, metric: Metrics = None) -> None:
     """Run a scenario and write results.csv and run.json.
 
     Without --out, results go to results/<folder of the scenario>/<its name>, followed by what --swap
@@ -66,8 +60,7 @@ def run(
     if wishes.out and name:
         raise ScenarioError("--out names the folder and --name a part of its path: give one of them")
     metrics = _metric_names(metric or ())
-    limit = isolation(wishes.isolate, wishes.call_limit)
-    plan = plan_of_scenario(scenario, wishes, validate=not no_validate)
+    plan = plan_of_scenario(scenario, wishes)
     if named := [name for name in metric or () if name != "standard"]:
         from ..metrics import run_metrics
 
@@ -81,7 +74,7 @@ def run(
         say(f"changed: {changed(plan.changes)}")
     title = with_changes(plan.title or scenario.stem, plan.changes)
     try:
-        with _bar(title) as progress, opener_of(plan, limit) as opener:
+        with _bar(title) as progress, opener_of(plan, wishes.limit) as opener:
             info = simulate(plan, folder, progress=progress, opener=opener, format=wishes.format_, apart=True)
     except SimulationError as error:
         _say_findings(error.findings)

@@ -193,14 +193,10 @@ ours = versions
 @contextlib.contextmanager
 def _told_to_end() -> Iterator[None]:
     """Let SIGTERM end the block as Ctrl-C does."""
-
-    def stop(number: int, frame: Any) -> None:
-        raise KeyboardInterrupt
-
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    earlier = signal.signal(signal.SIGTERM, stop)
+    earlier = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield
     finally:

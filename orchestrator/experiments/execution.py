@@ -16,12 +16,6 @@ Runner = Callable[[Sequence[Job], Told], object]
 """Makes runs; see `runner_of`."""
 
 
-def stale(jobs: Sequence[Job]) -> dict[str, str]:
-    """Return label -> why its results on disk are not those of its plan, of jobs that keep results."""
-    found = {job.label: staleness(job.plan, job.out) for job in jobs if job.plan is not None}
-    return {label: why for label, why in found.items() if why}
-
-
 def left_to_do(jobs: Sequence[Job], records: Mapping[str, Record]) -> list[Job]:
     """Return the runs that have not been made already, each key once, in their order.
 
@@ -44,23 +38,26 @@ def left_to_do(jobs: Sequence[Job], records: Mapping[str, Record]) -> list[Job]:
 
 def finish(
     left: Sequence[Job], journal: Journal | None, *, runner: Runner, told: Told = lambda _: None
-) -> None:
-    """Make runs and note each in the journal, if there is one, as it ends.
+) -> list[Outcome]:
+    """Make runs, note each in the journal, if there is one, as it ends, and return what became of them.
 
     Raises:
         KeyboardInterrupt: Ctrl-C; what is finished is in the journal.
         ResultsError: the journal cannot be written, or a cluster was lost.
     """
+    outcomes: list[Outcome] = []
 
     def done(outcome: Outcome) -> None:
         final = outcome.ok or (outcome.exit_status == 1 and not outcome.died)  # else it may go well next time
         if journal:
             journal.add(outcome.job.key, outcome.record, last=final)
+        outcomes.append(outcome)
         told(outcome)
 
     runner(left, done)
     if journal and any(job.key not in journal.records for job in left):
         raise ResultsError(f"{journal.folder}: not all runs were made; start it again.")
+    return outcomes
 
 
 def runner_of(workers: int | None, scheduler: str | None) -> Runner:

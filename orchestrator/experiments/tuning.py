@@ -12,11 +12,11 @@ generations to come, and a seed; nothing ends it early.
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ScenarioError
@@ -133,27 +133,17 @@ def best_of(experiment: Experiment, found: Sequence[Tuned]) -> Experiment:
 
 def _fixed(experiment: Experiment, judged: Judged) -> Values:
     """Return the metrics of the runs that no law drives."""
-    left = [name for name in experiment.runs if not _driven(experiment, name)]
-    if not left:
-        return {}
-    return judged(_along(experiment, left, {"as they stand": VariantSpec.model_validate({})})).values
+    left = _trials(experiment, {"as they stand": VariantSpec.model_validate({})}, driven=False)
+    return judged(left).values if left.runs else {}
 
 
-def _driven(experiment: Experiment, run: str) -> bool:
-    return any(fnmatchcase(run, pattern) for pattern in tuning_of(experiment).runs)
-
-
-def _trials(experiment: Experiment, tried: dict[str, VariantSpec]) -> Experiment:
-    """Return an experiment of the runs that laws drive, with a level of its only axis for each trial."""
-    return _along(experiment, [name for name in experiment.runs if _driven(experiment, name)], tried)
-
-
-def _along(experiment: Experiment, runs: Sequence[str], variants: dict[str, VariantSpec]) -> Experiment:
-    axis = DesignAxisSpec.model_validate({"variants": variants})
-    spec = experiment.spec.model_copy(
-        update={"axes": {TRIAL: axis}, "tuning": None, "tables": [], "figures": []}
-    )
-    return replace(experiment, spec=spec, runs={name: experiment.runs[name] for name in runs})
+def _trials(experiment: Experiment, tried: dict[str, VariantSpec], *, driven: bool = True) -> Experiment:
+    """Return an experiment of the runs that laws drive, or of the others, at each trial: its only axis."""
+    drives = experiment.matching(tuning_of(experiment).runs)
+    runs = {name: run for name, run in experiment.runs.items() if (run in drives) == driven}
+    axes = {TRIAL: DesignAxisSpec.model_validate({"variants": tried})}
+    changed: dict[str, Any] = {"axes": axes, "tuning": None, "tables": [], "figures": []}
+    return replace(experiment, spec=experiment.spec.model_copy(update=changed), runs=runs)
 
 
 def _values(law: LawSpec, places: Sequence[float]) -> dict[str, float]:
@@ -255,9 +245,7 @@ def history_figure(experiment: Experiment, found: Sequence[Tuned], note: str) ->
         unit, factor = shown_unit(spec.unit)
         handles = []
         for k, one in enumerate(found):
-            least = [
-                factor * min(trial.cost for trial in one.trials[: n + 1]) for n in range(len(one.trials))
-            ]
+            least = [factor * cost for cost in itertools.accumulate((t.cost for t in one.trials), min)]
             axes.step(range(1, len(least) + 1), least, where="post", **line_style(k))
             handles.append(Line2D([], [], label=one.law, **line_style(k)))
         axes.set(xlabel="trials", ylabel=f"least so far{f' [{unit}]' if unit else ''}")
