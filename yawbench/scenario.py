@@ -44,11 +44,6 @@ def load(source: str | Path) -> Scenario:
     return scenario
 
 
-def names() -> list[str]:
-    """Return the names of all scenarios that `load` takes by name."""
-    return catalogue.names("a scenario")
-
-
 @dataclass(frozen=True)
 class Scenario:
     """A scenario and what is changed in it; made by `load`, never changed itself.

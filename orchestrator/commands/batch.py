@@ -15,6 +15,8 @@ import typer
 from ..wording import counted, printable
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ..experiments.findings import Each
     from ..experiments.jobs import Job, Outcome
     from ..experiments.journal import Journal
@@ -167,6 +169,17 @@ def _lines(total: int, done: int) -> Callable[[int], None]:
         say(f"[{count:{len(str(total))}}/{total}]" + (f" {left:.0f} s left" if count < total else ""))
 
     return told
+
+
+def save_figure(figure: Figure, wanted: Path | None, default: Path) -> None:
+    """Save a figure as `.svg` and `.png` and say where; what is wanted may have either ending, or none."""
+    from ..figures.style import save
+
+    stem = wanted or default
+    if stem.suffix.lower() in (".svg", ".png"):
+        stem = stem.with_suffix("")
+    svg, png = save(figure, stem)
+    say(f"{svg}, {png.name}")
 
 
 def print_tables(tables: Iterable[Table]) -> None:

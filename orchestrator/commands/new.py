@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from ..scaffold.beginnings import KINDS
+
 if TYPE_CHECKING:
     from ..scaffold.beginnings import Beginning
 
 
-Kind = Literal[
-    "controller", "driver", "reference", "tyre", "plant", "road", "vehicle", "scenario", "study", "sweep"
-]
-What = Annotated[Kind, typer.Argument(help="What to write.", metavar="KIND")]
+Kind = Literal[KINDS]  # type: ignore[valid-type]
+What = Annotated[Kind, typer.Argument(help="What to write.", metavar="KIND")]  # type: ignore[valid-type]
 Name = Annotated[str, typer.Argument(help="Its name: lower-case letters, digits and _.", metavar="NAME")]
 Written = Annotated[Literal["python", "c"], typer.Option("--language", help="Language of a controller.")]
 Project = Annotated[

@@ -35,10 +35,9 @@ def tyre(
     One figure: lateral force and aligning moment over slip angle and longitudinal force over slip at four
     loads, forces in combined slip at five slip angles, stiffnesses and relaxation lengths over load.
     """
-    from ..figures.style import save
     from ..tyres.stand import put_on_stand
     from ..tyres.tyre_drawing import draw_tyre
-    from .batch import say
+    from .batch import save_figure, say
 
     stand = put_on_stand(source, friction=friction, fmus=wishes.fmus, build=wishes.build)
     name, fmu = Path(source).name, stand.unit.fmu
@@ -48,8 +47,5 @@ def tyre(
         for warning in file["warnings"]:
             say(f"warning: {warning}")
     note = f"front left wheel, friction {friction:g}, no camber · {fmu.name} ({fmu.sha256[:8]})"
-    stem = output or Path("results") / "tyres" / Path(source).stem
-    if stem.suffix.lower() in (".svg", ".png"):
-        stem = stem.with_suffix("")
-    paths = save(draw_tyre(stand, f"{name}{kind}{side}", note), stem)
-    say(f"{paths[0]}, {paths[1].name}")
+    default = Path("results", "tyres", Path(source).stem)
+    save_figure(draw_tyre(stand, f"{name}{kind}{side}", note), output, default)

@@ -55,13 +55,12 @@ def vehicle(
     acceleration; yaw gain, natural frequency and damping over speed. All in tables, and in one figure.
     """
     from ..errors import ScenarioError
-    from ..figures.style import save
     from ..fmu.opener import Opener
     from ..scenario import catalogue, yaml_lines
     from ..vehicles.car_drawing import draw_cars
     from ..vehicles.handling import handling_of
     from ..vehicles.proving import TestTrack, fitting_plant
-    from .batch import print_tables, say
+    from .batch import print_tables, save_figure, say
 
     file = catalogue.find(file, "a vehicle file")
     if problems := yaml_lines.read(file, what="vehicle file").sentences():
@@ -75,11 +74,7 @@ def vehicle(
         for why in car.failed:
             say(f"note: {car.plant}: {why}")
     note = f"on {tracks[0].tyres}, friction {friction:g}"
-    stem = output or Path("results") / "vehicles" / file.stem
-    if stem.suffix.lower() in (".svg", ".png"):
-        stem = stem.with_suffix("")
-    paths = save(draw_cars(cars, file.stem, note), stem)
-    say(f"{paths[0]}, {paths[1].name}")
+    save_figure(draw_cars(cars, file.stem, note), output, Path("results", "vehicles", file.stem))
 
 
 def _tables(cars: list[Handling]) -> list[Table]:

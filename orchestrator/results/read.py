@@ -42,6 +42,11 @@ class Results:
         return self.folder / str(self.run.get("results", RESULTS_FILE))
 
     @property
+    def where(self) -> str:
+        """What a message calls them: by their file, or if they are in memory alone by their title."""
+        return str(self.file) if self.folder != Path() else str(self.run.get("title") or "this run")
+
+    @property
     def ended(self) -> str | None:
         """Why a unit ended the run before its stop time, None if none did."""
         ended = self.run.get("ended")
@@ -83,7 +88,7 @@ class Results:
         if not found:
             raise ResultsError(self._unknown(variable, role))
         raise ResultsError(
-            f"{self.file}: '{variable}' was recorded of more than one unit: {', '.join(found)}."
+            f"{self.where}: '{variable}' was recorded of more than one unit: {', '.join(found)}."
         )
 
     def candidates(self, variable: str, *, role: str | None = None) -> list[str]:
@@ -118,7 +123,7 @@ class Results:
         short = {name.partition(".")[2]: name for name in self.columns}
         close = get_close_matches(variable, [*self.columns, *short], n=1)
         hint = f"; did you mean '{close[0]}'?" if close else f"; recorded: {', '.join(fold([*self]))}."
-        return f"{self.file}: no column '{variable}'{of} was recorded{hint}"
+        return f"{self.where}: no column '{variable}'{of} was recorded{hint}"
 
 
 def _is_the_same(wire: dict[str, Any], unit: str | None) -> bool:

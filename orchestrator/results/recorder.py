@@ -54,7 +54,7 @@ class Block:
         self._extremes = np.full((2, sum(real)), np.nan)
 
     def lay(self, block: np.ndarray) -> None:
-        """Take rows from this memory from here on, of shape (BLOCK, 1 + Reals)."""
+        """Take rows from this memory from here on, of shape (at most BLOCK, 1 + Reals)."""
         self._block = block
         self.rows = list(block)
 

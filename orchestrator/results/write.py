@@ -26,8 +26,7 @@ def write_results(results: Results, folder: Path, *, format: str = "csv") -> Non
     try:
         for first in range(0, len(numbers), BLOCK):
             block = numbers[first : first + BLOCK]
-            for row, values in zip(recorder.rows, block, strict=False):
-                row[:] = values
+            recorder.lay(block)
             recorder.others += [list(row) for row in others[first : first + len(block)]]
             recorder.write(len(block))
         recorder.finish(results.run)

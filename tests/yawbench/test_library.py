@@ -96,6 +96,8 @@ def test_names_of_signals_and_columns_give_the_same_arrays(run):
     assert run.time.shape == run["sideslip"].shape == (len(run),)
     assert run.unit_of("sideslip") == "rad"
     assert "plant.sideslip" in run
+    with pytest.raises(yb.ResultsError, match=f"^{run.title}: no column 'yawrate' .*did you mean 'yaw_rate'"):
+        run["yawrate"]
 
 
 def test_pandas_has_all_columns_and_their_units(run):
