@@ -27,11 +27,11 @@ from ..fmu.binary import CORE, INTEGERS, binary_of, binary_problem
 from ..plan import Place, Unit, Value
 from ..wording import listed
 from .log import ERROR, FATAL, OK, STATUS, WARNING, Log, known, unlisten
-from .slave import Buffers, Calls, Experiment, Status
+from .slave import Buffers, Calls, Experiment, Slave, Status
 
 
-class FmuSlave(ABC):
-    """What instances of all versions of FMI share. A `slave.Slave`."""
+class FmuSlave(Slave, ABC):
+    """What instances of all versions of FMI share."""
 
     prefix: ClassVar[str]
     """Of the names of the functions."""
@@ -165,15 +165,6 @@ class FmuSlave(ABC):
 
     def _has(self, name: str) -> bool:
         return hasattr(self._library, self.prefix + name)
-
-    @abstractmethod
-    def setup(self, experiment: Experiment) -> Status: ...
-
-    @abstractmethod
-    def enter(self) -> Status: ...
-
-    @abstractmethod
-    def ended(self) -> float | None: ...
 
     def _function(self, name: str) -> Any:
         """Return a C function, which takes C objects, and of Python's numbers only integers."""
