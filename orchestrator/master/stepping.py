@@ -27,6 +27,7 @@ from .course import Course, Opener
 from .exchange import REPLY, Channel, Relay, told
 from .guardian import die_with_parent
 from .interrupts import StopFlag
+from .isolation import Isolation
 from .master import WORDS, Master
 from .surroundings import flush_output
 from .unit import FmuSlave
@@ -145,6 +146,8 @@ def _make(plan: Plan, opener: Opener, stop: StopFlag, shared: Shared, channel: C
         if said is None:
             return
     course.end()
+    if isinstance(opener, Isolation):
+        opener.close()  # processes of units that the run has not come to
     log.finish()
     flush_output()
     channel.send(REPLY, None)
