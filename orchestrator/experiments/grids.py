@@ -83,10 +83,8 @@ def correlation(
     return rank_correlation(measured, published)
 
 
-def grid_table(
-    spec: GridSpec, values: Values, verdicts: Mapping[tuple[str, str], str] | None = None
-) -> Table:
-    """Return the table: measured on the left, published on the right, all in SI and three digits.
+def grid_tables(spec: GridSpec, values: Values, verdicts: Mapping[tuple[str, str], str]) -> list[Table]:
+    """Return the table of what is measured and that of what is published, in SI and three digits.
 
     A grid that says how far down its columns `holds`, one of derived numbers, or one of means over repeats,
     has its numbers as people read them.
@@ -100,20 +98,23 @@ def grid_table(
     ((_, columns),) = spec.columns.items()
     inside_all = [values.get(cell.key) for cell in cells(spec)]
     if spec.holds or spec.derived or any(value and value.half for value in inside_all):
-        return _told_table(spec, values, verdicts or {})
+        return [_told_table(spec, values, verdicts)]
     units = {value.unit for (_, key), value in values.items() if key == spec.metric}
     unit = "" if units <= {"1", "%"} else f" [{units.pop()}]"
     width, every = len(columns), cells(spec)
     inside, beside = every[: len(rows) * width], every[len(rows) * width :]
-    table = Table(f"{spec.title}{unit}", [spec.corner, *columns.values()])
+    lines = [(row, inside[i * width : (i + 1) * width]) for i, row in enumerate(rows.values())]
+    title, headings, numbers = (
+        f"{spec.title}{unit}",
+        [spec.corner, *columns.values()],
+        set(range(1, width + 1)),
+    )
+    measured = [[row, *(_digits(_measured(cell, values)) for cell in line)] for row, line in lines]
+    tables = [Table(title, headings, [*measured], [], numbers)]
     if spec.published:
-        table.headings += ["the paper:", *columns.values()]
-    for i, row in enumerate(rows.values()):
-        line = inside[i * width : (i + 1) * width]
-        measured = [_digits(_measured(cell, values)) for cell in line]
-        printed = [_digits(cell.published) for cell in line]
-        table.rows.append([row, *measured, *([row, *printed] if spec.published else [])])
-    table.numbers = set(range(1, len(table.headings))) - {width + 1}
+        printed = [[row, *(_digits(cell.published) for cell in line)] for row, line in lines]
+        tables.append(Table(f"{title}: what the paper prints", headings, [*printed], [], numbers))
+    table = tables[-1]
     for cell in beside:
         said = f", the paper: {_digits(cell.published)}" if cell.published is not None else ""
         table.notes.append(f"{cell.row}: {_digits(_measured(cell, values))}{said}")
@@ -123,7 +124,18 @@ def grid_table(
             f"rank correlation (Spearman) with the paper over {_count(every)} runs: "
             f"{'not all runs have results' if found is None else digits_of(found)}"
         )
-    return table
+    return tables
+
+
+def side_by_side(tables: Sequence[Table]) -> Table:
+    """Return what is measured and what the paper prints as one table."""
+    if len(tables) == 1:
+        return tables[0]
+    ours, theirs = tables
+    rows = [[*one, *other] for one, other in zip(ours.rows, theirs.rows, strict=True)]
+    headings = [*ours.headings, "the paper:", *theirs.headings[1:]]
+    numbers = ours.numbers | {len(ours.headings) + number for number in theirs.numbers}
+    return Table(ours.title, headings, [*rows], theirs.notes, numbers)
 
 
 def _told_table(spec: GridSpec, values: Values, verdicts: Mapping[tuple[str, str], str]) -> Table:

@@ -12,7 +12,7 @@ from ..titles import changed
 from .design import levels_of
 from .expansion import NamedRun
 from .findings import Findings
-from .grids import cells, grid_table
+from .grids import cells, grid_tables, side_by_side
 from .judged_schema import Claim, GridSpec, MetricSpec, Reference
 from .judging import Judgement
 from .limits import limit_table
@@ -39,15 +39,17 @@ def all_tables(findings: Findings) -> list[Table]:
 def limit_tables(findings: Findings) -> list[Table]:
     """Return the tables of all limits, and the grids that say how far down they hold."""
     tables = [limit_table(findings, name) for name in findings.spec.limits]
-    tables += [_grid_table(findings, grid) for grid in findings.spec.grids.values() if grid.holds]
+    tables += [
+        one for grid in findings.spec.grids.values() if grid.holds for one in _grid_tables(findings, grid)
+    ]
     if words := changed(findings.experiment.by_options):
         for table in tables:
             table.notes.append(f"changed: {words}")
     return tables
 
 
-def _grid_table(findings: Findings, grid: GridSpec) -> Table:
-    """Return a grid with what is said of its cells."""
+def _grid_tables(findings: Findings, grid: GridSpec) -> list[Table]:
+    """Return a grid with what is said of its cells, and what the paper prints."""
     signs: dict[tuple[str, str], str] = {}
     for one in findings.judgements if grid.holds else ():
         about = {(c.run, c.derived or c.metric) for c in one.said.holds_if}
@@ -55,13 +57,19 @@ def _grid_table(findings: Findings, grid: GridSpec) -> Table:
             word = verdict(one)
             (key,) = about
             signs[key] = signs.get(key) or ("" if word == HOLDS else "✗" if word in FAILS.values() else "?")
-    return grid_table(grid, findings.values_of_grids, signs)
+    return grid_tables(grid, findings.values_of_grids, signs)
 
 
-def derived_tables(findings: Findings) -> list[Table]:
-    """Return the grids, and a table of the derived numbers if there are any."""
-    spec = findings.spec
-    tables = [_grid_table(findings, grid) for grid in spec.grids.values() if not grid.holds]
+def derived_tables(findings: Findings, *, apart: bool = False) -> list[Table]:
+    """Return the grids, and a table of the derived numbers if there are any.
+
+    `apart`: what the paper prints for a grid is a table of its own.
+    """
+    spec, tables = findings.spec, []
+    for grid in spec.grids.values():
+        if not grid.holds:
+            found = _grid_tables(findings, grid)
+            tables += found if apart else [side_by_side(found)]
     in_grids = {cell.metric for grid in spec.grids.values() if grid.derived for cell in cells(grid)}
     if alone := {key: one for key, one in spec.derived.items() if key not in in_grids}:
         rows: list[list[Cell]] = [[one.says, findings.derived.get(key)] for key, one in alone.items()]

@@ -41,9 +41,6 @@ from .panel_images import Image, image_of
 from .provenance import count_kinds, groups_of
 from .system import systems_of
 
-PAPER = "the paper:"
-"""Heading of the column that separates what a grid measured from what the paper prints."""
-
 
 def chapter(
     findings: Findings,
@@ -85,7 +82,7 @@ def chapter(
         "animation": animation(findings),
         "figures": figures(findings, name, _beside(folder / FIGURES, shown_in), each),
         "charts": charts(findings, folder / FIGURES),
-        "tables": [*run_tables(findings), *_apart(derived_tables(findings))],
+        "tables": [*run_tables(findings), *derived_tables(findings, apart=True)],
         "definitions": definitions(findings),
         "groups": groups,
         "kinds": count_kinds(groups),
@@ -200,25 +197,6 @@ def charts(findings: Findings, folder: Path) -> list[Image]:
         file = folder / f"{spec.name}.svg"
         if spec.kind != "overlay" and file.is_file():
             found.append(image_of(file, title_of(findings, spec)))
-    return found
-
-
-def _apart(tables: Sequence[Table]) -> list[Table]:
-    """Return the tables; what a grid measured and what the paper prints as two."""
-    found: list[Table] = []
-    for table in tables:
-        if PAPER not in table.headings:
-            found.append(table)
-            continue
-        middle = table.headings.index(PAPER)
-        numbers = set(range(1, middle))
-        corner = table.headings[0]
-        ours = Table(table.title, table.headings[:middle], [row[:middle] for row in table.rows], [], numbers)
-        theirs = Table(
-            f"{table.title}: what the paper prints", [corner, *table.headings[middle + 1 :]],
-            [row[middle:] for row in table.rows], table.notes, numbers,
-        )  # fmt: skip
-        found += [ours, theirs]
     return found
 
 

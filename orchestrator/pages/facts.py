@@ -10,6 +10,7 @@ from datetime import datetime, timezone
 from markupsafe import Markup
 
 from ..errors import ResultsError
+from ..experiments.tables import Table
 from ..figures.display import Run
 from ..results.read import Results
 from ..results.run_record import versions
@@ -26,15 +27,6 @@ class Figure:
     panels: list[PanelImage]
     legend: list[LegendEntry]
     files: tuple[str, ...] = ()
-
-
-@dataclass
-class FmuFact:
-    """An FMU that took part, by its content."""
-
-    name: str
-    sha256: str
-    units: dict[str, None]  # it stood for
 
 
 def figure_of(
@@ -57,14 +49,16 @@ def animation_of(runs: Sequence[Run], title: str) -> Markup | None:
         return None
 
 
-def fmus_of(recorded: Iterable[Results]) -> list[FmuFact]:
+def fmus_of(recorded: Iterable[Results]) -> Table:
     """Return every FMU that took part in the runs, as their records say."""
-    found: dict[str, FmuFact] = {}
+    found: dict[tuple[str, str], dict[str, None]] = {}
     for results in recorded:
         for unit, fmu in results.run.get("fmus", {}).items():
-            name, sha256 = str(fmu.get("name", unit)), str(fmu.get("sha256", ""))
-            found.setdefault(f"{name} {sha256}", FmuFact(name, sha256, {})).units[unit] = None
-    return sorted(found.values(), key=lambda fmu: (min(fmu.units), fmu.name))
+            known = str(fmu.get("name", unit)), str(fmu.get("sha256", ""))
+            found.setdefault(known, {})[unit] = None
+    ordered = sorted(found.items(), key=lambda one: (min(one[1]), one[0][0]))
+    rows = [(name, ", ".join(units), sha256) for (name, sha256), units in ordered]
+    return Table("", ["FMU", "as", "SHA-256"], [*rows])
 
 
 def programs_of(recorded: Iterable[Results]) -> dict[str, str]:
