@@ -15,8 +15,12 @@ from orchestrator.experiments import workers
 from tests.fmu_copies import put_fmus
 
 TESTS = Path(__file__).parent
-LONGEST_FIRST = ("scenarios", "trials", "pages", "docs", "orchestrator", "yawbench", "fmus", "components")
-"""Folders: files with long runs begin first, so that no worker is left alone with one at the end."""
+LONGEST_FIRST = (
+    *("scenarios", "trials", "pages", "docs", "orchestrator", "yawbench", "fmus"),
+    *("components/test_conformance.py", "components/test_car_on_tyres.py", "components/test_w"),
+    "components",
+)
+"""How paths begin: files with long runs come first, so that no worker is left alone with one at the end."""
 
 gc.set_threshold(50_000, 20, 20)
 """Python looks for garbage less often: thousands of tests keep much, and leave little."""
@@ -26,9 +30,7 @@ workers.NEEDED += workers.FOR_TESTS
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items.sort(
-        key=lambda item: LONGEST_FIRST.index(item.path.relative_to(__file__.rpartition("/")[0]).parts[0])
-    )
+    items.sort(key=place_in_order)
     sampled: dict[tuple[str, str], list[pytest.Item]] = {}
     for item in items:
         if item.get_closest_marker("sampled"):
@@ -39,6 +41,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for k, item in enumerate(cases):
             if k not in kept:
                 item.add_marker(pytest.mark.exhaustive)
+
+
+def place_in_order(item: pytest.Item) -> int:
+    """Return how early the tests of an item's file begin."""
+    path = item.path.relative_to(TESTS).as_posix()
+    return next(k for k, start in enumerate(LONGEST_FIRST) if path.startswith(start))
 
 
 @pytest.fixture(scope="module")

@@ -18,14 +18,15 @@ class Stand:
     def __init__(self, component: type[Component], **parameters: Any) -> None:
         self.unit = component(instance_name="stand", resources=None)
         self.reference = {v.name: i for i, v in enumerate(component.variables)}
-        self.type = {v.name: v.type for v in component.variables}
+        self.type = {v.name: v.type.lower() for v in component.variables}
+        self.setter = {name: getattr(self.unit, f"set_{kind}") for name, kind in self.type.items()}
+        self.answers = {v.name: i for i, v in enumerate(component.variables) if v.causality == "output"}
         self.time = 0.0
         self.set(**parameters)
 
     def set(self, **values: Any) -> None:
         for name, value in values.items():
-            setter = getattr(self.unit, f"set_{self.type[name].lower()}")
-            setter([self.reference[name]], [value])
+            self.setter[name]([self.reference[name]], [value])
         self._check()
 
     def start(self, **inputs: float) -> dict[str, float]:
@@ -45,11 +46,10 @@ class Stand:
         return self.outputs()
 
     def outputs(self) -> dict[str, float]:
-        names = [v.name for v in self.unit.variables if v.causality == "output"]
-        return dict(zip(names, self.unit.get_real([self.reference[n] for n in names]), strict=True))
+        return dict(zip(self.answers, self.unit.get_real([*self.answers.values()]), strict=True))
 
     def __getitem__(self, name: str) -> Any:
-        getter = getattr(self.unit, f"get_{self.type[name].lower()}")
+        getter = getattr(self.unit, f"get_{self.type[name]}")
         return getter([self.reference[name]])[0]
 
     def _check(self) -> None:
