@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -55,10 +55,11 @@ def experiment(
         ScenarioError: an axis, a level or a metric is wrong.
     """
     given: dict[str, Any] = {}
-    changed = base
+    changed = base._unswapped(axes)
     for name, levels in axes.items():
         if isinstance(levels, str) or not isinstance(levels, Iterable):
             raise ScenarioError(f"{name}: give a list of levels (got {levels!r})")
+        levels = list(levels)
         if name in base.loaded.units:
             variants = {}
             for level in levels:
@@ -69,7 +70,7 @@ def experiment(
                     raise ScenarioError(f"{name}: two levels are called {words}")
                 settings = {one.place: one.value for one in brought}
                 variants[words] = {"swap": {name: str(swap.value)}, "set": settings}
-                changed = Scenario(base.path, base.changes, swapped.programs)
+                changed = replace(changed, programs=swapped.programs)
             given[name] = {"variants": variants}
         else:
             given[name] = {"vary": name, **_values(name, levels)}
@@ -77,7 +78,7 @@ def experiment(
     spec = {"scenario": base.path.name, "axes": given, "metrics": {one: {"metric": one} for one in wanted}}
     made = _checked(ExperimentSpec, {"title": base.title or base.path.stem, **spec})
     run = NamedRun("", "", "", base.path, ())
-    return Experiment(changed, Design(base.path, made, {"": run}, (), base.changes))
+    return Experiment(changed, Design(base.path, made, {"": run}, (), changed.changes))
 
 
 def _checked(model: type[Model], given: dict[str, Any]) -> Model:

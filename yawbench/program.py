@@ -187,7 +187,11 @@ def _of_function(function: Callable[..., Any], role: str) -> type[Component]:
         )
     parameters = inspect.signature(function).parameters.values()
     plain = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
-    names = [p.name for p in parameters if p.kind in plain and (p.default is p.empty)]
+    if unnamed := [str(p) for p in parameters if p.kind not in plain]:
+        raise ScenarioError(
+            f"{_name(function)}: {unnamed[0]} names no signal: name each, as in (yaw_rate, t)"
+        )
+    names = [p.name for p in parameters if p.default is p.empty]
     inputs = [name for name in names if name != "t"]
     outputs = [one for pattern in known[role] for one in wheels(pattern)]
 

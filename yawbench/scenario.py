@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
@@ -81,7 +81,7 @@ class Scenario:
             ScenarioError: there is no such unit, or what is given cannot stand for one.
         """
         given = self.loaded.units
-        changes, programs = [*self.changes], dict(self.programs)
+        changes, programs = [*self._unswapped(units).changes], dict(self.programs)
         for unit, wanted in units.items():
             if unit not in given:
                 text = f"there is no unit {unit!r}{hint(unit, given, lead='units')}"
@@ -98,6 +98,12 @@ class Scenario:
                 changes.append(Change(f"{unit}.step_size", program.step_size, "swap"))
         return replace(self, changes=tuple(changes), programs=programs)
 
+    def _unswapped(self, units: Iterable[str]) -> Scenario:
+        """Return the scenario without earlier swaps of units, and the step sizes that came with them."""
+        places = {place for unit in units for place in (unit, f"{unit}.step_size")}
+        kept = (one for one in self.changes if one.origin != "swap" or one.place not in places)
+        return replace(self, changes=tuple(kept))
+
     def set(self, values: Mapping[str, Value]) -> Scenario:
         """Return the scenario with other values.
 
@@ -112,7 +118,7 @@ class Scenario:
         Raises:
             ScenarioError: a place or value is wrong.
         """
-        changed = [setting(place, value, "set") for place, value in values.items()]
+        changed = [setting(place, _plain(value), "set") for place, value in values.items()]
         scenario = replace(self, changes=(*self.changes, *changed))
         scenario.loaded  # noqa: B018 - what is wrong is said now
         return scenario
@@ -216,6 +222,11 @@ class Scenario:
         )
         changed = "".join(f"<br>{escape(str(change))}" for change in self.changes)
         return f"<b>{escape(plan.title)}</b>{changed}<table>{rows}</table>"
+
+
+def _plain(value: Any) -> Any:
+    """Return a number of numpy as one of Python, anything else as it is."""
+    return value.item() if getattr(value, "shape", None) == () else value
 
 
 def _role(fmu: str, unit: str) -> str:

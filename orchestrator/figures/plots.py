@@ -60,7 +60,7 @@ def draw(
         raise ResultsError(nothing_recorded(early[0]))
     found = shown_by(runs, panels)
     if not found:
-        where = ", ".join(str(run.results.folder) for run in runs)
+        where = ", ".join(run.results.where for run in runs)
         raise ResultsError(f"{where}: nothing to draw, no run recorded any of {', '.join(panels)}.")
     rows = _rows(found)
     with new_figure() as figure:

@@ -59,6 +59,20 @@ def test_a_metric_is_drawn_over_an_axis_with_a_line_per_level(runs):
         runs.plot("peak(sideslp)", x="plant.initial_speed", lines="controller")
 
 
+def test_levels_may_come_from_anything_that_gives_them(base):
+    axes = {"driver.amplitude": (x for x in (0.01, 0.02)), "plant.initial_speed": range(20, 23)}
+    assert len(yb.experiment(base, axes)) == 6
+
+
+def test_levels_take_the_place_of_what_was_swapped_before(base):
+    class Slow(Proportional):
+        step_size = 0.1
+
+    axes = {"controller": ["controller_off", Proportional()]}
+    one, other = (yb.experiment(before, axes) for before in (base, base.swap(controller=Slow())))
+    assert one.design == other.design
+
+
 def test_a_run_that_fails_is_a_row_with_its_reason_and_the_others_are_made(base):
     def careless(yaw_rate_ref, yaw_rate):
         return 20000 * yaw_rate_ref / yaw_rate

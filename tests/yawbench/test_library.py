@@ -163,6 +163,16 @@ def test_every_run_begins_with_a_copy_of_the_object(base):
     assert first["controller.yaw_moment"][-1] == 16
 
 
+def test_a_step_size_goes_with_the_program_that_brought_it(base):
+    again = base.swap(controller=Counting()).swap(controller=proportional)
+    assert again.changes == base.swap(controller=proportional).changes
+
+
+@pytest.mark.parametrize("mass", [np.int64(1200), np.float32(1200), np.array(1200.0)])
+def test_numbers_of_numpy_are_numbers(base, mass):
+    assert base.set({"vehicle.mass": mass}).plan() == base.set({"vehicle.mass": mass.item()}).plan()
+
+
 def test_what_python_code_raises_is_the_cause(base):
     def broken(t, yaw_rate):
         return 1 / (t < 1)
@@ -179,6 +189,7 @@ def test_what_python_code_raises_is_the_cause(base):
     [
         (3, "int is no controller"),
         (Proportional, r"Proportional is a class; give an object of it, Proportional\(\)"),
+        (lambda **signals: 0.0, r"function: \*\*signals names no signal: name each"),
         (lambda x: x, "signal 'x' is not in the signal dictionary"),
         (type("Mute", (), {"output": lambda self, t, u: 0.0, "inputs": ()})(), "Mute has no outputs"),
         (type("Text", (), {"output": None, "inputs": "yaw_rate", "outputs": ()})(), "are tuples of names"),
