@@ -40,11 +40,8 @@ def draw_all(findings: Findings, out: Path, each: Each = map) -> tuple[dict[str,
     wanted: list[tuple[Any, FigureSpec, str, Path]] = []
     light = findings.light()
     for spec in findings.spec.figures:
-        stem = out / FIGURES / spec.name
-        if spec.kind == "overlay":
-            wanted.append((runs_of(findings, spec), spec, title_of(findings, spec), stem))
-        else:
-            wanted.append((light, spec, title_of(findings, spec), stem))
+        shown = runs_of(findings, spec) if spec.kind == "overlay" else light
+        wanted.append((shown, spec, title_of(findings, spec), out / FIGURES / spec.name))
     drawn, problems = {}, []
     for (_, spec, title, _), problem in zip(wanted, each(_draw, wanted), strict=True):
         if problem:

@@ -43,12 +43,9 @@ def limits_of(findings: Findings, spec: LimitSpec) -> list[Limit]:
 def _limit(
     findings: Findings, spec: LimitSpec, others: dict[str, Level], cases: list[Case], at: int
 ) -> Limit:
-    largest = None
-    run = cases[0].run
-    for setting in sorted(
-        map(findings.experiment.setting, (case.point for case in cases)),
-        key=lambda setting: float(setting[at].value),
-    ):
+    run, largest = cases[0].run, None
+    settings = {findings.experiment.setting(case.point) for case in cases}
+    for setting in sorted(settings, key=lambda setting: float(setting[at].value)):
         here = float(setting[at].value)
         if not judge(spec, findings.at[setting], {run.name: run.row}).holds:
             return Limit(others, largest, here, failed=bool(findings.failure(run, setting)))

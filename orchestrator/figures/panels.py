@@ -23,7 +23,7 @@ from ..metrics.run_metrics import columns_of, reference_of
 from ..metrics.symbols import variable_of, words
 from ..wording import cut, fold, hint
 from .display import Run, digits_of, in_formula, shown_unit
-from .portrait import curves_of, draw_portrait, signals_of
+from .portrait import curves_of, draw_portrait, signals_of, spread_rows
 from .spans import Span, mark, spans_of
 from .style import REFERENCE, ROW, WIDTH, line_style, literal, note_above
 
@@ -214,8 +214,7 @@ def draw_path(axes: Axes, runs: Sequence[Run], *, room: float = PATH_ROOM) -> No
     """
     drawn = [(k, run.results, c) for k, run in enumerate(runs) if (c := _path_columns(run))]
     for number, results, (x, y) in drawn:
-        every = max(1, results.time.size // POINTS)
-        keep = np.append(np.arange(0, results.time.size, every), results.time.size - 1)
+        keep = spread_rows(results, POINTS)
         axes.plot(results[x][keep], results[y][keep], **line_style(number))
         axes.plot(results[x][-1:], results[y][-1:], "o", ms=3.5, color=line_style(number)["color"])
     length = _span([results[x] for _, results, (x, _) in drawn])

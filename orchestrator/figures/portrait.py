@@ -63,9 +63,13 @@ def curves_of(runs: Sequence[Run], x: str, y: str) -> list[Curve]:
 
 
 def _shown(results: Results, column: str) -> np.ndarray:
-    every = max(1, results.time.size // POINTS)
-    kept = np.append(results[column][:-1:every], results[column][-1:])
-    return kept * shown_unit(results.units[column])[1]
+    return results[column][spread_rows(results, POINTS)] * shown_unit(results.units[column])[1]
+
+
+def spread_rows(results: Results, most: int) -> np.ndarray:
+    """Return about so many rows, the same way apart, and the last."""
+    size = results.time.size
+    return np.append(np.arange(0, size - 1, max(1, size // most)), size - 1)
 
 
 def draw_portrait(axes: Axes, runs: Sequence[Run], x: str, y: str) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import linecache
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -223,7 +224,5 @@ def text_of(value: Value | None) -> str:
 
 def count_kinds(groups: Iterable[Group]) -> dict[str, int]:
     """Return how many parameters there are of each kind of origin."""
-    kinds = [p.origin.kind for group in groups for p in group.parameters.values()]
-    return {
-        kind: kinds.count(kind) for kind in (PAPER, ERRATUM, CHOSEN, LITERATURE, NEUTRAL) if kind in kinds
-    }
+    kinds = Counter(one.origin.kind for group in groups for one in group.parameters.values())
+    return {kind: kinds[kind] for kind in (PAPER, ERRATUM, CHOSEN, LITERATURE, NEUTRAL) if kind in kinds}
