@@ -64,11 +64,18 @@ def _reason(plan: Plan, recorded: Mapping[str, Any]) -> str:
     for key, sentence in COMPARED.items():
         if recorded.get(key) != wanted.get(key):
             return sentence
-    return (
-        _changed_fmu(recorded.get("fmus", {}), wanted["fmus"])
-        or _changed_program(recorded.get("versions", {}), wanted["versions"])
-        or "its record is of an earlier kind"
-    )
+    for unit, fmu in wanted["fmus"].items():
+        known = recorded.get("fmus", {}).get(unit, {})
+        if known.get("sha256") != fmu["sha256"]:
+            return f"{unit}: another {fmu['name']}.fmu"
+        for key, words in _OF_UNIT.items():
+            if known.get(key) != fmu.get(key):
+                return f"{unit}: other {words}"
+    earlier = recorded.get("versions", {})
+    for program in (*PROGRAMS, "orchestrator"):
+        if earlier.get(program) != (version := wanted["versions"][program]):
+            return f"{program} {version} in place of {earlier.get(program, 'an unknown one')}"
+    return "its record is of an earlier kind"
 
 
 def _whole(results: Path, recorded: Mapping[str, Any]) -> bool:
@@ -79,21 +86,3 @@ def _whole(results: Path, recorded: Mapping[str, Any]) -> bool:
         return load_results(results.parent).time.size >= recorded.get("rows", 0)
     except (OSError, ResultsError):
         return False
-
-
-def _changed_fmu(recorded: Mapping[str, Any], wanted: Mapping[str, Any]) -> str | None:
-    for unit, fmu in wanted.items():
-        known = recorded.get(unit, {})
-        if known.get("sha256") != fmu["sha256"]:
-            return f"{unit}: another {fmu['name']}.fmu"
-        for key, words in _OF_UNIT.items():
-            if known.get(key) != fmu.get(key):
-                return f"{unit}: other {words}"
-    return None
-
-
-def _changed_program(recorded: Mapping[str, str], wanted: Mapping[str, str]) -> str | None:
-    for program in (*PROGRAMS, "orchestrator"):
-        if recorded.get(program) != wanted[program]:
-            return f"{program} {wanted[program]} in place of {recorded.get(program, 'an unknown one')}"
-    return None
