@@ -32,11 +32,17 @@ CAR: dict[str, Quantity] = {
         "kg.m2", "Yaw inertia of the sprung mass about its own centre", minimum=1.0
     ),
     "roll_inertia": Quantity("kg.m2", "Roll inertia I_x of the sprung mass about the roll axis", True, 1.0),
-    "sprung_roll_inertia": Quantity("kg.m2", "That about its own centre", True, 1.0),
+    "sprung_roll_inertia": Quantity(
+        "kg.m2", "Roll inertia of the sprung mass about its own centre", True, 1.0
+    ),
     "sprung_pitch_inertia": Quantity(
         "kg.m2", "Pitch inertia of the sprung mass about its own centre", True, 1.0
     ),
-    "sprung_roll_yaw_product": Quantity("kg.m2", "Product of inertia I_xz of the sprung mass"),
+    "sprung_roll_yaw_product": Quantity(
+        "kg.m2",
+        "Product of inertia I_xz of the sprung mass about its own centre, positive where its front is heavy "
+        "on top",
+    ),
     "wheelbase": Quantity("m", "Distance L of the axles", minimum=0.1),
     "cg_to_front_axle": Quantity("m", "Distance a of the centre of mass from the front axle", True, 0.1),
     "cg_to_rear_axle": Quantity("m", "Distance b of the centre of mass from the rear axle", True, 0.1),
@@ -59,10 +65,16 @@ CAR: dict[str, Quantity] = {
     "damping_front": Quantity("N.s/m", "Front damper, at the wheel", True, 0.0),
     "damping_rear": Quantity("N.s/m", "Rear damper, at the wheel", True, 0.0),
     "anti_roll_stiffness_front": Quantity(
-        "N/m", "Front anti-roll bar, force at each wheel per difference of travel", True
+        "N/m",
+        "Front anti-roll bar, force at each wheel per difference of travel, negative for a bar that stiffens "
+        "heave",
+        True,
     ),
     "anti_roll_stiffness_rear": Quantity(
-        "N/m", "Rear anti-roll bar, force at each wheel per difference of travel", True
+        "N/m",
+        "Rear anti-roll bar, force at each wheel per difference of travel, negative for a bar that stiffens "
+        "heave",
+        True,
     ),
     "roll_stiffness": Quantity("N.m/rad", "Roll stiffness K of the car on its tyres", True, 0.0),
     "roll_stiffness_front": Quantity("N.m/rad", "That of the front axle", minimum=0.0),
@@ -71,8 +83,12 @@ CAR: dict[str, Quantity] = {
     "roll_damping": Quantity("N.m.s/rad", "Roll damping C of the car on its tyres", True, 0.0),
     "roll_damping_front": Quantity("N.m.s/rad", "That of the front axle", minimum=0.0),
     "roll_damping_rear": Quantity("N.m.s/rad", "That of the rear axle", minimum=0.0),
-    "roll_camber_front": Quantity("1", "Inclination of the front wheels over the body's roll angle"),
-    "roll_camber_rear": Quantity("1", "Inclination of the rear wheels over the body's roll angle"),
+    "roll_camber_front": Quantity(
+        "1", "Roll camber of the front axle: inclination of its wheels over the body's roll angle"
+    ),
+    "roll_camber_rear": Quantity(
+        "1", "Roll camber of the rear axle: inclination of its wheels over the body's roll angle"
+    ),
     "steering_ratio": Quantity("1", "Hand-wheel angle over road-wheel angle", minimum=0.1),
     "wheel_radius": Quantity("m", "Rolling radius R of the wheels", True, 0.05),
     "wheel_inertia": Quantity("kg.m2", "Inertia J of one wheel", True, 0.01),

@@ -3,8 +3,8 @@
     F_i = s_i M_z / arm_i      s_fl = s_l n_l    s_rl = s_l (1 - n_l)       n front shares per side
                                s_fr = s_r n_r    s_rr = s_r (1 - n_r)       s_l + s_r = 1
 
-so sum(F_i arm_i) = M_z; see `control_laws.moment_sharing` for arms near zero. The driver's force comes on
-top, equal left and right as from one pedal, in fixed parts front and rear.
+so sum(F_i arm_i) = M_z; see `control_laws.moment_sharing` for arms near zero, `control_laws.allocator` for
+the driver's force.
 
 Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
 FNN, section 3.3: "equal distribution", s_i = 1/4. Ours differs: the shares are parameters.
@@ -14,11 +14,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from vocabulary.wheels import Four
+
 from ..cars.published_cars import PaperA
-from ..cars.wheel_kinematics import lever_arms
-from ..control_laws.moment_sharing import add_drive_force, share_moment
-from ..fmi.component import Component
-from ..fmi.variables import like, output, parameter, signal
+from ..control_laws.allocator import Allocator, DriveParameters
+from ..control_laws.moment_sharing import share_moment
+from ..fmi.variables import like, parameter
 
 
 @dataclass(frozen=True)
@@ -36,20 +37,16 @@ class FixedShareParameters:
     front_share_right: float = parameter(
         0.5, "1", "Share n_r of the right side's moment in front", "paper A: half", minimum=0.0, maximum=1.0
     )
-    drive_front_share: float = parameter(
-        0.5, "1", "Share of the driver's force in front", "chosen: equal motors", minimum=0.0, maximum=1.0
-    )
+    drive_front_share: float = like(DriveParameters, "drive_front_share")
 
 
-class FixedShare(Component):
+class FixedShare(Allocator):
     """Yaw moment shared among the wheels in fixed parts, by default a quarter each."""
 
     Parameters = FixedShareParameters
-    inputs = ("yaw_moment", signal("drive_force", optional=True), "steer_angle")
-    outputs = (output("force_request_*", "yaw_moment", "drive_force", "steer_angle"),)
-    sampled = True
 
     def configure(self) -> None:
+        super().configure()
         p = self.p
         left, right = p.left_share, 1.0 - p.left_share
         self.shares = (
@@ -59,10 +56,5 @@ class FixedShare(Component):
             right * (1.0 - p.front_share_right),
         )
 
-    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
-        p = self.p
-        moment, drive, delta = u
-        half_track = 0.5 * p.track_width
-        arms = lever_arms(delta, p.cg_to_front_axle, half_track)
-        forces = share_moment(moment, self.shares, arms, 0.25 * half_track)
-        return forces if drive == 0.0 else add_drive_force(forces, drive, p.drive_front_share)
+    def share(self, u: list[float], arms: Four) -> Four:
+        return share_moment(u[0], self.shares, arms, self.least_arm)

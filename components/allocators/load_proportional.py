@@ -3,9 +3,9 @@
     F_i = F_zi / sum(F_z) M_z / arm_i      arm_fl = a sin(delta) - d/2 cos(delta)    arm_rl = -d/2
                                            arm_fr = a sin(delta) + d/2 cos(delta)    arm_rr =  d/2
 
-so sum(F_i arm_i) = M_z; see `control_laws.moment_sharing` for arms near zero. The driver's force comes on
-top, equal left and right as from one pedal, shared between the axles like their loads. A car
-without any load on its wheels asks for no force.
+so sum(F_i arm_i) = M_z; see `control_laws.moment_sharing` for arms near zero. The driver's force
+(`control_laws.allocator`) is shared between the axles like their loads. A car without any load on its wheels
+asks for no force; a negative load counts as none.
 
 `side_forces` offers paper B's two other ways to the same moment: one force per side of the car, split
 between its front and rear wheel in proportion to their loads (`control_laws.side_forces`; paper B, equation
@@ -18,17 +18,16 @@ FNN, equations (36)-(39). Errata: the front-left arm is printed with the wrong s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from vocabulary.wheels import Four, wheels
 
 from ..cars.published_cars import PaperA
 from ..cars.wheel_kinematics import lever_arms
+from ..control_laws.allocator import BASIC, Allocator
 from ..control_laws.moment_sharing import NO_FORCE, add_drive_force, share_moment
 from ..control_laws.side_forces import SIDE_FORCES, load_share, share_sides
-from ..fmi.component import Component
-from ..fmi.variables import like, output, parameter, signal
+from ..fmi.variables import like, output, parameter
 
 
 @dataclass(frozen=True)
@@ -46,66 +45,32 @@ class LoadProportionalParameters:
     )
 
 
-def share_by_load(
-    moment: float,
-    drive: float,
-    *,
-    delta: float,
-    loads: Sequence[float],
-    a: float,
-    half_track: float,
-    side_forces: str = "all_wheels",
-) -> Four:
-    """Return the longitudinal forces [N] of fl, fr, rl, rr; equations (36)-(39).
-
-    Args:
-        moment, drive: yaw moment [N.m] and sum of the driver's forces [N].
-        delta: steer angle [rad].
-        loads: vertical loads of fl, fr, rl, rr [N]; a negative one counts as none.
-        a, half_track: distances of front axle and wheels from the centre of mass [m].
-        side_forces: "all_wheels", or one of `side_forces.SIDE_FORCES`.
-    """
-    f_fl, f_fr, f_rl, f_rr = loads
-    if min(f_fl, f_fr, f_rl, f_rr) < 0.0:
-        f_fl, f_fr, f_rl, f_rr = max(f_fl, 0.0), max(f_fr, 0.0), max(f_rl, 0.0), max(f_rr, 0.0)
-    front = f_fl + f_fr
-    total = front + (f_rl + f_rr)
-    if total <= 0.0:
-        return NO_FORCE
-    arms = lever_arms(delta, a, half_track)
-    least_arm = 0.25 * half_track
-    if side_forces == "all_wheels":
-        forces = share_moment(moment, (f_fl, f_fr, f_rl, f_rr), arms, least_arm)
-    else:
-        forces = share_sides(
-            moment,
-            side_forces,
-            front_left=load_share(f_fl, f_rl),
-            front_right=load_share(f_fr, f_rr),
-            arms=arms,
-            least_arm=least_arm,
-        )
-    return forces if drive == 0.0 else add_drive_force(forces, drive, front / total)
-
-
-class LoadProportional(Component):
+class LoadProportional(Allocator):
     """Yaw moment shared among the wheels in proportion to their vertical loads."""
 
     Parameters = LoadProportionalParameters
-    inputs = ("yaw_moment", signal("drive_force", optional=True), "steer_angle", "vertical_load_*")
-    outputs = (
-        output("force_request_*", "yaw_moment", "drive_force", "steer_angle", *wheels("vertical_load_*")),
-    )
-    sampled = True
+    inputs = (*Allocator.inputs, "vertical_load_*")
+    outputs = (output("force_request_*", *BASIC, *wheels("vertical_load_*")),)
 
-    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
+    def output(self, t: float, u: list[float]) -> Four:
+        moment, drive, delta, f_fl, f_fr, f_rl, f_rr = u
+        if min(f_fl, f_fr, f_rl, f_rr) < 0.0:
+            f_fl, f_fr, f_rl, f_rr = max(f_fl, 0.0), max(f_fr, 0.0), max(f_rl, 0.0), max(f_rr, 0.0)
+        front = f_fl + f_fr
+        total = front + (f_rl + f_rr)
+        if total <= 0.0:
+            return NO_FORCE
         p = self.p
-        return share_by_load(
-            u[0],
-            u[1],
-            delta=u[2],
-            loads=u[3:],
-            a=p.cg_to_front_axle,
-            half_track=0.5 * p.track_width,
-            side_forces=p.side_forces,
-        )
+        arms = lever_arms(delta, p.cg_to_front_axle, self.half_track)
+        if p.side_forces == "all_wheels":
+            forces = share_moment(moment, (f_fl, f_fr, f_rl, f_rr), arms, self.least_arm)
+        else:
+            forces = share_sides(
+                moment,
+                p.side_forces,
+                front_left=load_share(f_fl, f_rl),
+                front_right=load_share(f_fr, f_rr),
+                arms=arms,
+                least_arm=self.least_arm,
+            )
+        return forces if drive == 0.0 else add_drive_force(forces, drive, front / total)

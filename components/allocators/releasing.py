@@ -22,9 +22,9 @@ from vocabulary.wheels import Four
 
 from ..cars.published_cars import PaperC
 from ..cars.wheel_kinematics import lever_arms
+from ..control_laws.allocator import Allocator, DriveParameters
 from ..control_laws.moment_sharing import NO_FORCE, add_drive_force, share_moment
-from ..fmi.component import Component
-from ..fmi.variables import like, output, parameter, signal
+from ..fmi.variables import like, parameter
 
 
 @dataclass(frozen=True)
@@ -41,14 +41,7 @@ class ReleasingParameters:
         minimum=0.0,
         maximum=1.0,
     )
-    drive_front_share: float = parameter(
-        0.67,
-        "1",
-        "Share of the driver's force in front",
-        "chosen: brakes, two to one",
-        minimum=0.0,
-        maximum=1.0,
-    )
+    drive_front_share: float = like(DriveParameters, "drive_front_share", 0.67, "chosen: brakes, two to one")
 
 
 def release_and_brake(
@@ -93,15 +86,12 @@ def release_and_brake(
     return y_fl, y_fr, y_rl, y_rr
 
 
-class Releasing(Component):
+class Releasing(Allocator):
     """Yaw moment by releasing the driver's brakes on one side, then by braking the other."""
 
     Parameters = ReleasingParameters
-    inputs = ("yaw_moment", signal("drive_force", optional=True), "steer_angle")
-    outputs = (output("force_request_*", "yaw_moment", "drive_force", "steer_angle"),)
-    sampled = True
 
-    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
+    def output(self, t: float, u: list[float]) -> Four:
         p = self.p
         moment, drive, delta = u
         return release_and_brake(
@@ -111,5 +101,5 @@ class Releasing(Component):
             front_share=p.drive_front_share,
             limit=p.release_limit,
             a=p.cg_to_front_axle,
-            half_track=0.5 * p.track_width,
+            half_track=self.half_track,
         )

@@ -20,8 +20,6 @@ oversteer, and left and right are alike.
 Dead band with hysteresis: braking begins when |M| and |dr| both exceed their thresholds, and ends when
 one of them falls below `release_share` of its own.
 
-The driver's force comes on top, equal left and right, braked wheel or not.
-
 Source: Nie, Xiong, Pan, Multi-condition co-simulations of vehicle stability control via fuzzy PID
 algorithm, Journal of Dynamics and Control 19(3), 2021, table 3, equations (7)-(9). Erratum: (7)-(9) share
 the moment between two wheels, which would give the single wheel of section 2.3 only half. Ours differs:
@@ -35,10 +33,9 @@ from dataclasses import dataclass
 from vocabulary.wheels import Four
 
 from ..cars.published_cars import PaperC
-from ..cars.wheel_kinematics import lever_arms
-from ..control_laws.moment_sharing import NO_FORCE, add_drive_force, share_moment
-from ..fmi.component import Component
-from ..fmi.variables import like, output, parameter, signal
+from ..control_laws.allocator import BASIC, Allocator, DriveParameters
+from ..control_laws.moment_sharing import NO_FORCE, share_moment
+from ..fmi.variables import like, output, parameter
 
 FL, FR, RL, RR = range(4)
 ONE_WHEEL: tuple[Four, ...] = (
@@ -68,9 +65,7 @@ class SingleWheelParameters:
     release_share: float = parameter(
         0.5, "1", "Part of a threshold below which braking ends", "chosen: half", minimum=0.0, maximum=1.0
     )
-    drive_front_share: float = parameter(
-        0.0, "1", "Share of the driver's force in front", "chosen: rear drive", minimum=0.0, maximum=1.0
-    )
+    drive_front_share: float = like(DriveParameters, "drive_front_share", 0.0, "chosen: rear drive")
 
 
 def chosen_wheel(delta: float, dr: float, *, printed: bool = False) -> int:
@@ -86,18 +81,14 @@ def chosen_wheel(delta: float, dr: float, *, printed: bool = False) -> int:
     return RR if dr > 0.0 else FL
 
 
-def brake_forces(
-    moment: float, wheel: int, *, guarded: bool, delta: float, a: float, half_track: float
-) -> Four:
+def brake_forces(moment: float, wheel: int, *, guarded: bool, arms: Four, least_arm: float) -> Four:
     """Return the longitudinal forces [N] that brake `wheel` for `moment` [N.m].
 
     Args:
         guarded: brake only if that gives a moment of the sign of `moment`.
-        delta: steer angle [rad].
-        a, half_track: distances of front axle and wheels from the centre of mass [m].
+        arms, least_arm: as of `share_moment` [m].
     """
-    arms = lever_arms(delta, a, half_track)
-    forces = share_moment(moment, ONE_WHEEL[wheel], arms, 0.25 * half_track)
+    forces = share_moment(moment, ONE_WHEEL[wheel], arms, least_arm)
     if forces[wheel] <= 0.0:
         return forces
     if guarded:
@@ -106,15 +97,12 @@ def brake_forces(
     return -fl, -fr, -rl, -rr
 
 
-class SingleWheel(Component):
+class SingleWheel(Allocator):
     """Yaw moment by braking one wheel, chosen by steer angle and yaw-rate error."""
 
     Parameters = SingleWheelParameters
-    sampled = True
-    inputs = ("yaw_moment", signal("drive_force", optional=True), "steer_angle", "yaw_rate", "yaw_rate_ref")
-    outputs = (
-        output("force_request_*", "yaw_moment", "drive_force", "steer_angle", "yaw_rate", "yaw_rate_ref"),
-    )
+    inputs = (*Allocator.inputs, "yaw_rate", "yaw_rate_ref")
+    outputs = (output("force_request_*", *BASIC, "yaw_rate", "yaw_rate_ref"),)
 
     def start(self, t: float, u: list[float]) -> None:
         self.braking = False
@@ -123,22 +111,14 @@ class SingleWheel(Component):
     def advance(self, t: float, h: float, u: list[float]) -> None:
         self._decide(u)
 
-    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
-        p = self.p
-        moment, drive, delta, r, r_ref = u
-        forces = NO_FORCE
-        if self.braking:
-            choice = -moment if p.wheel_choice == "moment" else r - r_ref
-            printed = p.wheel_choice == "printed"
-            forces = brake_forces(
-                moment,
-                chosen_wheel(delta, choice, printed=printed),
-                guarded=not printed,
-                delta=delta,
-                a=p.cg_to_front_axle,
-                half_track=0.5 * p.track_width,
-            )
-        return forces if drive == 0.0 else add_drive_force(forces, drive, p.drive_front_share)
+    def share(self, u: list[float], arms: Four) -> Four:
+        if not self.braking:
+            return NO_FORCE
+        moment, _, delta, r, r_ref = u
+        choice = self.p.wheel_choice
+        printed = choice == "printed"
+        wheel = chosen_wheel(delta, -moment if choice == "moment" else r - r_ref, printed=printed)
+        return brake_forces(moment, wheel, guarded=not printed, arms=arms, least_arm=self.least_arm)
 
     def _decide(self, u: list[float]) -> None:
         p = self.p

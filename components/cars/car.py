@@ -7,14 +7,12 @@ A plant adds its body in four methods, called in this order:
     wheel_velocities()          of the wheels at the present motion and steer angle
     finish(carried)             `self.end` (a_x, a_y) and `self.loads` at the present time
 
-`rest` and `move` also set `self.pull`, what road and wind do to all parts of the car alike
-(`cars.road_plane`); what is carried is of the tyres alone.
+and, if its body has outputs of its own, in `output`. `self.pull` is what road and wind do to all parts of the
+car alike (`cars.road_plane`); what is carried is of the tyres alone.
 
-and, if its body has outputs of its own, in `output`.
-
-`signals` are the inputs, one item each: steer angle, tyre forces x and y, then the plant's own; forces are
-those at the middle of the step. What `rest` and `move` return belongs to that middle; it is carried to
-the step's end (`mathematics.carry`) and handed to `finish`.
+`signals` are the inputs, one item each: steer angle, tyre forces x and y, the plant's own, those of road and
+wind; forces are those at the middle of the step. What `rest` and `move` return belongs to that middle; it is
+carried to the step's end (`mathematics.carry`) and handed to `finish`.
 
     beta = atan2(v_y, v_x)        dbeta/dt = (v_x a_y - v_y a_x) / (v_x^2 + v_y^2) - r
 
@@ -35,7 +33,7 @@ from ..fmi.variables import output, parameter, signal
 from ..mathematics.carry import Carried, Values
 from .plane_body import Motion
 from .road_plane import INPUTS as ROAD_PLANE
-from .road_plane import LEVEL, Pull
+from .road_plane import Pull, pull_of
 from .wheel_kinematics import Eight, slip_angle, slip_ratio, wheel_velocities
 from .wheel_spin import spin
 
@@ -82,6 +80,19 @@ class StartParameters:
     )
 
 
+@dataclass(frozen=True)
+class DrivenCarParameters:
+    """What a car whose wheels are driven and braked needs beside that."""
+
+    slip_stiffness_per_load: float = parameter(
+        22.0,
+        "1",
+        "Slip stiffness over load for slow wheels, see cars.wheel_spin",
+        "chosen: tyre set 1",
+        minimum=0.0,
+    )
+
+
 class Car(Component):
     """Base: a car on four wheels that roll freely."""
 
@@ -90,7 +101,7 @@ class Car(Component):
     wheels: Eight
     end: tuple[float, float]
     loads: Four
-    pull: Pull = LEVEL
+    pull: Pull
 
     # ---- for the plant ----------------------------------------------------------------------
 
@@ -114,17 +125,8 @@ class Car(Component):
 
     def wheel_velocities(self) -> Eight:
         """Return the velocities [m/s] of the wheels in wheel axes: four longitudinal, four lateral."""
-        p = self.p
         v_x, v_y, r = self.motion[:3]
-        return wheel_velocities(
-            v_x,
-            v_y,
-            r=r,
-            delta=self.steer_angle,
-            a=p.cg_to_front_axle,
-            b=p.cg_to_rear_axle,
-            half_track=0.5 * p.track_width,
-        )
+        return wheel_velocities(v_x, v_y, r=r, delta=self.steer_angle, p=self.p)
 
     # ---- what all plants do -----------------------------------------------------------------
 
@@ -135,6 +137,7 @@ class Car(Component):
         v_y = p.initial_speed * sin(p.initial_sideslip)
         self.motion = v_x, v_y, p.initial_yaw_rate, 0.0, 0.0, 0.0
         self.steer_angle = signals[0]
+        self.pull = pull_of(u[-4:], p.mass)
         carried = self.rest(signals)
         self.carried = Carried(carried)
         self.wheels = self.wheel_velocities()
@@ -148,6 +151,7 @@ class Car(Component):
         if h <= 0.0:  # nothing moves
             self.wheels = self.wheel_velocities()
             return
+        self.pull = pull_of(u[-4:], self.p.mass)
         carried = self.move(h, 0.5 * (before + delta), signals)
         v, loads = self.wheels, self.loads
         self.wheels = self.wheel_velocities()

@@ -66,7 +66,7 @@ def contact(
 
 
 def contact_velocities(
-    v_x: float, v_y: float, r: float, y: Sequence[float], *, delta: float, ride: Ride, a: float, b: float
+    v_x: float, v_y: float, r: float, y: Sequence[float], *, delta: float, ride: Ride, p: Geometry
 ) -> Eight:
     """Return the velocities [m/s] of the contact points in wheel axes: four longitudinal, four lateral ones.
 
@@ -74,7 +74,7 @@ def contact_velocities(
         v_x, v_y, r: of the centre of mass, vehicle axes [m/s], [rad/s].
         y: coordinates and their rates.
         delta: steer angle of both front wheels [rad].
-        a, b: distances of the axles from the car's centre of mass [m].
+        p: geometry of the car.
     """
     z, phi, theta, u_fl, u_fr, u_rl, u_rr, dz, dphi, dtheta, du_fl, du_fr, du_rl, du_rr = y
     t, h, p_f, p_r = ride.half_track, ride.h, ride.p_f, ride.p_r
@@ -95,10 +95,10 @@ def contact_velocities(
     sway = v_y + h * dphi
     x_fl = ahead - r * (y_fl + shift)
     x_fr = ahead + r * (y_fr - shift)
-    along = sway + r * (a - pitched)
+    along = sway + r * (p.cg_to_front_axle - pitched)
     w_fl = along + p_f * (du_fl - front - side)
     w_fr = along - p_f * (du_fr - front + side)
-    along = sway - r * (b + pitched)
+    along = sway - r * (p.cg_to_rear_axle + pitched)
     c = cos(delta)
     s = sin(delta)
     return (

@@ -13,33 +13,20 @@ weight from axle to axle, about a thousandth.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
-from ..fmi.variables import parameter
+from ..fmi.variables import of_car
 
 
 @dataclass(frozen=True)
 class ResistanceParameters:
     """Those of paper B, table 1."""
 
-    drag_coefficient: float = parameter(0.3, "1", "Drag coefficient C_D", "paper B, table 1", minimum=0.0)
-    frontal_area: float = parameter(1.8, "m2", "Frontal area A", "paper B, table 1", minimum=0.0)
-    air_density: float = parameter(
-        1.2258, "kg/m3", "Air density rho", "paper B: what its 1 / 21.15 stands for", minimum=0.0
-    )
-    rolling_resistance: float = parameter(0.008, "1", "Rolling resistance f", "paper B, table 1", minimum=0.0)
+    drag_coefficient: float = of_car(0.3, "paper B, table 1")
+    frontal_area: float = of_car(1.8, "paper B, table 1")
+    air_density: float = of_car(1.2258, "paper B: what its 1 / 21.15 stands for")
+    rolling_resistance: float = of_car(0.008, "paper B, table 1")
 
 
-class Drag(NamedTuple):
-    """The drag of one car."""
-
-    per_speed_squared: float  # [kg/m]
-
-    @classmethod
-    def of(cls, p: Any) -> Drag:
-        """Return that of a car with `ResistanceParameters`."""
-        return cls(0.5 * p.air_density * p.drag_coefficient * p.frontal_area)
-
-    def force(self, v_x: float) -> float:
-        """Return the resisting force [N] along x at the speed `v_x` [m/s]; it has the sign of v_x."""
-        return self.per_speed_squared * v_x * abs(v_x)
+def drag_of(p: ResistanceParameters) -> float:
+    """Return the drag of a car over v_x |v_x| [kg/m]."""
+    return 0.5 * p.air_density * p.drag_coefficient * p.frontal_area

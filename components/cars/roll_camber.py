@@ -18,29 +18,17 @@ from dataclasses import dataclass
 
 from vocabulary.wheels import Four
 
-from ..fmi.variables import parameter
+from ..fmi.variables import of_car
+
+_TAKEN_BACK = "chosen: independent suspension that takes back three tenths of the roll"
 
 
 @dataclass(frozen=True)
 class RollCamberParameters:
     """Roll camber of both axles."""
 
-    roll_camber_front: float = parameter(
-        0.7,
-        "1",
-        "Roll camber of the front axle: inclination of its wheels over the body's roll angle",
-        "chosen: independent suspension that takes back three tenths of the roll",
-        minimum=-2.0,
-        maximum=2.0,
-    )
-    roll_camber_rear: float = parameter(
-        0.7,
-        "1",
-        "Roll camber of the rear axle: inclination of its wheels over the body's roll angle",
-        "chosen: independent suspension that takes back three tenths of the roll",
-        minimum=-2.0,
-        maximum=2.0,
-    )
+    roll_camber_front: float = of_car(0.7, _TAKEN_BACK, minimum=-2.0, maximum=2.0)
+    roll_camber_rear: float = of_car(0.7, _TAKEN_BACK, minimum=-2.0, maximum=2.0)
 
 
 def inclinations(phi: float, p: RollCamberParameters) -> Four:

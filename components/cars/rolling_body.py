@@ -11,10 +11,10 @@ from math import sin
 from vocabulary.gravity import G
 from vocabulary.wheels import Four
 
-from ..fmi.variables import parameter
-from .car import StartParameters
+from ..fmi.variables import like, of_car, parameter
+from .car import DrivenCarParameters, StartParameters
 from .published_cars import PaperB
-from .resistance import Drag, ResistanceParameters
+from .resistance import ResistanceParameters, drag_of
 from .road_plane import LEVEL, Pull
 from .roll_camber import RollCamberParameters
 
@@ -23,38 +23,21 @@ from .roll_camber import RollCamberParameters
 class RollingCarParameters(StartParameters, RollCamberParameters, ResistanceParameters, PaperB):
     """The car of paper B, table 1."""
 
-    sprung_mass: float = parameter(1110.0, "kg", "Sprung mass m_s", "paper B, table 1", minimum=0.0)
-    roll_inertia: float = parameter(
-        440.6, "kg.m2", "Roll inertia I_x about the roll axis", "paper B, table 1", minimum=1.0
+    sprung_mass: float = of_car(1110.0, "paper B, table 1", text="Sprung mass m_s")
+    roll_inertia: float = of_car(440.6, "paper B, table 1", text="Roll inertia I_x about the roll axis")
+    roll_arm: float = of_car(0.4, "paper B, table 1")
+    roll_stiffness: float = of_car(56000.0, "erratum: paper B, table 1, prints 5600", text="Roll stiffness K")
+    roll_damping: float = of_car(2600.0, "paper B, table 1", text="Roll damping C")
+    front_roll_share: float = of_car(
+        0.55, "chosen: mild understeer", text="Front part of roll stiffness and damping", maximum=1.0
     )
-    roll_arm: float = parameter(
-        0.4, "m", "Height h_s of the sprung mass above the roll axis", "paper B, table 1", minimum=0.0
-    )
-    roll_stiffness: float = parameter(
-        56000.0, "N.m/rad", "Roll stiffness K", "erratum: paper B, table 1, prints 5600", minimum=0.0
-    )
-    roll_damping: float = parameter(2600.0, "N.m.s/rad", "Roll damping C", "paper B, table 1", minimum=0.0)
-    front_roll_share: float = parameter(
-        0.55,
-        "1",
-        "Front part of roll stiffness and damping",
-        "chosen: mild understeer",
-        minimum=0.0,
-        maximum=1.0,
-    )
-    roll_centre_height_front: float = parameter(0.14, "m", "Front roll centre h_f", "chosen: h - h_s")
-    roll_centre_height_rear: float = parameter(0.14, "m", "Rear roll centre h_r", "chosen: h - h_s")
+    roll_centre_height_front: float = of_car(0.14, "chosen: h - h_s", text="Front roll centre h_f")
+    roll_centre_height_rear: float = of_car(0.14, "chosen: h - h_s", text="Rear roll centre h_r")
     rotating_mass_excess: float = parameter(
         0.0, "1", "Part xi of m that is added to resist dv_x", "chosen: none, see the erratum", minimum=0.0
     )
     initial_speed: float = parameter(27.7777778, "m/s", "Speed at the start", "paper B: 100 km/h")
-    slip_stiffness_per_load: float = parameter(
-        22.0,
-        "1",
-        "Slip stiffness over load for slow wheels, see cars.wheel_spin",
-        "chosen: tyre set 1",
-        minimum=0.0,
-    )
+    slip_stiffness_per_load: float = like(DrivenCarParameters, "slip_stiffness_per_load")
 
 
 class RollingBody:
@@ -66,7 +49,7 @@ class RollingBody:
 
     def __init__(self, p: RollingCarParameters) -> None:
         self.p = p
-        self.drag = Drag.of(p)
+        self.drag = drag_of(p)
         self.coupling = coupling = p.sprung_mass * p.roll_arm  # m_s h_s [kg.m]
         if p.roll_stiffness <= coupling * G:
             raise ValueError(
@@ -115,7 +98,7 @@ class RollingBody:
         self, x: float, *, pull: Pull, v_x: float, v_y: float, r: float, phi: float, dphi: float, dr: float
     ) -> float:
         """Return a_x [m/s2], equation (2), from the resultant `x` [N] and the motion."""
-        force = x - self.drag.force(v_x) - self.coupling * (2.0 * r * dphi + phi * dr)
+        force = x - self.drag * v_x * abs(v_x) - self.coupling * (2.0 * r * dphi + phi * dr)
         xi = self.p.rotating_mass_excess
         return (force / self.p.mass + pull.x - xi * v_y * r) / (1.0 + xi)
 

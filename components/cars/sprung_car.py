@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from vocabulary.gravity import G
 
-from ..fmi.variables import parameter
-from .car import StartParameters
-from .published_cars import PaperC
+from ..fmi.variables import like, of_car, parameter
+from .car import DrivenCarParameters, StartParameters
+from .published_cars import PaperA, PaperC
 from .resistance import ResistanceParameters
 from .ride import Ride
 from .roll_camber import RollCamberParameters
@@ -18,88 +18,32 @@ from .roll_camber import RollCamberParameters
 class FourteenDofParameters(StartParameters, RollCamberParameters, ResistanceParameters, PaperC):
     """A large saloon: paper C, table 1, where it says anything."""
 
-    sprung_mass: float = parameter(1650.0, "kg", "Sprung mass m_s", "paper C, table 1", minimum=1.0)
-    front_unsprung_share: float = parameter(
-        0.5, "1", "Front part of the unsprung mass", "chosen: equal wheels", minimum=0.01, maximum=0.99
-    )
-    yaw_inertia: float = parameter(3234.0, "kg.m2", "Yaw inertia I_z", "paper C, table 1", minimum=1.0)
-    sprung_roll_inertia: float = parameter(
-        928.0,
-        "kg.m2",
-        "Roll inertia of the sprung mass about its own centre",
-        "chosen: a large saloon",
-        minimum=1.0,
-    )
-    sprung_pitch_inertia: float = parameter(
-        2790.0,
-        "kg.m2",
-        "Pitch inertia of the sprung mass about its own centre",
-        "chosen: a large saloon",
-        minimum=1.0,
-    )
-    sprung_roll_yaw_product: float = parameter(
-        0.0,
-        "kg.m2",
-        "Product of inertia I_xz of the sprung mass about its own centre, positive where its front is"
-        " heavy on top",
-        "chosen: principal axes along the car",
-    )
-    cg_height: float = parameter(
-        0.5093, "m", "Height h of the centre of mass", "chosen: that of the sprung mass 0.53", minimum=0.0
-    )
-    unsprung_height: float = parameter(
-        0.32, "m", "Height of the wheels' centres", "chosen: tyre of 0.34, loaded", minimum=0.0
-    )
-    spring_stiffness_front: float = parameter(
-        34000.0, "N/m", "Front spring, at the wheel", "chosen: body modes at 1.3 to 1.7 Hz", minimum=0.0
-    )
-    spring_stiffness_rear: float = parameter(
-        32000.0, "N/m", "Rear spring, at the wheel", "chosen: body modes at 1.3 to 1.7 Hz", minimum=0.0
-    )
-    damping_front: float = parameter(
-        3000.0, "N.s/m", "Front damper, at the wheel", "chosen: 0.3 to 0.4 of critical", minimum=0.0
-    )
-    damping_rear: float = parameter(
-        2800.0, "N.s/m", "Rear damper, at the wheel", "chosen: 0.3 to 0.4 of critical", minimum=0.0
-    )
-    anti_roll_stiffness_front: float = parameter(
-        14000.0,
-        "N/m",
-        "Front anti-roll bar, force at each wheel per difference of travel, negative for a bar that "
-        "stiffens heave",
-        "chosen: 4.5 deg/g",
-    )
-    anti_roll_stiffness_rear: float = parameter(
-        6000.0,
-        "N/m",
-        "Rear anti-roll bar, force at each wheel per difference of travel, negative for a bar that "
-        "stiffens heave",
-        "chosen: 4.5 deg/g",
-    )
-    roll_centre_height_front: float = parameter(0.06, "m", "Front roll centre", "chosen: a strut axle")
-    roll_centre_height_rear: float = parameter(0.11, "m", "Rear roll centre", "chosen: a multi-link axle")
-    tyre_vertical_stiffness: float = parameter(
-        230000.0, "N/m", "Tyre spring k_t", "chosen: a passenger car's, wheel hop at 12 Hz", minimum=1.0
-    )
-    wheel_inertia: float = parameter(
-        1.5, "kg.m2", "Inertia J of one wheel", "chosen: a passenger car's", minimum=0.01
-    )
-    drag_coefficient: float = parameter(0.3, "1", "Drag coefficient C_D", "chosen: a saloon's", minimum=0.0)
-    frontal_area: float = parameter(2.2, "m2", "Frontal area A", "chosen: a saloon's", minimum=0.0)
-    rolling_resistance: float = parameter(
-        0.012, "1", "Rolling resistance f", "chosen: a passenger car tyre's", minimum=0.0
-    )
+    sprung_mass: float = of_car(1650.0, "paper C, table 1", text="Sprung mass m_s", minimum=1.0)
+    front_unsprung_share: float = of_car(0.5, "chosen: equal wheels", minimum=0.01, maximum=0.99)
+    yaw_inertia: float = like(PaperA, "yaw_inertia", 3234.0, "paper C, table 1")
+    sprung_roll_inertia: float = of_car(928.0, "chosen: a large saloon")
+    sprung_pitch_inertia: float = of_car(2790.0, "chosen: a large saloon")
+    sprung_roll_yaw_product: float = of_car(0.0, "chosen: principal axes along the car")
+    cg_height: float = of_car(0.5093, "chosen: that of the sprung mass 0.53")
+    unsprung_height: float = of_car(0.32, "chosen: tyre of 0.34, loaded")
+    spring_stiffness_front: float = of_car(34000.0, "chosen: body modes at 1.3 to 1.7 Hz")
+    spring_stiffness_rear: float = of_car(32000.0, "chosen: body modes at 1.3 to 1.7 Hz")
+    damping_front: float = of_car(3000.0, "chosen: 0.3 to 0.4 of critical")
+    damping_rear: float = of_car(2800.0, "chosen: 0.3 to 0.4 of critical")
+    anti_roll_stiffness_front: float = of_car(14000.0, "chosen: 4.5 deg/g")
+    anti_roll_stiffness_rear: float = of_car(6000.0, "chosen: 4.5 deg/g")
+    roll_centre_height_front: float = of_car(0.06, "chosen: a strut axle")
+    roll_centre_height_rear: float = of_car(0.11, "chosen: a multi-link axle")
+    tyre_vertical_stiffness: float = of_car(230000.0, "chosen: a passenger car's, wheel hop at 12 Hz")
+    wheel_inertia: float = of_car(1.5, "chosen: a passenger car's")
+    drag_coefficient: float = of_car(0.3, "chosen: a saloon's")
+    frontal_area: float = of_car(2.2, "chosen: a saloon's")
+    rolling_resistance: float = of_car(0.012, "chosen: a passenger car tyre's")
     initial_speed: float = parameter(25.0, "m/s", "Speed at the start", "paper C: 90 km/h")
     initial_heave: float = parameter(
         0.0, "m", "Height of body and wheels above rest at the start", "chosen: on the road"
     )
-    slip_stiffness_per_load: float = parameter(
-        22.0,
-        "1",
-        "Slip stiffness over load for slow wheels, see cars.wheel_spin",
-        "chosen: tyre set 1",
-        minimum=0.0,
-    )
+    slip_stiffness_per_load: float = like(DrivenCarParameters, "slip_stiffness_per_load")
 
 
 def ride_of(p: FourteenDofParameters) -> Ride:

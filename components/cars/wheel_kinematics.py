@@ -20,28 +20,28 @@ from math import atan2, cos, sin, sqrt
 
 from vocabulary.wheels import Four
 
+from .plane_body import Geometry
+
 Eight = tuple[float, float, float, float, float, float, float, float]
 
 
-def wheel_velocities(
-    v_x: float, v_y: float, *, r: float, delta: float, a: float, b: float, half_track: float
-) -> Eight:
+def wheel_velocities(v_x: float, v_y: float, *, r: float, delta: float, p: Geometry) -> Eight:
     """Return the velocities [m/s] of the wheel centres in wheel axes, front axle steered.
 
     Args:
         v_x, v_y: velocity of the centre of mass, vehicle axes [m/s].
         r: yaw rate [rad/s].
         delta: steer angle of both front wheels [rad].
-        a, b, half_track: distances of the axles and of the wheels from the centre of mass [m].
+        p: geometry of the car.
 
     Returns:
         Four longitudinal velocities (fl, fr, rl, rr), then four lateral ones.
     """
-    across = r * half_track
+    across = r * (0.5 * p.track_width)
     left = v_x - across
     right = v_x + across
-    front = v_y + a * r
-    rear = v_y - b * r
+    front = v_y + p.cg_to_front_axle * r
+    rear = v_y - p.cg_to_rear_axle * r
     c = cos(delta)
     s = sin(delta)
     inward = front * s

@@ -114,15 +114,7 @@ class Estimator(Component):
         v_x = max(self.speed.v + p.signal_delay * ahead, 0.0)
         v_y = self.v_y + p.signal_delay * rate
         square = max(v_x * v_x + v_y * v_y, LOW_SPEED * LOW_SPEED)
-        velocities = wheel_velocities(
-            v_x,
-            v_y,
-            r=r,
-            delta=delta,
-            a=p.cg_to_front_axle,
-            b=p.cg_to_rear_axle,
-            half_track=0.5 * p.track_width,
-        )
+        velocities = wheel_velocities(v_x, v_y, r=r, delta=delta, p=p)
         along, across = velocities[:4], velocities[4:]
         self.known = [
             v_x,

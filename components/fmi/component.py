@@ -48,7 +48,6 @@ from . import model_description
 from .roles import ROLES
 from .variables import (
     NoParameters,
-    Signal,
     Variable,
     check_parameter,
     input_variables,
@@ -65,7 +64,7 @@ _CATEGORY = {
 }
 
 
-def _picker(inputs: Sequence[str | Signal]) -> Callable[[list[float]], tuple[Any, ...]]:
+def _picker(inputs: Sequence[str | Variable]) -> Callable[[list[float]], tuple[Any, ...]]:
     """Return what makes one item per declared signal of a list of all inputs."""
     places: list[int | slice] = []
     end = 0
@@ -82,8 +81,8 @@ class Component(Fmi2Slave):
     """A unit of the test bench. The first line of a subclass's docstring describes its FMU."""
 
     Parameters: ClassVar[type] = NoParameters
-    inputs: ClassVar[tuple[str | Signal, ...]] = ()
-    outputs: ClassVar[tuple[str | Signal, ...]] = ()
+    inputs: ClassVar[tuple[str | Variable, ...]] = ()
+    outputs: ClassVar[tuple[str | Variable, ...]] = ()
     sampled: ClassVar[bool] = False
     """True for a unit that samples (controller, allocator): its outputs are discrete."""
 

@@ -7,13 +7,13 @@ which inputs they depend directly at the same instant. `*` in a name stands for 
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from vocabulary.signals import SIGNALS
 from vocabulary.units import UNITS
+from vocabulary.vehicle import CAR
 from vocabulary.wheels import WHEEL_NAMES, WHEELS, wheels
 
 _FMI_TYPES = {"float": "Real", "int": "Integer", "bool": "Boolean", "str": "String"}
@@ -25,14 +25,14 @@ class DeclarationError(TypeError):
 
 @dataclass(frozen=True)
 class Variable:
-    """One scalar variable of an FMU, ready for the model description."""
+    """A variable of an FMU, ready for the model description once `*` in its name is expanded."""
 
     name: str
-    causality: str  # "input", "output" or "parameter"
-    type: str  # "Real", "Integer", "Boolean" or "String"
     unit: str | None
     description: str
-    variability: str
+    causality: str = ""  # "input", "output" or "parameter"
+    type: str = "Real"  # or "Integer", "Boolean" or "String"
+    variability: str = "continuous"
     start: Any = None
     minimum: float | None = None
     maximum: float | None = None
@@ -40,20 +40,6 @@ class Variable:
     depends_on: tuple[str, ...] = ()
     optional: bool = False
     source: str = ""
-
-
-@dataclass(frozen=True)
-class Signal:
-    """A declared input or output before `*` is expanded."""
-
-    name: str
-    unit: str
-    description: str
-    start: float = 0.0
-    minimum: float | None = None
-    maximum: float | None = None
-    depends_on: tuple[str, ...] = ()
-    optional: bool = False
 
 
 def signal(
@@ -66,7 +52,7 @@ def signal(
     maximum: float | None = None,
     depends_on: Iterable[str] = (),
     optional: bool = False,
-) -> Signal:
+) -> Variable:
     """Declare an input or output, from the signal dictionary unless unit and text are given.
 
         >>> signal("roll_angle", optional=True).unit
@@ -109,10 +95,19 @@ def signal(
     text = description or known.text  # type: ignore[union-attr]
     if minimum is None and known is not None:
         minimum = known.minimum
-    return Signal(name, unit, text, start, minimum, maximum, tuple(depends_on), optional)
+    return Variable(
+        name,
+        unit,
+        text,
+        start=float(start),
+        minimum=minimum,
+        maximum=maximum,
+        depends_on=tuple(depends_on),
+        optional=optional,
+    )
 
 
-def output(name: str, *depends_on: str, unit: str | None = None, text: str | None = None) -> Signal:
+def output(name: str, *depends_on: str, unit: str | None = None, text: str | None = None) -> Variable:
     """Declare an output and the inputs on which it depends directly (see `signal`).
 
     >>> output("yaw_moment", "yaw_rate_ref", "yaw_rate").depends_on
@@ -143,25 +138,55 @@ def parameter(
     `source` says where the default comes from, and its first word of what kind that is: "paper A, table 1",
     "chosen: why", "erratum: what is printed", or anything else for other literature.
     """
-    options = None if choices is None else tuple(choices)
-    metadata = {
-        "type": _FMI_TYPES[type(default).__name__],
-        "unit": unit,
-        "description": description,
-        "minimum": minimum,
-        "maximum": maximum,
-        "choices": options,
-        "source": source,
-    }
-    return field(default=default, metadata=metadata)
+    declared = Variable(
+        "",
+        unit,
+        description,
+        causality="parameter",
+        type=_FMI_TYPES[type(default).__name__],
+        variability="fixed",
+        start=default,
+        minimum=minimum,
+        maximum=maximum,
+        choices=None if choices is None else tuple(choices),
+        source=source,
+    )
+    return field(default=default, metadata={"declared": declared})
 
 
-def like(parameters: type, name: str, default: float | int | bool | str | None = None) -> Any:
+def of_car(
+    default: float,
+    source: str,
+    *,
+    text: str = "",
+    minimum: float | None = None,
+    maximum: float | None = None,
+) -> Any:
+    """Declare a parameter whose name, unit, meaning and least value stand in `vocabulary.vehicle`.
+
+        >>> @dataclass(frozen=True)
+        ... class Parameters:
+        ...     frontal_area: float = of_car(1.8, "paper B, table 1")
+        >>> parameter_variables(Parameters)[0].unit
+        'm2'
+
+    Args:
+        default, source: as of `parameter`.
+        text: what this unit says in place of the dictionary's meaning.
+        minimum: in place of the dictionary's.
+        maximum: largest value.
+    """
+    return parameter(default, None, text, source, minimum=minimum, maximum=maximum)
+
+
+def like(
+    parameters: type, name: str, default: float | int | bool | str | None = None, source: str = ""
+) -> Any:
     """Declare anew a field that a dataclass of parameters has, with another default value if given."""
-    (original,) = (f for f in dataclasses.fields(parameters) if f.name == name)
-    if default is None or default == original.default:
-        return field(default=original.default, metadata=original.metadata)
-    return field(default=default, metadata={**original.metadata, "source": "chosen: for this FMU"})
+    (declared,) = (one for one in parameter_variables(parameters) if one.name == name)
+    if default is not None and (source or default != declared.start):
+        declared = replace(declared, start=default, source=source or "chosen: for this FMU")
+    return field(default=declared.start, metadata={"declared": declared})
 
 
 @dataclass(frozen=True)
@@ -176,29 +201,21 @@ def parameter_variables(parameters: type) -> list[Variable]:
         DeclarationError: a field not made by `parameter`, or an unknown unit.
     """
     variables = []
-    for f in dataclasses.fields(parameters):
-        m = f.metadata
-        if "type" not in m:
+    for f in fields(parameters):
+        declared = f.metadata.get("declared")
+        if declared is None:
             raise DeclarationError(f"{parameters.__name__}.{f.name} is not made by parameter(...)")
-        if m["type"] == "Real" and m["unit"] not in UNITS:
+        variable = replace(declared, name=f.name)
+        if variable.type == "Real" and variable.unit is None and f.name in CAR:
+            known = CAR[f.name]
+            least = known.minimum if variable.minimum is None else variable.minimum
+            text = variable.description or known.text
+            variable = replace(variable, unit=known.unit, description=text, minimum=least)
+        if variable.type == "Real" and variable.unit not in UNITS:
             raise DeclarationError(
-                f"{parameters.__name__}.{f.name}: unknown unit {m['unit']!r}; known: {', '.join(UNITS)}"
+                f"{parameters.__name__}.{f.name}: unknown unit {variable.unit!r}; known: {', '.join(UNITS)}"
             )
-        variables.append(
-            Variable(
-                f.name,
-                "parameter",
-                m["type"],
-                m["unit"],
-                m["description"],
-                "fixed",
-                f.default,
-                m["minimum"],
-                m["maximum"],
-                m["choices"],
-                source=m["source"],
-            )
-        )
+        variables.append(variable)
     return variables
 
 
@@ -214,23 +231,20 @@ def check_parameter(variable: Variable, value: Any) -> None:
         raise ValueError(f"{variable.name} must be at most {variable.maximum:g} (got {value!r})")
 
 
-def input_variables(declared: Iterable[str | Signal]) -> list[Variable]:
+def input_variables(declared: Iterable[str | Variable]) -> list[Variable]:
     """Return the scalar inputs of a declaration, `*` expanded, in order."""
     variables = []
     for item in declared:
         s = signal(item) if isinstance(item, str) else item
         variables += [
-            Variable(
-                name, "input", "Real", s.unit, _on_wheel(s, name), "continuous",
-                float(s.start), s.minimum, s.maximum, optional=s.optional,
-            )
+            replace(s, name=name, description=_on_wheel(s, name), causality="input")
             for name in wheels(s.name)
-        ]  # fmt: skip
+        ]
     return variables
 
 
 def output_variables(
-    declared: Iterable[str | Signal], inputs: Iterable[str], *, discrete: bool
+    declared: Iterable[str | Variable], inputs: Iterable[str], *, discrete: bool
 ) -> list[Variable]:
     """Return the scalar outputs of a declaration with their direct dependencies, in order.
 
@@ -238,7 +252,6 @@ def output_variables(
         DeclarationError: an output depends on something that is no input.
     """
     names = list(inputs)
-    variability = "discrete" if discrete else "continuous"
     variables = []
     for item in declared:
         s = signal(item) if isinstance(item, str) else item
@@ -251,17 +264,20 @@ def output_variables(
             unknown = [source for source in sources if source not in names]
             if unknown:
                 raise DeclarationError(f"output {name} depends on {unknown[0]!r}, which is no input")
-            ordered = tuple(n for n in names if n in sources)
-            variables.append(
-                Variable(
-                    name, "output", "Real", s.unit, _on_wheel(s, name), variability,
-                    None, s.minimum, s.maximum, None, ordered,
-                )
-            )  # fmt: skip
+            variable = replace(
+                s,
+                name=name,
+                description=_on_wheel(s, name),
+                causality="output",
+                variability="discrete" if discrete else "continuous",
+                start=None,
+                depends_on=tuple(n for n in names if n in sources),
+            )
+            variables.append(variable)
     return variables
 
 
-def _on_wheel(s: Signal, name: str) -> str:
+def _on_wheel(s: Variable, name: str) -> str:
     """Return the description of one scalar, naming the wheel where there is one."""
     of_wheel = name.removesuffix("_true")
     wheel = WHEEL_NAMES.get(of_wheel[-2:]) if of_wheel[-3:-2] == "_" else None

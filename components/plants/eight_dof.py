@@ -37,7 +37,6 @@ from typing import Any
 
 from ..cars.car import DRIVEN_WHEELS, MOTION, DrivenCar
 from ..cars.plane_body import move, resultants
-from ..cars.road_plane import pull_of
 from ..cars.roll_camber import inclinations
 from ..cars.rolling_body import RollingBody, RollingCarParameters
 from ..mathematics.carry import Values
@@ -57,7 +56,6 @@ class EightDof(DrivenCar):
 
     def rest(self, signals: Sequence[Any]) -> Values:
         held = resultants(signals[0], signals[1], signals[2], self.p, signals[6])
-        self.pull = pull_of(signals[7:], self.p.mass)
         phi = 0.0
         for _ in range(20):  # the body hangs in its springs; sin(phi) - phi is tiny
             phi = self.body.forcing(held[1] + held[2], phi, self.pull) / self.body.stiffness
@@ -68,7 +66,7 @@ class EightDof(DrivenCar):
         p, body = self.p, self.body
         x, y_f, y_r, moment = held = resultants(delta, signals[1], signals[2], self.p, signals[6])
         y = y_f + y_r
-        self.pull = pull = pull_of(signals[7:], p.mass)
+        pull = self.pull
         if h != self.step_size:
             self.step_size = h
             self.transition = transition(body.decay, body.stiffness, h)

@@ -36,9 +36,8 @@ from typing import Any
 from ..cars.car import DRIVEN_WHEELS, MOTION, DrivenCar
 from ..cars.contact_points import contact, contact_velocities
 from ..cars.plane_body import move
-from ..cars.resistance import Drag
+from ..cars.resistance import drag_of
 from ..cars.ride import AT_REST, RESOLVED, loads, move_ride
-from ..cars.road_plane import pull_of
 from ..cars.roll_camber import inclinations
 from ..cars.sprung_car import FourteenDofParameters, ride_of
 from ..cars.wheel_kinematics import Eight
@@ -68,19 +67,18 @@ class FourteenDof(DrivenCar):
     def configure(self) -> None:
         self.ride = ride_of(self.p)
         self.longest = RESOLVED / self.ride.fastest()
-        self.drag = Drag.of(self.p)
+        self.drag = drag_of(self.p)
         self.rolling_resistance = self.p.rolling_resistance
 
     def rest(self, signals: Sequence[Any]) -> Values:
         high = self.p.initial_heave
         self.body: tuple[float, ...] = (high, 0.0, 0.0, high, high, high, high, *AT_REST[7:])
         held = contact(signals[0], signals[1], signals[2], self.p, signals[6])
-        self.pull = pull_of(signals[7:], self.p.mass)
         return held.x, held.y
 
     def move(self, h: float, delta: float, signals: Sequence[Any]) -> Values:
         held = contact(delta, signals[1], signals[2], self.p, signals[6])
-        self.pull = pull = pull_of(signals[7:], self.p.mass)
+        pull = self.pull
         if pull.turn:
             held = held._replace(moment=held.moment + pull.turn)
         v_x, v_y, r = self.motion[:3]
@@ -117,21 +115,11 @@ class FourteenDof(DrivenCar):
 
     def wheel_velocities(self) -> Eight:
         """Return the velocities [m/s] of the contact points in wheel axes, longitudinal and lateral."""
-        p = self.p
         v_x, v_y, r = self.motion[:3]
-        return contact_velocities(
-            v_x,
-            v_y,
-            r,
-            self.body,
-            delta=self.steer_angle,
-            ride=self.ride,
-            a=p.cg_to_front_axle,
-            b=p.cg_to_rear_axle,
-        )
+        return contact_velocities(v_x, v_y, r, self.body, delta=self.steer_angle, ride=self.ride, p=self.p)
 
     def _accelerations(self, x: float, y: float, v_x: float) -> tuple[float, float]:
         """Return a_x, a_y [m/s2] from the tyre forces [N] and the speed [m/s]."""
         mass = self.p.mass
         pull = self.pull
-        return (x - self.drag.force(v_x)) / mass + pull.x, y / mass + pull.y
+        return (x - self.drag * v_x * abs(v_x)) / mass + pull.x, y / mass + pull.y

@@ -37,12 +37,11 @@ from typing import Any
 
 from vocabulary.gravity import G
 
-from ..cars.car import DRIVEN_WHEELS, MOTION, DrivenCar, StartParameters
+from ..cars.car import DRIVEN_WHEELS, MOTION, DrivenCar, DrivenCarParameters, StartParameters
 from ..cars.load_transfer import quasi_static_loads
 from ..cars.plane_body import move, resultants
 from ..cars.published_cars import PaperA
-from ..cars.road_plane import pull_of
-from ..fmi.variables import parameter
+from ..fmi.variables import like, parameter
 from ..mathematics.carry import Values
 
 
@@ -51,12 +50,8 @@ class SevenDofParameters(StartParameters, PaperA):
     """The car of paper A, table 1."""
 
     initial_speed: float = parameter(25.0, "m/s", "Speed at the start", "paper A drives 15, 25, 40 m/s")
-    slip_stiffness_per_load: float = parameter(
-        15.0,
-        "1",
-        "Slip stiffness over load for slow wheels, see cars.wheel_spin",
-        "chosen: paper A's tyre at rest",
-        minimum=0.0,
+    slip_stiffness_per_load: float = like(
+        DrivenCarParameters, "slip_stiffness_per_load", 15.0, "chosen: paper A's tyre at rest"
     )
 
 
@@ -67,12 +62,11 @@ class SevenDof(DrivenCar):
     outputs = (*MOTION, *DRIVEN_WHEELS)
 
     def rest(self, signals: Sequence[Any]) -> Values:
-        self.pull = pull_of(signals[7:], self.p.mass)
         return self._accelerations(signals[0], signals)[:2]
 
     def move(self, h: float, delta: float, signals: Sequence[Any]) -> Values:
         a_x, a_y, dr = self._accelerations(delta, signals)
-        self.pull = pull = pull_of(signals[7:], self.p.mass)
+        pull = self.pull
         dr += pull.turn / self.p.yaw_inertia
         self.motion = move(self.motion, h, a_x=a_x + pull.x, a_y=a_y + pull.y, dr=dr)
         return a_x, a_y

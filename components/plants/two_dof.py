@@ -36,10 +36,10 @@ from vocabulary.gravity import G
 from ..cars.car import MOTION, Car, StartParameters, of_steered_wheels
 from ..cars.load_transfer import quasi_static_loads
 from ..cars.plane_body import Geometry, Motion, sum_of
+from ..cars.published_cars import PaperA
 from ..cars.road_plane import INPUTS as ROAD_PLANE
-from ..cars.road_plane import pull_of
 from ..cars.wheel_kinematics import earth_velocity
-from ..fmi.variables import parameter, signal
+from ..fmi.variables import like, of_car, parameter, signal
 from ..mathematics.carry import Values
 
 _GAUSS = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
@@ -49,16 +49,12 @@ _GAUSS = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
 class TwoDofParameters(StartParameters):
     """The car of paper D."""
 
-    mass: float = parameter(1820.0, "kg", "Vehicle mass m", "paper D", minimum=1.0)
-    yaw_inertia: float = parameter(3800.0, "kg.m2", "Yaw inertia I_z", "paper D", minimum=1.0)
-    cg_to_front_axle: float = parameter(
-        1.463, "m", "Distance a of the centre of mass from the front axle", "paper D", minimum=0.1
-    )
-    cg_to_rear_axle: float = parameter(
-        1.585, "m", "Distance b of the centre of mass from the rear axle", "paper D", minimum=0.1
-    )
-    track_width: float = parameter(1.5, "m", "Track width d", "paper D", minimum=0.1)
-    cg_height: float = parameter(0.5, "m", "Height h of the centre of mass", "paper D", minimum=0.0)
+    mass: float = like(PaperA, "mass", 1820.0, "paper D")
+    yaw_inertia: float = like(PaperA, "yaw_inertia", 3800.0, "paper D")
+    cg_to_front_axle: float = of_car(1.463, "paper D")
+    cg_to_rear_axle: float = of_car(1.585, "paper D")
+    track_width: float = like(PaperA, "track_width", 1.5, "paper D")
+    cg_height: float = of_car(0.5, "paper D")
     initial_speed: float = parameter(25.0, "m/s", "Speed at the start, its part along x is kept", "paper D")
 
 
@@ -108,11 +104,10 @@ class TwoDof(Car):
     )
 
     def rest(self, signals: Sequence[Any]) -> Values:
-        self.pull = pull_of(signals[5:], self.p.mass)
         return (lateral_resultants(signals[0], signals[2], self.p)[0] / self.p.mass,)
 
     def move(self, h: float, delta: float, signals: Sequence[Any]) -> Values:
-        self.pull = pull = pull_of(signals[5:], self.p.mass)
+        pull = self.pull
         yaw_moment = signals[3] + sum_of(signals[4]) + pull.turn
         force, moment = lateral_resultants(delta, signals[2], self.p)
         a_y = force / self.p.mass

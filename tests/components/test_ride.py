@@ -68,7 +68,7 @@ def test_energy_changes_by_the_power_of_the_forces_at_the_contact_points_less_th
     step = 1e-6
     ahead, behind = (RIDE.energy(r + s * change[0], y + s * change[1:]) for s in (step, -step))
     moving = v_x * held.x + v_y * held.y  # of the translation: m (v_x a_x + v_y a_y)
-    velocities = contact_velocities(v_x, v_y, r, y, delta=0.0, ride=RIDE, a=A, b=B)
+    velocities = contact_velocities(v_x, v_y, r, y, delta=0.0, ride=RIDE, p=P)
     power = np.dot(velocities, [*f_x, *f_y])
     travel_rates = monolith_c.TRAVEL @ np.concatenate([[v_x, v_y, r], y[7:]])
     lost = np.dot(np.repeat([P.damping_front, P.damping_rear], 2), travel_rates**2)
@@ -114,7 +114,7 @@ def test_the_contact_point_stands_still_while_the_body_rolls_about_the_roll_cent
     dphi = 0.4
     y = [0.0] * 14
     y[8] = dphi
-    found = contact_velocities(0.0, 0.0, 0.0, y, delta=0.0, ride=RIDE, a=A, b=B)
+    found = contact_velocities(0.0, 0.0, 0.0, y, delta=0.0, ride=RIDE, p=P)
     h_f, h_r = P.roll_centre_height_front, P.roll_centre_height_rear
     expected = [(P.cg_height - h) * dphi for h in (h_f, h_f, h_r, h_r)]
     assert found[4:] == pytest.approx(expected, rel=1e-12)
@@ -137,7 +137,7 @@ def test_contact_velocities_are_the_time_derivatives_of_the_contact_points_place
             yield complex(v_x * t, v_y * t) + complex(x_i, y_i) * complex(cos(psi), sin(psi))
 
     step = 1e-5
-    found = contact_velocities(v_x, v_y, r, y, delta=delta, ride=RIDE, a=A, b=B)
+    found = contact_velocities(v_x, v_y, r, y, delta=delta, ride=RIDE, p=P)
     for i, (later, before) in enumerate(zip(places(step), places(-step), strict=True)):
         turned = (later - before) / (2 * step) * complex(cos(delta), -sin(delta) if i < 2 else 0.0)
         if i >= 2:

@@ -14,14 +14,16 @@ from components.cars.wheel_kinematics import (
     slip_ratio,
     wheel_velocities,
 )
+from components.plants.seven_dof import SevenDofParameters
 
-A, B, HALF = 1.256, 1.368, 0.825
+CAR = SevenDofParameters()
+A, B, HALF = CAR.cg_to_front_axle, CAR.cg_to_rear_axle, 0.5 * CAR.track_width
 PLACES = ((A, HALF), (A, -HALF), (-B, HALF), (-B, -HALF))
 LOW = 0.5
 
 
 def velocities(v_x, v_y, r, delta):
-    return wheel_velocities(v_x, v_y, r=r, delta=delta, a=A, b=B, half_track=HALF)
+    return wheel_velocities(v_x, v_y, r=r, delta=delta, p=CAR)
 
 
 def test_wheel_velocities_are_those_of_a_turning_rigid_body_in_wheel_axes():

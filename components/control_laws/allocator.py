@@ -1,0 +1,53 @@
+"""The base of allocators: what gives the yaw moment by longitudinal forces, and the driver's force on top.
+
+The driver's force is equal left and right on each axle, as from one pedal, and is no part of the moment asked
+for: with steered front wheels it turns the car by itself, as it does without any control.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from vocabulary.wheels import Four
+
+from ..cars.wheel_kinematics import lever_arms
+from ..fmi.component import Component
+from ..fmi.variables import of_car, output, signal
+from .moment_sharing import add_drive_force
+
+BASIC = ("yaw_moment", "drive_force", "steer_angle")
+"""Inputs of every allocator."""
+
+
+@dataclass(frozen=True)
+class DriveParameters:
+    """Of the driver's force."""
+
+    drive_front_share: float = of_car(
+        0.5, "chosen: equal motors", text="Share of the driver's force in front", maximum=1.0
+    )
+
+
+class Allocator(Component):
+    """Base: shares the yaw moment among the wheels and adds the driver's force."""
+
+    sampled = True
+    inputs: ClassVar[Any] = ("yaw_moment", signal("drive_force", optional=True), "steer_angle")
+    outputs = (output("force_request_*", *BASIC),)
+
+    least_arm: float
+    """Arm [m] below which a wheel's share fades, an eighth of the track, see `moment_sharing`."""
+
+    def configure(self) -> None:
+        self.half_track = 0.5 * self.p.track_width
+        self.least_arm = 0.25 * self.half_track
+
+    def share(self, u: list[float], arms: Four) -> Four:
+        """Return the forces [N] of fl, fr, rl, rr that give the moment; `arms` of the wheels [m]."""
+        raise NotImplementedError
+
+    def output(self, t: float, u: list[float]) -> Four:
+        p, drive = self.p, u[1]
+        forces = self.share(u, lever_arms(u[2], p.cg_to_front_axle, self.half_track))
+        return forces if drive == 0.0 else add_drive_force(forces, drive, p.drive_front_share)
