@@ -94,8 +94,7 @@ class FuzzyFeedback(Component):
         self.moments = (p.yaw_rate_weight * p.yaw_rate_moment, -p.sideslip_weight * p.sideslip_moment)
 
     def start(self, t: float, u: list[float]) -> None:
-        self.yaw_rate = Pid(self.p.rate_filter)
-        self.yaw_rate.start(u[0] - u[1])
+        self.yaw_rate = Pid(self.p.rate_filter, u[0] - u[1])
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
         self.yaw_rate.see(u[0] - u[1], h)

@@ -19,12 +19,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..control_laws.rule_tables import PID_GAINS
-from ..control_laws.sliding_surface import limit
-from ..fmi.component import Component
 from ..fmi.variables import output, parameter
 from ..mathematics.fuzzy import SEVEN, Mamdani, Partition
-from ..mathematics.pid_loop import Gains, Pid, YawLoops
-from .pid import SEEN, PidParameters, base_gains
+from ..mathematics.pid_loop import Gains
+from .pid import PidController, PidParameters, base_gains
 
 
 @dataclass(frozen=True)
@@ -121,15 +119,12 @@ class GainSchedule:
         )
 
 
-class FuzzyPid(Component):
+class FuzzyPid(PidController):
     """Fuzzy PID yaw-moment controller for yaw rate and sideslip."""
 
     Parameters = FuzzyPidParameters
-    sampled = True
-    inputs = (*SEEN, "velocity_x")
     outputs = (
-        output("yaw_moment", *SEEN, "velocity_x"),
-        output("integral_term", *SEEN, unit="N.m", text="Integral part of the moment"),
+        *PidController.outputs,
         output(
             "yaw_rate_proportional_gain_now",
             *("yaw_rate_ref", "yaw_rate"),
@@ -162,26 +157,14 @@ class FuzzyPid(Component):
             reading=p.table_reading,
         )
 
-    def start(self, t: float, u: list[float]) -> None:
-        self.loops = YawLoops(self.p.derivative_filter)
-        self.loops.start(*u[:4])
-        self._decide()
-
-    def advance(self, t: float, h: float, u: list[float]) -> None:
-        self.loops.see(*u[:4], h=h)
-        self._decide()
-
-    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
-        p = self.p
-        yaw_rate, sideslip = self.gains
-        moment = limit(self.moment, p.moment_limit, u[4], p.fade_speed)
-        return moment, self.loops.integral(), yaw_rate.p, sideslip.p
-
-    def _decide(self) -> None:
-        yaw_rate: Pid = self.loops.yaw_rate
-        sideslip: Pid = self.loops.sideslip  # its error is actual minus reference
+    def decide(self) -> None:
+        yaw_rate, sideslip = self.loops.yaw_rate, self.loops.sideslip  # whose error is actual minus reference
         self.gains = (
             self.yaw_rate.gains(yaw_rate.error, yaw_rate.slope),
             self.sideslip.gains(-sideslip.error, -sideslip.slope),
         )
-        self.moment = self.loops.moment(*self.gains, limit=self.p.moment_limit)
+        super().decide()
+
+    def output(self, t: float, u: list[float]) -> tuple[float, ...]:
+        yaw_rate, sideslip = self.gains
+        return *super().output(t, u), yaw_rate.p, sideslip.p

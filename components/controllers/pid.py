@@ -13,6 +13,7 @@ algorithm, Journal of Dynamics and Control 19(3), 2021, section 2.1, which names
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 from ..control_laws.sliding_surface import limit
 from ..fmi.component import Component
@@ -79,7 +80,7 @@ class PidController(Component):
     Parameters = PidParameters
     sampled = True
     inputs = (*SEEN, "velocity_x")
-    outputs = (
+    outputs: ClassVar[Any] = (
         output("yaw_moment", *SEEN, "velocity_x"),
         output("integral_term", *SEEN, unit="N.m", text="Integral part of the moment"),
     )
@@ -88,12 +89,15 @@ class PidController(Component):
         self.gains = base_gains(self.p)
 
     def start(self, t: float, u: list[float]) -> None:
-        self.loops = YawLoops(self.p.derivative_filter)
-        self.loops.start(*u[:4])
-        self.moment = self.loops.moment(*self.gains, limit=self.p.moment_limit)
+        self.loops = YawLoops(self.p.derivative_filter, *u[:4])
+        self.decide()
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
         self.loops.see(*u[:4], h=h)
+        self.decide()
+
+    def decide(self) -> None:
+        """Set the moment from what the loops have seen."""
         self.moment = self.loops.moment(*self.gains, limit=self.p.moment_limit)
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:

@@ -27,7 +27,7 @@ from ..cars.single_track_car import SingleTrackCar
 from ..driving.speed_holding import HeldSpeedParameters, SpeedHold
 from ..driving.track import TRACK_OUTPUTS, LaneChangeParameters, Track
 from ..fmi.component import Component
-from ..fmi.variables import like, parameter
+from ..fmi.variables import like, of_car, parameter
 from ..mathematics.first_order_lag import Stage
 
 
@@ -53,9 +53,7 @@ class DoubleLaneChangeParameters(HeldSpeedParameters, LaneChangeParameters):
     steering_wheel_rate_limit: float = parameter(
         12.0, "rad/s", "Fastest turn of the hand wheel", "chosen: a skilled driver", minimum=0.01
     )
-    steering_ratio: float = parameter(
-        17.0, "1", "Hand-wheel angle over road-wheel angle", "chosen: large saloon", minimum=0.1
-    )
+    steering_ratio: float = of_car(17.0, "chosen: large saloon")
     mass: float = like(PaperC, "mass")
     cg_to_front_axle: float = like(PaperC, "cg_to_front_axle")
     cg_to_rear_axle: float = like(PaperC, "cg_to_rear_axle")
@@ -78,12 +76,7 @@ class DoubleLaneChange(Component):
 
     Parameters = DoubleLaneChangeParameters
     inputs = ("velocity_x", "position_x", "position_y", "yaw_angle")
-    outputs = (
-        "steer_angle",
-        "drive_force",
-        "steering_wheel_angle",
-        *TRACK_OUTPUTS,
-    )
+    outputs = ("steer_angle", "drive_force", "steering_wheel_angle", *TRACK_OUTPUTS)
 
     def configure(self) -> None:
         self.track = Track(self.p)
@@ -91,8 +84,7 @@ class DoubleLaneChange(Component):
 
     def start(self, t: float, u: list[float]) -> None:
         p = self.p
-        self.speed = SpeedHold(p)
-        self.speed.start(u[0])
+        self.speed = SpeedHold(p, u[0])
         self.hands = Stage(tau=p.steering_lag, delay=p.reaction_delay, rate=p.steering_wheel_rate_limit)
         self.wanted = self._wanted(u)
 

@@ -35,7 +35,7 @@ from math import copysign, cos, sin
 
 from vocabulary.gravity import G
 
-from ..cars.published_cars import PaperC
+from ..cars.published_cars import PaperA, PaperC
 from ..cars.single_track_car import SingleTrackCar
 from ..driving.lane_path import LanePath
 from ..driving.speed_holding import HeldSpeedParameters, SpeedHold
@@ -118,7 +118,7 @@ class OptimalPreviewParameters(HeldSpeedParameters, LaneChangeParameters):
         "chosen: the speed is held",
     )
     mass: float = like(PaperC, "mass")
-    yaw_inertia: float = parameter(3234.0, "kg.m2", "Yaw inertia I_z", "paper C, table 1", minimum=1.0)
+    yaw_inertia: float = like(PaperA, "yaw_inertia", 3234.0, "paper C, table 1")
     cg_to_front_axle: float = like(PaperC, "cg_to_front_axle")
     cg_to_rear_axle: float = like(PaperC, "cg_to_rear_axle")
     cornering_stiffness_front: float = like(DoubleLaneChangeParameters, "cornering_stiffness_front")
@@ -130,12 +130,7 @@ class OptimalPreview(Component):
 
     Parameters = OptimalPreviewParameters
     inputs = ("velocity_x", "velocity_y", "yaw_rate", "position_x", "position_y", "yaw_angle")
-    outputs = (
-        "steer_angle",
-        "drive_force",
-        "steering_wheel_angle",
-        *TRACK_OUTPUTS,
-    )
+    outputs = ("steer_angle", "drive_force", "steering_wheel_angle", *TRACK_OUTPUTS)
 
     def configure(self) -> None:
         self.track = Track(self.p)
@@ -145,8 +140,7 @@ class OptimalPreview(Component):
         self.path = planned(self.p)
 
     def start(self, t: float, u: list[float]) -> None:
-        self.speed = SpeedHold(self.p)
-        self.speed.start(u[0])
+        self.speed = SpeedHold(self.p, u[0])
         self.linear = self.hand = 0.0  # hand wheel of the linear car and of this one [rad]
 
     def advance(self, t: float, h: float, u: list[float]) -> None:

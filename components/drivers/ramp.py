@@ -31,6 +31,6 @@ class Ramp(HandWheelDriver):
 
     Parameters = RampParameters
 
-    def hand_wheel_angle(self, t: float) -> float:
-        p = self.p
+    @staticmethod
+    def hand_wheel_angle(t: float, p: RampParameters) -> float:
         return ramp(t - p.start_time, p.ramp_time, p.amplitude)

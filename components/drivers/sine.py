@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from ..driving.hand_wheel import HandWheelDriver, SteeringParameters
 from ..driving.speed_holding import SpeedHoldingParameters
-from ..fmi.variables import parameter
+from ..fmi.variables import of_car, parameter
 
 
 @dataclass(frozen=True)
@@ -22,13 +22,7 @@ class SineParameters(SteeringParameters, SpeedHoldingParameters):
     """Of the steering input; papers A and B name a sine but neither amplitude nor period."""
 
     amplitude: float = parameter(0.05, "rad", "Amplitude at the hand wheel", "chosen: paper A at 15 m/s")
-    steering_ratio: float = parameter(
-        1.0,
-        "1",
-        "Hand-wheel angle over road-wheel angle",
-        "chosen: 1, the amplitude is that of the road wheels",
-        minimum=0.1,
-    )
+    steering_ratio: float = of_car(1.0, "chosen: 1, the amplitude is that of the road wheels")
     frequency: float = parameter(
         0.2, "Hz", "Frequency", "chosen: one period of 5 s, as in paper A's figure 6", minimum=0.0
     )
@@ -47,6 +41,4 @@ class Sine(HandWheelDriver):
     """Open-loop sine steering; the speed may be held."""
 
     Parameters = SineParameters
-
-    def hand_wheel_angle(self, t: float) -> float:
-        return sine_steer(t, self.p)
+    hand_wheel_angle = staticmethod(sine_steer)

@@ -22,10 +22,7 @@ class SineSweepParameters(SteeringParameters, HeldSpeedParameters):
     """Of the steering input."""
 
     amplitude: float = parameter(
-        math.radians(20.0),
-        "rad",
-        "Amplitude at the hand wheel",
-        "chosen: tyres stay linear",
+        math.radians(20.0), "rad", "Amplitude at the hand wheel", "chosen: tyres stay linear"
     )
     first_frequency: float = parameter(
         0.1, "Hz", "Frequency f_0 at the beginning", "chosen: half of ISO 7401's 0.2 Hz", minimum=0.0
@@ -50,6 +47,4 @@ class SineSweep(HandWheelDriver):
     """Open-loop sine of rising frequency, at a held speed."""
 
     Parameters = SineSweepParameters
-
-    def hand_wheel_angle(self, t: float) -> float:
-        return sweep(t, self.p)
+    hand_wheel_angle = staticmethod(sweep)

@@ -63,9 +63,7 @@ class SineWithDwell(HandWheelDriver):
     """Open-loop sine with dwell of a coasting car."""
 
     Parameters = SineWithDwellParameters
-
-    def hand_wheel_angle(self, t: float) -> float:
-        return sine_with_dwell(t, self.p)
+    hand_wheel_angle = staticmethod(sine_with_dwell)
 
     def coasts_from(self) -> float:
         p: SineWithDwellParameters = self.p

@@ -76,8 +76,7 @@ class SteadyTurn(Component):
         self.car = SingleTrackCar.of(self.p)
 
     def start(self, t: float, u: list[float]) -> None:
-        self.speed = SpeedHold(self.p, self.p.action_time)
-        self.speed.start(u[0])
+        self.speed = SpeedHold(self.p, u[0], self.p.action_time)
         self.learnt = 0.0
         self.steer = 0.0
         self._steer(t, u[0])

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf
+from typing import Any
 
 from ..fmi.component import Component
-from ..fmi.variables import parameter, signal
+from ..fmi.variables import of_car, parameter, signal
 from .speed_holding import SpeedHold
 
 
@@ -20,9 +21,7 @@ from .speed_holding import SpeedHold
 class SteeringParameters:
     """Of the steering and of when it begins."""
 
-    steering_ratio: float = parameter(
-        17.0, "1", "Hand-wheel angle over road-wheel angle", "chosen: large saloon", minimum=0.1
-    )
+    steering_ratio: float = of_car(17.0, "chosen: large saloon")
     start_time: float = parameter(1.0, "s", "Time at which steering begins", "chosen: 1 s straight ahead")
 
 
@@ -39,8 +38,9 @@ class HandWheelDriver(Component):
     inputs = (signal("velocity_x", optional=True),)
     outputs = ("steer_angle", "drive_force", "steering_wheel_angle")
 
-    def hand_wheel_angle(self, t: float) -> float:
-        """Return the hand-wheel angle [rad] at `t` [s]."""
+    @staticmethod
+    def hand_wheel_angle(t: float, p: Any) -> float:
+        """Return the hand-wheel angle [rad] at `t` [s]; `p` are the parameters."""
         raise NotImplementedError
 
     def coasts_from(self) -> float:
@@ -48,12 +48,11 @@ class HandWheelDriver(Component):
         return inf
 
     def start(self, t: float, u: list[float]) -> None:
-        self.speed = SpeedHold(self.p, self.coasts_from())
-        self.speed.start(u[0])
+        self.speed = SpeedHold(self.p, u[0], self.coasts_from())
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
         self.speed.advance(t, h, u[0])
 
     def output(self, t: float, u: list[float]) -> tuple[float, float, float]:
-        hand = self.hand_wheel_angle(t)
+        hand = self.hand_wheel_angle(t, self.p)
         return hand / self.p.steering_ratio, self.speed.force, hand

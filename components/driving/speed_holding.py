@@ -57,26 +57,22 @@ class SpeedHold:
 
     Args:
         p: of the driver; read again at every step, never changed.
+        v_x: speed at the start [m/s].
         let_go: when the accelerator is let go [s], for good; default: never.
     """
 
-    def __init__(self, p: SpeedHoldingParameters, let_go: float = inf) -> None:
+    def __init__(self, p: SpeedHoldingParameters, v_x: float, let_go: float = inf) -> None:
         self.p = p
         self.let_go = let_go
         self.gains = Gains(p.speed_gain, p.speed_gain / p.speed_integral_time, 0.0)
-        self.foot = Pid()
+        self.constant = p.constant_drive_force
+        self.foot = Pid(error=p.target_speed - v_x)
         self.engine = Stage(tau=p.drive_time_constant)
 
     @property
     def force(self) -> float:
         """The drive force [N]."""
         return self.constant + self.engine.value
-
-    def start(self, v_x: float) -> None:
-        """Begin at the speed `v_x` [m/s] with the constant force."""
-        self.constant = self.p.constant_drive_force
-        self.foot.start(self.p.target_speed - v_x)
-        self.engine = Stage(tau=self.p.drive_time_constant)
 
     def advance(self, t: float, h: float, v_x: float) -> None:
         """Take the force from `t` to `t + h` [s] at the speed `v_x` [m/s]."""

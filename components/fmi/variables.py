@@ -7,8 +7,8 @@ which inputs they depend directly at the same instant. `*` in a name stands for 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields, make_dataclass, replace
 from typing import Any
 
 from vocabulary.signals import SIGNALS
@@ -187,6 +187,18 @@ def like(
     if default is not None and (source or default != declared.start):
         declared = replace(declared, start=default, source=source or "chosen: for this FMU")
     return field(default=declared.start, metadata={"declared": declared})
+
+
+def parameter_class(module: str, name: str, declared: Mapping[str, Any], bases: tuple[type, ...] = ()) -> Any:
+    """Return a dataclass of parameters that stand in a table.
+
+    Args:
+        module, name: of the class, so that its values can be kept in an FMU's state.
+        declared: name -> what `parameter` returned.
+        bases: dataclasses to add to.
+    """
+    made = [(key, type(one.default), one) for key, one in declared.items()]
+    return make_dataclass(name, made, bases=bases, frozen=True, namespace={"__module__": module})
 
 
 @dataclass(frozen=True)

@@ -38,16 +38,12 @@ class Pid:
 
     Args:
         tau: time constant of the derivative's filter [s].
+        error: at the start, where there is no integral and no derivative.
     """
 
-    def __init__(self, tau: float = 0.0) -> None:
-        self.tau = tau
-        self.start(0.0)
-
-    def start(self, e: float) -> None:
-        """Begin with the error `e`: no integral, no derivative."""
-        self.error = e
-        self.rate = Slope(e, self.tau)
+    def __init__(self, tau: float = 0.0, error: float = 0.0) -> None:
+        self.error = error
+        self.rate = Slope(error, tau)
         self.area = 0.0  # under the error, over the last sample
         self.integral = 0.0
 
@@ -88,16 +84,12 @@ class YawLoops:
 
     Args:
         tau: time constant of both derivatives' filters [s].
+        r_ref, r, beta_ref, beta: yaw rates [rad/s] and sideslip angles [rad] at the start.
     """
 
-    def __init__(self, tau: float) -> None:
-        self.yaw_rate = Pid(tau)
-        self.sideslip = Pid(tau)
-
-    def start(self, r_ref: float, r: float, beta_ref: float, beta: float) -> None:
-        """Begin with these yaw rates [rad/s] and sideslip angles [rad]."""
-        self.yaw_rate.start(r_ref - r)
-        self.sideslip.start(beta - beta_ref)
+    def __init__(self, tau: float, r_ref: float, r: float, beta_ref: float, beta: float) -> None:
+        self.yaw_rate = Pid(tau, r_ref - r)
+        self.sideslip = Pid(tau, beta - beta_ref)
 
     def see(self, r_ref: float, r: float, beta_ref: float, beta: float, *, h: float) -> None:
         """Take in yaw rates [rad/s] and sideslip angles [rad] at the end of a sample of `h` [s]."""

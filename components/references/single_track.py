@@ -8,10 +8,7 @@ The limits keep the sign of the linear value (paper B writes the sign of delta).
 alone leaves yaw rate and sideslip of two different turns; limiting the steer angle that feeds the
 model keeps them of one. Paper B limits the outputs, paper D needs the steer angle limited first.
 
-Sliding mode needs the rates of the limited references. One mechanism serves all modes: the slope of
-the limited output over the step, smoothed by a first-order lag (`mathematics.slope`). So the rates
-belong to what is shown, corners included, and a jump of the reference gives a pulse of the area of the
-jump.
+Sliding mode needs the rates of the limited references: `control_laws.reference`.
 
 The model takes the steer angle and the speed in a straight line from the last value to the new one.
 Below `low_speed`, where its time constants vanish, it runs at that speed and the yaw rate is scaled
@@ -31,11 +28,10 @@ from vocabulary.gravity import G
 
 from ..cars.published_cars import PaperB
 from ..cars.single_track_car import SingleTrackCar
+from ..control_laws.reference import RateParameters, Reference
 from ..control_laws.sideslip_bound import PER_FRICTION, sideslip_bound
-from ..fmi.component import Component
-from ..fmi.variables import like, output, parameter, signal
+from ..fmi.variables import like, parameter
 from ..mathematics.integrators import rk4
-from ..mathematics.slope import Slope
 
 
 @dataclass(frozen=True)
@@ -70,9 +66,7 @@ class SingleTrackParameters:
         "paper B, equation (18): 0.02 s2/m times g",
         minimum=0.0,
     )
-    rate_time_constant: float = parameter(
-        0.005, "s", "Lag tau of the rates", "chosen: one sample of the controllers", minimum=0.0
-    )
+    rate_time_constant: float = like(RateParameters, "rate_time_constant")
     low_speed: float = parameter(
         2.0, "m/s", "Slowest speed of the model", "chosen: walking pace", minimum=0.1
     )
@@ -89,28 +83,20 @@ def clamp(x: float, most: float) -> float:
     return min(max(x, -most), most)
 
 
-class SingleTrack(Component):
+class SingleTrack(Reference):
     """Reference from the linear single-track model, steady state or dynamic, limited by friction."""
 
     Parameters = SingleTrackParameters
-    inputs = ("steer_angle", "velocity_x", signal("friction", start=1.0))
-    outputs = (
-        output("yaw_rate_ref", "steer_angle", "velocity_x", "friction"),
-        output("sideslip_ref", "steer_angle", "velocity_x", "friction"),
-        output("yaw_acceleration_ref", "steer_angle", "velocity_x", "friction"),
-        output("sideslip_rate_ref", "steer_angle", "velocity_x", "friction"),
-    )
 
     def configure(self) -> None:
         self.car = SingleTrackCar.of(self.p, self.p.yaw_inertia)
 
-    def start(self, t: float, u: list[float]) -> None:
+    def begin(self, u: list[float]) -> tuple[float, float]:
         self.feed = self._feed(u)
         self.model = self._steady(*self.feed)  # a dynamic model starts in its steady state
-        self.limited = self._limit(u)
-        self.rates = [Slope(value, self.p.rate_time_constant) for value in self.limited]
+        return self._limit(u)
 
-    def advance(self, t: float, h: float, u: list[float]) -> None:
+    def follow(self, h: float, u: list[float]) -> tuple[float, float]:
         delta, v = self.feed
         delta_end, v_end = self.feed = self._feed(u)
         if self.p.mode == "steady_state":
@@ -126,15 +112,7 @@ class SingleTrack(Component):
 
             beta, r = rk4(along, 0.0, h, self.model)
             self.model = beta, r
-        self.limited = self._limit(u)
-        first, second = self.limited
-        self.rates[0].see(first, h)
-        self.rates[1].see(second, h)
-
-    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
-        beta, r = self.limited
-        beta_rate, r_rate = self.rates
-        return r, beta, r_rate.rate, beta_rate.rate
+        return self._limit(u)
 
     def _feed(self, u: list[float]) -> tuple[float, float]:
         """Return steer angle [rad] and speed [m/s] as the model takes them."""
@@ -150,7 +128,7 @@ class SingleTrack(Component):
         return beta_gain * delta, r_gain * delta
 
     def _limit(self, u: list[float]) -> tuple[float, float]:
-        """Return (beta_ref [rad], r_ref [rad/s]) of the model's state; equations (17), (18)."""
+        """Return (r_ref [rad/s], beta_ref [rad]) of the model's state; equations (17), (18)."""
         p = self.p
         beta, r = self.model
         v = max(u[1], 0.0)
@@ -161,4 +139,4 @@ class SingleTrack(Component):
             r = clamp(r, p.friction_share * mu * G / max(v, p.low_speed))
         if p.limit_sideslip:
             beta = clamp(beta, sideslip_bound(mu, p.sideslip_per_friction))
-        return beta, r
+        return r, beta

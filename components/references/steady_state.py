@@ -6,8 +6,7 @@
     beta_ref = beta_1,   |beta_ref| <= min(|mu g (b / v_x^2 - m a / (C_r L))|, beta_max)
 
 with positive axle stiffnesses C_f, C_r. `friction_share` is the share of mu that the limits use.
-The rates are slopes over the unit's own step, smoothed by a first-order lag (`mathematics.slope`), since a
-steering angle often comes in steps of a sensor; zero at the start.
+The rates: `control_laws.reference`.
 
 beta_1 / delta crosses zero at v_x^2 = b C_r L / (m a) (16 m/s for the car of paper A), and so does
 its limit. An oversteering car (K < 0) has no steady state from v_x^2 = -1 / K on: there
@@ -26,11 +25,9 @@ from dataclasses import dataclass
 from vocabulary.gravity import G
 
 from ..cars.published_cars import PaperA
-from ..fmi.component import Component
-from ..fmi.variables import like, output, parameter, signal
-from ..mathematics.slope import Slope
-
-SMALLEST = 1e-3
+from ..cars.single_track_car import SMALLEST, SingleTrackCar
+from ..control_laws.reference import RateParameters, Reference
+from ..fmi.variables import like, of_car, parameter
 
 
 @dataclass(frozen=True)
@@ -40,20 +37,8 @@ class SteadyStateParameters:
     mass: float = like(PaperA, "mass")
     cg_to_front_axle: float = like(PaperA, "cg_to_front_axle")
     cg_to_rear_axle: float = like(PaperA, "cg_to_rear_axle")
-    cornering_stiffness_front: float = parameter(
-        100000.0,
-        "N/rad",
-        "Cornering stiffness C_f of the front axle",
-        "paper A, table 1, two tyres",
-        minimum=1.0,
-    )
-    cornering_stiffness_rear: float = parameter(
-        100000.0,
-        "N/rad",
-        "Cornering stiffness C_r of the rear axle",
-        "paper A, table 1, two tyres",
-        minimum=1.0,
-    )
+    cornering_stiffness_front: float = of_car(100000.0, "paper A, table 1, two tyres")
+    cornering_stiffness_rear: float = of_car(100000.0, "paper A, table 1, two tyres")
     limited: bool = parameter(
         True, None, "Limit the references to what the road's friction allows", "paper A"
     )
@@ -67,17 +52,7 @@ class SteadyStateParameters:
         "chosen: 6 degrees, the paper names none",
         minimum=0.0,
     )
-    rate_time_constant: float = parameter(
-        0.005, "s", "Lag tau of the rates", "chosen: one sample of the controllers", minimum=0.0
-    )
-
-
-def stability_factor(p: SteadyStateParameters) -> float:
-    """Return K [s2/m2], positive for an understeering car."""
-    a = p.cg_to_front_axle
-    b = p.cg_to_rear_axle
-    wheelbase = a + b
-    return p.mass / wheelbase**2 * (b / p.cornering_stiffness_front - a / p.cornering_stiffness_rear)
+    rate_time_constant: float = like(RateParameters, "rate_time_constant")
 
 
 def steady_state(
@@ -110,31 +85,16 @@ def steady_state(
     return r, min(max(beta, -bound), bound)
 
 
-class SteadyState(Component):
+class SteadyState(Reference):
     """Reference from the steady state of the linear single-track model, limited by friction."""
 
     Parameters = SteadyStateParameters
-    inputs = ("steer_angle", "velocity_x", signal("friction", start=1.0))
-    outputs = (
-        output("yaw_rate_ref", "steer_angle", "velocity_x", "friction"),
-        output("sideslip_ref", "steer_angle", "velocity_x", "friction"),
-        output("yaw_acceleration_ref", "steer_angle", "velocity_x", "friction"),
-        output("sideslip_rate_ref", "steer_angle", "velocity_x", "friction"),
-    )
 
     def configure(self) -> None:
-        self.k = stability_factor(self.p)
+        self.k = SingleTrackCar.of(self.p).stability_factor()
 
-    def start(self, t: float, u: list[float]) -> None:
-        self.now = steady_state(u[0], u[1], mu=u[2], k=self.k, p=self.p)
-        self.rates = [Slope(value, self.p.rate_time_constant) for value in self.now]
+    def begin(self, u: list[float]) -> tuple[float, float]:
+        return steady_state(u[0], u[1], mu=u[2], k=self.k, p=self.p)
 
-    def advance(self, t: float, h: float, u: list[float]) -> None:
-        self.now = steady_state(u[0], u[1], mu=u[2], k=self.k, p=self.p)
-        first, second = self.now
-        self.rates[0].see(first, h)
-        self.rates[1].see(second, h)
-
-    def output(self, t: float, u: list[float]) -> tuple[float, ...]:
-        r_rate, beta_rate = self.rates
-        return *self.now, r_rate.rate, beta_rate.rate
+    def follow(self, h: float, u: list[float]) -> tuple[float, float]:
+        return steady_state(u[0], u[1], mu=u[2], k=self.k, p=self.p)

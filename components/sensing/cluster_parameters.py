@@ -10,10 +10,9 @@ noise of the gyro, and what the whole cluster has in common.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import make_dataclass
 from typing import Any, NamedTuple
 
-from ..fmi.variables import parameter
+from ..fmi.variables import parameter, parameter_class
 from .channel import Figures
 
 
@@ -45,7 +44,7 @@ def parameters_of(module: str, name: str, given: Given, *, common: Mapping[str, 
     """Return a dataclass of parameters: the figures of every channel, those not given without effect.
 
     Args:
-        module, name: of the class, so that its values can be kept in an FMU's state.
+        module, name: of the class.
         given: the figures that a kind of cluster has.
         common: name -> parameter of the whole cluster; those of `COMMON` that are left out are added.
     """
@@ -61,8 +60,8 @@ def parameters_of(module: str, name: str, given: Given, *, common: Mapping[str, 
                 source,
                 minimum=least,
             )
-    made = [(field, type(how.default), how) for field, how in fields.items()]
-    return make_dataclass(name, made, frozen=True, namespace={"__module__": module})
+    made: type = parameter_class(module, name, fields)
+    return made
 
 
 _FIGURES = {

@@ -29,8 +29,9 @@ from dataclasses import dataclass
 from math import atan, copysign, cos, exp, pi, sin, sqrt
 from typing import Any, NamedTuple
 
-from ..fmi.variables import parameter
+from ..fmi.variables import like, parameter
 from .pacejka_2002 import SMALLEST_FRICTION, SMALLEST_LOAD, lateral_slip, practical_slip
+from .pacejka_2002_set import MagicFormulaParameters
 
 SMALLEST_SLIP = 1e-150
 """Slip below which there is no force: its square would vanish."""
@@ -59,13 +60,7 @@ class MagicFormula1987Parameters:
         "chosen: 1",
         minimum=0.01,
     )
-    maximum_load: float = parameter(
-        12000.0,
-        "N",
-        "Load above which forces are proportional to it, all coefficients held",
-        "chosen: beyond any test",
-        minimum=1.0,
-    )
+    maximum_load: float = like(MagicFormulaParameters, "maximum_load", 12000.0, "chosen: beyond any test")
     a0: float = _c(1.30, "Shape factor C of F_y")
     a1: float = _c(-22.1, "Peak of F_y, F_z squared")
     a2: float = _c(1011.0, "Peak of F_y, F_z")

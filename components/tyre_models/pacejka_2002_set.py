@@ -17,17 +17,25 @@ from dataclasses import dataclass
 from math import atan, pi
 from typing import Any, NamedTuple
 
-from ..fmi.variables import parameter
+from ..fmi.variables import like, parameter, parameter_class
+from .pacejka_2012_set import COMMON, LONGITUDINAL, REST, Pacejka2012Parameters
 
 _BOOK = "Pacejka 2006, table A3.1"
 
+NAMES = """
+    PCX1 PDX1 PDX2 PEX1 PEX2 PEX3 PEX4 PKX1 PKX2 PKX3 PHX1 PHX2 PVX1 PVX2 RBX1 RBX2 RCX1 REX1 REX2 RHX1
+    PCY1 PDY1 PDY2 PEY1 PEY2 PEY3 PKY1 PKY2 PKY4 PHY1 PHY2 PVY1 PVY2 RBY1 RBY2 RBY3 RCY1 REY1 REY2 RHY1
+    RHY2 RVY1 RVY2 RVY4 RVY5 RVY6
+    QBZ1 QBZ2 QBZ3 QBZ9 QBZ10 QCZ1 QDZ1 QDZ2 QDZ6 QDZ7 QEZ1 QEZ2 QEZ3 QEZ4 QHZ1 QHZ2 SSZ1 SSZ2
+"""
+"""The coefficients of F_x, F_y and M_z that count here."""
 
-def _c(default: float, description: str) -> Any:
-    return parameter(default, "1", description, _BOOK)
-
-
-def _odd(default: float, description: str) -> Any:
-    return parameter(default, "1", f"{description}, used with asymmetric_terms", _BOOK)
+ODD = """
+    PHX1 PHX2 PVX1 PVX2 RHX1
+    PEY3 PHY1 PHY2 PVY1 PVY2 RBY3 RVY1 RVY2 RVY4 RVY5 RVY6
+    QBZ9 QBZ10 QDZ6 QDZ7 QEZ4 QHZ1 QHZ2 SSZ1
+"""
+"""Those of them that are used with `asymmetric_terms` only."""
 
 
 def _one(description: str) -> Any:
@@ -35,8 +43,8 @@ def _one(description: str) -> Any:
 
 
 @dataclass(frozen=True)
-class MagicFormulaParameters:
-    """One set for all four tyres, with stiffness scalings per axle."""
+class _General:
+    """What is no coefficient of the tyre."""
 
     nominal_load: float = parameter(4000.0, "N", "Nominal load F_z0", _BOOK, minimum=1.0)
     unloaded_radius: float = parameter(0.313, "m", "Unloaded radius R_0", _BOOK, minimum=0.01)
@@ -47,13 +55,7 @@ class MagicFormulaParameters:
         "chosen: three times nominal",
         minimum=1.0,
     )
-    reference_friction: float = parameter(
-        1.0,
-        "1",
-        "Friction coefficient of the road the set was measured on: lambda_mu is friction over it",
-        "chosen: the papers' mu = 1 is the set as it is",
-        minimum=0.01,
-    )
+    reference_friction: float = like(Pacejka2012Parameters, "reference_friction")
     low_friction: str = parameter(
         "similarity",
         None,
@@ -72,72 +74,22 @@ class MagicFormulaParameters:
     cornering_stiffness_scale_front: float = _one("Scaling lambda_Ky of front cornering stiffness")
     cornering_stiffness_scale_rear: float = _one("Scaling lambda_Ky of rear cornering stiffness")
 
-    PCX1: float = parameter(1.685, "1", "Shape factor C of F_x", _BOOK, minimum=0.01)
-    PDX1: float = _c(1.210, "Friction mu_x at nominal load")
-    PDX2: float = _c(-0.037, "Variation of mu_x with load")
-    PEX1: float = _c(0.344, "Curvature E of F_x at nominal load")
-    PEX2: float = _c(0.095, "Variation of E of F_x with load")
-    PEX3: float = _c(-0.020, "Variation of E of F_x with load squared")
-    PEX4: float = _c(0.0, "Difference of E of F_x between driving and braking")
-    PKX1: float = _c(21.51, "Slip stiffness K_x / F_z at nominal load")
-    PKX2: float = _c(-0.163, "Variation of K_x / F_z with load")
-    PKX3: float = _c(0.245, "Exponent of K_x / F_z with load")
-    PHX1: float = _odd(-0.002, "Horizontal shift of F_x at nominal load")
-    PHX2: float = _odd(0.002, "Variation of the horizontal shift of F_x with load")
-    PVX1: float = _odd(0.0, "Vertical shift of F_x / F_z at nominal load")
-    PVX2: float = _odd(0.0, "Variation of the vertical shift of F_x / F_z with load")
-    RBX1: float = _c(12.35, "Slope of the reduction of F_x by slip angle")
-    RBX2: float = _c(-10.77, "Variation of that slope with kappa")
-    RCX1: float = _c(1.092, "Shape factor of the reduction of F_x by slip angle")
-    REX1: float = _c(0.0, "Curvature of the reduction of F_x by slip angle")
-    REX2: float = _c(0.0, "Variation of that curvature with load")
-    RHX1: float = _odd(0.007, "Shift of the reduction of F_x by slip angle")
 
-    PCY1: float = parameter(1.193, "1", "Shape factor C of F_y", _BOOK, minimum=0.01)
-    PDY1: float = _c(-0.990, "Friction mu_y at nominal load")
-    PDY2: float = _c(0.145, "Variation of mu_y with load")
-    PEY1: float = _c(-1.003, "Curvature E of F_y at nominal load")
-    PEY2: float = _c(-0.537, "Variation of E of F_y with load")
-    PEY3: float = _odd(-0.083, "Difference of E of F_y between left and right")
-    PKY1: float = _c(-14.95, "Largest cornering stiffness K_y / F_z0")
-    PKY2: float = parameter(2.130, "1", "Load over nominal load at which K_y is largest", _BOOK, minimum=0.01)
-    PKY4: float = _c(2.0, "Shape of K_y over load")
-    PHY1: float = _odd(0.003, "Horizontal shift of F_y at nominal load")
-    PHY2: float = _odd(-0.001, "Variation of the horizontal shift of F_y with load")
-    PVY1: float = _odd(0.045, "Vertical shift of F_y / F_z at nominal load")
-    PVY2: float = _odd(-0.024, "Variation of the vertical shift of F_y / F_z with load")
-    RBY1: float = _c(6.461, "Slope of the reduction of F_y by kappa")
-    RBY2: float = _c(4.196, "Variation of that slope with slip angle")
-    RBY3: float = _odd(-0.015, "Shift of the slip angle in RBY2")
-    RCY1: float = _c(1.081, "Shape factor of the reduction of F_y by kappa")
-    REY1: float = _c(0.0, "Curvature of the reduction of F_y by kappa")
-    REY2: float = _c(0.0, "Variation of that curvature with load")
-    RHY1: float = _c(0.009, "Shift of the reduction of F_y by kappa")
-    RHY2: float = _c(0.0, "Variation of that shift with load")
-    RVY1: float = _odd(0.053, "Side force induced by kappa, over mu_y F_z, at nominal load")
-    RVY2: float = _odd(-0.073, "Variation of the side force induced by kappa with load")
-    RVY4: float = _odd(35.44, "Decay of the side force induced by kappa with slip angle")
-    RVY5: float = _odd(1.9, "Shape of the side force induced by kappa")
-    RVY6: float = _odd(-10.71, "Slope of the side force induced by kappa")
+def _declared() -> dict[str, Any]:
+    """Declare the coefficients: those of the table of 2012, whose set is the same."""
+    rows = {name.upper(): row for name, row in (COMMON | LONGITUDINAL | REST).items()}
+    rows["PKY2"] = rows["PKY2"]._replace(minimum=0.01)
+    rows["RBY3"] = rows["RBY3"]._replace(text="Shift of the slip angle in RBY2")
+    rows["QDZ7"] = rows["QDZ7"]._replace(text="Variation of the largest residual moment with load")
+    odd = ", used with asymmetric_terms"
+    return {
+        name: rows[name]._replace(source=_BOOK).declared(rows[name].text + odd * (name in ODD.split()))
+        for name in NAMES.split()
+    }
 
-    QBZ1: float = _c(8.964, "Slope of the trail at nominal load")
-    QBZ2: float = _c(-1.106, "Variation of the slope of the trail with load")
-    QBZ3: float = _c(-0.842, "Variation of the slope of the trail with load squared")
-    QBZ9: float = _odd(18.47, "Slope of the residual moment")
-    QBZ10: float = _odd(0.0, "Slope of the residual moment with B C of F_y")
-    QCZ1: float = _c(1.180, "Shape factor of the trail")
-    QDZ1: float = _c(0.100, "Largest trail over R_0 at nominal load")
-    QDZ2: float = _c(-0.001, "Variation of the largest trail with load")
-    QDZ6: float = _odd(-0.008, "Largest residual moment over F_z R_0")
-    QDZ7: float = _odd(0.0, "Variation of the largest residual moment with load")
-    QEZ1: float = _c(-1.609, "Curvature of the trail at nominal load")
-    QEZ2: float = _c(-0.359, "Variation of the curvature of the trail with load")
-    QEZ3: float = _c(0.0, "Variation of the curvature of the trail with load squared")
-    QEZ4: float = _odd(0.174, "Difference of the curvature of the trail between left and right")
-    QHZ1: float = _odd(0.007, "Horizontal shift of the trail at nominal load")
-    QHZ2: float = _odd(-0.002, "Variation of the horizontal shift of the trail with load")
-    SSZ1: float = _odd(0.043, "Lever arm of F_x over R_0")
-    SSZ2: float = _c(0.001, "Variation of the lever arm of F_x with F_y / F_z0")
+
+MagicFormulaParameters = parameter_class(__name__, "MagicFormulaParameters", _declared(), bases=(_General,))
+"""One set for all four tyres, with stiffness scalings per axle."""
 
 
 class Coefficients(NamedTuple):
@@ -150,7 +102,7 @@ class Coefficients(NamedTuple):
     asymmetric: tuple[float, ...]  # empty when switched off
 
 
-def coefficients(p: MagicFormulaParameters, name: str) -> Coefficients:
+def coefficients(p: Any, name: str) -> Coefficients:
     """Return the set `p` made ready for the axle called "front" or "rear".
 
     Raises:

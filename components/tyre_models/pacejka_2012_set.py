@@ -13,10 +13,10 @@ resistance (QSY*: plants have their own), the decay of friction with speed (LMUV
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import make_dataclass
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from ..fmi.variables import parameter
+from ..fmi.variables import parameter, parameter_class
 
 _BOOK = "Pacejka 2012, table A3.1"
 
@@ -28,6 +28,12 @@ class _Row(NamedTuple):
     unit: str = "1"
     minimum: float | None = None
     maximum: float | None = None
+
+    def declared(self, text: str) -> Any:
+        """Declare the coefficient as a parameter with this text."""
+        return parameter(
+            self.default, self.unit, text, self.source, minimum=self.minimum, maximum=self.maximum
+        )
 
 
 def _scale(of: str) -> _Row:
@@ -240,28 +246,13 @@ RELAXATION = {
 """What the lag of forces behind slips needs beside that."""
 
 
-def of_axles(name: str, rows: dict[str, _Row], *more: tuple[str, Any], bases: tuple[type, ...] = ()) -> Any:
-    """Return a dataclass of parameters: every row for the front and for the rear axle.
-
-    Args:
-        name: of the class.
-        rows: of coefficients, by name.
-        more: (name, field) of parameters that are no coefficients.
-        bases: dataclasses to add to.
-    """
-    fields: list[tuple[str, Any, Any]] = [(key, type(value.default), value) for key, value in more]
-    for axle in ("front", "rear"):
-        for key, row in rows.items():
-            made = parameter(
-                row.default,
-                row.unit,
-                f"{row.text}, {axle} tyres",
-                row.source,
-                minimum=row.minimum,
-                maximum=row.maximum,
-            )
-            fields.append((f"{key}_{axle}", float, made))
-    return make_dataclass(name, fields, bases=bases, frozen=True, namespace={"__module__": __name__})
+def of_axles(rows: dict[str, _Row]) -> dict[str, Any]:
+    """Declare every row as a parameter of the front and of the rear axle."""
+    return {
+        f"{key}_{axle}": row.declared(f"{row.text}, {axle} tyres")
+        for axle in ("front", "rear")
+        for key, row in rows.items()
+    }
 
 
 def of_axle(p: Any, axle: str) -> Callable[[str], float]:
@@ -269,41 +260,39 @@ def of_axle(p: Any, axle: str) -> Callable[[str], float]:
     return lambda name: float(getattr(p, f"{name}_{axle}"))
 
 
-LongitudinalParameters = of_axles(
-    "LongitudinalParameters",
-    COMMON | LONGITUDINAL,
-    (
-        "reference_friction",
-        parameter(
-            1.0,
-            "1",
-            "Friction coefficient of the road the set was measured on: lambda_mu is friction over it",
-            "chosen: the papers' mu = 1 is the set as it is",
-            minimum=0.01,
-        ),
-    ),
-    (
-        "slip_angle_as_tangent",
-        parameter(
-            False,
-            None,
-            "Use tan(alpha) and sin(gamma) for alpha and gamma, as the book prints it",
-            "chosen: off, as programs do that fit and use such sets",
-        ),
-    ),
-    (
-        "file_low_friction",
-        parameter(
-            "scale",
-            None,
-            "low_friction of tyres from a property file: scale keeps the weights of the dry tyre in "
-            "combined slip, similarity scales the slips in them too",
-            "chosen: scale, as programs do that fit and use such sets",
-            choices=("scale", "similarity"),
-        ),
-    ),
+@dataclass(frozen=True)
+class _General:
+    """What is no coefficient of a tyre."""
+
+    reference_friction: float = parameter(
+        1.0,
+        "1",
+        "Friction coefficient of the road the set was measured on: lambda_mu is friction over it",
+        "chosen: the papers' mu = 1 is the set as it is",
+        minimum=0.01,
+    )
+    slip_angle_as_tangent: bool = parameter(
+        False,
+        None,
+        "Use tan(alpha) and sin(gamma) for alpha and gamma, as the book prints it",
+        "chosen: off, as programs do that fit and use such sets",
+    )
+    file_low_friction: str = parameter(
+        "scale",
+        None,
+        "low_friction of tyres from a property file: scale keeps the weights of the dry tyre in "
+        "combined slip, similarity scales the slips in them too",
+        "chosen: scale, as programs do that fit and use such sets",
+        choices=("scale", "similarity"),
+    )
+
+
+LongitudinalParameters = parameter_class(
+    __name__, "LongitudinalParameters", of_axles(COMMON | LONGITUDINAL), bases=(_General,)
 )
 """What F_x of kappa needs."""
 
-Pacejka2012Parameters = of_axles("Pacejka2012Parameters", REST, bases=(LongitudinalParameters,))
+Pacejka2012Parameters = parameter_class(
+    __name__, "Pacejka2012Parameters", of_axles(REST), bases=(LongitudinalParameters,)
+)
 """What all forces and moments need."""

@@ -33,7 +33,7 @@ from math import asin, cos, hypot, pi, sin, tan
 
 from ..cars.car import StartParameters
 from ..cars.published_cars import PaperB
-from ..fmi.variables import like, output, parameter, signal
+from ..fmi.variables import like, output, parameter, parameter_class, signal
 from ..tyre_models.pacejka_2002 import SMALLEST_LOAD
 from ..tyre_models.pacejka_2012 import longitudinal_curve, side_force, wheel_forces, whole_set
 from ..tyre_models.pacejka_2012_set import RELAXATION, Pacejka2012Parameters, of_axles
@@ -46,7 +46,7 @@ OF_SIDE = ("vertical_load_*", "inclination_angle_*")
 FIRST_STEP = 0.001
 """Step [s] for the slip stiffness until one is known; chosen: the usual one."""
 
-_Relaxation = of_axles("_Relaxation", RELAXATION, bases=(Pacejka2012Parameters,))
+_Relaxation = parameter_class(__name__, "_Relaxation", of_axles(RELAXATION), bases=(Pacejka2012Parameters,))
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,16 @@ from math import isfinite, pi, sin
 
 import pytest
 
+from components.cars.single_track_car import SingleTrackCar
 from components.references.single_track import SingleTrack
-from components.references.steady_state import (
-    SteadyState,
-    SteadyStateParameters,
-    stability_factor,
-    steady_state,
-)
+from components.references.steady_state import SteadyState, SteadyStateParameters, steady_state
 
 from .stand import Stand
+
+
+def stability_factor(p):
+    return SingleTrackCar.of(p).stability_factor()
+
 
 P = SteadyStateParameters()
 FREE = SteadyStateParameters(limited=False)

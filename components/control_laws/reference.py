@@ -1,0 +1,54 @@
+"""The base of references: the yaw rate and the sideslip asked for, and their rates.
+
+The rates are slopes of what is shown over the unit's own step, smoothed by a first-order lag
+(`mathematics.slope`), since a steering angle often comes in steps of a sensor. So they belong to limited
+references, corners included, and a jump gives a pulse of the area of the jump. They are zero at the start.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..fmi.component import Component
+from ..fmi.variables import output, parameter, signal
+from ..mathematics.slope import Slope
+
+SEEN = ("steer_angle", "velocity_x", "friction")
+SHOWN = ("yaw_rate_ref", "sideslip_ref", "yaw_acceleration_ref", "sideslip_rate_ref")
+
+
+@dataclass(frozen=True)
+class RateParameters:
+    """Of the rates."""
+
+    rate_time_constant: float = parameter(
+        0.005, "s", "Lag tau of the rates", "chosen: one sample of the controllers", minimum=0.0
+    )
+
+
+class Reference(Component):
+    """Base: what the driver asks for with the steer angle."""
+
+    inputs = ("steer_angle", "velocity_x", signal("friction", start=1.0))
+    outputs = tuple(output(name, *SEEN) for name in SHOWN)
+
+    def begin(self, u: list[float]) -> tuple[float, float]:
+        """Set the state at start time; return r_ref [rad/s] and beta_ref [rad]."""
+        raise NotImplementedError
+
+    def follow(self, h: float, u: list[float]) -> tuple[float, float]:
+        """Take the state over `h` [s]; return r_ref [rad/s] and beta_ref [rad]."""
+        raise NotImplementedError
+
+    def start(self, t: float, u: list[float]) -> None:
+        self.now = self.begin(u)
+        self.rates = [Slope(value, self.p.rate_time_constant) for value in self.now]
+
+    def advance(self, t: float, h: float, u: list[float]) -> None:
+        r, beta = self.now = self.follow(h, u)
+        self.rates[0].see(r, h)
+        self.rates[1].see(beta, h)
+
+    def output(self, t: float, u: list[float]) -> tuple[float, ...]:
+        r_rate, beta_rate = self.rates
+        return *self.now, r_rate.rate, beta_rate.rate
