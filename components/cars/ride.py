@@ -31,14 +31,14 @@ inertia, D that of the sprung mass, E = B - D; eta = theta + I_xz / A counts fro
     (I_z - I_xz^2 / A + A eta^2 - D theta^2 + E phi^2) dr - A eta ddphi + E phi ddtheta
               = M + (A - E) dphi dtheta - 2 r ((A eta - D theta) dtheta + E phi dphi)     (11)
 
-Without damping the energy `Ride.energy` changes only by the work of the contact forces. The derivation
-stands in docs/plant_fourteen_dof.md.
+Without damping the energy changes only by the work of the contact forces. The derivation stands in
+docs/plant_fourteen_dof.md.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import ceil, cos, sin, sqrt
+from math import ceil, sin, sqrt
 from typing import NamedTuple
 
 from vocabulary.gravity import G
@@ -90,38 +90,6 @@ class Ride(NamedTuple):
         body = 4.0 * (1.0 / self.m_s + self.half_track**2 / self.roll + arm * arm / self.pitch)
         wheel = 1.0 / min(self.m_f, self.m_r)
         return max(sqrt((k + self.k_t) * wheel + k * body), d * (wheel + body))
-
-    def energy(self, r: float, y: Sequence[float]) -> float:
-        """Return the energy [J] of yaw, roll, pitch and vertical motion beyond that at rest."""
-        z, phi, theta, *wheels = y[:7]
-        dz, dphi, dtheta, *speeds = y[7:]
-        a, b, t = self.a, self.b, self.half_track
-        moving = 0.5 * self.m_s * dz * dz + 0.5 * self.yaw * r * r
-        moving += (
-            0.5 * self.roll * (dphi - r * (theta + self.tilt)) ** 2
-            + 0.5 * self.pitch * (dtheta + r * phi) ** 2
-        )
-        moving -= self.yaw_sprung * (r * phi * dtheta + 0.5 * r * r * (phi * phi + theta * theta))
-        stored = self.gravity_roll * (cos(phi) - 1.0) + self.gravity_pitch * (cos(theta) - 1.0)
-        travel: list[float] = []
-        for u, du, x, side, m, load, k in zip(
-            wheels,
-            speeds,
-            (a, a, -b, -b),
-            (t, -t, t, -t),
-            (self.m_f, self.m_f, self.m_r, self.m_r),
-            (self.load_f, self.load_f, self.load_r, self.load_r),
-            (self.k_f, self.k_f, self.k_r, self.k_r),
-            strict=True,
-        ):
-            c = u - z - side * phi + x * theta
-            travel.append(c)
-            moving += 0.5 * m * du * du
-            # Static forces: N_0 of the tyre holds the wheel's weight and the suspension's static force.
-            lift = min(u, load / self.k_t)
-            stored += 0.5 * k * c * c + 0.5 * self.k_t * lift * lift - load * lift + load * u
-        fl, fr, rl, rr = travel
-        return moving + stored + 0.5 * self.s_f * (fl - fr) ** 2 + 0.5 * self.s_r * (rl - rr) ** 2
 
 
 def rates(y: Sequence[float], held: Contact, ride: Ride, lighter: float = -0.0) -> tuple[float, ...]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..mathematics.quadratic_program import Rows, inverse, multipliers
+from ..mathematics.quadratic_program import Rows, dot, inverse, multipliers
 from .linear_feedback import Matrix
 
 _ORDER = 14
@@ -93,8 +93,8 @@ class PredictiveLaw:
         ]  # z = unbound e_0 where no constraint is met
         rows += [[-value for value in row] for row in rows]  # upper bounds of all, then lower ones
         self.rows = rows
-        self.reach = [[_dot(row, line) for row in inverted] for line in rows]
-        self.p = [[_dot(up, line) for line in rows] for up in self.reach]
+        self.reach = [[dot(row, line) for row in inverted] for line in rows]
+        self.p = [[dot(up, line) for line in rows] for up in self.reach]
         for i, line in enumerate(self.p):
             if i % (2 * n) >= n:  # the sideslip's
                 line[i] += 1.0 / (w.penalty * q_beta)
@@ -115,13 +115,9 @@ class PredictiveLaw:
         highest = most / self.moment_0
         room = [highest] * len(z) + [bound - angle for angle in drift]
         room += [highest] * len(z) + [bound + angle for angle in drift]
-        y = multipliers(self.p, [b - _dot(row, z) for b, row in zip(room, self.rows, strict=True)])
+        y = multipliers(self.p, [b - dot(row, z) for b, row in zip(room, self.rows, strict=True)])
         first = z[0] - sum(y_i * reach[0] for y_i, reach in zip(y, self.reach, strict=True))
         return first * self.moment_0
-
-
-def _dot(one: list[float], other: list[float]) -> float:
-    return sum([a * b for a, b in zip(one, other, strict=True)])
 
 
 def _stepped(phi: Matrix, e: tuple[float, float]) -> tuple[float, float]:

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 from ..cars.published_cars import PaperB
 from ..fmi.variables import like, parameter
+from .moment_limit import LimitParameters, limit
 
 ERRORS = (
     "yaw_rate_ref",
@@ -45,12 +46,10 @@ class SurfaceParameters:
         -0.25, "1/s", "Weight w of the sideslip error, negative: see control_laws.sliding_surface", "chosen"
     )
     yaw_inertia: float = like(PaperB, "yaw_inertia")
-    moment_limit: float = parameter(
-        10000.0, "N.m", "Largest yaw moment", "chosen: m g d / 2, what the road can give at mu 1", minimum=0.0
+    moment_limit: float = like(
+        LimitParameters, "moment_limit", 10000.0, "chosen: m g d / 2, what the road can give at mu 1"
     )
-    fade_speed: float = parameter(
-        2.0, "m/s", "Below it the moment fades out", "chosen: walking pace", minimum=0.001
-    )
+    fade_speed: float = like(LimitParameters, "fade_speed")
 
 
 def sign(s: float) -> float:
@@ -91,14 +90,4 @@ class SlidingSurface:
         p, s = self.p, self.s
         switched = sign(s) if switching == "sign" else saturation(s, p.boundary_layer)
         moment = p.yaw_inertia * (self.equivalent + eps * switched + k_d * s)
-        return limit(moment, p.moment_limit, speed, p.fade_speed)
-
-
-def limit(moment: float, most: float, speed: float, fade_speed: float) -> float:
-    """Return `moment` [N.m] limited to +-`most`, faded out linearly below `fade_speed` [m/s].
-
-    Sideslip is a ratio of speeds: in a car that hardly moves it carries no information.
-    """
-    if speed < fade_speed:
-        moment *= max(speed, 0.0) / fade_speed
-    return min(max(moment, -most), most)
+        return limit(moment, p, speed)

@@ -19,10 +19,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..control_laws.moment_limit import LimitParameters
 from ..control_laws.sideslip_bound import sideslip_bound
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
-from .pid import PidParameters
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class DeadBandParameters:
     sideslip_gain: float = parameter(
         60000.0, "N.m/rad", "Gain k_beta beyond the limit", "chosen: the limit at 5 degrees", minimum=0.0
     )
-    moment_limit: float = like(PidParameters, "moment_limit")
+    moment_limit: float = like(LimitParameters, "moment_limit")
     release_speed: float = parameter(
         4.0, "m/s", "Below it the controller is off", "chosen: 15 km/h, usual", minimum=0.0
     )

@@ -126,18 +126,6 @@ def firing_strengths(n_1: Sequence[float], n_2: Sequence[float]) -> list[float]:
     return [p * q for p in n_1 for q in n_2]
 
 
-def network_output(
-    x: Sequence[float],
-    weights: Sequence[float],
-    centres: Sequence[Sequence[float]],
-    widths: Sequence[Sequence[float]],
-) -> float:
-    """Return u of the inputs x_1, x_2; equations (24)-(27). Centres and widths: one list per input."""
-    n_1, n_2 = map(normalised_grades, x, centres, widths)
-    u: float = sum(map(mul, firing_strengths(n_1, n_2), weights))
-    return u
-
-
 def set_gradients(
     x: Sequence[float],
     weights: Sequence[float],

@@ -21,10 +21,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..control_laws.moment_limit import LimitParameters, limit
 from ..control_laws.rule_tables import FIVE_BY_FIVE
-from ..control_laws.sliding_surface import limit
 from ..fmi.component import Component
-from ..fmi.variables import output, parameter
+from ..fmi.variables import like, output, parameter
 from ..mathematics.fuzzy import FIVE, Mamdani, Partition
 from ..mathematics.pid_loop import Pid
 
@@ -59,16 +59,13 @@ class FuzzyFeedbackParameters:
     rate_filter: float = parameter(
         0.0, "s", "Time constant smoothing the rate of the yaw-rate error", "chosen: none", minimum=0.0
     )
-    moment_limit: float = parameter(
+    moment_limit: float = like(
+        LimitParameters,
+        "moment_limit",
         6700.0,
-        "N.m",
-        "Largest yaw moment",
         "chosen: mu m g d / 2 at mu 0.5, the most that longitudinal forces could give",
-        minimum=0.0,
     )
-    fade_speed: float = parameter(
-        2.0, "m/s", "Below it the moment fades out", "chosen: walking pace", minimum=0.001
-    )
+    fade_speed: float = like(LimitParameters, "fade_speed")
 
 
 YAW_RATE = ("yaw_rate_ref", "yaw_rate")
@@ -110,4 +107,4 @@ class FuzzyFeedback(Component):
         )
         m_1 = self.moments[0] * share_r
         m_2 = self.moments[1] * share_beta
-        return limit(m_1 + m_2, p.moment_limit, u[6], p.fade_speed), m_1, m_2
+        return limit(m_1 + m_2, p, u[6]), m_1, m_2

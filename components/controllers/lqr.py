@@ -17,16 +17,16 @@ from dataclasses import dataclass
 from ..cars.published_cars import PaperA
 from ..cars.single_track_car import SingleTrackCar
 from ..control_laws.linear_feedback import error_dynamics, optimal_gains
-from ..control_laws.sliding_surface import limit
+from ..control_laws.moment_limit import LimitParameters, limit
 from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter
 from ..references.steady_state import SteadyStateParameters
-from .pid import SEEN, PidParameters
+from .pid import SEEN
 
 
 @dataclass(frozen=True)
-class SingleTrackParameters:
-    """Of the linear single-track car that the law is made for."""
+class LqrParameters:
+    """Of the linear single-track car that the law is made for; weights, by what counts alike, and limits."""
 
     mass: float = like(PaperA, "mass")
     yaw_inertia: float = like(PaperA, "yaw_inertia")
@@ -34,12 +34,6 @@ class SingleTrackParameters:
     cg_to_rear_axle: float = like(PaperA, "cg_to_rear_axle")
     cornering_stiffness_front: float = like(SteadyStateParameters, "cornering_stiffness_front")
     cornering_stiffness_rear: float = like(SteadyStateParameters, "cornering_stiffness_rear")
-
-
-@dataclass(frozen=True)
-class LqrParameters(SingleTrackParameters):
-    """Weights, by what counts alike, and limits."""
-
     sideslip_scale: float = parameter(
         0.02,
         "rad",
@@ -60,8 +54,8 @@ class LqrParameters(SingleTrackParameters):
     scheduling_speed: float = parameter(
         8.0, "m/s", "Below it the gains stay", "chosen: slower cars are not in danger", minimum=0.1
     )
-    moment_limit: float = like(PidParameters, "moment_limit")
-    fade_speed: float = like(PidParameters, "fade_speed")
+    moment_limit: float = like(LimitParameters, "moment_limit")
+    fade_speed: float = like(LimitParameters, "fade_speed")
 
 
 class Lqr(Component):
@@ -86,4 +80,4 @@ class Lqr(Component):
             moment_0=p.moment_scale,
         )
         moment = k_beta * (beta_ref - beta) + k_r * (r_ref - r)
-        return (limit(moment, p.moment_limit, speed, p.fade_speed),)
+        return (limit(moment, p, speed),)

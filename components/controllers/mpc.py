@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 from ..cars.single_track_car import SingleTrackCar
 from ..control_laws.linear_feedback import error_dynamics
+from ..control_laws.moment_limit import limit
 from ..control_laws.predictive_law import PredictiveLaw, Weights
 from ..control_laws.sideslip_bound import sideslip_bound
-from ..control_laws.sliding_surface import limit
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter, signal
 from .lqr import LqrParameters
@@ -81,4 +81,4 @@ class Mpc(Component):
         moment = self.law_at(speed).moment(
             beta, r, beta_ref, r_ref, most=p.moment_limit, bound=sideslip_bound(mu)
         )
-        return (limit(moment, p.moment_limit, speed, p.fade_speed),)
+        return (limit(moment, p, speed),)

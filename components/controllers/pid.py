@@ -15,9 +15,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from ..control_laws.sliding_surface import limit
+from ..control_laws.moment_limit import LimitParameters, limit
 from ..fmi.component import Component
-from ..fmi.variables import output, parameter
+from ..fmi.variables import like, output, parameter
 from ..mathematics.pid_loop import Gains, YawLoops
 
 
@@ -54,12 +54,8 @@ class PidParameters:
     derivative_filter: float = parameter(
         0.02, "s", "Time constant of the derivatives' filter", "chosen: a tenth of the car's own", minimum=0.0
     )
-    moment_limit: float = parameter(
-        5000.0, "N.m", "Largest yaw moment", "chosen: beyond what one wheel gives at mu 0.4", minimum=0.0
-    )
-    fade_speed: float = parameter(
-        2.0, "m/s", "Below it the moment fades out", "chosen: walking pace", minimum=0.001
-    )
+    moment_limit: float = like(LimitParameters, "moment_limit")
+    fade_speed: float = like(LimitParameters, "fade_speed")
 
 
 SEEN = ("yaw_rate_ref", "yaw_rate", "sideslip_ref", "sideslip")
@@ -101,5 +97,4 @@ class PidController(Component):
         self.moment = self.loops.moment(*self.gains, limit=self.p.moment_limit)
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
-        p = self.p
-        return limit(self.moment, p.moment_limit, u[4], p.fade_speed), self.loops.integral()
+        return limit(self.moment, self.p, u[4]), self.loops.integral()

@@ -43,6 +43,7 @@ from ..driving.track import TRACK_OUTPUTS, LaneChangeParameters, Track
 from ..fmi.component import Component
 from ..fmi.variables import like, parameter
 from ..mathematics.preview_control import discrete, tracking_gains
+from ..mathematics.quadratic_program import dot
 from .double_lane_change import DoubleLaneChangeParameters
 
 STEP = 0.03
@@ -174,8 +175,8 @@ class OptimalPreview(Component):
         level = max(v, SLOWEST)
         lower = int(level)
         share = level - lower
-        rate = sum([gain * value for gain, value in zip(self._gains(lower), seen, strict=True)])
-        above = sum([gain * value for gain, value in zip(self._gains(lower + 1), seen, strict=True)])
+        rate = dot(self._gains(lower), seen)
+        above = dot(self._gains(lower + 1), seen)
         return rate + share * (above - rate)
 
     def _gains(self, v: int) -> tuple[float, ...]:

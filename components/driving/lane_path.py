@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 from vocabulary.lane_change import Lane
 
-from ..mathematics.quadratic_program import Rows, solution
+from ..mathematics.quadratic_program import Rows, dot, solution
 from .track import Outline
 
 LEAD, TAIL = 15.0, 15.0
@@ -207,7 +207,7 @@ class _Program:
             force = here * z[k] + further * z[k + 1]
             total += self.weight * (force**POWER / POWER + 0.5 * CALM * force * force)
         for row, bound in zip(self.rows, self.bounds, strict=True):
-            lacking = _dot(row, z) - bound
+            lacking = dot(row, z) - bound
             if lacking > 0.0:
                 total += 0.5 * lacking * lacking
         return total
@@ -227,14 +227,10 @@ class _Program:
             hessian[k][k + 1] += here * further * second
             hessian[k + 1][k] += here * further * second
         for row, bound in zip(self.rows, self.bounds, strict=True):
-            lacking = _dot(row, z) - bound
+            lacking = dot(row, z) - bound
             if lacking > 0.0:
                 for i, value in enumerate(row):
                     if value:
                         slope[i] += lacking * value
                         hessian[i] = [a + value * b for a, b in zip(hessian[i], row, strict=True)]
         return slope, hessian
-
-
-def _dot(one: Sequence[float], other: Sequence[float]) -> float:
-    return sum([a * b for a, b in zip(one, other, strict=True)])

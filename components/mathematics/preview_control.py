@@ -18,9 +18,8 @@ Source: R. S. Sharp, V. Valtetsiotis, Optimal preview car steering control, Vehi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from operator import mul
 
-from .quadratic_program import Rows
+from .quadratic_program import Rows, dot
 
 ORDER = 12
 """Of the series of the matrix exponential: beyond what counts where its argument is at most 1."""
@@ -66,7 +65,7 @@ def tracking_gains(
     closed, s = phi, 1.0
     for _ in range(LONGEST):
         carried = _applied(p, gamma)
-        s = 1.0 + _dot(gamma, carried)
+        s = 1.0 + dot(gamma, carried)
         before, gains = gains, [value / s for value in _applied(across, carried)]
         closed = [
             [value - g * k for value, k in zip(row, gains, strict=True)]
@@ -82,7 +81,7 @@ def tracking_gains(
     line = [weight * value for value in c]
     ahead = []
     for _ in range(steps):
-        ahead.append(_dot(gamma, line) / s)
+        ahead.append(dot(gamma, line) / s)
         line = _applied(back, line)
     return gains, ahead
 
@@ -90,13 +89,8 @@ def tracking_gains(
 def product(one: Sequence[Sequence[float]], other: Sequence[Sequence[float]]) -> Rows:
     """Return the product of two matrices."""
     columns = list(zip(*other, strict=True))
-    return [[_dot(row, column) for column in columns] for row in one]
+    return [[dot(row, column) for column in columns] for row in one]
 
 
 def _applied(matrix: Sequence[Sequence[float]], vector: Sequence[float]) -> list[float]:
-    return [_dot(row, vector) for row in matrix]
-
-
-def _dot(one: Sequence[float], other: Sequence[float]) -> float:
-    total: float = sum(map(mul, one, other))
-    return total
+    return [dot(row, vector) for row in matrix]

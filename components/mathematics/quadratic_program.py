@@ -16,6 +16,7 @@ Model Predictive Control System Design and Implementation Using MATLAB, 2009, se
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import mul
 
 Rows = list[list[float]]
 
@@ -23,6 +24,12 @@ SWEEPS = 500
 """At most. Chosen: ten times what control of a car's yaw needs; programs without a solution end, too."""
 CLOSE = 1e-10
 """Of the largest multiplier, by which none may have moved. Chosen: far below a sensor's resolution."""
+
+
+def dot(one: Sequence[float], other: Sequence[float]) -> float:
+    """Return the sum of the products of two rows of numbers."""
+    total: float = sum(map(mul, one, other))
+    return total
 
 
 def inverse(h: Sequence[Sequence[float]]) -> Rows:
@@ -57,7 +64,7 @@ def solution(h: Sequence[Sequence[float]], g: Sequence[float]) -> list[float]:
                 rows[i + k] = [a - factor * b for a, b in zip(below, top[k:], strict=True)]
     z: list[float] = []
     for top in reversed(rows):
-        z.insert(0, (top[-1] - sum([a * b for a, b in zip(top[1:-1], z, strict=True)])) / top[0])
+        z.insert(0, (top[-1] - dot(top[1:-1], z)) / top[0])
     return z
 
 

@@ -1,4 +1,4 @@
-"""Questions to a tyre's force curve: which slip gives a force, and how steep the curve is.
+"""The question to a tyre's force curve which slip gives a force.
 
 The stable branch of F_x(kappa), at fixed slip angle, load and friction, goes from zero slip to the first
 optimum kappa_opt on either side; it may be flat near zero. Nothing else of the tyre is known here, no
@@ -24,7 +24,6 @@ SMALLEST_FORCE = 1e-6
 """Absolute error [N] of the force at the slip found, for forces near zero."""
 SLIP_TOLERANCE = 1e-3
 """Relative error of the optimum found."""
-_STEP = 1e-6  # of a central difference: truncation and rounding both below 1e-8 of a tyre's stiffness
 _GOLDEN = 0.5 * (sqrt(5.0) - 1.0)
 
 
@@ -118,20 +117,3 @@ def _optimum(rise: Callable[[float], float], low: float, high: float) -> float:
             outer = low + _GOLDEN * (high - low)
             at_outer = rise(outer)
     return 0.5 * (low + high)
-
-
-def slip_stiffness(
-    forces: Callable[[float, float], tuple[float, ...]], kappa: float, alpha: float
-) -> tuple[float, float, float, float]:
-    """Return dF_x/dkappa [N], dF_x/dalpha [N/rad], dF_y/dkappa [N], dF_y/dalpha [N/rad].
-
-    Args:
-        forces: F_x, F_y [N], and perhaps more, of kappa [1] and alpha [rad]; differenced centrally.
-        kappa, alpha: where; kappa well inside (-1, 1), alpha inside (-pi/2, pi/2).
-    """
-    x_1, y_1 = forces(kappa - _STEP, alpha)[:2]
-    x_2, y_2 = forces(kappa + _STEP, alpha)[:2]
-    x_3, y_3 = forces(kappa, alpha - _STEP)[:2]
-    x_4, y_4 = forces(kappa, alpha + _STEP)[:2]
-    per_step = 0.5 / _STEP
-    return (x_2 - x_1) * per_step, (x_4 - x_3) * per_step, (y_2 - y_1) * per_step, (y_4 - y_3) * per_step

@@ -14,7 +14,6 @@ from components.controllers.fnn import (
     Fnn,
     firing_strengths,
     initial_weights,
-    network_output,
     normalised_grades,
     set_gradients,
 )
@@ -29,6 +28,12 @@ def any_network(seed: int):
     centres = [[c + g.uniform(-0.1, 0.1) for c in CENTRES] for _ in range(2)]
     widths = [[g.uniform(0.15, 0.4) for _ in CENTRES] for _ in range(2)]
     return x, weights, centres, widths
+
+
+def network_output(x, weights, centres, widths) -> float:
+    """u of the inputs x_1, x_2 by the normalised strengths."""
+    strengths = firing_strengths(*map(normalised_grades, x, centres, widths))
+    return sum(strength * weight for strength, weight in zip(strengths, weights, strict=True))
 
 
 def rule_by_rule(x, weights, centres, widths) -> float:

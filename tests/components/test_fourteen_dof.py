@@ -24,6 +24,7 @@ from vocabulary.wheels import WHEELS
 from . import monolith, monolith_c
 from .loop import Loop, Straight
 from .magic import forces_and_moment
+from .ride_energy import energy as energy_of
 from .stand import Stand
 
 P = FourteenDofParameters()
@@ -172,10 +173,10 @@ def test_a_freely_rolling_undamped_car_keeps_its_energy():
     def energy():
         v_x, v_y, r = unit.motion[:3]
         spins = sum(0.5 * P.wheel_inertia * w * w for w in unit.spins)
-        return 0.5 * P.mass * (v_x**2 + v_y**2) + RIDE.energy(r, unit.body) + spins
+        return 0.5 * P.mass * (v_x**2 + v_y**2) + energy_of(RIDE, r, unit.body) + spins
 
     first = energy()
-    swinging, off = RIDE.energy(0.5, unit.body) - 0.5 * P.yaw_inertia * 0.25, 0.0
+    swinging, off = energy_of(RIDE, 0.5, unit.body) - 0.5 * P.yaw_inertia * 0.25, 0.0
     for _ in range(8000):
         stand.step(5e-4)
         off = max(off, abs(energy() - first) / swinging)

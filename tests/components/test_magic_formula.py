@@ -17,8 +17,8 @@ from components.tyre_models.pacejka_2002 import (
     practical_slip,
 )
 from components.tyre_models.pacejka_2002_set import MagicFormulaParameters, coefficients
-from components.tyre_models.slip_curve import slip_stiffness
 from components.tyres.magic_formula import MagicFormula
+from tests.components.slopes import slip_stiffness
 from tests.evidence import measured
 
 from .magic import forces_and_moment

@@ -12,8 +12,8 @@ from components.tyre_models.bakker_1987 import (
     coefficients_1987,
     loaded_tyre,
 )
-from components.tyre_models.slip_curve import slip_stiffness
 from components.tyres.magic_formula_1987 import MagicFormula1987
+from tests.components.slopes import slip_stiffness
 from tests.evidence import measured
 
 from .magic import forces_1987

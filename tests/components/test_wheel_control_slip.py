@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from components.control_laws.slip_control import SlipControlParameters, slip_torque, wheel_torque
 from components.plants.eight_dof import EightDof
-from components.tyre_models.slip_curve import slip_for_force, slip_stiffness
+from components.tyre_models.slip_curve import slip_for_force
 from components.tyres.dugoff import Dugoff
 from components.tyres.linear import LinearTyre
 from components.tyres.magic_formula import MagicFormula
@@ -21,6 +21,7 @@ from components.wheel_controls.slip import TYRES as KNOWN
 from components.wheel_controls.slip import Slip, SlipParameters
 
 from .loop import Loop, Straight
+from .slopes import slip_stiffness
 from .stand import Stand
 
 WHEELS = ("fl", "fr", "rl", "rr")

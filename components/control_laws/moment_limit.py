@@ -1,0 +1,31 @@
+"""What bounds a yaw moment: a largest one, and walking pace, where sideslip means nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ..fmi.variables import parameter
+
+
+@dataclass(frozen=True)
+class LimitParameters:
+    """Of the limits."""
+
+    moment_limit: float = parameter(
+        5000.0, "N.m", "Largest yaw moment", "chosen: beyond what one wheel gives at mu 0.4", minimum=0.0
+    )
+    fade_speed: float = parameter(
+        2.0, "m/s", "Below it the moment fades out", "chosen: walking pace", minimum=0.001
+    )
+
+
+def limit(moment: float, p: Any, speed: float) -> float:
+    """Return `moment` [N.m] within the limits of `p` at `speed` [m/s]; below `fade_speed` it fades linearly.
+
+    Sideslip is a ratio of speeds: in a car that hardly moves it carries no information.
+    """
+    if speed < p.fade_speed:
+        moment *= max(speed, 0.0) / p.fade_speed
+    most: float = p.moment_limit
+    return min(max(moment, -most), most)
