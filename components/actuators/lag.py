@@ -9,8 +9,8 @@ so braking is regenerative up to the motor's limit, and friction does the rest.
 
 How delay and lag are solved exactly, whatever the step: `mathematics.first_order_lag`.
 
-Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, equations
-(14), (15). Erratum: printed with exp(+k s), which would be an advance. The paper names no values.
+Source: paper B, equations (14), (15). Erratum: printed with exp(+k s), which would be an advance. The paper
+names no values.
 """
 
 from __future__ import annotations

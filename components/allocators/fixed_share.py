@@ -6,8 +6,7 @@
 so sum(F_i arm_i) = M_z; see `control_laws.moment_sharing` for arms near zero, `control_laws.allocator` for
 the driver's force.
 
-Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
-FNN, section 3.3: "equal distribution", s_i = 1/4. Ours differs: the shares are parameters.
+Source: paper A, section 3.3: "equal distribution", s_i = 1/4. Ours differs: the shares are parameters.
 """
 
 from __future__ import annotations

@@ -11,9 +11,8 @@ asks for no force; a negative load counts as none.
 between its front and rear wheel in proportion to their loads (`control_laws.side_forces`; paper B, equation
 (29) without the factor 1/2 that contradicts (25), (26)).
 
-Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
-FNN, equations (36)-(39). Errata: the front-left arm is printed with the wrong sign of a sin(delta);
-(38), (39) give both rear wheels the same sign; "2d" is 2/d.
+Source: paper A, equations (36)-(39). Errata: the front-left arm is printed with the wrong sign of a
+sin(delta); (38), (39) give both rear wheels the same sign; "2d" is 2/d.
 """
 
 from __future__ import annotations

@@ -2,8 +2,7 @@
 
 The law stands in `control_laws.side_forces`; the driver's force: `control_laws.allocator`.
 
-Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, equations
-(25)-(28).
+Source: paper B, equations (25)-(28).
 """
 
 from __future__ import annotations

@@ -20,10 +20,9 @@ oversteer, and left and right are alike.
 Dead band with hysteresis: braking begins when |M| and |dr| both exceed their thresholds, and ends when
 one of them falls below `release_share` of its own.
 
-Source: Nie, Xiong, Pan, Multi-condition co-simulations of vehicle stability control via fuzzy PID
-algorithm, Journal of Dynamics and Control 19(3), 2021, table 3, equations (7)-(9). Erratum: (7)-(9) share
-the moment between two wheels, which would give the single wheel of section 2.3 only half. Ours differs:
-the true arm, the guard, straight ahead, the dead band.
+Source: paper C, table 3, equations (7)-(9). Erratum: (7)-(9) share the moment between two wheels, which would
+give the single wheel of section 2.3 only half. Ours differs: the true arm, the guard, straight ahead, the
+dead band.
 """
 
 from __future__ import annotations

@@ -11,8 +11,7 @@ changes its force by n a sin(delta) / (d/2), 6 % at 0.09 rad on paper B's car wi
 moment of the longitudinal forces; what lateral force the tyres lose to them is the controller's
 business, as in the paper.
 
-Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, equations
-(25)-(29); which of the two readings it means is open, its table 3 fits the second.
+Source: paper B, equations (25)-(29); which of the two readings it means is open, its table 3 fits the second.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ The sign of w. On s = 0 with saturated tyres the sideslip obeys
 dbeta/dt = a_y / v - r_ref + w (beta - beta_ref): w > 0 drives it away, w < 0 brings it back. In
 ISO axes w is therefore negative (or zero); the paper does not say.
 
-Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, section 2.1.
+Source: paper B, section 2.1.
 """
 
 from __future__ import annotations

@@ -20,10 +20,9 @@ slip target; both fade in linearly. While braking, the torque is never more than
 within one sample. In reverse only positive torque is used, only to brake: negative torque is
 friction to every plant.
 
-Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, equations (31)-(38).
-Ours differs: sat for the sign in (36), which would chatter at every sample; the cap (with combined slip
-the optimum grows with slip angle, at mu 0.3 from 0.05 at 0 to 0.9 at 15 degrees, and then protects
-nothing); the fades.
+Source: paper B, equations (31)-(38). Ours differs: sat for the sign in (36), which would chatter at every
+sample; the cap (with combined slip the optimum grows with slip angle, at mu 0.3 from 0.05 at 0 to 0.9 at 15
+degrees, and then protects nothing); the fades.
 """
 
 from __future__ import annotations

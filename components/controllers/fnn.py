@@ -26,11 +26,10 @@ initial value, by |e|, and cures that (0.1: 13 %, unchanged in the paper's runs)
 Narendra, A. M. Annaswamy, IEEE Trans. Automatic Control 32(2), 1987, 134-145. The paper has
 none, so it is off by default.
 
-Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
-FNN, equations (22)-(35). Errata: (24) lacks the minus and the text swaps the names of centre
-and width; the gradients print "e2" for e, a product over "j != i" that is the other input's
-grade, and lack the derivative of the normalisation; (35) prints d/db for d/dsigma; (32) makes
-J = sign(e / dM_z) 5.5e-4, which is no estimate of de/dM_z and loses the car: J is a constant here.
+Source: paper A, equations (22)-(35). Errata: (24) lacks the minus and the text swaps the names of centre and
+width; the gradients print "e2" for e, a product over "j != i" that is the other input's grade, and lack the
+derivative of the normalisation; (35) prints d/db for d/dsigma; (32) makes J = sign(e / dM_z) 5.5e-4, which is
+no estimate of de/dM_z and loses the car: J is a constant here.
 """
 
 from __future__ import annotations

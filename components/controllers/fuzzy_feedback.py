@@ -12,8 +12,7 @@ de_r/dt is the difference of two samples of e_r (smoothed by `rate_filter`): it 
 sample before, divided by I_z. So k_c1 k_u1 / I_z times the slope of f along its second input must stay
 well below one, or the moment chatters from sample to sample; with the defaults it is about 0.1.
 
-Source: Xie, Li, Zheng, Pei, Synthesized feedback control of the ESP system based on fuzzy
-technology, section 3. Its tables 1, 2 and all factors were lost or not given: see
+Source: paper D, section 3. Its tables 1, 2 and all factors were lost or not given: see
 `control_laws.rule_tables`, and chosen values below.
 """
 

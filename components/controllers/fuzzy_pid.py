@@ -10,8 +10,7 @@ The table read. Its dK_p is antisymmetric: as printed, gains rise for e < 0 and 
 right turns differ. By default it is therefore read at (-|e|, -sign(e) de/dt), the side on which gains
 rise with the error and with its growth; `printed` reads it at (e, de/dt).
 
-Source: Nie, Xiong, Pan, Multi-condition co-simulations of vehicle stability control via fuzzy PID
-algorithm, Journal of Dynamics and Control 19(3), 2021, section 2.2, table 2; ranges are not given.
+Source: paper C, section 2.2, table 2; ranges are not given.
 """
 
 from __future__ import annotations

@@ -7,8 +7,7 @@ f is a Mamdani system (min, max, centroid) of seven triangular sets per variable
 rule table. A positive moment lowers beta, so the output is negated. f reaches +-8/9, the centroid of
 the outermost set.
 
-Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
-FNN, section 3, which names neither table nor ranges.
+Source: paper A, section 3, which names neither table nor ranges.
 
 Chosen ranges. The moment range is the moment limit of `fnn`, so that both may ask for the same. Over a
 grid of 9 x 9 (0.0025 to 0.04 rad, 0.025 to 0.4 rad/s, factor sqrt 2) the error ranges are those with

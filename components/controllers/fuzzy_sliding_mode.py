@@ -5,8 +5,7 @@ system with five sets per variable sets eps and k_d from |delta| and mu by one t
 gains on a slippery road and going straight, where a strong law only shakes the car, large ones in a
 sharp turn on a good road. The centroid spans about 0.08 to 0.92 of each gain's range.
 
-Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, section 2.1,
-table 2. Ranges, sets and boundary layer are not given there: chosen.
+Source: paper B, section 2.1, table 2. Ranges, sets and boundary layer are not given there: chosen.
 """
 
 from __future__ import annotations

@@ -6,8 +6,7 @@ A positive moment raises the yaw rate and lowers the sideslip. How the loops int
 and share their limit: `mathematics.pid_loop`. The moment fades out below walking pace, where sideslip
 means nothing.
 
-Source: Nie, Xiong, Pan, Multi-condition co-simulations of vehicle stability control via fuzzy PID
-algorithm, Journal of Dynamics and Control 19(3), 2021, section 2.1, which names no gains.
+Source: paper C, section 2.1, which names no gains.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ The law stands in `control_laws.sliding_surface`. Its switching function is the 
 baseline, or the saturation of equation (24) with the same constant gains: the second shows how
 much of the fuzzy controller's calm the boundary layer alone achieves.
 
-Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, section 2.1.
+Source: paper B, section 2.1.
 """
 
 from __future__ import annotations

@@ -5,8 +5,7 @@
 
 A ramp time of zero makes it a step. The speed is held by default (`driving.speed_holding`).
 
-Source: Nie, Xiong, Pan, Multi-condition co-simulations of vehicle stability control via fuzzy PID
-algorithm, Journal of Dynamics and Control 19(3), 2021, section 3.3: 1.5 rad, reached in 2 s.
+Source: paper C, section 3.3: 1.5 rad, reached in 2 s.
 """
 
 from __future__ import annotations

@@ -12,9 +12,7 @@ Two loops for yaw stability share one limit:
 
 A positive moment raises the yaw rate and lowers the sideslip, hence the order of the second difference.
 
-Source: Nie, Xiong, Pan, Multi-condition co-simulations of vehicle stability control via fuzzy PID
-algorithm, Journal of Dynamics and Control 19(3), 2021, section 2.1, whose block diagram leaves that sign
-open and names neither filter nor limit.
+Source: paper C, section 2.1, whose block diagram leaves that sign open and names neither filter nor limit.
 """
 
 from __future__ import annotations

@@ -18,11 +18,10 @@ camber for tyres that take it: `cars.roll_camber`.
 Ours differs: rolling resistance is a moment on each wheel (`cars.resistance`), where the paper has a force
 m g f on the body in (2). Free wheels slow the car alike; of driven ones the tyres carry m g f less.
 
-Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, equations (1)-(4),
-(8)-(13). Errata: (2) prints m_s h_s dphi, whose units are wrong, and adds xi m dv_x with xi = 1.04,
-which would double the mass (here the excess alone, 0: the wheels' inertia is in (8)); C_D A V^2 / 21.15
-is for km/h; the printed roll stiffness 5600 lies barely above m_s g h_s. The paper numbers the wheels
-fl, fr, rr, rl.
+Source: paper B, equations (1)-(4), (8)-(13). Errata: (2) prints m_s h_s dphi, whose units are wrong, and adds
+xi m dv_x with xi = 1.04, which would double the mass (here the excess alone, 0: the wheels' inertia is in
+(8)); C_D A V^2 / 21.15 is for km/h; the printed roll stiffness 5600 lies barely above m_s g h_s. The paper
+numbers the wheels fl, fr, rr, rl.
 
 How it couples, and why nothing but the front wheels' slip depends directly on an input: as in
 `plants.seven_dof`. The equations stand in `cars.rolling_body`. How they are solved over a step with

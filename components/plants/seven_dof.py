@@ -13,10 +13,9 @@ with a_x = X / m, a_y = Y / m; inclines and wind add theirs (`cars.road_plane`).
 load; the other wheel of its axle then carries the axle, so the loads always add up to m g. Roll, pitch and
 suspension are left out.
 
-Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
-FNN, equations (5)-(8), (13)-(20). Ours differs: the lifted wheel; slips at rest, see
-`cars.wheel_kinematics`. Errata: (7) prints the rear-track term with the opposite sign;
-(13)-(16) print sideslip for yaw rate; (17), (18) print b where a is meant.
+Source: paper A, equations (5)-(8), (13)-(20). Ours differs: the lifted wheel; slips at rest, see
+`cars.wheel_kinematics`. Errata: (7) prints the rear-track term with the opposite sign; (13)-(16) print
+sideslip for yaw rate; (17), (18) print b where a is meant.
 
 How it couples. Tyre forces and wheel torques enter the integration only: they are held over the
 step, and a master that knows this hands over their values at its middle. The steer angle feeds

@@ -14,8 +14,7 @@ A bank and wind act as `cars.road_plane` says; on a slope, too, something holds 
 Whatever holds v_x does work: a car that spins gains speed here, v_x / cos(beta), at 60 degrees of sideslip
 twice its own. Beyond some 20 degrees the model says that the car is lost, not how it moves.
 
-Source: Xie, Li, Zheng, Pei, Synthesized feedback control of the ESP system based on fuzzy technology,
-2-DOF model with four wheels. The height h is the paper's 0.5 m.
+Source: paper D, 2-DOF model with four wheels. The height h is the paper's 0.5 m.
 
 How it couples. Tyre forces and the yaw moment enter the integration only, at the middle of the step; the
 steer angle feeds the front slip angles directly. The lateral acceleration, known at the middle of each

@@ -14,9 +14,7 @@ The model takes the steer angle and the speed in a straight line from the last v
 Below `low_speed`, where its time constants vanish, it runs at that speed and the yaw rate is scaled
 down with the true one; a car that stands or rolls backwards is asked for none.
 
-Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, equations
-(16)-(18); Xie, Li, Zheng, Pei, Synthesized feedback control of the ESP system based on fuzzy
-technology, equation (3).
+Source: paper B, equations (16)-(18); paper D, equation (3).
 """
 
 from __future__ import annotations

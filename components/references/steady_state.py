@@ -12,10 +12,9 @@ beta_1 / delta crosses zero at v_x^2 = b C_r L / (m a) (16 m/s for the car of pa
 its limit. An oversteering car (K < 0) has no steady state from v_x^2 = -1 / K on: there
 1 + K v_x^2 is held at `SMALLEST` and the limits, if on, take over.
 
-Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
-FNN, equations (1)-(4). Errata: (3), (4) mix both sign conventions of cornering stiffness; (2)
-lacks r in m (dv_y/dt + v_x r). Ours differs: |v_x|, so that a car rolling backwards has its own
-steady state; beta_max, which the paper leaves open.
+Source: paper A, equations (1)-(4). Errata: (3), (4) mix both sign conventions of cornering stiffness; (2)
+lacks r in m (dv_y/dt + v_x r). Ours differs: |v_x|, so that a car rolling backwards has its own steady state;
+beta_max, which the paper leaves open.
 """
 
 from __future__ import annotations

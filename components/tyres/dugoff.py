@@ -13,8 +13,7 @@ so a locked or sideways sliding wheel has exactly mu F_z against its sliding, an
 against its travel (kappa < -1) slides like a locked one. c is positive also for a wheel that rolls
 backwards, |alpha| > 90 degrees.
 
-Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
-FNN, equations (9)-(12); H. Dugoff, P. S. Fancher, L. Segel, SAE 700377, 1970. Erratum: (10)
+Source: paper A, equations (9)-(12); H. Dugoff, P. S. Fancher, L. Segel, SAE 700377, 1970. Erratum: (10)
 prints cos(alpha) for tan(alpha); slip is positive when driving, as (9) needs.
 """
 

@@ -2,8 +2,7 @@
 
     T_i = F_i R,    |T_i| <= T_max
 
-Source: Yuan, Chen, Huang, Shi, Adaptive lateral stability control of electric vehicle based on
-FNN, section 3.3. Ours differs: the motor's limit, which the paper leaves open.
+Source: paper A, section 3.3. Ours differs: the motor's limit, which the paper leaves open.
 """
 
 from __future__ import annotations

@@ -11,8 +11,7 @@ slip, so a wheel does not lock; it fades out at walking pace, where slip means n
 A request holds from the communication point at which it arrives, so pressure never follows it at the
 same instant; the driving part does.
 
-Source: Nie, Xiong, Pan, Multi-condition co-simulations of vehicle stability control via fuzzy PID
-algorithm, Journal of Dynamics and Control 19(3), 2021, equations (10), (11); no value is given there.
+Source: paper C, equations (10), (11); no value is given there.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ The law is described in `control_laws.slip_control`. It needs the tyre's F_x(kap
 angle, load and friction; this unit evaluates the very functions that the tyre units evaluate, so no table is
 typed in. Give it the same parameters as the tyre, as a scenario's vehicle file does by itself.
 
-Source: Vehicle yaw stability control based on fuzzy sliding mode direct yaw moment, equations (31)-(38).
+Source: paper B, equations (31)-(38).
 """
 
 from __future__ import annotations
