@@ -10,8 +10,6 @@ remark, and so is what follows a `#`. Values are apart by commas, semicolons or 
 interpolated along x and y; outside the table the road has its friction elsewhere.
 """
 
-from __future__ import annotations
-
 import re
 from bisect import bisect_right
 from math import isfinite

@@ -1,6 +1,4 @@
 """The acceleration of gravity that all units and everything that judges them count with."""
 
-from __future__ import annotations
-
 G = 9.81
 """Acceleration of gravity, rounded as the papers do [m/s2]."""

@@ -16,8 +16,6 @@ lane-change; ISO 3888-2, Part 2: Obstacle avoidance, where the place of lane 5 i
 transitions of another length, for speeds that a slippery road does not bear on the standard's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import copysign
 from typing import Any, NamedTuple

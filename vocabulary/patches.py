@@ -12,8 +12,6 @@ friction of its own has that which its road has for patches. A later patch lies 
 Coordinates are those of the road [m], x = y = 0 where the car begins; the lower edge belongs to the patch.
 """
 
-from __future__ import annotations
-
 import re
 from math import isfinite
 from typing import NamedTuple

@@ -4,8 +4,6 @@ Axes and signs are those of ISO 8855: x forward, y left, z up; angles and moment
 counter-clockwise seen from above. `*` stands for the four wheels fl, fr, rl, rr.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 

@@ -5,8 +5,6 @@ The spellings are those of the interface contract; nothing else is accepted, so 
 error in a unit is found when the class is read, not when a wire is checked.
 """
 
-from __future__ import annotations
-
 import math
 
 UNITS: dict[str, dict[str, int]] = {

@@ -4,8 +4,6 @@ A parameter of a unit that bears one of these names means the same and has
 the same unit of measurement.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 

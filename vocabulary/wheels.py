@@ -1,7 +1,5 @@
 """The four wheels of a car: their names, their order, what a `*` in a signal's name stands for."""
 
-from __future__ import annotations
-
 Four = tuple[float, float, float, float]
 """A number for each wheel, in the order of `WHEELS`."""
 

@@ -13,8 +13,6 @@ Source: paper B, equations (14), (15). Erratum: printed with exp(+k s), which wo
 names no values.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..fmi.component import Component

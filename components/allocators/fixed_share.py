@@ -9,8 +9,6 @@ the driver's force.
 Source: paper A, section 3.3: "equal distribution", s_i = 1/4. Ours differs: the shares are parameters.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from vocabulary.wheels import Four

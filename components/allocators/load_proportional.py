@@ -15,8 +15,6 @@ Source: paper A, equations (36)-(39). Errata: the front-left arm is printed with
 sin(delta); (38), (39) give both rear wheels the same sign; "2d" is 2/d.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from vocabulary.wheels import Four, wheels

@@ -14,8 +14,6 @@ Source: chosen: what delays the build-up of yaw moment in anti-lock brakes on sp
 controller's moment in place of a fixed delay.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from vocabulary.wheels import Four

@@ -5,8 +5,6 @@ The law stands in `control_laws.side_forces`; the driver's force: `control_laws.
 Source: paper B, equations (25)-(28).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from vocabulary.wheels import Four

@@ -25,8 +25,6 @@ give the single wheel of section 2.3 only half. Ours differs: the true arm, the 
 dead band.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from vocabulary.wheels import Four

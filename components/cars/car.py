@@ -19,8 +19,6 @@ carried to the step's end (`mathematics.carry`) and handed to `finish`.
 Front wheels turn with the steer angle, so their slips and velocities follow it at the same instant.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan2, cos, sin

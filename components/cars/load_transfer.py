@@ -7,8 +7,6 @@ A wheel that lifts has no load; the other wheel of its axle then carries the axl
 add up to m g.
 """
 
-from __future__ import annotations
-
 from typing import Protocol
 
 from vocabulary.gravity import G

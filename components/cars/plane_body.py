@@ -13,8 +13,6 @@ acceleration, taken by Gauss's rule with two points, so a step is exact to fourt
 without force keeps its speed to the last bit but rounding.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import cos, sin
 from typing import Protocol

@@ -1,7 +1,5 @@
 """The cars of the papers, as far as several units know them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..fmi.variables import like, of_car

@@ -10,8 +10,6 @@ torque overcomes it, and the tyre then carries that much less. A car at rest sta
 weight from axle to axle, about a thousandth.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..fmi.variables import of_car

@@ -35,8 +35,6 @@ Without damping the energy changes only by the work of the contact forces. The d
 docs/plant_fourteen_dof.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import ceil, sin, sqrt
 from typing import NamedTuple

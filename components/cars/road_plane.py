@@ -10,8 +10,6 @@ bend of the same side force. Loads add up to m g_n. The wind F_w is taken to act
 of the centre of mass, M_w / F_w before it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import sin, sqrt
 from typing import NamedTuple

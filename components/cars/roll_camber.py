@@ -12,8 +12,6 @@ lifts one side. Left out: camber by heave, by steering (caster, kingpin), by for
 rest.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from vocabulary.wheels import Four

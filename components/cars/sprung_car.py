@@ -1,7 +1,5 @@
 """The parameters of a car with a sprung body, and what `cars.ride` needs of them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from vocabulary.gravity import G

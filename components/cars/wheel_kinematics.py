@@ -14,8 +14,6 @@ Every expression treats left and right by the same operations: mirrored motion g
 results to the last bit.
 """
 
-from __future__ import annotations
-
 from math import atan2, cos, sin, sqrt
 
 from vocabulary.wheels import Four

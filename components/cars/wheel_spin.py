@@ -37,8 +37,6 @@ exactness of the slip's own fast motion for stability; at higher speed or smalle
 and nothing is changed.
 """
 
-from __future__ import annotations
-
 from math import expm1
 
 BEARABLE = 0.6

@@ -4,8 +4,6 @@ The driver's force is equal left and right on each axle, as from one pedal, and 
 for: with steered front wheels it turns the car by itself, as it does without any control.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 

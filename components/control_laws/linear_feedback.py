@@ -20,8 +20,6 @@ Quadratic Methods, 1990, section 5.2 (return difference); scales 1 / x_0^2 as we
 Y.-C. Ho, Applied Optimal Control, 1975, section 5.2.
 """
 
-from __future__ import annotations
-
 from math import copysign, sqrt
 
 from ..cars.single_track_car import SingleTrackCar

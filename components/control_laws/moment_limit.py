@@ -1,7 +1,5 @@
 """What bounds a yaw moment: a largest one, and walking pace, where sideslip means nothing."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

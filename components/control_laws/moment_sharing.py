@@ -8,8 +8,6 @@ with the arm, without a jump, and the sum stays M_z. Only where the others had n
 so that less than `LEAST_CARRIED` of the shares is left, the sum falls short of M_z.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from vocabulary.wheels import Four

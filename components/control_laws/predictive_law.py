@@ -10,8 +10,6 @@ least, with |M| at most the limit. |beta| at the end of each value beyond its bo
 `penalty` times the square of the excess over beta_0: a wish, since no moment may be enough to hold it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..mathematics.quadratic_program import Rows, dot, inverse, multipliers

@@ -5,8 +5,6 @@ The rates are slopes of what is shown over the unit's own step, smoothed by a fi
 references, corners included, and a jump gives a pulse of the area of the jump. They are zero at the start.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..fmi.component import Component

@@ -3,8 +3,6 @@
 Rows stand for the error, columns for its rate, both from NB to PB.
 """
 
-from __future__ import annotations
-
 STANDARD = """
     NB NB NB NS Z
     NB NB NS Z  PS

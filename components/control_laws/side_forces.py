@@ -14,8 +14,6 @@ business, as in the paper.
 Source: paper B, equations (25)-(29); which of the two readings it means is open, its table 3 fits the second.
 """
 
-from __future__ import annotations
-
 from vocabulary.wheels import Four
 
 from .moment_sharing import share_moment

@@ -6,8 +6,6 @@ Source: R. Rajamani, Vehicle Dynamics and Control, 2nd edition, equation (8.14),
 up to which a tyre answers the driver; equation (18) of paper B is the same.
 """
 
-from __future__ import annotations
-
 from math import atan
 
 from vocabulary.gravity import G

@@ -11,8 +11,6 @@ ISO axes w is therefore negative (or zero); the paper does not say.
 Source: paper B, section 2.1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -25,8 +25,6 @@ sample; the cap (with combined slip the optimum grows with slip angle, at mu 0.3
 degrees, and then protects nothing); the fades.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..cars.published_cars import PaperB

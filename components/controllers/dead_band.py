@@ -15,8 +15,6 @@ the slip of each wheel is held by the wheel control (`wheel_control_slip`, `whee
 where Bosch's controller gives slip targets itself.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..control_laws.moment_limit import LimitParameters

@@ -32,8 +32,6 @@ derivative of the normalisation; (35) prints d/db for d/dsigma; (32) makes J = s
 no estimate of de/dM_z and loses the car: J is a constant here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import dist, tanh

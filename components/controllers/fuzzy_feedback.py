@@ -16,8 +16,6 @@ Source: paper D, section 3. Its tables 1, 2 and all factors were lost or not giv
 `control_laws.rule_tables`, and chosen values below.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..control_laws.moment_limit import LimitParameters, limit

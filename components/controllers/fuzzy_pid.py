@@ -13,8 +13,6 @@ rise with the error and with its growth; `printed` reads it at (e, de/dt).
 Source: paper C, section 2.2, table 2; ranges are not given.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..control_laws.rule_tables import PID_GAINS

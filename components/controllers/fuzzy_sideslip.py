@@ -17,8 +17,6 @@ narrower ranges (0.0025 rad, 0.05 rad/s) come close to `fnn`; wide ones (0.02 ra
 the error, which is nearer to the baseline that the paper shows.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..fmi.component import Component

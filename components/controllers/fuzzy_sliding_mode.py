@@ -8,8 +8,6 @@ sharp turn on a good road. The centroid spans about 0.08 to 0.92 of each gain's 
 Source: paper B, section 2.1, table 2. Ranges, sets and boundary layer are not given there: chosen.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..control_laws.sliding_surface import ERRORS, SURFACE, SlidingSurface, SurfaceParameters

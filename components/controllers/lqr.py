@@ -10,8 +10,6 @@ A baseline, not a paper's controller. The limit comes after the law, so at the l
 `controllers.mpc` knows of it beforehand.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..cars.published_cars import PaperA

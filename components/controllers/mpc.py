@@ -10,8 +10,6 @@ bound is that of `control_laws.sideslip_bound`. The car is linear at every speed
 A baseline, not a paper's controller.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..cars.single_track_car import SingleTrackCar

@@ -1,7 +1,5 @@
 """No control: the yaw moment is always zero, so the car answers as it would by itself."""
 
-from __future__ import annotations
-
 from ..fmi.component import Component
 
 

@@ -9,8 +9,6 @@ means nothing.
 Source: paper C, section 2.1, which names no gains.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 

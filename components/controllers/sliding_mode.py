@@ -7,8 +7,6 @@ much of the fuzzy controller's calm the boundary layer alone achieves.
 Source: paper B, section 2.1.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..control_laws.sliding_surface import ERRORS, SURFACE, SlidingSurface, SurfaceParameters

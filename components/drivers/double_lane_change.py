@@ -17,8 +17,6 @@ Source: the single-point preview of C. C. MacAdam, IEEE Trans. Systems, Man, and
 393-399, with an arc in place of an optimal control. Paper C does not describe CarSim's driver.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import cos, sin
 

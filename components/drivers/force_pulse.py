@@ -8,8 +8,6 @@ The pulse begins and ends at once, as a panic stop does. What the car cannot car
 road has less grip, is the business of wheel control and tyres. A steer time of zero makes it a step.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..driving.hand_wheel import ramp

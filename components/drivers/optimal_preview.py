@@ -27,8 +27,6 @@ Seitenkräfte am rollenden Luftreifen, VDI-Zeitschrift 96, 1954. Path and driver
 ours.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from math import copysign, cos, sin

@@ -8,8 +8,6 @@ A ramp time of zero makes it a step. The speed is held by default (`driving.spee
 Source: paper C, section 3.3: 1.5 rad, reached in 2 s.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..driving.hand_wheel import HandWheelDriver, SteeringParameters, ramp

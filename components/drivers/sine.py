@@ -7,8 +7,6 @@ With the default steering ratio of one the amplitude is that of the road wheels.
 `speed_gain` says so (`driving.speed_holding`).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

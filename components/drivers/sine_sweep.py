@@ -7,8 +7,6 @@ Source: after ISO 7401, Road vehicles - Lateral transient response test methods:
 input, 0.2 Hz to at least 2 Hz, from memory of the standard.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

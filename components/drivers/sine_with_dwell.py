@@ -12,8 +12,6 @@ Source: UN Global Technical Regulation No. 8 and UN Regulation No. 140, Electron
 systems: 0.7 Hz, a pause of 500 ms, coasting in the highest gear at 80 km/h; likewise FMVSS 126.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

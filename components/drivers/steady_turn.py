@@ -11,8 +11,6 @@ Source: after ISO 7975 (braking in a turn) and ISO 9816 (power-off in a turn), o
 standards: 100 m, 5 m/s2 of lateral acceleration, the hand wheel held.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import sqrt
 

@@ -6,8 +6,6 @@ A manoeuvre is one function of time. Stimuli live in a unit, not in the master, 
 every instant and not quantised to whole communication steps. The speed: `driving.speed_holding`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import inf
 from typing import Any

@@ -17,8 +17,6 @@ sideslip beta = c y'' of a steady turn. The sum is convex; Newton's method finds
 Source: ours. The forces are those of the single-track car whose sideslip changes slowly.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import NamedTuple

@@ -11,8 +11,6 @@ make no algebraic loop. A driver who holds the speed accelerates or lets go, but
 Paper C's runs are "at a constant 90 km/h"; the paper does not say how.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import inf
 

@@ -6,8 +6,6 @@ along the middles of lanes 1 and 5 and, in lane 3, at the lane offset from lane 
 half cosine. Paper C names neither path nor lanes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import cos, hypot, pi, sin
 from typing import NamedTuple

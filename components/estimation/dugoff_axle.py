@@ -6,8 +6,6 @@
 Source: that of `tyres.dugoff`, equations (10)-(12) with kappa = 0.
 """
 
-from __future__ import annotations
-
 from math import tan
 
 

@@ -24,8 +24,6 @@ There is no output `friction_*`: by its name it would drive the tyres of a scena
 believes is not the road. Connect `friction` to who has to know it by wheel.
 """
 
-from __future__ import annotations
-
 from math import atan2
 
 from vocabulary.wheels import wheels

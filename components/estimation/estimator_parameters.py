@@ -1,7 +1,5 @@
 """What all estimators are told: the car, as a control unit knows it, and how far signals are trusted."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..cars.published_cars import PaperB

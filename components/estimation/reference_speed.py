@@ -17,8 +17,6 @@ chapter on vehicle parameters and states (weighted wheel speeds and integrated a
 distance, without fuzzy rules.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import cos, sin
 

@@ -21,8 +21,6 @@ observed together, H. F. Grip et al., Vehicle sideslip estimation, IEEE Control 
 36-52. Ours has other tyres and another gain, and adds the share and (4) to (6).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import atan2, cos
 

@@ -9,8 +9,6 @@ A zero point of the accelerometer is also what a bank of the road gives. What is
 does not have more.
 """
 
-from __future__ import annotations
-
 from .estimator_parameters import EstimatorParameters
 
 

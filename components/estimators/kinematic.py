@@ -11,8 +11,6 @@ Zero points, roll compensation, speed, slips and loads: `estimation.estimator`.
 Source: the equation of lateral motion, (1) of `plants.two_dof` solved for the velocity; the washout chosen.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..estimation.estimator import Estimator

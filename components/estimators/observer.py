@@ -8,8 +8,6 @@ Tuned once, the same for all cars: the spread of a_y stands for what a single tr
 combined slip, another tyre law), not for the sensor's noise. Limits and what it reaches: docs/estimators.md.
 """
 
-from __future__ import annotations
-
 from ..estimation.estimator import OUTPUTS, Estimator
 from ..estimation.single_track_filter import FilterParameters, SingleTrackFilter
 from ..fmi.variables import signal

@@ -11,8 +11,6 @@ Inputs are the true values, named `*_true`, as those of sensors: `{from: plant.*
 Source: sampling and latency as in `sensing.channel`, equation (4) there.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from vocabulary.signals import SIGNALS

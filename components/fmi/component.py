@@ -27,8 +27,6 @@ What PythonFMU 0.7.0 makes necessary, and is done here once for all:
   not search ever more folders.
 """
 
-from __future__ import annotations
-
 import copy
 import os
 import pickle

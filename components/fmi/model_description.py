@@ -5,8 +5,6 @@ and the ability to save the state. The GUID and the date are filled in by the bu
 them from the content.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement
 

@@ -5,8 +5,6 @@ stands in gives its role, folder and file name together the name of its FMU:
 `controllers/fnn.py` becomes `controller_fnn`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

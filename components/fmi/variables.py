@@ -5,8 +5,6 @@ the signal dictionary, or signals of the component's own (`signal`), outputs say
 which inputs they depend directly at the same instant. `*` in a name stands for the four wheels.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, make_dataclass, replace
 from typing import Any

@@ -12,8 +12,6 @@ A line knows nothing of jumps: where a torque steps it would carry the forces pa
 reach. So what is added to the last value is limited (`limited`), which leaves smooth courses alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 Values = Sequence[float]

@@ -8,8 +8,6 @@ slower), so nothing is integrated numerically: the delay may be any time, no mul
 and a request held over two half steps gives what it gives over one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 from math import exp, inf

@@ -7,8 +7,6 @@
 Source: W. Kutta, Zeitschrift für Mathematik und Physik 46, 1901, 435-453.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 Derivatives = Callable[[float, Sequence[float]], Sequence[float]]

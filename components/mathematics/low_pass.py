@@ -5,8 +5,6 @@
 It follows a signal that changes slowly sqrt(2) / w late: 11 ms at 21 Hz.
 """
 
-from __future__ import annotations
-
 from math import pi, sqrt
 
 from .oscillator import transition

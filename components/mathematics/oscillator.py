@@ -6,8 +6,6 @@ for every damping, so a stiff oscillator needs no small step. With a held force,
 equilibrium that the force has.
 """
 
-from __future__ import annotations
-
 from math import cos, exp, sin, sinh, sqrt
 
 

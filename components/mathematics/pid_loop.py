@@ -15,8 +15,6 @@ A positive moment raises the yaw rate and lowers the sideslip, hence the order o
 Source: paper C, section 2.1, whose block diagram leaves that sign open and names neither filter nor limit.
 """
 
-from __future__ import annotations
-
 from math import inf
 from typing import NamedTuple
 

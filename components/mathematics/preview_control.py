@@ -15,8 +15,6 @@ Source: R. S. Sharp, V. Valtetsiotis, Optimal preview car steering control, Vehi
 (supplement), 2001, with the target outside the state, which gives the same gains.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from .quadratic_program import Rows, dot

@@ -13,8 +13,6 @@ Source: C. Hildreth, A quadratic programming procedure, Naval Research Logistics
 Model Predictive Control System Design and Implementation Using MATLAB, 2009, section 2.4.4.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from operator import mul
 

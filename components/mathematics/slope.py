@@ -6,8 +6,6 @@ A change that takes no time to speak of has no slope: a host's last step may be 
 error. Steps shorter than `SHORTEST` are added to the next; until then the rate stays as it is.
 """
 
-from __future__ import annotations
-
 from math import exp
 
 SHORTEST = 1e-6

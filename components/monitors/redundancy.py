@@ -33,8 +33,6 @@ Source: that signals are judged by such relations is the practice of van Zanten,
 Experience, SAE 2000-01-1633; the relations are kinematics, all thresholds are chosen.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from vocabulary.gravity import G

@@ -29,8 +29,6 @@ held forces: roll exactly (`mathematics.oscillator`), so any roll stiffness goes
 motion by `cars.plane_body`, wheels by `cars.wheel_spin`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -27,8 +27,6 @@ its end (`mathematics.carry`), as in `plants.seven_dof`. Solved over a step with
 springs are stiff or the step is long.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import degrees, pi
 from typing import Any

@@ -28,8 +28,6 @@ All of this is exact to second order in the step, which may vary. The body's mot
 `cars.plane_body`, the wheels' by `cars.wheel_spin`, which also says what becomes of slow, braked wheels.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -23,8 +23,6 @@ step, is carried to its end (`mathematics.carry`), which leaves the loop of load
 Gauss's rule with two points.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, sin

@@ -17,8 +17,6 @@ down with the true one; a car that stands or rolls backwards is asked for none.
 Source: paper B, equations (16)-(18); paper D, equation (3).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

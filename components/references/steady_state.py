@@ -17,8 +17,6 @@ lacks r in m (dv_y/dt + v_x r). Ours differs: |v_x|, so that a car rolling backw
 beta_max, which the paper leaves open.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from vocabulary.gravity import G

@@ -24,8 +24,6 @@ axis and F `wind_arm` about its z axis.
 Left out: heights of the road under single wheels, curvature of hills and dips, wind that depends on the car.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import asin, cos, pi, sin
 

@@ -12,8 +12,6 @@ times, whatever the step. N_k is counted, not drawn one after the other (`sensin
 message arrives, its value is there already; a low pass starts settled.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..mathematics.low_pass import LowPass

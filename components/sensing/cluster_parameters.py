@@ -7,8 +7,6 @@ is a dataclass with the nine figures of every channel (`sensing.channel.Figures`
 noise of the gyro, and what the whole cluster has in common.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

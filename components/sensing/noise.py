@@ -13,8 +13,6 @@ Statistics 29(2), 1958, 610-611; G. Fowler, L. C. Noll, K.-P. Vo, D. Eastlake, T
 algorithm, constants of 64 bits.
 """
 
-from __future__ import annotations
-
 from math import cos, log, pi, sqrt
 
 _MASK = (1 << 64) - 1

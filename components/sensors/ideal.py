@@ -5,8 +5,6 @@ gravity, so a run with it in the loop is that without it, to the bit. Where a fi
 a sample time and a latency show what time costs, noise on the gyro what that noise costs.
 """
 
-from __future__ import annotations
-
 from ..fmi.variables import parameter
 from ..sensing.cluster_parameters import parameters_of
 from .production import Production

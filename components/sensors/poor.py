@@ -4,8 +4,6 @@ The cluster of `sensors.production` with other figures. Noise and slow messages 
 1990s, biases those that a production sensor may have and that no zero-point learning has removed.
 """
 
-from __future__ import annotations
-
 from ..fmi.variables import parameter
 from ..sensing.cluster_parameters import Given, parameters_of
 from .production import PRODUCTION, Production

@@ -21,8 +21,6 @@ is left in cars is up to 0.3 deg/s and 0.2 m/s2.
 Sources stand at the parameters. `sensors.ideal` and `sensors.poor` are the same with other values.
 """
 
-from __future__ import annotations
-
 from math import cos, sin
 
 from vocabulary.gravity import G

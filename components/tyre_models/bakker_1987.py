@@ -23,8 +23,6 @@ Tire Science and Technology 21(2), 1993 (combined slip). Ours differs: kappa is 
 converted by `practical_slip`; the sign of F_y is that of ISO 8855.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import atan, copysign, cos, exp, pi, sin, sqrt
 from typing import Any, NamedTuple

@@ -34,8 +34,6 @@ the interface as (w R - v) / max(|w R|, |v|), by the book as (w R - v) / |v|: `p
 converts, up to 99 (w R = 100 v).
 """
 
-from __future__ import annotations
-
 from math import atan, cos, exp, pi, sin, sqrt, tan
 from typing import NamedTuple
 

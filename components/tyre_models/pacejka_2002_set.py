@@ -11,8 +11,6 @@ resistance (QSY1: the plants have it). Scaling factors that multiply a whole gro
 are left out too: scale the coefficients.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import atan, pi
 from typing import Any, NamedTuple

@@ -12,8 +12,6 @@ side is its mirror (slip angle, camber, F_y, M_x and M_z change sign), one that 
 fore and aft (kappa, F_x and M_z change sign). Both are exact.
 """
 
-from __future__ import annotations
-
 from math import atan, cos, exp, pi, sin, sqrt, tan
 from typing import Any
 

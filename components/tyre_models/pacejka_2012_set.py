@@ -10,8 +10,6 @@ Not here: turn slip (PDXP*, PKYP*, PDYP*, PHYP*, PECP*, QDTP1, QCRP*, QBRP1, QDR
 resistance (QSY*: plants have their own), the decay of friction with speed (LMUV), ranges but FZMAX.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple

@@ -13,8 +13,6 @@ held s, V and sigma this is solved exactly, z = V h / sigma:
 Contact that slides holds no more than its grip, which limits the deflection of a slow wheel (`gripped`).
 """
 
-from __future__ import annotations
-
 from math import atan, exp, expm1, hypot, sin
 from typing import Any
 

@@ -10,8 +10,6 @@ if the curve still rises at kappa / q, so a force far below the limit needs two 
 known as such.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import sqrt
 

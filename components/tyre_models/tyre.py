@@ -10,8 +10,6 @@ A tyre declares its parameters and overrides up to four functions:
 Slips and axes are those of the interface: forces act at the contact point, in wheel axes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from itertools import chain
 from typing import Any, ClassVar

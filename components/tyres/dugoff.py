@@ -17,8 +17,6 @@ Source: paper A, equations (9)-(12); H. Dugoff, P. S. Fancher, L. Segel, SAE 700
 prints cos(alpha) for tan(alpha); slip is positive when driving, as (9) needs.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import cos, sin, sqrt
 

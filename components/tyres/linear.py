@@ -7,8 +7,6 @@ For comparison with linear theory. A wheel that rolls backwards has its slip ang
 [-pi/2, pi/2], so that the force still opposes the lateral sliding. No load, no force.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import pi, sqrt
 

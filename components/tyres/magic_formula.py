@@ -4,8 +4,6 @@ The formulae, their source and what stands for friction are described in `tyre_m
 the default set, of a 205/60R15, in `tyre_models/pacejka_2002_set.py`.
 """
 
-from __future__ import annotations
-
 from ..tyre_models.pacejka_2002 import lateral_slip, longitudinal_curve, longitudinal_force, wheel_forces
 from ..tyre_models.pacejka_2002_set import Coefficients, MagicFormulaParameters, coefficients
 from ..tyre_models.tyre import Curve, Tyre, law_outputs, no_force

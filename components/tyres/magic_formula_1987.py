@@ -4,8 +4,6 @@ The formulae and their sources are described in `tyre_models/bakker_1987.py`. Th
 moment: the set has none.
 """
 
-from __future__ import annotations
-
 from ..tyre_models.bakker_1987 import (
     Coefficients1987,
     MagicFormula1987Parameters,

@@ -67,8 +67,6 @@ so a car on one set runs straight, whatever conicity and plysteer the set has. A
 backward is the forward one reflected fore and aft.
 """
 
-from __future__ import annotations
-
 from itertools import chain
 from typing import Any
 

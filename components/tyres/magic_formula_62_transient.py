@@ -26,8 +26,6 @@ A. J. C. Schmeitz, H. B. Pacejka, Vehicle System Dynamics 48 (2010), for the rel
 V_x and V_y bound the deflections when a wheel spins or slides sideways, where |v| would not.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import asin, cos, hypot, pi, sin, tan
 

@@ -5,8 +5,6 @@
 Source: paper A, section 3.3. Ours differs: the motor's limit, which the paper leaves open.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..cars.published_cars import PaperA

@@ -14,8 +14,6 @@ same instant; the driving part does.
 Source: paper C, equations (10), (11); no value is given there.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..cars.published_cars import PaperC

@@ -7,8 +7,6 @@ typed in. Give it the same parameters as the tyre, as a scenario's vehicle file 
 Source: paper B, equations (31)-(38).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
