@@ -19,7 +19,7 @@ from ..control_laws.rule_tables import PID_GAINS
 from ..fmi.variables import output, parameter
 from ..mathematics.fuzzy import SEVEN, Mamdani, Partition
 from ..mathematics.pid_loop import Gains
-from .pid import PidController, PidParameters, base_gains
+from .pid import PidController, PidParameters, gains_of
 
 
 @dataclass(frozen=True)
@@ -86,17 +86,12 @@ class FuzzyPidParameters(PidParameters):
 
 
 class GainSchedule:
-    """What sets the gains of one loop on line.
+    """What sets the gains of the loop "yaw_rate" or "sideslip" on line."""
 
-    Args:
-        base: K_p0, K_i0, K_d0.
-        ranges: of dK_p, dK_i, dK_d.
-        error, rate: ranges of the loop's error and of its rate.
-        reading: "mirrored" or "printed".
-    """
-
-    def __init__(self, base: Gains, ranges: Gains, *, error: float, rate: float, reading: str) -> None:
-        self.base, self.ranges, self.mirrored = base, ranges, reading == "mirrored"
+    def __init__(self, p: FuzzyPidParameters, loop: str) -> None:
+        self.base, self.ranges = gains_of(p, loop), gains_of(p, loop, "range")
+        self.mirrored = p.table_reading == "mirrored"
+        error, rate = getattr(p, f"{loop}_error_range"), getattr(p, f"{loop}_error_rate_range")
         self.system = Mamdani(
             Partition.even(SEVEN, -error, error),
             Partition.even(SEVEN, -rate, rate),
@@ -137,22 +132,7 @@ class FuzzyPid(PidController):
     )
 
     def configure(self) -> None:
-        p = self.p
-        yaw_rate, sideslip = base_gains(p)
-        self.yaw_rate = GainSchedule(
-            yaw_rate,
-            Gains(p.yaw_rate_proportional_range, p.yaw_rate_integral_range, p.yaw_rate_derivative_range),
-            error=p.yaw_rate_error_range,
-            rate=p.yaw_rate_error_rate_range,
-            reading=p.table_reading,
-        )
-        self.sideslip = GainSchedule(
-            sideslip,
-            Gains(p.sideslip_proportional_range, p.sideslip_integral_range, p.sideslip_derivative_range),
-            error=p.sideslip_error_range,
-            rate=p.sideslip_error_rate_range,
-            reading=p.table_reading,
-        )
+        self.yaw_rate, self.sideslip = GainSchedule(self.p, "yaw_rate"), GainSchedule(self.p, "sideslip")
 
     def decide(self) -> None:
         yaw_rate, sideslip = self.loops.yaw_rate, self.loops.sideslip  # whose error is actual minus reference

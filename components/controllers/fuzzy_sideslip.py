@@ -70,16 +70,7 @@ class FuzzySideslip(Component):
             RULES,
         )
 
-    def start(self, t: float, u: list[float]) -> None:
-        self._sample(u)
-
-    def advance(self, t: float, h: float, u: list[float]) -> None:
-        self._sample(u)
-
-    def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
-        return (self.moment,)
-
-    def _sample(self, u: list[float]) -> None:
+    def output(self, t: float, u: list[float]) -> tuple[float, ...]:
         beta_ref, beta, beta_ref_rate, beta_rate = u
         (share,) = self.surface(beta_ref - beta, beta_ref_rate - beta_rate)
-        self.moment = -self.p.moment_range * share
+        return (-self.p.moment_range * share,)

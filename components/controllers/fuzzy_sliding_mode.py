@@ -45,19 +45,6 @@ class FuzzySlidingModeParameters(SurfaceParameters):
     )
 
 
-def gain_system(p: FuzzySlidingModeParameters) -> Mamdani:
-    """Return the Mamdani system (friction, |steer angle| [rad]) -> (eps [rad/s2], k_d [1/s])."""
-    return Mamdani(
-        Partition.even(LABELS, 0.0, p.largest_friction),
-        Partition.even(LABELS, 0.0, p.largest_steer_angle),
-        [
-            Partition.even(LABELS, 0.0, p.largest_reaching_rate),
-            Partition.even(LABELS, 0.0, p.largest_reaching_gain),
-        ],
-        TABLE,
-    )
-
-
 class FuzzySlidingMode(Component):
     """Sliding-mode yaw-moment controller whose gains a fuzzy system sets from steering and friction."""
 
@@ -72,7 +59,15 @@ class FuzzySlidingMode(Component):
     )
 
     def configure(self) -> None:
-        self.gains = gain_system(self.p)
+        p = self.p
+        friction, angle, eps, k_d = (
+            Partition.even(LABELS, 0.0, largest)
+            for largest in (
+                *(p.largest_friction, p.largest_steer_angle),
+                *(p.largest_reaching_rate, p.largest_reaching_gain),
+            )
+        )
+        self.gains = Mamdani(friction, angle, [eps, k_d], TABLE)
 
     def output(self, t: float, u: list[float]) -> tuple[float, ...] | list[float]:
         p = self.p

@@ -59,11 +59,10 @@ SEEN = ("yaw_rate_ref", "yaw_rate", "sideslip_ref", "sideslip")
 """What the loops see, in the order of `YawLoops`."""
 
 
-def base_gains(p: PidParameters) -> tuple[Gains, Gains]:
-    """Return the constant gains of the yaw-rate and of the sideslip loop."""
-    return (
-        Gains(p.yaw_rate_proportional_gain, p.yaw_rate_integral_gain, p.yaw_rate_derivative_gain),
-        Gains(p.sideslip_proportional_gain, p.sideslip_integral_gain, p.sideslip_derivative_gain),
+def gains_of(p: PidParameters, loop: str, kind: str = "gain") -> Gains:
+    """Return the three parameters of one `kind` that the loop "yaw_rate" or "sideslip" has."""
+    return Gains(
+        *(getattr(p, f"{loop}_{part}_{kind}") for part in ("proportional", "integral", "derivative"))
     )
 
 
@@ -79,7 +78,7 @@ class PidController(Component):
     )
 
     def configure(self) -> None:
-        self.gains = base_gains(self.p)
+        self.gains = gains_of(self.p, "yaw_rate"), gains_of(self.p, "sideslip")
 
     def start(self, t: float, u: list[float]) -> None:
         self.loops = YawLoops(self.p.derivative_filter, *u[:4])

@@ -88,13 +88,6 @@ class Partition:
         start = peaks[k]
         return k, (x - start) / (peaks[k + 1] - start)
 
-    def grades(self, x: float) -> list[float]:
-        """Return the grades of `x` in all sets; they add up to one."""
-        k, t = self.locate(x)
-        grades = [0.0] * len(self.peaks)
-        grades[k], grades[k + 1] = 1.0 - t, t
-        return grades
-
     def centroid(self, clips: Sequence[float]) -> float:
         """Return the centroid of the union of the sets, each clipped at its value of `clips`.
 

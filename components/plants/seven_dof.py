@@ -1,17 +1,12 @@
 """Car with seven degrees of freedom: plane motion of the body, spin of the four wheels.
 
-    m (dv_x/dt - v_y r) = X,    m (dv_y/dt + v_x r) = Y                                     (5), (6)
-    X = (F_xfl + F_xfr) cos(delta) - (F_yfl + F_yfr) sin(delta) + F_xrl + F_xrr
-    Y = (F_xfl + F_xfr) sin(delta) + (F_yfl + F_yfr) cos(delta) + F_yrl + F_yrr
-    I_z dr/dt = a [(F_yfl + F_yfr) cos(delta) + (F_xfl + F_xfr) sin(delta)] - b (F_yrl + F_yrr)
-                + d/2 [(F_yfl - F_yfr) sin(delta) + (F_xfr - F_xfl) cos(delta) + F_xrr - F_xrl]     (7)
+    m (dv_x/dt - v_y r) = X,    m (dv_y/dt + v_x r) = Y_f + Y_r                             (5), (6)
+    I_z dr/dt = M                                                                           (7)
     J dw_i/dt = T_i - F_xi R                                                                (8)
-    F_zf = m g b / 2L - m h a_x / 2L -/+ b m h a_y / (L d)        minus left, plus right   (17)
-    F_zr = m g a / 2L + m h a_x / 2L -/+ a m h a_y / (L d)                                 (18)
 
-with a_x = X / m, a_y = Y / m; inclines and wind add theirs (`cars.road_plane`). A wheel that lifts has no
-load; the other wheel of its axle then carries the axle, so the loads always add up to m g. Roll, pitch and
-suspension are left out.
+with the resultants X, Y_f, Y_r, M of the tyre forces (`cars.plane_body`), to which inclines and wind add
+theirs (`cars.road_plane`), and the loads of a_x = X / m, a_y = (Y_f + Y_r) / m (`cars.load_transfer`,
+equations (17), (18)). Roll, pitch and suspension are left out.
 
 Source: paper A, equations (5)-(8), (13)-(20). Ours differs: the lifted wheel; slips at rest, see
 `cars.wheel_kinematics`. Errata: (7) prints the rear-track term with the opposite sign; (13)-(16) print

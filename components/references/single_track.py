@@ -68,12 +68,6 @@ class SingleTrackParameters:
     )
 
 
-def limited_steer(delta: float, v: float, *, mu: float, car: SingleTrackCar, share: float) -> float:
-    """Return the steer angle [rad] whose steady turn at `v` [m/s] needs at most `share` of `mu`."""
-    gain, _ = car.gains(v)
-    return clamp(delta, share * mu * G / max(v * gain, 1e-9))
-
-
 def clamp(x: float, most: float) -> float:
     """Return `x` limited to +-`most`, which keeps its sign."""
     return min(max(x, -most), most)
@@ -113,10 +107,11 @@ class SingleTrack(Reference):
     def _feed(self, u: list[float]) -> tuple[float, float]:
         """Return steer angle [rad] and speed [m/s] as the model takes them."""
         p = self.p
-        v = max(u[1], p.low_speed)
-        if p.limit_steer_angle:
-            return limited_steer(u[0], v, mu=max(u[2], 0.0), car=self.car, share=p.friction_share), v
-        return u[0], v
+        delta, v = u[0], max(u[1], p.low_speed)
+        if p.limit_steer_angle:  # to what a steady turn needs of the friction
+            gain, _ = self.car.gains(v)
+            delta = clamp(delta, p.friction_share * max(u[2], 0.0) * G / max(v * gain, 1e-9))
+        return delta, v
 
     def _steady(self, delta: float, v: float) -> tuple[float, float]:
         """Return (beta [rad], r [rad/s]) of the steady turn."""

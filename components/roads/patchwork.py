@@ -126,14 +126,13 @@ class Patchwork(Component):
 
     def configure(self) -> None:
         p = self.p
+        place = "patches"
         try:
             self.patches = patches_of(p.patches)
-        except ValueError as error:
-            raise ValueError(f"patches: {error}") from None
-        try:
+            place = "friction_table"
             self.table = table_of(p.friction_table)
         except ValueError as error:
-            raise ValueError(f"friction_table: {error}") from None
+            raise ValueError(f"{place}: {error}") from None
         steepest = sin(p.road_slope) ** 2 + sin(p.road_bank) ** 2
         if steepest > sin(0.25 * pi) ** 2:
             raise ValueError("road_slope and road_bank together are steeper than 45 degrees")

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from components.controllers.fuzzy_feedback import FuzzyFeedback
-from components.controllers.fuzzy_pid import FuzzyPid, GainSchedule
+from components.controllers.fuzzy_pid import FuzzyPid, FuzzyPidParameters, GainSchedule
 from components.controllers.pid import PidController
 from components.mathematics.pid_loop import Gains, Pid
 
@@ -71,12 +71,23 @@ def test_the_moment_is_limited_and_fades_out_at_rest(component):
     assert moment(component, yaw_rate_ref=9.0, velocity_x=0.0) == 0.0
 
 
+def schedule(reading="mirrored", derivative=100.0):
+    p = FuzzyPidParameters(
+        table_reading=reading,
+        yaw_rate_error_range=0.05,
+        yaw_rate_error_rate_range=1.0,
+        yaw_rate_proportional_gain=8e3,
+        yaw_rate_integral_gain=0.0,
+        yaw_rate_derivative_gain=derivative,
+        yaw_rate_proportional_range=3e4,
+        yaw_rate_integral_range=0.0,
+        yaw_rate_derivative_range=100.0,
+    )
+    return GainSchedule(p, "yaw_rate")
+
+
 def test_the_printed_table_treats_left_and_right_differently():
-    options = {"error": 0.05, "rate": 1.0}
-    schedules = {
-        reading: GainSchedule(Gains(8e3, 0.0, 100.0), Gains(3e4, 0.0, 100.0), reading=reading, **options)
-        for reading in ("mirrored", "printed")
-    }
+    schedules = {reading: schedule(reading) for reading in ("mirrored", "printed")}
     mirrored = schedules["mirrored"]
     assert mirrored.gains(0.04, 0.3) == mirrored.gains(-0.04, -0.3)
     printed = schedules["printed"]
@@ -85,12 +96,10 @@ def test_the_printed_table_treats_left_and_right_differently():
 
 
 def test_gains_grow_with_the_error_and_are_never_negative():
-    schedule = GainSchedule(
-        Gains(8e3, 0.0, 0.0), Gains(3e4, 0.0, 100.0), error=0.05, rate=1.0, reading="mirrored"
-    )
-    assert schedule.gains(0.05, 0.0).p == pytest.approx(8e3 + 3e4 * 2 / 3)  # PM: its set's own peak
-    assert schedule.gains(0.05, 1.0).p == pytest.approx(8e3 + 3e4 * 8 / 9)  # PB: its set's centroid
-    grid = [schedule.gains(e / 500, r / 5) for e in range(-30, 31) for r in range(-6, 7)]
+    gains_at = schedule(derivative=0.0).gains
+    assert gains_at(0.05, 0.0).p == pytest.approx(8e3 + 3e4 * 2 / 3)  # PM: its set's own peak
+    assert gains_at(0.05, 1.0).p == pytest.approx(8e3 + 3e4 * 8 / 9)  # PB: its set's centroid
+    grid = [gains_at(e / 500, r / 5) for e in range(-30, 31) for r in range(-6, 7)]
     assert min(min(gains) for gains in grid) == 0.0
 
 
