@@ -41,14 +41,7 @@ class Contact(NamedTuple):
 def contact(
     delta: float, f_x: Sequence[float], f_y: Sequence[float], p: Geometry, m_z: Sequence[float] = NO_MOMENTS
 ) -> Contact:
-    """Return the tyre forces in vehicle axes.
-
-    Args:
-        delta: steer angle of both front wheels [rad].
-        f_x, f_y: forces of fl, fr, rl, rr, wheel axes [N].
-        p: geometry of the car.
-        m_z: moments of the tyres about their vertical axes [N.m].
-    """
+    """Return the tyre forces in vehicle axes; arguments as of `plane_body.resultants`."""
     f_fl, f_fr, x_rl, x_rr = f_x
     g_fl, g_fr, y_rl, y_rr = f_y
     c = cos(delta)

@@ -35,11 +35,20 @@ def quasi_static_loads(a_x: float, a_y: float, p: Weight, gravity: float = G) ->
     a, b = p.cg_to_front_axle, p.cg_to_rear_axle
     weight = p.mass * gravity
     lift = p.mass * p.cg_height
-    front = min(max((weight * b - lift * a_x) / (a + b), 0.0), weight)
-    rear = weight - front
     across = lift * a_y / ((a + b) * p.track_width)
+    return loads_of_axles((weight * b - lift * a_x) / (a + b), weight, b * across, a * across)
+
+
+def loads_of_axles(front: float, weight: float, front_across: float, rear_across: float) -> Four:
+    """Return F_z [N] of fl, fr, rl, rr, none of them negative, that add up to the weight.
+
+    Args:
+        front, weight: load of the front axle and of both axles [N].
+        front_across, rear_across: what goes from the left to the right wheel of an axle [N].
+    """
+    front = min(max(front, 0.0), weight)
+    rear = 0.5 * (weight - front)
     front *= 0.5
-    rear *= 0.5
-    front_across = min(max(b * across, -front), front)
-    rear_across = min(max(a * across, -rear), rear)
+    front_across = min(max(front_across, -front), front)
+    rear_across = min(max(rear_across, -rear), rear)
     return front - front_across, front + front_across, rear - rear_across, rear + rear_across

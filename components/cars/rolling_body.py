@@ -13,6 +13,7 @@ from vocabulary.wheels import Four
 
 from ..fmi.variables import like, of_car, parameter
 from .car import DrivenCarParameters, StartParameters
+from .load_transfer import loads_of_axles
 from .published_cars import PaperB
 from .resistance import ResistanceParameters, drag_of
 from .road_plane import LEVEL, Pull
@@ -108,13 +109,11 @@ class RollingBody:
         x, y_f, y_r, _ = forces
         weight = p.mass * (G - pull.lighter)
         wheelbase = p.cg_to_front_axle + p.cg_to_rear_axle
-        front = min(max((weight * p.cg_to_rear_axle - p.cg_height * x) / wheelbase, 0.0), weight)
-        rear = 0.5 * (weight - front)
-        front *= 0.5
         spring = p.roll_stiffness * phi + p.roll_damping * dphi
         share = p.front_roll_share
-        across = (share * spring + p.roll_centre_height_front * y_f) / p.track_width
-        front_across = min(max(across, -front), front)
-        across = ((1.0 - share) * spring + p.roll_centre_height_rear * y_r) / p.track_width
-        rear_across = min(max(across, -rear), rear)
-        return front - front_across, front + front_across, rear - rear_across, rear + rear_across
+        return loads_of_axles(
+            (weight * p.cg_to_rear_axle - p.cg_height * x) / wheelbase,
+            weight,
+            (share * spring + p.roll_centre_height_front * y_f) / p.track_width,
+            ((1.0 - share) * spring + p.roll_centre_height_rear * y_r) / p.track_width,
+        )

@@ -12,7 +12,7 @@ with a_x = dv_x - v_y r, a_y = dv_y + v_x r, dotted quantities written with a d,
 left side up, X, Y_f, Y_r, M the resultants of the tyre forces (`cars.plane_body`). phi belongs to the
 sprung mass; v_x, v_y, a_x, a_y to the point of the roll axis below the centre of mass, which is what the
 paper calls the centre of mass. The pair (1), (4) is solved for a_y and ddphi exactly. A wheel that
-lifts has no load; the other wheel of its axle then carries the axle. Inclines and wind: `cars.road_plane`,
+lifts: `cars.load_transfer`. Inclines and wind: `cars.road_plane`,
 camber for tyres that take it: `cars.roll_camber`.
 
 Ours differs: rolling resistance is a moment on each wheel (`cars.resistance`), where the paper has a force

@@ -1,12 +1,11 @@
 """Steady state of the linear single-track model: what the driver asks for with the steer angle.
 
-    K        = m / L^2 (b / C_f - a / C_r)                                  stability factor
     r_ref    = v_x / (L (1 + K v_x^2)) delta,                 |r_ref| <= mu g / |v_x|               (3)
     beta_1   = (b - m a v_x^2 / (C_r L)) / (L (1 + K v_x^2)) delta                                  (4)
     beta_ref = beta_1,   |beta_ref| <= min(|mu g (b / v_x^2 - m a / (C_r L))|, beta_max)
 
-with positive axle stiffnesses C_f, C_r. `friction_share` is the share of mu that the limits use.
-The rates: `control_laws.reference`.
+with positive axle stiffnesses C_f, C_r and the stability factor K of `cars.single_track_car`.
+`friction_share` is the share of mu that the limits use. The rates: `control_laws.reference`.
 
 beta_1 / delta crosses zero at v_x^2 = b C_r L / (m a) (16 m/s for the car of paper A), and so does
 its limit. An oversteering car (K < 0) has no steady state from v_x^2 = -1 / K on: there
