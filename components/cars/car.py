@@ -10,9 +10,9 @@ A plant adds its body in four methods, called in this order:
 and, if its body has outputs of its own, in `output`. `self.pull` is what road and wind do to all parts of the
 car alike (`cars.road_plane`); what is carried is of the tyres alone.
 
-`signals` are the inputs, one item each: steer angle, tyre forces x and y, the plant's own, those of road and
-wind; forces are those at the middle of the step. What `rest` and `move` return belongs to that middle; it is
-carried to the step's end (`mathematics.carry`) and handed to `finish`.
+`signals` are the inputs, one item each: steer angle, tyre forces x and y, the plant's own, last those of road
+and wind if it knows them; forces are those at the middle of the step. What `rest` and `move` return belongs
+to that middle; it is carried to the step's end (`mathematics.carry`) and handed to `finish`.
 
     beta = atan2(v_y, v_x)        dbeta/dt = (v_x a_y - v_y a_x) / (v_x^2 + v_y^2) - r
 
@@ -22,7 +22,7 @@ Front wheels turn with the steer angle, so their slips and velocities follow it 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan2, cos, sin
-from typing import Any
+from typing import Any, ClassVar
 
 from vocabulary.wheels import Four
 
@@ -31,7 +31,7 @@ from ..fmi.variables import output, parameter, signal
 from ..mathematics.carry import Carried, Values
 from .plane_body import Motion
 from .road_plane import INPUTS as ROAD_PLANE
-from .road_plane import Pull, pull_of
+from .road_plane import LEVEL, Pull, pull_of
 from .wheel_kinematics import Eight, slip_angle, slip_ratio, wheel_velocities
 from .wheel_spin import spin
 
@@ -99,7 +99,13 @@ class Car(Component):
     wheels: Eight
     end: tuple[float, float]
     loads: Four
-    pull: Pull
+    pull: Pull = LEVEL
+    on_plane: ClassVar[bool]
+    """Whether the inputs end with those of road and wind."""
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        cls.on_plane = cls.inputs[-len(ROAD_PLANE) :] == ROAD_PLANE
 
     # ---- for the plant ----------------------------------------------------------------------
 
@@ -135,7 +141,8 @@ class Car(Component):
         v_y = p.initial_speed * sin(p.initial_sideslip)
         self.motion = v_x, v_y, p.initial_yaw_rate, 0.0, 0.0, 0.0
         self.steer_angle = signals[0]
-        self.pull = pull_of(u[-4:], p.mass)
+        if self.on_plane:
+            self.pull = pull_of(signals[-4:], p.mass)
         carried = self.rest(signals)
         self.carried = Carried(carried)
         self.wheels = self.wheel_velocities()
@@ -149,7 +156,8 @@ class Car(Component):
         if h <= 0.0:  # nothing moves
             self.wheels = self.wheel_velocities()
             return
-        self.pull = pull_of(u[-4:], self.p.mass)
+        if self.on_plane:
+            self.pull = pull_of(signals[-4:], self.p.mass)
         carried = self.move(h, 0.5 * (before + delta), signals)
         v, loads = self.wheels, self.loads
         self.wheels = self.wheel_velocities()

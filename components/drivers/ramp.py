@@ -28,6 +28,6 @@ class Ramp(HandWheelDriver):
 
     Parameters = RampParameters
 
-    @staticmethod
-    def hand_wheel_angle(t: float, p: RampParameters) -> float:
+    def hand_wheel_angle(self, t: float) -> float:
+        p = self.p
         return ramp(t - p.start_time, p.ramp_time, p.amplitude)

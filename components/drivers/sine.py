@@ -39,4 +39,6 @@ class Sine(HandWheelDriver):
     """Open-loop sine steering; the speed may be held."""
 
     Parameters = SineParameters
-    hand_wheel_angle = staticmethod(sine_steer)
+
+    def hand_wheel_angle(self, t: float) -> float:
+        return sine_steer(t, self.p)

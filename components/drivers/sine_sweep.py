@@ -45,4 +45,6 @@ class SineSweep(HandWheelDriver):
     """Open-loop sine of rising frequency, at a held speed."""
 
     Parameters = SineSweepParameters
-    hand_wheel_angle = staticmethod(sweep)
+
+    def hand_wheel_angle(self, t: float) -> float:
+        return sweep(t, self.p)

@@ -61,7 +61,9 @@ class SineWithDwell(HandWheelDriver):
     """Open-loop sine with dwell of a coasting car."""
 
     Parameters = SineWithDwellParameters
-    hand_wheel_angle = staticmethod(sine_with_dwell)
+
+    def hand_wheel_angle(self, t: float) -> float:
+        return sine_with_dwell(t, self.p)
 
     def coasts_from(self) -> float:
         p: SineWithDwellParameters = self.p

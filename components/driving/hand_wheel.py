@@ -8,7 +8,6 @@ every instant and not quantised to whole communication steps. The speed: `drivin
 
 from dataclasses import dataclass
 from math import inf
-from typing import Any
 
 from ..fmi.component import Component
 from ..fmi.variables import of_car, parameter, signal
@@ -36,9 +35,8 @@ class HandWheelDriver(Component):
     inputs = (signal("velocity_x", optional=True),)
     outputs = ("steer_angle", "drive_force", "steering_wheel_angle")
 
-    @staticmethod
-    def hand_wheel_angle(t: float, p: Any) -> float:
-        """Return the hand-wheel angle [rad] at `t` [s]; `p` are the parameters."""
+    def hand_wheel_angle(self, t: float) -> float:
+        """Return the hand-wheel angle [rad] at `t` [s]."""
         raise NotImplementedError
 
     def coasts_from(self) -> float:
@@ -52,5 +50,5 @@ class HandWheelDriver(Component):
         self.speed.advance(t, h, u[0])
 
     def output(self, t: float, u: list[float]) -> tuple[float, float, float]:
-        hand = self.hand_wheel_angle(t, self.p)
+        hand = self.hand_wheel_angle(t)
         return hand / self.p.steering_ratio, self.speed.force, hand
