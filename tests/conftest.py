@@ -7,11 +7,13 @@ every parametrized test in the first tier, evenly spread; the others are marked 
 from __future__ import annotations
 
 import gc
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from orchestrator.experiments import workers
+from tests.commands import status_of
 from tests.fmu_copies import put_fmus
 
 TESTS = Path(__file__).parent
@@ -55,6 +57,16 @@ def fmus(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     folder = tmp_path_factory.mktemp("fmus")
     put_fmus(folder, components=getattr(request.module, "UNITS", None))
     return folder
+
+
+@pytest.fixture
+def yawbench(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """Run the command line; return its exit status, its output and what it said on stderr."""
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        return status_of(*arguments), *capsys.readouterr()
+
+    return run
 
 
 def evenly(number: int, total: int) -> set[int]:

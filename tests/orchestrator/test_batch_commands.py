@@ -58,17 +58,9 @@ def folder(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def yawbench(fmus, folder, capsys):
-    """Run the command line; return its exit status, its output and what it said on stderr."""
-
-    def run(*arguments):
-        given = [*map(str, arguments), "--fmus", str(fmus)]
-        with pytest.raises(SystemExit) as exit_:
-            main(given)
-        captured = capsys.readouterr()
-        return exit_.value.code or 0, captured.out, captured.err
-
-    return run
+def yawbench(yawbench, fmus, folder):
+    """Run the command line in the folder, with the FMUs."""
+    return lambda *arguments: yawbench(*arguments, "--fmus", fmus)
 
 
 def test_compare_puts_the_runs_side_by_side(yawbench, folder):

@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 import yawbench as yb
-from orchestrator.cli import main
 from orchestrator.errors import ScenarioError
 from orchestrator.scenario import catalogue
 
@@ -20,16 +19,10 @@ NAME = "fuzzy_feedback/single_sine"
 
 
 @pytest.fixture
-def yawbench(capsys, tmp_path, monkeypatch):
+def yawbench(yawbench, tmp_path, monkeypatch):
+    """Run the command line in an empty folder."""
     monkeypatch.chdir(tmp_path)
-
-    def run(*arguments):
-        with pytest.raises(SystemExit) as exit_:
-            main([*map(str, arguments)])
-        captured = capsys.readouterr()
-        return exit_.value.code or 0, captured.out, captured.err
-
-    return run
+    return yawbench
 
 
 def test_a_scenario_that_comes_along_is_run_by_its_name_from_any_folder(yawbench, tmp_path):

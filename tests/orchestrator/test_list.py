@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from orchestrator.cli import main
 from orchestrator.experiments.listing import runs_table
 from orchestrator.metrics.run_metrics import columns_for, evaluate_all
 from orchestrator.pages.divergence import differences
@@ -12,17 +11,6 @@ from orchestrator.results.runs import found_runs
 from tests.fmu_copies import put_fmus
 
 from .recorded import car, write
-
-
-@pytest.fixture
-def yawbench(capsys):
-    def run(*arguments):
-        with pytest.raises(SystemExit) as exit_:
-            main([*map(str, arguments)])
-        captured = capsys.readouterr()
-        return exit_.value.code or 0, captured.out, captured.err
-
-    return run
 
 
 def ends(results):

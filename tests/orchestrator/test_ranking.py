@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cli import main
 from orchestrator.experiments.jobs import Record
 from orchestrator.experiments.ranking import Drive, load_ranking
 from orchestrator.experiments.ranking_schema import EntrySpec
 from orchestrator.experiments.standings import UNHELD, WORST, Cell, Driven, Standing, placed
+from tests.commands import status_of
 
 ROOT = Path(__file__).parents[2]
 GROUND = ROOT / "scenarios" / "proving_ground"
@@ -119,12 +119,6 @@ entries:
 """Two controllers in two conditions, one amplitude each, with steps of 5 ms."""
 
 
-def call(*arguments: object) -> int:
-    with pytest.raises(SystemExit) as ended:
-        main([str(one) for one in arguments])
-    return ended.value.code or 0
-
-
 def rows(file: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(file.open()))
 
@@ -132,13 +126,13 @@ def rows(file: Path) -> list[dict[str, str]]:
 def test_a_small_matrix_is_driven_goes_on_where_it_was_and_shows_what_is_missing(tmp_path, capsys):
     file, out = tmp_path / "small.yaml", tmp_path / "out"
     file.write_text(SMALL)
-    assert call("rank", file, "--out", out, "--only", "fuzzy_pid", "--jobs", 2) == 0
+    assert status_of("rank", file, "--out", out, "--only", "fuzzy_pid", "--jobs", 2) == 0
     assert "without a place, as runs are missing: none" in capsys.readouterr().err
     page = (out / "report.html").read_text()
     assert "runs are missing in this build: no control" in page
     lacking = rows(out / "table.csv")
     assert [(one["entry"], one["place"]) for one in lacking] == [("fuzzy_pid", "1"), ("none", "")]
-    assert call("rank", file, "--out", out, "--jobs", 2) == 0
+    assert status_of("rank", file, "--out", out, "--jobs", 2) == 0
     assert "4 runs, 2 finished before" in capsys.readouterr().err
     found = rows(out / "table.csv")
     assert [(one["entry"], one["place"], one["passed"]) for one in found] == [
@@ -171,7 +165,7 @@ def test_a_ranking_that_was_killed_goes_on_where_it_was(tmp_path, capsys):
         next(line for line in process.stderr if line.startswith("[1/4]"))
         process.kill()
     assert not (out / "table.csv").exists()
-    assert call("rank", file, "--out", out) == 0
+    assert status_of("rank", file, "--out", out) == 0
     told = capsys.readouterr().err
     assert re.search(r"small: 4 runs, [123] finished before", told), told
     assert [one["missing"] for one in rows(out / "table.csv")] == ["0", "0"]
@@ -180,7 +174,7 @@ def test_a_ranking_that_was_killed_goes_on_where_it_was(tmp_path, capsys):
 @pytest.mark.exhaustive
 def test_noisy_sensors_give_a_margin_with_its_confidence(tmp_path):
     options = ("--condition", "saloon75_sensors", "--quick", "--only", "sliding_mode", "--out", tmp_path)
-    assert call("rank", GROUND / "ranking.yaml", *options) == 0
+    assert status_of("rank", GROUND / "ranking.yaml", *options) == 0
     cell = next(row for row in rows(tmp_path / "cells.csv") if row["entry"] == "sliding_mode")
     assert int(cell["runs"]) == 5  # seeds
     assert 0 < float(cell["sideslip_half_width [rad]"]) < radians(1.0)
@@ -204,7 +198,7 @@ def test_noisy_sensors_give_a_margin_with_its_confidence(tmp_path):
 def test_what_is_wrong_with_a_ranking_is_said_before_any_run(wrong, options, sentence, tmp_path, capsys):
     file = tmp_path / "small.yaml"
     file.write_text(SMALL.replace(*wrong) if wrong else SMALL)
-    assert call("rank", file, "--out", tmp_path / "out", *options) in (1, 2)
+    assert status_of("rank", file, "--out", tmp_path / "out", *options) in (1, 2)
     assert sentence in capsys.readouterr().err
     assert not list(tmp_path.rglob("run.json"))
 

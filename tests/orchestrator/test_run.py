@@ -90,15 +90,13 @@ def faulty(tmp_path, fmus):
 
 
 @pytest.fixture
-def yawbench(fmus, capsys):
+def yawbench(yawbench, fmus):
     """Run the command line; return its exit status and what it said on stderr."""
 
     def run(scenario, *arguments, command="run"):
-        with pytest.raises(SystemExit) as exit_:
-            main([command, str(scenario), "--fmus", str(fmus), *map(str, arguments)])
-        captured = capsys.readouterr()
-        assert captured.out == ""
-        return exit_.value.code, captured.err
+        status, out, said = yawbench(command, scenario, "--fmus", fmus, *arguments)
+        assert out == ""
+        return status, said
 
     return run
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from components.drivers.sine_with_dwell import SineWithDwellParameters, sine_with_dwell
-from orchestrator.cli import main
 from orchestrator.evaluation.dwell_run import evaluate_dwell
 from orchestrator.evaluation.dwell_series import amplitudes, is_series, judge_series
 from orchestrator.evaluation.judgement import Judgement, NotJudged, Verdict
 from orchestrator.evaluation.slow_steer import G, characteristic_angle, evaluate_slow_steer
 from orchestrator.evaluation.trace import Trace
+from tests.commands import status_of
 
 A, LARGE = radians(36.0), radians(270.0)
 START = 1.5
@@ -275,12 +275,6 @@ mass: 1.8 t
 """
 
 
-def call(*arguments: object) -> int:
-    with pytest.raises(SystemExit) as ended:
-        main([str(one) for one in arguments])
-    return ended.value.code
-
-
 def test_measured_columns_under_other_names_units_and_signs_give_the_same(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     made = trace(sampling=SAMPLING["200 Hz"])
@@ -293,7 +287,7 @@ def test_measured_columns_under_other_names_units_and_signs_give_the_same(tmp_pa
     table = np.column_stack(list(columns.values()))
     np.savetxt("run.csv", table, "%.12g", ",", header=",".join(columns), comments="")
     (tmp_path / "map.yaml").write_text(MAPPING)
-    ended = call("evaluate", "sine-with-dwell", "run.csv", "--signals", "map.yaml", "--angle", "36 deg",
+    ended = status_of("evaluate", "sine-with-dwell", "run.csv", "--signals", "map.yaml", "--angle", "36 deg",
                  "--out", "out", "--no-figures")  # fmt: skip
     assert ended == 0
     found = json.loads((tmp_path / "out/evaluation.json").read_text())["runs"][0]
@@ -317,7 +311,7 @@ def test_measured_columns_under_other_names_units_and_signs_give_the_same(tmp_pa
 def test_a_wrong_mapping_is_answered_by_a_sentence(wrong, sentence, tmp_path, capsys):
     (tmp_path / "run.csv").write_text("Zeit,LRW,Gier [deg/s],ay\n0,0,0,0\n5,0,0,0\n10,0,0,0\n")
     (tmp_path / "map.yaml").write_text(MAPPING.replace(*wrong))
-    ended = call("evaluate", "sine-with-dwell", tmp_path / "run.csv", "--signals", tmp_path / "map.yaml")
+    ended = status_of("evaluate", "sine-with-dwell", tmp_path / "run.csv", "--signals", tmp_path / "map.yaml")
     assert ended in (1, 2)
     assert sentence in capsys.readouterr().err
 
@@ -327,7 +321,7 @@ def test_a_series_is_driven_from_a_and_goes_on_where_it_was(tmp_path, capsys):
     """With steps of 5 ms; A = 180 degrees asks for two amplitudes to each side."""
     series = tmp_path / "series"
     settings = ("--set", "step_size=0.005", "--angle", "180 deg", "--out", series)
-    assert call("drive", "sine-with-dwell", *settings) == 0
+    assert status_of("drive", "sine-with-dwell", *settings) == 0
     first = capsys.readouterr()
     found = json.loads((series / "evaluation.json").read_text())
     amplitudes_ = [degrees(one["quantities"]["amplitude"]["value"]) for one in found["runs"]]
@@ -338,7 +332,7 @@ def test_a_series_is_driven_from_a_and_goes_on_where_it_was(tmp_path, capsys):
         for key in ("ratio_1000", "ratio_1750", "displacement", "sideslip"):
             assert one[key]["value"] == pytest.approx(other[key]["value"], abs=1e-6), key
     assert (series / "sine_with_dwell_series.png").is_file()
-    assert call("drive", "sine-with-dwell", *settings) == 0
+    assert status_of("drive", "sine-with-dwell", *settings) == 0
     again = capsys.readouterr()
     assert "sine with dwell: 4 runs, all finished before" in again.err
     assert again.out == first.out
@@ -347,7 +341,7 @@ def test_a_series_is_driven_from_a_and_goes_on_where_it_was(tmp_path, capsys):
 @pytest.mark.exhaustive
 def test_a_series_with_a_car_that_rolls_over_has_a_verdict(tmp_path, capsys):
     high = ("--vehicle", "van", "--set", "plant.cg_height=1.1", "--set", "step_size=0.005")
-    assert call("drive", "sine-with-dwell", *high, "--angle", "200 deg", "--out", tmp_path) == 1
+    assert status_of("drive", "sine-with-dwell", *high, "--angle", "200 deg", "--out", tmp_path) == 1
     assert capsys.readouterr().err.count("the car has rolled over") == 2
     found = json.loads((tmp_path / "evaluation.json").read_text())
     assert found["series"]["verdict"] == "failed"
@@ -364,7 +358,7 @@ def test_a_series_with_a_car_that_rolls_over_has_a_verdict(tmp_path, capsys):
     ],
 )
 def test_what_a_series_cannot_be_driven_with_is_said_before_any_run(options, sentence, capsys, tmp_path):
-    assert call("drive", "sine-with-dwell", *options, "--out", tmp_path / "out") == 2
+    assert status_of("drive", "sine-with-dwell", *options, "--out", tmp_path / "out") == 2
     assert sentence in capsys.readouterr().err
     assert not list(tmp_path.rglob("run.json"))
 
@@ -379,7 +373,7 @@ def test_what_a_series_cannot_be_driven_with_is_said_before_any_run(options, sen
 def test_what_a_series_of_lane_changes_cannot_be_driven_with_is_said_before_any_run(
     options, sentence, capsys, tmp_path
 ):
-    assert call("drive", "iso-3888-2", *options, "--out", tmp_path / "out") == 2
+    assert status_of("drive", "iso-3888-2", *options, "--out", tmp_path / "out") == 2
     assert sentence in capsys.readouterr().err
     assert not list(tmp_path.rglob("run.json"))
 
@@ -388,13 +382,13 @@ def test_what_a_series_of_lane_changes_cannot_be_driven_with_is_said_before_any_
 def test_a_series_of_lane_changes_finds_the_highest_clean_speed_and_goes_on_where_it_was(tmp_path, capsys):
     series = tmp_path / "series"
     settings = ("--set", "step_size=0.005", "--out", series)
-    assert call("drive", "iso-3888-2", *settings) == 0
+    assert status_of("drive", "iso-3888-2", *settings) == 0
     first = capsys.readouterr()
     found = json.loads((series / "evaluation.json").read_text())
     highest, touched = (found["series"][key] for key in ("highest_clean_entry_speed", "lowest_not_clean"))
     assert 55.0 < 3.6 * highest < 3.6 * touched < 3.6 * highest + 0.5
     assert (series / "lane_change_series.png").is_file()
-    assert call("drive", "iso-3888-2", *settings) == 0
+    assert status_of("drive", "iso-3888-2", *settings) == 0
     again = capsys.readouterr()
     assert again.out == first.out
     assert "km/h: 1 run, all finished before" in again.err

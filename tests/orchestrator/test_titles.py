@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cli import main
 from orchestrator.experiments import figures as sweep_figures
 from orchestrator.figures import plots
 from orchestrator.figures.panels import Run
@@ -43,16 +42,14 @@ figures: [{{name: peaks, kind: curve, x: amplitude, metric: sideslip}}]
 
 
 @pytest.fixture
-def yawbench(fmus, tmp_path, monkeypatch, capsys):
+def yawbench(yawbench, fmus, tmp_path, monkeypatch):
     """Run the command line in an empty folder; return all it printed."""
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments, fmus=fmus):
-        with pytest.raises(SystemExit) as exit_:
-            main([*map(str, arguments), *(["--fmus", str(fmus)] if fmus else [])])
-        captured = capsys.readouterr()
-        assert not exit_.value.code, captured.err
-        return captured.out, captured.err
+        status, out, said = yawbench(*arguments, *(["--fmus", fmus] if fmus else []))
+        assert status == 0, said
+        return out, said
 
     return run
 

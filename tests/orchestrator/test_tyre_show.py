@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from components.tyres.magic_formula_62 import MagicFormula62
-from orchestrator.cli import main
 from orchestrator.scenario.tir import read_tir
 from orchestrator.tyres.stand import State, put_on_stand, stiffnesses
 from orchestrator.tyres.tyre_drawing import draw_tyre
+from tests.commands import status_of
 from tests.components.stand import Stand as Bench
 
 from .tir_files import write
@@ -21,12 +21,6 @@ STATES = [
     State(0.2, 0.4, 6000.0),
     State(0.0, 0.0, 4000.0),
 ]
-
-
-def status(*arguments):
-    with pytest.raises(SystemExit) as done:
-        main([str(argument) for argument in arguments])
-    return done.value.code
 
 
 def stand_of(source, fmus, friction=0.8):
@@ -80,7 +74,7 @@ def test_the_figure_shows_all_that_the_tyre_tells(tmp_path, fmus):
 
 def test_the_command_writes_one_figure_and_tells_warnings(tmp_path, fmus, capsys):
     path = write(tmp_path / "a.tir", {"TYRESIDE": "UNKNOWN"})
-    assert not status("tyre", "show", path, "--fmus", fmus, "--output", tmp_path / "shown.png")
+    assert not status_of("tyre", "show", path, "--fmus", fmus, "--output", tmp_path / "shown.png")
     assert {"shown.svg", "shown.png"} <= {file.name for file in tmp_path.iterdir()}
     assert "TYRESIDE: UNKNOWN: read as LEFT" in capsys.readouterr().err
 
@@ -95,5 +89,5 @@ def test_the_command_writes_one_figure_and_tells_warnings(tmp_path, fmus, capsys
 )
 def test_what_is_no_tyre_is_refused_in_a_sentence(tmp_path, fmus, capsys, monkeypatch, source, says):
     monkeypatch.chdir(tmp_path)
-    assert status("tyre", "show", source, "--fmus", fmus) == 2
+    assert status_of("tyre", "show", source, "--fmus", fmus) == 2
     assert says in capsys.readouterr().err

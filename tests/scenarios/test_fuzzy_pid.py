@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.cli import main
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.findings import derive
 from orchestrator.experiments.jobs import Job
@@ -16,6 +15,7 @@ from orchestrator.figures.display import shown
 from orchestrator.metrics.run_metrics import Value
 from orchestrator.results.read import load_results
 from tests.changed import changed
+from tests.commands import status_of
 from tests.studies import check_figures, judge_all, judge_some, verdicts
 
 FOLDER = Path(__file__).parents[2] / "scenarios" / "fuzzy_pid"
@@ -28,13 +28,6 @@ UNITS = (
     "controller_pid", "controller_fuzzy_pid", "allocator_single_wheel", "wheel_control_hydraulic",
     "plant_fourteen_dof", "tyre_magic_formula",
 )  # fmt: skip
-
-
-def yawbench(*arguments):
-    """Return the exit status of a command."""
-    with pytest.raises(SystemExit) as exit_:
-        main([str(argument) for argument in arguments])
-    return exit_.value.code
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +49,7 @@ def test_every_file_of_the_folder_is_tested_here():
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_every_scenario_is_valid_and_runs(fmus, study, name):
-    assert not yawbench("check", FOLDER / f"{name}.yaml", "--fmus", fmus)
+    assert not status_of("check", FOLDER / f"{name}.yaml", "--fmus", fmus)
     assert study["runs"][f"{name}/fuzzy_pid"]["failed"] is None
     assert load_results(study["folder"] / name / "fuzzy_pid").time[-1] == 9.0
 
