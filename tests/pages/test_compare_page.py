@@ -75,7 +75,7 @@ def test_it_shows_the_system_its_parameters_and_how_to_repeat_it(tree):
     ]  # fmt: skip
     assert len(tree.cssselect("svg.diagonal, svg.stack")) == 2
     assert "controller_fuzzy_feedback" in texts(tree, "svg.diagonal text")
-    assert len(tree.cssselect(".hash")) == len(UNITS)
+    assert len(tree.cssselect(".fmus td:last-child")) == len(UNITS)
     (command,) = texts(tree, "pre")
     assert command.startswith("yawbench compare ")
     assert "--swap controller=controller_off,controller_fuzzy_feedback" in command
