@@ -52,6 +52,6 @@ def interval(numbers: Sequence[float], level: float = LEVEL) -> Interval | None:
 @cache
 def _quantile(degrees: int, level: float) -> float:
     """Return the quantile of Student's distribution that leaves out (1 - level) / 2 at each end."""
-    from scipy.stats import t
+    from scipy.special import stdtrit  # as scipy.stats.t does, which takes long to import
 
-    return float(t.ppf(0.5 + level / 2, degrees))
+    return float(stdtrit(degrees, 0.5 + level / 2))
