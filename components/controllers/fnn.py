@@ -34,8 +34,9 @@ no estimate of de/dM_z and loses the car: J is a constant here.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import repeat
 from math import dist, tanh
-from operator import mul
+from operator import mul, sub
 
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter
@@ -151,7 +152,7 @@ def learnt(
     values: Sequence[float], gradient: Sequence[float], step: float, low: float, high: float
 ) -> list[float]:
     """Return values - step gradient, each limited to low..high; equations (33)-(35)."""
-    moved = [v - step * d for v, d in zip(values, gradient, strict=True)]
+    moved = list(map(sub, values, map(mul, gradient, repeat(step))))
     if max(moved) > high or min(moved) < low:
         return [min(max(v, low), high) for v in moved]
     return moved

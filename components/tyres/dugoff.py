@@ -36,8 +36,13 @@ class DugoffParameters:
     )
 
 
-def dugoff(alpha: float, kappa: float, f_z: float, mu: float, c_x: float, c_y: float) -> tuple[float, float]:
-    """Return (F_x, F_y) [N] in wheel axes; equations (9)-(12), finite for every slip.
+def dugoff(
+    alpha: float, kappa: float, f_z: float, mu: float, c_x: float, c_y: float
+) -> tuple[float, float, float]:
+    """Return F_x, F_y, dF_x/dkappa [N] in wheel axes; equations (9)-(12), finite for every slip.
+
+    dF_x/dkappa, at constant slip angle, is C_x / (1 + kappa)^2 where the tyre grips; where it slides, with
+    q_x' = C_x c and s' = ds/dkappa, mu F_z ((1 - s/2) q_x' q_y^2 / n^3 - s' q_x / 2n).
 
     Args:
         alpha, kappa: slip angle [rad] and longitudinal slip [1].
@@ -45,48 +50,26 @@ def dugoff(alpha: float, kappa: float, f_z: float, mu: float, c_x: float, c_y: f
         c_x, c_y: stiffnesses [N], [N/rad], positive.
     """
     if f_z <= 0.0 or mu <= 0.0:
-        return 0.0, 0.0
-    grip = mu * f_z
-    c = abs(cos(alpha))
-    q_x = c_x * kappa * c
-    q_y = -c_y * sin(alpha)
-    n = sqrt(q_x * q_x + q_y * q_y)
-    rolling = (1.0 + kappa) * c
-    if rolling <= 0.0:
-        s = 0.0
-    else:
-        s = 0.5 * grip * rolling
-        if not s < n:
-            return q_x / rolling, q_y / rolling
-        s /= n
-    scale = grip * (1.0 - 0.5 * s) / n
-    return scale * q_x, scale * q_y
-
-
-def dugoff_slip_stiffness(alpha: float, kappa: float, f_z: float, mu: float, c_x: float, c_y: float) -> float:
-    """Return dF_x/dkappa [N] at constant slip angle; arguments as of `dugoff`.
-
-    F_x = C_x / (1 + kappa)^2 where the tyre grips; where it slides, with q_x' = C_x c and s' = ds/dkappa,
-    mu F_z ((1 - s/2) q_x' q_y^2 / n^3 - s' q_x / 2n).
-    """
-    if f_z <= 0.0 or mu <= 0.0:
-        return 0.0
+        return 0.0, 0.0, 0.0
     grip = mu * f_z
     c = abs(cos(alpha))
     slope = c_x * c
-    q_x = slope * kappa
+    q_x = c_x * kappa * c
     q_y = -c_y * sin(alpha)
     n_2 = q_x * q_x + q_y * q_y
+    n = sqrt(n_2)
     rolling = (1.0 + kappa) * c
     s = turn = 0.0
     if rolling > 0.0:
         s = 0.5 * grip * rolling
-        if s * s >= n_2:
-            return slope * c / (rolling * rolling)
-        s /= sqrt(n_2)
+        if not s < n:
+            return q_x / rolling, q_y / rolling, slope * c / (rolling * rolling)
+        s /= n
         turn = s * c / rolling - s * slope * q_x / n_2
-    n = sqrt(n_2)
-    return grip / n * ((1.0 - 0.5 * s) * slope * q_y * q_y / n_2 - 0.5 * turn * q_x)
+    kept = 1.0 - 0.5 * s
+    scale = grip * kept / n
+    stiffness = grip / n * (kept * slope * q_y * q_y / n_2 - 0.5 * turn * q_x)
+    return scale * q_x, scale * q_y, stiffness
 
 
 class Dugoff(Tyre):
@@ -103,8 +86,7 @@ class Dugoff(Tyre):
         kappa: float, alpha: float, f_z: float, mu: float, axle: tuple[float, float]
     ) -> tuple[float, ...]:
         c_x, c_y = axle
-        f_x, f_y = dugoff(alpha, kappa, f_z, mu, c_x, c_y)
-        return f_x, f_y, dugoff_slip_stiffness(alpha, kappa, f_z, mu, c_x, c_y)
+        return dugoff(alpha, kappa, f_z, mu, c_x, c_y)
 
     @classmethod
     def curve(cls, alpha: float, f_z: float, mu: float, axle: tuple[float, float]) -> Curve:

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from components.tyres.dugoff import Dugoff, dugoff, dugoff_slip_stiffness
+from components.tyres.dugoff import Dugoff, dugoff
 from components.tyres.linear import LinearTyre
 from components.tyres.magic_formula import MagicFormula
 from components.tyres.magic_formula_62 import MagicFormula62
@@ -84,7 +84,6 @@ def test_dugoffs_stiffness_is_finite_wherever_its_force_is():
     random = np.random.default_rng(5)
     tyre = {"f_z": 3000.0, "mu": 0.8, "c_x": 4e4, "c_y": 5e4}
     for alpha, kappa in [*random.uniform((-3.2, -2.0), (3.2, 2.0), (2000, 2)), (0.0, -1.0), (np.pi / 2, 0.0)]:
-        assert np.isfinite(dugoff_slip_stiffness(alpha, kappa, **tyre))
         assert np.all(np.isfinite(dugoff(alpha, kappa, **tyre)))
 
 
