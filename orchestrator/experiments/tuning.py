@@ -91,14 +91,12 @@ def search(experiment: Experiment, judged: Judged) -> list[Tuned]:
         judged: makes runs and judges them.
 
     Raises:
-        ScenarioError: scipy is not installed, or a run cannot start.
+        ScenarioError: a run cannot start.
     """
-    try:
-        import numpy as np
-        from scipy.optimize import differential_evolution
-        from scipy.stats import qmc
-    except ImportError:
-        raise ScenarioError("tuning needs the package scipy: pip install 'yawbench[tuning]'") from None
+    import numpy as np
+    from scipy.optimize import differential_evolution
+    from scipy.stats import qmc
+
     tuning = tuning_of(experiment)
     fixed = _fixed(experiment, judged)
     found = []

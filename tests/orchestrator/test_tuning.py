@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import sys
 
 import pytest
 from lxml import html
@@ -126,9 +125,3 @@ def test_other_commands_say_what_a_tuning_file_is_for_and_tune_what_it_is_not(ya
     status, _, told = yawbench(**{TUNING.partition("tuning:")[2]: "", "tuning:": ""})
     assert (status, told.count("\n")) == (2, 1)
     assert "has no 'tuning'" in told
-
-
-def test_without_scipy_a_sentence_says_what_to_install(yawbench, monkeypatch):
-    monkeypatch.setitem(sys.modules, "scipy.optimize", None)
-    status, _, told = yawbench()
-    assert (status, told) == (2, "tuning needs the package scipy: pip install 'yawbench[tuning]'\n")
