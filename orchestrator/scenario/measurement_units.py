@@ -14,8 +14,7 @@ import math
 import re
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cache, reduce
-from operator import mul
+from functools import cache
 
 from ..plan import UnitDefinition
 from ..wording import short
@@ -97,10 +96,7 @@ ROUNDING = 1e-6
 written with seven digits, and no two units lie that close together."""
 
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
-_DIVIDED = re.compile(r"/(?![^(]*\))")  # not in parentheses
-_ENCLOSED = re.compile(r"\s*\((.*)\)\s*")
-_JOINED = re.compile(r"\s*[.*·]\s*|\s+")
-_POWER = re.compile(r"([A-Za-zµ°%]+|1)(?:\^?(-?\d{1,2}))?")
+_TOKEN = re.compile(r"(?P<symbol>[A-Za-zµ°%]+|1)(?:\^?(?P<power>-?\d{1,2}))?|(?P<mark>[./()*·])|\s+")
 
 
 class UnknownUnitError(ValueError):
@@ -122,39 +118,58 @@ def parse_unit(text: str) -> Measure:
     """
     if len(text) > LONGEST:
         raise UnknownUnitError(text)
-    try:
-        return _quotient(text.translate(_SUPERSCRIPTS).replace("μ", "µ"))
-    except LookupError:
-        raise UnknownUnitError(text) from None
+    plain = text.translate(_SUPERSCRIPTS).replace("μ", "µ")
+    tokens: list[Measure | str] = []
+    position = 0
+    while position < len(plain):
+        match = _TOKEN.match(plain, position)
+        if match is None:
+            raise UnknownUnitError(text)
+        position = match.end()
+        if match["symbol"]:
+            tokens.append(_symbol(match["symbol"], text) ** int(match["power"] or 1))
+        elif match["mark"]:
+            tokens.append("." if match["mark"] in "*·" else match["mark"])
+    measure, rest = _product(tokens, text)
+    if rest:
+        raise UnknownUnitError(text)
+    return measure
 
 
-def _quotient(text: str) -> Measure:
-    """Return what a product of powers means, divided by others.
-
-    Raises:
-        LookupError: there is no such unit.
-        ValueError: a denominator of several symbols.
-    """
-    measures: list[Measure] = []
-    for part in _DIVIDED.split(text):
-        enclosed = _ENCLOSED.fullmatch(part)
-        factors = [_quotient(enclosed[1])] if enclosed else [*map(_power, _JOINED.split(part.strip()))]
-        if measures and len(factors) > 1:
-            raise ValueError(f"{text!r} is ambiguous: put the denominator in parentheses")
-        measures += [one**-1 for one in factors] if measures else [reduce(mul, factors)]
-    return reduce(mul, measures)
-
-
-def _power(text: str) -> Measure:
-    symbol, power = found.groups() if (found := _POWER.fullmatch(text)) else (text, None)
-    return _symbol(symbol) ** int(power or 1)
-
-
-def _symbol(symbol: str) -> Measure:
+def _symbol(symbol: str, text: str) -> Measure:
     known = _PLAIN.get(symbol) or _PREFIXED.get(symbol)
     if known is not None:
         return known
-    return Measure(_PREFIXES[symbol[:1]], 0, _NONE) * _PREFIXED[symbol[1:]]
+    prefix, base = _PREFIXES.get(symbol[0]), _PREFIXED.get(symbol[1:])
+    if prefix is None or base is None:
+        raise UnknownUnitError(text)
+    return Measure(prefix, 0, _NONE) * base
+
+
+def _product(tokens: list[Measure | str], text: str) -> tuple[Measure, list[Measure | str]]:
+    """Return the product at the head of `tokens`, and what follows it."""
+    result, tokens = _factor(tokens, text)
+    divided = False
+    while tokens and tokens[0] != ")":
+        mark = tokens[0]
+        if mark in (".", "/"):
+            tokens = tokens[1:]
+        if mark != "/" and divided:
+            raise ValueError(f"{text!r} is ambiguous: put the denominator in parentheses")
+        factor, tokens = _factor(tokens, text)
+        divided = divided or mark == "/"
+        result = result * (factor**-1 if mark == "/" else factor)
+    return result, tokens
+
+
+def _factor(tokens: list[Measure | str], text: str) -> tuple[Measure, list[Measure | str]]:
+    if tokens and isinstance(tokens[0], Measure):
+        return tokens[0], tokens[1:]
+    if tokens and tokens[0] == "(":
+        inner, rest = _product(tokens[1:], text)
+        if rest and rest[0] == ")":
+            return inner, rest[1:]
+    raise UnknownUnitError(text)
 
 
 @cache

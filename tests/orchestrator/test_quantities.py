@@ -141,6 +141,13 @@ def test_a_quantity_is_converted_into_a_unit_that_only_the_fmu_defines() -> None
 
 
 @pytest.mark.parametrize(
+    ("text", "alike"), [("N.(m/rad)", "N.m/rad"), ("(kg.m).s-2", "N"), ("m/(s/kg)", "kg.m/s"), ("((m))", "m")]
+)
+def test_parentheses_may_stand_wherever_a_symbol_may(text: str, alike: str) -> None:
+    assert parse_unit(text) == parse_unit(alike)
+
+
+@pytest.mark.parametrize(
     ("value", "time"),
     [(0.001, Fraction(1, 1000)), (8, Fraction(8)), ("1 ms", Fraction(1, 1000)), (1e-5, Fraction(1, 100_000))],
 )
