@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 from tests.checkout import ROOT
+from tests.commands import status_of
 from tests.docs.test_commands import blocks
-from tests.orchestrator.test_ranking import SMALL, call, rows
+from tests.orchestrator.test_ranking import SMALL, rows
 
 PAGE = "docs/own_controller.md"
 
@@ -39,7 +40,7 @@ def test_an_fmu_in_c_is_ranked_by_the_command_of_the_docs(typed, tmp_path):
     assert (program, command) == ("yawbench", "rank")
     file, out = tmp_path / "small.yaml", tmp_path / "out"
     file.write_text(SMALL)
-    assert call("rank", file, *options, "--condition", "dry", "--jobs", 1, "--out", out) == 0
+    assert status_of("rank", file, *options, "--condition", "dry", "--jobs", 1, "--out", out) == 0
     found = {row["entry"]: row for row in rows(out / "cells.csv")}
     assert {name: row["state"] for name, row in found.items()} == {
         "yaw_guard": "passed", "fuzzy_pid": "passed", "none": "failed",
