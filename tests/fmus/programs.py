@@ -7,6 +7,7 @@ import random
 import re
 import shutil
 import subprocess
+import sys
 from functools import lru_cache
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from tests.fmus.bare import Fmu, Unit
 from tests.fmus.plausible import plausible
 
 MINORS = (10, 11, 12, 13)
+OURS_FIRST = sorted(MINORS, key=lambda minor: minor != sys.version_info.minor)
+"""Which Pythons there are is asked as late as in a test: it takes a process each."""
 """Of the versions of Python 3 that are supported."""
 
 
@@ -85,17 +88,16 @@ def python_libraries() -> dict[str, str]:
     return found
 
 
-def interpreters() -> list[str]:
-    """Return every different Python of 3.10 to 3.13 on PATH, in /usr/bin or in the folders of pyenv."""
+def interpreters(minor: int) -> list[str]:
+    """Return every different Python 3.`minor` on PATH, in /usr/bin or in the folders of pyenv."""
     found = {}
     pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv"))
-    for minor in MINORS:
-        name = f"python3.{minor}"
-        candidates = [shutil.which(name), shutil.which(name, path="/usr/bin")]
-        candidates += map(str, sorted(pyenv.glob(f"versions/3.{minor}.*/bin/{name}")))
-        for interpreter in filter(None, candidates):
-            asked = [interpreter, "-c", "import sys; print(sys.executable)"]
-            answer = subprocess.run(asked, capture_output=True, text=True, check=False)
-            if answer.returncode == 0:
-                found[os.path.realpath(answer.stdout.strip())] = None
+    name = f"python3.{minor}"
+    candidates = [shutil.which(name), shutil.which(name, path="/usr/bin")]
+    candidates += map(str, sorted(pyenv.glob(f"versions/3.{minor}.*/bin/{name}")))
+    for interpreter in filter(None, candidates):
+        asked = [interpreter, "-c", "import sys; print(sys.executable)"]
+        answer = subprocess.run(asked, capture_output=True, text=True, check=False)
+        if answer.returncode == 0:
+            found[os.path.realpath(answer.stdout.strip())] = None
     return list(found)
