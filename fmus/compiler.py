@@ -96,5 +96,6 @@ def _launcher(command: tuple[str, ...]) -> tuple[bytes | None, str]:
             binary = compile_library(command, sources, *FLAGS, SOURCES[0], *LIBRARIES)
             keep(STORE, key, binary)
     except BuildError as error:
-        return None, error.problems[0]
+        why = error.problems[0]
+        return None, why if "C compiler" in why else f"the C compiler failed: {why}"
     return binary, ""

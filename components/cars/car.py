@@ -100,12 +100,13 @@ class Car(Component):
     end: tuple[float, float]
     loads: Four
     pull: Pull = LEVEL
-    on_plane: ClassVar[bool]
-    """Whether the inputs end with those of road and wind."""
+    of_plane: ClassVar[slice | None]
+    """Where those of road and wind stand among the inputs; None: nowhere."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        cls.on_plane = cls.inputs[-len(ROAD_PLANE) :] == ROAD_PLANE
+        first = cls.inputs.index(ROAD_PLANE[0]) if ROAD_PLANE[0] in cls.inputs else None
+        cls.of_plane = None if first is None else slice(first, first + len(ROAD_PLANE))
 
     # ---- for the plant ----------------------------------------------------------------------
 
@@ -141,8 +142,8 @@ class Car(Component):
         v_y = p.initial_speed * sin(p.initial_sideslip)
         self.motion = v_x, v_y, p.initial_yaw_rate, 0.0, 0.0, 0.0
         self.steer_angle = signals[0]
-        if self.on_plane:
-            self.pull = pull_of(signals[-4:], p.mass)
+        if self.of_plane:
+            self.pull = pull_of(signals[self.of_plane], p.mass)
         carried = self.rest(signals)
         self.carried = Carried(carried)
         self.wheels = self.wheel_velocities()
@@ -156,8 +157,8 @@ class Car(Component):
         if h <= 0.0:  # nothing moves
             self.wheels = self.wheel_velocities()
             return
-        if self.on_plane:
-            self.pull = pull_of(signals[-4:], self.p.mass)
+        if self.of_plane:
+            self.pull = pull_of(signals[self.of_plane], self.p.mass)
         carried = self.move(h, 0.5 * (before + delta), signals)
         v, loads = self.wheels, self.loads
         self.wheels = self.wheel_velocities()

@@ -90,7 +90,7 @@ def make(title: str, jobs: Sequence[Job], wishes: Wishes, journal: Journal | Non
     done = total - len(left)
     before = "" if not done else ", all finished before" if done == total else f", {done} finished before"
     say(f"{title}: {counted(len(jobs), 'run')}{before}")
-    if wishes.no_run:
+    if wishes.no_run or not left:
         return []
     with reported("runs", total, done, each=journal is None) as told:
         return finish(left, journal, runner=runner_of(wishes.jobs, wishes.scheduler), told=told)

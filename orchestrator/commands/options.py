@@ -77,7 +77,12 @@ class Wishes:
             "Repeatable.",
         ),
     ] = None
-    out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results.")] = None
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="DIR", help="Folder for the results, and for the page if there is one."
+        ),
+    ] = None
     fmus: Annotated[
         Path | None,
         typer.Option("--fmus", metavar="DIR", help="Folder of the FMUs; default: the nearest fmus/ folder."),

@@ -111,7 +111,8 @@ def trace_of(results: Results, label: str = "") -> Trace:
     told = {unit: {**fmu.get("defaults", {}), **fmu.get("parameters", {})} for unit, fmu in fmus.items()}
     best = [unit for role in ("driver", "plant") for unit in results.units_of_role(role)]  # of test and car
     facts = {name: value for unit in (*told, *best) for name, value in told.get(unit, {}).items()}
-    mass = facts.get("mass")
+    masses = [told[unit]["mass"] for unit in results.units_of_role("plant") if "mass" in told.get(unit, {})]
+    mass = masses[-1] if masses else None
     return Trace(
         label or str(results.folder),
         results.time,
@@ -148,7 +149,9 @@ def _signal(name: str) -> str:
 
 
 def _kilograms(value: object) -> object:
-    return float(convert(value, "kg")) if isinstance(value, str) else value
+    if not isinstance(value, str):
+        raise ValueError(f"must be text with a unit, such as 1500 kg (got {value!r})")
+    return float(convert(value, "kg"))
 
 
 def _column(value: object) -> object:

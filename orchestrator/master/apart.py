@@ -198,6 +198,7 @@ class CourseApart(Course, Process):
             if not self._told_end:
                 self._ask()
                 self._hear(ENDED)
+            self._where = None  # what was asked for the end belongs to the run
             self._channel.say(FREE)
             self._hear(REPLY)
         except (Lost, OSError) as lost:

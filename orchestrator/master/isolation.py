@@ -152,7 +152,7 @@ class IsolatedSlave:
         return self._ask(f"{self._prefix}GetBooleanStatus", None, "ended")
 
     def note(self, status: Status) -> Status:
-        return self._ask("", status, "note", status)
+        return self._ask("", known(status), "note", status)
 
     def _ask(self, function: str, failed: Any, request: str, *arguments: Any) -> Any:
         """Return the answer to a request, or `failed` if the process did not survive it."""

@@ -178,9 +178,9 @@ class Master:
         real = {v.name: float(u) for v, u in zip(s.inputs, s.u, strict=True)}
         return real | self.memory.given_others(s)
 
-    def operation_of(self, k: int, call: Callable[[], Status | None]) -> Operation:
-        """Return the operation of the step to `k` that a call belongs to."""
-        return next(op for op in self._operations[k % self.programs.cycle] if op.call is call)
+    def operation_of(self, k: int, call: Callable[[], Status | None]) -> Operation | None:
+        """Return the operation of the step to `k` that a call belongs to; None: it is of another step."""
+        return next((op for op in self._operations[k % self.programs.cycle] if op.call is call), None)
 
     def _values_of_others(self) -> list[Value]:
         return [self.memory.others[key] for key in self._recorded_others]
@@ -202,6 +202,7 @@ class Master:
     def _answer(self, k: int, call: Callable[[], Status | None], status: Status) -> None:
         """Judge a call of the step from `k` - 1 to `k` that did not return OK."""
         operation = self.operation_of(k, call)
+        assert operation is not None
         station = self.memory.of[operation.unit]
         kind = station.slave.part(operation.kind)
         status = station.slave.note(status)

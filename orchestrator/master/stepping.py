@@ -200,7 +200,7 @@ def _whereabouts(thread: int) -> tuple[str, str] | None:
             local = frame.f_locals
             if frame.f_code is Master.advance.__code__ and "call" in local:
                 operation = local["self"].operation_of(local["k"], local["call"])
-                return operation.unit, WORDS.get(operation.kind, operation.kind)
+                return operation and (operation.unit, WORDS.get(operation.kind, operation.kind))
             if isinstance(local.get("self"), FmuSlave):
                 ending = frame.f_code.co_name == FmuSlave.free.__name__
                 found = local["self"].name, "its end" if ending else "initialization"

@@ -73,8 +73,9 @@ class Surroundings:
 
 def flush_output() -> None:
     """Write what Python and C have still to print."""
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in filter(None, (sys.stdout, sys.stderr)):
+        with contextlib.suppress(OSError, ValueError):  # nobody reads it any more
+            stream.flush()
     _c.fflush(None)
 
 

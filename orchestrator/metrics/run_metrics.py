@@ -114,8 +114,8 @@ class Metric:
 
 def _times_seconds(unit: str, power: int) -> str:
     """Return a unit times a power of a second: "m/s3" for "m/s" and -2."""
-    base, _, of_time = unit.partition("/s")
-    total = power - (int(of_time or 1) if "/s" in unit else 0)
+    per_time = re.fullmatch(r"(.+)/s(\d*)", unit)
+    base, total = (per_time[1], power - int(per_time[2] or 1)) if per_time else (unit, power)
     if total > 0:
         return "s" if base == "1" else f"{base}.s"
     return base if total == 0 else f"{base}/s{-total if total < -1 else ''}"

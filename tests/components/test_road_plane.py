@@ -66,6 +66,13 @@ def test_a_car_that_coasts_on_a_slope_gains_its_part_of_gravity(plant, slope):
     assert y["acceleration_x"] == pytest.approx(-G * sin(slope), rel=1e-12)
 
 
+def test_a_plant_may_have_inputs_of_its_own_after_those_of_road_and_wind():
+    class Mine(SevenDof):
+        inputs = (*SevenDof.inputs, "yaw_rate_ref")
+
+    assert held(stand_of(Mine), 0.1, slope=0.1) == held(stand_of(SevenDof), 0.1, slope=0.1)
+
+
 @plants
 def test_held_on_a_slope_a_car_stands_on_the_axles_that_statics_says(plant):
     slope, stand = 0.15, stand_of(plant, initial_speed=0.0)

@@ -206,6 +206,8 @@ def test_units_of_metrics_follow_from_the_signal():
     assert units["settling_time(yaw_rate)"] == "s"
     assert metric("slope_variation_rate(yaw_rate)").unit("rad/s") == "rad/s3"
     assert metric("effort(velocity_x)").unit("m/s") == "m"
+    for odd in ("N/(m/s)", "m/s^3", "W/sr"):  # as other tools may write them
+        assert metric("effort(yaw_rate)").unit(odd) == f"{odd}.s"
 
 
 def test_metrics_find_signals_whatever_the_units_are_called():

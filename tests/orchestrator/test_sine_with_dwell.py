@@ -306,6 +306,7 @@ def test_measured_columns_under_other_names_units_and_signs_give_the_same(tmp_pa
         (("LRW", "Lenkrad"), "has no column 'Lenkrad'"),
         (("unit: deg,", "unit: kg,"), "column 'LRW': its unit 'kg' does not fit: rad is wanted"),
         (("1.8 t", "1.8 m"), "'1.8 m' is not a value in kg"),
+        (("1.8 t", "1800"), "mass: must be text with a unit, such as 1500 kg (got 1800)"),
     ],
 )  # fmt: skip
 def test_a_wrong_mapping_is_answered_by_a_sentence(wrong, sentence, tmp_path, capsys):
