@@ -10,9 +10,9 @@ A plant adds its body in four methods, called in this order:
 and, if its body has outputs of its own, in `output`. `self.pull` is what road and wind do to all parts of the
 car alike (`cars.road_plane`); what is carried is of the tyres alone.
 
-`signals` are the inputs, one item each: steer angle, tyre forces x and y, the plant's own, last those of road
-and wind if it knows them; forces are those at the middle of the step. What `rest` and `move` return belongs
-to that middle; it is carried to the step's end (`mathematics.carry`) and handed to `finish`.
+`signals` are the inputs, one item each: steer angle, tyre forces x and y, the plant's own, and in one row
+those of road and wind if it knows them; forces are those at the middle of the step. What `rest` and `move`
+return belongs to that middle; it is carried to the step's end (`mathematics.carry`) and handed to `finish`.
 
     beta = atan2(v_y, v_x)        dbeta/dt = (v_x a_y - v_y a_x) / (v_x^2 + v_y^2) - r
 

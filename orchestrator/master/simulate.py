@@ -179,9 +179,9 @@ class Run:
 
     def _abandon(self) -> None:
         """Leave at once: somebody insists, perhaps because a unit never comes back."""
-        if (
-            self._saving or self.course.writing or self._apart
-        ):  # units that are apart are not waited for long anyway
+        if self._saving or self.course.writing:
+            return
+        if self._apart:  # units that are apart are not waited for long anyway
             return
         doing = "while its units were freed" if self._saved else "inside a unit"
         error = Interrupted(f"the run was interrupted {doing}", unit=None, time=self.log.time.value)
