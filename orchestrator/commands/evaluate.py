@@ -64,10 +64,11 @@ def evaluate(
 
     Every quantity, a verdict per criterion with its reason, a figure per run; also of measured data.
     Of sine with dwell, A comes from runs of slowly increasing steer (--slow-steer) or is given
-    (--angle); several runs are judged as a series.
+    (--angle); several runs are judged as a series. Exit status 1 if nothing could be judged.
     """
     from ..evaluation.dwell_series import is_series, judge_series
     from ..evaluation.trace import load_mapping, load_trace
+    from .batch import say
     from .recorded import distinct, folder_of_all
 
     chosen = TESTS[test]
@@ -81,6 +82,9 @@ def evaluate(
     recorded_here = all(place.is_dir() for place in places)
     folder = out or (folder_of_all(places) if recorded_here else Path("results") / "evaluation")
     Evaluation(chosen, traces, judged, series, known, folder).conclude(each=figures, together=out is not None)
+    if all(one.judges_nothing for one in judged):
+        say(f"{chosen.name}: nothing could be judged, see above")
+        raise typer.Exit(1)
 
 
 @dataclass(frozen=True)

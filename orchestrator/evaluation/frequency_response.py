@@ -18,6 +18,7 @@ import numpy as np
 
 from .filters import SLOWEST
 from .judgement import Judgement, NotJudged, evaluation
+from .signs import opposed
 from .trace import Trace
 
 FREQUENCIES = (0.2, 0.5, 1.0, 1.5, 2.0)
@@ -51,8 +52,12 @@ def response(trace: Trace, answer: str) -> np.ndarray:
 @evaluation
 def evaluate_sweep(judged: Judgement, trace: Trace) -> None:
     """Return gains, phases, largest gain and bandwidth."""
+    responses = {key: response(trace, key) for key in ANSWERS}
+    for key, (name, _) in ANSWERS.items():
+        if responses[key][0].real < 0.0:  # more than a quarter of a period late at 0.2 Hz, or turned round
+            raise opposed(name)
     for key, (name, unit) in ANSWERS.items():
-        found = response(trace, key)
+        found = responses[key]
         gain, phase = np.abs(found), np.angle(found)
         for f in FREQUENCIES:
             k = int(np.argmin(np.abs(GRID - f)))

@@ -12,6 +12,8 @@ from enum import Enum
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec
 
+from ..metrics.symbols import si
+
 if TYPE_CHECKING:
     from .trace import Trace
 
@@ -78,14 +80,20 @@ class Judgement:
         """The verdict over all criteria, None if the test has none."""
         return overall(ruling.verdict for ruling in self.rulings.values())
 
+    @property
+    def judges_nothing(self) -> bool:
+        """Whether no criterion is judged; of a test without criteria, whether no quantity has a value."""
+        if self.rulings:
+            return all(one.verdict is Verdict.NOT_JUDGED for one in self.rulings.values())
+        return all(one.value is None for one in self.quantities.values())
+
     def as_data(self) -> dict[str, Any]:
-        """Return it as plain data, for files."""
-        said = asdict(self)
+        """Return it as plain data, for files: units are SI."""
         return {
             "label": self.label,
             "verdict": self.verdict,
-            "quantities": said["quantities"],
-            "criteria": said["rulings"],
+            "quantities": {key: asdict(one) | {"unit": si(one.unit)} for key, one in self.quantities.items()},
+            "criteria": {name: asdict(one) for name, one in self.rulings.items()},
             "notes": self.notes,
         }
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from .filters import prepared
 from .judgement import Judgement, NotJudged, evaluation
+from .signs import refuse_opposed
 from .trace import Trace
 
 G = 9.80665
@@ -34,6 +35,7 @@ def evaluate_slow_steer(judged: Judgement, trace: Trace) -> None:
     judged.add("angle", "hand-wheel angle at 0.3 g", None, "rad")
     signals = prepared(trace, ("steering_wheel_angle", "acceleration_y"))
     angle, acceleration = signals["steering_wheel_angle"], signals["acceleration_y"]
+    refuse_opposed(angle, acceleration, "lateral acceleration")
     side = math.copysign(1.0, float(angle[np.argmax(np.abs(angle))]))
     a_y, delta = side * acceleration, side * angle
     beyond = np.flatnonzero(a_y > WINDOW[1])

@@ -20,6 +20,7 @@ import numpy as np
 
 from .filters import at, first_crossing
 from .judgement import Judgement, NotJudged, evaluation
+from .signs import refuse_opposed
 from .trace import Trace
 
 STEADY = 1.0
@@ -47,6 +48,8 @@ def evaluate_step(judged: Judgement, trace: Trace) -> None:
     zero = first_crossing(t, side * (hand - hand[0]), 0.5 * abs(step), float(t[0]))
     if zero is None or np.ptp(hand[end]) > SETTLED * abs(step):
         raise NotJudged("the hand wheel is still turned at the end of the record")
+    for key, (name, _) in ANSWERS.items():
+        refuse_opposed(hand - hand[0], trace[key] - trace[key][0], name)
     judged.add("step", "final hand-wheel angle", step, "rad")
     judged.add("zero", "time zero", zero, "s", "half of the final hand-wheel angle")
     if "velocity_x" in trace:

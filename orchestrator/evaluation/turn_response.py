@@ -21,6 +21,7 @@ import numpy as np
 
 from .filters import at
 from .judgement import Judgement, NotJudged, evaluation
+from .signs import refuse_opposed
 from .trace import Trace
 
 BEFORE, AFTER = 0.5, 1.0
@@ -40,6 +41,8 @@ def evaluate_turn(judged: Judgement, trace: Trace, action: float | None = None) 
     v_0, r_0 = float(v[before].mean()), float(r[before].mean())
     if abs(r_0) < 1e-3 or np.ptp(r[before]) > STEADY * abs(r_0):
         raise NotJudged(f"the turn is not steady before {now:g} s")
+    if "steering_wheel_angle" in trace:
+        refuse_opposed(trace["steering_wheel_angle"][before], r[before], "yaw rate")
     side, radius = math.copysign(1.0, r_0), v_0 / abs(r_0)
     judged.add("radius", "radius of the steady turn", side * radius, "m", "v / r, positive: to the left")
     judged.add("speed", "speed of the steady turn", v_0, "m/s")

@@ -21,6 +21,7 @@ import math
 import numpy as np
 
 from .judgement import Judgement, NotJudged, evaluation
+from .signs import refuse_opposed
 from .trace import Trace
 
 WINDOW = (0.5, 2.0)
@@ -46,6 +47,8 @@ def evaluate_understeer(judged: Judgement, trace: Trace) -> None:
     extra = side * (hand / ratio - (front + rear) * r / np.maximum(v, 0.1))
     last = int(np.argmax(a_y))  # what comes after is not the slow rise any more
     a_y, extra = a_y[: last + 1], extra[: last + 1]
+    refuse_opposed(side * hand[: last + 1], a_y, "lateral acceleration")
+    refuse_opposed(hand[: last + 1], r[: last + 1], "yaw rate")
     found = gradients(a_y, extra)
     gradient = found.pop(0.0)
     if gradient is None:

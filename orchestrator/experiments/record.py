@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..metrics.run_metrics import Value, metric
+from ..metrics.symbols import si
 from ..results.read import Results
 from ..writing import write_whole
 from .findings import Findings
@@ -16,7 +17,7 @@ from .judging import Judgement
 from .limits import limits_of
 from .margins import Region
 from .numbers import si_number
-from .table import si, write_table
+from .table import write_table
 from .verdicts import heading, verdict
 
 RECORD = "experiment.json"

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from ..errors import ResultsError
 from ..files import reason
 from ..metrics.run_metrics import metric
+from ..metrics.symbols import si
 from ..writing import write_whole
 from .findings import Findings
 from .numbers import text_of
@@ -86,11 +87,6 @@ def verdict_columns(findings: Findings) -> list[Column]:
         Column("chosen", "string", [(flip and flip.chosen) or None for flip in flips]),
         Column("robust", "string", [region and text_of(region.robust) for region in regions]),
     ]
-
-
-def si(unit: str) -> str:
-    """Return a metric's unit as it stands in a table for programs: ratios are not in per cent there."""
-    return "1" if unit == "%" else unit
 
 
 def to_pandas(columns: Sequence[Column]) -> pd.DataFrame:

@@ -24,6 +24,11 @@ def si_of(unit: str) -> tuple[str, float]:
     return unit, 1.0
 
 
+def si(unit: str) -> str:
+    """Return the unit of a number as files have it: there a ratio has the unit 1, not per cent."""
+    return "1" if unit == "%" else unit
+
+
 def variable_of(column: str) -> str:
     """Return the variable's name of `unit.variable`, or the name itself."""
     return column.rpartition(".")[2]

@@ -16,11 +16,13 @@ from orchestrator.evaluation.judgement import Judgement, NotJudged, Verdict
 from orchestrator.evaluation.slow_steer import G, characteristic_angle, evaluate_slow_steer
 from orchestrator.evaluation.trace import Trace
 from tests.commands import status_of
+from vocabulary.units import UNITS
 
 A, LARGE = radians(36.0), radians(270.0)
 START = 1.5
 END = START + 1.0 / 0.7 + 0.5
 PEAK_AT, PEAK, FALL = START + 1.2, 0.8, 0.45  # yaw rate -PEAK / cosh((t - PEAK_AT) / FALL)
+FIRST, REVERSAL = 0.5, START + 0.5 / 0.7
 FAR, MIDDLE, RISE = 4.0, START + 1.0, 0.15  # displacement FAR (1 + tanh((t - MIDDLE) / RISE)) / 2
 
 
@@ -40,8 +42,14 @@ as_sampled = pytest.mark.parametrize("sampling", SAMPLING.values(), ids=SAMPLING
 
 
 def fall(t: np.ndarray, width: float) -> np.ndarray:
-    """Return a yaw rate that has nothing before the steering, a peak, and a tail of 1 / cosh."""
-    return -PEAK / np.cosh((t - PEAK_AT) / width) * 0.5 * (1.0 + np.tanh((t - START - 0.4) / 0.1))
+    """Return a yaw rate that has next to nothing before the reversal, a peak, and a tail of 1 / cosh."""
+    return -PEAK / np.cosh((t - PEAK_AT) / width) * 0.5 * (1.0 + np.tanh((t - START - 0.6) / 0.1))
+
+
+def answer(t: np.ndarray) -> np.ndarray:
+    """Return the yaw rate of the first half wave; nothing before and after it."""
+    share = np.clip((t - START) / (REVERSAL - START), 0.0, 1.0)
+    return FIRST * np.sin(np.pi * share) ** 2
 
 
 def trace(
@@ -54,7 +62,7 @@ def trace(
     x = np.tanh((t - MIDDLE) / RISE)
     signals = {
         "steering_wheel_angle": np.array([sine_with_dwell(s, p) for s in t]) + 2.0 * offset,
-        "yaw_rate": side * (fall(t, FALL) if yaw_rate is None else yaw_rate(t)) + offset,
+        "yaw_rate": side * (answer(t) + (fall(t, FALL) if yaw_rate is None else yaw_rate(t))) + offset,
         "acceleration_y": side * -FAR * x * (1.0 - x * x) / RISE**2 + offset,
         "sideslip": np.where(t > END, radians(3.0), 0.0),
         "velocity_x": np.full_like(t, 80.0 / 3.6),
@@ -156,6 +164,67 @@ def test_what_cannot_be_judged_says_why_and_passes_nothing(changes, why):
     assert judged.rulings["stability"].verdict is Verdict.NOT_JUDGED
     assert why in judged.rulings["stability"].why
     assert judged.verdict is Verdict.NOT_JUDGED
+
+
+def noise(size: float, seed: int = 1):
+    """Return a yaw rate that is nothing but noise [rad/s], smooth enough to pass the filter."""
+    phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, 12)
+    return lambda t: (
+        size * sum(np.sin(2.0 * np.pi * (1.0 + 0.4 * k) * t + phase) for k, phase in enumerate(phases))
+    )
+
+
+def unanswered(made: Trace, yaw_rate) -> Trace:
+    made.signals["yaw_rate"] = yaw_rate(made.time)
+    return made
+
+
+def turned(made: Trace, *names: str) -> Trace:
+    for name in names:
+        made.signals[name] = -made.signals[name]
+    return made
+
+
+@pytest.mark.parametrize(
+    "made, why",
+    [
+        (turned(trace(), "steering_wheel_angle"), "the yaw rate opposes the steering"),
+        (turned(trace(), "yaw_rate"), "the yaw rate opposes the steering"),
+        (turned(trace(-LARGE), "yaw_rate"), "the yaw rate opposes the steering"),
+        (turned(trace(), "acceleration_y"), "the lateral acceleration opposes the steering"),
+        (unanswered(trace(), np.zeros_like), "the yaw rate does not follow the steering"),
+        (trace(yaw_rate=noise(1e-4)), "the yaw rate hardly answers the reversal"),
+    ],
+    ids=["steering", "yaw rate", "right first", "acceleration", "still", "no answer to the reversal"],
+)
+def test_a_car_that_does_not_answer_the_steering_is_not_judged(made, why):
+    judged = evaluate_dwell(made, A)
+    assert set(verdicts(judged)) == {"stability", "responsiveness"}
+    assert set(verdicts(judged).values()) == {"not judged"}
+    assert all(why in ruling.why for ruling in judged.rulings.values())
+    assert judged.judges_nothing
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_noise_is_no_answer_and_passes_nothing(seed):
+    judged = evaluate_dwell(unanswered(trace(), noise(0.01, seed)), A)
+    assert judged.rulings["stability"].verdict is not Verdict.PASSED
+
+
+def test_a_second_peak_that_comes_later_than_the_first_ratio_is_none():
+    def yaw_rate(late):
+        return lambda t: -PEAK * np.exp(-(((t - END - late) / 0.5) ** 2))
+
+    assert evaluate_dwell(trace(yaw_rate=yaw_rate(0.8)), A)["peak_at"] == pytest.approx(END + 0.8, abs=0.005)
+    judged = evaluate_dwell(trace(yaw_rate=yaw_rate(1.2)), A)
+    assert judged["peak"] is None
+    assert judged.rulings["stability"].verdict is Verdict.FAILED
+
+
+def test_a_slow_steer_whose_acceleration_opposes_it_has_no_angle():
+    judged = evaluate_slow_steer(turned(slow_steer(), "acceleration_y"))
+    assert judged["angle"] is None
+    assert judged.notes[0].startswith("the lateral acceleration opposes the steering")
 
 
 def test_responsiveness_is_asked_from_5_a_on_a_dry_road_at_80_km_h():
@@ -296,6 +365,33 @@ def test_measured_columns_under_other_names_units_and_signs_give_the_same(tmp_pa
     for key, one in found["quantities"].items():
         assert one["value"] == pytest.approx(exact[key], rel=1e-8), key
     assert "sideslip was not recorded: a spin may pass the ratios unseen" in found["notes"]
+
+
+def test_an_evaluation_that_judges_nothing_says_so_and_ends_with_1(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    made = turned(trace(sampling=SAMPLING["200 Hz"]), "steering_wheel_angle")
+    names = ("steering_wheel_angle", "yaw_rate", "acceleration_y")
+    table = np.column_stack([made.time, *(made[name] for name in names)])
+    np.savetxt("run.csv", table, "%.12g", ",", header="t,a [rad],r [rad/s],ay [m/s2]", comments="")
+    signals = "signals: {steering_wheel_angle: a, yaw_rate: r, acceleration_y: ay}\n"
+    mapping = f"time: {{column: t, unit: s}}\n{signals}"
+    (tmp_path / "map.yaml").write_text(mapping)
+    options = ("--signals", "map.yaml", "--out", "out", "--no-figures")
+    command = ("evaluate", "sine-with-dwell", "run.csv", *options)
+    assert status_of(*command) == 1
+    said = capsys.readouterr()
+    assert "the yaw rate opposes the steering" in said.out
+    assert "nothing could be judged" in said.err
+    (tmp_path / "map.yaml").write_text(mapping.replace("a, yaw", "{column: a, sign: -1}, yaw"))
+    assert status_of(*command) == 0
+
+
+def test_units_in_the_file_are_si(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    data = evaluate_dwell(trace(), A).as_data()
+    units = {key: one["unit"] for key, one in data["quantities"].items()}
+    assert (units["ratio_1000"], units["ratio_1750"]) == ("1", "1")
+    assert set(units.values()) <= {*UNITS}
 
 
 @pytest.mark.parametrize(

@@ -73,6 +73,22 @@ def test_a_step_steer_gives_gain_response_time_and_overshoot_of_its_closed_form(
     assert judged["t_beta"] == pytest.approx(0.02 * judged["yaw_rate_peak"], rel=1e-5)
 
 
+@pytest.mark.parametrize(
+    "column, answer",
+    [
+        ("steering_wheel_angle", "yaw rate"),
+        ("yaw_rate", "yaw rate"),
+        ("acceleration_y", "lateral acceleration"),
+    ],
+)
+def test_a_step_whose_answer_opposes_it_gives_nothing(column, answer):
+    made = step_trace(lambda last: np.arange(0.0, last, 0.001))
+    made.signals[column] = -made.signals[column]
+    judged = evaluate_step(made)
+    assert judged.quantities == {}
+    assert judged.notes[0].startswith(f"the {answer} opposes the steering")
+
+
 def test_a_wheel_that_is_not_held_is_no_step():
     made = step_trace(lambda last: np.arange(0.0, last, 0.001))
     made.signals["steering_wheel_angle"] = 0.1 * made.time
@@ -93,6 +109,10 @@ def test_the_understeer_gradient_does_not_depend_on_what_is_held(sampling, held)
     signals = {"velocity_x": v, "yaw_rate": -r, "acceleration_y": -a_y,
                "steering_wheel_angle": -16.0 * (2.7 * r / v + extra)}  # fmt: skip
     judged = evaluate_understeer(Trace("slow", t, signals, facts=facts))
+    for answer in ("yaw_rate", "acceleration_y"):
+        turned = evaluate_understeer(Trace("slow", t, signals | {answer: -signals[answer]}, facts=facts))
+        assert turned.quantities == {}
+        assert "opposes the steering" in turned.notes[0]
     assert judged["gradient"] == pytest.approx(0.004, rel=1e-9)
     assert judged["gradient_hand"] == pytest.approx(0.064, rel=1e-9)
     assert judged["gradient_4"] == pytest.approx(0.004 + 3e-4 * 16.0, rel=0.01)  # over 1 m/s2
@@ -225,6 +245,9 @@ def test_a_braked_turn_gives_the_ratios_of_its_closed_form(sampling):
     assert judged["sideslip"] == pytest.approx(-np.radians(1.0), rel=1e-3)
     assert evaluate_turn(Trace("turn", t, signals, facts={})).notes[0].startswith("the run does not tell")
     assert "not steady" in evaluate_turn(Trace("turn", t, signals), action=9.6).notes[0]
+    steered = signals | {"steering_wheel_angle": np.full_like(t, 0.5)}
+    (why,) = evaluate_turn(Trace("turn", t, steered, facts={"action_time": 9.0})).notes
+    assert why.startswith("the yaw rate opposes the steering")
 
 
 @as_sampled
@@ -238,6 +261,9 @@ def test_a_sweep_gives_the_frequency_response_of_an_oscillator(sampling):
     signals = {"steering_wheel_angle": np.interp(t, fine, steered)}
     signals |= {name: np.interp(t, fine, answer) for name in ("yaw_rate", "acceleration_y")}
     judged = evaluate_sweep(Trace("sweep", t, signals))
+    turned = evaluate_sweep(Trace("sweep", t, signals | {"yaw_rate": -signals["yaw_rate"]}))
+    assert turned.quantities == {}
+    assert turned.notes[0].startswith("the yaw rate opposes the steering")
     for f in (0.5, 1.0, 1.5, 2.0):
         exact = gain * omega**2 / (omega**2 - (2 * pi * f) ** 2 + 2j * damping * omega * 2 * pi * f)
         assert judged[f"yaw_rate_gain_{f:g}"] == pytest.approx(abs(exact), rel=0.01), f
