@@ -4,6 +4,7 @@ Axes and signs are those of ISO 8855: x forward, y left, z up; angles and moment
 counter-clockwise seen from above. `*` stands for the four wheels fl, fr, rl, rr.
 """
 
+import math
 from typing import NamedTuple
 
 
@@ -19,18 +20,32 @@ class Entry(NamedTuple):
     """What headings call it, where that is not its name in words."""
     minimum: float | None = None
     """A smaller value is a mistake, not a strange road."""
+    largest: float | None = None
+    """A larger magnitude in a measurement is no car's: most likely its unit is another one. All chosen."""
 
 
 SIGNALS: dict[str, Entry] = {
     "velocity_x": Entry(
-        "m/s", "Longitudinal velocity v_x of the centre of mass, vehicle axes", "v_x", "Longitudinal velocity"
+        "m/s",
+        "Longitudinal velocity v_x of the centre of mass, vehicle axes",
+        "v_x",
+        "Longitudinal velocity",
+        largest=70.0,  # above the top speed of nearly all cars
     ),
     "velocity_y": Entry(
-        "m/s", "Lateral velocity v_y of the centre of mass, vehicle axes", "v_y", "Lateral velocity"
+        "m/s",
+        "Lateral velocity v_y of the centre of mass, vehicle axes",
+        "v_y",
+        "Lateral velocity",
+        largest=70.0,
     ),
-    "yaw_rate": Entry("rad/s", "Yaw rate r", "r"),
+    "yaw_rate": Entry("rad/s", "Yaw rate r", "r", largest=5.0),  # 4 times that of cars here that spin
     "sideslip": Entry(
-        "rad", "Sideslip angle beta = atan2(v_y, v_x) of the centre of mass", "β", "Sideslip angle"
+        "rad",
+        "Sideslip angle beta = atan2(v_y, v_x) of the centre of mass",
+        "β",
+        "Sideslip angle",
+        largest=math.pi,
     ),
     "sideslip_rate": Entry("rad/s", "Time derivative of the sideslip angle", "dβ/dt"),
     "acceleration_x": Entry(
@@ -38,21 +53,40 @@ SIGNALS: dict[str, Entry] = {
         "Longitudinal acceleration of the centre of mass, vehicle axes",
         "a_x",
         "Longitudinal acceleration",
+        largest=30.0,  # three times what tyres of the road give
     ),
     "acceleration_y": Entry(
-        "m/s2", "Lateral acceleration of the centre of mass, vehicle axes", "a_y", "Lateral acceleration"
+        "m/s2",
+        "Lateral acceleration of the centre of mass, vehicle axes",
+        "a_y",
+        "Lateral acceleration",
+        largest=30.0,
     ),
-    "roll_angle": Entry("rad", "Roll angle, positive with the left side up", "φ"),
-    "roll_rate": Entry("rad/s", "Roll rate"),
-    "pitch_angle": Entry("rad", "Pitch angle, positive with the nose down", "θ"),
+    "roll_angle": Entry("rad", "Roll angle, positive with the left side up", "φ", largest=math.pi),
+    "roll_rate": Entry("rad/s", "Roll rate", largest=5.0),
+    "pitch_angle": Entry("rad", "Pitch angle, positive with the nose down", "θ", largest=math.pi),
     "position_x": Entry("m", "Position of the centre of mass, earth axes, x", "x", "Longitudinal position"),
     "position_y": Entry("m", "Position of the centre of mass, earth axes, y", "y", "Lateral position"),
     "yaw_angle": Entry("rad", "Yaw angle psi", "ψ"),
-    "steer_angle": Entry("rad", "Road-wheel steer angle delta of the front axle", "δ"),
-    "steering_wheel_angle": Entry("rad", "Hand-wheel angle", "δ_H", "Hand-wheel angle"),
+    "steer_angle": Entry(
+        "rad",
+        "Road-wheel steer angle delta of the front axle",
+        "δ",
+        largest=1.05,  # 60 degrees, above the lock of all cars
+    ),
+    "steering_wheel_angle": Entry(
+        "rad",
+        "Hand-wheel angle",
+        "δ_H",
+        "Hand-wheel angle",
+        largest=4.0 * math.pi,  # two turns
+    ),
     "drive_force": Entry("N", "Sum of the longitudinal tyre forces the driver asks for"),
     "friction": Entry(
-        "1", "Friction coefficient mu of the road, as known to reference and controller", minimum=0.0
+        "1",
+        "Friction coefficient mu of the road, as known to reference and controller",
+        minimum=0.0,
+        largest=2.0,
     ),
     "friction_*": Entry("1", "Friction coefficient mu under the wheel", minimum=0.0),
     "friction_delayed": Entry("1", "Friction coefficient mu of the road, known with a delay", minimum=0.0),

@@ -3,11 +3,14 @@
 A trace of a run here finds its signals by their names in the vocabulary. Of a measurement a mapping says
 which column is which:
 
-    time: {column: Zeit, unit: ms}            # a number with its own unit, if the header names none
+    time: {column: Zeit, unit: ms}            # the unit, if the file names none
     signals:
       steering_wheel_angle: {column: LRW, unit: deg, sign: -1}     # -1: positive to the right there
       yaw_rate: Gierrate                      # the header names the unit: "Gierrate [deg/s]"
     mass: 1650 kg
+
+No unit is taken for granted: a column has one in the mapping, in its header, in a row of units below the
+header or in the file's own description, unless its signal is a plain number.
 """
 
 from __future__ import annotations
@@ -32,14 +35,17 @@ from ..metrics.symbols import si_of
 from ..results.read import Results, load_results
 from ..scenario import yaml_lines
 from ..scenario.measurement_units import measure_of, parse_unit
-from ..scenario.quantities import convert
+from ..scenario.quantities import convert, meant_unit, spellings
 from ..scenario.strict import Strict, validate
 from ..titles import changes_in, with_changes
 from ..wiring.series import SECOND, numbers_in, reading_series
 from ..wiring.series_file import SeriesFile
-from ..wording import hint
+from ..wording import hint, listed
 from .filters import even_grid, resample
 from .judgement import NotJudged
+
+SPIKES = 0.01
+"""Share of the samples that may be beyond what cars reach; chosen: accelerometers have spikes."""
 
 
 @dataclass(frozen=True)
@@ -221,14 +227,54 @@ def _measured(file: SeriesFile, mapping: MappingSpec, label: str, title: str) ->
     clock = np.zeros(0)
     for name, spec in mapping.signals.items():
         column = file.column(spec.column, mapping.time.column)
-        times = numbers_in(column.times, mapping.time.unit or column.time_unit, SECOND, "s", "time")
+        of_times = _unit_of("time", mapping.time, column.time_unit, "s")
+        times = numbers_in(column.times, of_times, SECOND, "s", "time")
         if not signals:
             clock = times
             if len(clock) < 2 or not np.all(np.diff(clock) > 0):
                 raise ValueError("times must increase from row to row")
-        unit, wanted = spec.unit or column.unit, SIGNALS[name].unit
+        wanted = SIGNALS[name].unit
+        unit = _unit_of(name, spec, column.unit, wanted)
         values = numbers_in(column.values, unit, measure_of(wanted), wanted, f"column {spec.column!r}")
+        _refuse_implausible(name, spec.column, column.values, values, unit)
         if not np.array_equal(times, clock):
             values = np.interp(clock, times, values)  # channels of MDF have clocks of their own
         signals[name] = spec.sign * values
     return Trace(label, clock, signals, mapping.mass, mapping.friction, title=title)
+
+
+def _unit_of(name: str, spec: ColumnSpec, of_file: str | None, wanted: str) -> str:
+    """Return the unit of the column of a signal, or of the time.
+
+    Raises:
+        ValueError: neither the mapping nor the file gives it; only plain numbers may go without.
+    """
+    unit = spec.unit or of_file or (wanted if wanted == "1" else None)
+    if unit is None:
+        raise ValueError(
+            f"column {spec.column!r} has no unit, such as {listed(spellings(wanted), last='or')}: give it in "
+            f"the mapping, '{name}: {{column: {spec.column}, unit: {wanted}}}', or in the file's header, "
+            f"'{spec.column} [{wanted}]'"
+        )
+    return unit
+
+
+def _refuse_implausible(name: str, column: str, given: np.ndarray, values: np.ndarray, unit: str) -> None:
+    """Raise ValueError if a signal has values that no car reaches, with the unit that was probably meant.
+
+    Args:
+        name: of the signal.
+        column: its heading.
+        given: the numbers of the column, in `unit`.
+        values: the same in SI.
+        unit: of the column.
+    """
+    largest, wanted = SIGNALS[name].largest, SIGNALS[name].unit
+    if largest is None or np.mean(np.abs(values) > largest) <= SPIKES:
+        return
+    number = float(np.quantile(np.abs(given.astype(float)), 1.0 - SPIKES))
+    likely = meant_unit(number, unit, wanted, lambda value: abs(value) <= largest)
+    raise ValueError(
+        f"column {column!r}: no car reaches {name} of {number:.4g}{f' {unit}' if unit != '1' else ''}, "
+        f"at most {largest:.4g} {wanted} is allowed{f'; did you mean {likely!r}?' if likely else ''}"
+    )

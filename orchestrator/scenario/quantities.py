@@ -8,12 +8,13 @@ from __future__ import annotations
 import math
 import re
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 
 from ..plan import UnitDefinition
 from ..wording import closest, listed, short
-from .measurement_units import Measure, UnknownUnitError, measure_of, parse_unit
+from .measurement_units import Measure, UnknownUnitError, conversion, measure_of, parse_unit
 
 LONGEST = 1e9
 """The longest time that is taken for one [s]."""
@@ -69,11 +70,9 @@ def convert(text: str, unit: str | None, definition: UnitDefinition | None = Non
     if target is None:
         raise ValueError(f"{text!r} cannot be converted to {unit}: give a number in {unit}")
     try:
-        source = parse_unit(given)
+        source = _source(given, target)
     except UnknownUnitError as error:
         raise ValueError(f"{error}{_guess(given, unit, target)}") from None
-    if given == "g" and target.powers == _GRAVITY.powers:
-        source = _GRAVITY
     if source.powers != target.powers:
         raise ValueError(
             f"{text!r} is not a value in {unit}: use {listed(_spellings(unit, target), last='or')}"
@@ -82,6 +81,23 @@ def convert(text: str, unit: str | None, definition: UnitDefinition | None = Non
     if value == math.inf:
         raise ValueError(f"must be a finite number in {unit} (got {text!r})")
     return value
+
+
+def _source(given: str, target: Measure) -> Measure:
+    """Return what a unit means where a quantity is wanted in another: `g` of an acceleration is gravity.
+
+    Raises:
+        ValueError: not a unit.
+    """
+    return _GRAVITY if given == "g" and target.powers == _GRAVITY.powers else parse_unit(given)
+
+
+def gain_and_offset(given: str, target: Measure) -> tuple[float, float] | None:
+    """Return what makes a number in a unit one in another, None if they do not fit or one is no unit."""
+    try:
+        return conversion(_source(given, target), target)
+    except ValueError:
+        return None
 
 
 def converted(number: Fraction, source: Measure, target: Measure) -> Fraction | float:
@@ -114,6 +130,26 @@ def _spellings(unit: str, target: Measure) -> list[str]:
     if target.powers == _GRAVITY.powers:
         fitting.append("g")
     return list(dict.fromkeys((unit, *fitting)))
+
+
+def meant_unit(number: float, given: str, unit: str, fits: Callable[[float], bool]) -> str:
+    """Return the unit in which a number would be a plausible value, "" if there is none.
+
+    Args:
+        number: as it is written.
+        given: the unit that it was taken to be in.
+        unit: of the quantity.
+        fits: whether a value in that unit is plausible.
+    """
+    target = parse_unit(unit)
+    others = (one for one in _spellings(unit, target) if one != given)
+    in_unit = ((one, converted(Fraction(number), _source(one, target), target)) for one in others)
+    return next((one for one, value in in_unit if fits(float(value))), "")
+
+
+def spellings(unit: str) -> list[str]:
+    """Return the common units of what a unit measures, itself first."""
+    return _spellings(unit, parse_unit(unit))
 
 
 def instant(value: object) -> Fraction:

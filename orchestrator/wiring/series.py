@@ -15,7 +15,8 @@ from ..errors import ScenarioError
 from ..files import reading
 from ..plan import Series, Value, Variable
 from ..scenario.load import Scenario
-from ..scenario.measurement_units import Measure, conversion, measure_of
+from ..scenario.measurement_units import Measure, measure_of
+from ..scenario.quantities import gain_and_offset
 from ..scenario.scenario_schema import SeriesSpec
 from .parameters import value_for
 from .series_file import SeriesFile
@@ -83,8 +84,7 @@ def numbers_in(
     numbers = _numbers(column, what)
     if unit is None or wanted is None:
         return numbers
-    source = measure_of(unit)
-    between = None if source is None else conversion(source, wanted)
+    between = gain_and_offset(unit, wanted)
     if between is None:
         raise ValueError(f"{what}: its unit {unit!r} does not fit: {says} is wanted")
     gain, offset = between

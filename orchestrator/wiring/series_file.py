@@ -1,7 +1,8 @@
 """Files of time series: columns by name, with the units of measurement that their headers give.
 
-CSV (`,`, `;` or tab), Parquet, ASAM MDF 4. A header may name a unit, `delta [deg]`; Parquet has it in
-the field's metadata, MDF in the channel. Results of a run here have theirs in the run.json beside them.
+CSV (`,`, `;` or tab), Parquet, ASAM MDF 4. A header may name a unit, `delta [deg]`, and CSV may have a row
+of units below its header; Parquet has it in the field's metadata, MDF in the channel. Results of a run here
+have theirs in the run.json beside them.
 """
 
 from __future__ import annotations
@@ -94,25 +95,47 @@ def _csv(raw: bytes) -> _Table:
 
     def rows() -> Iterator[list[str]]:
         text = io.TextIOWrapper(io.BytesIO(raw), encoding="utf-8-sig", newline="")
-        return (row for row in csv.reader(text, delimiter=delimiter) if row)
+        found = (row for row in csv.reader(text, delimiter=delimiter) if row)
+        return itertools.islice(found, head, None)
 
     def values(at: int) -> np.ndarray:
         try:
-            return np.fromiter((float(row[at]) for row in itertools.islice(rows(), 1, None)), float)
+            return np.fromiter((float(row[at]) for row in rows()), float)
         except ValueError:
-            return np.array([row[at] for row in itertools.islice(rows(), 1, None)], dtype=object)
+            return np.array([row[at] for row in rows()], dtype=object)
 
+    head = 0
     try:
-        headers = next(rows(), [])
-        number = 0
-        for number, row in enumerate(rows(), start=1):
+        headers, below = [*itertools.islice(rows(), 2), [], []][:2]
+        units = _row_of_units(below) if len(below) == len(headers) else None
+        head = 2 if units else 1
+        number = head
+        for number, row in enumerate(rows(), start=head + 1):
             if len(row) != len(headers):
                 raise ValueError(f"row {number} has {len(row)} values for {len(headers)} columns")
     except UnicodeDecodeError:
         raise ValueError("is not UTF-8") from None
-    if number < 2:
+    if number == head:
         raise ValueError("has no rows")
-    return _Table(headers, [None] * len(headers), values)
+    return _Table(headers, units or [None] * len(headers), values)
+
+
+def _row_of_units(row: Sequence[str]) -> list[str | None] | None:
+    """Return what a row of units says of each column, None if it is a row of values, which has a number.
+
+    Nothing and `-` stand for no unit.
+    """
+    cells = [cell.strip().removeprefix("[").removesuffix("]").strip() for cell in row]
+    units = [cell if cell not in ("", "-") else None for cell in cells]
+    return units if any(units) and not any(map(_is_number, cells)) else None
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _parquet(raw: bytes) -> _Table:

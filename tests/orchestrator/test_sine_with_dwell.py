@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from math import cosh, degrees, radians, tanh
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from orchestrator.evaluation.dwell_run import evaluate_dwell
 from orchestrator.evaluation.dwell_series import amplitudes, is_series, judge_series
 from orchestrator.evaluation.judgement import Judgement, NotJudged, Verdict
 from orchestrator.evaluation.slow_steer import G, characteristic_angle, evaluate_slow_steer
-from orchestrator.evaluation.trace import Trace
+from orchestrator.evaluation.trace import Trace, load_mapping, load_trace
 from tests.commands import status_of
 from vocabulary.units import UNITS
 
@@ -23,7 +24,7 @@ START = 1.5
 END = START + 1.0 / 0.7 + 0.5
 PEAK_AT, PEAK, FALL = START + 1.2, 0.8, 0.45  # yaw rate -PEAK / cosh((t - PEAK_AT) / FALL)
 FIRST, REVERSAL = 0.5, START + 0.5 / 0.7
-FAR, MIDDLE, RISE = 4.0, START + 1.0, 0.15  # displacement FAR (1 + tanh((t - MIDDLE) / RISE)) / 2
+FAR, MIDDLE, RISE = 2.4, START + 0.9, 0.18  # displacement FAR (1 + tanh((t - MIDDLE) / RISE)) / 2
 
 
 def uneven(step: float, last: float) -> np.ndarray:
@@ -242,7 +243,7 @@ def test_responsiveness_is_asked_from_5_a_on_a_dry_road_at_80_km_h():
 
 def test_a_heavy_car_may_be_slower():
     made = trace()
-    made.signals["acceleration_y"] *= 1.65 / 2.91  # between 1.52 and 1.83 m
+    made.signals["acceleration_y"] *= 1.65 / evaluate_dwell(made, A)["displacement"]  # of 1.52 to 1.83 m
     heavy = Trace("heavy", made.time, made.signals, mass=3501.0)
     assert 1.52 < evaluate_dwell(made, A)["displacement"] < 1.83
     assert verdicts(evaluate_dwell(made, A))["responsiveness"] == "failed"
@@ -344,9 +345,8 @@ mass: 1.8 t
 """
 
 
-def test_measured_columns_under_other_names_units_and_signs_give_the_same(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    made = trace(sampling=SAMPLING["200 Hz"])
+def write_measured(made: Trace, file: Path) -> None:
+    """Write a trace as other programs would, under other names and in other units."""
     columns = {
         "Zeit": 1000.0 * made.time,
         "LRW": -np.degrees(made["steering_wheel_angle"]),
@@ -354,7 +354,13 @@ def test_measured_columns_under_other_names_units_and_signs_give_the_same(tmp_pa
         "ay": made["acceleration_y"] / 0.01,
     }
     table = np.column_stack(list(columns.values()))
-    np.savetxt("run.csv", table, "%.12g", ",", header=",".join(columns), comments="")
+    np.savetxt(file, table, "%.12g", ",", header=",".join(columns), comments="")
+
+
+def test_measured_columns_under_other_names_units_and_signs_give_the_same(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    made = trace(sampling=SAMPLING["200 Hz"])
+    write_measured(made, tmp_path / "run.csv")
     (tmp_path / "map.yaml").write_text(MAPPING)
     ended = status_of("evaluate", "sine-with-dwell", "run.csv", "--signals", "map.yaml", "--angle", "36 deg",
                  "--out", "out", "--no-figures")  # fmt: skip
@@ -365,6 +371,47 @@ def test_measured_columns_under_other_names_units_and_signs_give_the_same(tmp_pa
     for key, one in found["quantities"].items():
         assert one["value"] == pytest.approx(exact[key], rel=1e-8), key
     assert "sideslip was not recorded: a spin may pass the ratios unseen" in found["notes"]
+
+
+UNITS_GIVEN = {
+    "in the header": "Zeit [ms],LRW [deg],Gier [deg/s],ay [cm/s2]\n",
+    "in a row": "Zeit,LRW,Gier,ay\nms,deg,deg/s,cm/s2\n",
+    "in a row with brackets": "Zeit,LRW,Gier,ay\n[ms],[deg],[deg/s],[cm/s2]\n",
+    "mixed": "Zeit [ms],LRW,Gier,ay\n-,deg,deg/s,cm/s2\n",
+}
+
+
+@pytest.mark.parametrize("heading", UNITS_GIVEN.values(), ids=UNITS_GIVEN)
+def test_units_of_measured_columns_are_read_from_the_file(heading, tmp_path):
+    made, file = trace(sampling=SAMPLING["200 Hz"]), tmp_path / "run.csv"
+    write_measured(made, file)
+    file.write_text(heading + file.read_text().partition("\n")[2])
+    (tmp_path / "map.yaml").write_text(
+        "time: Zeit\n"
+        "signals: {steering_wheel_angle: {column: LRW, sign: -1}, yaw_rate: Gier, acceleration_y: ay}\n"
+    )
+    read = load_trace(file, load_mapping(tmp_path / "map.yaml"))
+    assert read.time == pytest.approx(made.time)
+    for name in ("steering_wheel_angle", "yaw_rate", "acceleration_y"):
+        assert read[name] == pytest.approx(made[name], abs=1e-9), name
+
+
+def test_accelerations_may_be_in_g(tmp_path):
+    made, file = trace(sampling=SAMPLING["200 Hz"]), tmp_path / "run.csv"
+    made.signals["acceleration_y"] *= 0.01 / G
+    write_measured(made, file)
+    (tmp_path / "map.yaml").write_text(MAPPING.replace("unit: cm/s2", "unit: g"))
+    read = load_trace(file, load_mapping(tmp_path / "map.yaml"))
+    assert read["acceleration_y"] == pytest.approx(G * made["acceleration_y"] / 0.01, rel=1e-9)
+
+
+def test_a_few_spikes_of_an_accelerometer_are_no_wrong_unit(tmp_path):
+    made, file = trace(sampling=SAMPLING["200 Hz"]), tmp_path / "run.csv"
+    made.signals["acceleration_y"][:: made.time.size // 5] = 90.0
+    write_measured(made, file)
+    (tmp_path / "map.yaml").write_text(MAPPING)
+    read = load_trace(file, load_mapping(tmp_path / "map.yaml"))
+    assert read["acceleration_y"].max() == pytest.approx(90.0)
 
 
 def test_an_evaluation_that_judges_nothing_says_so_and_ends_with_1(tmp_path, monkeypatch, capsys):
@@ -401,12 +448,22 @@ def test_units_in_the_file_are_si(tmp_path, monkeypatch):
         (("deg,", "grad,"), "'grad' is not a unit"),
         (("LRW", "Lenkrad"), "has no column 'Lenkrad'"),
         (("unit: deg,", "unit: kg,"), "column 'LRW': its unit 'kg' does not fit: rad is wanted"),
+        (("yaw_rate: Gier", "yaw_rate: {column: Gier, unit: rad/s}"),
+         "no car reaches yaw_rate of 45.7 rad/s, at most 5 rad/s is allowed; did you mean 'deg/s'?"),
+        (("unit: deg,", "unit: rad,"),
+         "no car reaches steering_wheel_angle of 270 rad, at most 12.57 rad is allowed; did you mean 'deg'?"),
+        (("unit: cm/s2", "unit: m/s2"), "no car reaches acceleration_y of"),
+        (("unit: cm/s2", "unit: g"), "no car reaches acceleration_y of"),
+        (("{column: ay, unit: cm/s2}", "ay"),
+         "column 'ay' has no unit, such as m/s2 or g: give it in the mapping, "
+         "'acceleration_y: {column: ay, unit: m/s2}', or in the file's header, 'ay [m/s2]'"),
+        (("{column: Zeit, unit: ms}", "Zeit"), "column 'Zeit' has no unit, such as s, ms, min or h"),
         (("1.8 t", "1.8 m"), "'1.8 m' is not a value in kg"),
         (("1.8 t", "1800"), "mass: must be text with a unit, such as 1500 kg (got 1800)"),
     ],
 )  # fmt: skip
 def test_a_wrong_mapping_is_answered_by_a_sentence(wrong, sentence, tmp_path, capsys):
-    (tmp_path / "run.csv").write_text("Zeit,LRW,Gier [deg/s],ay\n0,0,0,0\n5,0,0,0\n10,0,0,0\n")
+    write_measured(trace(sampling=SAMPLING["200 Hz"]), tmp_path / "run.csv")
     (tmp_path / "map.yaml").write_text(MAPPING.replace(*wrong))
     ended = status_of("evaluate", "sine-with-dwell", tmp_path / "run.csv", "--signals", tmp_path / "map.yaml")
     assert ended in (1, 2)
