@@ -74,6 +74,21 @@ class YawbenchError(Exception):
         super().__init__("\n".join(self.problems))
 
 
+class YawbenchWarning(UserWarning):
+    """Remarks on a run that is no failure but hardly meant: a car that spins, a friction of 65.
+
+    `Scenario.run` and `Experiment.run` give one for each call. Filters of the module `warnings` make it an
+    error or silence it.
+
+    >>> import warnings
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("error", yb.YawbenchWarning)
+    ...     base.set({"speed": 300}).run()
+    Traceback (most recent call last):
+    orchestrator.errors.YawbenchWarning: ...300 m/s is 1080 km/h; did you mean '300 km/h'?...
+    """
+
+
 class ScenarioError(YawbenchError):
     """The scenario file or a change of it is wrong.
 

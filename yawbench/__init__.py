@@ -26,6 +26,8 @@ and is itself at those of the first:
     ├── ResultsError              recorded results are missing or unreadable
     ├── BuildError                a component cannot be made into an FMU
     └── SimulationError           a run failed; knows `unit` and `time`
+
+What is no failure but hardly meant, such as a car that spins, is a `YawbenchWarning`: once per run.
 """
 
 from orchestrator.errors import (
@@ -36,6 +38,7 @@ from orchestrator.errors import (
     SimulationError,
     WiringError,
     YawbenchError,
+    YawbenchWarning,
 )
 
 from .experiment import Experiment, Runs, experiment
@@ -57,6 +60,7 @@ __all__ = [
     "SimulationError",
     "WiringError",
     "YawbenchError",
+    "YawbenchWarning",
     "experiment",
     "load",
     "open",

@@ -21,6 +21,7 @@ from orchestrator.experiments.table import columns_of, to_pandas
 from orchestrator.master.course import Opener
 from orchestrator.master.opening import open_unit
 from orchestrator.master.simulate import simulate_in_memory
+from orchestrator.metrics.plausibility import first_of_each
 from orchestrator.results.read import Results
 from orchestrator.scenario.quantities import number_and_unit
 from orchestrator.scenario.strict import Model, validate
@@ -29,7 +30,7 @@ from orchestrator.wording import hint
 
 from .making import make_all
 from .run import Run, shown_in_notebooks
-from .scenario import Scenario
+from .scenario import Scenario, warn
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -126,7 +127,8 @@ class Experiment:
         """Make all runs and return what they come to; nothing is written.
 
         Every run has a process of its own, but for those of plain Python, which follow each other in this
-        one. A run that fails is a row of the table with its reason.
+        one. A run that fails is a row of the table with its reason. Remarks on the runs, if any, are one
+        `YawbenchWarning`.
 
         Args:
             workers: processes at a time; default: one per core.
@@ -143,7 +145,14 @@ class Experiment:
             outcomes = make_all(planned.jobs, self.base.programs, workers=workers, done=told, run=_in_memory)
         records = [measured(one.value, metrics) if one.ok else Record({}, one.problems) for one in outcomes]
         runs = [Run(one.value) if one.ok else None for one in outcomes] if keep else None
-        return Runs(Findings(planned.experiment, records, {}, planned), runs)
+        findings = Findings(planned.experiment, records, {}, planned)
+        warn(self.design.spec.title, filter(None, (*_of_values(planned.jobs), findings.remarkable())))
+        return Runs(findings, runs)
+
+
+def _of_values(jobs: Iterable[Job]) -> list[str]:
+    """Return the remarks on the values that runs are given, the first of each kind."""
+    return [one.says for one in first_of_each(one for job in jobs if job.plan for one in job.plan.findings)]
 
 
 def _in_memory(job: Job, opener: Opener = open_unit) -> Results:
@@ -211,8 +220,9 @@ class Runs:
         return shown_in_notebooks(draw_over_axes(self.findings, _checked(FigureSpec, given)))
 
     def __repr__(self) -> str:
-        failed = len(self.findings.failed)
-        return f"<Runs {self.findings.spec.title!r}: {len(self.findings.records)} runs, {failed} failed>"
+        all_, found = self.findings, self.findings.remarkable()
+        noted = f"; {found}" if found else ""
+        return f"<Runs {all_.spec.title!r}: {len(all_.records)} runs, {len(all_.failed)} failed{noted}>"
 
     def _repr_html_(self) -> str:
         return str(self.table.drop(columns="key").to_html(index=False, na_rep=""))

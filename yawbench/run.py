@@ -17,6 +17,7 @@ from orchestrator.errors import ResultsError, ScenarioError
 from orchestrator.evaluation.judgement import Judgement
 from orchestrator.evaluation.standard_tests import TESTS
 from orchestrator.evaluation.trace import trace_of
+from orchestrator.metrics.plausibility import findings_in, first_of_each
 from orchestrator.metrics.run_metrics import STANDARD, Value, evaluate, evaluate_all, metric, why_none
 from orchestrator.results.read import Results, load_results
 from orchestrator.wording import hint
@@ -69,6 +70,15 @@ class Run:
     def record(self) -> dict[str, Any]:
         """Everything needed to repeat the run: run.json."""
         return self.results.run
+
+    @property
+    def remarks(self) -> list[str]:
+        """What is no failure but hardly meant, in sentences: on given values, then on the run's course.
+
+        >>> base.swap(controller="controller_off").set({"driver.amplitude": 0.2}).run().remarks[0][:14]
+        'the car spins:'
+        """
+        return [one.says for one in first_of_each(findings_in(self.record))]
 
     @property
     def changes(self) -> list[dict[str, Any]]:
@@ -193,7 +203,8 @@ class Run:
         return Path(folder)
 
     def __repr__(self) -> str:
-        return f"<Run {self.title!r}: {len(self)} rows of {len(self.results.columns)} variables>"
+        noted = "".join(f"; {text}" for text in self.remarks)
+        return f"<Run {self.title!r}: {len(self)} rows of {len(self.results.columns)} variables{noted}>"
 
     def _repr_html_(self) -> str:
         from orchestrator.figures.display import shown
@@ -201,7 +212,8 @@ class Run:
         changed = "".join(f"<br>{escape(str(c['place']))} = {escape(str(c['value']))}" for c in self.changes)
         cells = [(metric(name).title, shown(x.number, x.unit)) for name, x in self.metrics().items()]
         rows = "".join(f"<tr><td>{escape(title)}</td><td>{escape(value)}</td></tr>" for title, value in cells)
-        return f"<b>{escape(self.title)}</b>{changed}<table>{rows}</table>"
+        noted = "".join(f"<br>⚠ {escape(text)}" for text in self.remarks)
+        return f"<b>{escape(self.title)}</b>{changed}{noted}<table>{rows}</table>"
 
 
 def shown_in_notebooks(figure: Figure) -> Figure:

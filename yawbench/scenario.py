@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -9,10 +10,11 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from orchestrator.errors import Problem, ScenarioError, SimulationError
+from orchestrator.errors import Problem, ScenarioError, SimulationError, YawbenchWarning
 from orchestrator.fmu.opener import Opener
 from orchestrator.master.log import Log
 from orchestrator.master.simulate import simulate_in_memory
+from orchestrator.metrics.plausibility import first_of_each
 from orchestrator.plan import FAULTS, Change, Faults, Plan, Unit, Value
 from orchestrator.scenario import catalogue, scenario_schema
 from orchestrator.scenario.load import load_scenario
@@ -189,6 +191,8 @@ class Scenario:
     def run(self, *, progress: Callable[[int, int], None] | None = None) -> Run:
         """Run the scenario in this process and return its results; nothing is written.
 
+        Remarks on the run, if any, are one `YawbenchWarning`.
+
         Args:
             progress: called a few times a second with the steps done and those in all.
 
@@ -202,11 +206,15 @@ class Scenario:
             opened.append(make(unit, log, corrupted))
             return opened[-1]
 
+        plan = self.plan()
         try:
-            return Run(simulate_in_memory(self.plan(), opener=opener, progress=progress))
+            run = Run(simulate_in_memory(plan, opener=opener, progress=progress))
         except SimulationError as error:
+            warn(plan.title, (one.says for one in first_of_each((*plan.findings, *error.findings))))
             causes = [getattr(slave, "error", None) for slave in opened if slave.name == error.unit]
             raise error from next(iter(causes), None)
+        warn(run.title, run.remarks)
+        return run
 
     @property
     def title(self) -> str:
@@ -222,6 +230,12 @@ class Scenario:
         )
         changed = "".join(f"<br>{escape(str(change))}" for change in self.changes)
         return f"<b>{escape(plan.title)}</b>{changed}<table>{rows}</table>"
+
+
+def warn(title: str, remarks: Iterable[str]) -> None:
+    """Give one warning of all remarks, if there are any, at the line that called our caller."""
+    if said := "; ".join(remarks):
+        warnings.warn(f"{title}: {said}", YawbenchWarning, stacklevel=3)
 
 
 def _plain(value: Any) -> Any:

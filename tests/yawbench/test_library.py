@@ -1,6 +1,8 @@
 """The Python library: scenarios as values, runs in memory, units in plain Python."""
 
 import json
+import warnings
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -244,3 +246,45 @@ def test_an_error_is_at_the_file_and_line_of_its_first_problem(tmp_path):
     with pytest.raises(yb.ScenarioError, match="did you mean 'step_size'") as caught:
         yb.load(file)
     assert (caught.value.file, caught.value.line) == (file, 4)
+
+
+def test_remarks_are_in_what_a_run_shows_of_itself_and_warn_once_where_it_was_started(base):
+    spinning = base.set({"friction": 65, "plant.initial_sideslip": "60 deg"})
+    with pytest.warns(yb.YawbenchWarning) as warned:
+        run = spinning.run()
+    assert len(run.remarks) >= 2
+    assert len(warned) == 1
+    assert warned[0].filename == __file__
+    for says in ("did you mean '65 %'?", "the car spins"):
+        assert any(says in one for one in run.remarks)
+        assert says in str(warned[0].message)
+        assert says in repr(run)
+        assert escape(says) in run._repr_html_()
+
+
+def test_a_run_without_remarks_warns_of_nothing(base):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run = base.run()
+    assert run.remarks == []
+
+
+def test_an_experiment_warns_once_and_says_in_how_many_runs(base):
+    made = yb.experiment(base, {"speed": [20, 300]}, metrics=["peak(yaw_rate)"])
+    with pytest.warns(yb.YawbenchWarning) as warned:
+        runs = made.run(workers=1)
+    assert len(warned) == 1
+    assert warned[0].filename == __file__
+    assert "did you mean '300 km/h'?" in str(warned[0].message)
+    assert "speed in 1 of 2 runs" in str(warned[0].message)
+    assert "speed in 1 of 2 runs" in repr(runs)
+
+
+def test_a_run_that_fails_warns_of_what_was_remarkable_before(base):
+    def giving_up(t, yaw_rate):
+        if t > 0.1:
+            raise RuntimeError("enough")
+        return 0.0
+
+    with pytest.warns(yb.YawbenchWarning, match="did you mean '300 km/h'"), pytest.raises(yb.SimulationError):
+        base.swap(controller=giving_up).set({"speed": 300}).run()
