@@ -15,53 +15,81 @@ class Quantity(NamedTuple):
     needed: bool = False
     """Without it a unit would be another car: what its FMU begins with stands for none but its own."""
     minimum: float | None = None
+    plausible: tuple[float, float] | None = None
+    """Least and largest value of a car; 0 may stand for what is turned off. Chosen: beyond those of road
+    vehicles between a light quadricycle, some 400 kg, and the heaviest of FMVSS 126, 4536 kg; so wide
+    that only mistakes are outside."""
 
+
+DYNAMIC_INDEX = (0.4, 1.6)
+"""Yaw inertia over mass times the distances of both axles from the centre of mass. Chosen: 1 is that of two
+masses at the axles; the cars in `scenarios/vehicles` have 0.61 to 1.10."""
 
 CAR: dict[str, Quantity] = {
-    "mass": Quantity("kg", "Mass m of the car as it drives", True, 1.0),
-    "sprung_mass": Quantity("kg", "Mass m_s of what the springs carry", True, 0.0),
-    "unsprung_mass": Quantity("kg", "Mass m_u of all wheels and what moves with them", minimum=0.0),
-    "unsprung_mass_front": Quantity("kg", "That of both front wheels", minimum=0.0),
-    "unsprung_mass_rear": Quantity("kg", "That of both rear wheels", minimum=0.0),
-    "front_unsprung_share": Quantity("1", "Front part of the unsprung mass", minimum=0.0),
-    "front_load_share": Quantity("1", "Part of the weight that the front axle carries at rest", minimum=0.0),
-    "yaw_inertia": Quantity("kg.m2", "Yaw inertia I_z of the whole car", True, 1.0),
-    "sprung_yaw_inertia": Quantity(
-        "kg.m2", "Yaw inertia of the sprung mass about its own centre", minimum=1.0
+    "mass": Quantity("kg", "Mass m of the car as it drives", True, 1.0, plausible=(300, 5000)),
+    "sprung_mass": Quantity("kg", "Mass m_s of what the springs carry", True, 0.0, plausible=(200, 5000)),
+    "unsprung_mass": Quantity(
+        "kg", "Mass m_u of all wheels and what moves with them", minimum=0.0, plausible=(30, 800)
     ),
-    "roll_inertia": Quantity("kg.m2", "Roll inertia I_x of the sprung mass about the roll axis", True, 1.0),
+    "unsprung_mass_front": Quantity("kg", "That of both front wheels", minimum=0.0, plausible=(15, 400)),
+    "unsprung_mass_rear": Quantity("kg", "That of both rear wheels", minimum=0.0, plausible=(15, 400)),
+    "front_unsprung_share": Quantity(
+        "1", "Front part of the unsprung mass", minimum=0.0, plausible=(0.2, 0.8)
+    ),
+    "front_load_share": Quantity(
+        "1", "Part of the weight that the front axle carries at rest", minimum=0.0, plausible=(0.2, 0.8)
+    ),
+    "yaw_inertia": Quantity("kg.m2", "Yaw inertia I_z of the whole car", True, 1.0, plausible=(150, 15000)),
+    "sprung_yaw_inertia": Quantity(
+        "kg.m2", "Yaw inertia of the sprung mass about its own centre", minimum=1.0, plausible=(100, 15000)
+    ),
+    "roll_inertia": Quantity(
+        "kg.m2", "Roll inertia I_x of the sprung mass about the roll axis", True, 1.0, plausible=(30, 5000)
+    ),
     "sprung_roll_inertia": Quantity(
-        "kg.m2", "Roll inertia of the sprung mass about its own centre", True, 1.0
+        "kg.m2", "Roll inertia of the sprung mass about its own centre", True, 1.0, plausible=(20, 5000)
     ),
     "sprung_pitch_inertia": Quantity(
-        "kg.m2", "Pitch inertia of the sprung mass about its own centre", True, 1.0
+        "kg.m2", "Pitch inertia of the sprung mass about its own centre", True, 1.0, plausible=(100, 15000)
     ),
     "sprung_roll_yaw_product": Quantity(
         "kg.m2",
         "Product of inertia I_xz of the sprung mass about its own centre, positive where its front is heavy "
         "on top",
     ),
-    "wheelbase": Quantity("m", "Distance L of the axles", minimum=0.1),
-    "cg_to_front_axle": Quantity("m", "Distance a of the centre of mass from the front axle", True, 0.1),
-    "cg_to_rear_axle": Quantity("m", "Distance b of the centre of mass from the rear axle", True, 0.1),
-    "cg_to_front_end": Quantity("m", "Distance of the centre of mass from the front end", minimum=0.0),
-    "cg_to_rear_end": Quantity("m", "Distance of the centre of mass from the rear end", minimum=0.0),
+    "wheelbase": Quantity("m", "Distance L of the axles", minimum=0.1, plausible=(1.4, 5)),
+    "cg_to_front_axle": Quantity(
+        "m", "Distance a of the centre of mass from the front axle", True, 0.1, plausible=(0.4, 3.5)
+    ),
+    "cg_to_rear_axle": Quantity(
+        "m", "Distance b of the centre of mass from the rear axle", True, 0.1, plausible=(0.4, 3.5)
+    ),
+    "cg_to_front_end": Quantity(
+        "m", "Distance of the centre of mass from the front end", minimum=0.0, plausible=(0.5, 5)
+    ),
+    "cg_to_rear_end": Quantity(
+        "m", "Distance of the centre of mass from the rear end", minimum=0.0, plausible=(0.5, 5)
+    ),
     "sprung_cg_offset": Quantity("m", "Centre of the sprung mass before that of the car"),
-    "track_width": Quantity("m", "Track d, the same for both axles", True, 0.1),
-    "track_width_front": Quantity("m", "Track of the front axle", minimum=0.1),
-    "track_width_rear": Quantity("m", "Track of the rear axle", minimum=0.1),
-    "vehicle_width": Quantity("m", "Width of the body without mirrors", minimum=0.1),
-    "cg_height": Quantity("m", "Height h of the centre of mass", True, 0.0),
-    "sprung_cg_height": Quantity("m", "Height of the centre of the sprung mass", minimum=0.0),
-    "unsprung_height": Quantity("m", "Height of the wheels' centres", True, 0.0),
-    "roll_centre_height_front": Quantity("m", "Front roll centre", True),
-    "roll_centre_height_rear": Quantity("m", "Rear roll centre", True),
+    "track_width": Quantity("m", "Track d, the same for both axles", True, 0.1, plausible=(0.7, 2.3)),
+    "track_width_front": Quantity("m", "Track of the front axle", minimum=0.1, plausible=(0.7, 2.3)),
+    "track_width_rear": Quantity("m", "Track of the rear axle", minimum=0.1, plausible=(0.7, 2.3)),
+    "vehicle_width": Quantity("m", "Width of the body without mirrors", minimum=0.1, plausible=(0.9, 2.7)),
+    "cg_height": Quantity("m", "Height h of the centre of mass", True, 0.0, plausible=(0.2, 1.5)),
+    "sprung_cg_height": Quantity(
+        "m", "Height of the centre of the sprung mass", minimum=0.0, plausible=(0.2, 1.8)
+    ),
+    "unsprung_height": Quantity("m", "Height of the wheels' centres", True, 0.0, plausible=(0.15, 0.6)),
+    "roll_centre_height_front": Quantity("m", "Front roll centre", True, plausible=(-0.5, 1)),
+    "roll_centre_height_rear": Quantity("m", "Rear roll centre", True, plausible=(-0.5, 1)),
     "roll_axis_height": Quantity("m", "Roll axis below the centre of the sprung mass"),
-    "roll_arm": Quantity("m", "Height h_s of the sprung mass above the roll axis", True, 0.0),
-    "spring_stiffness_front": Quantity("N/m", "Front spring, at the wheel", True, 0.0),
-    "spring_stiffness_rear": Quantity("N/m", "Rear spring, at the wheel", True, 0.0),
-    "damping_front": Quantity("N.s/m", "Front damper, at the wheel", True, 0.0),
-    "damping_rear": Quantity("N.s/m", "Rear damper, at the wheel", True, 0.0),
+    "roll_arm": Quantity(
+        "m", "Height h_s of the sprung mass above the roll axis", True, 0.0, plausible=(0, 1.5)
+    ),
+    "spring_stiffness_front": Quantity("N/m", "Front spring, at the wheel", True, 0.0, plausible=(3e3, 5e5)),
+    "spring_stiffness_rear": Quantity("N/m", "Rear spring, at the wheel", True, 0.0, plausible=(3e3, 5e5)),
+    "damping_front": Quantity("N.s/m", "Front damper, at the wheel", True, 0.0, plausible=(100, 5e4)),
+    "damping_rear": Quantity("N.s/m", "Rear damper, at the wheel", True, 0.0, plausible=(100, 5e4)),
     "anti_roll_stiffness_front": Quantity(
         "N/m",
         "Front anti-roll bar, force at each wheel per difference of travel, negative for a bar that stiffens "
@@ -74,7 +102,9 @@ CAR: dict[str, Quantity] = {
         "heave",
         True,
     ),
-    "roll_stiffness": Quantity("N.m/rad", "Roll stiffness K of the car on its tyres", True, 0.0),
+    "roll_stiffness": Quantity(
+        "N.m/rad", "Roll stiffness K of the car on its tyres", True, 0.0, plausible=(5e3, 2e6)
+    ),
     "roll_stiffness_front": Quantity("N.m/rad", "That of the front axle", minimum=0.0),
     "roll_stiffness_rear": Quantity("N.m/rad", "That of the rear axle", minimum=0.0),
     "front_roll_share": Quantity("1", "Front part of the roll stiffness", True, 0.0),
@@ -87,16 +117,18 @@ CAR: dict[str, Quantity] = {
     "roll_camber_rear": Quantity(
         "1", "Roll camber of the rear axle: inclination of its wheels over the body's roll angle"
     ),
-    "steering_ratio": Quantity("1", "Hand-wheel angle over road-wheel angle", minimum=0.1),
-    "wheel_radius": Quantity("m", "Rolling radius R of the wheels", True, 0.05),
-    "wheel_inertia": Quantity("kg.m2", "Inertia J of one wheel", True, 0.01),
-    "tyre_vertical_stiffness": Quantity("N/m", "Tyre spring k_t", True, 1.0),
-    "static_load_front": Quantity("N", "Load of one front wheel at rest", minimum=0.0),
-    "static_load_rear": Quantity("N", "Load of one rear wheel at rest", minimum=0.0),
-    "nominal_load": Quantity("N", "Nominal load F_z0 of the tyres", minimum=1.0),
-    "unloaded_radius": Quantity("m", "Radius R_0 of the tyres without load", minimum=0.05),
+    "steering_ratio": Quantity("1", "Hand-wheel angle over road-wheel angle", minimum=0.1, plausible=(1, 40)),
+    "wheel_radius": Quantity("m", "Rolling radius R of the wheels", True, 0.05, plausible=(0.15, 0.6)),
+    "wheel_inertia": Quantity("kg.m2", "Inertia J of one wheel", True, 0.01, plausible=(0.1, 10)),
+    "tyre_vertical_stiffness": Quantity("N/m", "Tyre spring k_t", True, 1.0, plausible=(3e4, 1e6)),
+    "static_load_front": Quantity("N", "Load of one front wheel at rest", minimum=0.0, plausible=(500, 3e4)),
+    "static_load_rear": Quantity("N", "Load of one rear wheel at rest", minimum=0.0, plausible=(500, 3e4)),
+    "nominal_load": Quantity("N", "Nominal load F_z0 of the tyres", minimum=1.0, plausible=(500, 3e4)),
+    "unloaded_radius": Quantity(
+        "m", "Radius R_0 of the tyres without load", minimum=0.05, plausible=(0.15, 0.6)
+    ),
     "cornering_stiffness": Quantity(
-        "N/rad", "Cornering stiffness of one tyre that knows no load", minimum=0.0
+        "N/rad", "Cornering stiffness of one tyre that knows no load", minimum=0.0, plausible=(3e3, 5e5)
     ),
     "longitudinal_stiffness": Quantity("N", "Slip stiffness of one tyre that knows no load", minimum=0.0),
     "cornering_stiffness_scale_front": Quantity(
@@ -105,12 +137,16 @@ CAR: dict[str, Quantity] = {
     "cornering_stiffness_scale_rear": Quantity(
         "1", "Scales the rear tyres' cornering stiffness", minimum=0.0
     ),
-    "cornering_stiffness_front": Quantity("N/rad", "Cornering stiffness C_f of the front axle", minimum=1.0),
-    "cornering_stiffness_rear": Quantity("N/rad", "Cornering stiffness C_r of the rear axle", minimum=1.0),
-    "drag_coefficient": Quantity("1", "Drag coefficient C_D", minimum=0.0),
-    "frontal_area": Quantity("m2", "Frontal area A", minimum=0.0),
-    "air_density": Quantity("kg/m3", "Air density rho", minimum=0.0),
-    "rolling_resistance": Quantity("1", "Rolling resistance f", minimum=0.0),
+    "cornering_stiffness_front": Quantity(
+        "N/rad", "Cornering stiffness C_f of the front axle", minimum=1.0, plausible=(5e3, 1e6)
+    ),
+    "cornering_stiffness_rear": Quantity(
+        "N/rad", "Cornering stiffness C_r of the rear axle", minimum=1.0, plausible=(5e3, 1e6)
+    ),
+    "drag_coefficient": Quantity("1", "Drag coefficient C_D", minimum=0.0, plausible=(0, 2)),
+    "frontal_area": Quantity("m2", "Frontal area A", minimum=0.0, plausible=(0, 10)),
+    "air_density": Quantity("kg/m3", "Air density rho", minimum=0.0, plausible=(0, 2)),
+    "rolling_resistance": Quantity("1", "Rolling resistance f", minimum=0.0, plausible=(0, 0.5)),
     "torque_limit": Quantity("N.m", "Largest torque of the motor at one wheel", minimum=0.0),
     "drive_front_share": Quantity("1", "Part of the drive force of the front axle", minimum=0.0),
     "brake_factor_front": Quantity("m3", "Torque of one front brake per pressure", minimum=0.0),

@@ -21,7 +21,7 @@ from orchestrator.experiments.table import columns_of, to_pandas
 from orchestrator.master.course import Opener
 from orchestrator.master.opening import open_unit
 from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.metrics.plausibility import first_of_each
+from orchestrator.metrics.plausibility import remarks_of
 from orchestrator.results.read import Results
 from orchestrator.scenario.quantities import number_and_unit
 from orchestrator.scenario.strict import Model, validate
@@ -146,13 +146,9 @@ class Experiment:
         records = [measured(one.value, metrics) if one.ok else Record({}, one.problems) for one in outcomes]
         runs = [Run(one.value) if one.ok else None for one in outcomes] if keep else None
         findings = Findings(planned.experiment, records, {}, planned)
-        warn(self.design.spec.title, filter(None, (*_of_values(planned.jobs), findings.remarkable())))
+        given = remarks_of(one for job in planned.jobs if job.plan for one in job.plan.findings)
+        warn(self.design.spec.title, filter(None, (*given, findings.remarkable())))
         return Runs(findings, runs)
-
-
-def _of_values(jobs: Iterable[Job]) -> list[str]:
-    """Return the remarks on the values that runs are given, the first of each kind."""
-    return [one.says for one in first_of_each(one for job in jobs if job.plan for one in job.plan.findings)]
 
 
 def _in_memory(job: Job, opener: Opener = open_unit) -> Results:

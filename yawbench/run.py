@@ -17,7 +17,7 @@ from orchestrator.errors import ResultsError, ScenarioError
 from orchestrator.evaluation.judgement import Judgement
 from orchestrator.evaluation.standard_tests import TESTS
 from orchestrator.evaluation.trace import trace_of
-from orchestrator.metrics.plausibility import findings_in, first_of_each
+from orchestrator.metrics.plausibility import findings_in, remarks_of
 from orchestrator.metrics.run_metrics import STANDARD, Value, evaluate, evaluate_all, metric, why_none
 from orchestrator.results.read import Results, load_results
 from orchestrator.wording import hint
@@ -75,10 +75,10 @@ class Run:
     def remarks(self) -> list[str]:
         """What is no failure but hardly meant, in sentences: on given values, then on the run's course.
 
-        >>> base.swap(controller="controller_off").set({"driver.amplitude": 0.2}).run().remarks[0][:14]
-        'the car spins:'
+        >>> base.set({"speed": 300}).run().remarks[0]
+        "plant.initial_speed: 300 m/s is 1080 km/h; did you mean '300 km/h'?"
         """
-        return [one.says for one in first_of_each(findings_in(self.record))]
+        return remarks_of(findings_in(self.record))
 
     @property
     def changes(self) -> list[dict[str, Any]]:

@@ -14,7 +14,7 @@ from orchestrator.errors import Problem, ScenarioError, SimulationError, Yawbenc
 from orchestrator.fmu.opener import Opener
 from orchestrator.master.log import Log
 from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.metrics.plausibility import first_of_each
+from orchestrator.metrics.plausibility import remarks_of
 from orchestrator.plan import FAULTS, Change, Faults, Plan, Unit, Value
 from orchestrator.scenario import catalogue, scenario_schema
 from orchestrator.scenario.load import load_scenario
@@ -210,7 +210,7 @@ class Scenario:
         try:
             run = Run(simulate_in_memory(plan, opener=opener, progress=progress))
         except SimulationError as error:
-            warn(plan.title, (one.says for one in first_of_each((*plan.findings, *error.findings))))
+            warn(plan.title, remarks_of((*plan.findings, *error.findings)))
             causes = [getattr(slave, "error", None) for slave in opened if slave.name == error.unit]
             raise error from next(iter(causes), None)
         warn(run.title, run.remarks)

@@ -12,7 +12,7 @@ import typer
 from vocabulary.wheels import WHEELS, wheels
 
 from ..plan import DEFAULT, ValueOrigin
-from ..wording import cut, printable
+from ..wording import counted, cut, printable
 from .batch import say
 from .options import CHANGES, ScenarioFile, Wishes, takes
 from .planning import plan_of_scenario
@@ -96,7 +96,8 @@ def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None
     _show(
         console, "Against the order", ("from", "to", "uses earlier values of"), _backward_rows(plan, direct)
     )
-    console.print("\nNothing is wrong.")
+    doubtful = f"No error, but {counted(len(plan.findings), 'value')} to look at: see the notes."
+    console.print(f"\n{doubtful if plan.findings else 'Nothing is wrong.'}")
 
 
 def _show(console: Console, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

@@ -57,14 +57,21 @@ def vehicle(
     from ..errors import ScenarioError
     from ..fmu.opener import Opener
     from ..scenario import catalogue, yaml_lines
+    from ..scenario.scenario_schema import Vehicle
+    from ..scenario.strict import validate
     from ..vehicles.car_drawing import draw_cars
     from ..vehicles.handling import handling_of
     from ..vehicles.proving import TestTrack, fitting_plant
+    from ..wiring.plausible_car import remarks_on_values
     from .batch import print_tables, save_figure, say
 
     file = catalogue.find(file, "a vehicle file")
-    if problems := yaml_lines.read(file, what="vehicle file").sentences():
-        raise ScenarioError(problems)
+    document = yaml_lines.read(file, what="vehicle file")
+    spec = validate(Vehicle, document)
+    if spec is None:
+        raise ScenarioError(document.sentences())
+    for finding in remarks_on_values(spec.parameters):
+        say(f"note: {finding.says}")
     opener = Opener(build=wishes.build)
     names = plant.split(",") if plant else [fitting_plant(file, tyre, wishes.fmus, opener)]
     tracks = [TestTrack(file, name.strip(), tyre, friction, wishes.fmus, opener) for name in names]

@@ -195,6 +195,13 @@ def findings_in(run: Mapping[str, Any]) -> tuple[Finding, ...]:
     )
 
 
+def remarks_of(findings: Iterable[Finding]) -> list[str]:
+    """Return sentences: all on given values, each once, and the first of each kind on the run's course."""
+    every = list(findings)
+    values = dict.fromkeys(one.says for one in every if one.time is None)
+    return [*values, *(one.says for one in first_of_each(one for one in every if one.time is not None))]
+
+
 def first_of_each(findings: Iterable[Finding]) -> list[Finding]:
     """Return the earliest finding of each kind: four wheels are one matter."""
     first: dict[str, Finding] = {}

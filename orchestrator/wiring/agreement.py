@@ -13,6 +13,7 @@ from ..plan import DEFAULT, Finding, Unit, Value, Variable
 from ..scenario.load import Scenario
 from ..wording import fold, listed
 from .parameters import STIFFNESSES
+from .plausible_car import remarks_on_car
 from .shared_facts import FACTS
 
 OF_CAR = (*(name for name, one in CAR.items() if one.needed), *STIFFNESSES, "steering_ratio")
@@ -47,7 +48,22 @@ def remarks(scenario: Scenario, units: Mapping[str, Unit]) -> list[Finding]:
         *_other_cars(scenario, units),
         *_slips(scenario, units),
         *_of_tyres(scenario, units),
+        *remarks_on_car(scenario, units),
+        *_idle_units(scenario, units),
     ]
+
+
+def _idle_units(scenario: Scenario, units: Mapping[str, Unit]) -> Iterator[Finding]:
+    """Yield a remark for every unit that would take its first step after the end of the run."""
+    lasts = scenario.stop_time - scenario.start_time
+    for unit in units.values():
+        step = unit.period * scenario.step_size
+        if step > lasts:
+            says = (
+                f"{unit.name} never takes a step: its step_size, {float(step):g} s, is longer than the run, "
+                f"{float(lasts):g} s; it keeps what it gave at the start"
+            )
+            yield Finding("no step", f"{unit.name}.step_size", float(step), None, says)
 
 
 def _of_tyres(scenario: Scenario, units: Mapping[str, Unit]) -> Iterator[Finding]:

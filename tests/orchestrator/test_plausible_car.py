@@ -1,0 +1,133 @@
+"""Cars that cannot be, and units that never step: remarks of check, run and library."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from orchestrator.scenario.load import load_scenario
+from orchestrator.wiring.make_plan import make_plan
+from orchestrator.wiring.parameters import known_car
+from orchestrator.wiring.plausible_car import remarks_on_values
+from tests.changed import changed
+from tests.commands import status_of
+from vocabulary.vehicle import CAR, DYNAMIC_INDEX
+
+from .fake_fmus import Var, make_fmu, out
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+SCENARIO = """\
+vehicle: car.yaml
+stop_time: 2
+step_size: 0.01
+units:
+  plant: {fmu: plant_x}
+  controller: {fmu: controller_x}
+"""
+GIVEN = {
+    "mass": 1650,
+    "yaw_inertia": 2600,
+    "cg_to_front_axle": 1.2,
+    "cg_to_rear_axle": 1.55,
+    "wheel_radius": 0.32,
+}
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch, cache):
+    """A working directory with a car and a controller."""
+    monkeypatch.chdir(tmp_path)
+    parameters = [Var(name, CAR[name].unit, start=float(value)) for name, value in GIVEN.items()]
+    make_fmu(tmp_path / "fmus/plant_x.fmu", outputs=[out("yaw_rate", unit="rad/s")], parameters=parameters)
+    make_fmu(
+        tmp_path / "fmus/controller_x.fmu",
+        inputs=[Var("yaw_rate", "rad/s")],
+        outputs=[out("yaw_moment", unit="N.m")],
+    )
+    return tmp_path
+
+
+def remarks(*settings, **car):
+    given = {**GIVEN, **car}
+    Path("car.yaml").write_text("".join(["parameters:\n", *(f"  {k}: {v}\n" for k, v in given.items())]))
+    Path("a.yaml").write_text(SCENARIO)
+    made = make_plan(load_scenario("a.yaml", changes=changed(settings=settings)))
+    return [one.says for one in made.findings]
+
+
+def test_a_car_that_can_be_has_no_remarks():
+    assert remarks() == []
+
+
+@pytest.mark.parametrize(
+    "car, says",
+    [
+        ({"mass": 1650000}, "vehicle.mass: 1650000 kg is no car's, 300 to 5000 kg is plausible; "
+         "did you mean '1650000 g'?"),
+        ({"mass": "1650 t"}, "vehicle.mass: 1650000 kg is no car's, 300 to 5000 kg is plausible; "
+         "did you mean '1650 kg'?"),
+        ({"mass": 1.65}, "did you mean '1.65 t'?"),
+        ({"yaw_inertia": 26}, "vehicle.yaw_inertia: 26 kg.m2 is no car's, 150 to 15000 kg.m2 is plausible"),
+        ({"wheel_radius": 320}, "did you mean '320 mm'?"),
+        ({"wheelbase": 2750, "cg_to_front_axle": 1200, "cg_to_rear_axle": 1550}, "did you mean '2750 mm'?"),
+        ({"cg_height": 55}, "did you mean '55 cm'?"),
+    ],
+)  # fmt: skip
+def test_a_quantity_that_no_car_has_is_named_with_the_unit_that_was_probably_meant(car, says):
+    assert sum(says in one for one in remarks(**car)) == 1
+
+
+def test_what_is_turned_off_is_meant():
+    assert remarks(cg_height=0, anti_roll_stiffness_rear=0) == []
+
+
+def test_a_value_is_named_once_wherever_it_is_given():
+    assert len(remarks("vehicle.mass=1650000")) == 1
+    (own, *others) = [one for one in remarks("plant.mass=1650000") if "no car's" in one]
+    assert own.startswith("plant.mass: ")
+    assert others == []
+
+
+def test_a_yaw_inertia_that_does_not_fit_the_mass_is_named():
+    (says,) = remarks(yaw_inertia=9000)
+    assert says == (
+        "plant: the yaw inertia, 9000 kg.m2, is 2.93 times mass times the distances of both axles from the "
+        "centre of mass; that of cars is 0.4 to 1.6 times"
+    )
+
+
+def test_a_unit_whose_step_is_longer_than_the_run_is_named():
+    (says,) = remarks("controller.step_size=10")
+    assert says.startswith("controller never takes a step: its step_size, 10 s, is longer than the run, 2 s")
+    assert remarks("controller.step_size=2") == []
+
+
+def test_check_does_not_say_that_nothing_is_wrong(capsys):
+    remarks(mass=1650000)
+    assert status_of("check", "a.yaml") == 0
+    said = capsys.readouterr()
+    assert "Nothing is wrong" not in said.out
+    assert "No error, but 1 value to look at: see the notes." in said.out
+    assert "note: vehicle.mass: 1650000 kg is no car's" in said.err
+
+
+@pytest.mark.parametrize("file", sorted((SCENARIOS / "vehicles").glob("*.yaml")), ids=lambda file: file.stem)
+def test_every_car_of_the_library_is_plausible_with_all_that_follows(file):
+    given = yaml.safe_load(file.read_text())["parameters"]
+    assert remarks_on_values(given) == []
+    known = known_car(given).values
+    for name, value in known.items():
+        low, high = CAR[name].plausible or (value, value)
+        assert low <= value <= high, name
+    index = known["yaw_inertia"] / (known["mass"] * known["cg_to_front_axle"] * known["cg_to_rear_axle"])
+    assert DYNAMIC_INDEX[0] <= index <= DYNAMIC_INDEX[1]
+
+
+def test_every_range_holds_what_the_quantity_may_be():
+    for name, one in CAR.items():
+        if one.plausible:
+            low, high = one.plausible
+            assert low < high, name
+            assert one.minimum is None or one.minimum <= high, name
