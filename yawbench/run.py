@@ -76,7 +76,7 @@ class Run:
         """What is no failure but hardly meant, in sentences: on given values, then on the run's course.
 
         >>> base.set({"speed": 300}).run().remarks[0]
-        "plant.initial_speed: 300 m/s is 1080 km/h; did you mean '300 km/h'?"
+        "driver.target_speed: 300 m/s is 1080 km/h; did you mean '300 km/h'?"
         """
         return remarks_of(findings_in(self.record))
 

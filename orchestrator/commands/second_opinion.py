@@ -84,9 +84,20 @@ def show(opinions: list[Opinion]) -> None:
         for one in found:
             times.rows.append([one.master.title, *(f"{1e6 * one.seconds[key]:.0f}" for key in keys)])
         print_tables([apart, times])
+        _show_still(found[0])
     for one in opinions:
         if one.problem:
             print(printable(f"{one.master.title}: {one.problem}"))
         elif one.one_step or one.master.note:
             step = "compared with one step for all units: " if one.one_step else ""
             print(printable(f"{one.master.title}: {step}{one.master.note}"))
+
+
+def _show_still(one: Opinion) -> None:
+    """Say of how many signals the comparison says little, since they do not change during the run."""
+    from ..wording import counted, fold, listed, printable
+
+    if one.still:
+        share = f"{len(one.still)} of {counted(len(one.differences), 'signal')}"
+        names = listed(fold(list(one.still)))
+        print(printable(f"Constant during the run, so their agreement says little: {share}, {names}."))

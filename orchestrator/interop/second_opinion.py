@@ -76,6 +76,7 @@ class Opinion:
     problem: str = ""
     differences: dict[str, float] = field(default_factory=dict)  # unit.variable -> largest, over range
     seconds: dict[str, float] = field(default_factory=dict)  # per step: "theirs", "ours", "... on one core"
+    still: tuple[str, ...] = ()  # signals that keep their first value in our run, and so say little
 
     @property
     def largest(self) -> float:
@@ -144,7 +145,8 @@ def second_opinion(
         seconds = {f"theirs{key}": recording.seconds for key, recording in theirs.items()}
         seconds |= {f"ours{key}": recording.seconds for key, recording in own.items()}
         gaps = differences(request, own[""].values, theirs[""].values)
-        opinions.append(Opinion(master, one_step, differences=gaps, seconds=seconds))
+        still = still_signals(request, own[""].values)
+        opinions.append(Opinion(master, one_step, differences=gaps, seconds=seconds, still=still))
     return opinions
 
 
@@ -207,7 +209,21 @@ def differences(request: Request, own: np.ndarray, other: np.ndarray) -> dict[st
     first = int(np.all(np.isnan(other[0])))
     gap = np.abs(other[first:] - own[first:])
     gap = np.where(np.isfinite(gap), gap, np.inf)
-    span, magnitude = np.ptp(own, axis=0), np.max(np.abs(own), axis=0)
-    scale = np.where(span > ROUNDING * magnitude, span, np.where(magnitude > 0, magnitude, 1.0))
+    magnitude = np.max(np.abs(own), axis=0)
+    scale = np.where(_moving(own), np.ptp(own, axis=0), np.where(magnitude > 0, magnitude, 1.0))
     relative = np.max(gap, axis=0) / scale
     return {f"{unit}.{name}": float(d) for (unit, name), d in zip(request.columns, relative, strict=True)}
+
+
+def still_signals(request: Request, own: np.ndarray) -> tuple[str, ...]:
+    """Return the signals that stay constant but for rounding in our run."""
+    return tuple(
+        f"{unit}.{name}"
+        for (unit, name), moves in zip(request.columns, _moving(own), strict=True)
+        if not moves
+    )
+
+
+def _moving(own: np.ndarray) -> np.ndarray:
+    """Return which columns change by more than rounding, shape (columns,)."""
+    return np.asarray(np.ptp(own, axis=0) > ROUNDING * np.max(np.abs(own), axis=0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import re
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +23,9 @@ from orchestrator.interop.second_opinion import (
     OtherMaster,
     differences,
     second_opinion,
+    still_signals,
 )
+from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
@@ -37,6 +40,8 @@ PAPERS = {  # until the car moves as hard as in the whole run; the one with the 
     "fuzzy_sliding_mode/high_friction.yaml": 1.5,
     "fuzzy_pid/sine.yaml": 2.5,
 }
+
+OF = {"steer_angle": "driver", "yaw_rate": "plant", "sideslip": "plant", "yaw_moment": "controller"}
 
 
 def plan_of(fmus, scenario="fuzzy_feedback/single_sine.yaml", stop_time=0.1, settings=()):
@@ -118,6 +123,28 @@ def test_differences_of_a_signal_constant_but_for_rounding_are_relative_to_its_m
     other = np.array([[5.0, 5.0, 0.0], [5.5, 5.0, 0.25]])
     found = differences(request, own, other)
     assert found == {"a.still": pytest.approx(0.1), "a.rounded": pytest.approx(1.8e-16, 0.1), "a.zero": 0.25}
+
+
+def test_signals_that_do_not_change_are_told(capsys):
+    request = Request("x.ssp", 0.1, 1, [("a", "moves"), ("a", "rounded"), ("b", "zero_fl"), ("b", "zero_fr")])
+    own = np.array([[0.0, 5.0, 0.0, 0.0], [1.0, np.nextafter(5.0, 6.0), 0.0, 0.0]])
+    still = still_signals(request, own)
+    assert still == ("a.rounded", "b.zero_fl", "b.zero_fr")
+    gaps = differences(request, own, own)
+    show([Opinion(MASTERS[0], False, "", gaps, {"theirs": 1e-6, "ours": 1e-6}, still)])
+    said = capsys.readouterr().out
+    assert "Constant during the run, so their agreement says little: 3 of 4 signals, a.rounded" in said
+    show([Opinion(MASTERS[0], False, "", gaps, {"theirs": 1e-6, "ours": 1e-6})])
+    assert "Constant" not in capsys.readouterr().out
+
+
+def test_the_example_of_the_documentation_compares_signals_that_move(fmus, tmp_path):
+    text = (SCENARIOS.parent / "docs/other_tools.md").read_text()
+    (command,) = re.findall(r"second-opinion scenarios/(\S+) --set stop_time=(\S+)", text)
+    plan = plan_of(fmus, command[0], float(command[1]))
+    results = simulate_in_memory(plan)
+    for name in ("steer_angle", "yaw_rate", "sideslip", "yaw_moment"):
+        assert np.ptp(results.columns[results.column(f"{OF[name]}.{name}")]) > 1e-3, name
 
 
 def test_a_master_that_is_not_installed_costs_a_sentence(fmus, tmp_path):
