@@ -31,6 +31,7 @@ VOLATILE = re.compile(
 MASKED = (
     (re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d+)?)?(Z|[+-]\d\d:\d\d)?"), "TIME"),
     (re.compile(r"(?<![.\w])(?=\d*[a-f])[0-9a-f]{12,}(?![-+.\w])"), "HASH"),
+    (re.compile(r"(?<=\()[0-9a-f]{8}(?=\))"), "HASH"),  # the beginning of one
     (re.compile(r"\b(yawbench|pythonfmu|python|fmpy|numpy) \d+(\.\w+)+", re.IGNORECASE), r"\1 VERSION"),
     (re.compile(r"\d+(\.\d+)? ?[µμ]s\b"), "DURATION"),
     (re.compile(r"(?<= in )\d+(\.\d+)? s$", re.MULTILINE), "DURATION"),
@@ -39,7 +40,8 @@ MASKED = (
 """The same within a text."""
 KEYED = re.compile(r"(?=\d*[a-f])[0-9a-f]{12,}")
 """Folders named by a hash that covers the program's code; what they hold is collected under `*`."""
-NUMBER = re.compile(r"(?<![\w.])[-+\u2212]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+NUMBER = re.compile(r"\b[0-9a-f]{64}\b|(?<![\w.])[-+\u2212]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+"""A number, or a hash that stands for many."""
 DRAWN_FROM_TIMES = ("figures/pareto.svg",)
 
 

@@ -18,7 +18,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from itertools import zip_longest
 from pathlib import Path
@@ -90,8 +90,8 @@ metrics:
 """
 TUNING = """\
 title: A small tuning
-step_size: 0.005
-stop_time: 4.0
+step_size: 0.002
+stop_time: 3.0
 runs:
   - {name: sine, scenario: ../fnn_sideslip/25mps.yaml}
 metrics:
@@ -234,8 +234,14 @@ def _other_jobs() -> list[Job]:
     ]  # fmt: skip
 
 
-def fingerprint(folder: Path, quick: bool = False) -> dict[str, str]:
-    """Run everything in an empty folder; return name -> text of all artefacts, sorted by name."""
+def fingerprint(folder: Path, quick: bool = False, only: Sequence[str] = ()) -> dict[str, str]:
+    """Run everything in an empty folder; return name -> text of all artefacts, sorted by name.
+
+    Args:
+        folder: for all that is written.
+        quick: leaves out what takes longest.
+        only: names of jobs that are run alone.
+    """
     work = folder.resolve()
     shutil.copytree(
         ROOT / "scenarios", work / "scenarios", ignore=shutil.ignore_patterns("__pycache__", "*.py")
@@ -252,7 +258,7 @@ def fingerprint(folder: Path, quick: bool = False) -> dict[str, str]:
     if built.returncode:
         raise SystemExit(built.stderr)
     found = {f"fmus/{name}": text for name, text in artefacts_in(work / "fmus", work).items()}
-    todo = jobs(ROOT / "scenarios", quick)
+    todo = [job for job in jobs(ROOT / "scenarios", quick) if not only or job.name in only]
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         running = {pool.submit(_run, job, work): job for job in todo}
         for k, future in enumerate(as_completed(running), start=1):
@@ -320,6 +326,12 @@ def compare(before: Mapping[str, str], after: Mapping[str, str]) -> Comparison:
         sorted(before.keys() - after.keys()),
         sorted(after.keys() - before.keys()),
     )
+
+
+def part_of(hashes: Mapping[str, str], only: Sequence[str]) -> dict[str, str]:
+    """Return the hashes of some jobs, and of the FMUs; of all if `only` is empty."""
+    kept = tuple(f"{name}/" for name in ("fmus", *only))
+    return {name: digest for name, digest in hashes.items() if not only or name.startswith(kept)}
 
 
 def first_difference(before: str, after: str) -> tuple[int, str, str]:
@@ -390,12 +402,16 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, metavar="FILE", help="write it here instead of printing it")
     parser.add_argument("--compare", type=Path, metavar="FILE", help="show what differs from an earlier one")
     parser.add_argument("--quick", action="store_true", help="a part of everything")
+    parser.add_argument("--only", metavar="JOB", action="append", default=[], help="this alone; repeatable")
     chosen = parser.parse_args(arguments)
+    known = [job.name for job in jobs(ROOT / "scenarios", chosen.quick)]
+    if wrong := [name for name in chosen.only if name not in known]:
+        parser.error(f"--only {wrong[0]}: there is no such job; known: {', '.join(known)}")
     if chosen.compare and not chosen.compare.is_file():
         parser.error(f"--compare {chosen.compare}: there is no such file")
     before = read(chosen.compare) if chosen.compare else None
     with tempfile.TemporaryDirectory() as folder:
-        texts = fingerprint(Path(folder), chosen.quick)
+        texts = fingerprint(Path(folder), chosen.quick, chosen.only)
     hashes = hashes_in(lines_of(texts))
     if chosen.out:
         write(texts, chosen.out)
@@ -403,7 +419,7 @@ def main(arguments: list[str] | None = None) -> int:
         print("\n".join(lines_of(texts)))
     if before is None:
         return 0
-    found = compare(before[0], hashes)
+    found = compare(part_of(before[0], chosen.only), hashes)
     print("\n".join(report(found, before[1], texts)))
     return 1 if found else 0
 

@@ -20,6 +20,7 @@ from tests.fingerprint import (
     jobs,
     lines_of,
     main,
+    part_of,
     read,
     report,
     write,
@@ -41,6 +42,7 @@ def put(file: Path, text: str) -> Path:
         ("SHA-256 1baf10d766b920efa9a94bb01f7622a757d7a37246690054a218dff4da8161e3", "SHA-256 HASH"),
         ("yawbench 0.2.0, pythonfmu 0.7.0", "yawbench VERSION, pythonfmu VERSION"),
         ("results: 8001 rows of 64 variables in 1.33 s", "results: 8001 rows of 64 variables in DURATION"),
+        ("controller_fnn (b4573b63)", "controller_fnn (HASH)"),
         ("21.6 µs per step", "DURATION per step"),
         ("-4.716664836194605e-04, 0.47166648361946058", "-4.716664836194605e-04, 0.47166648361946058"),
         ("stops at 8.0 s with 12345678901234567890 rows", "stops at 8.0 s with 12345678901234567890 rows"),
@@ -151,6 +153,16 @@ def test_without_the_texts_a_comparison_still_names_what_differs(tmp_path):
     assert report(compare(hashes, hashes_in(lines_of(after))), texts, after)[0] == "differs: d"
 
 
+def test_a_part_is_compared_with_the_same_part():
+    before = {"fmus/a.fmu": "0", "sweep/table.csv": "1", "sweeping/table.csv": "2"}
+    assert part_of(before, ["sweep"]) == {"fmus/a.fmu": "0", "sweep/table.csv": "1"}
+    assert part_of(before, []) == before
+
+
+def test_a_hash_counts_as_a_number_whatever_it_begins_with():
+    assert numbers_in(f"x: 3 values, {'ab' * 32}") == ["3", "ab" * 32]
+
+
 def test_numbers_are_found_with_signs_and_exponents_and_not_within_names():
     assert numbers_in("fl_2 x1 -3.5e-06, +4 \u22122 (40mps) 7") == ["-3.5e-06", "+4", "\u22122", "40", "7"]
 
@@ -162,6 +174,13 @@ def test_every_scenario_is_run_and_what_is_named_exists():
     assert of_scenarios >= {*EVALUATED, *QUICK_SCENARIOS}
     assert len(of_scenarios) > 40
     assert {job.name for job in jobs(ROOT / "scenarios", quick=True)} < names
+
+
+def test_a_job_that_does_not_exist_is_told_with_those_that_do(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["--only", "sweeep"])
+    assert ended.value.code == 2
+    assert "--only sweeep" in (told := capsys.readouterr().err) and "ranking" in told
 
 
 def test_an_earlier_fingerprint_that_does_not_exist_is_told_before_anything_runs(tmp_path, capsys):
