@@ -6,8 +6,9 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from .. import checksums
 from ..errors import ResultsError, ScenarioError
-from ..results.freshness import staleness
+from ..results.freshness import altered, staleness
 from .jobs import Job, Outcome, Record, Told, read_back
 from .journal import Journal
 from .workers import execute
@@ -20,7 +21,7 @@ def left_to_do(jobs: Sequence[Job], records: Mapping[str, Record]) -> list[Job]:
     """Return the runs that have not been made already, each key once, in their order.
 
     Runs that are measured are those whose key is in `records`, and that have kept results if they are to;
-    of others the key stands in the results.
+    of others the key stands in the results. The user is told of results that were changed.
     """
     left: dict[tuple[str, Path], Job] = {}
     for job in jobs:
@@ -31,8 +32,11 @@ def left_to_do(jobs: Sequence[Job], records: Mapping[str, Record]) -> list[Job]:
         else:
             record = records.get(job.key)
             made = record is not None and not (job.keep and record.ok and isinstance(read_back(job.out), str))
-        if not made:
-            left[job.key, job.out] = job
+        if made:
+            continue
+        left[job.key, job.out] = job
+        if words := altered(job.out):
+            checksums.warn(f"{job.label} is to be made again: {words}")
     return list(left.values())
 
 

@@ -128,7 +128,7 @@ class Journal:
         for number, line in enumerate(lines[1:], start=2):
             try:
                 entry: _Entry = _Entry.read(line)
-            except ValueError as error:
+            except ValueError as error:  # noqa: PERF203 - all are named
                 damaged[number] = str(error)
             else:
                 self.records[entry.key] = entry.record

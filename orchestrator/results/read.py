@@ -18,7 +18,7 @@ from ..wording import fold, listed, short
 from .digest import checksum
 from .folder import COMPLETED, RUN_FILE
 from .formats import FILES, RESULTS_FILE, source_of
-from .record_file import load_record
+from .record_file import load_record, warn_if_unchecked
 from .thinning import thinned
 
 
@@ -156,6 +156,7 @@ def load_results(
     """
     folder = Path(folder)
     run = load_record(folder)
+    warn_if_unchecked(run, folder)
     name = str(run.get("results", RESULTS_FILE))
     if name not in FILES.values():
         known = listed(FILES.values(), last="or")

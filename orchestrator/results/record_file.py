@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, ValidationError
 
+from .. import checksums
 from ..errors import ResultsError
 from ..files import read_bytes, reading, reason
 from ..wording import short
@@ -108,14 +110,28 @@ def load_record(folder: Path, *, settled: bool = False) -> dict[str, Any]:
         return check_record(run, file)
 
 
+def warn_if_unchecked(run: Mapping[str, Any], folder: Path) -> None:
+    """Tell the user of a record without checksums."""
+    if not checksums.has_checksums(run):
+        checksums.warn(
+            f"{folder / RUN_FILE}: has no checksums, it is of an earlier version or was changed; "
+            "its units and names are taken as they are"
+        )
+
+
 def check_record(run: Any, file: Path) -> dict[str, Any]:
     """Return the content of a record.
 
     Raises:
-        ResultsError: something in it is not what a run writes.
+        ResultsError: it was changed, or something in it is not what a run writes.
     """
     if not isinstance(run, dict):
         raise ResultsError(f"{file}: is not the record of a run.")
+    if words := checksums.changed_since(run):
+        raise ResultsError(
+            f"{file}: is not what its run has written: {words}; run it again, or remove "
+            f"{checksums.KEY!r} if you have changed the file yourself."
+        )
     try:
         _Record.model_validate(run)
     except ValidationError as errors:

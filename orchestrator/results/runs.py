@@ -10,7 +10,7 @@ from typing import Any
 
 from ..errors import ResultsError
 from .folder import DIED, PART, RUN_FILE, RUNNING, is_dead, unfinished
-from .record_file import load_record
+from .record_file import load_record, warn_if_unchecked
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,7 @@ def _runs_in(folder: Path) -> Iterator[FoundRun]:
         return
     try:
         record = load_record(folder, settled=going is not None)
+        warn_if_unchecked(record, folder)
     except ResultsError as error:
         yield FoundRun(folder, "unreadable", {}, str(error))
         return

@@ -347,18 +347,14 @@ def test_a_line_that_a_kill_has_cut_off_is_dropped(tmp_path):
 
 def test_a_file_that_is_no_journal_is_one_sentence(tmp_path):
     (tmp_path / "runs.jsonl").write_text("nonsense\n")
-    with pytest.raises(
-        ResultsError, match=r"runs\.jsonl: line 1 is damaged: is no JSON; --fresh begins anew"
-    ):
+    with pytest.raises(ResultsError, match=r"runs\.jsonl: line 1 is damaged: is no JSON; --fresh begins"):
         Journal(tmp_path, "a/b.yaml")
     assert (tmp_path / "runs.jsonl").read_text() == "nonsense\n"
 
 
 def test_a_journal_without_checksums_is_of_an_earlier_version(tmp_path):
     (tmp_path / "runs.jsonl").write_text('{"sweep": "a/b.yaml", "format": 1}\n')
-    with pytest.raises(
-        ResultsError, match="holds the runs of an earlier version of this program; give anoth"
-    ):
+    with pytest.raises(ResultsError, match="holds the runs of an earlier version of this program; give"):
         Journal(tmp_path, "a/b.yaml")
 
 
