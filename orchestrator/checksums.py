@@ -84,4 +84,4 @@ def _named(keys: list[str]) -> str:
 
 def _digest(value: Any) -> str:
     text = json.dumps(value, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:DIGITS]
+    return f"sha256:{hashlib.sha256(text.encode()).hexdigest()[:DIGITS]}"

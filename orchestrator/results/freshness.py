@@ -17,7 +17,7 @@ from .formats import RESULTS_FILE
 from .key import key_of
 from .read import load_results
 from .record_file import load_record
-from .run_record import PROGRAMS, run_record
+from .run_record import PROGRAMS, run_record, units_of
 
 COMPARED = {
     "algorithm": "the algorithm has changed",
@@ -60,6 +60,8 @@ def staleness(plan: Plan, folder: Path) -> str | None:
         return "the results were changed or cut off"
     if recorded.get("key") != key_of(plan):
         return _reason(plan, recorded)
+    if recorded.get("units") != units_of(plan):
+        return "the units of its record are not those of the FMUs"
     return None if checksums.has_checksums(recorded) else "the record has no checksums"
 
 

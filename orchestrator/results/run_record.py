@@ -26,7 +26,6 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
         started: when the run began, with a time zone.
     """
     units = {unit.name: unit for unit in plan.units}
-    columns = {f"{u}.{name}": units[u].fmu.variables[name].unit for u, name in plan.record}
     return {
         "status": status,
         "error": None,
@@ -40,7 +39,7 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
         "stop_time": plan.time(plan.n_steps),
         "ended": None,
         "evaluation_order": list(units),
-        "units": {"time": "s", **columns},
+        "units": units_of(plan),
         "texts": [f"{u}.{name}" for u, name in plan.record if units[u].fmu.variables[name].type == "String"],
         "fmus": {name: _fmu(unit, plan) for name, unit in units.items()},
         "changes": [asdict(change) | {"value": change.plain} for change in plan.changes],
@@ -50,6 +49,13 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
         "notes": list(plan.notes),
         "versions": versions(),
     }
+
+
+def units_of(plan: Plan) -> dict[str, str | None]:
+    """Return the measurement units of time and of all that is recorded."""
+    units = {unit.name: unit for unit in plan.units}
+    columns = {f"{u}.{name}": units[u].fmu.variables[name].unit for u, name in plan.record}
+    return {"time": "s", **columns}
 
 
 def connections_of(plan: Plan) -> list[dict[str, Any]]:
