@@ -114,7 +114,7 @@ class RecordWarning(UserWarning):
     """What stands in a folder of results is not what was written there, or cannot be checked.
 
     >>> import warnings
-    >>> warnings.simplefilter("error", RecordWarning)  # to stop where a record carries no checksums
+    >>> warnings.simplefilter("error", yb.RecordWarning)  # to stop where a record carries no checksums
     """
 
 

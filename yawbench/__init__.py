@@ -31,6 +31,7 @@ and is itself at those of the first:
 from orchestrator.errors import (
     BuildError,
     ModelDescriptionError,
+    RecordWarning,
     ResultsError,
     ScenarioError,
     SimulationError,
@@ -49,6 +50,7 @@ __all__ = [
     "Experiment",
     "ModelDescriptionError",
     "Places",
+    "RecordWarning",
     "ResultsError",
     "Run",
     "Runs",

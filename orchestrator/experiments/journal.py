@@ -36,7 +36,7 @@ class _Line(BaseModel):
     def text(self) -> bytes:
         """Return it as it is written; what is empty is left out."""
         content = checksums.with_checksums(self.model_dump(exclude_defaults=True))
-        return json.dumps(content, ensure_ascii=False).encode() + b"\n"
+        return json.dumps(content, ensure_ascii=False).encode("utf-8", "backslashreplace") + b"\n"
 
     @classmethod
     def read(cls, line: bytes) -> Any:
@@ -109,7 +109,7 @@ class Journal:
                 os.ftruncate(self._file, 0)
             lines, whole = _whole_lines(path.read_bytes())
             os.ftruncate(self._file, whole)
-            self._take_over(lines, _Head(sweep=_utf8(identity), format=FORMAT))
+            self._take_over(lines, _Head(sweep=identity, format=FORMAT))
         except BaseException:
             self.close()
             raise
@@ -181,11 +181,10 @@ class Journal:
             ResultsError: the journal cannot be written.
         """
         if last:
-            problems = tuple(map(_utf8, record.problems))
             self._append(
                 _Entry(
-                    key=key, values=record.values, problems=problems, findings=record.findings,
-                    ended=record.ended and _utf8(record.ended),
+                    key=key, values=record.values, problems=record.problems, findings=record.findings,
+                    ended=record.ended,
                 )
             )  # fmt: skip
         self.records[key] = record
@@ -226,14 +225,10 @@ def _content(line: bytes) -> dict[str, Any]:
 def _is_earlier(line: bytes) -> bool:
     """Return whether a first line is one of a journal without checksums."""
     try:
-        return _content(line).keys() == {"sweep", "format"}
+        content = _content(line)
     except ValueError:
         return False
-
-
-def _utf8(text: str) -> str:
-    """Return a text in which bytes of a path that is no UTF-8 are written out."""
-    return str(text).encode("utf-8", "backslashreplace").decode()
+    return content.keys() == {"sweep", "format"} and content["format"] == FORMAT - 1
 
 
 def _whole_lines(data: bytes) -> tuple[list[bytes], int]:

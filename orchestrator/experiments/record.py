@@ -111,8 +111,8 @@ def _record(findings: Findings, drawn: dict[str, str]) -> dict[str, Any]:
 
 
 def _hashes(results: Results | None) -> dict[str, str]:
-    fmus = results.run.get("fmus", {}) if results else {}
-    return {fmu["name"]: fmu["sha256"] for fmu in fmus.values() if "name" in fmu and "sha256" in fmu}
+    fmus = results.record.fmus.values() if results else ()
+    return {fmu.name: fmu.sha256 for fmu in fmus if fmu.name and fmu.sha256}
 
 
 def _value(value: Value) -> dict[str, Any]:

@@ -44,7 +44,7 @@ VALUES = (
 RIGHT, SAID, MADE = "numbers right, nothing to say", "named in a sentence", "named, and made again"
 NAMED = (
     r"(:line\d+:|:\d+:|:[^;]{0,300}(was(changed|added|removed)|cannotberead|isnottherecordofarun|"
-    r"hasnochecksums|itisnorecord|entries\.|entries:))"
+    r"hasnochecksums|itisnorecord|entries\.|entries:|isnotUTF-8|isempty|notvalidYAML))"
 )
 """Behind the name of the file: the line or the key, or that nothing in it can be believed."""
 BAD = ("WRONG", "NOT NAMED", "OWN ERROR")
