@@ -12,13 +12,16 @@ from ..errors import ResultsError
 from .folder import DIED, PART, RUN_FILE, RUNNING, is_dead, unfinished
 from .record_file import load_record, warn_if_unchecked
 
+UNREADABLE = "unreadable"
+"""Status of a run whose record cannot be read, or is not as it was written."""
+
 
 @dataclass(frozen=True)
 class FoundRun:
     """A run by its folder and its record."""
 
     folder: Path
-    status: str  # "completed", "failed", "interrupted", "running", "died", or "unreadable"
+    status: str  # "completed", "failed", "interrupted", "running", "died", or UNREADABLE
     record: dict[str, Any]
     problem: str = ""  # why it has no results, or none to the end
 
@@ -56,7 +59,7 @@ def _runs_in(folder: Path) -> Iterator[FoundRun]:
         record = load_record(folder, settled=going is not None)
         warn_if_unchecked(record, folder)
     except ResultsError as error:
-        yield FoundRun(folder, "unreadable", {}, str(error))
+        yield FoundRun(folder, UNREADABLE, {}, str(error))
         return
     problem = str((record.get("error") or {}).get("message") or "")
     yield FoundRun(folder, str(record.get("status") or ""), record, problem)
