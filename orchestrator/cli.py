@@ -9,12 +9,14 @@ import os
 import sys
 import threading
 import traceback
-from collections.abc import Sequence
-from typing import Annotated
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Annotated, Any
 
 import typer
 
-from .errors import YawbenchError
+from .errors import RecordWarning, YawbenchError
 from .wording import cut, printable
 
 COMMANDS = (
@@ -106,7 +108,8 @@ def _status(arguments: Sequence[str]) -> int:
         return 2
     try:
         try:
-            _application(arguments)(arguments)
+            with _warnings_as_notes():
+                _application(arguments)(arguments)
         except SystemExit as ended:
             return ended.code if isinstance(ended.code, int) else int(ended.code is not None)
         finally:
@@ -128,6 +131,23 @@ def _status(arguments: Sequence[str]) -> int:
     else:
         return 0
     return 1
+
+
+@contextmanager
+def _warnings_as_notes() -> Iterator[None]:
+    """Say warnings of our own as every note is said; others stay as Python shows them."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", RecordWarning)
+        before = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+            if issubclass(category, RecordWarning):
+                print(cut(printable(f"note: {message}"), SAID), file=sys.stderr, flush=True)
+            else:
+                before(message, category, *where, **more)
+
+        warnings.showwarning = show
+        yield
 
 
 SAID = 5000

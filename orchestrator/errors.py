@@ -125,6 +125,14 @@ class ResultsError(YawbenchError):
     """
 
 
+class RecordWarning(UserWarning):
+    """What stands in a folder of results is not what was written there, or cannot be checked.
+
+    >>> import warnings
+    >>> warnings.simplefilter("error", yb.RecordWarning)  # to stop where a record carries no checksums
+    """
+
+
 class BuildError(YawbenchError):
     """A component cannot be made into an FMU; raised by a run whose FMUs have to be built first.
 

@@ -41,11 +41,6 @@ def faults_of(plan: Plan) -> str:
     return "; ".join(dict.fromkeys(f"{one.place}: {one.says}" for one in plan.faults))
 
 
-def fault_in(one: Mapping[str, Any]) -> str:
-    """Return a fault of a run in words, by its record."""
-    return f"{one.get('on')}: {one.get('fault')}"
-
-
 def with_changes(title: str, changes: Iterable[Change]) -> str:
     """Return a title in one line with what was changed behind it."""
     words = changed(changes)

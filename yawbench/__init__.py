@@ -33,6 +33,7 @@ What is no failure but hardly meant, such as a car that spins, is a `YawbenchWar
 from orchestrator.errors import (
     BuildError,
     ModelDescriptionError,
+    RecordWarning,
     ResultsError,
     ScenarioError,
     SimulationError,
@@ -52,6 +53,7 @@ __all__ = [
     "Experiment",
     "ModelDescriptionError",
     "Places",
+    "RecordWarning",
     "ResultsError",
     "Run",
     "Runs",

@@ -35,7 +35,7 @@ def animate(sources: Sources, wishes: Wishes, label: Labels = None, out: Page = 
         raise ScenarioError(f"an animation shows up to {MOST} runs, not {len(sources)}")
     folders = recorded(sources, wishes)
     runs = list(zip(labels_of(folders, label), map(load_results, folders), strict=True))
-    titles = [str(results.run.get("title") or name) for name, results in runs]
+    titles = [results.record.title or name for name, results in runs]
     changed = changed_each([(name, changes_in(results.run)) for name, results in runs])
     if len(runs) == 1:
         text = page(runs, title=titles[0], changed=changed)

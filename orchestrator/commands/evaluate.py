@@ -150,15 +150,20 @@ def _runs(source: Path, mapping: MappingSpec | None) -> list[Path]:
     """Return the folders of the runs in and below a folder, or the file itself."""
     from ..errors import ResultsError
     from ..results.folder import COMPLETED
-    from ..results.runs import found_runs
+    from ..results.runs import UNREADABLE, found_runs
+    from .batch import say
 
     if not source.is_dir():
         if not source.exists():
             raise ResultsError(f"{source}: there is no such folder or file")
         return [source]
-    found = [run.folder for run in found_runs(source) if run.status == COMPLETED]
+    runs = found_runs(source)
+    found = [run.folder for run in runs if run.status == COMPLETED]
+    unreadable = [run.problem for run in runs if run.status == UNREADABLE]
     if not found:
-        raise ResultsError(f"{source}: holds no run that was completed")
+        raise ResultsError(unreadable or f"{source}: holds no run that was completed")
+    for problem in unreadable:
+        say(f"note: left out: {problem}")
     return found
 
 

@@ -33,6 +33,7 @@ from ..files import reads
 from ..metrics.run_metrics import columns_of
 from ..metrics.symbols import si_of
 from ..results.read import Results, load_results
+from ..results.run_record import FmuRecord
 from ..scenario import yaml_lines
 from ..scenario.measurement_units import measure_of, parse_unit
 from ..scenario.quantities import convert, meant_unit, spellings
@@ -113,8 +114,8 @@ def trace_of(results: Results, label: str = "") -> Trace:
         name = column.partition(".")[2]
         if name not in signals and own[name] == 1 and np.issubdtype(values.dtype, np.number):
             signals[name] = values
-    fmus = {unit: fmu for unit, fmu in results.run.get("fmus", {}).items() if isinstance(fmu, dict)}
-    told = {unit: {**fmu.get("defaults", {}), **fmu.get("parameters", {})} for unit, fmu in fmus.items()}
+    fmus = results.record.fmus
+    told = {unit: {**fmu.defaults, **fmu.parameters} for unit, fmu in fmus.items()}
     best = [unit for role in ("driver", "plant") for unit in results.units_of_role(role)]  # of test and car
     facts = {name: value for unit in (*told, *best) for name, value in told.get(unit, {}).items()}
     masses = [told[unit]["mass"] for unit in results.units_of_role("plant") if "mass" in told.get(unit, {})]
@@ -127,18 +128,17 @@ def trace_of(results: Results, label: str = "") -> Trace:
         _friction(results, fmus, told),
         facts,
         results.folder,
-        with_changes(str(results.run.get("title") or ""), changes_in(results.run)),
+        with_changes(results.record.title or "", changes_in(results.run)),
     )
 
 
-def _friction(results: Results, fmus: Mapping[str, Any], told: Mapping[str, Any]) -> float | None:
+def _friction(results: Results, fmus: Mapping[str, FmuRecord], told: Mapping[str, Any]) -> float | None:
     """Return the lowest friction that any wheel met: as recorded, else as roads or tyres were told."""
     if columns := columns_of(results, "friction_*"):
         return float(min(results.columns[column].min() for column in columns))
     found = [told.get(unit, {}).get("base_friction") for unit in results.units_of_role("road")]
     for fmu in fmus.values():
-        constants = fmu.get("constants", {}).items()
-        found += [value for name, value in constants if name.startswith("friction_")]
+        found += [value for name, value in fmu.constants.items() if name.startswith("friction_")]
     return min((float(value) for value in found if isinstance(value, (int, float))), default=None)
 
 

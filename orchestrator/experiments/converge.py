@@ -137,7 +137,7 @@ def _samples(found: Results | None, signal: str, why: str) -> tuple[np.ndarray |
         return None, None, why
     if not np.issubdtype(found[signal].dtype, np.number):
         return None, None, f"{signal} is no number"
-    return found[signal], float(found.run["wall_time"]), ""
+    return found[signal], found.record.wall_time, ""
 
 
 def _common(x: np.ndarray | None, k: int) -> np.ndarray | None:

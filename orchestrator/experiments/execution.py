@@ -6,9 +6,12 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from .. import checksums
 from ..errors import ResultsError, ScenarioError
-from ..results.freshness import staleness
-from .jobs import Job, Outcome, Record, Told, read_back
+from ..metrics.run_metrics import metric, results_to_be, unit_in
+from ..plan import Plan
+from ..results.freshness import altered, staleness
+from .jobs import Job, Metrics, Outcome, Record, Told, read_back
 from .journal import Journal
 from .workers import execute
 
@@ -20,7 +23,7 @@ def left_to_do(jobs: Sequence[Job], records: Mapping[str, Record]) -> list[Job]:
     """Return the runs that have not been made already, each key once, in their order.
 
     Runs that are measured are those whose key is in `records`, and that have kept results if they are to;
-    of others the key stands in the results.
+    of others the key stands in the results. The user is told of results that were changed.
     """
     left: dict[tuple[str, Path], Job] = {}
     for job in jobs:
@@ -30,10 +33,32 @@ def left_to_do(jobs: Sequence[Job], records: Mapping[str, Record]) -> list[Job]:
             made = job.plan is not None and staleness(job.plan, job.out) is None
         else:
             record = records.get(job.key)
+            if record is not None and (words := _other_unit(job, record)):
+                checksums.warn(f"{job.label} is to be made again: {words}")
+                record = None
             made = record is not None and not (job.keep and record.ok and isinstance(read_back(job.out), str))
-        if not made:
-            left[job.key, job.out] = job
+        if made:
+            continue
+        left[job.key, job.out] = job
+        if words := altered(job.out):
+            checksums.warn(f"{job.label} is to be made again: {words}")
     return list(left.values())
+
+
+def _other_unit(job: Job, record: Record) -> str:
+    """Return which number of a run is in another unit than its plan gives it, "" if none is."""
+    assert job.plan is not None
+    units = _units(job.plan, job.metrics)
+    for key, value in record.values.items():
+        if value is not None and units.get(key, value[1]) != value[1]:
+            return f"{key} is noted in {value[1]}, and measured in {units[key]}"
+    return ""
+
+
+def _units(plan: Plan, metrics: Metrics) -> dict[str, str]:
+    """Return the unit of every metric of a run."""
+    results = results_to_be(plan)
+    return {key: unit for key, name, _ in metrics if (unit := unit_in(results, metric(name))) is not None}
 
 
 def finish(

@@ -268,9 +268,9 @@ def read_back(folder: Path, run: str | None = None) -> Results | str:
         results = load_results(folder)
     except ResultsError as error:
         return str(error)
-    if run is not None and results.run.get("id") != run:
+    if run is not None and results.record.id != run:
         return f"{folder}: holds the results of another run than the one just made"
-    if results.run.get("status") == "completed":
+    if results.record.status == "completed":
         return results
-    message = (results.run.get("error") or {}).get("message", "no reason recorded")
-    return f"{folder}: this run ended early: {message}"
+    failed = results.record.error
+    return f"{folder}: this run ended early: {failed.message if failed else 'no reason recorded'}"

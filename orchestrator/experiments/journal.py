@@ -1,7 +1,8 @@
 """Which runs are finished that keep no results, and what they came to: a line per run, written as it ends.
 
-The file is only ever appended to, each line is on the disk before the next run is counted, and a
-line that a kill has cut off is dropped when the experiment goes on. The folder is held by its writer.
+The file is appended to, and each line is on the disk before the next run is counted. A line that a kill has
+cut off is dropped when the experiment goes on, and so, with a warning, is one whose checksums or types do
+not fit: its run is made again. The folder is held by its writer.
 """
 
 from __future__ import annotations
@@ -9,14 +10,73 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, NoReturn
 
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from .. import checksums
 from ..errors import ResultsError
 from ..files import check_regular, reason
+from ..wording import counted
+from ..writing import write_whole
 from .jobs import Record
 
 FILE = "runs.jsonl"
-FORMAT = 1
+FORMAT = 2
+"""Chosen: 1 had no checksums."""
+NAMED = 10
+"""Damaged lines named one by one. Chosen: what a terminal shows at once."""
+
+
+class _Line(BaseModel):
+    """A line, with checksums beside what the kinds of line hold."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    def text(self) -> bytes:
+        """Return it as it is written; what is empty is left out."""
+        content = checksums.with_checksums(self.model_dump(exclude_defaults=True))
+        return json.dumps(content, ensure_ascii=False).encode("utf-8", "backslashreplace") + b"\n"
+
+    @classmethod
+    def read(cls, line: bytes) -> Any:
+        """Return what a line holds.
+
+        Raises:
+            ValueError: it is not what was written: a few words.
+        """
+        content = _content(line)
+        if not checksums.has_checksums(content):
+            raise ValueError("it has no checksums")
+        if changed := checksums.changed_since(content):
+            raise ValueError(changed)
+        try:
+            return cls.model_validate({key: x for key, x in content.items() if key != checksums.KEY})
+        except ValidationError as errors:
+            first = errors.errors(include_url=False)[0]
+            raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg'].lower()}") from None
+
+
+class _Head(_Line):
+    """The first line: whose runs these are."""
+
+    sweep: str
+    format: int
+
+
+class _Entry(_Line):
+    """What became of the run of a key."""
+
+    key: str
+    values: dict[str, Annotated[tuple[float, str], Field(strict=False)] | None]
+    problems: Annotated[tuple[str, ...], Field(strict=False)]
+    findings: Annotated[tuple[str, ...], Field(strict=False)] = ()
+    ended: str | None = None
+
+    @property
+    def record(self) -> Record:
+        """The same for the experiment."""
+        return Record(self.values, self.problems, self.findings, self.ended)
 
 
 class Journal:
@@ -34,12 +94,12 @@ class Journal:
     def __init__(self, folder: Path, identity: str, *, fresh: bool = False) -> None:
         self.folder = folder
         self.records: dict[str, Record] = {}
-        path = folder / FILE
+        self._path = path = folder / FILE
         try:
             folder.mkdir(parents=True, exist_ok=True)
             if path.exists():
                 check_regular(path)
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+            self._file = _opened(path)
         except OSError as error:
             raise ResultsError(f"{folder}: results cannot be written here: {reason(error)}.") from None
         except ValueError as error:
@@ -49,32 +109,65 @@ class Journal:
                 os.ftruncate(self._file, 0)
             lines, whole = _whole_lines(path.read_bytes())
             os.ftruncate(self._file, whole)
-            self._take_over(lines, identity)
+            self._take_over(lines, _Head(sweep=identity, format=FORMAT))
         except BaseException:
             self.close()
             raise
 
-    def _take_over(self, lines: list[bytes], identity: str) -> None:
-        path = self.folder / FILE
-        if not lines:
-            self._append({"sweep": identity, "format": FORMAT})
-            return
-        entry = 0
-        try:
-            self._check(json.loads(lines[0]), identity)
-            for entry in range(1, len(lines)):
-                key, record = _record(json.loads(lines[entry]))
-                self.records[key] = record
-        except (ValueError, KeyError, TypeError, AttributeError, IndexError):
-            raise ResultsError(f"{path}: line {entry + 1} is damaged; --fresh begins anew.") from None
+    def _take_over(self, lines: list[bytes], head: _Head) -> None:
+        """Read the lines of a journal; write it anew without those that are damaged.
 
-    def _check(self, entry: dict[str, Any], identity: str) -> None:
-        if entry["sweep"] != identity or entry["format"] != FORMAT:
-            other = entry["sweep"] if entry["sweep"] != identity else "an earlier version of this program"
-            raise ResultsError(
-                f"{self.folder}: holds the runs of {other}; give another folder with --out, "
-                "or --fresh to begin anew."
-            )
+        Raises:
+            ResultsError: it is of another experiment, or no journal.
+        """
+        if not lines:
+            self._append(head)
+            return
+        damaged: dict[int, str] = {}
+        whole = [head.text()]
+        for number, line in enumerate(lines[1:], start=2):
+            try:
+                entry: _Entry = _Entry.read(line)
+            except ValueError as error:  # noqa: PERF203 - all are named
+                damaged[number] = str(error)
+            else:
+                self.records[entry.key] = entry.record
+                whole.append(line + b"\n")
+        try:
+            self._check(_Head.read(lines[0]), head)
+        except ValueError as error:
+            if _is_earlier(lines[0]):
+                self._refuse("an earlier version of this program")
+            if not self.records:
+                raise ResultsError(
+                    f"{self._path}: line 1 is damaged: {error}; --fresh begins anew."
+                ) from None
+            checksums.warn(f"{self._path}: line 1: {error}; the runs below it are kept")
+        for number, why in list(damaged.items())[:NAMED]:
+            checksums.warn(f"{self._path}: line {number}: {why}; its run is to be made again")
+        if len(damaged) > NAMED:
+            checksums.warn(f"{self._path}: {counted(len(damaged) - NAMED, 'more line')} like these")
+        if whole != [line + b"\n" for line in lines]:
+            self._replace(b"".join(whole))
+
+    def _check(self, found: _Head, wanted: _Head) -> None:
+        if found.sweep != wanted.sweep:
+            self._refuse(found.sweep)
+        if found.format != wanted.format:
+            self._refuse("another version of this program")
+
+    def _refuse(self, other: str) -> NoReturn:
+        raise ResultsError(
+            f"{self.folder}: holds the runs of {other}; give another folder with --out, "
+            "or --fresh to begin anew."
+        )
+
+    def _replace(self, content: bytes) -> None:
+        os.close(self._file)
+        try:
+            write_whole(self._path, content)
+        finally:
+            self._file = _opened(self._path)
 
     def add(self, key: str, record: Record, *, last: bool = True) -> None:
         """Note that a run is finished.
@@ -88,34 +181,57 @@ class Journal:
             ResultsError: the journal cannot be written.
         """
         if last:
-            entry = {"key": key, "values": record.values, "problems": record.problems}
-            more = {"findings": record.findings, "ended": record.ended}
-            self._append(entry | {name: value for name, value in more.items() if value})
+            self._append(
+                _Entry(
+                    key=key, values=record.values, problems=record.problems, findings=record.findings,
+                    ended=record.ended,
+                )
+            )  # fmt: skip
         self.records[key] = record
 
-    def _append(self, entry: dict[str, Any]) -> None:
-        line = json.dumps(entry, ensure_ascii=False).encode("utf-8", "backslashreplace") + b"\n"
+    def _append(self, entry: _Line) -> None:
         try:
-            view = memoryview(line)
+            view = memoryview(entry.text())
             while view:
                 view = view[os.write(self._file, view) :]
             os.fsync(self._file)
         except OSError as error:
-            path = self.folder / FILE
-            raise ResultsError(f"{path}: cannot be written: {reason(error)}.") from None
+            raise ResultsError(f"{self._path}: cannot be written: {reason(error)}.") from None
 
     def close(self) -> None:
         """Let go of the file."""
         os.close(self._file)
 
 
-def _record(entry: dict[str, Any]) -> tuple[str, Record]:
-    values = {key: value and (float(value[0]), str(value[1])) for key, value in entry["values"].items()}
-    problems, findings = tuple(entry["problems"]), tuple(entry.get("findings", ()))
-    return str(entry["key"]), Record(values, problems, findings, entry.get("ended"))
+def _opened(path: Path) -> int:
+    return os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+
+
+def _content(line: bytes) -> dict[str, Any]:
+    """Return the JSON of a line.
+
+    Raises:
+        ValueError: it is none.
+    """
+    try:
+        found = json.loads(line)
+    except (ValueError, RecursionError):
+        raise ValueError("is no JSON") from None
+    if not isinstance(found, dict):
+        raise ValueError("is no JSON object")
+    return found
+
+
+def _is_earlier(line: bytes) -> bool:
+    """Return whether a first line is one of a journal without checksums."""
+    try:
+        content = _content(line)
+    except ValueError:
+        return False
+    return content.keys() == {"sweep", "format"} and content["format"] == FORMAT - 1
 
 
 def _whole_lines(data: bytes) -> tuple[list[bytes], int]:
     """Return the lines that have an end, and where the last of them ends."""
     whole = data.rfind(b"\n") + 1
-    return data[:whole].splitlines(), whole
+    return data[:whole].split(b"\n")[:-1], whole

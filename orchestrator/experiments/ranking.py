@@ -14,6 +14,7 @@ from functools import cached_property
 from itertools import product
 from pathlib import Path
 
+from .. import checksums
 from ..errors import ResultsError, ScenarioError
 from ..evaluation.dwell_series import amplitudes
 from ..evaluation.judgement import Judgement, NotJudged
@@ -54,6 +55,7 @@ class Ranking:
     entries: dict[str, tuple[EntrySpec, Path]]  # name -> controller, and the folder its path is relative to
     quick: bool = False  # the last amplitudes of few conditions
     chosen: tuple[str, ...] = ()  # conditions; none: all
+    edited: tuple[str, ...] = ()  # what is not as `yawbench tune` has written it
 
     @property
     def identity(self) -> str:
@@ -120,12 +122,16 @@ def load_ranking(
     if spec is None or document.problems:
         raise ScenarioError(document.sentences())
     entries = {name: (one, path.parent) for name, one in spec.entries.items()}
+    edited: list[str] = []
     for name in spec.more_entries:
         file = path.parent / name
         listed = yaml_lines.read(file, what="file of entries")
         found = validate(EntriesSpec, listed)
         if found is None or listed.problems:
             raise ScenarioError(listed.sentences())
+        if words := found.edited:
+            edited.append(f"{file}: {words}")
+            checksums.warn(edited[-1])
         for key, one in found.entries.items():
             if key in entries:
                 raise ScenarioError(f"{file}: entries.{key}: there is already an entry {key!r}")
@@ -139,7 +145,7 @@ def load_ranking(
             raise ScenarioError(
                 f"{path}: there is no condition {name!r}{hint(name, spec.conditions, lead='known')}"
             )
-    return Ranking(path, spec, entries, quick, tuple(chosen))
+    return Ranking(path, spec, entries, quick, tuple(chosen), tuple(edited))
 
 
 def jobs_for_angles(ranking: Ranking, base: Job, once: Once) -> dict[str, list[Job]]:

@@ -20,10 +20,11 @@ A condition changes a scenario as an entry of a study does. An entry puts its FM
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from .. import checksums
 from ..scenario.scenario_schema import Scalar
 from ..scenario.strict import Strict, Time
 from .axis_schema import Changes
@@ -78,9 +79,25 @@ class EntrySpec(Strict):
 
 
 class EntriesSpec(Strict):
-    """A file of entries alone."""
+    """A file of entries alone: written by hand, or by `yawbench tune`, with checksums then."""
 
     entries: dict[str, EntrySpec] = Field(min_length=1, description="Name -> controller")
+    checksums: dict[str, str] = Field({}, description="Of entries that `yawbench tune` has written")
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """What checksums are of: the entries as they stand."""
+        return {name: one.model_dump(exclude_defaults=True) for name, one in self.entries.items()}
+
+    @property
+    def edited(self) -> str:
+        """What is not as `yawbench tune` has written it, in words, "" if all is."""
+        if self.checksums:
+            words = checksums.what_changed(self.content, self.checksums)
+            return f"{words} since `yawbench tune` wrote it" if words else ""
+        if any(one.gains == "tuned" for one in self.entries.values()):
+            return "has no checksums, so its tuned gains are taken as they are"
+        return ""
 
 
 class RankingSpec(Strict):

@@ -8,8 +8,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from .. import checksums
+from ..files import read_bytes
 from ..metrics.run_metrics import Value, metric
 from ..metrics.symbols import si
+from ..results.folder import LARGEST
 from ..results.read import Results
 from ..writing import write_whole
 from .findings import Findings
@@ -30,8 +33,22 @@ def write_findings(findings: Findings, drawn: dict[str, str], out: Path) -> None
         ResultsError: they cannot be written.
     """
     write_table(findings, out)
-    record = json.dumps(_record(findings, drawn), indent=1, ensure_ascii=False, allow_nan=False)
-    write_whole(out / RECORD, record + "\n")
+    _tell_of_changes(out / RECORD)
+    content = checksums.with_checksums(_record(findings, drawn))
+    write_whole(out / RECORD, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def _tell_of_changes(file: Path) -> None:
+    """Warn that a record was changed since it was written: it is about to be written anew from the runs."""
+    try:
+        found = json.loads(read_bytes(file, largest=LARGEST))
+        words = checksums.changed_since(found) if isinstance(found, dict) else "it is no record"
+    except FileNotFoundError:
+        return
+    except (OSError, ValueError, RecursionError):
+        words = "it cannot be read"
+    if words:
+        checksums.warn(f"{file}: {words} since it was written; it is written anew from the runs")
 
 
 def _record(findings: Findings, drawn: dict[str, str]) -> dict[str, Any]:
@@ -95,8 +112,8 @@ def _record(findings: Findings, drawn: dict[str, str]) -> dict[str, Any]:
 
 
 def _hashes(results: Results | None) -> dict[str, str]:
-    fmus = results.run.get("fmus", {}) if results else {}
-    return {fmu["name"]: fmu["sha256"] for fmu in fmus.values() if "name" in fmu and "sha256" in fmu}
+    fmus = results.record.fmus.values() if results else ()
+    return {fmu.name: fmu.sha256 for fmu in fmus if fmu.name and fmu.sha256}
 
 
 def _value(value: Value) -> dict[str, Any]:

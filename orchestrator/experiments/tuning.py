@@ -19,6 +19,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from .. import checksums
 from ..errors import ScenarioError
 from ..metrics.run_metrics import Value
 from .axis_schema import Changes, DesignAxisSpec, VariantSpec
@@ -212,9 +213,12 @@ def entries_text(entries: dict[str, dict[str, Any]], command: str) -> str:
 
     from ruamel.yaml import YAML
 
+    from .ranking_schema import EntriesSpec
+
     yaml: Any = YAML(typ="safe", pure=True)
     yaml.default_flow_style, yaml.sort_base_mapping_type_on_output, yaml.width = False, False, 110
-    yaml.dump({"entries": entries}, stream := StringIO())
+    known = checksums.checksums_of(EntriesSpec.model_validate({"entries": entries}).content)
+    yaml.dump({"entries": entries, "checksums": known}, stream := StringIO())
     return f"# Written by: {command}\n{stream.getvalue()}"
 
 

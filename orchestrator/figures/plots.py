@@ -91,8 +91,8 @@ def draw(
 
 def nothing_recorded(run: Run) -> str:
     """Return a sentence on a run that has ended before there was anything to draw."""
-    error = run.results.run.get("error") or {}
-    why = f": {' '.join(str(error['message']).split())}" if error.get("message") else ""
+    error = run.results.record.error
+    why = f": {' '.join(error.message.split())}" if error and error.message else ""
     return f"{run.results.folder}: nothing to draw, this run ended at its start{why}."
 
 
@@ -121,7 +121,7 @@ def legend_of(runs: Sequence[Run], drawn: Iterable[Axes]) -> list[tuple[str, dic
 
 def title_of(runs: Sequence[Run]) -> str:
     """Return the title of the runs' scenario, or a general one where they differ."""
-    titles = {str(run.results.run.get("title") or "") for run in runs}
+    titles = {run.results.record.title or "" for run in runs}
     return (titles.pop() if len(titles) == 1 else "") or "Comparison of runs"
 
 
@@ -132,18 +132,14 @@ def changes_of(runs: Sequence[Run]) -> str:
 
 def provenance(runs: Sequence[Run]) -> str:
     """Return where the figure comes from: version, source, algorithm, step, FMUs with their hashes."""
-    records = [run.results.run for run in runs]
-    sources = dict.fromkeys(str(record.get("scenario", {}).get("source") or "") for record in records)
-    parts = [f"yawbench {records[0].get('versions', {}).get('yawbench', '')}".strip(), *filter(None, sources)]
-    algorithms = dict.fromkeys(str(record.get("algorithm")) for record in records if "algorithm" in record)
-    steps = dict.fromkeys(record["step_size"] for record in records if "step_size" in record)
+    records = [run.results.record for run in runs]
+    sources = dict.fromkeys(str(record.scenario.get("source") or "") for record in records)
+    parts = [f"yawbench {records[0].versions.get('yawbench', '')}".strip(), *filter(None, sources)]
+    algorithms = dict.fromkeys(record.algorithm for record in records if record.algorithm)
+    steps = dict.fromkeys(record.step_size for record in records if record.step_size)
     parts += [*algorithms, *(f"step {digits_of(1000 * step)} ms" for step in steps)]
-    fmus = dict.fromkeys(
-        f"{fmu.get('name')} {str(fmu.get('sha256', ''))[:8]}"
-        for record in records
-        for fmu in record.get("fmus", {}).values()
-    )
+    fmus = dict.fromkeys(f"{fmu.name} {fmu.sha256[:8]}" for record in records for fmu in record.fmus.values())
     parts += [f"FMUs: {', '.join(fmus)}"] if fmus else []
-    unfinished = [r.label for r in runs if r.results.ended or r.results.run.get("status") != "completed"]
+    unfinished = [r.label for r in runs if r.results.ended or r.results.record.status != "completed"]
     parts += [f"ended early: {', '.join(unfinished)}"] if unfinished else []
     return " · ".join(parts)

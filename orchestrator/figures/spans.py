@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..titles import fault_in
 from .display import Run
 
 if TYPE_CHECKING:
@@ -31,13 +30,13 @@ def spans_of(runs: Sequence[Run]) -> list[Span]:
     """Return the faults of runs, each once; that not all have is said with the label."""
     found: dict[Span, list[str]] = {}
     for label, results in runs:
-        for fault in results.run.get("faults", ()) if results.time.size else ():
-            begin, end = fault.get("from"), fault.get("until")
+        for fault in results.record.faults if results.time.size else ():
+            begin, end = fault.begin, fault.until
             first, last = results.time[0], results.time[-1]
             span = Span(
                 float(first if begin is None else max(begin, first)),
                 float(last if end is None else min(end, last)),
-                fault_in(fault),
+                fault.words,
             )
             if span.begin < span.end:
                 found.setdefault(span, []).append(label)

@@ -391,9 +391,7 @@ def reference_of(results: Results, column: str) -> str | None:
     name = f"{variable_of(column)}_ref"
     if found := _column(results, name):
         return found
-    wires = results.run.get("connections")
-    given = [str(w.get("from")) for w in (wires if isinstance(wires, list) else ()) if isinstance(w, dict)]
-    acting = {end.partition(".")[0] for end in given}
+    acting = {wire.source.partition(".")[0] for wire in results.record.connections}
     having = [c for c in results.columns if variable_of(c) == name and c.partition(".")[0] in acting]
     return having[0] if len(having) == 1 else None
 

@@ -95,7 +95,7 @@ def frames_of(results: Results) -> Frames:
     car, known = _car(results)
     if not known:
         notes.append("the plant tells no sizes: a mid-size car is drawn")
-    if failed := results.run.get("status", "completed") != "completed":
+    if failed := results.record.status not in ("", "completed"):
         notes.append(f"the run did not end as planned; shown until {time[-1]:.2f} s")
     elif results.ended:
         notes.append(results.ended)
@@ -179,7 +179,8 @@ def _friction(results: Results, wheel: str, *, tyre: str) -> np.ndarray | float 
     """Return the friction at a wheel: as a road recorded it, or the constant that the tyre was given."""
     if (recorded := _signal(results, f"friction_{wheel}")) is not None:
         return recorded
-    constants = results.run.get("fmus", {}).get(tyre, {}).get("constants", {})
+    fmu = results.record.fmus.get(tyre)
+    constants = fmu.constants if fmu else {}
     friction = constants.get(f"friction_{wheel}", constants.get("friction"))
     return float(friction) if isinstance(friction, (int, float)) else None
 
@@ -187,8 +188,8 @@ def _friction(results: Results, wheel: str, *, tyre: str) -> np.ndarray | float 
 def _parameters(results: Results, role: str) -> Iterator[Mapping[str, Any]]:
     """Yield the parameters of the units of a role."""
     for unit in results.units_of_role(role):
-        fmu = results.run["fmus"][unit]
-        yield {**fmu.get("defaults", {}), **fmu.get("parameters", {})}
+        fmu = results.record.fmus[unit]
+        yield {**fmu.defaults, **fmu.parameters}
 
 
 def _car(results: Results) -> tuple[Car, bool]:

@@ -33,7 +33,7 @@ from ..metrics.run_metrics import metric
 from ..plan import Plan
 from ..results.read import Results
 from ..scenario.load import Scenario, load_scenario
-from ..titles import changed, fault_in
+from ..titles import changed
 from ..wording import counted
 from .diagram import diagrams
 from .facts import anchor, animation_of, figure_of, fmus_of, programs_of
@@ -219,7 +219,7 @@ def settings(findings: Findings) -> Table:
     rows: list[list[Cell]] = []
     for run in findings.experiment.runs.values():
         results = findings.results.get(run.name)
-        faults = "; ".join(map(fault_in, results.run.get("faults", []))) if results else ""
+        faults = "; ".join(fault.words for fault in results.record.faults) if results else ""
         rows.append([run.name, run.scenario.name, changed(run.changes) or None, faults or None])
     kept = [k for k in range(len(headings)) if any(row[k] is not None for row in rows)]
     return Table("", [headings[k] for k in kept], [[row[k] for k in kept] for row in rows])
@@ -229,10 +229,11 @@ def grid_of_times(runs: Iterable[Plan | Results]) -> list[str]:
     """Return algorithm, step and end of the runs, each combination once, as plans or records say."""
     found: Counter[str] = Counter()
     for one in runs:
+        algorithm: str
         if isinstance(one, Plan):
             algorithm, step, end = one.algorithm, float(one.step), one.time(one.n_steps)
         else:
-            algorithm, step, end = (one.run.get(key, 0) for key in ("algorithm", "step_size", "stop_time"))
+            algorithm, step, end = one.record.algorithm, one.record.step_size, one.record.stop_time
         found[f"{algorithm}, {1000 * step:g} ms, until {end:g} s"] += 1
     return [f"{text} ({counted(count, 'run')})" for text, count in found.items()]
 

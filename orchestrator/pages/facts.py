@@ -53,9 +53,8 @@ def fmus_of(recorded: Iterable[Results]) -> Table:
     """Return every FMU that took part in the runs, as their records say."""
     found: dict[tuple[str, str], dict[str, None]] = {}
     for results in recorded:
-        for unit, fmu in results.run.get("fmus", {}).items():
-            known = str(fmu.get("name", unit)), str(fmu.get("sha256", ""))
-            found.setdefault(known, {})[unit] = None
+        for unit, fmu in results.record.fmus.items():
+            found.setdefault((fmu.name or unit, fmu.sha256), {})[unit] = None
     ordered = sorted(found.items(), key=lambda one: (min(one[1]), one[0][0]))
     rows = [(name, ", ".join(units), sha256) for (name, sha256), units in ordered]
     return Table("", ["FMU", "as", "SHA-256"], [*rows])
@@ -65,8 +64,8 @@ def programs_of(recorded: Iterable[Results]) -> dict[str, str]:
     """Return the versions of the programs that made the runs, as their records say."""
     found: dict[str, dict[str, None]] = {}
     for results in recorded:
-        for name, version in results.run.get("versions", {}).items():
-            found.setdefault(name, {})[str(version)] = None
+        for name, version in results.record.versions.items():
+            found.setdefault(name, {})[version] = None
     return {name: " and ".join(several) for name, several in found.items()}
 
 

@@ -58,7 +58,7 @@ def ranking_page(ranked: Ranked, folder: Path, command: str) -> str:
         title=ranking.spec.title,
         source=ranking.spec.source,
         rule=RULE,
-        notes=ranking.spec.notes,
+        notes=[*ranking.spec.notes, *ranking.edited],
         quick=ranking.quick,
         missing=[one.spec.title for one in ranked.standings if one.missing],
         first=["place", "controller", "passed", "runs"],

@@ -8,6 +8,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
+from .. import checksums
 from ..errors import ResultsError
 from ..plan import Plan
 from .digest import checksum
@@ -16,7 +17,7 @@ from .formats import RESULTS_FILE
 from .key import key_of
 from .read import load_results
 from .record_file import load_record
-from .run_record import PROGRAMS, run_record
+from .run_record import PROGRAMS, run_record, units_of
 
 COMPARED = {
     "algorithm": "the algorithm has changed",
@@ -40,13 +41,16 @@ _OF_UNIT = {
 
 
 def staleness(plan: Plan, folder: Path) -> str | None:
-    """Return why the results in a folder are not those of the plan, None if they are: their keys are one."""
+    """Return why the results in a folder are not those of the plan, None if they are: their keys are one.
+
+    What carries no checksums, as results of earlier versions, is never those of the plan.
+    """
     if not (folder / RUN_FILE).is_file():
         return "no results yet"
     try:
         recorded = load_record(folder)
-    except ResultsError:
-        return "the last run has died" if is_dead(folder) else "the record cannot be read"
+    except ResultsError as error:
+        return "the last run has died" if is_dead(folder) else str(error)
     if recorded.get("status") != COMPLETED:
         return "the run did not reach its end"
     results = folder / str(recorded.get("results", RESULTS_FILE))
@@ -54,7 +58,25 @@ def staleness(plan: Plan, folder: Path) -> str | None:
         return "the results are missing"
     if not _whole(results, recorded):
         return "the results were changed or cut off"
-    return None if recorded.get("key") == key_of(plan) else _reason(plan, recorded)
+    if recorded.get("key") != key_of(plan):
+        return _reason(plan, recorded)
+    if recorded.get("units") != units_of(plan):
+        return "the units of its record are not those of the FMUs"
+    return None if checksums.has_checksums(recorded) else "the record has no checksums"
+
+
+def altered(folder: Path) -> str:
+    """Return in a sentence what in a folder is not as its run has written it, "" if nothing is."""
+    if not (folder / RUN_FILE).is_file() or is_dead(folder):
+        return ""
+    try:
+        recorded = load_record(folder)
+        results = folder / str(recorded.get("results", RESULTS_FILE))
+        if results.is_file() and not _whole(results, recorded):
+            return f"{results}: was changed or cut off"
+    except ResultsError as error:
+        return str(error)
+    return "" if checksums.has_checksums(recorded) else f"{folder / RUN_FILE}: has no checksums"
 
 
 def _reason(plan: Plan, recorded: Mapping[str, Any]) -> str:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,8 @@ from ..wording import fold, listed, short
 from .digest import checksum
 from .folder import COMPLETED, RUN_FILE
 from .formats import FILES, RESULTS_FILE, source_of
-from .record_file import load_record
+from .record_file import load_record, warn_if_unchecked
+from .run_record import ConnectionRecord, RunRecord
 from .thinning import thinned
 
 
@@ -36,21 +38,26 @@ class Results:
     units: dict[str, str]  # "time" and "<unit>.<variable>" -> measurement unit; "" if it has none
     run: dict[str, Any]  # run.json
 
+    @cached_property
+    def record(self) -> RunRecord:
+        """What `run` holds, typed; as it was when this was first asked for."""
+        return RunRecord.model_validate(self.run)
+
     @property
     def file(self) -> Path:
         """The file that the columns come from."""
-        return self.folder / str(self.run.get("results", RESULTS_FILE))
+        return self.folder / self.record.results
 
     @property
     def where(self) -> str:
         """What a message calls them: by their file, or if they are in memory alone by their title."""
-        return str(self.file) if self.folder != Path() else str(self.run.get("title") or "this run")
+        return str(self.file) if self.folder != Path() else self.record.title or "this run"
 
     @property
     def ended(self) -> str | None:
         """Why a unit ended the run before its stop time, None if none did."""
-        ended = self.run.get("ended")
-        return str(ended.get("message")) if isinstance(ended, dict) else None
+        ended = self.record.ended
+        return ended.message if ended else None
 
     def __getitem__(self, column: str) -> np.ndarray:
         try:
@@ -103,19 +110,17 @@ class Results:
 
     def _feeding(self, variable: str) -> list[str]:
         """Return the columns that feed inputs of a name as they are, but for the unit of measurement."""
-        wires = self.run.get("connections")
         feeding = [
-            str(wire.get("from"))
-            for wire in (wires if isinstance(wires, list) else ())
-            if isinstance(wire, dict) and str(wire.get("to")).partition(".")[2] == variable
-            if _is_the_same(wire, self.units.get(str(wire.get("from"))))
+            wire.source
+            for wire in self.record.connections
+            if wire.target.partition(".")[2] == variable and _is_the_same(wire, self.units.get(wire.source))
         ]
         return [column for column in dict.fromkeys(feeding) if column in self.columns]
 
     def units_of_role(self, role: str) -> list[str]:
         """Return the names of the scenario's units that have the role, in evaluation order."""
-        fmus: dict[str, dict[str, Any]] = self.run.get("fmus", {})
-        found = [unit for unit, fmu in fmus.items() if str(fmu.get("name", "")).startswith(role + "_")]
+        fmus = self.record.fmus
+        found = [unit for unit, fmu in fmus.items() if fmu.name.startswith(role + "_")]
         return found or [unit for unit in fmus if unit == role]
 
     def _unknown(self, variable: str, role: str | None = None) -> str:
@@ -126,14 +131,13 @@ class Results:
         return f"{self.where}: no column '{variable}'{of} was recorded{hint}"
 
 
-def _is_the_same(wire: dict[str, Any], unit: str | None) -> bool:
+def _is_the_same(wire: ConnectionRecord, unit: str | None) -> bool:
     """Return whether a wire hands on what the output of this unit says: at most in another unit."""
-    if "gain" not in wire:
+    if wire.gain is None:
         return True
-    given = (wire["gain"], wire.get("offset", 0.0))
-    one, other = measure_of(unit), measure_of(str(wire.get("unit")))
+    one, other = measure_of(unit), measure_of(str(wire.unit))
     factors = conversion(one, other) if one and other else None
-    return factors is not None and all(isinstance(x, float) for x in given) and np.allclose(factors, given)
+    return factors is not None and np.allclose(factors, (wire.gain, wire.offset))
 
 
 @reads("recorded run", ResultsError)
@@ -156,6 +160,7 @@ def load_results(
     """
     folder = Path(folder)
     run = load_record(folder)
+    warn_if_unchecked(run, folder)
     name = str(run.get("results", RESULTS_FILE))
     if name not in FILES.values():
         known = listed(FILES.values(), last="or")

@@ -3,77 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, ValidationError
+from pydantic import ValidationError
 
+from .. import checksums
 from ..errors import ResultsError
 from ..files import read_bytes, reading, reason
 from ..wording import short
 from .folder import FAILED, LARGEST, RUN_FILE, settle
 from .formats import FILES
-
-
-class _Part(BaseModel):
-    model_config = ConfigDict(strict=True, extra="allow")
-
-
-class _Fmu(_Part):
-    name: str = ""
-    sha256: str = ""
-    parameters: dict[str, Any] = {}
-    constants: dict[str, Any] = {}
-    defaults: dict[str, Any] = {}
-
-
-class _Error(_Part):
-    message: str = ""
-
-
-class _Finding(_Part):
-    kind: str
-    place: str | None = None
-    value: float | None = None
-    time: float | None = None
-    says: str = ""
-
-
-class _Fault(_Part):
-    on: str
-    fault: str
-    begin: float | None = Field(None, alias="from")
-    until: float | None = None
-
-
-class _Record(_Part):
-    """What others rely on; all of it may be missing."""
-
-    id: str | None = None
-    status: str = ""
-    error: _Error | None = None
-    title: str | None = None
-    started: str | None = None
-    wall_time: float = 0.0
-    rows: NonNegativeInt = 0
-    algorithm: str = ""
-    step_size: float = 0.0
-    stop_time: float = 0.0
-    results: str = ""
-    checksum: str = ""
-    texts: list[str] | None = None
-    evaluation_order: list[str] = []
-    units: dict[str, str | None] = {}
-    fmus: dict[str, _Fmu] = {}
-    changes: list[dict[str, Any]] = []
-    findings: list[_Finding] = []
-    faults: list[_Fault] = []
-    connections: list[Any] = []
-    scenario: dict[str, Any] = {}
-    versions: dict[str, str] = {}
-    warnings: list[dict[str, Any]] = []
-    smallest: dict[str, float | str] = {}
-    largest: dict[str, float | str] = {}
+from .run_record import RunRecord
 
 
 def load_record(folder: Path, *, settled: bool = False) -> dict[str, Any]:
@@ -108,16 +50,30 @@ def load_record(folder: Path, *, settled: bool = False) -> dict[str, Any]:
         return check_record(run, file)
 
 
+def warn_if_unchecked(run: Mapping[str, Any], folder: Path) -> None:
+    """Tell the user of a record without checksums."""
+    if not checksums.has_checksums(run):
+        checksums.warn(
+            f"{folder / RUN_FILE}: has no checksums, it is of an earlier version or was changed; "
+            "its units and names are taken as they are"
+        )
+
+
 def check_record(run: Any, file: Path) -> dict[str, Any]:
     """Return the content of a record.
 
     Raises:
-        ResultsError: something in it is not what a run writes.
+        ResultsError: it was changed, or something in it is not what a run writes.
     """
     if not isinstance(run, dict):
         raise ResultsError(f"{file}: is not the record of a run.")
+    if words := checksums.changed_since(run):
+        raise ResultsError(
+            f"{file}: is not what its run has written: {words}; run it again, or remove "
+            f"{checksums.KEY!r} if you have changed the file yourself."
+        )
     try:
-        _Record.model_validate(run)
+        RunRecord.model_validate(run)
     except ValidationError as errors:
         first, *others = errors.errors(include_url=False)
         place = ".".join(map(str, first["loc"]))

@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from ..checksums import with_checksums
 from ..errors import ResultsError
 from ..files import reason
 from ..plan import Value
@@ -198,7 +199,7 @@ class Recorder(Block):
             try:
                 self._write_record(self._whole(run))
             except OSError as error:
-                if error.errno != errno.ENOSPC or not self._make_room(len(json.dumps(_plain(run)))):
+                if error.errno != errno.ENOSPC or not self._make_room(len(record_text(run).encode())):
                     raise
                 self._write_record(self._whole(run))
             self._file.close()
@@ -236,8 +237,7 @@ class Recorder(Block):
         return checksum(self._path) if self._digest is None else shown(self._digest)
 
     def _write_record(self, run: dict[str, Any], path: Path | None = None) -> None:
-        text = json.dumps(_plain(run), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-        write_whole(path or self._run_path, text)
+        write_whole(path or self._run_path, record_text(run))
 
     def _unwritable(self, error: OSError) -> ResultsError:
         return ResultsError(f"{self.folder}: results cannot be written: {reason(error)}.")
@@ -274,6 +274,11 @@ def _order(real: Sequence[bool]) -> list[int]:
         order.append(reals if is_real else others)
         reals, others = reals + is_real, others + (not is_real)
     return order
+
+
+def record_text(run: Mapping[str, Any]) -> str:
+    """Return the record of a run as it is written, with its checksums."""
+    return json.dumps(with_checksums(_plain(run)), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _plain(value: Any) -> Any:

@@ -1,4 +1,7 @@
-"""What run.json says about a run: everything needed to repeat and to judge it."""
+"""What run.json says about a run: everything needed to repeat and to judge it.
+
+`RunRecord` is the one definition: what a run writes has its fields, and what is read back is checked by it.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +14,137 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt
+
 from ..plan import DEFAULT, Plan, Series, Unit, Wire
 from ..sources import OF_RESULTS, sources_hash
 
 PROGRAMS = ("yawbench", "fmpy", "pythonfmu", "numpy")
 """Packages that have a say in the numbers."""
+
+
+class _Part(BaseModel):
+    """A part of a record. All of it may be missing, and earlier versions may have written more."""
+
+    model_config = ConfigDict(strict=True, extra="allow")
+
+
+class SeriesRecord(_Part):
+    """Where an input that is a time series comes from."""
+
+    file: str = ""
+    column: str = ""
+    interpolation: str = ""
+    sha256: str = ""
+
+
+class FmuRecord(_Part):
+    """An FMU as a unit of the run had it."""
+
+    name: str = ""
+    file: str = ""
+    sha256: str = ""
+    guid: str | None = None
+    generation_tool: str | None = None
+    fmi_version: str = ""
+    built: dict[str, Any] | None = None
+    step_size: float | None = None
+    tolerance: float | None = None
+    parameters: dict[str, Any] = {}
+    origins: dict[str, str] = {}
+    defaults: dict[str, Any] = {}  # of parameters that the run leaves as they are
+    constants: dict[str, Any] = {}
+    series: dict[str, SeriesRecord] = {}
+
+
+class ErrorRecord(_Part):
+    """Why a run failed."""
+
+    message: str = ""
+    unit: str | None = None
+    time: float | None = None
+    inputs: dict[str, Any] = {}
+    traceback: list[str] = []
+
+
+class EndRecord(_Part):
+    """Which unit ended a run before its stop time, when [s] and why."""
+
+    unit: str | None = None
+    time: float | None = None
+    message: str = ""
+
+
+class ConnectionRecord(_Part):
+    """A wire: `gain` and `offset` where it converts, and then the unit that it converts to."""
+
+    source: str = Field("", alias="from")
+    target: str = Field("", alias="to")
+    gain: float | None = None
+    offset: float = 0.0
+    unit: str | None = None
+
+
+class FindingRecord(_Part):
+    """A remark on the run's course."""
+
+    kind: str
+    place: str | None = None
+    value: float | str | None = None
+    time: float | None = None
+    says: str = ""
+
+
+class FaultRecord(_Part):
+    """A fault, and from when until when [s] it acts."""
+
+    on: str
+    fault: str
+    begin: float | None = Field(None, alias="from")
+    until: float | None = None
+    at: list[str] = []
+
+    @property
+    def words(self) -> str:
+        """What it is, in words."""
+        return f"{self.on}: {self.fault}"
+
+
+class RunRecord(_Part):
+    """The record of a run."""
+
+    id: str | None = None
+    key: str | None = None  # see `key.key_of`
+    status: str = ""
+    error: ErrorRecord | None = None
+    title: str | None = None
+    started: str | None = None  # ISO 8601
+    wall_time: float = 0.0  # [s]
+    rows: NonNegativeInt = 0
+    results: str = "results.csv"  # name of the file
+    checksum: str = ""  # of that file
+    algorithm: str = ""
+    step_size: float = 0.0  # [s]
+    start_time: float = 0.0  # [s]
+    stop_time: float = 0.0  # [s]
+    ended: EndRecord | None = None
+    evaluation_order: list[str] = []
+    units: dict[str, str | None] = {}  # of measurement, of time and columns
+    texts: list[str] | None = None  # columns that hold text
+    fmus: dict[str, FmuRecord] = {}
+    changes: list[dict[str, Any]] = []
+    connections: list[ConnectionRecord] = []
+    faults: list[FaultRecord] = []
+    findings: list[FindingRecord] = []
+    scenario: dict[str, Any] = {}
+    notes: list[str] = []
+    versions: dict[str, str] = {}
+    warnings: list[dict[str, Any]] = []
+    more_warnings: NonNegativeInt = 0
+    units_freed: bool = False
+    smallest: dict[str, float | str] = {}
+    largest: dict[str, float | str] = {}
+    checksums: dict[str, str] = {}  # of the keys of the record itself; see `orchestrator.checksums`
 
 
 def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
@@ -26,7 +155,6 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
         started: when the run began, with a time zone.
     """
     units = {unit.name: unit for unit in plan.units}
-    columns = {f"{u}.{name}": units[u].fmu.variables[name].unit for u, name in plan.record}
     return {
         "status": status,
         "error": None,
@@ -40,7 +168,7 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
         "stop_time": plan.time(plan.n_steps),
         "ended": None,
         "evaluation_order": list(units),
-        "units": {"time": "s", **columns},
+        "units": units_of(plan),
         "texts": [f"{u}.{name}" for u, name in plan.record if units[u].fmu.variables[name].type == "String"],
         "fmus": {name: _fmu(unit, plan) for name, unit in units.items()},
         "changes": [asdict(change) | {"value": change.plain} for change in plan.changes],
@@ -50,6 +178,13 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
         "notes": list(plan.notes),
         "versions": versions(),
     }
+
+
+def units_of(plan: Plan) -> dict[str, str | None]:
+    """Return the measurement units of time and of all that is recorded."""
+    units = {unit.name: unit for unit in plan.units}
+    columns = {f"{u}.{name}": units[u].fmu.variables[name].unit for u, name in plan.record}
+    return {"time": "s", **columns}
 
 
 def connections_of(plan: Plan) -> list[dict[str, Any]]:

@@ -10,7 +10,10 @@ from typing import Any
 
 from ..errors import ResultsError
 from .folder import DIED, PART, RUN_FILE, RUNNING, is_dead, unfinished
-from .record_file import load_record
+from .record_file import load_record, warn_if_unchecked
+
+UNREADABLE = "unreadable"
+"""Status of a run whose record cannot be read, or is not as it was written."""
 
 
 @dataclass(frozen=True)
@@ -18,7 +21,7 @@ class FoundRun:
     """A run by its folder and its record."""
 
     folder: Path
-    status: str  # "completed", "failed", "interrupted", "running", "died", or "unreadable"
+    status: str  # "completed", "failed", "interrupted", "running", "died", or UNREADABLE
     record: dict[str, Any]
     problem: str = ""  # why it has no results, or none to the end
 
@@ -54,8 +57,9 @@ def _runs_in(folder: Path) -> Iterator[FoundRun]:
         return
     try:
         record = load_record(folder, settled=going is not None)
+        warn_if_unchecked(record, folder)
     except ResultsError as error:
-        yield FoundRun(folder, "unreadable", {}, str(error))
+        yield FoundRun(folder, UNREADABLE, {}, str(error))
         return
     problem = str((record.get("error") or {}).get("message") or "")
     yield FoundRun(folder, str(record.get("status") or ""), record, problem)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from .digest import checksum
 from .folder import DIED, PART, RUN_FILE, is_dead, put_in_place, tidy, unfinished
 from .formats import FILES, RESULTS_FILE
 from .lock import Lock
+from .recorder import record_text
 
 WHY = "the process of this run ended without a word"
 
@@ -39,8 +39,7 @@ def salvage(folder: Path) -> tuple[Path, int]:
         if rows:
             record = unfinished(folder) or {}
             ended = {"status": DIED, "rows": rows, "checksum": checksum(path), "error": {"message": WHY}}
-            text = json.dumps({**record, **ended}, indent=1, ensure_ascii=False)
-            write_whole(folder / f"{RUN_FILE}{PART}", text + "\n")
+            write_whole(folder / f"{RUN_FILE}{PART}", record_text({**record, **ended}))
             return put_in_place(folder), rows
         tidy(folder)
         return folder, 0

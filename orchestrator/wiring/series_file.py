@@ -19,7 +19,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..files import read_bytes
+from .. import checksums
+from ..files import read_bytes, reason
 from ..wording import hint
 
 LARGEST = 1_000_000_000
@@ -179,10 +180,25 @@ def _mdf(raw: bytes) -> _Table:
 
 
 def _units_beside(path: Path) -> Mapping[str, str]:
-    """Return the units of recorded results."""
-    try:
-        record = json.loads(read_bytes(path.parent / BESIDE, largest=LARGEST))
-        units = record["units"] if record.get("results", "results.csv") == path.name else {}
-        return {str(name): str(unit) for name, unit in units.items() if unit}
-    except (OSError, ValueError, KeyError, AttributeError, RecursionError):
+    """Return the units of recorded results.
+
+    Raises:
+        ValueError: the record beside them is not what their run has written.
+    """
+    if path.stem != "results":
         return {}
+    beside = path.parent / BESIDE
+    try:
+        record = json.loads(read_bytes(beside, largest=LARGEST))
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError, RecursionError) as error:
+        raise ValueError(f"the {BESIDE} beside it cannot be read: {reason(error)}") from None
+    if not isinstance(record, dict) or record.get("results", "results.csv") != path.name:
+        return {}
+    if words := checksums.changed_since(record):
+        raise ValueError(f"the {BESIDE} beside it is not what the run has written: {words}")
+    units = record.get("units")
+    if isinstance(units, dict) and not checksums.has_checksums(record):
+        checksums.warn(f"{beside}: has no checksums; its units are taken as they are")
+    return {str(name): str(unit) for name, unit in units.items() if unit} if isinstance(units, dict) else {}

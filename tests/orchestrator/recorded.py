@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from orchestrator.results.read import Results
+from orchestrator.results.recorder import record_text
 
 UNITS = {
     "driver.steer_angle": "rad",
@@ -85,5 +85,5 @@ def write(recorded: Results, folder: Path, **changes: Any) -> Path:
     table = np.column_stack([recorded.time, *recorded.columns.values()])
     header = ",".join(["time", *recorded.columns])
     np.savetxt(folder / "results.csv", table, fmt="%.17g", delimiter=",", header=header, comments="")
-    (folder / "run.json").write_text(json.dumps({**recorded.run, **changes}))
+    (folder / "run.json").write_text(record_text({**recorded.run, **changes}))
     return folder

@@ -18,7 +18,7 @@ from orchestrator.results import parquet
 from orchestrator.results.columnar import MemoryRecorder
 from orchestrator.results.formats import FILES, recorder_of
 from orchestrator.results.read import load_results
-from orchestrator.results.recorder import BLOCK
+from orchestrator.results.recorder import BLOCK, record_text
 from tests.fmu_copies import put_fmus
 
 from .fakes import Clock, Function, Stage, make_plan
@@ -212,7 +212,7 @@ def test_damaged_files_are_one_sentence(name, tmp_path):
 def test_a_record_that_names_another_file_is_refused(tmp_path):
     folder = write(car(n=5), tmp_path / "run")
     run = json.loads((folder / "run.json").read_text())
-    (folder / "run.json").write_text(json.dumps({**run, "results": "../secret.csv"}))
+    (folder / "run.json").write_text(record_text({**run, "results": "../secret.csv"}))
     with pytest.raises(ResultsError, match=r"names '\.\./secret\.csv' as the file of results"):
         load_results(folder)
 

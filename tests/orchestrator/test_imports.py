@@ -25,6 +25,7 @@ STAGES = (
         "plan",
         "sources",
         "cache",
+        "checksums",
         "files",
         "titles",
         "writing",

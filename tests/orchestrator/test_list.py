@@ -7,7 +7,7 @@ from orchestrator.experiments.listing import runs_table
 from orchestrator.metrics.run_metrics import columns_for, evaluate_all
 from orchestrator.pages.divergence import differences
 from orchestrator.results.read import load_results
-from orchestrator.results.runs import found_runs
+from orchestrator.results.runs import UNREADABLE, found_runs
 from tests.fmu_copies import put_fmus
 
 from .recorded import car, write
@@ -134,3 +134,22 @@ def test_without_a_word_the_list_shows_scenarios_by_name_then_vehicles(yawbench,
     assert rows[2][:2] == ["mine/turn", "scenario"]
     assert ["fnn_sideslip/25mps", "scenario"] in [row[:2] for row in rows]
     assert kinds.index("vehicle") > kinds.index("sweep") > 0
+
+
+def test_a_run_whose_record_was_changed_is_listed_and_left_out_of_an_evaluation_by_name(yawbench, tmp_path):
+    for name in ("one", "other"):
+        write(car(), tmp_path / name)
+    file = tmp_path / "one" / "run.json"
+    file.write_text(file.read_text().replace('"plant.yaw_rate": "rad/s"', '"plant.yaw_rate": "deg/s"'))
+    sentence = f"{file}: is not what its run has written: 'units' was changed; run it again, or remove "
+    (one,) = (run for run in found_runs(tmp_path) if run.status == UNREADABLE)
+    assert one.problem.startswith(sentence)
+    status, out, said = yawbench("evaluate", "step-steer", tmp_path / "one", "--no-figures")
+    assert (status, out) == (2, "")
+    assert said.startswith(sentence)
+    _, _, said = yawbench("evaluate", "step-steer", tmp_path, "--no-figures")
+    assert f"note: left out: {sentence}" in said
+    for command in (("plot", tmp_path / "one"), ("diff", tmp_path / "one", tmp_path / "other")):
+        status, out, said = yawbench(*command)
+        assert (status, out) == (2, "")
+        assert said.startswith(sentence)

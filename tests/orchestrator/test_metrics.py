@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -250,12 +251,13 @@ def test_the_output_that_feeds_an_input_is_the_signal_of_that_name():
     columns = {"mine.Mz": 2 * T, "mine.beta": T, "plant.yaw_rate": T}
     run = results(columns, T, {"mine.Mz": "N.m", "mine.beta": "deg", "plant.yaw_rate": "rad/s"})
     assert evaluate(run, metric("peak(yaw_moment)")) is None
-    run.run["connections"] = [
+    wires = [
         {"from": "mine.Mz", "to": "allocator.yaw_moment"},
         {"from": "mine.Mz", "to": "plant.yaw_moment"},
         {"from": "mine.beta", "to": "driver.sideslip", "gain": np.pi / 180, "offset": 0.0, "unit": "rad"},
         {"from": "plant.yaw_rate", "to": "driver.turn", "gain": -1.0, "offset": 0.0, "unit": "rad/s"},
     ]
+    run = replace(run, run={**run.run, "connections": wires})
     assert evaluate(run, metric("peak(yaw_moment)")) == Value(2 * T[-1], "N.m")
     assert evaluate(run, metric("peak(sideslip)")) == Value(pytest.approx(np.radians(T[-1])), "rad")
     assert evaluate(run, metric("peak(turn)")) is None  # another sign is another signal

@@ -7,12 +7,14 @@ import sys
 
 import numpy as np
 import pytest
+from pydantic import BaseModel
 
 from orchestrator.errors import ResultsError, SimulationError
 from orchestrator.master.simulate import simulate
 from orchestrator.results import recorder as module
 from orchestrator.results.read import load_results
-from orchestrator.results.recorder import BLOCK, Recorder
+from orchestrator.results.recorder import BLOCK, Recorder, record_text
+from orchestrator.results.run_record import RunRecord
 from orchestrator.writing import write_whole
 
 from .fakes import Clock, Function, Stage, make_plan
@@ -217,3 +219,22 @@ def test_a_failure_that_cannot_be_recorded_says_both(tmp_path, monkeypatch):
         f"{tmp_path / 'out'}: results cannot be written: the disk is full.",
     ]
     assert list(tmp_path.iterdir()) == []
+
+
+def test_every_key_that_a_run_writes_is_a_field_of_its_record(tmp_path):
+    units = {"a": Clock(x=math.sin)}
+    simulate(make_plan(units), tmp_path, opener=Stage(units))
+    written = json.loads((tmp_path / "run.json").read_text())
+
+    def foreign(part):
+        """Return the keys that a part of the record has beside its fields."""
+        parts = [part, *[x for x in vars(part).values() if isinstance(x, BaseModel)]]
+        parts += [x for one in vars(part).values() if isinstance(one, list) for x in one]
+        parts += [x for one in vars(part).values() if isinstance(one, dict) for x in one.values()]
+        return {key for one in parts if isinstance(one, BaseModel) for key in one.model_extra or {}}
+
+    record = RunRecord.model_validate(written)
+    assert foreign(record) == set()
+    assert written.keys() <= RunRecord.model_fields.keys()
+    assert record.fmus["a"].name
+    assert json.loads(record_text(written)) == written  # its checksums are those of what stands there

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cli import main
-from orchestrator.errors import ResultsError, YawbenchError
+from orchestrator.errors import RecordWarning, ResultsError, YawbenchError
 from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.master.simulate import simulate
 from orchestrator.plan import Plan, Series
@@ -21,11 +21,13 @@ from orchestrator.results.freshness import staleness
 from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
+from orchestrator.wiring.series_file import SeriesFile
 from vocabulary.wheels import WHEELS
 
 from .fake_fmus import Var, make_fmu, out
 from .fakes import Behaviour, Stage
 from .fakes import make_plan as fake_plan
+from .recorded import car, write
 
 pytestmark = pytest.mark.usefixtures("cache")
 
@@ -367,3 +369,20 @@ def test_a_long_series_takes_little_more_memory_than_its_file(folder: Path) -> N
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 6 * Path("runs/data.csv").stat().st_size
+
+
+def test_a_changed_record_beside_recorded_results_is_no_source_of_units(tmp_path: Path) -> None:
+    file = write(car(n=5), tmp_path / "run") / "results.csv"
+    beside = file.with_name("run.json")
+    assert SeriesFile(file).column("driver.steer_angle", "time").unit == "rad"
+    text = beside.read_text()
+    beside.write_text(text.replace('"driver.steer_angle": "rad"', '"driver.steer_angle": "deg"'))
+    with pytest.raises(ValueError, match=r"run\.json beside it is not what the run has written: 'units' was"):
+        SeriesFile(file)
+    beside.write_text("{")
+    with pytest.raises(ValueError, match=r"the run\.json beside it cannot be read: "):
+        SeriesFile(file)
+    bare = {key: value for key, value in json.loads(text).items() if key != "checksums"}
+    beside.write_text(json.dumps(bare))
+    with pytest.warns(RecordWarning, match="has no checksums; its units are taken as they are"):
+        SeriesFile(file)

@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import warnings
 
 import pyarrow.parquet as pq
 import pytest
@@ -15,7 +16,7 @@ from lxml import html
 
 from fmus.build import build_component
 from orchestrator.cli import main
-from orchestrator.errors import ResultsError
+from orchestrator.errors import RecordWarning, ResultsError
 from orchestrator.experiments.jobs import Record
 from orchestrator.experiments.journal import Journal
 from orchestrator.results.read import load_results
@@ -344,12 +345,85 @@ def test_a_line_that_a_kill_has_cut_off_is_dropped(tmp_path):
     last.close()
 
 
-def test_a_damaged_journal_is_one_sentence(tmp_path):
-    Journal(tmp_path, "a/b.yaml").close()
-    with (tmp_path / "runs.jsonl").open("ab") as stream:
-        stream.write(b"nonsense\n")
-    with pytest.raises(ResultsError, match=r"runs\.jsonl: line 2 is damaged; --fresh begins anew\.$"):
+def test_a_file_that_is_no_journal_is_one_sentence(tmp_path):
+    (tmp_path / "runs.jsonl").write_text("nonsense\n")
+    with pytest.raises(ResultsError, match=r"runs\.jsonl: line 1 is damaged: is no JSON; --fresh begins"):
         Journal(tmp_path, "a/b.yaml")
+    assert (tmp_path / "runs.jsonl").read_text() == "nonsense\n"
+
+
+def test_a_journal_without_checksums_is_of_an_earlier_version(tmp_path):
+    (tmp_path / "runs.jsonl").write_text('{"sweep": "a/b.yaml", "format": 1}\n')
+    with pytest.raises(ResultsError, match="holds the runs of an earlier version of this program; give"):
+        Journal(tmp_path, "a/b.yaml")
+
+
+RECORDS = {
+    "one": Record({"slip": (0.0302, "rad"), "moment": (12.0, "N.m")}),
+    "two": Record({"slip": None, "moment": (13.0, "N.m")}, findings=("spin",)),
+}
+
+
+def journal_of(folder):
+    made = Journal(folder, "a/b.yaml")
+    for key, record in RECORDS.items():
+        made.add(key, record)
+    made.close()
+    return folder / "runs.jsonl"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('"rad"', '"deg"', "'values' was changed"),
+        ("0.0302", "3.7", "'values' was changed"),
+        ("0.0302", '"7.5"', "'values' was changed"),
+        ("0.0302", "true", "'values' was changed"),
+        ("0.0302", "NaN", "'values' was changed"),
+        ("0.0302", "1e308", "'values' was changed"),
+        ("0.0302", "[" * 5000 + "]" * 5000, "is no JSON"),
+        ('"slip"', '"moment"', "'values' was changed"),
+        ('"key": "one"', '"key": "two"', "'key' was changed"),
+        ('"problems": []', '"problems": ["no"]', "'problems' was changed"),
+        ('"problems": [], ', "", "'problems' was removed"),
+        ('"problems": []', '"problems": [], "ended": "no"', "'ended' was added"),
+        ('"checksums"', '"checksum"', "it has no checksums"),
+        ('"checksums": {"*"', '"checksums": {"+"', "'checksums' was changed"),
+        ('"key": "one"', '"key: "one"', "is no JSON"),
+    ],
+)
+def test_an_altered_line_of_a_journal_is_named_and_its_run_made_again(old, new, words, tmp_path):
+    file = journal_of(tmp_path)
+    head, first, *others = file.read_text().splitlines(keepends=True)
+    altered = first.replace(old, new, 1)
+    assert altered != first
+    file.write_text("".join([head, altered, *others]))
+    with pytest.warns(RecordWarning) as told:
+        again = Journal(tmp_path, "a/b.yaml")
+    again.close()
+    assert [str(one.message) for one in told] == [f"{file}: line 2: {words}; its run is to be made again"]
+    assert again.records == {"two": RECORDS["two"]}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        Journal(tmp_path, "a/b.yaml").close()  # the line is gone
+
+
+def test_a_changed_head_of_a_journal_is_said_and_its_runs_are_kept(tmp_path):
+    file = journal_of(tmp_path)
+    file.write_text(file.read_text().replace("a/b.yaml", "a/c.yaml", 1))
+    with pytest.warns(RecordWarning, match=r"line 1: 'sweep' was changed; the runs below it are kept$"):
+        again = Journal(tmp_path, "a/b.yaml")
+    again.close()
+    assert again.records == RECORDS
+
+
+def test_a_path_that_is_no_utf_8_comes_back_from_the_journal(tmp_path):
+    made = Journal(tmp_path, "a/b.yaml")
+    made.add("one", Record({}, ("/home/\udcff: no such file",)))
+    made.close()
+    again = Journal(tmp_path, "a/b.yaml")
+    again.close()
+    assert again.records == made.records
 
 
 def test_a_sweep_file_that_is_wrong_makes_no_run(moods, yawbench, tmp_path):

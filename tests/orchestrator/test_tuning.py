@@ -10,6 +10,9 @@ from lxml import html
 from ruamel.yaml import YAML
 
 from orchestrator.cli import main
+from orchestrator.experiments.ranking_schema import EntriesSpec
+from orchestrator.scenario import yaml_lines
+from orchestrator.scenario.strict import validate
 
 SCENARIO = """
 title: A steering wheel
@@ -78,6 +81,8 @@ def test_the_least_of_all_trials_is_found_written_down_and_not_sought_twice(yawb
     best = min(trials, key=lambda row: float(row["objective"]))
     assert float(best["driver.amplitude"]) == pytest.approx(1.719, abs=0.5)
     assert f"driver.amplitude: {float(best['driver.amplitude']):g} deg" in out
+    written = yaml_lines.read(tmp_path / "out/entries.yaml", what="file of entries")
+    assert validate(EntriesSpec, written).edited == ""
     (entry,) = YAML(typ="safe").load((tmp_path / "out/entries.yaml").read_text())["entries"].items()
     made = {"amplitude": f"{float(best['driver.amplitude'])!r} deg"}
     wanted = {"title": "big wheel, tuned", "fmu": "driver_sine", "gains": "tuned", "parameters": made}

@@ -22,6 +22,7 @@ from orchestrator.pages.provenance import (
 from orchestrator.results.digest import checksum
 from orchestrator.results.freshness import staleness
 from orchestrator.results.key import key_of
+from orchestrator.results.recorder import record_text
 from orchestrator.results.run_record import run_record
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
@@ -181,7 +182,7 @@ def recorded(plan, folder: Path, **changes) -> Path:
     (folder / "results.csv").write_text("time,x\n0.0,1.0\n0.1,2.0\n")
     record = run_record(plan, status="completed", started=datetime.now(timezone.utc))
     record |= {"key": key_of(plan), "rows": 2, "checksum": checksum(folder / "results.csv")} | changes
-    (folder / "run.json").write_text(json.dumps(record))
+    (folder / "run.json").write_text(record_text(record))
     return folder
 
 
@@ -227,7 +228,18 @@ def test_missing_failed_and_damaged_results_are_stale(folder, tmp_path):
     (recorded(plan, tmp_path / "d") / "run.json.part").write_text('{"status": "running"}')
     assert staleness(plan, tmp_path / "d") == "the last run has died"
     (tmp_path / "b" / "run.json").write_text("{")
-    assert staleness(plan, tmp_path / "b") == "the record cannot be read"
+    assert "run.json: cannot be read: " in staleness(plan, tmp_path / "b")
+
+
+@pytest.mark.parametrize("key", ["units", "rows", "key", "checksum", "title", "id"])
+def test_a_changed_record_is_stale_and_names_the_key(key, folder, tmp_path):
+    _, plan = planned(folder)
+    file = recorded(plan, tmp_path, id="1") / "run.json"
+    record = json.loads(file.read_text())
+    file.write_text(json.dumps(record | {key: {"x": "deg"} if key == "units" else "other"}))
+    assert f"is not what its run has written: {key!r} was changed; run it again" in staleness(plan, tmp_path)
+    file.write_text(json.dumps({name: value for name, value in record.items() if name != "checksums"}))
+    assert staleness(plan, tmp_path) == "the record has no checksums"
 
 
 def test_a_value_given_by_a_fact_has_the_source_that_stands_beside_the_fact(folder):

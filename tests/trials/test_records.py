@@ -1,0 +1,28 @@
+"""Records and journals with altered lines, a sample; `python -m tests.trials.records` alters more."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fmus.build import build_all
+from tests.orchestrator.test_batch_commands import UNITS
+
+from .records import KINDS, trial
+
+
+def _none_wrong(counts: dict[str, int], seed: int, place: Path) -> None:
+    build_all(place / "fmus", components=UNITS)
+    for kind, tally, notes in trial(counts, seed, place, place / "fmus"):
+        assert notes == []
+        assert sum(tally.values()) == counts[kind]
+
+
+def test_a_few_altered_records_and_lines_change_no_number_without_a_word(tmp_path: Path) -> None:
+    _none_wrong({"record_listed": 20, "journal": 3, "entries": 10}, 2, tmp_path)
+
+
+@pytest.mark.exhaustive
+def test_altered_records_and_lines_change_no_number_without_a_word(tmp_path: Path) -> None:
+    _none_wrong({kind: 5 if kind.endswith(("_study", "_sweep")) else 125 for kind in KINDS}, 3, tmp_path)
