@@ -50,7 +50,9 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
         reason = _one_line(error) or type(error).__name__
         unforeseen = isinstance(error, LookupError | TypeError | AttributeError | NameError)
         if flaws:
-            reason = f"it is not valid FMI {fmi}.0: {flaws[0].rstrip('.')}" + f" ({reason})" * (not unforeseen)
+            reason = f"it is not valid FMI {fmi}.0: {flaws[0].rstrip('.')}" + f" ({reason})" * (
+                not unforeseen
+            )
         elif unforeseen:
             reason = f"something in it is not understood ({type(error).__name__}: {reason})"
         raise ModelDescriptionError(f"{path}: the model description cannot be used: {reason}") from None

@@ -303,11 +303,13 @@ def test_folders_in_each_other_are_unpacked_up_to_a_depth(nested: int, tmp_path:
         ),
         (
             model_description("a", outputs=["x"]).replace('index="1"', 'index="7"'),
-            "the model description cannot be used: index of Unknown names variable number '7', but there are 1",
+            "the model description cannot be used: index of Unknown names variable number '7', "
+            "but there are 1",
         ),
         (
             model_description("a", outputs=["x"]).replace('index="1"', 'index="0"'),
-            "the model description cannot be used: index of Unknown names variable number '0', but there are 1",
+            "the model description cannot be used: index of Unknown names variable number '0', "
+            "but there are 1",
         ),
         (
             model_description("a", ["u"], [out("x", "u")]).replace('dependencies="1"', 'dependencies="1 9"'),
@@ -316,8 +318,8 @@ def test_folders_in_each_other_are_unpacked_up_to_a_depth(nested: int, tmp_path:
         ),
         (
             model_description("a", outputs=["x"]).replace(' valueReference="1"', ""),
-            "the model description cannot be used: it is not valid FMI 2.0: ERROR (line 6, column 0): Element "
-            "'ScalarVariable': The attribute 'valueReference' is required but missing",
+            "the model description cannot be used: it is not valid FMI 2.0: ERROR (line 6, column 0): "
+            "Element 'ScalarVariable': The attribute 'valueReference' is required but missing",
         ),
         (
             model_description("a").replace("UTF-8", "UTF-7"),
