@@ -79,6 +79,8 @@ def conduct(experiment: Experiment, folder: Path, wishes: Wishes, each: Each, **
         write_findings(findings, drawn, folder)
     for problem in problems:
         say(problem)
+    if findings.not_made:
+        say(f"{findings.not_made} of {counted(len(findings.records), 'run')} not made yet")
     if experiment.spec.axes:  # others have been named as they failed
         say_failed(findings.failed)
         if found := findings.remarkable():
@@ -196,7 +198,7 @@ def of_files(context: typer.Context, files: Sequence[Path], wishes: Wishes) -> N
             **wishes.changing,
         )
         chapters.append(chapter_of(findings, folder, command, each, shown_in=page))
-        failed = failed or bool(findings.failed)
+        failed = failed or bool(findings.failed) or bool(findings.not_made)
         if len(files) == 1:
             print_tables(all_tables(findings))
         counts = counts_of(findings.claims)

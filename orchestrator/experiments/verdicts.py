@@ -13,6 +13,7 @@ from .design import levels_of
 from .expansion import NamedRun
 from .findings import Findings
 from .grids import cells, grid_tables, side_by_side
+from .jobs import NOT_MADE
 from .judged_schema import Claim, GridSpec, MetricSpec, Reference
 from .judging import Judgement
 from .limits import limit_table
@@ -165,8 +166,10 @@ def _run_table(findings: Findings, spec: TableSpec) -> Table:
         table.headings[2:2] = ["the paper says", "verdict", *carries]
     for run, setting in itertools.product(runs, study.settings):
         row = ", ".join(filter(None, [run.row, *(level.words for level in setting)]))
-        if why := findings.failure(run, setting):
-            cells: list[Cell] = ["failed", *[None] * (len(table.headings) - 2)]
+        if not findings.made(run, setting):
+            cells: list[Cell] = [NOT_MADE.status, *[None] * (len(table.headings) - 2)]
+        elif why := findings.failure(run, setting):
+            cells = ["failed", *[None] * (len(table.headings) - 2)]
             table.notes.append(f"{row}: {why}")
         else:
             cells = [findings.at[setting].get((run.name, key)) for key in spec.metrics]

@@ -65,7 +65,7 @@ def chapter(
     name = anchor(f"{experiment.path.absolute().parent.name} {experiment.path.stem}")
     plans = plans_of(findings)
     groups = groups_of([plan for _, plan in plans])
-    results = findings.results.values()
+    made = runs_made(findings)
     failed = findings.failed
     return {
         "id": name,
@@ -93,10 +93,20 @@ def chapter(
         "command": command,
         "folder": str(folder),
         "settings": settings(findings),
-        "grid": grid_of_times([plan for _, (_, plan) in plans] if spec.axes else results),
-        "fmus": fmus_of(results),
-        "programs": programs_of(results),
+        "grid": grid_of_times(made),
+        "runs": len(findings.records),
+        "not_made": findings.not_made,
+        "fmus": fmus_of(made),
+        "programs": programs_of(made),
     }
+
+
+def runs_made(findings: Findings) -> list[Results | Plan]:
+    """Return the results of all runs, along axes the plans of those that have been made."""
+    if not findings.spec.axes or findings.planned is None:
+        return [*findings.results.values()]
+    jobs = zip(findings.planned.jobs, findings.records, strict=True)
+    return [job.plan for job, record in jobs if job.plan and record.made]
 
 
 def repeats(findings: Findings) -> str:
@@ -214,18 +224,24 @@ def definitions(findings: Findings) -> list[dict[str, str]]:
 
 
 def settings(findings: Findings) -> Table:
-    """Return how every run differs from its scenario."""
-    headings = ["run", "scenario", "changed", "faults"]
+    """Return how every run differs from its scenario; along axes how many runs of it ended how."""
+    statuses = list(dict.fromkeys(record.status for record in findings.records)) if findings.spec.axes else []
+    headings = ["run", "scenario", "changed", "faults", *statuses]
     rows: list[list[Cell]] = []
     for run in findings.experiment.runs.values():
         results = findings.results.get(run.name)
         faults = "; ".join(map(fault_in, results.run.get("faults", []))) if results else ""
-        rows.append([run.name, run.scenario.name, changed(run.changes) or None, faults or None])
+        ended = Counter(findings.record(one).status for one in findings.experiment.cases if one.run == run)
+        rows.append([
+            run.name or None, run.scenario.name, changed(run.changes) or None, faults or None,
+            *(str(ended[status]) for status in statuses),
+        ])  # fmt: skip
     kept = [k for k in range(len(headings)) if any(row[k] is not None for row in rows)]
-    return Table("", [headings[k] for k in kept], [[row[k] for k in kept] for row in rows])
+    numbers = {place for place, k in enumerate(kept) if headings[k] in statuses}
+    return Table("", [headings[k] for k in kept], [[row[k] for k in kept] for row in rows], [], numbers)
 
 
-def grid_of_times(runs: Iterable[Plan | Results]) -> list[str]:
+def grid_of_times(runs: Iterable[Results | Plan]) -> list[str]:
     """Return algorithm, step and end of the runs, each combination once, as plans or records say."""
     found: Counter[str] = Counter()
     for one in runs:

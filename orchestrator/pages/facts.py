@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
 
@@ -12,6 +12,7 @@ from markupsafe import Markup
 from ..errors import ResultsError
 from ..experiments.tables import Table
 from ..figures.display import Run
+from ..plan import Plan
 from ..results.read import Results
 from ..results.run_record import versions
 from .animation import fragment
@@ -49,23 +50,35 @@ def animation_of(runs: Sequence[Run], title: str) -> Markup | None:
         return None
 
 
-def fmus_of(recorded: Iterable[Results]) -> Table:
-    """Return every FMU that took part in the runs, as their records say."""
+def fmus_of(runs: Iterable[Results | Plan]) -> Table:
+    """Return every FMU that took part in the runs, as their records or plans say."""
     found: dict[tuple[str, str], dict[str, None]] = {}
-    for results in recorded:
-        for unit, fmu in results.run.get("fmus", {}).items():
-            known = str(fmu.get("name", unit)), str(fmu.get("sha256", ""))
-            found.setdefault(known, {})[unit] = None
+    for one in runs:
+        for unit, name, sha256 in _fmus_in(one):
+            found.setdefault((name, sha256), {})[unit] = None
     ordered = sorted(found.items(), key=lambda one: (min(one[1]), one[0][0]))
     rows = [(name, ", ".join(units), sha256) for (name, sha256), units in ordered]
     return Table("", ["FMU", "as", "SHA-256"], [*rows])
 
 
-def programs_of(recorded: Iterable[Results]) -> dict[str, str]:
-    """Return the versions of the programs that made the runs, as their records say."""
+def _fmus_in(one: Results | Plan) -> Iterator[tuple[str, str, str]]:
+    """Yield unit, FMU and its hash."""
+    if isinstance(one, Plan):
+        yield from ((unit.name, unit.fmu.name, unit.fmu.sha256) for unit in one.units)
+    else:
+        for unit, fmu in one.run.get("fmus", {}).items():
+            yield unit, str(fmu.get("name", unit)), str(fmu.get("sha256", ""))
+
+
+def programs_of(runs: Iterable[Results | Plan]) -> dict[str, str]:
+    """Return the versions of the programs that made the runs, as their records say.
+
+    Of a run without a record, known by its key in the journal, they are those of today: the key tells them.
+    """
     found: dict[str, dict[str, None]] = {}
-    for results in recorded:
-        for name, version in results.run.get("versions", {}).items():
+    for one in runs:
+        known = versions() if isinstance(one, Plan) else one.run.get("versions", {})
+        for name, version in known.items():
             found.setdefault(name, {})[str(version)] = None
     return {name: " and ".join(several) for name, several in found.items()}
 

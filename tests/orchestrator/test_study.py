@@ -117,6 +117,28 @@ def out(tmp_path) -> Path:
     return tmp_path / "out"
 
 
+def test_a_grid_is_drawn_from_results_alone(study, out):
+    """Where scenarios or FMUs are not at hand, so that nothing can be planned."""
+    grid = """
+grids:
+  errors:
+    title: Errors
+    metric: error
+    run: "{speed}mps/{controller}"
+    rows: {speed: [15, 25]}
+    columns: {controller: {"off": free, fnn: held}}
+checks:"""
+    figure = """
+figures:
+  - {name: lines, kind: grid, grid: errors}"""
+    made = study(("\nchecks:", grid), ("\nfigures:", figure))
+    findings = judge_results(made, out)
+    assert draw_all(findings, out)[0]["lines"] == "A made-up paper: lines"
+    drawn = (out / "figures" / "lines.svg").read_text()
+    assert "5 runs of 15mps.yaml" in drawn
+    assert "FMUs: controller_made_up 01234567, plant_made_up 01234567" in drawn
+
+
 def test_for_stands_for_one_run_per_combination(study, tmp_path):
     runs = study().runs
     assert list(runs) == ["15mps/off", "15mps/fnn", "25mps/off", "25mps/fnn", "slow"]
@@ -522,7 +544,7 @@ def test_a_study_without_any_result_still_says_so(study, tmp_path):
     findings = judge_results(study(), tmp_path / "empty")
     _, said = draw_all(findings, tmp_path / "empty")
     assert said == [f"figure {name}: none of its runs has results" for name in ("both", "roll")]
-    assert "no results here" in page(findings, tmp_path / "empty")
+    assert "5 of 5 runs have not been made yet" in page(findings, tmp_path / "empty")
 
 
 def test_an_angle_below_what_can_be_told_is_shown_as_such():
