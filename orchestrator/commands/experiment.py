@@ -167,7 +167,7 @@ def of_files(context: typer.Context, files: Sequence[Path], wishes: Wishes) -> N
 
     from ..errors import ScenarioError
     from ..experiments.experiment import load_experiment
-    from ..experiments.verdicts import all_tables, counts_of
+    from ..experiments.verdicts import all_tables, counts_of, reach, tally_words
     from ..results.naming import default_folder
     from .batch import print_tables
 
@@ -201,9 +201,9 @@ def of_files(context: typer.Context, files: Sequence[Path], wishes: Wishes) -> N
         failed = failed or bool(findings.failed) or bool(findings.not_made)
         if len(files) == 1:
             print_tables(all_tables(findings))
-        counts = counts_of(findings.claims)
-        if verdicts := ", ".join(f"{word}: {count}" for word, count in counts.items()):
-            say(f"{experiment.spec.title}: {verdicts}")
+        if verdicts := tally_words(counts_of(findings.claims)):
+            where = reach(findings)
+            say(f"{experiment.spec.title}: {verdicts}" + f" ({where})" * bool(where))
     write_page(chapters, page)
     if failed:
         raise typer.Exit(1)

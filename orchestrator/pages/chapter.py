@@ -23,20 +23,22 @@ from ..experiments.verdicts import (
     limit_tables,
     line_table,
     margin_words,
+    reach,
     region_table,
     region_words,
     run_tables,
     verdict,
 )
 from ..figures import plots
-from ..metrics.run_metrics import metric
+from ..figures.display import Run
+from ..metrics.run_metrics import evaluate, metric
 from ..plan import Plan
 from ..results.read import Results
 from ..scenario.load import Scenario, load_scenario
 from ..titles import changed, fault_in
 from ..wording import counted
 from .diagram import diagrams
-from .facts import anchor, animation_of, figure_of, fmus_of, programs_of
+from .facts import Animation, anchor, animation_of, figure_of, fmus_of, programs_of
 from .panel_images import Image, image_of
 from .provenance import count_kinds, groups_of
 from .system import systems_of
@@ -73,6 +75,7 @@ def chapter(
         "source": spec.source,
         "changed": changed(experiment.by_options),
         "counts": counts_of(findings.claims),
+        "reach": reach(findings),
         "conclusions": conclusions(findings),
         "claims": [judged(one) for one in findings.claims],
         "checks": [judged(one) for one in findings.checks],
@@ -176,16 +179,30 @@ def systems(plans: Sequence[tuple[Job, tuple[Scenario, Plan]]], title: str) -> l
     return drawn
 
 
-def animation(findings: Findings) -> dict[str, Any] | None:
-    """Return the animation of the first figure with a path: its first run and its last."""
-    for figure in findings.spec.figures:
-        runs = runs_of(findings, figure)
-        if "path" in figure.panels and runs:
-            ends = [runs[0], *runs[-1:]] if len(runs) > 1 else runs
-            seen = animation_of(ends, " and ".join(run.label for run in ends))
-            if seen is not None:
-                return {"title": figure.title or plots.title_of(ends), "drawing": seen}
+LIVELY = tuple(map(metric, ("peak(sideslip)", "peak(yaw_rate)")))
+"""What tells how much happens in a run, the first that all have."""
+
+
+def animation(findings: Findings) -> Animation | None:
+    """Return the animation of the figure with a path in which most happens, all of its runs."""
+    found = [
+        (figure, runs)
+        for figure in findings.spec.figures
+        if "path" in figure.panels and (runs := runs_of(findings, figure))
+    ]
+    for figure, runs in sorted(found, key=lambda one: -_liveliest(one[1])):
+        if seen := animation_of(runs, figure.title or plots.title_of(runs)):
+            return seen
     return None
+
+
+def _liveliest(runs: Sequence[Run]) -> float:
+    """Return the largest sideslip of any run, or the largest yaw rate; 0 if neither is known."""
+    for one in LIVELY:
+        values = [value.number for run in runs if (value := evaluate(run.results, one))]
+        if values:
+            return max(values)
+    return 0.0
 
 
 def figures(findings: Findings, chapter: str, files: str, each: Each = map) -> list[Any]:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
+from itertools import compress
 
 from markupsafe import Markup
 
@@ -15,7 +16,9 @@ from ..figures.display import Run
 from ..plan import Plan
 from ..results.read import Results
 from ..results.run_record import versions
-from .animation import fragment
+from ..wording import listed
+from .animation import MOST, fragment
+from .animation_frames import frames_of
 from .panel_images import LegendEntry, PanelImage, panel_images
 
 
@@ -42,12 +45,26 @@ def figure_of(
     return Figure(name, title, images, legend, files) if images else None
 
 
-def animation_of(runs: Sequence[Run], title: str) -> Markup | None:
-    """Return the animation of one or two runs; None if they recorded no positions."""
-    try:
-        return fragment(runs, title=title)
-    except ResultsError:
+@dataclass(frozen=True)
+class Animation:
+    """Runs seen from above, and which runs of the figure are not among them."""
+
+    title: str
+    drawing: Markup
+    left_out: str
+
+
+def animation_of(runs: Sequence[Run], title: str) -> Animation | None:
+    """Return the animation of as many runs as have colours; None if none recorded its position."""
+    placed = [_is_placed(run) for run in runs]
+    able = list(compress(runs, placed))
+    if not able:
         return None
+    unable = [run.label for run, known in zip(runs, placed, strict=True) if not known]
+    shown, others = able[:MOST], [run.label for run in able[MOST:]]
+    reasons = [f"{listed(unable)}: no position recorded"] if unable else []
+    reasons += [f"{listed(others)}: an animation shows up to {MOST} runs"] if others else []
+    return Animation(title, fragment(shown, title=listed(run.label for run in shown)), "; ".join(reasons))
 
 
 def fmus_of(runs: Iterable[Results | Plan]) -> Table:
@@ -59,6 +76,15 @@ def fmus_of(runs: Iterable[Results | Plan]) -> Table:
     ordered = sorted(found.items(), key=lambda one: (min(one[1]), one[0][0]))
     rows = [(name, ", ".join(units), sha256) for (name, sha256), units in ordered]
     return Table("", ["FMU", "as", "SHA-256"], [*rows])
+
+
+def _is_placed(run: Run) -> bool:
+    """Return whether a run recorded where its car is."""
+    try:
+        frames_of(run.results)
+    except ResultsError:
+        return False
+    return True
 
 
 def _fmus_in(one: Results | Plan) -> Iterator[tuple[str, str, str]]:

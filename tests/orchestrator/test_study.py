@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,7 @@ from orchestrator.experiments.judging import judge
 from orchestrator.experiments.planning import jobs_of
 from orchestrator.experiments.record import write_findings
 from orchestrator.experiments.tables import Table, for_terminal
-from orchestrator.experiments.verdicts import claim_tables, derived_tables, run_tables
+from orchestrator.experiments.verdicts import claim_tables, derived_tables, run_tables, share
 from orchestrator.figures.display import shown
 from orchestrator.metrics.run_metrics import Value
 from orchestrator.pages.chapter import chapter
@@ -139,6 +140,43 @@ figures:
     assert "FMUs: controller_made_up 01234567, plant_made_up 01234567" in drawn
 
 
+@pytest.mark.parametrize(
+    "value, bound, expected",
+    [
+        (3.8612, 3.8614, "3.8612 m (held) against 3.8614 m (free)"),
+        (3.8612, 3.9, "3.86 m (held) against 3.90 m (free)"),
+        (3.8612, 3.8612, "3.86 m (held) against 3.86 m (free)"),
+        (1e-6, 2e-6, "1.00e-06 m (held) against 2.00e-06 m (free)"),
+    ],
+)
+def test_numbers_that_decide_a_verdict_read_differently(value, bound, expected):
+    condition = {"run": "a", "metric": "far", "below": {"run": "b", "metric": "far"}}
+    claim = Claim.model_validate({"says": "Less.", "holds_if": [condition]})
+    found = judge(
+        claim, {("a", "far"): Value(value, "m"), ("b", "far"): Value(bound, "m")}, {"a": "held", "b": "free"}
+    )
+    assert (found.holds, found.measured) == (value < bound, (expected,))
+
+
+def test_a_number_beside_a_threshold_that_it_misses_by_little_is_told_from_it():
+    claim = Claim.model_validate(
+        {"says": "No more.", "holds_if": [{"run": "a", "metric": "x", "at_most": "5 %"}]}
+    )
+    found = judge(claim, {("a", "x"): Value(0.0500004, "%")}, {"a": "held"})
+    assert (found.holds, found.measured) == (False, ("5.00004 % (held)",))
+    angle = Claim.model_validate(
+        {"says": "No more.", "holds_if": [{"run": "a", "metric": "x", "at_most": "0.0002 deg"}]}
+    )
+    (text,) = judge(angle, {("a", "x"): Value(np.radians(3e-4), "rad")}, {"a": "held"}).measured
+    assert not text.startswith("<")
+
+
+def test_a_margin_beyond_the_threshold_itself_is_told_in_words():
+    assert [share(x) for x in (0.016, -0.5, 1.0, -1.0, 1.01, -62.29, math.inf, -math.inf)] == [
+        "1.6 %", "-50 %", "100 %", "-100 %", "by far", "missed by far", "by far", "missed by far",
+    ]  # fmt: skip
+
+
 def test_for_stands_for_one_run_per_combination(study, tmp_path):
     runs = study().runs
     assert list(runs) == ["15mps/off", "15mps/fnn", "25mps/off", "25mps/fnn", "slow"]
@@ -243,7 +281,7 @@ def test_claims_are_judged_by_the_results_on_disk(study, out):
     assert verdicts(findings.checks) == [True, False]
     assert findings.claims[0].measured == ("140 % (15 m/s, no control)",)
     assert findings.claims[2].measured == (
-        "2.00 % (15 m/s, neural network) against 140 % (15 m/s, no control)",
+        "2.00 % (15 m/s, neural network) against 0.5 × 140 % (15 m/s, no control)",
         "4.00 % (25 m/s, neural network) against 200 % (25 m/s, no control)",
     )
     assert findings.checks[1].measured == ("2000 N·m (15 m/s, neural network)",)
