@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,11 +27,14 @@ from orchestrator.experiments.planning import jobs_of
 from orchestrator.experiments.record import write_findings
 from orchestrator.experiments.tables import Table, for_terminal
 from orchestrator.experiments.verdicts import claim_tables, derived_tables, run_tables, share
-from orchestrator.figures.display import shown
+from orchestrator.figures.display import Run, shown
 from orchestrator.metrics.run_metrics import Value
-from orchestrator.pages.chapter import chapter
+from orchestrator.pages.animation import MOST
+from orchestrator.pages.chapter import animation, chapter
+from orchestrator.pages.facts import animation_of
 from orchestrator.pages.report import report_page
 from orchestrator.plan import Change
+from tests.pages.made_up import data_in
 
 from .recorded import car, write
 
@@ -175,6 +179,31 @@ def test_a_margin_beyond_the_threshold_itself_is_told_in_words():
     assert [share(x) for x in (0.016, -0.5, 1.0, -1.0, 1.01, -62.29, math.inf, -math.inf)] == [
         "1.6 %", "-50 %", "100 %", "-100 %", "by far", "missed by far", "by far", "missed by far",
     ]  # fmt: skip
+
+
+def test_the_animation_shows_all_runs_of_the_figure_in_which_most_happens(study, tmp_path):
+    figures = """
+figures:
+  - {name: calm, title: Calm, runs: ["15mps/*"], panels: [path]}
+  - {name: lively, title: Lively, runs: ["25mps/*", slow], panels: [path]}"""
+    made = study(("\nfigures:", figures))
+    gains = {"15mps/off": 1.1, "15mps/fnn": 1.0, "25mps/off": 3.0, "25mps/fnn": 1.0, "slow": 1.0}
+    for name, gain in gains.items():
+        run = car(gain)
+        lost = replace(run, columns={k: x for k, x in run.columns.items() if "position" not in k})
+        write(lost if name == "slow" else run, tmp_path / "out" / name)
+    seen = animation(judge_results(made, tmp_path / "out"))
+    assert seen is not None
+    assert seen.title == "Lively"
+    assert [one["label"] for one in data_in(seen.drawing)["runs"]] == ["no control", "neural network"]
+    assert seen.left_out == "slow: no position recorded"
+
+
+def test_runs_beyond_those_that_an_animation_can_show_are_named():
+    seen = animation_of([Run(str(k), car(1.0 + k)) for k in range(MOST + 2)], "Many")
+    assert seen is not None
+    assert len(data_in(seen.drawing)["runs"]) == MOST
+    assert seen.left_out == f"{MOST} and {MOST + 1}: an animation shows up to {MOST} runs"
 
 
 def test_for_stands_for_one_run_per_combination(study, tmp_path):
