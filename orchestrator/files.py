@@ -11,6 +11,7 @@ import contextlib
 import errno
 import functools
 import os
+import re
 import stat
 import zipfile
 from collections.abc import Callable, Iterator
@@ -30,6 +31,9 @@ UNPACKED = 1_000_000_000
 """Bytes of all members of an archive. Chosen: likewise."""
 MEMBERS = 50_000
 """Members of an archive. Chosen: ten times what a whole Python with numpy has."""
+DEPTH = 100
+"""Folders in each other in an archive. Chosen: ten times what a whole Python has; the standard library
+makes and deletes folders by recursion."""
 
 
 class TooLargeError(ValueError):
@@ -82,7 +86,7 @@ def read_bytes(path: Path, *, largest: int) -> bytes:
 
 
 def check_archive(archive: zipfile.ZipFile) -> None:
-    """Make sure that an archive has room when unpacked, by what its directory says: no more is ever read.
+    """Make sure that an archive can be unpacked, by what its directory says: no more is ever read.
 
     Raises:
         TooLargeError: a sentence.
@@ -93,6 +97,9 @@ def check_archive(archive: zipfile.ZipFile) -> None:
     size = sum(member.file_size for member in members)
     if size > UNPACKED:
         raise TooLargeError(f"unpacked it has {_in_words(size)}, more than {_in_words(UNPACKED)}")
+    depth = max((re.sub(r"[/\\\\]+", "/", member.filename).count("/") for member in members), default=0)
+    if depth > DEPTH:
+        raise TooLargeError(f"it holds {depth} folders in each other, more than {DEPTH}")
 
 
 def _in_words(size: int) -> str:

@@ -79,6 +79,8 @@ def conduct(experiment: Experiment, folder: Path, wishes: Wishes, each: Each, **
         write_findings(findings, drawn, folder)
     for problem in problems:
         say(problem)
+    if findings.not_made:
+        say(f"{findings.not_made} of {counted(len(findings.records), 'run')} not made yet")
     if experiment.spec.axes:  # others have been named as they failed
         say_failed(findings.failed)
         if found := findings.remarkable():
@@ -165,7 +167,7 @@ def of_files(context: typer.Context, files: Sequence[Path], wishes: Wishes) -> N
 
     from ..errors import ScenarioError
     from ..experiments.experiment import load_experiment
-    from ..experiments.verdicts import all_tables, counts_of
+    from ..experiments.verdicts import all_tables, counts_of, reach, tally_words
     from ..results.naming import default_folder
     from .batch import print_tables
 
@@ -196,12 +198,12 @@ def of_files(context: typer.Context, files: Sequence[Path], wishes: Wishes) -> N
             **wishes.changing,
         )
         chapters.append(chapter_of(findings, folder, command, each, shown_in=page))
-        failed = failed or bool(findings.failed)
+        failed = failed or bool(findings.failed) or bool(findings.not_made)
         if len(files) == 1:
             print_tables(all_tables(findings))
-        counts = counts_of(findings.claims)
-        if verdicts := ", ".join(f"{word}: {count}" for word, count in counts.items()):
-            say(f"{experiment.spec.title}: {verdicts}")
+        if verdicts := tally_words(counts_of(findings.claims)):
+            where = reach(findings)
+            say(f"{experiment.spec.title}: {verdicts}" + f" ({where})" * bool(where))
     write_page(chapters, page)
     if failed:
         raise typer.Exit(1)

@@ -23,7 +23,7 @@ FAILED: dict[str, Any] = {
     "markersize": 6,
     "linestyle": "",
     "color": "#111111",
-    "label": "no number: failed, or never",
+    "label": "no number: failed, not made, or never",
 }
 """A run that gives no number: a cross, never a gap that could pass for nothing."""
 GUIDE: dict[str, Any] = {"color": QUIET, "linewidth": 0.9, "linestyle": (0, (4, 2))}
@@ -40,8 +40,6 @@ class Drawing:
     def __init__(self, findings: Findings, spec: FigureSpec) -> None:
         self.findings = findings
         self.spec = spec
-        assert findings.planned is not None
-        self.planned = findings.planned
         self.axes = findings.spec.axes
         self.names = list(self.axes)
         only = {axis: set(map(text_of, values)) for axis, values in spec.only.items()}
@@ -110,7 +108,8 @@ class Drawing:
 
     def unit_of(self, axis: str) -> str:
         """Return the unit that an axis counts in, as people write it."""
-        return self.planned.axis_unit(axis).strip(" []").replace(".", "·")
+        assert self.findings.planned is not None  # as of every experiment along axes
+        return self.findings.planned.axis_unit(axis).strip(" []").replace(".", "·")
 
     def name_of(self, axis: str, level: Level) -> str:
         """Return a level of an axis in words."""

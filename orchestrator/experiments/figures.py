@@ -13,6 +13,7 @@ from ..figures.display import Run
 from ..figures.plots import draw
 from ..figures.style import ROW, frame, literal, new_figure, save
 from ..titles import changed
+from ..wording import counted
 from .drawing import FAILED, Drawing
 from .expansion import FIGURES
 from .findings import Each, Findings
@@ -114,10 +115,10 @@ def _legend(drawn: Sequence[Axes]) -> list[Artist]:
 
 
 def _provenance(findings: Findings) -> str:
-    planned, spec = findings.planned, findings.spec
-    assert planned is not None
-    fmus = sorted(f"{fmu.name} {digest[:8]}" for digest, fmu in planned.fmus.items())
+    spec = findings.spec
+    fmus = [f"{name} {digest[:8]}" for name, digest in findings.fmus]
     scenarios = dict.fromkeys(run.scenario.name for run in findings.experiment.runs.values())
-    parts = [f"{len(findings.records)} runs of {', '.join(scenarios)}", f"FMUs: {', '.join(fmus)}"]
+    made = len(findings.records) - findings.not_made
+    parts = [f"{counted(made, 'run')} of {', '.join(scenarios)}", f"FMUs: {', '.join(fmus)}"]
     parts += [f"changed in all runs: {words}"] if (words := changed(findings.experiment.changed)) else []
     return " · ".join([spec.source, *parts] if spec.source else parts)

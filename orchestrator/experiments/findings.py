@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..metrics.run_metrics import Value
+from ..results.folder import RUN_FILE
 from ..results.read import Results
 from ..wording import counted
 from .confidence import interval
@@ -18,7 +19,7 @@ from .design import Point
 from .expansion import NamedRun
 from .experiment import Case, Experiment
 from .grids import correlation
-from .jobs import Outcome, Record, measured, read_back
+from .jobs import NOT_MADE, Outcome, Record, measured, read_back
 from .judged_schema import Claim
 from .judging import Judgement, Values, judge
 from .margins import Region
@@ -52,8 +53,23 @@ class Findings:
         return {
             self.words(case): "; ".join(record.problems)
             for case, record in zip(self.experiment.cases, self.records, strict=True)
-            if not record.ok
+            if record.failed
         }
+
+    @property
+    def not_made(self) -> int:
+        """How many cases have not been run."""
+        return sum(not record.made for record in self.records)
+
+    @property
+    def fmus(self) -> list[tuple[str, str]]:
+        """Name and SHA-256 of the FMUs that the runs are made of, as planned, else as recorded; sorted."""
+        if self.planned:
+            return sorted((fmu.name, digest) for digest, fmu in self.planned.fmus.items())
+        recorded = (fmu for one in self.results.values() for fmu in one.run.get("fmus", {}).values())
+        return sorted(
+            {(str(fmu["name"]), str(fmu["sha256"])) for fmu in recorded if {"name", "sha256"} <= set(fmu)}
+        )
 
     def words(self, case: Case) -> str:
         """Return what a case is called in messages."""
@@ -133,7 +149,11 @@ class Findings:
     def failure(self, run: NamedRun, setting: Point) -> str:
         """Return why a run at a setting failed, or the first of its repeats that did; "" for none."""
         records = (self.record(case) for case in self.cases_of(run, setting))
-        return next(("; ".join(record.problems) for record in records if not record.ok), "")
+        return next(("; ".join(record.problems) for record in records if record.failed), "")
+
+    def made(self, run: NamedRun, setting: Point) -> bool:
+        """Return whether a run at a setting has been made, with all its repeats."""
+        return all(self.record(case).made for case in self.cases_of(run, setting))
 
     @property
     def derived(self) -> dict[str, Value]:
@@ -182,19 +202,19 @@ class Findings:
         planned = self.planned and replace(self.planned, jobs=[], fmus={
             digest: replace(fmu, variables={}) for digest, fmu in self.planned.fmus.items()
         })  # fmt: skip
-        return Findings(self.experiment, self.records, {}, planned)
+        recorded = {} if planned else {k: replace(one, columns={}) for k, one in self.results.items()}
+        return Findings(self.experiment, self.records, recorded, planned)
 
     def remarkable(self) -> str:
         """Return in how many runs something was remarkable, `spin in 3 of 20 runs`; "" for none."""
         kinds = Counter(kind for record in self.records for kind in record.findings)
-        total = counted(len(self.records), "run")
+        total = counted(len(self.records) - self.not_made, "run")
         return ", ".join(f"{kind} in {count} of {total}" for kind, count in kinds.items())
 
 
 def judge_records(planned: Planned, records: Mapping[str, Record]) -> Findings:
     """Return what an experiment along axes comes to; `records`: key -> what became of a run."""
-    missing = Record({}, ("no results yet",))
-    found = [records.get(job.key, missing) for job in planned.jobs]
+    found = [records.get(job.key, NOT_MADE) for job in planned.jobs]
     return Findings(planned.experiment, found, {}, planned)
 
 
@@ -226,7 +246,8 @@ def judge_results(
     for name, read in zip(experiment.runs, recorded, strict=True):
         found = (made[name].reason if name in made else "") or read
         if isinstance(found, str):
-            records.append(Record({}, (found,)))
+            begun = name in made or any((out / name).glob(f"{RUN_FILE}*"))  # a died run leaves a part of it
+            records.append(Record({}, (found,)) if begun else NOT_MADE)
         else:
             results[name] = found
             records.append(measured(found, metrics_of(experiment)))

@@ -65,20 +65,32 @@ class Record:
     findings: tuple[str, ...] = ()  # kinds of what was remarkable in its course
     ended: str | None = None  # why a unit has ended it early
     id: str | None = None  # of its results on disk, just made
+    made: bool = True  # False: there is no such run yet
 
     @property
     def ok(self) -> bool:
         return not self.problems
 
     @property
+    def failed(self) -> bool:
+        """Whether it was made and gave no result."""
+        return self.made and not self.ok
+
+    @property
     def status(self) -> str:
         """How the run ended, in one word or two."""
+        if not self.made:
+            return NOT_MADE.reason or ""
         return ("ended early" if self.ended else "completed") if self.ok else "failed"
 
     @property
     def reason(self) -> str | None:
         """Why it failed or ended early."""
         return "; ".join(self.problems) or self.ended
+
+
+NOT_MADE = Record({}, ("not made",), made=False)
+"""Of a run that has no results yet."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from ..errors import ScenarioError
-from ..figures.display import shown
+from ..figures.display import DIGITS, digits_apart, shown
 from ..metrics.run_metrics import Value
 from .judged_schema import Condition, Judged, Reference
 from .margins import Gap, Region, margin
@@ -91,15 +91,21 @@ def _compare(
         measured = [(runs[run], values.get((run, condition.metric))) for run in named]
     known = sorted(((v, run) for run, v in measured if v is not None), key=lambda one: one[0].number)
     missing = len(known) < len(measured)
-    text = _range(known, missing)
     limit: float | None
     if isinstance(bound, Reference):
         other = values.get((bound.run, bound.metric))
         limit = None if other is None else bound.times * other.number
         off = 0.0 if other is None else abs(bound.times) * other.half
-        text = f"{text} against {_range([(other, runs[bound.run])] if other else [], other is None)}"
     else:
         limit, off = _number(bound, known[0][0].unit) if known else None, 0.0
+    near = [(value.number, limit) for value, _ in known] if limit is not None else []
+    digits = digits_apart(near, known[0][0].unit) if known else DIGITS
+    text = _range(known, missing, digits)
+    if isinstance(bound, Reference):
+        times = f"{bound.times:g} × " if other and bound.times != 1.0 else ""
+        text += (
+            f" against {times}{_range([(other, runs[bound.run])] if other else [], other is None, digits)}"
+        )
     itself = (bound.run, bound.metric) if isinstance(bound, Reference) else None
     gaps = [
         None
@@ -114,11 +120,11 @@ def _compare(
     return all(compare(value.number, limit) for value, _ in known), text, gaps
 
 
-def _range(known: Sequence[tuple[Value, str]], missing: bool) -> str:
+def _range(known: Sequence[tuple[Value, str]], missing: bool, digits: int) -> str:
     """Return the value, or the smallest and the largest where they read differently, with their runs."""
     ends: dict[str, str] = {}
     for value, run in (*known[:1], *known[-1:]):
-        ends.setdefault(shown(value.number, value.unit, half=value.half), run)
+        ends.setdefault(shown(value.number, value.unit, digits=digits, half=value.half), run)
     text = " to ".join(f"{number} ({run})" if run else number for number, run in ends.items())
     return " and ".join(filter(None, [text, "no result" if missing else ""]))
 

@@ -20,7 +20,7 @@ class Limit:
     others: dict[str, Level]  # axis -> its level; "run" -> the run, if runs have names
     largest: float | None  # that holds with all below it; None: not even the smallest
     beyond: float | None  # the next value, which does not hold; None: all hold
-    failed: bool = False  # the run beyond failed and gives no metric
+    lacks: str = ""  # why the run beyond gives no metric: "failed", "not made"
 
 
 def limits_of(findings: Findings, spec: LimitSpec) -> list[Limit]:
@@ -48,7 +48,9 @@ def _limit(
     for setting in sorted(settings, key=lambda setting: float(setting[at].value)):
         here = float(setting[at].value)
         if not judge(spec, findings.at[setting], {run.name: run.row}).holds:
-            return Limit(others, largest, here, failed=bool(findings.failure(run, setting)))
+            cases_here = (findings.record(case) for case in findings.cases_of(run, setting))
+            lacks = next((record.status for record in cases_here if not record.ok), "")
+            return Limit(others, largest, here, lacks)
         largest = here
     return Limit(others, largest, None)
 
@@ -64,6 +66,7 @@ def limit_table(findings: Findings, name: str) -> Table:
         words: list[Cell] = [level.words for level in limit.others.values()]
         up_to = "-" if limit.largest is None else digits_of(limit.largest)
         beyond = "-" if limit.beyond is None else digits_of(limit.beyond)
-        table.rows.append([*words, up_to, f"{beyond} (the run failed)" if limit.failed else beyond])
+        lacks = {"": "", "failed": " (the run failed)"}.get(limit.lacks, f" ({limit.lacks})")
+        table.rows.append([*words, up_to, f"{beyond}{lacks}"])
     table.numbers = {len(others), len(others) + 1}
     return table

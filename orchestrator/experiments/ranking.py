@@ -26,7 +26,7 @@ from ..scenario.strict import validate
 from ..wording import hint
 from .axis_schema import Changes
 from .changes import changes_of_file
-from .driven_series import SIDES, slow_steer_jobs, steered
+from .driven_series import AMPLITUDE, SIDES, slow_steer_jobs, steered
 from .jobs import Job, Metrics, Once, Record, keyed, ready
 from .ranking_schema import UNIT, ConditionSpec, EntriesSpec, EntrySpec, RankingSpec
 
@@ -34,11 +34,14 @@ RUNS = "runs"
 """Folder of the results that are kept: of every cell's last amplitude."""
 SERIES, SLOW = "sine-with-dwell", "slowly-increasing-steer"
 METRICS: Metrics = (
-    ("intervention", "effort(wheel_torque_*)", None),
     ("effort", "effort(yaw_moment)", None),
     ("chatter", "total_variation_rate(yaw_moment)", None),
 )
-"""What is measured beside what the test gives."""
+"""What is measured beside what the test gives, and the intervention."""
+INTERVENTION = "effort(wheel_torque_*)"
+"""Measured from the beginning of steer on: until the driver lets go of the accelerator, torque is his."""
+STEERING_BEGINS = "start_time"
+"""Parameter of the driver [s]."""
 RECORDED = (
     "steering_wheel_angle", "yaw_rate", "sideslip", "acceleration_y", "velocity_x", "yaw_moment",
     "wheel_torque", "torque_request",
@@ -255,9 +258,17 @@ def plan_drives(
             keep=base.keep and drive.last and first and drive.amplitude > 0,
         ))  # fmt: skip
     planned = ready(jobs, once=once, progress=progress)
-    made = [keyed(replace(job, plan=_lean(job.plan)), METRICS) for job in planned]
+    made = [keyed(replace(job, plan=_lean(job.plan)), _metrics(job.plan)) for job in planned]
     made = [replace(job, out=base.out / RUNS / job.key[:12]) for job in made]
     return [replace(drive, job=job) for drive, job in zip(drives, made, strict=True)]
+
+
+def _metrics(plan: Plan | None) -> Metrics:
+    assert plan is not None
+    driver = AMPLITUDE.partition(".")[0]
+    begins = next(unit.parameter(STEERING_BEGINS) for unit in plan.units if unit.name == driver)
+    first, last = float(begins or 0.0), plan.time(plan.n_steps)
+    return (("intervention", INTERVENTION, (first, last) if first < last else None), *METRICS)
 
 
 def _lean(plan: Plan | None) -> Plan:

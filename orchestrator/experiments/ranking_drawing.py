@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 from ..errors import ResultsError
 from ..evaluation.standard_tests import TESTS
 from ..evaluation.trace import trace_of
+from ..figures.display import shown
 from ..figures.style import QUIET, frame, literal, new_figure, save
 from ..results.read import load_results
 from .ranking import SERIES
-from .standings import Cell, Standing
+from .standings import Cell, Standing, deciding_digits
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,6 +51,7 @@ def draw_matrix(ranked: Ranked, note: str) -> Figure:
     rows = ranked.standings
     conditions = ranked.ranking.conditions
     wide = len(conditions)
+    digits = deciding_digits(rows)
     beside = ((-5.1, "right", "place"), (wide + 0.15, "left", "passed"), (wide + 2.05, "right", "runs"))
     with new_figure() as figure:
         axes = figure.subplots()
@@ -61,7 +63,7 @@ def draw_matrix(ranked: Ranked, note: str) -> Figure:
                 axes.text(k + 0.5, i + 0.52, sign_of(cell), ha="center", va="center", fontsize=7.5)
             axes.text(-0.15, i + 0.52, literal(one.spec.title), va="center", ha="right", fontsize=8.5)
             counted = f"{one.count('passed')} of {wide}" if one.place else f"{one.missing} missing"
-            share = f"{100 * one.share:.0f} %" if one.place else ""
+            share = shown(one.share, "%", digits=digits.share) if one.place else ""
             for (x, side, _), text in zip(beside, (place_words(one), counted, share), strict=True):
                 weight = "bold" if x < 0 else "normal"
                 axes.text(x, i + 0.52, text, va="center", ha=side, fontsize=8, weight=weight)
@@ -118,7 +120,7 @@ def draw_pareto(ranked: Ranked, note: str) -> Figure:
         axes.plot(*best, color=QUIET, linewidth=1.0, zorder=1, label="none is better in both:")
         for _, _, one in front:
             axes.plot([], [], " ", label=f"{one.place}  {one.spec.title}")
-        axes.set_xlabel("Intervention: ∫|torque| dt of the wheel that gets most, mean [kN·m·s]")
+        axes.set_xlabel("Intervention: ∫|torque| dt of the wheel that gets most, once steered, mean [kN·m·s]")
         axes.set_title("Stability margin: points of per cent below the limits, least of each condition, mean")
         handles = {str(line.get_label()): line for line in axes.get_lines()}
         title = "Stability over intervention; numbers are places"

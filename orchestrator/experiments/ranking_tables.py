@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from ..evaluation.dwell_run import percent
-from ..figures.display import digits_of
+from ..figures.display import digits_of, shown
 from ..metrics.run_metrics import Value
 from .jobs import STEP_TIME
 from .ranking_drawing import degrees, place_words
-from .standings import Cell, Standing
+from .standings import Cell, Digits, Standing, deciding_digits
 from .table import Column
 from .tables import Cell as Words
 from .tables import Table
@@ -47,18 +47,21 @@ def spread(one: Interval | None, words: Callable[[float], str]) -> str | None:
     return f"{words(one.mean)} ± {words(one.half)}" if one.half else words(one.mean)
 
 
-def row_of(one: Standing) -> dict[str, Words]:
-    """Return the row of a controller: heading -> cell."""
+def row_of(one: Standing, digits: Digits) -> dict[str, Words]:
+    """Return the row of a controller: heading -> cell; `digits`: of what decides places."""
+    slip = one.mean("sideslip")
     means = {
         key.replace("_", " "): words_of(one.mean(key), unit) for key, unit in UNITS.items() if key != "effort"
     }
+    if slip is not None:
+        means["sideslip"] = shown(slip, "rad", digits=digits.sideslip)
     row: dict[str, Words] = {
         "place": place_words(one),
         "controller": one.spec.title,
         "gains": one.spec.gains,
         "passed": str(one.count("passed")),
         "spun": str(one.count("spun")),
-        "runs": words_of(one.share, "%"),
+        "runs": shown(one.share, "%", digits=digits.share),
         **means,
         "time per step": words_of(one.step_time, "s"),
     }
@@ -71,9 +74,10 @@ def row_of(one: Standing) -> dict[str, Words]:
 
 def table_of(ranked: Ranked, *left_out: str) -> Table:
     """Return the table of controllers, the first place first; `left_out`: headings."""
-    rows = [row_of(one) for one in ranked.standings]
+    digits = deciding_digits(ranked.standings)
+    rows = [row_of(one, digits) for one in ranked.standings]
     kept = [heading for heading in rows[0] if heading not in left_out]
-    texts = ("place", "passed", "spun", "margin", "time per step")
+    texts = ("place", "passed", "spun", "runs", "margin", "sideslip", "time per step")
     numbers = {kept.index(heading) for heading in texts if heading in kept}
     cells = [[row[heading] for heading in kept] for row in rows]
     return Table(ranked.ranking.spec.title, kept, [*cells], [RULE], numbers)

@@ -63,6 +63,7 @@ def _record(findings: Findings, drawn: dict[str, str]) -> dict[str, Any]:
                 "label": run.label,
                 "scenario": str(run.scenario),
                 "changes": [asdict(change) for change in run.changes],
+                "status": findings.record(findings.cases_of(run, settings[0])[0]).status if alone else None,
                 "failed": (findings.failure(run, settings[0]) or None) if alone else None,
                 "fmus": _hashes(findings.results.get(run.name)),
                 "metrics": {

@@ -14,8 +14,11 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
 
 from ..evaluation.dwell_run import FROM, RATIOS, SLIGHT, SPUN
+from ..figures.display import digits_apart
 from .confidence import Interval, interval
 from .jobs import STEP_TIME, Record
 from .ranking import Drive, Ranking
@@ -213,6 +216,26 @@ def standings(ranking: Ranking, drives: Sequence[Drive], records: Mapping[str, R
         cells = {key: Cell(name, key, runs[name, key]) for key in ranking.conditions}
         every.append(Standing(name, spec, cells))
     return placed(every)
+
+
+class Digits(NamedTuple):
+    """Significant digits with which numbers that decide places read differently."""
+
+    share: int
+    sideslip: int
+
+
+def deciding_digits(ranked: Sequence[Standing]) -> Digits:
+    """Return the digits for shares and mean peak sideslips; `ranked`: in the order of their places."""
+    share, slip = [], []
+    for one, next_ in pairwise(one for one in ranked if one.place):
+        if one.order[0] != next_.order[0]:
+            continue
+        if one.order[1] != next_.order[1]:
+            share.append((one.share, next_.share))
+        elif one.order[2] != next_.order[2]:
+            slip.append((one.order[2], next_.order[2]))
+    return Digits(digits_apart(share, "%", 2), digits_apart(slip, "rad"))
 
 
 def placed(every: Sequence[Standing]) -> list[Standing]:

@@ -150,7 +150,5 @@ def _parquet(findings: Findings, columns: Sequence[Column]) -> bytes:
 def _description(findings: Findings) -> str:
     """Return what the experiment was, as JSON: the file's content, the FMUs with their hashes."""
     content = findings.spec.model_dump(by_alias=True, exclude_defaults=True)
-    used = findings.planned.fmus if findings.planned else {}
-    fmus = {fmu.name: digest for digest, fmu in used.items()}
-    about = {"experiment": content, "fmus": dict(sorted(fmus.items()))}
+    about = {"experiment": content, "fmus": dict(findings.fmus)}
     return json.dumps(about, ensure_ascii=False, default=str)

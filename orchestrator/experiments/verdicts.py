@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import itertools
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 from ..figures.display import shown
 from ..metrics.run_metrics import Value, metric
@@ -13,6 +13,7 @@ from .design import levels_of
 from .expansion import NamedRun
 from .findings import Findings
 from .grids import cells, grid_tables, side_by_side
+from .jobs import NOT_MADE
 from .judged_schema import Claim, GridSpec, MetricSpec, Reference
 from .judging import Judgement
 from .limits import limit_table
@@ -105,8 +106,25 @@ def margin_words(judgement: Judgement) -> str | None:
 
 
 def share(ratio: float) -> str:
-    """Return a ratio in per cent, two digits of it: 1.6 %."""
-    return shown(ratio, "%", digits=2) if math.isfinite(ratio) else "any"
+    """Return a margin in per cent, two digits of it: 1.6 %; beyond 100 % its size tells nothing more."""
+    if abs(ratio) > 1.0:
+        return "by far" if ratio > 0 else "missed by far"
+    return shown(ratio, "%", digits=2)
+
+
+def reach(findings: Findings) -> str:
+    """Return where claims have been judged, in words; "" if nothing is left open."""
+    if findings.spec.region is None or not findings.claims:
+        return ""
+    if not findings.regions:
+        return "at the chosen point only; the region of the open values has not been run"
+    alone = [replace(one, region=None) for one in findings.claims]
+    return f"over the region of the open values; at the chosen point alone {tally_words(counts_of(alone))}"
+
+
+def tally_words(counts: Mapping[str, int]) -> str:
+    """Return counts of verdicts in words: `holds: 13, undecided: 2`."""
+    return ", ".join(f"{word}: {count}" for word, count in counts.items())
 
 
 def region_words(judgement: Judgement) -> list[str]:
@@ -161,12 +179,16 @@ def _run_table(findings: Findings, spec: TableSpec) -> Table:
     table.notes = [f"{', '.join(named)}: {formula}" for formula, named in formulas.items()]
     some = any(said.values())
     carries = CARRIES if findings.regions else CARRIES[:1]
+    if some and not findings.regions and (only := reach(findings)):
+        table.notes.append(f"verdicts: {only}")
     if some:  # beside the first metric, which the claims are about
         table.headings[2:2] = ["the paper says", "verdict", *carries]
     for run, setting in itertools.product(runs, study.settings):
         row = ", ".join(filter(None, [run.row, *(level.words for level in setting)]))
-        if why := findings.failure(run, setting):
-            cells: list[Cell] = ["failed", *[None] * (len(table.headings) - 2)]
+        if not findings.made(run, setting):
+            cells: list[Cell] = [NOT_MADE.status, *[None] * (len(table.headings) - 2)]
+        elif why := findings.failure(run, setting):
+            cells = ["failed", *[None] * (len(table.headings) - 2)]
             table.notes.append(f"{row}: {why}")
         else:
             cells = [findings.at[setting].get((run.name, key)) for key in spec.metrics]
@@ -222,7 +244,8 @@ def line_table(judgement: Judgement) -> Table:
         table.rows.append([line.says, *map(share, ends or ()), *([] if ends else [None, None]), flip])
     table.numbers = {1, 2}
     if (spread := judgement.region.spread) is not None:
-        table.notes = [f"spread of the margin over all of them: {share(spread)}"]
+        words = share(spread) if spread <= 1.0 else "more than 100 %"
+        table.notes = [f"spread of the margin over all of them: {words}"]
     return table
 
 
@@ -268,5 +291,7 @@ def claim_tables(findings: Findings) -> list[Table]:
                 note = f"\n{one.said.note}" if one.said.note else ""
                 carries = _carries(one, len(table.headings) - 3)
                 table.rows.append([f"{says}{note}", "\n".join(one.measured), verdict(one), *carries])
+        if not findings.regions and judged is findings.claims and (only := reach(findings)):
+            table.notes.append(f"verdicts: {only}")
         tables += [table] if table.rows else []
     return tables

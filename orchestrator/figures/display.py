@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from vocabulary.units import SHOWN
@@ -12,6 +13,10 @@ from ..results.read import Results
 
 RESOLUTION = 1e-3
 """Of angles and their rates, as shown [°, °/s, °/s²]; chosen: less than any sensor of a car can tell."""
+ROUNDING = 1e-12
+"""Relative difference of two numbers that is none."""
+DIGITS, EXACT = 3, 17
+"""Significant digits of a number, and with how many no two floats read alike."""
 
 
 class Run(NamedTuple):
@@ -38,13 +43,14 @@ def shown_unit(unit: str) -> tuple[str, float]:
     return text, to_si * factor
 
 
-def shown(value: float, unit: str, *, digits: int = 3, half: float = 0.0) -> str:
+def shown(value: float, unit: str, *, digits: int = DIGITS, half: float = 0.0) -> str:
     """Return a value given in SI as text in the unit that people read, e.g. `3.94 %`; `< 0.001 °` of less.
 
     With `half`, half the width of its confidence interval: `3.94 ± 0.12 %`.
     """
     text, factor = shown_unit(unit)
-    if text.startswith("°") and 0 < abs(value * factor) < RESOLUTION and not half:
+    coarse = digits <= DIGITS and not half
+    if text.startswith("°") and 0 < abs(value * factor) < RESOLUTION and coarse:
         return f"< {RESOLUTION:g} {text}"
     number = digits_of(value * factor, digits)
     if half:
@@ -52,7 +58,20 @@ def shown(value: float, unit: str, *, digits: int = 3, half: float = 0.0) -> str
     return f"{number} {text}".rstrip() if math.isfinite(value) else number
 
 
-def digits_of(value: float, digits: int = 3) -> str:
+def digits_apart(pairs: Iterable[tuple[float, float]], unit: str, digits: int = DIGITS) -> int:
+    """Return the least digits, at least so many, with which the numbers of each pair read differently.
+
+    Numbers that are equal are left alone, and so are those that differ by nothing but rounding.
+    """
+    for a, b in pairs:
+        if not math.isfinite(a) or not math.isfinite(b) or math.isclose(a, b, rel_tol=ROUNDING):
+            continue
+        while digits < EXACT and shown(a, unit, digits=digits) == shown(b, unit, digits=digits):
+            digits += 1
+    return digits
+
+
+def digits_of(value: float, digits: int = DIGITS) -> str:
     """Return a number with so many significant digits, whole digits all kept, no exponent if readable."""
     if math.isinf(value):
         return "never" if value > 0 else "-∞"

@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 
 from ..errors import ModelDescriptionError
 from ..plan import Fmu, UnitDefinition, Variable
+from ..wording import short
 from .binary import binary_of, lacking
 from .scalars import scalars
 from .shadowing import hashes_of_modules
@@ -32,6 +33,8 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
         raise ModelDescriptionError(f"{path}: no FMU: the archive holds no modelDescription.xml")
     root = _parsed(files["modelDescription.xml"], path)
     fmi = int(root.get("fmiVersion", "")[0])
+    if wrong := _dangling(root, fmi):
+        raise ModelDescriptionError(f"{path}: the model description cannot be used: {wrong}")
 
     from fmpy.model_description import ValidationError, read_model_description
 
@@ -45,8 +48,13 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
         variables, refused = scalars(description, root)
     except Exception as error:  # fmpy raises whatever its parsing meets
         reason = _one_line(error) or type(error).__name__
+        unforeseen = isinstance(error, LookupError | TypeError | AttributeError | NameError)
         if flaws:
-            reason = f"it is not valid FMI {fmi}.0: {flaws[0].rstrip('.')} ({reason})"
+            reason = f"it is not valid FMI {fmi}.0: {flaws[0].rstrip('.')}" + f" ({reason})" * (
+                not unforeseen
+            )
+        elif unforeseen:
+            reason = f"something in it is not understood ({type(error).__name__}: {reason})"
         raise ModelDescriptionError(f"{path}: the model description cannot be used: {reason}") from None
     kind = description.coSimulation
     experiment = description.defaultExperiment
@@ -73,6 +81,26 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
     )
 
 
+def _dangling(root: ElementTree.Element, fmi: int) -> str | None:
+    """Return which variable is meant that does not exist, None if all do; fmpy takes 0 for the last one."""
+    variables = root.findall("ModelVariables/*")
+    if fmi == 2:
+        known = {str(number) for number in range(1, len(variables) + 1)}
+        what, own, among = "variable number", "index", f"there are {len(variables)}"
+        rates = [(one, "derivative") for one in root.iterfind("ModelVariables/ScalarVariable/Real")]
+    else:
+        known = {one.get("valueReference", "") for one in variables}
+        what, own, among = "value reference", "valueReference", "no variable has it"
+        rates = [(one, "derivative") for one in variables]
+    unknowns = root.findall("ModelStructure//Unknown") if fmi == 2 else root.findall("ModelStructure/*")
+    places = [(one, key) for one in unknowns for key in (own, "dependencies")]
+    for element, key in (*places, *rates):
+        for number in (element.get(key) or "").split():
+            if number.isdecimal() and number.lstrip("0") not in known and number not in known:
+                return f"{key} of {element.tag} names {what} {short(number)}, but {among}"
+    return None
+
+
 def _host_packages(root: ElementTree.Element) -> tuple[str, ...]:
     """Return what one of our units needs of a Python beyond the standard library."""
     needed = root.find("VendorAnnotations/Tool[@name='yawbench']/hostPackages")
@@ -96,6 +124,11 @@ def _parsed(xml: bytes, path: Path) -> ElementTree.Element:
         root = ElementTree.fromstring(xml)
     except ElementTree.ParseError as error:
         raise ModelDescriptionError(f"{path}: modelDescription.xml is not well-formed XML: {error}") from None
+    except (ValueError, LookupError) as error:  # of encodings that Python knows and the parser does not
+        raise ModelDescriptionError(
+            f"{path}: modelDescription.xml has an encoding that cannot be read ({_one_line(error)}); "
+            "FMI asks for UTF-8"
+        ) from None
     version = root.get("fmiVersion")
     if root.tag != "fmiModelDescription" or version is None:
         raise ModelDescriptionError(f"{path}: modelDescription.xml is no FMI model description; {SUPPORTED}")

@@ -23,20 +23,22 @@ from ..experiments.verdicts import (
     limit_tables,
     line_table,
     margin_words,
+    reach,
     region_table,
     region_words,
     run_tables,
     verdict,
 )
 from ..figures import plots
-from ..metrics.run_metrics import metric
+from ..figures.display import Run
+from ..metrics.run_metrics import evaluate, metric
 from ..plan import Plan
 from ..results.read import Results
 from ..scenario.load import Scenario, load_scenario
 from ..titles import changed
 from ..wording import counted
 from .diagram import diagrams
-from .facts import anchor, animation_of, figure_of, fmus_of, programs_of
+from .facts import Animation, anchor, animation_of, figure_of, fmus_of, programs_of
 from .panel_images import Image, image_of
 from .provenance import count_kinds, groups_of
 from .system import systems_of
@@ -65,7 +67,7 @@ def chapter(
     name = anchor(f"{experiment.path.absolute().parent.name} {experiment.path.stem}")
     plans = plans_of(findings)
     groups = groups_of([plan for _, plan in plans])
-    results = findings.results.values()
+    made = runs_made(findings)
     failed = findings.failed
     return {
         "id": name,
@@ -73,6 +75,7 @@ def chapter(
         "source": spec.source,
         "changed": changed(experiment.by_options),
         "counts": counts_of(findings.claims),
+        "reach": reach(findings),
         "conclusions": conclusions(findings),
         "claims": [judged(one) for one in findings.claims],
         "checks": [judged(one) for one in findings.checks],
@@ -93,10 +96,20 @@ def chapter(
         "command": command,
         "folder": str(folder),
         "settings": settings(findings),
-        "grid": grid_of_times([plan for _, (_, plan) in plans] if spec.axes else results),
-        "fmus": fmus_of(results),
-        "programs": programs_of(results),
+        "grid": grid_of_times(made),
+        "runs": len(findings.records),
+        "not_made": findings.not_made,
+        "fmus": fmus_of(made),
+        "programs": programs_of(made),
     }
+
+
+def runs_made(findings: Findings) -> list[Results | Plan]:
+    """Return the results of all runs, along axes the plans of those that have been made."""
+    if not findings.spec.axes or findings.planned is None:
+        return [*findings.results.values()]
+    jobs = zip(findings.planned.jobs, findings.records, strict=True)
+    return [job.plan for job, record in jobs if job.plan and record.made]
 
 
 def repeats(findings: Findings) -> str:
@@ -166,16 +179,30 @@ def systems(plans: Sequence[tuple[Job, tuple[Scenario, Plan]]], title: str) -> l
     return drawn
 
 
-def animation(findings: Findings) -> dict[str, Any] | None:
-    """Return the animation of the first figure with a path: its first run and its last."""
-    for figure in findings.spec.figures:
-        runs = runs_of(findings, figure)
-        if "path" in figure.panels and runs:
-            ends = [runs[0], *runs[-1:]] if len(runs) > 1 else runs
-            seen = animation_of(ends, " and ".join(run.label for run in ends))
-            if seen is not None:
-                return {"title": figure.title or plots.title_of(ends), "drawing": seen}
+LIVELY = tuple(map(metric, ("peak(sideslip)", "peak(yaw_rate)")))
+"""What tells how much happens in a run, the first that all have."""
+
+
+def animation(findings: Findings) -> Animation | None:
+    """Return the animation of the figure with a path in which most happens, all of its runs."""
+    found = [
+        (figure, runs)
+        for figure in findings.spec.figures
+        if "path" in figure.panels and (runs := runs_of(findings, figure))
+    ]
+    for figure, runs in sorted(found, key=lambda one: -_liveliest(one[1])):
+        if seen := animation_of(runs, figure.title or plots.title_of(runs)):
+            return seen
     return None
+
+
+def _liveliest(runs: Sequence[Run]) -> float:
+    """Return the largest sideslip of any run, or the largest yaw rate; 0 if neither is known."""
+    for one in LIVELY:
+        values = [value.number for run in runs if (value := evaluate(run.results, one))]
+        if values:
+            return max(values)
+    return 0.0
 
 
 def figures(findings: Findings, chapter: str, files: str, each: Each = map) -> list[Any]:
@@ -214,18 +241,24 @@ def definitions(findings: Findings) -> list[dict[str, str]]:
 
 
 def settings(findings: Findings) -> Table:
-    """Return how every run differs from its scenario."""
-    headings = ["run", "scenario", "changed", "faults"]
+    """Return how every run differs from its scenario; along axes how many runs of it ended how."""
+    statuses = list(dict.fromkeys(record.status for record in findings.records)) if findings.spec.axes else []
+    headings = ["run", "scenario", "changed", "faults", *statuses]
     rows: list[list[Cell]] = []
     for run in findings.experiment.runs.values():
         results = findings.results.get(run.name)
         faults = "; ".join(fault.words for fault in results.record.faults) if results else ""
-        rows.append([run.name, run.scenario.name, changed(run.changes) or None, faults or None])
+        ended = Counter(findings.record(one).status for one in findings.experiment.cases if one.run == run)
+        rows.append([
+            run.name or None, run.scenario.name, changed(run.changes) or None, faults or None,
+            *(str(ended[status]) for status in statuses),
+        ])  # fmt: skip
     kept = [k for k in range(len(headings)) if any(row[k] is not None for row in rows)]
-    return Table("", [headings[k] for k in kept], [[row[k] for k in kept] for row in rows])
+    numbers = {place for place, k in enumerate(kept) if headings[k] in statuses}
+    return Table("", [headings[k] for k in kept], [[row[k] for k in kept] for row in rows], [], numbers)
 
 
-def grid_of_times(runs: Iterable[Plan | Results]) -> list[str]:
+def grid_of_times(runs: Iterable[Results | Plan]) -> list[str]:
     """Return algorithm, step and end of the runs, each combination once, as plans or records say."""
     found: Counter[str] = Counter()
     for one in runs:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, NamedTuple
 
 from ..experiments.findings import Findings
@@ -27,6 +27,8 @@ LESS_IS_BETTER = (
     "slope_variation_rate", "effort", "total_variation_rate",
 )  # fmt: skip
 """Measures of which the least is the best; of others, such as a path's displacement, that depends."""
+OF_CONTROL = ("effort", "total_variation_rate")
+"""Measures of what a controller does: of one that does nothing they are no merit."""
 
 
 class MetricCell(NamedTuple):
@@ -61,21 +63,48 @@ def comparison_facts(findings: Findings) -> dict[str, Any] | None:
 def metric_rows(findings: Findings) -> list[dict[str, Any]]:
     """Return the metrics of all runs with results, each with its difference from the first."""
     rows = []
+    idle = _idle(findings)
     for key, spec in findings.spec.metrics.items():
         chosen = metric(spec.metric)
         values = [findings.values.get((name, key)) for name in findings.results]
-        known = {value.number for value in values if value is not None}
-        ranked = chosen.name.partition("(")[0] in LESS_IS_BETTER and len(known) > 1
+        measure = chosen.name.partition("(")[0]
+        least = _best(values, idle if measure in OF_CONTROL else ()) if measure in LESS_IS_BETTER else None
         cells = [
             MetricCell(
                 shown(value.number, value.unit) if value else "",
                 difference(values[0], value) if k else "",
-                ranked and value is not None and value.number == min(known),
+                k == least,
             )
             for k, value in enumerate(values)
         ]
         rows.append({"title": chosen.title, "formula": chosen.formula, "cells": cells})
     return rows
+
+
+def _idle(findings: Findings) -> set[int]:
+    """Return the numbers of runs in which nothing controls: some signal has no effort or chatter at all."""
+    of_control = [
+        key
+        for key, spec in findings.spec.metrics.items()
+        if metric(spec.metric).name.partition("(")[0] in OF_CONTROL
+    ]
+    found = [[findings.values.get((name, key)) for key in of_control] for name in findings.results]
+    return {k for k, values in enumerate(found) if any(one is not None and one.number == 0 for one in values)}
+
+
+def _best(values: Sequence[Value | None], apart: Collection[int]) -> int | None:
+    """Return the number of the run whose value is the least, as it reads; None if no single one is.
+
+    Args:
+        values: of all runs.
+        apart: numbers of runs that do not take part.
+    """
+    known = sorted((one.number, k) for k, one in enumerate(values) if one is not None and k not in apart)
+    if len(known) < 2:
+        return None
+    (first, best), (second, _) = known[:2]
+    unit = next(one.unit for one in values if one is not None)
+    return None if shown(first, unit) == shown(second, unit) else best
 
 
 def _most_different(runs: Sequence[Run], found: Sequence[Divergence]) -> Figure | None:

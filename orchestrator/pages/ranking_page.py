@@ -25,7 +25,7 @@ from ..experiments.ranking_tables import (
     table_of,
     words_of,
 )
-from ..experiments.standings import Cell, Standing
+from ..experiments.standings import Cell, Digits, Standing, deciding_digits
 from ..experiments.tables import Table
 from ..plan import FAULTS, Change
 from ..titles import changed
@@ -52,6 +52,7 @@ def ranking_page(ranked: Ranked, folder: Path, command: str) -> str:
         command: that makes it.
     """
     ranking = ranked.ranking
+    digits = deciding_digits(ranked.standings)
     after = ["margin", "sideslip", "intervention", "time per step"]
     return render(
         "ranking.html.j2",
@@ -67,7 +68,7 @@ def ranking_page(ranked: Ranked, folder: Path, command: str) -> str:
             {"name": name, "short": one.heading, "title": one.title}
             for name, one in ranking.conditions.items()
         ],
-        rows=[_row(ranked, one, after) for one in ranked.standings],
+        rows=[_row(ranked, one, after, digits) for one in ranked.standings],
         states=STATES,
         pareto=_image(folder / FIGURES / "pareto.svg", "Stability over intervention"),
         table=replace(table_of(ranked), title="", notes=[]),
@@ -86,16 +87,16 @@ def _image(file: Path, title: str) -> Image | None:
     return image_of(file, title) if file.is_file() else None
 
 
-def _row(ranked: Ranked, one: Standing, after: list[str]) -> dict[str, Any]:
+def _row(ranked: Ranked, one: Standing, after: list[str], digits: Digits) -> dict[str, Any]:
     """Return a controller's row of the first table."""
-    row = row_of(one)
+    row = row_of(one, digits)
     texts = Table("", after, [[row[heading] for heading in after]]).text()[0]
     return {
         "place": place_words(one),
         "title": one.spec.title,
         "tuned": one.spec.gains == "tuned",
         "passed": f"{one.count('passed')}/{len(one.cells)}" if one.place else f"{one.missing} missing",
-        "share": f"{100 * one.share:.0f} %" if one.place else "–",
+        "share": row["runs"] if one.place else "–",
         "cells": [
             {
                 "id": _id(cell),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from matplotlib.figure import Figure
@@ -16,10 +17,12 @@ from orchestrator.experiments.expansion import NamedRun
 from orchestrator.experiments.figures import draw_all
 from orchestrator.experiments.findings import judge_results
 from orchestrator.experiments.jobs import Job, Outcome
+from orchestrator.experiments.judged_schema import MetricSpec
 from orchestrator.experiments.record import write_findings
 from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.figures.panels import Run, shown_by
-from orchestrator.pages.comparison import comparison_facts
+from orchestrator.metrics.run_metrics import Value
+from orchestrator.pages.comparison import comparison_facts, metric_rows
 from tests.changed import changed
 
 from .recorded import car, write
@@ -181,6 +184,34 @@ def test_the_page_marks_the_best_and_tells_differences_from_the_first(findings):
     assert [cell.best for cell in error] == [False, True]
     assert [cell.difference for cell in error] == ["", "−138 points"]
     assert not any(cell.best for cell in facts["rows"][1]["cells"])  # less speed is not better as such
+
+
+def stars(*values: tuple[float, ...]) -> list[list[int]]:
+    """Return which runs are marked the best by RMS error, effort and chatter."""
+    names = ("rms_error(yaw_rate)", "effort(yaw_moment)", "total_variation_rate(yaw_moment)")
+    runs = [str(k) for k in range(len(values))]
+    known = {
+        (run, name): Value(x, "1")
+        for run, row in zip(runs, values, strict=True)
+        for name, x in zip(names, row, strict=True)
+    }
+    spec = SimpleNamespace(metrics={name: MetricSpec(metric=name) for name in names})
+    rows = metric_rows(SimpleNamespace(spec=spec, values=known, results=dict.fromkeys(runs)))
+    return [[k for k, cell in enumerate(row["cells"]) if cell.best] for row in rows]
+
+
+@pytest.mark.parametrize(
+    "values, expected",
+    [
+        (((2.0, 0.0, 0.0), (1.0, 5.0, 7.0), (3.0, 4.0, 9.0)), [[1], [2], [1]]),  # 0 controls nothing
+        (((2.0, 0.0, 0.0), (1.0, 5.0, 7.0)), [[1], [], []]),  # the only one that acts is no winner
+        (((2.0, 9.0, 0.0), (1.0, 5.0, 7.0), (3.0, 6.0, 8.0)), [[1], [1], [1]]),  # constant, of the driver
+        (((6.0214, 4.0, 4.0), (6.0186, 5.0, 3.0)), [[], [0], [1]]),  # both read 6.02
+        (((1.0, 1.0, 1.0), (1.0, 1.0, 1.0)), [[], [], []]),
+    ],
+)
+def test_the_best_is_marked_where_it_reads_better_and_doing_nothing_wins_no_effort(values, expected):
+    assert stars(*values) == expected
 
 
 def test_no_run_leaves_the_axes_of_the_signals_that_differ_most(tmp_path):

@@ -254,6 +254,18 @@ def test_an_archive_that_reaches_out_of_its_folder_is_refused(name: str, tmp_pat
     assert not list(tmp_path.rglob("evil.txt"))
 
 
+@pytest.mark.parametrize("nested", [files.DEPTH, files.DEPTH + 1, 1500])
+def test_folders_in_each_other_are_unpacked_up_to_a_depth(nested: int, tmp_path: Path, cache: Path) -> None:
+    path = make_fmu(tmp_path / "a.fmu", files={f"{'d/' * nested}x": b"here"})
+    if nested <= files.DEPTH:
+        assert next(open_fmu(path).directory.rglob("x")).read_bytes() == b"here"
+    else:
+        assert problem(path) == (
+            f"{path}: cannot read this FMU: it holds {nested} folders in each other, more than {files.DEPTH}"
+        )
+        assert not list(cache.glob("*"))
+
+
 @pytest.mark.parametrize(
     ("xml", "expected"),
     [
@@ -291,7 +303,33 @@ def test_an_archive_that_reaches_out_of_its_folder_is_refused(name: str, tmp_pat
         ),
         (
             model_description("a", outputs=["x"]).replace('index="1"', 'index="7"'),
-            "the model description cannot be used: list index out of range",
+            "the model description cannot be used: index of Unknown names variable number '7', "
+            "but there are 1",
+        ),
+        (
+            model_description("a", outputs=["x"]).replace('index="1"', 'index="0"'),
+            "the model description cannot be used: index of Unknown names variable number '0', "
+            "but there are 1",
+        ),
+        (
+            model_description("a", ["u"], [out("x", "u")]).replace('dependencies="1"', 'dependencies="1 9"'),
+            "the model description cannot be used: dependencies of Unknown names variable number '9', "
+            "but there are 2",
+        ),
+        (
+            model_description("a", outputs=["x"]).replace(' valueReference="1"', ""),
+            "the model description cannot be used: it is not valid FMI 2.0: ERROR (line 6, column 0): "
+            "Element 'ScalarVariable': The attribute 'valueReference' is required but missing",
+        ),
+        (
+            model_description("a").replace("UTF-8", "UTF-7"),
+            "modelDescription.xml has an encoding that cannot be read (multi-byte encodings are not "
+            "supported); FMI asks for UTF-8",
+        ),
+        (
+            model_description("a").replace("UTF-8", "KLINGON"),
+            "modelDescription.xml has an encoding that cannot be read (unknown encoding: KLINGON); FMI asks "
+            "for UTF-8",
         ),
     ],
 )

@@ -17,7 +17,16 @@ from orchestrator.errors import RecordWarning
 from orchestrator.experiments.jobs import Record
 from orchestrator.experiments.ranking import Drive, load_ranking
 from orchestrator.experiments.ranking_schema import EntrySpec
-from orchestrator.experiments.standings import UNHELD, WORST, Cell, Driven, Standing, placed
+from orchestrator.experiments.standings import (
+    UNHELD,
+    WORST,
+    Cell,
+    Driven,
+    Standing,
+    deciding_digits,
+    placed,
+)
+from orchestrator.figures.display import shown
 from tests.commands import status_of
 
 ROOT = Path(__file__).parents[2]
@@ -85,6 +94,24 @@ def test_places_go_by_conditions_passed_then_runs_then_sideslip():
     ]  # fmt: skip
 
 
+def test_numbers_that_decide_places_read_differently():
+    close = [
+        standing("first", [driven(sideslip=0.300001)]),
+        standing("second", [driven(sideslip=0.300004)]),
+        standing("bad", [driven(stability=0.0, sideslip=0.300004)] + [driven()] * 999, [driven()]),
+        standing("worse", [driven(stability=0.0, sideslip=0.3)] * 2 + [driven()] * 998, [driven()]),
+    ]
+    ranked = placed(close)
+    digits = deciding_digits(ranked)
+    slips = [shown(one.mean("sideslip"), "rad", digits=digits.sideslip) for one in ranked]
+    shares = [shown(one.share, "%", digits=digits.share) for one in ranked]
+    known = {one.entry: k for k, one in enumerate(ranked)}
+    assert len({slips[known[name]] for name in ("first", "second")}) == 2
+    assert len({shares[known[name]] for name in ("bad", "worse")}) == 2
+    far = placed([standing(name, [driven(sideslip=x)]) for name, x in (("a", 0.2), ("b", 0.3))])
+    assert deciding_digits(far) == (2, 3)
+
+
 def test_an_entry_without_a_run_is_missing_and_has_no_place():
     missing = Driven(Drive("x", "c", A, A), True, None)
     first, last = placed([standing("lacks", [driven()], [driven(), missing]), standing("has", [driven()])])
@@ -148,6 +175,8 @@ def test_a_small_matrix_is_driven_goes_on_where_it_was_and_shows_what_is_missing
         ("none", "dry"): "failed", ("none", "low"): "failed",
     }  # fmt: skip
     assert 0 < float(found[0]["step_time [s]"]) < 0.005
+    held, free = (float(one["intervention [N.m.s]"]) for one in found)
+    assert free < 0.001 * held  # what the engine's lag leaves of the driver's force
     assert len(rows(out / "runs.csv")) == 4
     page = (out / "report.html").read_text()
     assert 'href="#fuzzy-pid-in-low"' in page

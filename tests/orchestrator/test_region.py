@@ -8,6 +8,7 @@ import math
 import re
 
 import pytest
+from lxml import html
 
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError
@@ -269,11 +270,19 @@ def test_study_makes_the_runs_of_the_region_once_and_quick_leaves_them_out(
     page = (tmp_path / "o/report.html").read_text("utf-8")
     assert "flips at ratio" in page
     assert "unsure" in page
+    alone = "at the chosen point alone holds: 3, does not reproduce: 1"
+    assert f"(over the region of the open values; {alone})" in said
+    assert alone in page
+    assert "at the chosen point only" not in out + page
     out, said, record = study("--no-run")
     assert "region of its verdicts: 10 runs, all finished before" in said
     assert record["claims"][0]["region"] == region
     out, said, record = study("--no-run", "--quick")
-    assert "region" not in said
+    assert "region of its verdicts" not in said
+    only = "at the chosen point only; the region of the open values has not been run"
+    assert f"Half a paper: holds: 3, does not reproduce: 1 ({only})" in said
+    assert f"verdicts: {only}" in " ".join(out.split())
+    assert only in html.fromstring((tmp_path / "o/report.html").read_text("utf-8")).text_content()
     assert record["claims"][0]["region"] is None
     assert record["claims"][0]["margin"] == pytest.approx(1 / 6)
     assert "17 %" in out

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,12 +26,15 @@ from orchestrator.experiments.judging import judge
 from orchestrator.experiments.planning import jobs_of
 from orchestrator.experiments.record import write_findings
 from orchestrator.experiments.tables import Table, for_terminal
-from orchestrator.experiments.verdicts import claim_tables, derived_tables, run_tables
-from orchestrator.figures.display import shown
+from orchestrator.experiments.verdicts import claim_tables, derived_tables, run_tables, share
+from orchestrator.figures.display import Run, shown
 from orchestrator.metrics.run_metrics import Value
-from orchestrator.pages.chapter import chapter
+from orchestrator.pages.animation import MOST
+from orchestrator.pages.chapter import animation, chapter
+from orchestrator.pages.facts import animation_of
 from orchestrator.pages.report import report_page
 from orchestrator.plan import Change
+from tests.pages.made_up import data_in
 
 from .recorded import car, write
 
@@ -115,6 +120,90 @@ def out(tmp_path) -> Path:
     for name, gain in GAINS.items():
         write(car(gain), tmp_path / "out" / name)
     return tmp_path / "out"
+
+
+def test_a_grid_is_drawn_from_results_alone(study, out):
+    """Where scenarios or FMUs are not at hand, so that nothing can be planned."""
+    grid = """
+grids:
+  errors:
+    title: Errors
+    metric: error
+    run: "{speed}mps/{controller}"
+    rows: {speed: [15, 25]}
+    columns: {controller: {"off": free, fnn: held}}
+checks:"""
+    figure = """
+figures:
+  - {name: lines, kind: grid, grid: errors}"""
+    made = study(("\nchecks:", grid), ("\nfigures:", figure))
+    findings = judge_results(made, out)
+    assert draw_all(findings, out)[0]["lines"] == "A made-up paper: lines"
+    drawn = (out / "figures" / "lines.svg").read_text()
+    assert "5 runs of 15mps.yaml" in drawn
+    assert "FMUs: controller_made_up 01234567, plant_made_up 01234567" in drawn
+
+
+@pytest.mark.parametrize(
+    "value, bound, expected",
+    [
+        (3.8612, 3.8614, "3.8612 m (held) against 3.8614 m (free)"),
+        (3.8612, 3.9, "3.86 m (held) against 3.90 m (free)"),
+        (3.8612, 3.8612, "3.86 m (held) against 3.86 m (free)"),
+        (1e-6, 2e-6, "1.00e-06 m (held) against 2.00e-06 m (free)"),
+    ],
+)
+def test_numbers_that_decide_a_verdict_read_differently(value, bound, expected):
+    condition = {"run": "a", "metric": "far", "below": {"run": "b", "metric": "far"}}
+    claim = Claim.model_validate({"says": "Less.", "holds_if": [condition]})
+    found = judge(
+        claim, {("a", "far"): Value(value, "m"), ("b", "far"): Value(bound, "m")}, {"a": "held", "b": "free"}
+    )
+    assert (found.holds, found.measured) == (value < bound, (expected,))
+
+
+def test_a_number_beside_a_threshold_that_it_misses_by_little_is_told_from_it():
+    claim = Claim.model_validate(
+        {"says": "No more.", "holds_if": [{"run": "a", "metric": "x", "at_most": "5 %"}]}
+    )
+    found = judge(claim, {("a", "x"): Value(0.0500004, "%")}, {"a": "held"})
+    assert (found.holds, found.measured) == (False, ("5.00004 % (held)",))
+    angle = Claim.model_validate(
+        {"says": "No more.", "holds_if": [{"run": "a", "metric": "x", "at_most": "0.0002 deg"}]}
+    )
+    (text,) = judge(angle, {("a", "x"): Value(np.radians(3e-4), "rad")}, {"a": "held"}).measured
+    assert not text.startswith("<")
+
+
+def test_a_margin_beyond_the_threshold_itself_is_told_in_words():
+    assert [share(x) for x in (0.016, -0.5, 1.0, -1.0, 1.01, -62.29, math.inf, -math.inf)] == [
+        "1.6 %", "-50 %", "100 %", "-100 %", "by far", "missed by far", "by far", "missed by far",
+    ]  # fmt: skip
+
+
+def test_the_animation_shows_all_runs_of_the_figure_in_which_most_happens(study, tmp_path):
+    figures = """
+figures:
+  - {name: calm, title: Calm, runs: ["15mps/*"], panels: [path]}
+  - {name: lively, title: Lively, runs: ["25mps/*", slow], panels: [path]}"""
+    made = study(("\nfigures:", figures))
+    gains = {"15mps/off": 1.1, "15mps/fnn": 1.0, "25mps/off": 3.0, "25mps/fnn": 1.0, "slow": 1.0}
+    for name, gain in gains.items():
+        run = car(gain)
+        lost = replace(run, columns={k: x for k, x in run.columns.items() if "position" not in k})
+        write(lost if name == "slow" else run, tmp_path / "out" / name)
+    seen = animation(judge_results(made, tmp_path / "out"))
+    assert seen is not None
+    assert seen.title == "Lively"
+    assert [one["label"] for one in data_in(seen.drawing)["runs"]] == ["no control", "neural network"]
+    assert seen.left_out == "slow: no position recorded"
+
+
+def test_runs_beyond_those_that_an_animation_can_show_are_named():
+    seen = animation_of([Run(str(k), car(1.0 + k)) for k in range(MOST + 2)], "Many")
+    assert seen is not None
+    assert len(data_in(seen.drawing)["runs"]) == MOST
+    assert seen.left_out == f"{MOST} and {MOST + 1}: an animation shows up to {MOST} runs"
 
 
 def test_for_stands_for_one_run_per_combination(study, tmp_path):
@@ -221,7 +310,7 @@ def test_claims_are_judged_by_the_results_on_disk(study, out):
     assert verdicts(findings.checks) == [True, False]
     assert findings.claims[0].measured == ("140 % (15 m/s, no control)",)
     assert findings.claims[2].measured == (
-        "2.00 % (15 m/s, neural network) against 140 % (15 m/s, no control)",
+        "2.00 % (15 m/s, neural network) against 0.5 × 140 % (15 m/s, no control)",
         "4.00 % (25 m/s, neural network) against 200 % (25 m/s, no control)",
     )
     assert findings.checks[1].measured == ("2000 N·m (15 m/s, neural network)",)
@@ -522,7 +611,7 @@ def test_a_study_without_any_result_still_says_so(study, tmp_path):
     findings = judge_results(study(), tmp_path / "empty")
     _, said = draw_all(findings, tmp_path / "empty")
     assert said == [f"figure {name}: none of its runs has results" for name in ("both", "roll")]
-    assert "no results here" in page(findings, tmp_path / "empty")
+    assert "5 of 5 runs have not been made yet" in page(findings, tmp_path / "empty")
 
 
 def test_an_angle_below_what_can_be_told_is_shown_as_such():

@@ -434,3 +434,54 @@ def test_a_sweep_file_that_is_wrong_makes_no_run(moods, yawbench, tmp_path):
     assert len(err.splitlines()) == 1
     assert "axes.level: sweep controller.levle=10: " in err
     assert not (tmp_path / "out").exists()
+
+
+def page_of(folder) -> html.HtmlElement:
+    return html.fromstring((folder / "report.html").read_text())
+
+
+def words_of(element) -> str:
+    return " ".join(" ".join(element.itertext()).split())
+
+
+def test_runs_that_were_never_made_are_not_called_failed(moods, yawbench, tmp_path):
+    file = moods(1, 2, 20)
+    status, out, said = yawbench(file, "out", "--no-run")
+    assert status == 1
+    assert "6 of 6 runs not made yet" in said
+    assert "failed" not in out + said
+    assert "failed" not in (tmp_path / "out" / "table.csv").read_text()
+    assert [row["status"] for row in csv.DictReader((tmp_path / "out/table.csv").open())] == ["not made"] * 6
+    assert "1.00 (not made)" in out  # the limit's table: from where on nothing is known
+    assert "6 of 6 runs have not been made yet" in words_of(page_of(tmp_path / "out"))
+    page = words_of(page_of(tmp_path / "out").body)
+    assert "failed" not in page
+    assert " ." not in page
+    assert yawbench(file, "out")[0] == 1  # twenty is too much
+    status, out, said = yawbench(file, "out", "--no-run")
+    assert (status, "not made" in out + said) == (1, False)
+    assert "level 20" in said
+    assert "failed: controller" in said
+
+
+def test_every_count_on_the_page_of_a_sweep_is_that_of_its_runs(moods, yawbench, tmp_path):
+    assert yawbench(moods(1, 2, 20, count=4), "out")[0] == 1
+    page = page_of(tmp_path / "out")
+    told = {
+        words_of(one).split()[0]: int(words_of(one).split()[-1])
+        for one in page.xpath("//details[@class='group']/summary")
+        if words_of(one).startswith(("Runs", "FMUs"))
+    }
+    rows = list(csv.DictReader((tmp_path / "out" / "table.csv").open()))
+    assert told == {"Runs": len(rows), "FMUs": 2}
+    fmus = page.xpath("//table[@class='fmus']/tbody/tr")
+    assert len(fmus) == told["FMUs"]
+    (runs,) = page.xpath("//table[@class='runs']")
+    headings = [words_of(one) for one in runs.xpath("./thead/tr/th")]
+    (cells,) = ([words_of(one) for one in row] for row in runs.xpath("./tbody/tr"))
+    counts = dict(zip(headings, cells, strict=True))
+    assert {key: counts[key] for key in ("completed", "failed")} == {
+        status: str(sum(row["status"] == status for row in rows)) for status in ("completed", "failed")
+    }
+    assert f"({len(rows)} runs)" in words_of(page)
+    assert "yawbench 0" in words_of(page).partition("To repeat this")[2].partition("Made by")[0]

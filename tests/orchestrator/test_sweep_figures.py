@@ -145,7 +145,7 @@ def test_a_map_has_a_cell_per_run_a_cross_where_it_failed_and_the_edge_of_the_ma
     crosses = [line for line in with_.get_lines() if line.get_marker() == "x"]
     assert crosses[0].get_xydata().tolist() == [[0.2, 72.0]]
     assert bar.get_ylabel() == "Largest sideslip in °"
-    assert legend(drawn) == ["beyond this line more than 10.0 °", "no number: failed, or never"]
+    assert legend(drawn) == ["beyond this line more than 10.0 °", "no number: failed, not made, or never"]
 
 
 def test_curves_have_a_panel_per_level_and_only_those_that_are_asked_for(swept):
