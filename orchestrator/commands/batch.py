@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from ..errors import Interrupted
 from ..wording import counted, printable
 
 if TYPE_CHECKING:
@@ -58,12 +59,16 @@ def pooled(context: typer.Context, wishes: Wishes) -> Each:
 
 @contextlib.contextmanager
 def stoppable(folder: Path) -> Iterator[None]:
-    """Let Ctrl-C end the command with a word on what has been recorded."""
+    """Let Ctrl-C and SIGTERM end the command with a word on what has been recorded.
+
+    Raises:
+        Interrupted: with that word.
+    """
     try:
         yield
-    except KeyboardInterrupt:
-        say(f"Interrupted; what was recorded until then: {folder}")
-        raise typer.Exit(1) from None
+    except KeyboardInterrupt as error:
+        number = Interrupted.of(error).number
+        raise Interrupted(f"Interrupted; what was recorded until then: {folder}", number=number) from None
 
 
 def make(title: str, jobs: Sequence[Job], wishes: Wishes, journal: Journal | None = None) -> list[Outcome]:
