@@ -52,9 +52,9 @@ def pooled(context: typer.Context, wishes: Wishes) -> Each:
     Raises:
         YawbenchError: this process may not open as many files as that takes.
     """
-    from ..experiments.workers import pool
+    from ..experiments.pool import Pool
 
-    return context.with_resource(pool(wishes.jobs)).map
+    return context.with_resource(Pool(wishes.jobs)).map
 
 
 @contextlib.contextmanager

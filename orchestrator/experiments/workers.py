@@ -12,7 +12,6 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing import forkserver, resource_tracker
@@ -39,6 +38,7 @@ processes; each takes a pipe for its report and one that tells of its end."""
 TRIES = 2
 """Times that a run is begun whose process dies; chosen: a kill from outside strikes seldom twice."""
 NEEDED = (
+    "orchestrator.quiet",
     "orchestrator.wiring.make_plan",
     "orchestrator.master.simulate",
     "orchestrator.experiments.figures",
@@ -48,7 +48,7 @@ NEEDED = (
     "matplotlib.mathtext",
     "pyarrow.csv",
 )
-"""Modules that take long to import."""
+"""What runs need: modules that take long to import, after one that keeps the server quiet."""
 FOR_TESTS = ("scipy.signal", "orchestrator.evaluation.dwell_run")
 """Likewise, where runs are judged by a standard test."""
 
@@ -86,7 +86,7 @@ def execute(
         YawbenchError: this process may not open as many files as that takes.
     """
     limit = max(1, workers or default_workers())
-    context = _context(limit, FOR_TESTS if any(job.test for job in jobs) else ())
+    context = context_of(limit, FOR_TESTS if any(job.test for job in jobs) else ())
     outcomes: dict[int, Outcome] = {}
     waiting = deque((number, job, TRIES) for number, job in enumerate(jobs))
     running: list[_Running] = []
@@ -115,21 +115,7 @@ def execute(
                 one.end()
 
 
-def pool(workers: int | None = None) -> ProcessPoolExecutor:
-    """Return an executor for work that cannot fail as FMUs can: reading results, drawing figures.
-
-    Raises:
-        YawbenchError: this process may not open as many files as that takes.
-    """
-    limit = max(1, workers or default_workers())
-    return ProcessPoolExecutor(
-        limit,
-        mp_context=_context(limit),
-        initializer=_end_with_caller,
-    )
-
-
-def _context(workers: int, needed: Sequence[str] = ()) -> Any:
+def context_of(workers: int, needed: Sequence[str] = ()) -> Any:
     """Return how processes start: from a server that has imported once what each needs, or afresh."""
     _require_files(FILES + FILES_EACH * max(workers, default_workers()))
     if "forkserver" not in multiprocessing.get_all_start_methods() or not _has_place_for_sockets():
@@ -209,7 +195,7 @@ class _Running:
     def start(cls, number: int, job: Job, tries: int, context: Any, run: Callable[[Job], Any]) -> _Running:
         ours, theirs = context.Pipe(duplex=False)
         process = context.Process(target=_work, args=(job, run, theirs), daemon=True)
-        _start(process)
+        start(process)
         theirs.close()
         return cls(number, job, tries, process, ours)
 
@@ -232,7 +218,7 @@ class _Running:
         self.process.join()
 
 
-def _start(process: Any) -> None:
+def start(process: Any) -> None:
     """Start a process, from a daemonic one as well.
 
     Daemonic processes may have no children because they could leave orphans; ours end with their caller.
@@ -248,7 +234,7 @@ def _start(process: Any) -> None:
 
 def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:
     """Do one job in a process of its own and report how it ended."""
-    _end_with_caller()
+    end_with_caller()
     os.environ.pop(SAFE_PATH, None)  # what an FMU starts may need its own folder
     if hasattr(os, "setpgrp"):
         os.setpgrp()  # Ctrl-C on the terminal is for the caller, who ends this process
@@ -265,7 +251,7 @@ def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:
     pipe.close()
 
 
-def _end_with_caller() -> None:
+def end_with_caller() -> None:
     """Let this process get SIGTERM when the caller has ended, however it did (Linux).
 
     The pipe that tells of it asks for the signal; a thread that waits for it could not be forked.
