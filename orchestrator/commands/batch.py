@@ -157,7 +157,7 @@ def bar(title: str, total: int, done: int = 0, *, quiet: bool = False) -> Iterat
     )  # fmt: skip
     # time left from the pace of the last runs; they differ less than their number
     with Progress(*columns, console=Console(stderr=True), transient=True, speed_estimate_period=120) as shown:
-        task = shown.add_task(title.replace("[", r"\["), total=total, completed=done)
+        task = shown.add_task(printable(title).replace("[", r"\["), total=total, completed=done)
         yield lambda count: shown.update(task, completed=count)
 
 
