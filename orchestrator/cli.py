@@ -138,8 +138,7 @@ def _status(arguments: Sequence[str]) -> int:
     try:
         try:
             with _interruptible():
-                application = _application(arguments)
-            application(arguments)
+                _application(arguments)(arguments)
         except SystemExit as ended:
             return ended.code if isinstance(ended.code, int) else int(ended.code is not None)
         finally:
