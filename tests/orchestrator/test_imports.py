@@ -30,6 +30,7 @@ STAGES = (
         "writing",
         "processes",
         "spawning",
+        "quiet",
     },  # what all share
     {"scenario"},
     {"fmu"},
