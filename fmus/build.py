@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from components.fmi.roles import ROLES
-from orchestrator.cache import draft_of
 from orchestrator.errors import BuildError
+from orchestrator.writing import draft_of, remove_draft
 
 from .c.c_recipe import CRecipe, find_c_components
 from .check import defects, reference_files
@@ -198,6 +198,7 @@ def bring_up_to_date(recipe: Recipe, target: Path, mark: Mark, force: bool = Fal
     Raises:
         BuildError: each problem begins with the FMU's name.
     """
+    remove_draft(target)
     try:
         mark = replace(mark, key=recipe.key(), tool=TOOL)
         if not force and read_mark(target) == mark:

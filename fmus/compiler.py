@@ -16,6 +16,7 @@ from pathlib import Path
 
 from orchestrator.cache import keep, recall
 from orchestrator.errors import BuildError
+from orchestrator.wording import printable
 
 HERE = Path(__file__).resolve().parent
 SOURCES = ("launcher.c", "fmi2.h", "find_python.h", "text.h")
@@ -71,7 +72,7 @@ def compile_library(command: Sequence[str], sources: Mapping[str, bytes], *argum
             lines = [line for line in done.stderr.splitlines() if "error" in line or "undefined" in line]
             raise BuildError(lines or [f"the C compiler failed: exit status {done.returncode}"])
         if done.stderr:
-            print(done.stderr.rstrip(), file=sys.stderr)
+            print(printable(done.stderr.rstrip()), file=sys.stderr)
         return Path(temporary, "made.so").read_bytes()
 
 

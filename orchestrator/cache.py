@@ -21,7 +21,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import ModelDescriptionError
-from .writing import write_whole
+from .writing import fcntl, write_whole
 
 _PLAIN_PATH = re.compile(r"[A-Za-z0-9_.~/\\: -]+")
 KEEP_DAYS = 60
@@ -71,6 +71,45 @@ def cache_folder() -> Path:
             if os.access(folder, os.W_OK | os.X_OK):
                 return folder
     raise ModelDescriptionError("no folder for the cache can be written; name one in YAWBENCH_CACHE")
+
+
+_held: dict[Path, int] = {}
+"""Folders of the cache that this process uses, and the descriptors of its locks."""
+
+
+def hold(folder: Path) -> None:
+    """Keep a folder of the cache from being cleared until this process has ended; it is made if need be."""
+    if fcntl is None or folder in _held:
+        return
+    with contextlib.suppress(OSError):  # what cannot be locked is not cleared either
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        descriptor = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_SH)
+        except OSError:
+            os.close(descriptor)
+            raise
+        _held[folder] = descriptor
+
+
+@contextlib.contextmanager
+def alone_in(folder: Path) -> Iterator[bool]:
+    """Keep others from using a folder of the cache while the block runs; yield whether nobody does."""
+    if fcntl is None:
+        yield True
+        return
+    if folder in _held:
+        os.close(_held.pop(folder))
+    descriptor = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            yield False
+        else:
+            yield True
+    finally:
+        os.close(descriptor)
 
 
 def _wanted() -> Path | None:
@@ -148,21 +187,3 @@ def content_of(file: Path) -> bytes | None:
 
 def _hash(content: bytes) -> bytes:
     return hashlib.sha256(content).hexdigest()[:_DIGITS].encode()
-
-
-@contextlib.contextmanager
-def draft_of(file: Path, content: bytes) -> Iterator[Path]:
-    """Write `content` beside `file`, for whoever looks at it before it is put in its place."""
-    with tempfile.NamedTemporaryFile(dir=file.parent, prefix=".", suffix=".draft", delete=False) as draft:
-        path = Path(draft.name)
-        try:
-            draft.write(content)
-            draft.flush()
-            os.fsync(draft.fileno())
-        except OSError:
-            path.unlink(missing_ok=True)
-            raise
-    try:
-        yield path
-    finally:
-        path.unlink(missing_ok=True)

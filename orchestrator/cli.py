@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import importlib
 import io
 import os
@@ -10,13 +11,14 @@ import sys
 import threading
 import traceback
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
-from .errors import RecordWarning, YawbenchError
+from .errors import Interrupted, RecordWarning, YawbenchError
+from .master.interrupts import terminable
 from .wording import cut, printable
 
 COMMANDS = (
@@ -47,11 +49,36 @@ COMMANDS = (
 """Each a module of `orchestrator.commands` with a function of the same name, `_` for `-`."""
 
 
+class _Commands(TyperGroup):
+    """All commands. What ends one of them from outside is told here, for typer tells SIGTERM as Ctrl-C."""
+
+    def make_context(self, *given: Any, **options: Any) -> Any:
+        with _interruptible():
+            return super().make_context(*given, **options)
+
+    def invoke(self, context: Any) -> Any:
+        with _interruptible():
+            return super().invoke(context)
+
+
+@contextlib.contextmanager
+def _interruptible() -> Iterator[None]:
+    """Let Ctrl-C and SIGTERM end the program with a word and an exit status that tells them apart."""
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        interrupted = Interrupted.of(error)
+        _print_traceback(error)
+        _say(interrupted.problems)
+        raise SystemExit(interrupted.exit_status) from None
+
+
 def _application(arguments: Sequence[str] = ()) -> typer.Typer:
     """Return the program with the command that is called, or with all if none is, as for help."""
     called = arguments[:1] if arguments and arguments[0] in COMMANDS else COMMANDS
     app = typer.Typer(
         name="yawbench",
+        cls=_Commands,
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
@@ -84,13 +111,16 @@ def _options(
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit with 0, 1 (the run failed) or 2 (the input is wrong).
 
+    If Ctrl-C or SIGTERM ends it, with 130 or 143.
+
     Without arguments, this is the program: it takes them from its call, and leaves at once.
     """
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # of others; to look for them takes time
     _make_printable()
     if not os.environ.get(TRACEBACK):  # what a library's objects complain of when they go is for nobody
         sys.unraisablehook = lambda _: None
-    status = _status(sys.argv[1:] if arguments is None else arguments)
+    with terminable():
+        status = _status(sys.argv[1:] if arguments is None else arguments)
     if arguments is None and threading.active_count() == 1:
         # To take the interpreter apart takes as long as a short command.
         atexit._run_exitfuncs()
@@ -108,7 +138,7 @@ def _status(arguments: Sequence[str]) -> int:
         return 2
     try:
         try:
-            with _warnings_as_notes():
+            with _interruptible(), _warnings_as_notes():
                 _application(arguments)(arguments)
         except SystemExit as ended:
             return ended.code if isinstance(ended.code, int) else int(ended.code is not None)
@@ -116,8 +146,7 @@ def _status(arguments: Sequence[str]) -> int:
             sys.stdout.flush()
     except YawbenchError as error:
         _print_traceback(error)
-        for problem in error.problems:
-            print(cut(printable(problem), SAID), file=sys.stderr)
+        _say(error.problems)
         return error.exit_status
     except BrokenPipeError:  # whoever read it has seen enough
         pass
@@ -133,7 +162,7 @@ def _status(arguments: Sequence[str]) -> int:
     return 1
 
 
-@contextmanager
+@contextlib.contextmanager
 def _warnings_as_notes() -> Iterator[None]:
     """Say warnings of our own as every note is said; others stay as Python shows them."""
     with warnings.catch_warnings():
@@ -156,11 +185,16 @@ TRACEBACK = "YAWBENCH_TRACEBACK"
 """Environment variable; if it is set, errors are shown with where in the program they come from."""
 
 
-def _print_traceback(error: Exception) -> bool:
+def _say(problems: Iterable[str]) -> None:
+    for problem in problems:
+        print(cut(printable(problem), SAID), file=sys.stderr)
+
+
+def _print_traceback(error: BaseException) -> bool:
     """Show where an error and what it was made of come from, if that is asked for; return whether."""
     wanted = bool(os.environ.get(TRACEBACK))
     if wanted:
-        traceback.print_exception(error)
+        print(printable("".join(traceback.format_exception(error))), end="", file=sys.stderr)
     return wanted
 
 

@@ -8,12 +8,16 @@
     ├── BuildError                1   a component cannot be made into an FMU
     └── SimulationError           1   a run failed; knows unit and time
 
+`Interrupted` (Ctrl-C, SIGTERM) is not part of it: it is a KeyboardInterrupt, so code that goes on after an
+error does not go on after Ctrl-C.
+
 All problems of one file are collected and raised once. Each is a sentence that says where, what,
 and what is allowed.
 """
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -164,3 +168,31 @@ class SimulationError(YawbenchError):
         self.unit = unit
         self.time = time
         self.findings: tuple[Finding, ...] = ()  # on the run's course until then
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C or SIGTERM, which has ended a run of `unit` (None: between two calls) at `time` [s]."""
+
+    def __init__(
+        self,
+        problem: str | Iterable[str] = "Interrupted",
+        *,
+        unit: str | None = None,
+        time: float | None = None,
+        number: int = signal.SIGINT,
+    ) -> None:
+        self.problems = [Problem(one) for one in ([problem] if isinstance(problem, str) else problem)]
+        self.unit = unit
+        self.time = time
+        self.number = number
+        super().__init__("\n".join(self.problems))
+
+    @property
+    def exit_status(self) -> int:
+        """As shells have it: 130 after Ctrl-C, 143 after SIGTERM."""
+        return 128 + self.number
+
+    @classmethod
+    def of(cls, error: KeyboardInterrupt) -> Interrupted:
+        """Return the error itself, or one that stands for a plain KeyboardInterrupt."""
+        return error if isinstance(error, cls) else cls()

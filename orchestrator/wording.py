@@ -43,6 +43,7 @@ def cut(text: str, longest: int = 200) -> str:
 _UNPRINTABLE = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f"  # control characters but tab and line feed
     "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff"  # what turns the direction of text, or hides
+    "\ufffe\uffff"  # what XML does not allow
     "\ud800-\udfff]"  # halves of characters
 )
 

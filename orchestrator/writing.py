@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 try:
@@ -80,3 +81,41 @@ def claim(path: Path, *, wait: bool = False) -> int:
             if os.path.samestat(os.fstat(descriptor), os.stat(path)):
                 return descriptor
         os.close(descriptor)  # the one who held it has renamed or removed it
+
+
+@contextlib.contextmanager
+def draft_of(file: Path, content: bytes) -> Iterator[Path]:
+    """Write `content` beside `file`, for whoever looks at it before it is put in its place.
+
+    Who else makes a draft of the same file waits. What a dead process has left is overwritten.
+    """
+    path = _draft(file)
+    descriptor = claim(path, wait=True)
+    try:
+        os.ftruncate(descriptor, 0)
+        with os.fdopen(os.dup(descriptor), "wb") as draft:
+            draft.write(content)
+            draft.flush()
+            os.fsync(draft.fileno())
+        if fcntl is None:
+            os.close(descriptor)
+        yield path
+    finally:
+        path.unlink(missing_ok=True)
+        if fcntl is not None:
+            os.close(descriptor)
+
+
+def remove_draft(file: Path) -> None:
+    """Remove the draft of a file that a dead process has left."""
+    path = _draft(file)
+    if not path.is_file():
+        return
+    with contextlib.suppress(OSError):
+        descriptor = claim(path)
+        path.unlink(missing_ok=True)
+        os.close(descriptor)
+
+
+def _draft(file: Path) -> Path:
+    return file.with_name(f".{file.name}.draft")

@@ -26,7 +26,7 @@ from orchestrator.results.read import Results
 from orchestrator.scenario.quantities import number_and_unit
 from orchestrator.scenario.strict import Model, validate
 from orchestrator.scenario.yaml_lines import Document
-from orchestrator.wording import hint
+from orchestrator.wording import hint, printable
 
 from .making import make_all
 from .run import Run, shown_in_notebooks
@@ -233,5 +233,5 @@ def _bar(title: str, total: int, *, shown: bool) -> Iterator[Callable[[Outcome],
     from rich.progress import Progress
 
     with Progress() as bar:
-        task = bar.add_task(title.replace("[", r"\["), total=total)
+        task = bar.add_task(printable(title).replace("[", r"\["), total=total)
         yield lambda outcome: bar.advance(task)

@@ -165,7 +165,7 @@ def _component(given: Any, role: str) -> type[Component]:
     """Return the component class that a function, an object or a class stands for."""
     if isinstance(given, type):
         if issubclass(given, Component):
-            return given
+            return _reporting(given)
         raise ScenarioError(f"{_name(given)} is a class; give an object of it, {_name(given)}()")
     if hasattr(given, "output"):
         return _of_object(given)
@@ -255,9 +255,21 @@ def _class(
     return type(_name(given), (Component,), members)
 
 
+def _reporting(component: type[Component]) -> type[Component]:
+    """Return a component class that tells what its code raises, otherwise the same."""
+    same = {name: getattr(component, name) for name in ("__doc__", "__module__", "fmu_name")}
+    return type(component.__name__, (component,), {**same, "_fail": _fail})
+
+
 def _fail(self: Any, what: str, t: float) -> None:
-    """Remember the exception for whoever started the run, then do what every component does."""
-    self.error = self.__dict__.get("error") or sys.exc_info()[1]
+    """Remember the exception for whoever started the run, then do what every component does.
+
+    What no error is (Ctrl-C, exit) is not for the run: it goes on to the caller.
+    """
+    error = sys.exc_info()[1]
+    if error is not None and not isinstance(error, Exception):
+        raise error
+    self.error = self.__dict__.get("error") or error
     Component._fail(self, what, t)
 
 

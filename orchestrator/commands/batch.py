@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from ..errors import Interrupted
 from ..wording import counted, printable
 
 if TYPE_CHECKING:
@@ -51,19 +52,23 @@ def pooled(context: typer.Context, wishes: Wishes) -> Each:
     Raises:
         YawbenchError: this process may not open as many files as that takes.
     """
-    from ..experiments.workers import pool
+    from ..experiments.pool import Pool
 
-    return context.with_resource(pool(wishes.jobs)).map
+    return context.with_resource(Pool(wishes.jobs)).map
 
 
 @contextlib.contextmanager
 def stoppable(folder: Path) -> Iterator[None]:
-    """Let Ctrl-C end the command with a word on what has been recorded."""
+    """Let Ctrl-C and SIGTERM end the command with a word on what has been recorded.
+
+    Raises:
+        Interrupted: with that word.
+    """
     try:
         yield
-    except KeyboardInterrupt:
-        say(f"Interrupted; what was recorded until then: {folder}")
-        raise typer.Exit(1) from None
+    except KeyboardInterrupt as error:
+        number = Interrupted.of(error).number
+        raise Interrupted(f"Interrupted; what was recorded until then: {folder}", number=number) from None
 
 
 def make(title: str, jobs: Sequence[Job], wishes: Wishes, journal: Journal | None = None) -> list[Outcome]:
@@ -152,7 +157,7 @@ def bar(title: str, total: int, done: int = 0, *, quiet: bool = False) -> Iterat
     )  # fmt: skip
     # time left from the pace of the last runs; they differ less than their number
     with Progress(*columns, console=Console(stderr=True), transient=True, speed_estimate_period=120) as shown:
-        task = shown.add_task(title.replace("[", r"\["), total=total, completed=done)
+        task = shown.add_task(printable(title).replace("[", r"\["), total=total, completed=done)
         yield lambda count: shown.update(task, completed=count)
 
 

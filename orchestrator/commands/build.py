@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from .batch import say
 
 Components = Annotated[
     list[str] | None,
@@ -32,7 +33,7 @@ def build(components: Components = None, out: Target = None, force: Force = Fals
 
     target = out or place_of(HERE)
     if out is None and target != HERE:
-        print(f"FMUs go to {target}", file=sys.stderr)
+        say(f"FMUs go to {target}")
 
     from orchestrator.wording import hint
 
@@ -48,20 +49,20 @@ def build(components: Components = None, out: Target = None, force: Force = Fals
         if not Path(name).exists():
             raise typer.BadParameter(f"{name}: there is no such file; name a component or its Python file")
         fmu = build_component(Path(name), target, force=force)
-        print(f"{fmu.stem}: built from {name}", file=sys.stderr)
+        say(f"{fmu.stem}: built from {name}")
     names = [name for name in named if name in known]
     if named and not names:
         return
     report = build_all(target, components=names or None, force=force, progress=tell_of_build)
     if report.warning:
         why = f"these FMUs load in Python only, they have no launcher: {report.warning}"
-        print(f"warning: {why}", file=sys.stderr)
+        say(f"warning: {why}")
     if report.current:
         total = len(report.built) + len(report.current)
-        print(f"{len(report.current)} of {total} FMUs up to date", file=sys.stderr)
+        say(f"{len(report.current)} of {total} FMUs up to date")
 
 
 def tell_of_build(name: str, what: str) -> None:
     """Say what became of an FMU, unless nothing had to be done."""
     if what != "current":
-        print(f"{name}: {what}", file=sys.stderr)
+        say(f"{name}: {what}")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..wording import printable
 from .batch import say
 from .options import CHANGES, MAKING, ScenarioFile, Wishes, takes
 from .planning import plan_of_scenario
@@ -133,7 +134,7 @@ def _bar(title: str) -> Iterator[Callable[[int, int], None] | None]:
     console = Console(stderr=True)
     with Progress(*columns, console=console, auto_refresh=False, transient=True) as bar:
         shown = textwrap.shorten(title, max(10, console.width - BESIDE), placeholder="…")
-        task = bar.add_task(shown.replace("[", r"\["), total=None)
+        task = bar.add_task(printable(shown).replace("[", r"\["), total=None)
 
         def report(done: int, total: int) -> None:
             bar.update(task, completed=done, total=total, refresh=True)

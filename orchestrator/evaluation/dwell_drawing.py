@@ -53,7 +53,7 @@ def draw_run(trace: Trace, judged: Judgement) -> Figure | None:
         said = f"{title}: {_verdicts(judged)}"
         note = " · ".join(
             [
-                *filter(None, [trace.title, str(trace.folder or trace.label)]),
+                *filter(None, [trace.title, trace.name]),
                 "first half wave positive, signals filtered and zeroed as UN R140 says",
                 *judged.notes,
             ]

@@ -57,7 +57,7 @@ def draw_run(trace: Trace, judged: Judgement) -> Figure:
         entry = judged["entry"]
         ruling = judged.rulings[CLEAN]
         speed = "" if entry is None else f", {3.6 * entry:.1f} km/h at the first cones"
-        note = " · ".join([*filter(None, [trace.title, str(trace.folder or trace.label)]), *judged.notes])
+        note = " · ".join([*filter(None, [trace.title, trace.name]), *judged.notes])
         frame(
             figure, 1.45 * sum(heights), [], f"Lane change{speed}: {ruling.verdict.value}, {ruling.why}", note
         )

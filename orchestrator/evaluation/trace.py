@@ -62,6 +62,11 @@ class Trace:
     folder: Path | None = None  # where it lies
     title: str = ""
 
+    @property
+    def name(self) -> str:
+        """What figures call it: the name of its folder, wherever that is, or its label."""
+        return (self.folder.name if self.folder else "") or self.label
+
     def __contains__(self, name: object) -> bool:
         return name in self.signals
 

@@ -11,12 +11,9 @@ import asyncio
 import contextlib
 import itertools
 import logging
-import multiprocessing
 import os
 import platform
-import signal
 import tempfile
-import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from importlib.metadata import version
@@ -27,6 +24,7 @@ import distributed
 
 from ..errors import ResultsError, ScenarioError
 from ..fmu.archive import open_fmu, read_archive
+from ..master.interrupts import terminable
 from ..plan import Plan
 from ..sources import OF_METRICS, sources_hash
 from ..wording import listed
@@ -56,7 +54,7 @@ def run_on_cluster(jobs: Sequence[Job], done: Told, *, scheduler: str) -> None:
         KeyboardInterrupt: Ctrl-C or SIGTERM.
     """
     fmus = {unit.fmu.sha256: unit.fmu for job in jobs if job.plan for unit in job.plan.units}
-    with _connected(scheduler) as client, _told_to_end():
+    with _connected(scheduler) as client, terminable():
         threads = _check_workers(client, scheduler)
         client.register_plugin(_Archives({digest: read_archive(fmu.path) for digest, fmu in fmus.items()}))
         _submit_all(client, jobs, done, scheduler, AHEAD * threads)
@@ -101,7 +99,6 @@ def _make(job: Job) -> Outcome:
     """Make a run on a worker, in a process of its own."""
     assert job.plan is not None
     here = replace(job, plan=_unpacked_here(job.plan))
-    multiprocessing.current_process().daemon = False  # daemons may have no children
     (outcome,) = execute([here], workers=1)
     return replace(outcome, job=replace(job, plan=None))  # the plan is known where it came from
 
@@ -188,16 +185,3 @@ def versions() -> dict[str, str]:
 
 ours = versions
 """What the workers' versions are compared with."""
-
-
-@contextlib.contextmanager
-def _told_to_end() -> Iterator[None]:
-    """Let SIGTERM end the block as Ctrl-C does."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    earlier = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, earlier)

@@ -9,18 +9,19 @@ import signal
 import sys
 import tempfile
 import time
+import traceback
 from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-from ..errors import YawbenchError
+from ..errors import Interrupted, YawbenchError
 from ..master.interrupts import StopFlag, interrupts
 from ..spawning import SAFE_PATH, SafeSpawnContext, no_script, safe_path
+from ..wording import printable
 from .jobs import Job, Outcome, run_job
 
 GRACE = 5.0
@@ -37,6 +38,7 @@ processes; each takes a pipe for its report and one that tells of its end."""
 TRIES = 2
 """Times that a run is begun whose process dies; chosen: a kill from outside strikes seldom twice."""
 NEEDED = (
+    "orchestrator.quiet",
     "orchestrator.wiring.make_plan",
     "orchestrator.master.simulate",
     "orchestrator.experiments.figures",
@@ -46,7 +48,7 @@ NEEDED = (
     "matplotlib.mathtext",
     "pyarrow.csv",
 )
-"""Modules that take long to import."""
+"""What runs need: modules that take long to import, after one that keeps the server quiet."""
 FOR_TESTS = ("scipy.signal", "orchestrator.evaluation.dwell_run")
 """Likewise, where runs are judged by a standard test."""
 
@@ -80,11 +82,11 @@ def execute(
             outcome's value.
 
     Raises:
-        KeyboardInterrupt: Ctrl-C or SIGTERM, when all runs have ended.
+        Interrupted: Ctrl-C or SIGTERM, when all runs have ended.
         YawbenchError: this process may not open as many files as that takes.
     """
     limit = max(1, workers or default_workers())
-    context = _context(limit, FOR_TESTS if any(job.test for job in jobs) else ())
+    context = context_of(limit, FOR_TESTS if any(job.test for job in jobs) else ())
     outcomes: dict[int, Outcome] = {}
     waiting = deque((number, job, TRIES) for number, job in enumerate(jobs))
     running: list[_Running] = []
@@ -105,7 +107,7 @@ def execute(
                         continue
                     outcomes[one.number] = outcome
                     done(outcome)
-            raise KeyboardInterrupt
+            raise Interrupted(number=stop.number)
         finally:
             for one in running:
                 one.process.terminate()  # a run writes what it has recorded
@@ -113,21 +115,7 @@ def execute(
                 one.end()
 
 
-def pool(workers: int | None = None) -> ProcessPoolExecutor:
-    """Return an executor for work that cannot fail as FMUs can: reading results, drawing figures.
-
-    Raises:
-        YawbenchError: this process may not open as many files as that takes.
-    """
-    limit = max(1, workers or default_workers())
-    return ProcessPoolExecutor(
-        limit,
-        mp_context=_context(limit),
-        initializer=_end_with_caller,
-    )
-
-
-def _context(workers: int, needed: Sequence[str] = ()) -> Any:
+def context_of(workers: int, needed: Sequence[str] = ()) -> Any:
     """Return how processes start: from a server that has imported once what each needs, or afresh."""
     _require_files(FILES + FILES_EACH * max(workers, default_workers()))
     if "forkserver" not in multiprocessing.get_all_start_methods() or not _has_place_for_sockets():
@@ -146,6 +134,19 @@ def _context(workers: int, needed: Sequence[str] = ()) -> Any:
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, earlier)
     return context
+
+
+def _forget_server() -> None:
+    """Let a copy of this process that somebody forks start a server of its own; it cannot wait for ours."""
+    server: Any = forkserver._forkserver  # type: ignore[attr-defined]
+    alive = server._forkserver_alive_fd
+    if alive is not None:
+        os.close(alive)
+        server._forkserver_address = server._forkserver_alive_fd = server._forkserver_pid = None
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_server)
 
 
 def _require_files(needed: int) -> None:
@@ -194,7 +195,7 @@ class _Running:
     def start(cls, number: int, job: Job, tries: int, context: Any, run: Callable[[Job], Any]) -> _Running:
         ours, theirs = context.Pipe(duplex=False)
         process = context.Process(target=_work, args=(job, run, theirs), daemon=True)
-        process.start()
+        start(process)
         theirs.close()
         return cls(number, job, tries, process, ours)
 
@@ -217,28 +218,40 @@ class _Running:
         self.process.join()
 
 
+def start(process: Any) -> None:
+    """Start a process, from a daemonic one as well.
+
+    Daemonic processes may have no children because they could leave orphans; ours end with their caller.
+    """
+    settings = multiprocessing.current_process()._config  # type: ignore[attr-defined]
+    daemonic = settings.pop("daemon", None)
+    try:
+        process.start()
+    finally:
+        if daemonic is not None:
+            settings["daemon"] = daemonic
+
+
 def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:
     """Do one job in a process of its own and report how it ended."""
-    from ..master.master import Interrupted
-
-    _end_with_caller()
+    end_with_caller()
     os.environ.pop(SAFE_PATH, None)  # what an FMU starts may need its own folder
     if hasattr(os, "setpgrp"):
         os.setpgrp()  # Ctrl-C on the terminal is for the caller, who ends this process
     try:
         report: tuple[int, list[str], Any, bool] = (0, [], run(job), False)
-    except YawbenchError as error:
+    except (YawbenchError, Interrupted) as error:
         told = isinstance(error, Interrupted)
         report = (error.exit_status, [*error.problems] or [type(error).__name__], None, told)
     except BaseException as error:
-        sys.excepthook(type(error), error, error.__traceback__)
+        print(printable("".join(traceback.format_exception(error))), file=sys.stderr)
         report = (1, [f"{type(error).__name__}: {error}"], None, False)
     with suppress(BrokenPipeError):  # the caller was killed
         pipe.send(report)
     pipe.close()
 
 
-def _end_with_caller() -> None:
+def end_with_caller() -> None:
     """Let this process get SIGTERM when the caller has ended, however it did (Linux).
 
     The pipe that tells of it asks for the signal; a thread that waits for it could not be forked.

@@ -27,7 +27,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
-from ..cache import KEEP_DAYS, cache_folders
+from ..cache import KEEP_DAYS, cache_folders, hold
 from ..errors import ModelDescriptionError
 from ..files import PACKED, TooLargeError, check_archive, read_bytes, reason
 from ..plan import Fmu
@@ -60,6 +60,7 @@ def open_fmu(path: Path | str, *, validate: bool = True) -> Fmu:
     name = f"{hashlib.sha256(raw).hexdigest()[:32]}-{FORMAT}"
     problem: ModelDescriptionError | None = None
     for folder in cache_folders():
+        hold(folder)
         try:
             fmu = _load(folder / name, path) or _unpack(raw, folder / name, path)
         except OSError as error:

@@ -16,7 +16,7 @@ import fmus
 from ..errors import ModelDescriptionError
 from ..plan import Built, Fmu
 from ..scenario.overrides import is_path
-from ..wording import closest, listed, short
+from ..wording import closest, listed, printable, short
 from .archive import open_fmu
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ HOME = Path(fmus.__file__).resolve().parent
 
 
 def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
+    print(printable(text), file=sys.stderr, flush=True)
 
 
 class Opener:

@@ -23,7 +23,7 @@ import time
 from functools import partial
 from typing import Any
 
-from ..errors import SimulationError
+from ..errors import Interrupted, SimulationError
 from ..plan import Plan, Value
 from ..results.recorder import BLOCK, Block
 from ..wording import listed
@@ -31,7 +31,7 @@ from .course import Course, Opener, Progress
 from .exchange import REPLY, Channel, Garbled, rebuilt
 from .interrupts import StopFlag, stop_requested_at
 from .log import MASTER, WARNING, Log
-from .master import Ended, Interrupted
+from .master import Ended
 from .opening import open_unit
 from .process import Lost, Process
 from .stepping import ENDED, FREE, PROGRESS, ROWS, TAKEN, WHERE, Shared, step_units
@@ -149,7 +149,7 @@ class CourseApart(Course, Process):
     def _ask(self) -> None:
         """Let the process stop, and tell in which unit it is."""
         with contextlib.suppress(OSError):
-            os.write(self._asking, b"?")
+            os.write(self._asking, bytes([self._stop.number]))
 
     def _has_ended(self, within: float) -> bool:
         assert self._process is not None
@@ -171,7 +171,7 @@ class CourseApart(Course, Process):
             os.close(self._asking)
         return self._status
 
-    def _death(self, lost: Lost) -> SimulationError:
+    def _death(self, lost: Lost) -> SimulationError | Interrupted:
         """Return what ends the run when its process did."""
         completed = self._shared.completed.value
         unit, doing = self._where or (None, "step" if completed >= 0 else "initialization")
@@ -185,7 +185,7 @@ class CourseApart(Course, Process):
         elif self._suspects:
             sentence += f"; --isolate tells in which unit (not in Python are {listed(self._suspects)})"
         if self._stop.requested:
-            return Interrupted(f"the run was interrupted: {sentence}", unit=unit, time=now)
+            return self._stop.interrupted(f": {sentence}", unit=unit, time=now)
         return SimulationError(sentence, unit=unit, time=now)
 
     def end(self) -> None:

@@ -13,10 +13,12 @@ import numpy as np
 from ..errors import ResultsError, SimulationError
 from ..plan import Plan, Unit, Value
 from ..results.recorder import BLOCK
+from ..wording import listed
 from .interrupts import StopFlag
 from .log import MASTER, WARNING, Log
 from .master import Ended, Master
 from .slave import Slave
+from .surroundings import Copies, suspects
 
 Progress = Callable[[int, int], None]
 """Called a few times a second with the communication points done and those in all."""
@@ -68,6 +70,7 @@ class Course:
         self._reached = reached
         self._master: Master | None = None
         self._slaves: dict[str, Slave] = {}
+        self._copies = Copies()
 
     def inputs_of(self, unit: str) -> dict[str, Value]:
         """Return the inputs with which a unit was last stepped."""
@@ -80,7 +83,8 @@ class Course:
             for doubt in unit.fmu.doubts():
                 self.log.add(unit.name, WARNING, MASTER, doubt, self.plan.time(0))
             self._slaves[unit.name] = opener(unit, self.log, corrupted)
-        self._master = Master(self.plan, self._slaves, self.log, self._stop, self._reached)
+            self._copies.end()
+        self._master = Master(self.plan, self._slaves, self.log, self._stop, self._reached, self._copies)
         with np.errstate(all="ignore"):  # what is not finite is found by looking, not by warning
             self._master.initialize(self._rows.rows[0], self._rows.others)
             self.passes = self._master.passes
@@ -106,6 +110,7 @@ class Course:
                 master.check_surroundings(since)
                 raise
             master.check_surroundings(since)
+            self._refuse_copies(master.completed)
             now = time.perf_counter()
             if now - reported < REPORT_EVERY:
                 stretch = min(2 * stretch, BLOCK)
@@ -116,6 +121,23 @@ class Course:
         self.flush()
         if self._progress is not None:
             self._progress(total, total)
+
+    def _refuse_copies(self, completed: int) -> None:
+        """Make sure that no unit has copied this process.
+
+        Raises:
+            SimulationError: one has. It would do so in every step, and each copy remains until the run ends.
+        """
+        if not self._copies.made:
+            return
+        time = self.plan.time(completed)
+        among = suspects(self.plan.units)
+        raise SimulationError(
+            f"by t = {time:.9g} s a unit ({listed(among, last='or')}) had copied the process of the run "
+            "(fork), and the copy went on with it; with --isolate it copies its own process alone",
+            unit=among[0] if len(among) == 1 else None,
+            time=time,
+        )
 
     def flush(self) -> None:
         """Hand over all whole rows."""
@@ -144,3 +166,4 @@ class Course:
         """Terminate and free the units."""
         for slave in reversed(self._slaves.values()):
             slave.free()
+            self._copies.end()

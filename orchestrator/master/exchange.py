@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SimulationError, YawbenchError
+from ..errors import Interrupted, YawbenchError
 from .log import KEPT, Log
 
 SET, STEP, GET = 1, 2, 4
@@ -88,6 +88,7 @@ class Channel:
         self.reading = reading
         self.writing = writing
         self._wait = wait
+        self._process = os.getpid()
         self._alone = threading.Lock()  # an FMU may log from a thread of its own
 
     def say(self, byte: bytes) -> None:
@@ -139,6 +140,8 @@ class Channel:
             raise Garbled("what it holds is no record") from None
 
     def _send(self, kind: int, data: bytes) -> None:
+        if os.getpid() != self._process:
+            os._exit(0)  # a copy that an FMU has made of this process
         rest = memoryview(bytes([kind]) + len(data).to_bytes(_LENGTH, "little") + data)
         with self._alone:
             while rest:
@@ -166,17 +169,15 @@ class Channel:
                 os.close(descriptor)
 
 
-def told(error: YawbenchError) -> dict[str, Any]:
+def told(error: YawbenchError | Interrupted) -> dict[str, Any]:
     """Return what there is to tell of an error to another process."""
-    where = {name: value for name, value in vars(error).items() if name in ("unit", "time")}
+    where = {name: value for name, value in vars(error).items() if name in ("unit", "time", "number")}
     return {"kind": type(error).__name__, "problems": error.problems, "where": where}
 
 
-def rebuilt(told: dict[str, Any]) -> YawbenchError:
+def rebuilt(told: dict[str, Any]) -> YawbenchError | Interrupted:
     """Return the error that another process has told of."""
-    kinds = {
-        kind.__name__: kind for base in (YawbenchError, SimulationError) for kind in base.__subclasses__()
-    }
+    kinds = {kind.__name__: kind for kind in (*YawbenchError.__subclasses__(), Interrupted)}
     return kinds.get(told["kind"], YawbenchError)(told["problems"], **told["where"])
 
 

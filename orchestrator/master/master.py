@@ -14,12 +14,13 @@ from __future__ import annotations
 
 import ctypes
 import math
+import os
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from ..errors import SimulationError
+from ..errors import Interrupted, SimulationError
 from ..plan import Plan, Value
 from ..wording import listed
 from .initialization import initialize
@@ -28,14 +29,10 @@ from .log import DISCARD, MASTER, OK, WARNING, Log, describe
 from .memory import Memory
 from .operations import Operation, Programs
 from .slave import Buffers, Slave, Status
-from .surroundings import Surroundings
+from .surroundings import Copies, Surroundings, suspects
 
 ALMOST = 1e-6
 """Part of a step by which an FMU may be short of its end; chosen: rounding of its own times."""
-
-
-class Interrupted(SimulationError):
-    """The run was asked to stop."""
 
 
 class Ended(Exception):
@@ -57,11 +54,13 @@ class Master:
         log: Log,
         stop: StopFlag,
         reached: ctypes.c_int64 | None = None,
+        copies: Copies | None = None,
     ) -> None:
         """Connect the units.
 
         Args:
             reached: gets what `completed` is, for others to see.
+            copies: of this process, since before the units were opened.
         """
         self.plan = plan
         self.log = log
@@ -92,6 +91,7 @@ class Master:
         self._ending: Ended | None = None
         self._points: Iterator[int] = iter(())  # left to be stepped to
         self._surroundings = Surroundings()
+        self._copies = copies or Copies()
 
     def initialize(self, row: np.ndarray, others: list[list[Value]]) -> None:
         """Bring all units to the start, and record it like `advance`.
@@ -126,12 +126,13 @@ class Master:
         calls = {phase: [op.call for op in operations] for phase, operations in self._operations.items()}
         clocks = list(self._clocks.items())
         total, ones, finite = self.memory.now.dot, self._ones, math.isfinite
+        getpid, process = os.getpid, self._copies.process
         take, recorded, time = self.memory.pool.take, self._recorded, self.memory.time
         self._points = iter(range(first, end + 1))
         for k, row in zip(self._points, rows, strict=False):
             if stop.requested:
                 now = self.plan.time(k - 1)
-                raise Interrupted(f"the run was interrupted at t = {now:.9g} s", unit=None, time=now)
+                raise stop.interrupted(f"at t = {now:.9g} s", time=now)
             for period, clock in clocks:
                 if k % period == 0:
                     clock.value = (s + (k - period) * p) / q
@@ -146,6 +147,8 @@ class Master:
             if self._recorded_others:
                 others.append(self._values_of_others())
             self.completed = reached.value = k
+            if getpid() != process:
+                self._copies.end()
         if self._ending is not None:
             raise self._ending
 
@@ -161,8 +164,7 @@ class Master:
         if not self._surroundings.arithmetic_changed():
             return
         time = self.plan.time(since)
-        units = self.plan.units
-        among = [u.name for u in units if u.fmu.compiled] or [u.name for u in units]
+        among = suspects(self.plan.units)
         self._surroundings.restore("", self.log)
         self.completed = self._reached.value = since
         raise SimulationError(
@@ -187,6 +189,7 @@ class Master:
 
     def _check_initialization(self, unit: str, what: str, status: Status) -> None:
         """Judge a call during initialization, where a logged error counts whatever the status is."""
+        self._copies.end()
         self._surroundings.restore(unit, self.log)
         status = self.memory.of[unit].slave.note(status)
         if status > WARNING or self.log.errors(unit):
@@ -195,9 +198,7 @@ class Master:
         if status == WARNING:
             self._note_warning(unit, what)
         if self.stop.requested:
-            raise Interrupted(
-                "the run was interrupted during initialization", unit=None, time=self.plan.time(0)
-            )
+            raise self.stop.interrupted("during initialization", time=self.plan.time(0))
 
     def _answer(self, k: int, call: Callable[[], Status | None], status: Status) -> None:
         """Judge a call of the step from `k` - 1 to `k` that did not return OK."""
@@ -228,10 +229,10 @@ class Master:
         self._ending = self._ending or ending
         deque(self._points, maxlen=0)
 
-    def _failure(self, sentence: str, unit: str, time: float) -> SimulationError:
+    def _failure(self, sentence: str, unit: str, time: float) -> SimulationError | Interrupted:
         """Return what ends the run because of a unit."""
         if self.stop.requested:
-            return Interrupted(f"the run was interrupted: {sentence}", unit=unit, time=time)
+            return self.stop.interrupted(f": {sentence}", unit=unit, time=time)
         return SimulationError(sentence, unit=unit, time=time)
 
     def _note_warning(self, unit: str, what: str) -> None:

@@ -12,7 +12,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from ..errors import KEPT, Problem, ResultsError, SimulationError, YawbenchError
+from ..errors import KEPT, Interrupted, Problem, ResultsError, SimulationError, YawbenchError
 from ..metrics.plausibility import Watch
 from ..plan import Finding, Plan
 from ..results.columnar import MemoryRecorder
@@ -22,11 +22,11 @@ from ..results.key import key_of
 from ..results.read import Results
 from ..results.recorder import Recorder
 from ..results.run_record import run_record
+from ..wording import printable
 from .apart import CourseApart, can_be_apart
 from .course import Course, Opener, Progress
 from .interrupts import StopFlag, interrupts
 from .log import Log, Message
-from .master import Interrupted
 from .opening import open_unit
 
 
@@ -74,8 +74,8 @@ def simulate(
     Raises:
         ScenarioError: there is no such format.
         ModelDescriptionError: an FMU has no library that this computer can load.
-        SimulationError: a unit failed, a wire was not finite, the run was interrupted or the results
-            cannot be written any further.
+        SimulationError: a unit failed, a wire was not finite or the results cannot be written any further.
+        Interrupted: Ctrl-C or SIGTERM.
         ResultsError: nothing can be written to `out`, or the format needs a package that is missing.
     """
     recorder = recorder_of(format)(Path(out), *_columns(plan))
@@ -165,11 +165,11 @@ class Run:
         """Write what there is and why there is no more."""
         with contextlib.suppress(SimulationError):  # the disk may be why; what fits has been kept
             self.course.flush()
-        problems = error.problems if isinstance(error, YawbenchError) else []
+        problems = error.problems if isinstance(error, (YawbenchError, Interrupted)) else []
         if isinstance(error, SimulationError):
             error.findings = self.watch.findings()
         try:
-            self._save("interrupted" if isinstance(error, Interrupted) else "failed", error)
+            self._save("interrupted" if isinstance(error, KeyboardInterrupt) else "failed", error)
         except ResultsError as lost:
             problems += lost.problems
         else:
@@ -184,13 +184,15 @@ class Run:
         if self._apart:  # units that are apart are not waited for long anyway
             return
         doing = "while its units were freed" if self._saved else "inside a unit"
-        error = Interrupted(f"the run was interrupted {doing}", unit=None, time=self.log.time.value)
+        error = self._stop.interrupted(doing, time=self.log.time.value)
+        if self.recorder.place is None:  # the program is somebody else's
+            raise error
         try:
             if not self._saved:
                 self._fail(error)
         finally:
-            where = "" if self.recorder.place is None else f"; results so far: {self.recorder.place}"
-            print(f"yawbench: {error}{where}", file=sys.stderr, flush=True)
+            place = printable(str(self.recorder.place))
+            print(f"yawbench: {error}; results so far: {place}", file=sys.stderr, flush=True)
             os._exit(error.exit_status)
 
     def _save(self, status: str, error: BaseException | None = None) -> None:

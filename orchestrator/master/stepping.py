@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import YawbenchError
+from ..errors import Interrupted, YawbenchError
 from ..plan import Plan, Value
 from ..results.recorder import BLOCK
 from .course import Course, Opener
@@ -82,7 +82,6 @@ class _Rows:
         self._channel = channel
         self._blocks = [list(block) for block in shared.blocks]
         self._given = 0  # blocks
-        self._process = os.getpid()
         self._first = 0
         self.rows = self._blocks[0]
         self.others: list[list[Value]] = _Others(shared)
@@ -91,8 +90,6 @@ class _Rows:
         """Give the first `count` of `rows` away, when those before have been written."""
         if count <= 0:
             return
-        if os.getpid() != self._process:
-            os._exit(0)  # a copy that an FMU has made of this process
         if self._given and self._channel.hear() is None:
             os._exit(1)
         self._channel.send(ROWS, (self._first, count, self.others))
@@ -127,7 +124,6 @@ def step_units(
 
 
 def _make(plan: Plan, opener: Opener, stop: StopFlag, shared: Shared, channel: Channel, asking: int) -> None:
-    process = os.getpid()
     log = Relay(channel, timed=True)
     rows = _Rows(shared, channel)
 
@@ -137,8 +133,6 @@ def _make(plan: Plan, opener: Opener, stop: StopFlag, shared: Shared, channel: C
     course = Course(plan, rows, log, stop, progress, shared.completed)
     _tell_where(channel, asking, stop)
     error = _go(course, opener)
-    if os.getpid() != process:
-        return  # a copy that an FMU has made of this process
     log.finish()
     ending = course.ended and (str(course.ended), course.ended.unit, course.ended.time)
     channel.send(ENDED, (course.passes, ending, error))
@@ -157,7 +151,7 @@ def _go(course: Course, opener: Opener) -> dict[str, Any] | None:
     """Open, initialize, step; return what there is to tell if that fails."""
     try:
         course.go(opener)
-    except YawbenchError as error:
+    except (YawbenchError, Interrupted) as error:
         unit = getattr(error, "unit", None)
         return {**told(error), "inputs": course.inputs_of(unit) if unit else {}}
     except BaseException:
@@ -171,8 +165,8 @@ def _tell_where(channel: Channel, asking: int, stop: StopFlag) -> None:
 
     def answer() -> None:
         with contextlib.suppress(OSError):  # the other side is gone
-            while os.read(asking, 1):
-                stop.request()
+            while number := os.read(asking, 1):
+                stop.request(number[0])
                 channel.send(WHERE, _whereabouts(stepping))
 
     threading.Thread(target=answer, daemon=True).start()

@@ -13,14 +13,16 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import locale
+import mmap
 import os
 import platform
 import signal
 import struct
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
+from ..plan import Unit
 from .log import MASTER, WARNING, Log
 
 _ENVIRONMENT = 64  # bytes; no platform's fenv_t is larger
@@ -69,6 +71,34 @@ class Surroundings:
             for number in _HANDLED:
                 if (handler := signal.getsignal(number)) is not None:  # Python's, whatever C has now
                     signal.signal(number, handler)
+
+
+class Copies:
+    """Ends the copies that a unit makes of this process with `fork` and lets return.
+
+    Each would go on with the run, and a unit that forks in every step would soon fill the machine. The
+    process is looked at once per step.
+    """
+
+    def __init__(self) -> None:
+        self.process = os.getpid()
+        self._made = mmap.mmap(-1, 1)  # shared with them
+
+    def end(self) -> None:
+        """End this process if it is a copy."""
+        if os.getpid() != self.process:
+            self._made[0] = 1
+            os._exit(0)
+
+    @property
+    def made(self) -> bool:
+        """Whether one has been ended."""
+        return bool(self._made[0])
+
+
+def suspects(units: Sequence[Unit]) -> list[str]:
+    """Return the units that may have changed something: those that are compiled, or all if none is."""
+    return [u.name for u in units if u.fmu.compiled] or [u.name for u in units]
 
 
 def flush_output() -> None:

@@ -279,7 +279,7 @@ def test_ctrl_c_ends_a_study_and_keeps_finished_runs(fmus, folder):
             break
     os.killpg(process.pid, signal.SIGINT)
     said = process.stderr.read()
-    assert process.wait() == 1
+    assert process.wait() == 130
     assert said.splitlines()[-1] == "Interrupted; what was recorded until then: o"
     assert json.loads((folder / "o/fuzzy_sideslip/run.json").read_text())["status"] == "completed"
 

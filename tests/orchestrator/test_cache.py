@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -124,3 +126,30 @@ def test_a_cache_that_cannot_be_made_is_passed_over(tmp_path, monkeypatch):
     keep("store", "key", b"two")
     assert recall("store", "key") == b"two"
     assert open_fmu(make_fmu(tmp_path / "a.fmu")).directory.is_relative_to(cache_folder())
+
+
+USER = """
+import sys
+from orchestrator.fmu.archive import open_fmu
+open_fmu(sys.argv[1])
+print("opened", flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs locks on folders")
+def test_nothing_is_deleted_while_another_command_uses_the_cache(full, tmp_path, capsys):
+    command = [sys.executable, "-c", USER, str(tmp_path / "a.fmu")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as user:
+        assert user.stdout is not None
+        assert user.stdout.readline() == "opened\n"
+        before = sorted(full.rglob("*"))
+        with pytest.raises(SystemExit) as ended:
+            main(["cache", "clear"])
+        assert ended.value.code == 1
+        assert f"{full}: another command uses it, so nothing was deleted" in capsys.readouterr().err
+        assert sorted(full.rglob("*")) == before
+        told(capsys, "show")
+        user.communicate()
+    told(capsys, "clear")
+    assert not [one for one in full.iterdir() if one.name != "letters" and any(one.rglob("*"))]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import os
+import signal
 import subprocess
 import sys
 from importlib.metadata import version
@@ -13,6 +15,8 @@ import typer
 
 from orchestrator import cli
 from orchestrator.cli import COMMANDS, _application, main
+from orchestrator.errors import Interrupted, ScenarioError
+from orchestrator.wording import printable
 
 
 def say(capsys, *arguments):
@@ -110,3 +114,40 @@ def test_every_command_that_sets_parameters_takes_faults() -> None:
     setting = {name for name, own in options.items() if "--set" in own}
     assert len(setting) > 8
     assert {name for name in setting if "--fault" not in options[name]} == set()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="os.kill ends the process there")
+@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_every_command_with_a_word_and_the_same_status(name, number, monkeypatch, capsys):
+    def ended() -> None:
+        os.kill(os.getpid(), number)
+
+    module = importlib.import_module(f"orchestrator.commands.{name.replace('-', '_')}")
+    monkeypatch.setattr(module, name.replace("-", "_"), ended)
+    before = signal.getsignal(signal.SIGTERM)
+    with pytest.raises(SystemExit) as end:
+        main([name])
+    assert end.value.code == 128 + number
+    assert capsys.readouterr().err == "Interrupted\n"
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+@pytest.mark.parametrize("shown", ["", "1"])
+@pytest.mark.parametrize("error", [ZeroDivisionError, OSError, ScenarioError, Interrupted])
+def test_nothing_that_turns_the_text_reaches_the_terminal_even_in_a_traceback(
+    shown, error, monkeypatch, capsys
+):
+    text = "\u202etxt.exe \x1b[31m \u2066 \x9b"
+
+    def broken(arguments: object) -> None:
+        raise error(text)
+
+    monkeypatch.setattr(cli, "_application", lambda _: broken)
+    monkeypatch.setenv(cli.TRACEBACK, shown)
+    with pytest.raises(SystemExit):
+        main([])
+    said = capsys.readouterr().err
+    assert ("Traceback" in said) == bool(shown)
+    assert r"\u202etxt.exe \x1b[31m \u2066 \x9b" in said
+    assert not set(text) & set(said) - set(printable(text))

@@ -5,7 +5,7 @@ import signal
 
 import pytest
 
-from orchestrator.errors import SimulationError
+from orchestrator.errors import Interrupted, SimulationError
 from orchestrator.master.log import DISCARD, ERROR, FATAL, OK, PENDING, WARNING
 from orchestrator.master.simulate import simulate
 from orchestrator.results.read import load_results
@@ -29,12 +29,12 @@ class Passing(Behaviour):
         return {"y": u["x"]}
 
 
-def fail(tmp_path, units, wires, *, opener=None, **options):
+def fail(tmp_path, units, wires, *, opener=None, status=1, **options):
     """Run fake units to the error they make; return its sentence, the results and the slaves."""
     stage = opener or Stage(units)
-    with pytest.raises(SimulationError) as caught:
+    with pytest.raises(SimulationError if status == 1 else Interrupted) as caught:
         simulate(make_plan(units, wires, **options), tmp_path, opener=stage)
-    assert caught.value.exit_status == 1
+    assert caught.value.exit_status == status
     return str(caught.value), load_results(tmp_path), stage.slaves
 
 
@@ -111,9 +111,11 @@ def answering(status, *messages, call="step", at=3):
     return Slave
 
 
-def answer(tmp_path, kind):
+def answer(tmp_path, kind, *, status=1):
     units = {"source": Clock(x=lambda t: 10.0 * t), "target": Passing()}
-    return fail(tmp_path, units, ["source.x -> target.x"], opener=Opener(units, "target", kind))
+    return fail(
+        tmp_path, units, ["source.x -> target.x"], opener=Opener(units, "target", kind), status=status
+    )
 
 
 @pytest.mark.parametrize(("status", "word"), [(DISCARD, "Discard"), (ERROR, "Error"), (FATAL, "Fatal")])
@@ -347,7 +349,8 @@ def interrupt_at(when, number):
 def test_an_interrupted_run_ends_between_two_steps_and_keeps_its_results(number, tmp_path):
     before = signal.getsignal(number)
     units = ramp_into(interrupt_at(0.5, number))
-    sentence, results, slaves = fail(tmp_path, units, ["source.x -> target.x"])
+    status = 128 + number
+    sentence, results, slaves = fail(tmp_path, units, ["source.x -> target.x"], status=status)
     assert sentence == "the run was interrupted at t = 0.6 s"
     assert results.run["status"] == "interrupted"
     assert results.time.tolist()[-1] == 0.6
@@ -361,7 +364,7 @@ def test_a_run_interrupted_during_initialization_has_no_rows(tmp_path):
             os.kill(os.getpid(), signal.SIGINT)
             return OK
 
-    sentence, results, slaves = answer(tmp_path, Slave)
+    sentence, results, slaves = answer(tmp_path, Slave, status=130)
     assert sentence == "the run was interrupted during initialization"
     assert results.run["status"] == "interrupted"
     assert len(results.time) == 0

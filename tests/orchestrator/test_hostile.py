@@ -6,16 +6,19 @@ import os
 import pickle
 import random
 import shutil
+import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from orchestrator.master import process
 from orchestrator.master.exchange import FAILED, LOG, REPLY, Channel, Garbled
 from orchestrator.master.log import Log
 from orchestrator.master.process import Lost, UnitProcess
+from orchestrator.results.read import load_results
 
-from ..trials.hostile_fmus import Case, attack
+from ..trials.hostile_fmus import VALUES_OF, Case, attack, make_files
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux"),
@@ -143,3 +146,19 @@ def test_a_record_that_is_too_long_or_cannot_be_written_is_refused():
         with pytest.raises(Garbled):
             channel.send(REPLY, content)
     channel.close()
+
+
+@pytest.mark.parametrize("does", ["instantiate:fork", "step:fork"])
+def test_a_unit_that_copies_the_process_of_its_run_ends_it_before_there_are_many(does, tmp_path):
+    scenario = make_files(tmp_path)
+    command = ["run", str(scenario), "--out", "out", "--set", "stop_time=0.3"]
+    done = subprocess.run(
+        [sys.executable, "-m", "orchestrator.cli", *command],
+        cwd=tmp_path, env=os.environ | {"HOSTILE": does}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert "a unit (good, bad or after) had copied the process of the run (fork)" in done.stderr
+    assert "Traceback" not in done.stderr
+    results = load_results(tmp_path / "out")
+    assert results.run["status"] == "failed"
+    assert np.array_equal(results["good.y"], np.full(len(results.time), VALUES_OF["good.y"]))

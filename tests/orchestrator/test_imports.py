@@ -31,6 +31,7 @@ STAGES = (
         "writing",
         "processes",
         "spawning",
+        "quiet",
     },  # what all share
     {"scenario"},
     {"fmu"},

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.errors import ScenarioError, SimulationError, YawbenchError
+from orchestrator.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
 from orchestrator.experiments.jobs import Job, read_back, ready
-from orchestrator.experiments.workers import execute, pool
+from orchestrator.experiments.pool import Pool
+from orchestrator.experiments.workers import execute
 from orchestrator.results.read import load_results
 
 from .recorded import car, write
@@ -159,8 +160,28 @@ def test_all_problems_of_all_jobs_are_found_before_any_runs(tmp_path):
 
 def test_results_can_be_read_by_several_processes(tmp_path):
     folders = [write(car(n=5), tmp_path / name) for name in "ab"]
-    with pool(2) as workers:
+    with Pool(2) as workers:
         assert [results.folder for results in workers.map(read_back, folders)] == folders
+
+
+def half(number):
+    """Return half of an even number; end at 99."""
+    if number == 99:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if number % 2:
+        raise ResultsError(f"{number} is odd")
+    return number // 2
+
+
+def test_processes_that_share_work_keep_its_order_and_hand_on_what_is_raised():
+    with Pool(2) as workers:
+        assert workers.map(half, range(0, 40, 2)) == list(range(20))
+        with pytest.raises(ResultsError, match="7 is odd"):
+            workers.map(half, [2, 4, 6, 7, 8, 10])
+        assert workers.map(half, [2, 4]) == [1, 2]
+        assert workers.map(half, []) == []
+        with pytest.raises(YawbenchError, match="has been killed"):
+            workers.map(half, [2, 99])
 
 
 @pytest.mark.parametrize("fallback", ["/tmp", "/does/not/exist"])

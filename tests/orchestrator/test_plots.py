@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from orchestrator.errors import ResultsError, ScenarioError
 from orchestrator.figures.panels import Run, check_panels, thinned
 from orchestrator.figures.plots import draw, provenance, title_of
 from orchestrator.figures.style import LINES, NOTE_WIDTH, REFERENCE, save
+from orchestrator.wording import printable
 
 from .recorded import car, results
 
@@ -304,3 +306,17 @@ def test_a_run_that_ended_at_its_start_is_one_sentence(rows):
     assert caught.value.problems == [
         "made_up: nothing to draw, this run ended at its start: plant: initialization failed."
     ]
+
+
+@pytest.mark.parametrize(
+    "label", ["\x1b[31mred", "a\x00b", "\u202eturned", "\ufffe\uffff", "\ud800", "<&>\"'"]
+)
+def test_a_figure_is_valid_svg_whatever_characters_a_label_has(label, tmp_path):
+    runs = [Run(label, car(1.2)), Run("other", car(2.4))]
+    figures = {"plot": draw(runs, title=label), "portrait": draw(runs, ["yaw_rate(sideslip)"], title=label)}
+    for name, figure in figures.items():
+        svg, png = save(figure, tmp_path / name)
+        root = ElementTree.parse(svg).getroot()
+        assert root.tag == "{http://www.w3.org/2000/svg}svg"
+        assert png.stat().st_size
+        assert printable(label) in legend(figure)

@@ -297,7 +297,7 @@ def test_a_warning_of_a_component_is_shown_and_recorded(yawbench, faulty, tmp_pa
 
 def test_ctrl_c_inside_a_component_ends_the_run_after_the_step(yawbench, faulty, tmp_path):
     status, said = yawbench(faulty("os.kill(os.getpid(), signal.SIGINT)"), "--out", tmp_path / "out")
-    assert status == 1
+    assert status == 130
     assert said.splitlines() == [
         "the run was interrupted at t = 0.06 s",
         f"What was recorded until then: {tmp_path / 'out'}",
@@ -317,7 +317,7 @@ def run_process(*arguments):
 def test_ctrl_c_ends_a_component_that_never_comes_back(faulty, fmus, tmp_path):
     scenario = faulty("os.kill(os.getppid(), signal.SIGINT)\n            while True: pass")
     done = run_process("run", scenario, "--fmus", fmus, "--out", tmp_path / "out")
-    assert done.returncode == 1
+    assert done.returncode == 130
     assert done.stderr == (
         "the run was interrupted: controller: step failed at t = 0.05 s: the process of the run did not come "
         f"back\nWhat was recorded until then: {tmp_path / 'out'}\n"

@@ -15,7 +15,9 @@ from orchestrator.evaluation.dwell_run import evaluate_dwell
 from orchestrator.evaluation.dwell_series import amplitudes, is_series, judge_series
 from orchestrator.evaluation.judgement import Judgement, NotJudged, Verdict
 from orchestrator.evaluation.slow_steer import G, characteristic_angle, evaluate_slow_steer
+from orchestrator.evaluation.standard_tests import TESTS
 from orchestrator.evaluation.trace import Trace, load_mapping, load_trace
+from orchestrator.figures.style import save
 from tests.commands import status_of
 from vocabulary.units import UNITS
 
@@ -546,3 +548,12 @@ def test_a_series_of_lane_changes_finds_the_highest_clean_speed_and_goes_on_wher
     again = capsys.readouterr()
     assert again.out == first.out
     assert "km/h: 1 run, all finished before" in again.err
+
+
+def test_equal_runs_have_equal_figures_wherever_their_results_are(tmp_path):
+    files = []
+    for place in ("here", "somewhere/else"):
+        run = trace(folder=tmp_path / place / "runs" / "0123", title="A run")
+        files.append(save(TESTS["sine-with-dwell"].draw(run, evaluate_dwell(run, A)), tmp_path / place))
+    for one, other in zip(*files, strict=True):
+        assert one.read_bytes() == other.read_bytes()

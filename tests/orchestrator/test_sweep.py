@@ -300,7 +300,7 @@ def interrupted(file, out, fmus, tmp_path, number):
 def test_a_sweep_that_was_stopped_goes_on_where_it_was(number, moods, yawbench, fmus, tmp_path):
     file = moods(5, 10, 60, 70)
     status, told = interrupted(file, "out", fmus, tmp_path, number)
-    assert status == (-number if number == signal.SIGKILL else 1)
+    assert status == (-number if number == signal.SIGKILL else 128 + number)
     if number != signal.SIGKILL:
         assert f"Interrupted; what was recorded until then: {tmp_path / 'out'}" in told
     before = journal(tmp_path / "out")

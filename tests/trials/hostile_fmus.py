@@ -224,7 +224,7 @@ def verdict(run: Running, status: int) -> list[str]:
             os.kill(pid, signal.SIGKILL)
     if status == -999:
         return ["did not end"]
-    if status not in (0, 1, 2):
+    if status not in (0, 1, 2, 130):
         problems.append(f"exit status {status}")
     if "Traceback" in said or "Fatal Python error" in said:
         problems.append("traceback")

@@ -9,6 +9,7 @@ file of the killed one.
 from __future__ import annotations
 
 import argparse
+import csv
 import os
 import random
 import shutil
@@ -24,11 +25,13 @@ from pathlib import Path
 from fmus.build import build_all
 from orchestrator.errors import ResultsError
 from orchestrator.results.folder import PART, RUN_FILE
-from orchestrator.results.formats import FILES
 from orchestrator.results.lock import LOCK_FILE
 from orchestrator.results.read import load_results
 from orchestrator.writing import NEW
 from tests.orchestrator.test_batch_commands import SCENARIO, STUDY, UNITS
+from tests.orchestrator.test_ranking import SMALL
+from tests.orchestrator.test_tuning import SCENARIO as WHEEL
+from tests.orchestrator.test_tuning import TUNING
 
 SWEEP = """
 title: Half a sweep
@@ -36,18 +39,28 @@ scenario: half.yaml
 axes: {amplitude: {vary: driver.amplitude, values: [0.01, 0.02, 0.03, 0.04, 0.05, 0.06], unit: rad}}
 metrics: {moment: {metric: peak(yaw_moment)}}
 """
+RANKING = SMALL.replace("  low: ", "  # ")
+"""Two controllers in one condition."""
 COMMANDS = {
     "run": ("run", "half.yaml", "--out", "out"),
     "compare": ("compare", "half.yaml", "--swap", "controller=controller_off", "--out", "out"),
     "study": ("study", "study.yaml", "--out", "out"),
     "report": ("report", "study.yaml", "--out", "out"),
     "sweep": ("sweep", "sweep.yaml", "--out", "out"),
+    "tune": ("tune", "tuning.yaml", "--out", "out"),
+    "rank": ("rank", "ranking.yaml", "--out", "out"),
     "build": ("build", "--out", "out", *UNITS),
 }
-SAME = ("*.csv", "*.parquet", "*.fmu", "experiment.json")
+SAME = ("*.csv", "*.parquet", "*.fmu", "experiment.json", "entries.yaml")
 """Files that are the same to the last byte, whatever happened before; others hold times and versions."""
-LITTER = (PART, NEW, LOCK_FILE, ".tmp")
+MEASURED = "step_time"
+"""What columns of computing time begin with, which no two runs share."""
+LITTER = (PART, NEW, LOCK_FILE, ".tmp", ".draft")
 """What the names of files end in that a command which has ended may not leave."""
+NOISE = ("Traceback", "leaked", "resource_tracker", "yawbench itself")
+"""What a command that is killed may not have on the terminal."""
+ENDED = {signal.SIGKILL: (-signal.SIGKILL,), signal.SIGTERM: (128 + signal.SIGTERM, -signal.SIGTERM)}
+"""How a command ends by a signal: by SIGTERM also at once, while Python is still being started."""
 WHOLE = {".svg": b"</svg>", ".html": b"</html>", ".png": b"IEND\xaeB`\x82", ".json": b"}"}
 """What the files end in that are written at once."""
 
@@ -62,11 +75,14 @@ class Trial:
         (place / "half.yaml").write_text(SCENARIO.replace("stop_time: 0.4", "stop_time: 40"))
         (place / "study.yaml").write_text(STUDY)
         (place / "sweep.yaml").write_text(SWEEP)
+        (place / "wheel.yaml").write_text(WHEEL)
+        (place / "tuning.yaml").write_text(TUNING)
+        (place / "ranking.yaml").write_text(RANKING)
 
     def start(self, command: str) -> subprocess.Popen[str]:
         """Start a command in a group of its own."""
         arguments = [sys.executable, "-m", "orchestrator.cli", *COMMANDS[command]]
-        if command != "build":
+        if command not in ("build", "rank"):  # which has the cars of this checkout
             arguments += ["--fmus", str(self._fmus)]
         environment = {**os.environ, "TMPDIR": str(self.place / "tmp")}
         return subprocess.Popen(
@@ -81,22 +97,32 @@ class Trial:
         said = process.communicate()[0]
         return process.returncode, said, time.monotonic() - began
 
-    def kill(self, command: str, after: float, number: signal.Signals) -> bool:
-        """Start a command and stop it after a time [s]; return whether it was still there."""
+    def kill(self, command: str, after: float, number: signal.Signals) -> tuple[bool, list[str]]:
+        """Start a command and stop it after a time [s].
+
+        Returns:
+            whether it was still there; what is wrong with how it has ended.
+        """
         process = self.start(command)
         try:
             process.communicate(timeout=after)
-            return False
+            return False, []
         except subprocess.TimeoutExpired:
             process.send_signal(number)
-            process.communicate()
-            return True
+            said = process.communicate()[0]
+        noise = [f"{word!r} on the terminal: {said.strip()[-300:]}" for word in NOISE if word in said]
+        status = process.returncode
+        if status == 128 + number and "nterrupted" not in said:
+            noise.append("no word on what ended it")
+        if status not in (0, *ENDED[number]):  # 0: it was about to end
+            noise.append(f"exit status {status}: {said.strip()[-300:]}")
+        return True, noise
 
     def numbers(self) -> dict[str, bytes]:
         """Return the content of all files that must be the same."""
         out = self.place / "out"
         return {
-            path.relative_to(out).as_posix(): path.read_bytes()
+            path.relative_to(out).as_posix(): _computed(path)
             for pattern in SAME
             for path in sorted(out.rglob(pattern))
             if path.is_file()
@@ -120,9 +146,19 @@ class Trial:
                 results = load_results(record.parent)
             except ResultsError:
                 continue
-            name = (record.parent / FILES["csv"]).relative_to(out).as_posix()
+            name = results.file.relative_to(out).as_posix()
             if results.run["status"] == "completed" and whole.get(name) != (out / name).read_bytes():
                 yield f"half a result passes for whole: {name}"
+
+
+def _computed(file: Path) -> bytes:
+    """Return what a file holds, without times that were measured."""
+    content = file.read_bytes()
+    if MEASURED.encode() not in content.partition(b"\n")[0]:
+        return content
+    rows = [*csv.reader(content.decode().splitlines())]
+    kept = [k for k, name in enumerate(rows[0]) if not name.startswith(MEASURED)]
+    return repr([[row[k] for k in kept] for row in rows]).encode()
 
 
 def trial(command: str, each: int, seed: int, folder: Path, fmus: Path) -> tuple[Counter[str], list[str]]:
@@ -145,8 +181,8 @@ def trial(command: str, each: int, seed: int, folder: Path, fmus: Path) -> tuple
             shutil.copytree(undisturbed.place / "out", one.place / "out")
         how = r.choice((signal.SIGKILL, signal.SIGTERM))
         after = r.uniform(0.1, 1.0) * duration
-        alive = one.kill(command, after, how)
-        found = [*one.halves(whole)]
+        alive, found = one.kill(command, after, how)
+        found += one.halves(whole)
         status, said, _ = one.call(command)
         found += [f"exit status {status}: {said.strip().splitlines()[-1:]}"] if status else []
         found += ["a traceback"] if "Traceback" in said else []

@@ -10,12 +10,12 @@ import pytest
 from fmus.build import build_all
 from tests.orchestrator.test_batch_commands import UNITS
 
-from .kills import trial
+from .kills import COMMANDS, trial
 
 
-@pytest.mark.exhaustive
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
-@pytest.mark.parametrize("command", ["run", "study", "sweep"])
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.sampled(1)
 def test_a_killed_command_passes_nothing_half_for_whole_and_the_next_call_repairs_all(
     command: str, tmp_path: Path
 ) -> None:
