@@ -27,6 +27,7 @@ from orchestrator.scenario.strict import Model, validate
 from orchestrator.scenario.yaml_lines import Document
 from orchestrator.wording import hint
 
+from . import arguments
 from .making import make_all
 from .run import Run, shown_in_notebooks
 from .scenario import Scenario
@@ -54,12 +55,13 @@ def experiment(
     Raises:
         ScenarioError: an axis, a level or a metric is wrong.
     """
+    base = arguments.instance(base, "base", Scenario, "yawbench.load")
+    axes = arguments.mapping(axes, "axes", "a mapping of what varies to levels, {'plant.mass': [900, 1000]}")
     given: dict[str, Any] = {}
     changed = base._unswapped(axes)
     for name, levels in axes.items():
-        if isinstance(levels, str) or not isinstance(levels, Iterable):
-            raise ScenarioError(f"{name}: give a list of levels (got {levels!r})")
-        levels = list(levels)
+        with arguments.as_scenario_errors():
+            levels = arguments.items(levels, name, "a list of levels")
         if name in base.loaded.units:
             variants = {}
             for level in levels:
@@ -74,7 +76,7 @@ def experiment(
             given[name] = {"variants": variants}
         else:
             given[name] = {"vary": name, **_values(name, levels)}
-    wanted = [metrics] if isinstance(metrics, str) else metrics
+    wanted = arguments.texts(metrics, "metrics")
     spec = {"scenario": base.path.name, "axes": given, "metrics": {one: {"metric": one} for one in wanted}}
     made = _checked(ExperimentSpec, {"title": base.title or base.path.stem, **spec})
     run = NamedRun("", "", "", base.path, ())
@@ -90,12 +92,14 @@ def _checked(model: type[Model], given: dict[str, Any]) -> Model:
     return made
 
 
-def _values(name: str, levels: Iterable[Any]) -> dict[str, Any]:
+def _values(name: str, given: Iterable[Any]) -> dict[str, Any]:
     """Return levels as an axis has them: numbers apart from the unit that they share."""
+    with arguments.as_scenario_errors():
+        levels = [arguments.scalar(level, f"{name}[{k}]") for k, level in enumerate(given)]
     split = [number_and_unit(level) if isinstance(level, str) else None for level in levels]
     units = {one[1] for one in split if one}
     if not units:
-        return {"values": [float(x) if hasattr(x, "dtype") else x for x in levels]}
+        return {"values": levels}
     if len(units) > 1 or not all(split):
         raise ScenarioError(f"{name}: give all levels in one unit, or none")
     return {"values": [float(one[0]) for one in split if one], "unit": units.pop()}
@@ -114,6 +118,10 @@ class Experiment:
 
     base: Scenario
     design: Design
+
+    def __post_init__(self) -> None:
+        arguments.instance(self.base, "base", Scenario, "yawbench.load")
+        arguments.instance(self.design, "design", Design, "yawbench.experiment")
 
     def __len__(self) -> int:
         return len(self.design.cases)
@@ -136,6 +144,8 @@ class Experiment:
         Raises:
             YawbenchError: a run cannot start; none has been made.
         """
+        workers = None if workers is None else arguments.count(workers, "workers")
+        keep, progress = arguments.flag(keep, "keep"), arguments.flag(progress, "progress")
         once = Once(**self.base._opening())
         planned = plan_experiment(self.design, self.base.path.parent, once=once)
         metrics = metrics_of(planned.experiment)
@@ -167,6 +177,11 @@ class Runs:
     findings: Findings
     runs: list[Run | None] | None = None
 
+    def __post_init__(self) -> None:
+        arguments.instance(self.findings, "findings", Findings, "Experiment.run")
+        if self.runs is not None and not isinstance(self.runs, list):
+            arguments.refuse("runs", "a list of runs", self.runs)
+
     @cached_property
     def table(self) -> pd.DataFrame:
         """One row per run: axes, status, reason, metrics, key; `attrs["units"]` holds the units."""
@@ -192,6 +207,17 @@ class Runs:
             ResultsError: no run gives a number.
         """
         spec = self.findings.spec
+        metric, x = arguments.text(metric, "metric"), arguments.text(x, "x")
+        y, lines, panels = (
+            arguments.text(axis, name, empty=True)
+            for name, axis in (("y", y), ("lines", lines), ("panels", panels))
+        )
+        if "only" in more:
+            only = arguments.mapping(more["only"], "only", "a mapping of axes to levels")
+            more["only"] = {
+                axis: _values(axis, arguments.items(one, f"only[{axis!r}]", "a list of levels"))["values"]
+                for axis, one in only.items()
+            }
         for name in filter(None, (x, y, lines, panels)):
             if name not in spec.axes:
                 raise ScenarioError(f"there is no axis {name!r}{hint(name, spec.axes, lead='axes')}")

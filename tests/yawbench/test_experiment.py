@@ -91,8 +91,8 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_others_are_made(base)
         ({"driver.amplitude": ["1 deg", 2]}, "driver.amplitude: give all levels in one unit, or none"),
         ({"driver.amplitude": ["1.2.3 deg"]}, "'1.2.3 deg': give plain numbers, and their unit"),
         ({"driver.amplitde": [1, 2]}, "has no parameter 'amplitde'; did you mean 'amplitude'"),
-        ({"driver.amplitude": 1}, r"driver.amplitude: give a list of levels \(got 1\)"),
-        ({"controller": "controller_off"}, "controller: give a list of levels"),
+        ({"driver.amplitude": 1}, r"driver.amplitude: must be a list of levels \(got 1\)"),
+        ({"controller": "controller_off"}, "controller: must be a list of levels"),
         ({"controller": [Proportional(), Proportional()]}, "controller: two levels are called Proportional"),
     ],
 )

@@ -192,7 +192,8 @@ def test_what_python_code_raises_is_the_cause(base):
         (lambda **signals: 0.0, r"function: \*\*signals names no signal: name each"),
         (lambda x: x, "signal 'x' is not in the signal dictionary"),
         (type("Mute", (), {"output": lambda self, t, u: 0.0, "inputs": ()})(), "Mute has no outputs"),
-        (type("Text", (), {"output": None, "inputs": "yaw_rate", "outputs": ()})(), "are tuples of names"),
+        (type("Text", (), {"output": None, "inputs": "yaw_rate", "outputs": ()})(), "output: must be a method"),
+        (type("Text", (Proportional,), {"inputs": "yaw_rate"})(), "inputs: must be a tuple of names"),
     ],
 )
 def test_what_cannot_stand_for_a_controller_is_refused_in_a_sentence(base, given, sentence):
@@ -227,8 +228,8 @@ def test_a_run_can_be_saved_again_into_the_same_folder(run, tmp_path):
         ("sine-with-dwel", None, "there is no test 'sine-with-dwel'; did you mean 'sine-with-dwell'?"),
         ("sine-with-dwell", 0.0, "angle: must be a number between 0 and 2 pi rad (got 0.0)"),
         ("sine-with-dwell", -0.6, "angle: must be a number between 0 and 2 pi rad (got -0.6)"),
-        ("sine-with-dwell", float("nan"), "angle: must be a number between 0 and 2 pi rad (got nan)"),
-        ("sine-with-dwell", "36 deg", "angle: must be a number between 0 and 2 pi rad (got '36 deg')"),
+        ("sine-with-dwell", float("nan"), "angle: must be a finite number (got nan)"),
+        ("sine-with-dwell", "36 deg", "angle: must be a number (got '36 deg')"),
         ("step-steer", 0.6, "step-steer needs no angle: leave it away"),
     ],
 )
