@@ -26,6 +26,11 @@ from orchestrator.wording import listed, short, unprintable
 MOST = 100_000
 """Items of one argument. Chosen: as many as an experiment may have runs."""
 
+LONGEST = 1000
+"""Characters of a name or a title. Chosen: no sentence is as long."""
+NAME = 255
+"""Bytes of a file's name that file systems allow."""
+
 T = TypeVar("T")
 
 
@@ -36,15 +41,17 @@ def text(value: Any, name: str, *, empty: bool = False) -> str:
         refuse(name, "text", value)
     if bad := unprintable(given):
         raise ValueError(f"{name}: must be text without {bad} (got {short(given)})")
-    if not (empty or given.strip()):
-        raise ValueError(f"{name}: must not be empty")
-    return given
+    if not (given.strip() or (empty and not given)):
+        raise ValueError(f"{name}: must not be blank")
+    if len(given) > LONGEST:
+        raise ValueError(f"{name}: must be text of at most {LONGEST} characters (got {short(given)})")
+    return cast(str, given)
 
 
 def flag(value: Any, name: str) -> bool:
     """Return True or False."""
     given = plain(value)
-    return given if is_a(given, bool) else refuse(name, "True or False", value)
+    return cast(bool, given) if is_a(given, bool) else refuse(name, "True or False", value)
 
 
 def number(value: Any, name: str) -> float:
@@ -68,19 +75,21 @@ def count(value: Any, name: str, *, least: int = 1, most: int = MOST) -> int:
         refuse(name, "a whole number", value)
     if not least <= given <= most:
         raise ValueError(f"{name}: must be a whole number from {least} to {most:,} (got {short(given)})")
-    return given
+    return cast(int, given)
 
 
 def scalar(value: Any, name: str) -> float | int | bool | str:
     """Return a value that a scenario may give: a number, True or False, or text."""
     given = plain(value)
     if is_a(given, bool):
-        return given
+        return cast(bool, given)
     if is_a(given, str):
-        return text(given, name, empty=True)
+        if bad := unprintable(given):
+            raise ValueError(f"{name}: must be text without {bad} (got {short(given)})")
+        return cast(str, given)
     if is_a(given, int, float, Fraction):
         finite = number(given, name)
-        return given if is_a(given, int) else finite
+        return cast(int, given) if is_a(given, int) else finite
     refuse(name, "a number, True or False, or text", value)
 
 
@@ -106,10 +115,10 @@ def path(value: Any, name: str) -> Path:
     if not is_a(given, str):
         refuse(name, "a name or a path", value)
     try:
-        os.fsencode(given)
+        longest = max((len(os.fsencode(part)) for part in Path(given).parts), default=0)
     except UnicodeEncodeError:
         raise ValueError(f"{name}: no file can be called {short(given)}") from None
-    if "\0" in given or not given.strip():
+    if "\0" in given or not given.strip() or longest > NAME:
         raise ValueError(f"{name}: no file can be called {short(given)}")
     return Path(given)
 

@@ -111,8 +111,10 @@ def _entry(given: Any, name: str) -> tuple[dict[str, EntrySpec], dict[Path, Prog
         return {}, {}
     if arguments.names_file(given):
         fmu = fmu_of(given, "controller")
+        if not (name or Path(fmu).stem):
+            raise ScenarioError(f"controller: {fmu!r} is no name of an FMU")
         return {name or Path(fmu).stem: _spec(name or Path(fmu).stem, fmu)}, {}
-    if isinstance(given, type) and not issubclass(given, Component):
+    if arguments.is_a(given, type) and not issubclass(given, Component):
         given = _object_of(given)
     program = Program(given, unit=UNIT, role=UNIT)
     words = name or program.path.stem

@@ -33,7 +33,7 @@ from orchestrator.master.log import ERROR, OK, Log
 from orchestrator.master.slave import Buffers, Calls, Experiment, Status
 from orchestrator.master.unit import nothing_to_do
 from orchestrator.plan import Fmu, Place, Unit, Value
-from orchestrator.wording import counted, listed
+from orchestrator.wording import counted, listed, short
 from vocabulary.wheels import wheels
 
 from . import arguments
@@ -169,7 +169,7 @@ def _archived(xml: bytes) -> bytes:
 
 def _component(given: Any, role: str) -> type[Component]:
     """Return the component class that a function, an object or a class stands for."""
-    if isinstance(given, type):
+    if arguments.is_a(given, type):
         if issubclass(given, Component):
             return given
         raise ScenarioError(f"{_name(given)} is a class; give an object of it, {_name(given)}()")
@@ -304,7 +304,9 @@ def _numbers(given: Any, outputs: Sequence[str]) -> tuple[float, ...]:
     else:
         values = arguments.items(given, listed(outputs), "numbers in order")
     if len(values) != len(outputs):
-        raise ValueError(f"output() gave {len(values)} values for {counted(len(outputs), 'output')}")
+        raise ValueError(
+            f"output() gave {len(values)} values for {counted(len(outputs), 'output')}: {listed(outputs)}"
+        )
     return tuple(_number(one, name) for one, name in zip(values, outputs, strict=True))
 
 
@@ -327,7 +329,7 @@ def _fail(self: Any, what: str, t: float) -> None:
 
 def _name(given: Any) -> str:
     """Return what a program is called."""
-    if isinstance(given, functools.partial):
+    if arguments.is_a(given, functools.partial):
         return _name(given.func)
     try:
         name = getattr(given, "__name__", None)
@@ -345,4 +347,4 @@ def _source(given: Any) -> bytes:
             given if callable(given) and not hasattr(given, "output") else type(given)
         ).encode()
     except Exception:  # there is none, or somebody else's code fails at being looked at
-        return arguments.short(given).encode()
+        return short(given).encode()

@@ -81,7 +81,7 @@ class Run:
         return self.results.columns[self.results.column(arguments.text(name, "name of a column"))]
 
     def __contains__(self, name: object) -> bool:
-        return isinstance(name, str) and name in self.results.columns
+        return arguments.is_a(name, str) and arguments.plain(name) in self.results.columns
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.results.columns)

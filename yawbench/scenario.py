@@ -13,7 +13,7 @@ from orchestrator.errors import Problem, ScenarioError, SimulationError
 from orchestrator.fmu.opener import Opener
 from orchestrator.master.log import Log
 from orchestrator.master.simulate import simulate_in_memory
-from orchestrator.plan import FAULTS, Change, Faults, Plan, Unit, Value
+from orchestrator.plan import FAULTS, TYRES, Change, Faults, Plan, Unit, Value
 from orchestrator.scenario import catalogue, scenario_schema
 from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import setting, spelled
@@ -65,11 +65,13 @@ class Scenario:
     """Units in plain Python, by the path that stands for each."""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.path, Path):
+        if not arguments.is_a(self.path, Path):
             arguments.refuse("path", "a Path; yawbench.load takes names, too", self.path)
-        if not (isinstance(self.changes, tuple) and all(isinstance(one, Change) for one in self.changes)):
+        if not arguments.is_a(self.changes, tuple) or not all(
+            arguments.is_a(one, Change) for one in self.changes
+        ):
             arguments.refuse("changes", "changes as `set`, `swap` and `fault` make them", self.changes)
-        if not isinstance(self.programs, dict):
+        if not arguments.is_a(self.programs, dict):
             arguments.refuse("programs", "programs as `swap` makes them", self.programs)
 
     def swap(self, **units: Any) -> Scenario:
@@ -128,7 +130,7 @@ class Scenario:
         """
         given = arguments.mapping(values, "values", "a mapping of places to values, {'stop_time': 2}")
         with arguments.as_scenario_errors("set"):
-            plain = {place: arguments.scalar(value, place) for place, value in given.items()}
+            plain = {place: _plain(place, value) for place, value in given.items()}
         changed = [setting(place, value, "set") for place, value in plain.items()]
         scenario = replace(self, changes=(*self.changes, *changed))
         scenario.loaded  # noqa: B018 - what is wrong is said now
@@ -245,6 +247,12 @@ def fmu_of(wanted: str | Path, name: str) -> str:
     if path.suffix == ".fmu":
         return str(path.absolute())
     return arguments.text(wanted, name) if isinstance(wanted, str) else str(path)
+
+
+def _plain(place: str, value: Any) -> Value:
+    """Return the value of a place as plain Python."""
+    of_file = place == "vehicle" or place.partition(".")[0] == TYRES
+    return str(arguments.path(value, place)) if of_file else arguments.scalar(value, place)
 
 
 def _role(fmu: str, unit: str) -> str:
