@@ -22,6 +22,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .wording import printable
+
 if TYPE_CHECKING:
     from .plan import Finding
 
@@ -50,7 +52,8 @@ class Problem(str):
         cls, text: str, *, file: Path | None = None, line: int | None = None, place: str = "", kind: str = ""
     ) -> Problem:
         where = f"{file}:{line}" if file and line else f"{file or ''}"
-        made = super().__new__(cls, ": ".join(filter(None, (where, place, text))))
+        text = printable(text)  # of users, FMUs and files: nothing of it may act on a terminal or a page
+        made = super().__new__(cls, printable(": ".join(filter(None, (where, place, text)))))
         made.text, made.file, made.line, made.place, made.kind = text, file, line, place, kind
         return made
 

@@ -31,8 +31,14 @@ def listed(items: Iterable[object], *, last: str = "and") -> str:
 
 
 def short(value: object) -> str:
-    """Return a value as it stands in a message, cut if long."""
-    return cut("nothing" if value is None else repr(value), 60)
+    """Return a value as it stands in a message: in one line, cut if long, by its type if it has no text."""
+    if value is None:
+        return "nothing"
+    try:
+        text = repr(value)
+    except Exception:  # a number of 5000 digits, or what an object of somebody else's makes of itself
+        return f"an object of {type(value).__name__}"
+    return cut(printable(" ".join(text.splitlines())), 60)
 
 
 def cut(text: str, longest: int = 200) -> str:

@@ -15,6 +15,7 @@ from orchestrator.experiments.experiment import Experiment as Design
 from orchestrator.experiments.figures import draw_over_axes
 from orchestrator.experiments.findings import Findings
 from orchestrator.experiments.jobs import Job, Once, Outcome, Record, measured
+from orchestrator.experiments.numbers import si_number, text_of
 from orchestrator.experiments.planning import metrics_of, plan_experiment
 from orchestrator.experiments.schema import ExperimentSpec, FigureSpec
 from orchestrator.experiments.table import columns_of, to_pandas
@@ -25,9 +26,10 @@ from orchestrator.metrics.plausibility import remarks_of
 from orchestrator.results.read import Results
 from orchestrator.scenario.quantities import number_and_unit
 from orchestrator.scenario.strict import Model, validate
-from orchestrator.scenario.yaml_lines import Document
-from orchestrator.wording import hint, printable
+from orchestrator.scenario.yaml_lines import Document, scalar
+from orchestrator.wording import hint, listed, printable, short
 
+from . import arguments
 from .making import make_all
 from .run import Run, shown_in_notebooks
 from .scenario import Scenario, warn
@@ -35,6 +37,10 @@ from .scenario import Scenario, warn
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
+
+
+FAR = 1e100
+"""Where no scale of a figure ends. Chosen: drawing multiplies, and 1e308 would be infinite."""
 
 
 def experiment(
@@ -55,12 +61,13 @@ def experiment(
     Raises:
         ScenarioError: an axis, a level or a metric is wrong.
     """
+    base = arguments.instance(base, "base", Scenario, "yawbench.load")
+    axes = arguments.mapping(axes, "axes", "a mapping of what varies to levels, {'plant.mass': [900, 1000]}")
     given: dict[str, Any] = {}
     changed = base._unswapped(axes)
     for name, levels in axes.items():
-        if isinstance(levels, str) or not isinstance(levels, Iterable):
-            raise ScenarioError(f"{name}: give a list of levels (got {levels!r})")
-        levels = list(levels)
+        with arguments.as_scenario_errors():
+            levels = arguments.items(levels, name, "a list of levels")
         if name in base.loaded.units:
             variants = {}
             for level in levels:
@@ -75,7 +82,7 @@ def experiment(
             given[name] = {"variants": variants}
         else:
             given[name] = {"vary": name, **_values(name, levels)}
-    wanted = [metrics] if isinstance(metrics, str) else metrics
+    wanted = arguments.texts(metrics, "metrics")
     spec = {"scenario": base.path.name, "axes": given, "metrics": {one: {"metric": one} for one in wanted}}
     made = _checked(ExperimentSpec, {"title": base.title or base.path.stem, **spec})
     run = NamedRun("", "", "", base.path, ())
@@ -91,12 +98,16 @@ def _checked(model: type[Model], given: dict[str, Any]) -> Model:
     return made
 
 
-def _values(name: str, levels: Iterable[Any]) -> dict[str, Any]:
+def _values(name: str, given: Iterable[Any]) -> dict[str, Any]:
     """Return levels as an axis has them: numbers apart from the unit that they share."""
+    with arguments.as_scenario_errors():
+        levels = [arguments.scalar(level, f"{name}[{k}]") for k, level in enumerate(given)]
     split = [number_and_unit(level) if isinstance(level, str) else None for level in levels]
     units = {one[1] for one in split if one}
+    if as_text := next((x for x in levels if isinstance(x, str) and not isinstance(scalar(x), str)), None):
+        raise ScenarioError(f"{name}: give numbers, True or False as such, not as text (got {as_text!r})")
     if not units:
-        return {"values": [float(x) if hasattr(x, "dtype") else x for x in levels]}
+        return {"values": levels}
     if len(units) > 1 or not all(split):
         raise ScenarioError(f"{name}: give all levels in one unit, or none")
     return {"values": [float(one[0]) for one in split if one], "unit": units.pop()}
@@ -115,6 +126,10 @@ class Experiment:
 
     base: Scenario
     design: Design
+
+    def __post_init__(self) -> None:
+        arguments.instance(self.base, "base", Scenario, "yawbench.load")
+        arguments.instance(self.design, "design", Design, "yawbench.experiment")
 
     def __len__(self) -> int:
         return len(self.design.cases)
@@ -138,6 +153,8 @@ class Experiment:
         Raises:
             YawbenchError: a run cannot start; none has been made.
         """
+        workers = None if workers is None else arguments.count(workers, "workers")
+        keep, progress = arguments.flag(keep, "keep"), arguments.flag(progress, "progress")
         once = Once(**self.base._opening())
         planned = plan_experiment(self.design, self.base.path.parent, once=once)
         metrics = metrics_of(planned.experiment)
@@ -172,6 +189,13 @@ class Runs:
     findings: Findings
     runs: list[Run | None] | None = None
 
+    def __post_init__(self) -> None:
+        arguments.instance(self.findings, "findings", Findings, "Experiment.run")
+        if self.runs is not None and not (
+            type(self.runs) is list and all(one is None or arguments.is_a(one, Run) for one in self.runs)
+        ):
+            arguments.refuse("runs", "a list of runs", self.runs)
+
     @cached_property
     def table(self) -> pd.DataFrame:
         """One row per run: axes, status, reason, metrics, key; `attrs["units"]` holds the units."""
@@ -197,13 +221,22 @@ class Runs:
             ResultsError: no run gives a number.
         """
         spec = self.findings.spec
+        metric, x = arguments.text(metric, "metric"), arguments.text(x, "x")
+        y, lines, panels = (
+            arguments.text(axis, name, empty=True)
+            for name, axis in (("y", y), ("lines", lines), ("panels", panels))
+        )
         for name in filter(None, (x, y, lines, panels)):
             if name not in spec.axes:
                 raise ScenarioError(f"there is no axis {name!r}{hint(name, spec.axes, lead='axes')}")
         if metric not in spec.metrics:
             raise ScenarioError(f"there is no metric {metric!r}{hint(metric, spec.metrics, lead='metrics')}")
-        if left := [name for name in spec.axes if name not in (x, y, lines, panels, *more.get("only", ()))]:
+        if left := [
+            name for name in spec.axes if name not in (x, y, lines, panels, *_axes_of(more.get("only")))
+        ]:
             raise ScenarioError(f"the axis {left[0]!r} has no place in this figure: give lines or panels")
+        for name, value in more.items():
+            more[name] = self._checked(name, value, metric)
         places = {key: value for key, value in (("y", y), ("lines", lines), ("panels", panels)) if value}
         given = {
             "name": "figure",
@@ -215,6 +248,32 @@ class Runs:
         }
         return shown_in_notebooks(draw_over_axes(self.findings, _checked(FigureSpec, given)))
 
+    def _checked(self, name: str, value: Any, metric: str) -> Any:
+        """Return what a figure is told beside its axes as plain Python."""
+        if name == "only":
+            return {axis: self._levels_of(axis, levels) for axis, levels in _axes_of(value).items()}
+        if name == "title":
+            return arguments.text(value, name, empty=True)
+        given = None if value is None else arguments.scalar(value, name)
+        if name in ("largest", "mark") and given is not None:
+            with arguments.as_scenario_errors(f"{name}:"):
+                if not abs(si_number(given, self.table.attrs["units"].get(metric, ""))) < FAR:
+                    raise ValueError(f"must be between {-FAR:g} and {FAR:g} (got {short(given)})")
+        return given
+
+    def _levels_of(self, axis: str, levels: Any) -> list[Any]:
+        """Return levels of an axis that a figure shows alone."""
+        spec, name = self.findings.spec, f"only[{axis!r}]"
+        if axis not in spec.axes:
+            raise ScenarioError(f"only: there is no axis {axis!r}{hint(axis, spec.axes, lead='axes')}")
+        given = _values(name, arguments.items(levels, name, "a list of levels"))["values"]
+        known = [text_of(one) for one in spec.axes[axis].variants or spec.axes[axis].values or ()]
+        unknown = [text_of(one) for one in given if text_of(one) not in known]
+        if unknown or not given:
+            wrong = f"there is no level {unknown[0]!r}" if unknown else "names no level"
+            raise ScenarioError(f"{name}: {wrong}; levels: {listed(known)}")
+        return list(given)
+
     def __repr__(self) -> str:
         all_, found = self.findings, self.findings.remarkable()
         noted = f"; {found}" if found else ""
@@ -222,6 +281,10 @@ class Runs:
 
     def _repr_html_(self) -> str:
         return str(self.table.drop(columns="key").to_html(index=False, na_rep=""))
+
+
+def _axes_of(only: Any) -> dict[str, Any]:
+    return {} if only is None else arguments.mapping(only, "only", "a mapping of axes to lists of levels")
 
 
 @contextlib.contextmanager

@@ -43,7 +43,7 @@ def make_all(
     """
     here = [any(unit.fmu.path in programs for unit in job.plan.units) if job.plan else False for job in jobs]
     apart = [job for job, plain in zip(jobs, here, strict=True) if not plain]
-    made = iter(execute(apart, workers=workers, done=done, run=run))
+    made = iter(execute(apart, workers=workers, done=done, run=run) if apart else ())
     outcomes = []
     for job, plain in zip(jobs, here, strict=True):
         outcome = _made_here(job, run, programs) if plain else next(made)

@@ -25,9 +25,11 @@ from orchestrator.results.lock import writing
 from orchestrator.scenario import catalogue
 from orchestrator.wording import hint
 
+from . import arguments
 from .making import make_all
 from .program import Program
 from .run import shown_in_notebooks
+from .scenario import fmu_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,11 +73,15 @@ def rank(
     Raises:
         YawbenchError: the controller is none, or a run cannot start.
     """
-    more, programs = _entry(controller, name)
-    loaded = load_ranking(
-        catalogue.find(ranking, "a ranking file"), more=more, quick=quick, chosen=conditions
-    )
-    wanted = set(loaded.entries if against is None else against)
+    chosen = arguments.texts(conditions, "conditions", ordered=False)
+    others = None if against is None else arguments.texts(against, "against", ordered=False)
+    quick = arguments.flag(quick, "quick")
+    workers = None if workers is None else arguments.count(workers, "workers")
+    kept_in = None if out is None else arguments.path(out, "out")
+    file = catalogue.find(arguments.path(ranking, "ranking"), "a ranking file")
+    more, programs = _entry(controller, arguments.text(name, "name", empty=True))
+    loaded = load_ranking(file, more=more, quick=quick, chosen=chosen)
+    wanted = set(loaded.entries if others is None else others)
     if unknown := sorted(wanted - set(loaded.entries)):
         raise ScenarioError(
             f"there is no entry {unknown[0]!r}{hint(unknown[0], loaded.entries, lead='known')}"
@@ -85,7 +91,7 @@ def rank(
     opened = {path: program.fmu for path, program in programs.items()}
     once = Once(build=True, tell=lambda text: None, opened=opened)
     with contextlib.ExitStack() as stack:
-        folder = Path(out or stack.enter_context(tempfile.TemporaryDirectory()))
+        folder = Path(kept_in or stack.enter_context(tempfile.TemporaryDirectory()))
         stack.enter_context(writing(folder))
         journal = stack.enter_context(contextlib.closing(Journal(folder, loaded.identity)))
 
@@ -103,14 +109,24 @@ def _entry(given: Any, name: str) -> tuple[dict[str, EntrySpec], dict[Path, Prog
     """Return the entry of a controller by its name, and what it is in this process, by its path."""
     if given is None:
         return {}, {}
-    if isinstance(given, (str, Path)):
-        fmu = str(Path(given).absolute()) if Path(given).suffix == ".fmu" else str(given)
+    if arguments.names_file(given):
+        fmu = fmu_of(given, "controller")
+        if not (name or Path(fmu).stem):
+            raise ScenarioError(f"controller: {fmu!r} is no name of an FMU")
         return {name or Path(fmu).stem: _spec(name or Path(fmu).stem, fmu)}, {}
-    if isinstance(given, type) and not issubclass(given, Component):
-        given = given()
+    if arguments.is_a(given, type) and not issubclass(given, Component):
+        given = _object_of(given)
     program = Program(given, unit=UNIT, role=UNIT)
     words = name or program.path.stem
     return {words: _spec(words, str(program.path))}, {program.path: program}
+
+
+def _object_of(given: type) -> Any:
+    try:
+        return given()
+    except Exception as error:
+        said = f"no object can be made of it without arguments: {error!r}"
+        raise ScenarioError(f"controller: {given.__name__}: {said}") from error
 
 
 def _spec(name: str, fmu: str) -> EntrySpec:
@@ -128,6 +144,9 @@ class Places:
 
     ranked: Ranked
 
+    def __post_init__(self) -> None:
+        arguments.instance(self.ranked, "ranked", Ranked, "yawbench.rank")
+
     @cached_property
     def table(self) -> pd.DataFrame:
         """One row per controller, the first place first; `attrs["units"]` holds the units."""
@@ -144,6 +163,7 @@ class Places:
         Raises:
             ScenarioError: there is no such entry.
         """
+        name = arguments.text(name, "name of an entry")
         places = {one.entry: one.place for one in self.ranked.standings}
         if name not in places:
             raise ScenarioError(f"there is no entry {name!r}{hint(name, places, lead='known')}")
@@ -156,6 +176,7 @@ class Places:
             ScenarioError: there is no such picture.
         """
         drawn = {"matrix": draw_matrix, "pareto": draw_pareto}
+        kind = arguments.text(kind, "kind")
         if kind not in drawn:
             raise ScenarioError(f"there is no picture {kind!r}{hint(kind, drawn, lead='known')}")
         return shown_in_notebooks(drawn[kind](self.ranked, "yawbench.rank"))

@@ -11,11 +11,13 @@ import functools
 import hashlib
 import inspect
 import io
+import math
 import sys
 import zipfile
 from collections import namedtuple
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -24,14 +26,17 @@ import numpy as np
 
 from components.fmi.component import Component
 from components.fmi.roles import ROLES
-from components.fmi.variables import output, parameter, signal
+from components.fmi.variables import Variable, output, parameter, signal
 from orchestrator.errors import ScenarioError
 from orchestrator.fmu.description import describe
 from orchestrator.master.log import ERROR, OK, Log
 from orchestrator.master.slave import Buffers, Calls, Experiment, Status
 from orchestrator.master.unit import nothing_to_do
 from orchestrator.plan import Fmu, Place, Unit, Value
+from orchestrator.wording import counted, listed, short
 from vocabulary.wheels import wheels
+
+from . import arguments
 
 __all__ = ["Program", "output", "parameter", "signal"]
 
@@ -47,6 +52,9 @@ class Program:
         unit: the unit whose FMU it replaces, for messages.
         role: of that unit (controller, driver, ...); its signals are the outputs of a function.
 
+    Attributes:
+        step_size: time between two samples [s], None where the program does not say.
+
     Raises:
         ScenarioError: it is none of these, or declares what cannot be.
     """
@@ -55,21 +63,19 @@ class Program:
         self.given = given
         try:
             self.component = _component(given, role)
+            self.step_size = _step_size(given)
             xml = ElementTree.tostring(self._made(unit).to_xml())
         except ScenarioError as error:
             raise ScenarioError(f"{unit}: {error}") from None
         except (TypeError, ValueError) as error:
             raise ScenarioError(f"{unit}: {_name(given)}: {error}") from error
+        except Exception as error:  # whatever somebody else's code does when it is asked what it declares
+            raise ScenarioError(f"{unit}: {_name(given)}: {arguments.said(error)}") from error
         name = self.component.fmu_name
         self.path = HOME / f"{name}.fmu"
         digest = hashlib.sha256(xml + _source(given)).hexdigest()
         described = describe({"modelDescription.xml": xml}, _archived(xml), self.path)
         self.fmu: Fmu = replace(described, sha256=digest, generation_tool="Python, no FMU")
-
-    @property
-    def step_size(self) -> float | None:
-        """Time between two samples [s], where the program says so."""
-        return getattr(self.given, "step_size", None)
 
     def open(self, unit: Unit, log: Log) -> ProgramSlave:
         """Return an instance for a unit of a run."""
@@ -163,7 +169,7 @@ def _archived(xml: bytes) -> bytes:
 
 def _component(given: Any, role: str) -> type[Component]:
     """Return the component class that a function, an object or a class stands for."""
-    if isinstance(given, type):
+    if arguments.is_a(given, type):
         if issubclass(given, Component):
             return _reporting(given)
         raise ScenarioError(f"{_name(given)} is a class; give an object of it, {_name(given)}()")
@@ -198,7 +204,7 @@ def _of_function(function: Callable[..., Any], role: str) -> type[Component]:
     def compute(self: Component, t: float, u: Sequence[float]) -> Any:
         given = dict(zip(inputs, u, strict=True))
         result = function(**given, t=t) if "t" in names else function(**given)
-        return (result,) if len(outputs) == 1 and np.ndim(result) == 0 else result
+        return _numbers(result, outputs)
 
     return _class(function, inputs, known[role], {"output": compute})
 
@@ -219,6 +225,8 @@ def _of_object(given: Any) -> type[Component]:
     members = {"__init__": __init__}
     for method in ("output", "advance", "start"):
         if hasattr(given, method):
+            if not callable(getattr(given, method)):
+                arguments.refuse(method, "a method", getattr(given, method))
             members[method] = _passing_on(method)
     component = _class(given, given.inputs, given.outputs, members)
     return component
@@ -228,8 +236,9 @@ def _passing_on(method: str) -> Callable[..., Any]:
     def call(self: Any, t: float, *rest: Any) -> Any:
         *step, u = rest
         result = getattr(self._given, method)(t, *step, self._named(*u))
-        single = method == "output" and self._n_io - self._n_in == 1 and np.ndim(result) == 0
-        return (result,) if single and result is not None else result
+        if method != "output":
+            return None
+        return _numbers(result, [one.name for one in self.variables[self._n_in : self._n_io]])
 
     return call
 
@@ -238,15 +247,14 @@ def _class(
     given: Any, inputs: Sequence[Any], outputs: Sequence[Any], members: dict[str, Any]
 ) -> type[Component]:
     """Return a component class; outputs that do not say what they follow follow all inputs."""
-    if isinstance(inputs, str) or isinstance(outputs, str):
-        raise ScenarioError(f"{_name(given)}: inputs and outputs are tuples of names, ('yaw_rate',)")
+    inputs, outputs = _signals(inputs, "inputs"), _signals(outputs, "outputs")
     names = [one if isinstance(one, str) else one.name for one in inputs]
     declared = tuple(output(one, *names) if isinstance(one, str) else one for one in outputs)
     scalars = [name for pattern in names for name in wheels(pattern)]
     members |= {
         "inputs": tuple(inputs),
         "outputs": declared,
-        "sampled": getattr(given, "sampled", True),
+        "sampled": arguments.flag(getattr(given, "sampled", True), "sampled"),
         "fmu_name": _name(given),
         "__doc__": inspect.getdoc(given) or f"{_name(given)}, plain Python.",
         "_named": staticmethod(namedtuple("Inputs", scalars)),
@@ -259,6 +267,64 @@ def _reporting(component: type[Component]) -> type[Component]:
     """Return a component class that tells what its code raises, otherwise the same."""
     same = {name: getattr(component, name) for name in ("__doc__", "__module__", "fmu_name")}
     return type(component.__name__, (component,), {**same, "_fail": _fail})
+
+
+def _signals(given: Any, name: str) -> tuple[str | Variable, ...]:
+    """Return declared signals: names, or what `signal` and `output` make."""
+    wanted = "a tuple of names, ('yaw_rate',)"
+    found = arguments.items(given, name, wanted)
+    for k, one in enumerate(found):
+        if not arguments.is_a(one, Variable):
+            found[k] = arguments.text(one, f"{name}[{k}]")
+    return tuple(found)
+
+
+def _step_size(given: Any) -> float | None:
+    """Return the time between two samples that a program gives [s], None if it gives none."""
+    wanted = getattr(given, "step_size", None)
+    if wanted is None:
+        return None
+    found = arguments.number(wanted, "step_size")
+    if found <= 0.0:
+        raise ValueError(f"step_size: must be a time above 0 s (got {found:g})")
+    return found
+
+
+def _numbers(given: Any, outputs: Sequence[str]) -> tuple[float, ...]:
+    """Return what a program has returned as one number for each output.
+
+    Raises:
+        TypeError, ValueError: it is something else; names the output.
+    """
+    if type(given) is float and len(outputs) == 1:
+        return (given,)
+    if given is None:
+        raise TypeError(f"nothing was returned; return {listed(outputs)}")
+    shape = given.shape if arguments.is_a(given, np.ndarray, np.generic) else None
+    if len(outputs) == 1 and (shape == () or not arguments.is_a(given, list, tuple, np.ndarray)):
+        values = [given]
+    elif shape is not None and len(shape) != 1:
+        raise ValueError(
+            f"an array of shape {shape} was returned for {listed(outputs)}: give numbers in order"
+        )
+    else:
+        values = arguments.items(given, listed(outputs), "numbers in order")
+    if len(values) != len(outputs):
+        raise ValueError(
+            f"output() gave {len(values)} values for {counted(len(outputs), 'output')}: {listed(outputs)}"
+        )
+    return tuple(_number(one, name) for one, name in zip(values, outputs, strict=True))
+
+
+def _number(given: Any, output: str) -> float:
+    """Return one output; what is not finite is for the master to say."""
+    found = arguments.plain(given)
+    if arguments.is_a(found, bool) or not arguments.is_a(found, int, float, Fraction):
+        arguments.refuse(output, "a number", given)
+    try:
+        return float(found)
+    except OverflowError:
+        return math.inf if found > 0 else -math.inf
 
 
 def _fail(self: Any, what: str, t: float) -> None:
@@ -275,10 +341,15 @@ def _fail(self: Any, what: str, t: float) -> None:
 
 def _name(given: Any) -> str:
     """Return what a program is called."""
-    if isinstance(given, functools.partial):
+    if arguments.is_a(given, functools.partial):
         return _name(given.func)
-    name = getattr(given, "__name__", None) or type(given).__name__
-    return "function" if name == "<lambda>" else name
+    try:
+        name = getattr(given, "__name__", None)
+    except Exception:
+        name = None
+    if name == "<lambda>":
+        return "function"
+    return name if type(name) is str and name.isidentifier() else type(given).__name__
 
 
 def _source(given: Any) -> bytes:
@@ -287,5 +358,5 @@ def _source(given: Any) -> bytes:
         return inspect.getsource(
             given if callable(given) and not hasattr(given, "output") else type(given)
         ).encode()
-    except (OSError, TypeError):
-        return repr(given).encode()
+    except Exception:  # there is none, or somebody else's code fails at being looked at
+        return short(given).encode()

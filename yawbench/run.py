@@ -7,7 +7,6 @@ import io
 import math
 from collections.abc import Iterator
 from html import escape
-from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +19,9 @@ from orchestrator.evaluation.trace import trace_of
 from orchestrator.metrics.plausibility import findings_in, remarks_of
 from orchestrator.metrics.run_metrics import STANDARD, Value, evaluate, evaluate_all, metric, why_none
 from orchestrator.results.read import Results, load_results
-from orchestrator.wording import hint
+from orchestrator.wording import hint, short
+
+from . import arguments
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,7 +37,7 @@ def open(folder: str | Path) -> Run:
     Raises:
         ResultsError: they are missing or unreadable.
     """
-    return Run(load_results(folder))
+    return Run(load_results(arguments.path(folder, "folder")))
 
 
 class Run:
@@ -54,7 +55,7 @@ class Run:
     """
 
     def __init__(self, results: Results) -> None:
-        self.results = results
+        self.results = arguments.instance(results, "results", Results, "a run; yawbench.open reads folders")
 
     @property
     def time(self) -> np.ndarray:
@@ -87,10 +88,10 @@ class Run:
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Return a column, shape (rows,): `unit.variable`, or the only variable of that name."""
-        return self.results.columns[self.results.column(name)]
+        return self.results.columns[self.results.column(arguments.text(name, "name of a column"))]
 
     def __contains__(self, name: object) -> bool:
-        return name in self.results.columns
+        return arguments.is_a(name, str) and arguments.plain(name) in self.results.columns
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.results.columns)
@@ -100,7 +101,7 @@ class Run:
 
     def unit_of(self, name: str) -> str:
         """Return the measurement unit of a column, "" if it has none."""
-        return self.results.units[self.results.column(name)]
+        return self.results.units[self.results.column(arguments.text(name, "name of a column"))]
 
     def to_pandas(self) -> pd.DataFrame:
         """Return all columns over time; `attrs["units"]` holds their units.
@@ -131,7 +132,8 @@ class Run:
             ScenarioError: there is no such measure.
             ResultsError: the run has not recorded what it needs, or does not last for the window.
         """
-        chosen = metric(name)
+        chosen = metric(arguments.text(name, "name of a metric"))
+        window = None if window is None else arguments.span(window, "window")
         value = evaluate(self.results, chosen, window)
         if value is None:
             why = why_none(self.results, chosen, window or chosen.window, self.time[-1])
@@ -160,12 +162,16 @@ class Run:
             ScenarioError: there is no such test, or the angle is none.
             ResultsError: the run has not recorded what it needs.
         """
+        test = arguments.text(test, "test")
         if test not in TESTS:
             raise ScenarioError(f"there is no test {test!r}{hint(test, TESTS, lead='known')}")
         if angle is not None and not TESTS[test].needs_angle:
             raise ScenarioError(f"{test} needs no angle: leave it away")
-        if angle is not None and not (isinstance(angle, Real) and 0.0 < angle < 2.0 * math.pi):
-            raise ScenarioError(f"angle: must be a number between 0 and 2 pi rad (got {angle!r})")
+        if angle is not None:
+            with arguments.as_scenario_errors():
+                given = arguments.number(angle, "angle")
+            if not 0.0 < given < 2.0 * math.pi:
+                raise ScenarioError(f"angle: must be a number between 0 and 2 pi rad (got {short(angle)})")
         return TESTS[test].evaluate(trace_of(self.results, self.title), angle)
 
     def plot(self, *panels: str, title: str | None = None) -> Figure:
@@ -179,14 +185,17 @@ class Run:
             title: default: the run's.
 
         Raises:
-            ResultsError: the run has recorded none of them.
+            ScenarioError: the run has not recorded one of them.
+            ResultsError: it has recorded nothing that could be drawn.
         """
         from orchestrator.figures import panels as drawing
         from orchestrator.figures.plots import OVERVIEW, draw
 
-        return shown_in_notebooks(
-            draw([drawing.Run(self.title, self.results)], panels or OVERVIEW, title=title)
-        )
+        wanted = [arguments.text(one, f"panels[{k}]") for k, one in enumerate(panels)]
+        title = None if title is None else arguments.text(title, "title")
+        runs = [drawing.Run(self.title, self.results)]
+        drawing.check_panels(runs, wanted, option="panel ")
+        return shown_in_notebooks(draw(runs, wanted or OVERVIEW, title=title))
 
     def save(self, folder: str | Path, *, format: str = "csv") -> Path:
         """Write results and run.json, as `yawbench run` does, and return the folder.
@@ -199,8 +208,9 @@ class Run:
         """
         from orchestrator.results.write import write_results
 
-        write_results(self.results, Path(folder), format=format)
-        return Path(folder)
+        place = arguments.path(folder, "folder")
+        write_results(self.results, place, format=arguments.text(format, "format"))
+        return place
 
     def __repr__(self) -> str:
         noted = "".join(f"; {text}" for text in self.remarks)

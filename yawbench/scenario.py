@@ -15,14 +15,15 @@ from orchestrator.fmu.opener import Opener
 from orchestrator.master.log import Log
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.metrics.plausibility import remarks_of
-from orchestrator.plan import FAULTS, Change, Faults, Plan, Unit, Value
+from orchestrator.plan import FAULTS, TYRES, Change, Faults, Plan, Unit, Value
 from orchestrator.scenario import catalogue, scenario_schema
 from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import setting, spelled
 from orchestrator.tyres.axle_stiffness import cornering_stiffness
 from orchestrator.wiring.make_plan import make_plan
-from orchestrator.wording import hint
+from orchestrator.wording import hint, short
 
+from . import arguments
 from .making import opener_of
 from .program import Program
 from .run import Run
@@ -41,7 +42,7 @@ def load(source: str | Path) -> Scenario:
     Raises:
         ScenarioError: there is no such scenario, or something is wrong with it.
     """
-    scenario = Scenario(catalogue.find(source, "a scenario").absolute())
+    scenario = Scenario(catalogue.find(arguments.path(source, "source"), "a scenario").absolute())
     scenario.loaded  # noqa: B018 - what is wrong is said now
     return scenario
 
@@ -65,6 +66,16 @@ class Scenario:
     programs: Mapping[Path, Program] = field(default_factory=dict, repr=False)
     """Units in plain Python, by the path that stands for each."""
 
+    def __post_init__(self) -> None:
+        if not arguments.is_a(self.path, Path):
+            arguments.refuse("path", "a Path; yawbench.load takes names, too", self.path)
+        if not arguments.is_a(self.changes, tuple) or not all(
+            arguments.is_a(one, Change) for one in self.changes
+        ):
+            arguments.refuse("changes", "changes as `set`, `swap` and `fault` make them", self.changes)
+        if not arguments.is_a(self.programs, dict):
+            arguments.refuse("programs", "programs as `swap` makes them", self.programs)
+
     def swap(self, **units: Any) -> Scenario:
         """Return the scenario with other units.
 
@@ -86,11 +97,10 @@ class Scenario:
         changes, programs = [*self._unswapped(units).changes], dict(self.programs)
         for unit, wanted in units.items():
             if unit not in given:
-                text = f"there is no unit {unit!r}{hint(unit, given, lead='units')}"
+                text = f"there is no unit {short(unit)}{hint(unit, given, lead='units')}"
                 raise ScenarioError([Problem(text, file=self.path)])
-            if isinstance(wanted, (str, Path)):
-                path = Path(wanted).absolute() if Path(wanted).suffix == ".fmu" else wanted
-                changes.append(Change(unit, str(path), "swap"))
+            if arguments.names_file(wanted):
+                changes.append(Change(unit, fmu_of(wanted, unit), "swap"))
                 continue
             role = _role(self.loaded.replaced.get(unit, given[unit].fmu), unit)
             program = Program(wanted, unit=unit, role=role)
@@ -120,7 +130,10 @@ class Scenario:
         Raises:
             ScenarioError: a place or value is wrong.
         """
-        changed = [setting(place, _plain(value), "set") for place, value in values.items()]
+        given = arguments.mapping(values, "values", "a mapping of places to values, {'stop_time': 2}")
+        with arguments.as_scenario_errors("set"):
+            plain = {place: _plain(place, value) for place, value in given.items()}
+        changed = [setting(place, value, "set") for place, value in plain.items()]
         scenario = replace(self, changes=(*self.changes, *changed))
         scenario.loaded  # noqa: B018 - what is wrong is said now
         return scenario
@@ -153,8 +166,10 @@ class Scenario:
         Raises:
             ScenarioError: there is no such place or kind, or it takes something else.
         """
+        place, kind = arguments.text(place, "place"), arguments.text(kind, "kind")
         given = {"kind": kind, "value": value, **told, "from": start, "until": until}
-        item = {name: x for name, x in given.items() if x is not None}
+        with arguments.as_scenario_errors("fault"):
+            item = {name: arguments.scalar(x, name) for name, x in given.items() if x is not None}
         at = f"{FAULTS}.{spelled(place)}"
         earlier = next((c for c in self.changes if (c.place, c.origin) == (at, "fault")), None)
         before = earlier.value if earlier and isinstance(earlier.value, Faults) else ()
@@ -199,6 +214,8 @@ class Scenario:
         Raises:
             SimulationError: a unit failed; what Python code raised is its `__cause__`.
         """
+        if progress is not None:
+            arguments.function(progress, "progress", "done", "total")
         opened: list[Any] = []
         make = opener_of(self.programs)
 
@@ -238,9 +255,18 @@ def warn(title: str, remarks: Iterable[str]) -> None:
         warnings.warn(f"{title}: {said}", YawbenchWarning, stacklevel=3)
 
 
-def _plain(value: Any) -> Any:
-    """Return a number of numpy as one of Python, anything else as it is."""
-    return value.item() if getattr(value, "shape", None) == () else value
+def fmu_of(wanted: str | Path, name: str) -> str:
+    """Return the FMU that an argument names: a name as it is, a path as an absolute one."""
+    path = arguments.path(wanted, name)
+    if path.suffix == ".fmu":
+        return str(path.absolute())
+    return arguments.text(wanted, name) if isinstance(wanted, str) else str(path)
+
+
+def _plain(place: str, value: Any) -> Value:
+    """Return the value of a place as plain Python."""
+    of_file = place == "vehicle" or place.partition(".")[0] == TYRES
+    return str(arguments.path(value, place)) if of_file else arguments.scalar(value, place)
 
 
 def _role(fmu: str, unit: str) -> str:

@@ -5,6 +5,7 @@ the signal dictionary, or signals of the component's own (`signal`), outputs say
 which inputs they depend directly at the same instant. `*` in a name stands for the four wheels.
 """
 
+import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, make_dataclass, replace
 from typing import Any
@@ -14,7 +15,7 @@ from vocabulary.units import UNITS
 from vocabulary.vehicle import CAR
 from vocabulary.wheels import WHEEL_NAMES, WHEELS, wheels
 
-_FMI_TYPES = {"float": "Real", "int": "Integer", "bool": "Boolean", "str": "String"}
+_FMI_TYPES: dict[type, str] = {float: "Real", int: "Integer", bool: "Boolean", str: "String"}
 
 
 class DeclarationError(TypeError):
@@ -72,9 +73,18 @@ def signal(
         DeclarationError: unknown name without unit and text, a name that is no lower-case
             identifier, unknown unit, or a unit that contradicts the dictionary.
     """
+    _check("signal", "name", name, str)
+    what = f"signal {_shown(name)}"
+    _check(what, "unit", unit, str, optional=True)
+    _check(what, "description", description, str, optional=True)
+    _check(what, "start", start, float)
+    _check(what, "minimum", minimum, float, optional=True)
+    _check(what, "maximum", maximum, float, optional=True)
+    _check(what, "optional", optional, bool)
+    sources = _names(what, "depends_on", depends_on)
     plain = name.replace("*", "x")
     if not (plain.isidentifier() and plain.isascii() and plain == plain.lower()):
-        raise DeclarationError(f"signal {name!r}: a name is made of lower-case letters, digits and _")
+        raise DeclarationError(f"{what}: a name is made of lower-case letters, digits and _")
     entry = name
     if name not in SIGNALS:
         for wheel in WHEELS:  # a single wheel of a four-wheel signal
@@ -83,13 +93,13 @@ def signal(
     known = SIGNALS.get(entry)
     if known is None and (unit is None or description is None):
         raise DeclarationError(
-            f"signal {name!r} is not in the signal dictionary: give its unit and description"
+            f"{what} is not in the signal dictionary: give its unit and description{_guess(name)}"
         )
     if known is not None and unit is not None and unit != known.unit:
-        raise DeclarationError(f"signal {name!r} has the unit {known.unit}, not {unit}")
+        raise DeclarationError(f"{what} has the unit {known.unit}, not {_shown(unit)}")
     unit = unit or known.unit  # type: ignore[union-attr]
     if unit not in UNITS:
-        raise DeclarationError(f"signal {name!r}: unknown unit {unit!r}; known: {', '.join(UNITS)}")
+        raise DeclarationError(f"{what}: unknown unit {_shown(unit)}; known: {', '.join(UNITS)}")
     text = description or known.text  # type: ignore[union-attr]
     if minimum is None and known is not None:
         minimum = known.minimum
@@ -100,9 +110,49 @@ def signal(
         start=float(start),
         minimum=minimum,
         maximum=maximum,
-        depends_on=tuple(depends_on),
+        depends_on=sources,
         optional=optional,
     )
+
+
+def _check(what: str, argument: str, value: Any, kind: type, *, optional: bool = False) -> None:
+    """Raise DeclarationError if a value is not of a kind, or no finite number; `optional`: or None."""
+    if optional and value is None:
+        return
+    wanted = {str: "text", float: "a finite number", bool: "True or False"}[kind]
+    if kind is not float:
+        fits = type(value) is kind
+    else:
+        number = issubclass(type(value), (int, float)) and type(value) is not bool
+        fits = number and abs(value) <= sys.float_info.max
+    if not fits:
+        raise DeclarationError(f"{what}: {argument} must be {wanted} (got {type(value).__name__})")
+
+
+def _names(what: str, argument: str, value: Iterable[str]) -> tuple[str, ...]:
+    """Return a tuple or list of texts as a tuple.
+
+    Raises:
+        DeclarationError: it is something else.
+    """
+    if type(value) not in (tuple, list):
+        raise DeclarationError(f"{what}: {argument} must be a tuple of texts (got {type(value).__name__})")
+    for one in value:
+        _check(what, f"every item of {argument}", one, str)
+    return tuple(value)
+
+
+def _shown(text: str | None) -> str:
+    """Return a text as it stands in a message, cut if long."""
+    return repr(text if text is None or len(text) <= 60 else f"{text[:57]}...")
+
+
+def _guess(name: str) -> str:
+    """Return "; did you mean 'x'?" for a name that is like one of the dictionary."""
+    from difflib import get_close_matches  # takes long to import, and FMUs have no need of it
+
+    likely = get_close_matches(name, SIGNALS, n=1, cutoff=0.65)
+    return f"; did you mean {likely[0]!r}?" if likely else ""
 
 
 def output(name: str, *depends_on: str, unit: str | None = None, text: str | None = None) -> Variable:
@@ -136,17 +186,28 @@ def parameter(
     `source` says where the default comes from, and its first word of what kind that is: "paper A, table 1",
     "chosen: why", "erratum: what is printed", or anything else for other literature.
     """
+    kind = _FMI_TYPES.get(type(default))
+    if kind is None:
+        known = ", ".join(one.__name__ for one in _FMI_TYPES)
+        raise DeclarationError(f"parameter: default must be one of {known} (got {type(default).__name__})")
+    if kind == "Real":
+        _check("parameter", "default", default, float)
+    _check("parameter", "unit", unit, str, optional=True)
+    _check("parameter", "description", description, str)
+    _check("parameter", "source", source, str)
+    _check("parameter", "minimum", minimum, float, optional=True)
+    _check("parameter", "maximum", maximum, float, optional=True)
     declared = Variable(
         "",
         unit,
         description,
         causality="parameter",
-        type=_FMI_TYPES[type(default).__name__],
+        type=kind,
         variability="fixed",
         start=default,
         minimum=minimum,
         maximum=maximum,
-        choices=None if choices is None else tuple(choices),
+        choices=None if choices is None else _names("parameter", "choices", choices),
         source=source,
     )
     return field(default=default, metadata={"declared": declared})

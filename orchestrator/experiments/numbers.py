@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import re
+import sys
 from typing import Annotated
 
 from pydantic import PlainValidator
@@ -19,7 +19,9 @@ def text_of(value: object) -> str:
 
 def is_finite(value: object) -> bool:
     """Return whether a value is a finite number."""
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    return abs(value) <= sys.float_info.max  # also of whole numbers that no float can hold
 
 
 def si_number(given: float | str, unit: str) -> float:

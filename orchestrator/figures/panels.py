@@ -104,8 +104,13 @@ def _marked(draw: Callable[[Axes], None], spans: Sequence[Span]) -> Callable[[Ax
     return fill
 
 
-def check_panels(runs: Sequence[Run], names: Sequence[str]) -> None:
+def check_panels(runs: Sequence[Run], names: Sequence[str], *, option: str = "--panel ") -> None:
     """Make sure that every name stands for a panel of at least one run.
+
+    Args:
+        runs: what there is to draw.
+        names: of panels.
+        option: what messages put before a name.
 
     Raises:
         ScenarioError: with a sentence for each name that does not.
@@ -114,7 +119,7 @@ def check_panels(runs: Sequence[Run], names: Sequence[str]) -> None:
     errors = [f"{name}_error" for name in recorded if panels_of(runs, f"{name}_error")]
     known = [*recorded, *errors, "path"]
     problems = [
-        f"--panel {cut(name)}: no run has recorded it{hint(name, known, lead='there are')}"
+        f"{option}{cut(name)}: no run has recorded it{hint(name, known, lead='there are')}"
         for name in names
         if not panels_of(runs, name)
     ]

@@ -12,7 +12,15 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from ..errors import KEPT, Interrupted, Problem, ResultsError, SimulationError, YawbenchError
+from ..errors import (
+    KEPT,
+    Interrupted,
+    Problem,
+    ResultsError,
+    ScenarioError,
+    SimulationError,
+    YawbenchError,
+)
 from ..metrics.plausibility import Watch
 from ..plan import Finding, Plan
 from ..results.columnar import MemoryRecorder
@@ -28,6 +36,9 @@ from .course import Course, Opener, Progress
 from .interrupts import StopFlag, interrupts
 from .log import Log, Message
 from .opening import open_unit
+
+IN_MEMORY = 16 * 10**9
+"""Bytes that the results of a run may take in memory. Chosen: what a desktop computer has."""
 
 
 @dataclass(frozen=True)
@@ -100,8 +111,16 @@ def simulate_in_memory(
     """Run a plan and return its results; nothing is written.
 
     Raises:
+        ScenarioError: they would take more memory than `IN_MEMORY`.
         ModelDescriptionError, SimulationError: as `simulate`.
     """
+    taken = 8 * (plan.n_steps + 1) * (len(plan.record) + 1)
+    if taken > IN_MEMORY:
+        size = f"{plan.n_steps:,} steps of {len(plan.record)} variables are {taken / 1e9:.3g} GB"
+        raise ScenarioError(
+            f"{size}, and {IN_MEMORY / 1e9:g} GB may be kept in memory: record less, or let 'yawbench run' "
+            "write them to a file"
+        )
     recorder = MemoryRecorder(*_columns(plan))
     Run(plan, recorder, progress, apart=False).make(opener)
     assert recorder.results is not None

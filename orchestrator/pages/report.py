@@ -30,7 +30,7 @@ def found_studies(folder: Path = SCENARIOS) -> list[Path]:
         ScenarioError: there are none.
     """
     titles: dict[Path, str] = {}
-    for path, _ in catalogue.files(folder, ["a study file"], below="*/*"):
+    for path, _ in catalogue.files(folder, ["a study file"], depth=2):
         data = yaml_lines.read(path, what="study file").data
         titles[path] = str(data.get("title", "")) if isinstance(data, dict) else ""
     if not titles:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Collection, Iterator
+from itertools import islice
 from pathlib import Path
 
 from ..errors import ScenarioError
 from ..files import TEXT, read_bytes
-from ..wording import hint, listed
+from ..wording import hint, listed, short
 from .strict import KINDS
 
 FOLDER = "scenarios"
@@ -17,6 +18,8 @@ SHIPPED = Path(__file__).resolve().parents[2] / FOLDER
 """Where this program's own scenarios lie."""
 YAML = (".yaml", ".yml")
 ENDINGS = (*YAML, ".ssp")
+LOOKED_AT = 20_000
+"""Entries of a folder that are looked at for files. Chosen: a second, and more than anybody has."""
 COMMANDS = {
     "a scenario": "run",
     "a study file": "study",
@@ -48,11 +51,29 @@ def kind_of(path: Path) -> str:
     return next((kind for key, (kind, *_) in KINDS.items() if key in keys), "")
 
 
-def files(folder: Path, kinds: Collection[str], *, below: str = "**/*") -> Iterator[tuple[Path, str]]:
-    """Yield every file of some kinds in a folder with its kind, in alphabetical order."""
-    for path in sorted(folder.glob(below)):
+def files(folder: Path, kinds: Collection[str], *, depth: int | None = None) -> Iterator[tuple[Path, str]]:
+    """Yield every file of some kinds in a folder with its kind, in alphabetical order.
+
+    Args:
+        folder: where they are; of very many files in it the first `LOOKED_AT` are looked at.
+        kinds: of `strict.KINDS`.
+        depth: 1: those in the folder itself, 2: those in a folder of it; None: all below.
+    """
+    for path in sorted(islice(_below(folder, depth), LOOKED_AT)):
         if path.suffix in ENDINGS and (kind := kind_of(path)) in kinds:
             yield path, kind
+
+
+def _below(folder: Path, depth: int | None) -> Iterator[Path]:
+    """Yield what is in a folder and may be read; no link to a folder is followed."""
+    for above, inside, names in os.walk(folder):
+        place = Path(above)
+        level = len(place.relative_to(folder).parts) + 1
+        if depth is None or level == depth:
+            yield from (place / name for name in (*inside, *names))
+        if level == depth:
+            inside.clear()
+        inside.sort()
 
 
 def names(kind: str) -> list[str]:
@@ -60,7 +81,7 @@ def names(kind: str) -> list[str]:
     found = (
         path.relative_to(folder).with_suffix("").as_posix()
         for folder in folders()
-        for path, _ in files(folder, [kind], below="*/*")
+        for path, _ in files(folder, [kind], depth=2)
     )
     return list(dict.fromkeys(found))
 
@@ -98,15 +119,15 @@ def find(source: str | Path, kind: str) -> Path:
             raise ScenarioError(f"{source}: {_what_is_in(folder, kind)}")
     others = hint(str(source), elsewhere or known, lead="by name there are")
     what = kind.partition(" ")[2]
-    raise ScenarioError(f"there is no {what} {str(source)!r}{others}")
+    raise ScenarioError(f"there is no {what} {short(str(source))}{others}")
 
 
 def _what_is_in(folder: Path, kind: str) -> str:
     """Return what a folder is that was given in place of a file, and what could be meant."""
     if (folder / "run.json").is_file():
         return f"these are the results of a run, not {kind}; 'yawbench plot {folder}' draws them"
-    for below in ("*", "*/*"):
-        if found := [str(path) for path, _ in files(folder, [kind], below=below)]:
+    for depth in (1, 2):
+        if found := [str(path) for path, _ in files(folder, [kind], depth=depth)]:
             return f"a folder, not {kind}; in it there are: {listed(found)}"
     for other, command in COMMANDS.items():
         if found := [str(path) for path, _ in files(folder, [other])]:

@@ -16,6 +16,9 @@ from .scenario_schema import Connection, Endpoint, Scenario, ScenarioSpec, Vehic
 from .tir import TyreFile, read_tir
 from .yaml_lines import Document, Key
 
+STEPS = 1_000_000_000
+"""Steps of a run. Chosen: a computer makes about as many in a day."""
+
 __all__ = ["Connection", "Endpoint", "Scenario", "ScenarioSpec", "load_scenario"]
 
 
@@ -127,6 +130,10 @@ def _check_time_grid(document: Document) -> None:
     if start is not None and stop is not None and not start < stop:
         what = f"must be after start_time, {float(start):.12g} s (got {float(stop):.12g} s)"
         document.report(("stop_time",), what)
+        return
+    if stop is not None and (stop - (start or 0)) / step > STEPS:
+        steps = float((stop - (start or 0)) / step)
+        document.report(("stop_time",), f"a run has at most {STEPS:,} steps (this would have {steps:.3g})")
         return
     times: list[tuple[Key, object]] = [(("stop_time",), None if stop is None else stop - (start or 0))]
     units = data.get("units")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 import yawbench as yb
@@ -91,14 +93,23 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_others_are_made(base)
         ({"driver.amplitude": ["1 deg", 2]}, "driver.amplitude: give all levels in one unit, or none"),
         ({"driver.amplitude": ["1.2.3 deg"]}, "'1.2.3 deg': give plain numbers, and their unit"),
         ({"driver.amplitde": [1, 2]}, "has no parameter 'amplitde'; did you mean 'amplitude'"),
-        ({"driver.amplitude": 1}, r"driver.amplitude: give a list of levels \(got 1\)"),
-        ({"controller": "controller_off"}, "controller: give a list of levels"),
+        ({"driver.amplitude": 1}, r"driver.amplitude: must be a list of levels \(got 1\)"),
+        ({"controller": "controller_off"}, "controller: must be a list of levels"),
+        ({"driver.amplitude": ["0.01", "0.02"]}, "driver.amplitude: give numbers, .* as such, not as text"),
+        ({"driver.amplitude": np.ones((2, 2))}, r"driver.amplitude\[0\]: must be a number"),
         ({"controller": [Proportional(), Proportional()]}, "controller: two levels are called Proportional"),
     ],
 )
 def test_what_is_wrong_is_said_before_any_run_is_made(base, axes, said):
     with pytest.raises(yb.ScenarioError, match=said):
         yb.experiment(base, axes).run()
+
+
+def test_levels_without_end_and_workers_that_are_no_number_are_refused(base):
+    with pytest.raises(yb.ScenarioError, match=r"driver.amplitude: gives more than 100,000 items"):
+        yb.experiment(base, {"driver.amplitude": itertools.count(0.01, 0.01)})
+    with pytest.raises(TypeError, match="workers: must be a whole number"):
+        yb.experiment(base, {"driver.amplitude": [0.02]}).run(workers="x")
 
 
 def test_a_script_runs_an_experiment_without_a_guard_and_only_once(tmp_path):

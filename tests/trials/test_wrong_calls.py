@@ -1,0 +1,38 @@
+"""The library called with wrong things: a sample in the first tier, all calls in the second."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from .wrong_calls import TAKEN, Tally, cases, described, trial
+
+EACH = 29
+"""Of so many calls the sample makes one. Chosen: a prime, so that each parameter meets other values."""
+
+
+def held(tally: Tally, calls: int) -> bool:
+    """Return whether every call was made and came to what it should."""
+    assert not tally.bad, "\n".join(tally.notes)
+    return sum(tally.counts.values()) == calls
+
+
+def test_some_wrong_calls_of_every_function_are_answered_by_name(tmp_path: Path) -> None:
+    chosen = cases()[::EACH]
+    assert held(trial(chosen, tmp_path), len(chosen))
+
+
+@pytest.mark.exhaustive
+def test_all_wrong_calls_are_answered_by_name_and_what_is_right_is_taken(tmp_path: Path) -> None:
+    chosen = cases()
+    assert len(chosen) > 2000
+    tally = trial(chosen, tmp_path)
+    assert held(tally, len(chosen))
+    assert tally.counts[TAKEN] > 500
+
+
+def test_every_parameter_of_every_public_function_is_called_with_wrong_things() -> None:
+    tried = {parameter.name.partition(" [")[0] for parameter, _ in cases()}
+    wanted = {f"{name}.{one}" for name, parameters in described().items() for one in parameters}
+    assert wanted - tried == set()

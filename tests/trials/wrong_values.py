@@ -1,0 +1,238 @@
+"""Values that no function of the library was made for, each with what it is."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+
+class Raised(Exception):
+    """What hostile objects raise: nobody may let it pass."""
+
+
+def _raises(*_: Any, **__: Any) -> Any:
+    raise Raised("hostile")
+
+
+def hostile(*names: str, base: type = object) -> Any:
+    """Return an object whose methods of some names raise."""
+    return type("Hostile", (base,), dict.fromkeys(names, _raises))()
+
+
+class Property:
+    """An object whose attributes cannot be read."""
+
+    output = inputs = outputs = step_size = dtype = shape = name = __name__ = property(_raises)  # type: ignore[assignment]
+
+
+class SaysItIsText:
+    """An object that gives another class than it has."""
+
+    @property  # type: ignore[misc]
+    def __class__(self) -> type:
+        return str
+
+
+class HasNoClass:
+    """An object that raises when it is asked for its class."""
+
+    __class__ = property(_raises)  # type: ignore[assignment]
+
+
+class Mute:
+    """An object without anything."""
+
+
+class Coloured:
+    """An object whose text would do something to a terminal."""
+
+    def __repr__(self) -> str:
+        return "\x1b[31m\u202e red"
+
+
+class Endless:
+    """An iterable that never ends, and has no length."""
+
+    def __iter__(self) -> Iterator[float]:
+        return itertools.count(0.01, 0.01)
+
+
+def _nested() -> list[Any]:
+    inside: list[Any] = []
+    for _ in range(3000):
+        inside = [inside]
+    return inside
+
+
+def _itself() -> list[Any]:
+    given: list[Any] = []
+    given.append(given)
+    return given
+
+
+TEXTS: dict[str, Callable[[], Any]] = {
+    "empty text": str,
+    "blank text": lambda: " ",
+    "number as text": lambda: "1.0",
+    "nan as text": lambda: "nan",
+    "1e400 as text": lambda: "1e400",
+    "half a character": lambda: "\ud800",
+    "text turned around": lambda: "\u202eabc",
+    "zero byte": lambda: "a\0b",
+    "escape sequence": lambda: "\x1b[31mred",
+    "long text": lambda: "x" * 100_000,
+    "long number as text": lambda: "1" * 5000,
+    "numpy text": lambda: np.str_("numpy text"),
+    "hostile text": lambda: hostile("__str__", "__repr__", "__eq__", "__hash__", "__len__", base=str),
+    "path upwards": lambda: "../../../../nothing",
+    "root": lambda: "/",
+    "markup": lambda: "<script>$\\frac{$",
+    "brackets": lambda: "(" * 3000,
+    "minus one second": lambda: "-1 s",
+    "one apple": lambda: "1 apple",
+    "pattern": lambda: "*",
+    "point": lambda: ".",
+    "arrow": lambda: "a.b -> c.d -> e",
+}
+NUMBERS: dict[str, Callable[[], Any]] = {
+    "zero": lambda: 0,
+    "minus one": lambda: -1,
+    "three": lambda: 3,
+    "two and a half": lambda: 2.5,
+    "minus one and a half": lambda: -1.5,
+    "10**400": lambda: 10**400,
+    "-10**400": lambda: -(10**400),
+    "10**5000": lambda: 10**5000,
+    "10**18": lambda: 10**18,
+    "1e308": lambda: 1e308,
+    "nan": lambda: math.nan,
+    "inf": lambda: math.inf,
+    "-inf": lambda: -math.inf,
+    "numpy nan": lambda: np.float64("nan"),
+    "numpy inf": lambda: np.float32("inf"),
+    "numpy int": lambda: np.int64(-3),
+    "numpy uint8": lambda: np.uint8(200),
+    "numpy longdouble": lambda: np.longdouble("1e4000"),
+    "array of no dimensions": lambda: np.array(-2.0),
+    "fraction": lambda: Fraction(-1, 3),
+    "huge fraction": lambda: Fraction(10**400),
+    "hostile int": lambda: hostile("__index__", "__int__", "__eq__", "__repr__", "__lt__", base=int),
+    "hostile float": lambda: hostile("__float__", "__eq__", "__repr__", "__hash__", "__lt__", base=float),
+}
+OTHERS: dict[str, Callable[[], Any]] = {
+    "None": lambda: None,
+    "True": lambda: True,
+    "False": lambda: False,
+    "numpy True": lambda: np.True_,
+    "complex": lambda: 1j,
+    "numpy complex": lambda: np.complex128(1),
+    "decimal": lambda: Decimal("1.0"),
+    "decimal nan": lambda: Decimal("sNaN"),
+    "array of 1 dimension": lambda: np.array([1.0]),
+    "array of 2 dimensions": lambda: np.array([[1.0]]),
+    "matrix 2x2": lambda: np.ones((2, 2)),
+    "array of 3 dimensions": lambda: np.ones((1, 1, 1)),
+    "empty array": lambda: np.array([]),
+    "array of objects": lambda: np.array([None, {}], dtype=object),
+    "object in an array": lambda: np.array({}, dtype=object),
+    "array of records": lambda: np.zeros(1, dtype=[("a", float)]),
+    "masked array": lambda: np.ma.masked,
+    "date": lambda: np.datetime64("2020-01-01T00:00:00", "ns"),
+    "time span": lambda: np.timedelta64(3, "ns"),
+    "bytes": lambda: b"1",
+    "bytearray": lambda: bytearray(b"1"),
+    "memoryview": lambda: memoryview(b"1"),
+    "memoryview of numbers": lambda: memoryview(np.array(1.0)),
+    "object": object,
+    "empty object": Mute,
+    "coloured object": Coloured,
+    "hostile repr": lambda: hostile("__repr__"),
+    "hostile str": lambda: hostile("__str__", "__format__"),
+    "hostile eq": lambda: hostile("__eq__", "__ne__"),
+    "hostile hash": lambda: hostile("__hash__"),
+    "hostile bool": lambda: hostile("__bool__", "__len__"),
+    "hostile getattr": lambda: hostile("__getattr__"),
+    "hostile getattribute": lambda: hostile("__getattribute__"),
+    "hostile iterator": lambda: hostile("__iter__", "__getitem__", "__next__", "__contains__"),
+    "hostile number": lambda: hostile("__float__", "__int__", "__index__", "__lt__", "__gt__", "__abs__"),
+    "hostile array": lambda: hostile("__array__", "__array_interface__"),
+    "hostile path": lambda: hostile("__fspath__"),
+    "hostile call": lambda: hostile("__call__"),
+    "hostile list": lambda: hostile("__iter__", "__len__", "__repr__", "__eq__", base=list),
+    "hostile dict": lambda: hostile("__iter__", "items", "keys", "get", "__getitem__", "__len__", base=dict),
+    "hostile properties": Property,
+    "text by its own word": SaysItIsText,
+    "no class": HasNoClass,
+    "number as float()": lambda: type("Number", (), {"__float__": lambda self: 1.0})(),
+    "path of bytes": lambda: type("Bytes", (), {"__fspath__": lambda self: b"/tmp"})(),
+    "list": lambda: [1],
+    "list of None": lambda: [None],
+    "list of lists": lambda: [[1]],
+    "list of hostile": lambda: [hostile("__repr__", "__eq__", "__hash__", "__getattribute__")],
+    "list in itself": _itself,
+    "nested list": _nested,
+    "tuple": lambda: (1, 2, 3),
+    "pair of texts": lambda: ("1.0", "2.0"),
+    "pair of bytes": lambda: (b"1", b"2"),
+    "pair turned around": lambda: (2.0, 1.0),
+    "pair with nan": lambda: (0.0, math.nan),
+    "pair of truths": lambda: (False, True),
+    "list of a pair": lambda: [("a", 1)],
+    "set": lambda: {1, 2},
+    "set of texts": lambda: frozenset({"b", "a"}),
+    "generator": lambda: (x for x in (None, 2)),
+    "failing generator": lambda: (1 / x for x in (1, 0)),
+    "endless generator": lambda: (x for x in itertools.count()),
+    "endless numbers": lambda: itertools.count(0.01, 0.01),
+    "endless texts": lambda: itertools.repeat("peak(sideslip)"),
+    "endless object": Endless,
+    "long range": lambda: range(10**12),
+    "zip": lambda: zip(),
+    "dict": lambda: {"a": 1},
+    "dict of numbers": lambda: {1: 2},
+    "dict of None": lambda: {None: None},
+    "dict of tuples": lambda: {(): 1},
+    "dict of halves": lambda: {"\ud800": 1},
+    "class": lambda: int,
+    "class of ours": lambda: Mute,
+    "type": lambda: type,
+    "lambda": lambda: lambda: None,
+    "lambda of x": lambda: lambda x: x,
+    "lambda of all": lambda: lambda *a, **k: None,
+    "builtin": lambda: print,
+    "builtin type method": lambda: str.join,
+    "module": lambda: math,
+    "ellipsis": lambda: ...,
+    "not implemented": lambda: NotImplemented,
+    "slice": lambda: slice(1, 2),
+    "exception": lambda: ValueError("x"),
+    "path": lambda: Path("nothing/of/this/name"),
+    "path with a zero": lambda: Path("a\0b"),
+    "path of half a character": lambda: Path("\ud800"),
+    "link to nothing": lambda: Path("dangling"),
+    "link to itself": lambda: Path("loop.yaml"),
+    "link to a folder": lambda: Path("linked"),
+    "device": lambda: Path("/dev/zero"),
+    "series": lambda: pd.Series([None, 1]),
+    "frame": lambda: pd.DataFrame({"a": [1]}),
+    "pandas NA": lambda: pd.NA,
+    "pandas NaT": lambda: pd.NaT,
+    "file": lambda: open("/dev/null", "rb"),  # noqa: SIM115
+}  # fmt: skip
+WRONG = TEXTS | NUMBERS | OTHERS
+"""What it is -> makes it, anew for every call."""
+
+
+def plant_links(folder: Path) -> None:
+    """Put the links that some of the values name into a folder."""
+    (folder / "empty").mkdir()
+    for name, target in (("dangling", "nowhere"), ("loop.yaml", "loop.yaml"), ("linked", "empty")):
+        (folder / name).symlink_to(target)

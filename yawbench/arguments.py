@@ -1,0 +1,245 @@
+"""Checks of what the library's functions are called with.
+
+Public functions pass their arguments through here before they use them. A check returns the value as
+plain Python, or raises TypeError (it is of another kind) or ValueError (of the right kind, but not allowed)
+with a sentence that begins with the argument's name. Nothing that the value itself defines is trusted: its
+type decides, no text or bytes count as a number, and no iterator is read without end.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import inspect
+import math
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from fractions import Fraction
+from itertools import islice
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar, cast
+
+import numpy as np
+
+from orchestrator.errors import Problem, ScenarioError
+from orchestrator.wording import listed, short, unprintable
+
+MOST = 100_000
+"""Items of one argument. Chosen: as many as an experiment may have runs."""
+
+LONGEST = 1000
+"""Characters of a name or a title. Chosen: no sentence is as long."""
+NAME = 255
+"""Bytes of a file's name that file systems allow."""
+
+T = TypeVar("T")
+
+
+def text(value: Any, name: str, *, empty: bool = False) -> str:
+    """Return a text without control characters; `empty`: it may have no characters."""
+    given = plain(value)
+    if not is_a(given, str):
+        refuse(name, "text", value)
+    if bad := unprintable(given):
+        raise ValueError(f"{name}: must be text without {bad} (got {short(given)})")
+    if not (given.strip() or (empty and not given)):
+        raise ValueError(f"{name}: must not be blank")
+    if len(given) > LONGEST:
+        raise ValueError(f"{name}: must be text of at most {LONGEST} characters (got {short(given)})")
+    return cast(str, given)
+
+
+def flag(value: Any, name: str) -> bool:
+    """Return True or False."""
+    given = plain(value)
+    return cast(bool, given) if is_a(given, bool) else refuse(name, "True or False", value)
+
+
+def number(value: Any, name: str) -> float:
+    """Return a finite number."""
+    given = plain(value)
+    if is_a(given, bool) or not is_a(given, int, float, Fraction):
+        refuse(name, "a number", value)
+    try:
+        found = float(given)
+    except OverflowError:
+        found = math.inf
+    if not math.isfinite(found):
+        raise ValueError(f"{name}: must be a finite number (got {short(value)})")
+    return found
+
+
+def count(value: Any, name: str, *, least: int = 1, most: int = MOST) -> int:
+    """Return a whole number from `least` to `most`."""
+    given = plain(value)
+    if is_a(given, bool) or not is_a(given, int):
+        refuse(name, "a whole number", value)
+    if not least <= given <= most:
+        raise ValueError(f"{name}: must be a whole number from {least} to {most:,} (got {short(given)})")
+    return cast(int, given)
+
+
+def scalar(value: Any, name: str) -> float | int | bool | str:
+    """Return a value that a scenario may give: a number, True or False, or text."""
+    given = plain(value)
+    if is_a(given, bool):
+        return cast(bool, given)
+    if is_a(given, str):
+        if bad := unprintable(given):
+            raise ValueError(f"{name}: must be text without {bad} (got {short(given)})")
+        return cast(str, given)
+    if is_a(given, int, float, Fraction):
+        finite = number(given, name)
+        return cast(int, given) if is_a(given, int) else finite
+    refuse(name, "a number, True or False, or text", value)
+
+
+def span(value: Any, name: str) -> tuple[float, float]:
+    """Return the beginning and the end of a stretch of time [s]."""
+    ends = items(value, name, "a pair of times, (1.0, 3.0)")
+    if len(ends) != 2:
+        refuse(name, "a pair of times, (1.0, 3.0)", value)
+    first, last = (number(one, f"{name}[{k}]") for k, one in enumerate(ends))
+    if first > last:
+        raise ValueError(f"{name}: must not end before it begins (got {first:g} to {last:g} s)")
+    return first, last
+
+
+def path(value: Any, name: str) -> Path:
+    """Return the path of a file or folder, or a name in place of one."""
+    given = plain(value)
+    if is_a(value, os.PathLike):
+        try:
+            given = os.fspath(value)
+        except Exception as error:
+            raise TypeError(f"{name}: gives no path: {said(error)}") from error
+    if not is_a(given, str):
+        refuse(name, "a name or a path", value)
+    try:
+        longest = max((len(os.fsencode(part)) for part in Path(given).parts), default=0)
+    except UnicodeEncodeError:
+        raise ValueError(f"{name}: no file can be called {short(given)}") from None
+    if "\0" in given or not given.strip() or longest > NAME:
+        raise ValueError(f"{name}: no file can be called {short(given)}")
+    return Path(given)
+
+
+def names_file(value: object) -> bool:
+    """Return whether a value is a text or a path: of a file, or a name in place of one."""
+    return is_a(value, str, os.PathLike)
+
+
+def items(value: Any, name: str, wanted: str, *, ordered: bool = True) -> list[Any]:
+    """Return what an iterable gives, at most `MOST` items; text, bytes and mappings are none.
+
+    Args:
+        value, name: the argument.
+        wanted: what it should have been, for messages.
+        ordered: whether a set, whose order is left to chance, is none, too.
+    """
+    unfit: tuple[type, ...] = (str, bytes, bytearray, memoryview, Mapping)
+    unfit += (set, frozenset) if ordered else ()
+    if is_a(value, *unfit) or not is_a(value, Iterable, np.ndarray) or _is_single(value):
+        refuse(name, wanted, value)
+    try:
+        given = list(islice(iter(value), MOST + 1))
+    except Exception as error:
+        raise TypeError(f"{name}: must be {wanted}, but cannot be read: {said(error)}") from error
+    if len(given) > MOST:
+        raise ValueError(f"{name}: gives more than {MOST:,} items")
+    return given
+
+
+def texts(value: Any, name: str, *, ordered: bool = True) -> list[str]:
+    """Return texts; a single one need not be in a list."""
+    if is_a(plain(value), str):
+        return [text(value, name)]
+    given = items(value, name, "text, or a list of texts", ordered=ordered)
+    return [text(one, f"{name}[{k}]") for k, one in enumerate(given)]
+
+
+def mapping(value: Any, name: str, wanted: str) -> dict[str, Any]:
+    """Return a mapping whose keys are texts."""
+    if not is_a(value, Mapping):
+        refuse(name, wanted, value)
+    try:
+        pairs = list(islice(value.items(), MOST + 1))
+        given = [(key, one) for key, one in pairs]
+    except Exception as error:
+        raise TypeError(f"{name}: must be {wanted}, but cannot be read: {said(error)}") from error
+    if len(given) > MOST:
+        raise ValueError(f"{name}: has more than {MOST:,} keys")
+    return {text(key, f"key {short(key)} of {name}"): one for key, one in given}
+
+
+def function(value: Any, name: str, *parameters: str) -> Callable[..., Any]:
+    """Return what can be called with so many values as it has parameters."""
+    wanted = f"a function of {listed(parameters)}"
+    if not callable(value) or is_a(value, type):
+        refuse(name, wanted, value)
+    try:
+        inspect.signature(value).bind(*parameters)
+    except TypeError:
+        refuse(name, wanted, value)
+    except Exception:  # it does not tell, as those of C
+        return cast(Callable[..., Any], value)
+    return cast(Callable[..., Any], value)
+
+
+def instance(value: Any, name: str, kind: type[T], made_by: str) -> T:
+    """Return an object of one of the library's classes.
+
+    Args:
+        value, name: the argument.
+        kind: the class.
+        made_by: the function whose result it is, for messages.
+    """
+    if not is_a(value, kind):
+        refuse(name, f"what {made_by} returns", value)
+    return cast(T, value)
+
+
+@contextlib.contextmanager
+def as_scenario_errors(origin: str = "") -> Iterator[None]:
+    """Raise what is wrong with values of a scenario as its error, behind where they come from."""
+    try:
+        yield
+    except (TypeError, ValueError) as error:
+        raise ScenarioError([Problem(f"{origin} {error}".lstrip())]) from None
+
+
+def plain(value: Any) -> Any:
+    """Return a scalar of numpy, an array of no dimensions or an object of a subclass as plain Python.
+
+    Whatever is no number, text, True or False is given back as it is.
+    """
+    if is_a(value, np.generic, np.ndarray) and value.shape == ():
+        makes = {"b": bool, "i": int, "u": int, "f": float, "U": str}
+        make = makes.get(value.dtype.kind)
+        return value if make is None else make(value)
+    if is_a(value, int):
+        return value if type(value) is bool else int.__int__(value)
+    if is_a(value, float):
+        return float.__float__(value)
+    return str.__str__(value) if is_a(value, str) else value
+
+
+def refuse(name: str, wanted: str, value: object) -> NoReturn:
+    """Raise TypeError for an argument that is of another kind than it must be."""
+    raise TypeError(f"{name}: must be {wanted} (got {short(value)})")
+
+
+def is_a(value: object, *kinds: type) -> bool:
+    """Return whether a value is of one of some types, whatever it says itself of its class."""
+    return issubclass(type(value), kinds)
+
+
+def _is_single(value: Any) -> bool:
+    return is_a(value, np.ndarray) and value.shape == ()
+
+
+def said(error: BaseException) -> str:
+    """Return kind and text of an error that somebody else's code has raised."""
+    try:
+        return f"{type(error).__name__}: {error}"
+    except Exception:
+        return type(error).__name__
