@@ -68,6 +68,7 @@ def evaluate(
     """
     from ..evaluation.dwell_series import is_series, judge_series
     from ..evaluation.trace import load_mapping, load_trace
+    from ..results.naming import below_results
     from .recorded import distinct, folder_of_all
 
     chosen = TESTS[test]
@@ -79,7 +80,7 @@ def evaluate(
     judged = [chosen.evaluate(trace, known) for trace in traces]
     series = judge_series(judged, known) if known and is_series(judged) else None
     recorded_here = all(place.is_dir() for place in places)
-    folder = out or (folder_of_all(places) if recorded_here else Path("results") / "evaluation")
+    folder = out or (folder_of_all(places) if recorded_here else below_results("evaluation"))
     Evaluation(chosen, traces, judged, series, known, folder).conclude(each=figures, together=out is not None)
 
 

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ResultsError
-from ..files import check_regular, reason
+from ..files import reason
+from ..writing import open_own
 from .jobs import Record
 
 FILE = "runs.jsonl"
@@ -37,13 +38,9 @@ class Journal:
         path = folder / FILE
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            if path.exists():
-                check_regular(path)
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+            self._file = open_own(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
         except OSError as error:
             raise ResultsError(f"{folder}: results cannot be written here: {reason(error)}.") from None
-        except ValueError as error:
-            raise ResultsError(f"{path}: cannot be read: {error}.") from None
         try:
             if fresh:
                 os.ftruncate(self._file, 0)
