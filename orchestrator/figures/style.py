@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ResultsError
 from ..files import reason
+from ..wording import printable
 from ..writing import write_whole
 
 if TYPE_CHECKING:
@@ -128,8 +129,8 @@ def note_above(axes: Axes, note: str) -> None:
 
 
 def literal(text: str) -> str:
-    """Return a user's text so that no `$` in it begins a formula."""
-    return text.replace("$", r"\$")
+    """Return a user's text with control characters written out, and so that no `$` in it begins a formula."""
+    return printable(text).replace("$", r"\$")
 
 
 def frame(
