@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, ValidationError
 
@@ -13,6 +13,9 @@ from ..files import read_bytes, reading, reason
 from ..wording import short
 from .folder import FAILED, LARGEST, RUN_FILE, refuse_dead
 from .formats import FILES
+
+NotFinite = Literal["nan", "inf", "-inf"]
+"""How a record holds what JSON cannot."""
 
 
 class _Part(BaseModel):
@@ -68,12 +71,12 @@ class _Record(_Part):
     changes: list[dict[str, Any]] = []
     findings: list[_Finding] = []
     faults: list[_Fault] = []
-    connections: list[Any] = []
+    connections: list[dict[str, Any]] = []
     scenario: dict[str, Any] = {}
     versions: dict[str, str] = {}
     warnings: list[dict[str, Any]] = []
-    smallest: dict[str, float | str] = {}
-    largest: dict[str, float | str] = {}
+    smallest: dict[str, float | NotFinite] = {}
+    largest: dict[str, float | NotFinite] = {}
 
 
 def load_record(folder: Path, *, settled: bool = False) -> dict[str, Any]:

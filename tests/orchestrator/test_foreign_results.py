@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from lxml import html
 
 import yawbench as yb
 from orchestrator.errors import ResultsError, ScenarioError, YawbenchError
@@ -487,3 +488,42 @@ def test_only_names_of_our_formats_are_put_in_place(work):
     assert salvage(folder)[1] == 0
     assert sorted(path.name for path in folder.iterdir()) == ["notes.part", "results.csv", "run.json"]
     assert math.isclose(yb.open(folder).time[-1], 8.0)
+
+
+def test_results_are_read_through_links(work):
+    data = work / "data"
+    data.mkdir()
+    for name in ("run.json", "results.csv"):
+        (work / "theirs" / name).rename(data / name)
+        (work / "theirs" / name).symlink_to(data / name)
+    before = snapshot(work)
+    assert yb.open("theirs").time.size == 801
+    assert snapshot(work) == before
+
+
+def test_a_page_of_foreign_results_loads_nothing_and_runs_no_script_of_theirs(work, yawbench):
+    evil = "</script><script src='http://e.vil/x.js'></script><img src=x onerror=alert(1)>"
+    good = json.loads((work / "good" / "run.json").read_text())
+    scenario = {"title": evil, "source": evil, "file": evil, "parameters": {evil: evil}}
+    theirs = {**good, "title": evil, "scenario": scenario, "versions": {evil: evil}, "notes": [evil]}
+    theirs["fmus"] = {evil: good["fmus"]["plant"], "plant": {**good["fmus"]["plant"], "name": evil}}
+    (work / "theirs" / "run.json").write_text(json.dumps(theirs))
+    (work / "study.yaml").write_text(
+        "title: Theirs\nruns: [{name: theirs, scenario: no.yaml}, {name: good, scenario: no.yaml}]\n"
+        "metrics: {sideslip: {metric: peak(sideslip)}}\n"
+        "figures: [{name: overlay, runs: ['*'], panels: [sideslip]}]\n"
+    )
+    assert (
+        yawbench("animate", "theirs", "good", "--label", evil, "--label", "good", "--out", "a.html")[0] == 0
+    )
+    yawbench("study", "study.yaml", "--no-run", "--jobs", "1", "--out", ".")
+    assert yawbench("plot", "theirs", "--label", evil)[0] == 0
+    for name in ("a.html", "report.html"):
+        page = html.parse(str(work / name))
+        assert not [one for one in page.iter("script") if one.get("src")]
+        assert not page.xpath("//@onerror | //iframe | //object | //embed | //form | //base")
+        links = page.xpath("//@src | //@href | //@srcset | //@poster | //@action | //@data")
+        assert not [one for one in links if not one.startswith(("data:", "#")) and ":" in one]
+        text = (work / name).read_text()
+        assert "<script src" not in text
+        assert "url(http" not in text.replace("'", "").replace('"', "")
