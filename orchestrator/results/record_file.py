@@ -30,6 +30,11 @@ class _Fmu(_Part):
     defaults: dict[str, Any] = {}
 
 
+class _Change(_Part):
+    place: str
+    value: Any
+
+
 class _Error(_Part):
     message: str = ""
 
@@ -68,7 +73,7 @@ class _Record(_Part):
     evaluation_order: list[str] = []
     units: dict[str, str | None] = {}
     fmus: dict[str, _Fmu] = {}
-    changes: list[dict[str, Any]] = []
+    changes: list[_Change] = []
     findings: list[_Finding] = []
     faults: list[_Fault] = []
     connections: list[dict[str, Any]] = []

@@ -339,9 +339,7 @@ def projects(tmp_path: Path, work: Path, fmus: Path, yawbench: Callable[..., tup
 
 
 @pytest.mark.parametrize("command", MAKES)
-def test_a_command_that_makes_runs_follows_no_link_in_the_folder_that_it_writes(
-    command, projects, work, home
-):
+def test_a_command_that_makes_runs_follows_no_link_where_it_writes(command, projects, work, home):
     assert projects(command, "--out", "clean")[0] == 0
     made = _products(work / "clean")
     files = [path for path in made if (work / "clean" / path).is_file()]

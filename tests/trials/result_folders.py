@@ -99,7 +99,7 @@ class Tally:
 
 def whole_record() -> dict[str, Any]:
     """Return a record with every part that a run may write, each with something in it."""
-    units = recorded.run_record({"time": "s", **recorded.UNITS})
+    units = recorded.run_record({"time": "s", **recorded.UNITS, "driver.steering_wheel_angle": "rad"})
     fmu = {
         "name": "plant_made_up", "file": "plant_made_up.fmu", "sha256": "0123456789" * 6, "guid": "{0}",
         "generation_tool": "by hand", "fmi_version": "2.0", "built": None, "step_size": 0.01,
@@ -111,7 +111,7 @@ def whole_record() -> dict[str, Any]:
     return units | {
         "id": "3446bfa3df41", "key": "98b86a4f4f6baa3be335e193295c8de6",
         "started": "2026-01-01T00:00:00+00:00",
-        "start_time": 0.0, "stop_time": 8.0, "ended": {"message": "the car has stopped", "time": 8.0},
+        "start_time": 0.0, "stop_time": 8.0, "ended": None,
         "error": {"message": "it failed", "unit": "plant", "time": 1.0}, "results": "results.csv",
         "evaluation_order": ["controller", "plant"], "texts": [], "fmus": {"plant": fmu, "controller": fmu},
         "changes": [{"place": "plant.mass", "value": 1500.0, "origin": "--set", "plain": 1500.0}],
@@ -130,6 +130,8 @@ def whole_record() -> dict[str, Any]:
 def make_good(folder: Path) -> None:
     """Write the results of a good run, with a whole record."""
     car = recorded.car(n=81)
+    car.columns["driver.steering_wheel_angle"] = 16.0 * car["driver.steer_angle"]
+    car.units["driver.steering_wheel_angle"] = "rad"
     car.run.update(whole_record())
     write_results(car, folder)
 
