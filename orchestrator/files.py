@@ -36,6 +36,10 @@ DEPTH = 100
 makes and deletes folders by recursion."""
 
 
+NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
+"""Flag that opens no symbolic link; Windows has none, there `refuse_link` alone must do."""
+
+
 class TooLargeError(ValueError):
     """What is in a file is more than is read, in a sentence that begins with "it" or a participle."""
 
@@ -54,8 +58,22 @@ def check_regular(path: Path) -> None:
         raise ValueError("it is a pipe, a socket or a device, not a file")
 
 
-def open_regular(path: Path) -> BinaryIO:
+def refuse_link(path: Path) -> None:
+    """Make sure that a path does not name a symbolic link.
+
+    Raises:
+        OSError: it does.
+    """
+    if os.path.islink(path):
+        raise OSError(errno.ELOOP, f"{path.name} is a symbolic link, which is not followed", str(path))
+
+
+def open_regular(path: Path, *, follow: bool = True) -> BinaryIO:
     """Open a regular file for reading, without waiting for anything.
+
+    Args:
+        path: of the file.
+        follow: a symbolic link; False: refuse it.
 
     Raises:
         OSError: it cannot be opened.
@@ -63,6 +81,9 @@ def open_regular(path: Path) -> BinaryIO:
     """
     check_regular(path)
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    if not follow:
+        refuse_link(path)
+        flags |= NO_FOLLOW
     stream = open(os.open(path, flags), "rb")  # noqa: SIM115
     if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):  # exchanged since
         stream.close()
@@ -70,15 +91,20 @@ def open_regular(path: Path) -> BinaryIO:
     return stream
 
 
-def read_bytes(path: Path, *, largest: int) -> bytes:
+def read_bytes(path: Path, *, largest: int, follow: bool = True) -> bytes:
     """Return the content of a regular file.
+
+    Args:
+        path: of the file.
+        largest: size [bytes].
+        follow: a symbolic link; False: refuse it.
 
     Raises:
         OSError: it cannot be opened or read.
         ValueError: it is no regular file, or no path can be called so.
         TooLargeError: it is larger than `largest`.
     """
-    with open_regular(path) as stream:
+    with open_regular(path, follow=follow) as stream:
         size = os.fstat(stream.fileno()).st_size
         if size > largest:
             raise TooLargeError(f"it is larger than {_in_words(largest)}")

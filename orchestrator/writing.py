@@ -1,12 +1,19 @@
-"""Files that are written whole or not at all, whatever ends the program on the way."""
+"""Files written whole or not at all, and never through a link in a results folder.
+
+Results may come from somebody else, with links in place of the files and folders that are written there.
+The folder that the user names may itself be a link, or lie behind one. Below it no link is followed.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import errno
 import os
+import stat
 from collections.abc import Iterator
 from pathlib import Path
+
+from .files import NO_FOLLOW, TEXT, refuse_link
 
 try:
     import fcntl
@@ -17,21 +24,33 @@ NEW = ".new"
 """What the name of a file ends in for the moment in which it is being written."""
 
 
-def write_whole(path: Path, content: str | bytes) -> None:
+LOCK_FILE = ".yawbench-lock"
+"""Name of the file that its writer has locked in a folder of results."""
+
+
+def write_whole(path: Path, content: str | bytes, *, named: bool = False) -> None:
     """Write a file so that at any moment there is what stood there before, or all of the new content.
 
-    The folder is made if it does not exist. A symbolic link stays one: its target is replaced. What a
-    dead process has left under the temporary name is overwritten.
+    The folder is made if it does not exist. What a dead process has left under the temporary name is
+    overwritten. A link, pipe or device in the file's place is replaced, its target left alone.
+
+    Args:
+        path: of the file.
+        content: of the file.
+        named: the user has named this very file: a link stays and its target is replaced, a pipe or a
+            device is written to.
 
     Raises:
         OSError: the file cannot be written; what stood there has not changed.
     """
     # a path that is no UTF-8 comes as lone surrogates, which text shows as \\udcxx
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
-    target = Path(os.path.realpath(path))
+    target = Path(os.path.realpath(path)) if named else path
     try:
+        if not named:
+            refuse_links_within(target.parent)
         target.parent.mkdir(parents=True, exist_ok=True)
-        if target.exists() and not target.is_file():  # a device or a pipe; a folder will say so
+        if named and target.exists() and not target.is_file():  # a device or a pipe; a folder will say so
             target.write_bytes(data)
             return
         part = target.with_name(target.name + NEW)
@@ -53,8 +72,28 @@ def write_whole(path: Path, content: str | bytes) -> None:
         raise
 
 
+def open_own(path: Path, flags: int, mode: int = 0o666) -> int:
+    """Open a file that only this program writes: a regular file, no link, with no other name.
+
+    Raises:
+        OSError: it cannot be opened, or is something else.
+    """
+    refuse_link(path)
+    more = NO_FOLLOW | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
+    descriptor = os.open(path, flags | more, mode)
+    status = os.fstat(descriptor)
+    if not stat.S_ISREG(status.st_mode):
+        problem = "is a pipe, a socket or a device, not a file"
+    elif status.st_nlink > 1:
+        problem = "has another name (a hard link), whose content would change, too; copy or remove it"
+    else:
+        return descriptor
+    os.close(descriptor)
+    raise OSError(errno.EINVAL, f"{path.name} {problem}", str(path))
+
+
 def claim(path: Path, *, wait: bool = False) -> int:
-    """Open a file, made if it does not exist, and lock it until its descriptor is closed.
+    """Open a file (see `open_own`), made if it does not exist, and lock it until its descriptor is closed.
 
     The lock ends with the process, however that ends. On network drives that cannot lock it is none.
 
@@ -67,7 +106,7 @@ def claim(path: Path, *, wait: bool = False) -> int:
         OSError: it cannot be opened.
     """
     while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0), 0o666)
+        descriptor = open_own(path, os.O_RDWR | os.O_CREAT)
         if fcntl is None:
             return descriptor
         try:
@@ -78,7 +117,7 @@ def claim(path: Path, *, wait: bool = False) -> int:
             os.close(descriptor)
             raise BlockingIOError(error.errno, os.strerror(error.errno), str(path)) from None
         with contextlib.suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(descriptor), os.stat(path)):
+            if os.path.samestat(os.fstat(descriptor), os.lstat(path)):
                 return descriptor
         os.close(descriptor)  # the one who held it has renamed or removed it
 
@@ -119,3 +158,39 @@ def remove_draft(file: Path) -> None:
 
 def _draft(file: Path) -> Path:
     return file.with_name(f".{file.name}.draft")
+
+
+def lock_note(folder: Path) -> bytes | None:
+    """Return what the process that holds a folder has written into its lock file, None if nobody does.
+
+    Nothing is changed, and no lock file made.
+    """
+    try:
+        descriptor = open_own(folder / LOCK_FILE, os.O_RDONLY)
+    except OSError:
+        return None
+    with os.fdopen(descriptor, "rb") as stream:
+        try:
+            if fcntl is not None:
+                fcntl.flock(stream.fileno(), fcntl.LOCK_SH | fcntl.LOCK_NB)
+                return None
+        except OSError:  # held, or on a network drive that cannot tell
+            pass
+        with contextlib.suppress(OSError):
+            return stream.read(TEXT)
+        return b""
+
+
+def refuse_links_within(folder: Path) -> None:
+    """Make sure that no link leads from a held folder to one below it, or out of it.
+
+    Raises:
+        OSError: one of the folders below the outermost that a process holds is a link.
+    """
+    absolute = Path(os.path.abspath(folder))
+    below: list[Path] = []
+    for place in reversed((absolute, *absolute.parents)):
+        if below or lock_note(place) is not None:
+            below.append(place)
+    for place in below[1:]:
+        refuse_link(place)

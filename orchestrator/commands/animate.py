@@ -43,7 +43,7 @@ def animate(sources: Sources, wishes: Wishes, label: Labels = None, out: Page = 
         text = page(runs, below="; ".join(dict.fromkeys(titles)), changed=changed)
     file = out or folder_of_all(folders) / "animation.html"
     try:
-        write_whole(file, text)
+        write_whole(file, text, named=out is not None)
     except OSError as error:
         raise ResultsError(f"{file}: the page cannot be written: {error.strerror or error}.") from None
     say(f"{file}: {len(text.encode()) / 1000:.0f} kB")

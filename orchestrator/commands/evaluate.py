@@ -68,6 +68,7 @@ def evaluate(
     """
     from ..evaluation.dwell_series import is_series, judge_series
     from ..evaluation.trace import load_mapping, load_trace
+    from ..results.naming import below_results
     from .batch import say
     from .recorded import distinct, folder_of_all
 
@@ -80,7 +81,7 @@ def evaluate(
     judged = [chosen.evaluate(trace, known) for trace in traces]
     series = judge_series(judged, known) if known and is_series(judged) else None
     recorded_here = all(place.is_dir() for place in places)
-    folder = out or (folder_of_all(places) if recorded_here else Path("results") / "evaluation")
+    folder = out or (folder_of_all(places) if recorded_here else below_results("evaluation"))
     Evaluation(chosen, traces, judged, series, known, folder).conclude(each=figures, together=out is not None)
     if all(one.judges_nothing for one in judged):
         say(f"{chosen.name}: nothing could be judged, see above")

@@ -168,17 +168,19 @@ def of_files(context: typer.Context, files: Sequence[Path], wishes: Wishes) -> N
     from ..errors import ScenarioError
     from ..experiments.experiment import load_experiment
     from ..experiments.verdicts import all_tables, counts_of, reach, tally_words
-    from ..results.naming import default_folder
+    from ..results.naming import default_folder, names_of
     from .batch import print_tables
 
     changes, out = wishes.changes, wishes.out
     experiments = [load_experiment(file, changes=changes) for file in files]
     if tuned := [str(one.path) for one in experiments if one.spec.tuning]:
         raise ScenarioError([f"{file}: a tuning file; it is for `yawbench tune`" for file in tuned])
-    folders = [default_folder(file, changes) for file in files]
-    page = out or (folders[0] if len(folders) == 1 else Path(os.path.commonpath(folders)))
-    if out is not None:
-        below = [out / file.absolute().parent.name / file.stem for file in files]
+    if out is None:
+        folders = [default_folder(file, changes) for file in files]
+        page = folders[0] if len(folders) == 1 else Path(os.path.commonpath(folders))
+    else:
+        page = out
+        below = [out.joinpath(*names_of(file)) for file in files]
         folders = [out] if len(files) == 1 else below
     for folder in dict.fromkeys(folders):
         if len(sharing := [str(f) for f, of in zip(files, folders, strict=True) if of == folder]) > 1:

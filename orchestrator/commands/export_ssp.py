@@ -49,5 +49,5 @@ def export_ssp(
     for note in notes:
         say(f"note: {note}")
     path = out or Path(f"{scenario.stem}.ssp")
-    write_ssp(plan, path, standard)
+    write_ssp(plan, path, standard, named=out is not None)
     say(f"{path}: {len(plan.units)} units, {len(plan.wires)} connections")

@@ -139,7 +139,6 @@ def _write(ranked: Ranked, folder: Path, command: str, each: Each) -> None:
         ("runs", columns_of_runs),
     ):
         write_whole(folder / f"{name}.csv", to_csv(columns(ranked)))
-    (folder / FIGURES).mkdir(exist_ok=True)
     save(draw_matrix(ranked, command), folder / FIGURES / "matrix")
     try:
         save(draw_pareto(ranked, command), folder / FIGURES / "pareto")

@@ -35,6 +35,7 @@ def tyre(
     One figure: lateral force and aligning moment over slip angle and longitudinal force over slip at four
     loads, forces in combined slip at five slip angles, stiffnesses and relaxation lengths over load.
     """
+    from ..results.naming import below_results
     from ..tyres.stand import put_on_stand
     from ..tyres.tyre_drawing import draw_tyre
     from .batch import save_figure, say
@@ -47,5 +48,5 @@ def tyre(
         for warning in file["warnings"]:
             say(f"warning: {warning}")
     note = f"front left wheel, friction {friction:g}, no camber · {fmu.name} ({fmu.sha256[:8]})"
-    default = Path("results", "tyres", Path(source).stem)
+    default = below_results("tyres", Path(source).stem)
     save_figure(draw_tyre(stand, f"{name}{kind}{side}", note), output, default)

@@ -56,6 +56,7 @@ def vehicle(
     """
     from ..errors import ScenarioError
     from ..fmu.opener import Opener
+    from ..results.naming import below_results
     from ..scenario import catalogue, yaml_lines
     from ..scenario.scenario_schema import Vehicle
     from ..scenario.strict import validate
@@ -81,7 +82,7 @@ def vehicle(
         for why in car.failed:
             say(f"note: {car.plant}: {why}")
     note = f"on {tracks[0].tyres}, friction {friction:g}"
-    save_figure(draw_cars(cars, file.stem, note), output, Path("results", "vehicles", file.stem))
+    save_figure(draw_cars(cars, file.stem, note), output, below_results("vehicles", file.stem))
 
 
 def _tables(cars: list[Handling]) -> list[Table]:

@@ -16,9 +16,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .. import checksums
 from ..errors import ResultsError
-from ..files import check_regular, reason
+from ..files import reason
 from ..wording import counted
-from ..writing import write_whole
+from ..writing import open_own, write_whole
 from .jobs import Record
 
 FILE = "runs.jsonl"
@@ -97,13 +97,9 @@ class Journal:
         self._path = path = folder / FILE
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            if path.exists():
-                check_regular(path)
             self._file = _opened(path)
         except OSError as error:
             raise ResultsError(f"{folder}: results cannot be written here: {reason(error)}.") from None
-        except ValueError as error:
-            raise ResultsError(f"{path}: cannot be read: {error}.") from None
         try:
             if fresh:
                 os.ftruncate(self._file, 0)
@@ -204,7 +200,7 @@ class Journal:
 
 
 def _opened(path: Path) -> int:
-    return os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+    return open_own(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
 
 
 def _content(line: bytes) -> dict[str, Any]:

@@ -129,7 +129,7 @@ def note_above(axes: Axes, note: str) -> None:
 
 
 def literal(text: str) -> str:
-    """Return a user's text so that no `$` in it begins a formula and no character breaks a file of SVG."""
+    """Return a user's text with control characters written out, and so that no `$` in it begins a formula."""
     return printable(text).replace("$", r"\$")
 
 

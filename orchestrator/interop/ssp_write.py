@@ -56,8 +56,8 @@ Version = Literal["1.0", "2.0"]
 """Of the standard. What is written here is the same in both but for the number."""
 
 
-def write_ssp(plan: Plan, path: Path, standard: Version = "1.0") -> None:
-    """Write the plan and its FMUs into the archive `path`.
+def write_ssp(plan: Plan, path: Path, standard: Version = "1.0", *, named: bool = False) -> None:
+    """Write the plan and its FMUs into the archive `path`; `named`: as in `write_whole`.
 
     Raises:
         ResultsError: it cannot be written, or not in XML.
@@ -79,7 +79,7 @@ def write_ssp(plan: Plan, path: Path, standard: Version = "1.0") -> None:
             for sha256, source in sorted(sources.items(), key=lambda item: item[1]):
                 fmu = next(unit.fmu for unit in plan.units if unit.fmu.sha256 == sha256)
                 _put(archive, source, read_archive(fmu.path))
-        write_whole(path, content.getvalue())
+        write_whole(path, content.getvalue(), named=named)
     except OSError as error:
         raise ResultsError(f"{path}: cannot write this archive: {error.strerror or error}") from None
 

@@ -1,13 +1,15 @@
 """The folder of a run: what stands in it, and how new results take their place.
 
 While a run goes on its files are called `.part`, and the record among them says "running"; earlier
-results stay beside them. At its end the record is replaced by the final one, and from then on the end
-can be caught up with by whoever comes next, should the process die between two renames. Where the
-record still says "running" and nobody holds the folder, the run has died: the folder is not read
-before that has been dealt with, by another run or by `salvage`.
+results stay beside them. At its end the record is replaced by the final one, and the files get their
+names. A record that is still called `.part` while nobody holds the folder is that of a run that has died.
+Readers say so and change nothing; the next run there, or `salvage`, puts in place what is whole.
 
 Results that reached their end are replaced only by such. Those of a run that failed go to `failed`
 below them, until a run reaches its end again.
+
+The content of a folder may come from anybody. Only files are moved that have the names of our formats and
+stand in the folder itself; a link among them is never followed.
 """
 
 from __future__ import annotations
@@ -15,14 +17,16 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import stat
 from pathlib import Path
 from typing import Any
 
 from ..errors import ResultsError
-from ..files import read_bytes, reason
+from ..files import read_bytes, refuse_link
+from ..wording import cut
 from ..writing import NEW
 from .formats import FILES, RESULTS_FILE
-from .lock import Lock, holder_of
+from .lock import holder_of
 
 RUN_FILE = "run.json"
 
@@ -34,6 +38,8 @@ FAILED = "failed"
 """Folder of a failed run's results below those of one that reached its end."""
 RUNNING, COMPLETED, DIED = "running", "completed", "died"
 """What a record says of a run that goes on, that reached its end, that was salvaged after its death."""
+FINAL = (COMPLETED, "failed", "interrupted", DIED)
+"""What it says of a run that has ended."""
 
 
 def place_of(folder: Path, status: str) -> Path:
@@ -44,17 +50,19 @@ def place_of(folder: Path, status: str) -> Path:
 def put_in_place(folder: Path) -> Path:
     """Give the files of a run whose record is final their names; return the folder they are in.
 
-    Further calls go on where an earlier one has ended.
+    Further calls go on where an earlier one has ended. To be called by the holder of the folder.
 
     Raises:
         OSError: they cannot be renamed.
     """
     part = folder / f"{RUN_FILE}{PART}"
-    run = _record(part)
+    run = _record(part, follow=False)
     place = place_of(folder, run.get("status", ""))
-    file = str(run.get("results", RESULTS_FILE))
-    if (results := folder / f"{file}{PART}").exists():
+    file = _file_of(run)
+    if place != folder:
+        refuse_link(place)
         place.mkdir(exist_ok=True)
+    if is_regular(results := folder / f"{file}{PART}"):
         os.replace(results, place / file)
     os.replace(part, place / RUN_FILE)
     for other in {*FILES.values()} - {file}:
@@ -65,12 +73,22 @@ def put_in_place(folder: Path) -> Path:
 
 
 def remove_results(folder: Path) -> None:
-    """Remove the results in a folder, and the folder if it is empty then."""
+    """Remove the results in a folder, and the folder if it is empty then; nothing through a link."""
+    if folder.is_symlink():
+        return
     for name in (*FILES.values(), RUN_FILE):
         with contextlib.suppress(OSError):
             (folder / name).unlink()
     with contextlib.suppress(OSError):
         folder.rmdir()
+
+
+def is_regular(path: Path) -> bool:
+    """Return whether a path names a regular file, not by a link."""
+    try:
+        return stat.S_ISREG(path.lstat().st_mode)
+    except (OSError, ValueError):
+        return False
 
 
 def tidy(folder: Path) -> None:
@@ -81,38 +99,32 @@ def tidy(folder: Path) -> None:
     Raises:
         OSError: files cannot be renamed or removed.
     """
-    if _is_final(folder):
+    if is_final(folder):
         put_in_place(folder)
     for name in (*FILES.values(), RUN_FILE):
         for left in (f"{name}{PART}", f"{name}{PART}{NEW}", f"{name}{NEW}"):
             (folder / left).unlink(missing_ok=True)
 
 
-def settle(folder: Path) -> None:
-    """Make sure that what stands in a folder may be read.
+def refuse_dead(folder: Path) -> None:
+    """Make sure that the last run in a folder has not died.
 
     Raises:
-        ResultsError: the last run there has died, or its results cannot be put in their places.
+        ResultsError: it has.
     """
-    record = folder / f"{RUN_FILE}{PART}"
-    if not record.exists() or holder_of(folder) is not None:
-        return
-    if not _is_final(folder):
+    if is_dead(folder):
         raise ResultsError(death(folder))
-    lock = Lock(folder)
-    try:
-        if _is_final(folder):
-            put_in_place(folder)
-    except OSError as error:
-        raise ResultsError(f"{folder}: results cannot be put in their places: {reason(error)}.") from None
-    finally:
-        lock.release()
 
 
 def death(folder: Path) -> str:
     """Return a sentence on a run that has died in a folder."""
-    begun = str(_record(folder / f"{RUN_FILE}{PART}").get("started") or "")
-    when = f" begun at {begun}" if begun else ""
+    begun = _record(folder / f"{RUN_FILE}{PART}", follow=False).get("started")
+    when = f" begun at {cut(begun, 60)}" if begun and isinstance(begun, str) else ""
+    if is_final(folder):
+        return (
+            f"{folder}: the run{when} was stopped before its results were in their places; put them there "
+            f"with 'yawbench salvage {folder}', or run it again."
+        )
     beside = "; the results of the run before it are read again then" if _status(folder / RUN_FILE) else ""
     return (
         f"{folder}: the run{when} ended without a word; run it again, or keep what it recorded with "
@@ -123,27 +135,35 @@ def death(folder: Path) -> str:
 def is_dead(folder: Path) -> bool:
     """Return whether the last run in a folder has died."""
     part = folder / f"{RUN_FILE}{PART}"
-    return part.exists() and holder_of(folder) is None and not _is_final(folder)
+    # the second look is for a run that has ended between the first one and that at its lock
+    return os.path.lexists(part) and holder_of(folder) is None and os.path.lexists(part)
 
 
 def unfinished(folder: Path) -> dict[str, Any] | None:
     """Return the record of the run that goes on in a folder, or has died there; None if there is none."""
     part = folder / f"{RUN_FILE}{PART}"
-    return _record(part) if part.exists() and not _is_final(folder) else None
+    return _record(part, follow=False) if os.path.lexists(part) else None
 
 
-def _is_final(folder: Path) -> bool:
-    return _status(folder / f"{RUN_FILE}{PART}") not in ("", RUNNING)
+def is_final(folder: Path) -> bool:
+    """Return whether a run that has ended has yet to get its files put in their places."""
+    run = _record(folder / f"{RUN_FILE}{PART}", follow=False)
+    return run.get("status") in FINAL and _file_of(run) in FILES.values()
+
+
+def _file_of(run: dict[str, Any]) -> str:
+    """Return the name of the file of results that a record names."""
+    return str(run.get("results") or RESULTS_FILE)
 
 
 def _status(path: Path) -> str:
     return str(_record(path).get("status") or "")
 
 
-def _record(path: Path) -> dict[str, Any]:
+def _record(path: Path, *, follow: bool = True) -> dict[str, Any]:
     """Return a record without looking into it; an empty one if there is none."""
     try:
-        found = json.loads(read_bytes(path, largest=LARGEST))
+        found = json.loads(read_bytes(path, largest=LARGEST, follow=follow))
     except (OSError, ValueError, RecursionError, MemoryError):
         return {}
     return found if isinstance(found, dict) else {}

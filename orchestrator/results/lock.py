@@ -19,10 +19,9 @@ from datetime import datetime
 from pathlib import Path
 
 from ..errors import ResultsError
-from ..files import TEXT, read_bytes, reason
-from ..writing import claim, fcntl
+from ..files import reason
+from ..writing import LOCK_FILE, claim, fcntl, lock_note, refuse_links_within
 
-LOCK_FILE = ".yawbench-lock"
 LOOKS = 100
 """Times that a lock is asked for again, 10 ms apart; chosen: runs whose command was killed end sooner."""
 
@@ -62,6 +61,7 @@ class Lock:
         self._made: list[Path] = []
         self._descriptor: int | None = None
         try:
+            refuse_links_within(home)
             self._made = [place for place in (home, *home.parents) if not place.exists()]
             home.mkdir(parents=True, exist_ok=True)
             self._descriptor = _claimed(self._path)
@@ -72,7 +72,7 @@ class Lock:
                 f"{folder}: results cannot be written here: it is no folder; name another with --out."
             ) from None
         except BlockingIOError:
-            raise _held(folder, _said(self._path)) from None
+            raise _held(folder, holder_of(home) or _said(b"")) from None
         except OSError as error:
             self.release()
             raise ResultsError(f"{folder}: results cannot be written here: {reason(error)}.") from None
@@ -130,29 +130,19 @@ def refuse_below_others(folder: Path) -> None:
 
 
 def holder_of(folder: Path) -> Holder | None:
-    """Return who writes into a folder, None if nobody does."""
-    path = folder / LOCK_FILE
-    try:
-        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
-    except OSError:
-        return None
-    try:
-        if fcntl is not None:
-            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-            return None
-    except OSError:  # held, or on a network drive that cannot tell
-        pass
-    finally:
-        os.close(descriptor)
-    return _said(path)
+    """Return who writes into a folder, None if nobody does. Nothing is changed there."""
+    note = lock_note(folder)
+    return None if note is None else _said(note)
 
 
-def _said(path: Path) -> Holder:
+def _said(note: bytes) -> Holder:
     """Return what a lock file says of its holder, who may not have come to say it."""
     try:
-        return Holder(**json.loads(read_bytes(path, largest=TEXT)))
-    except (OSError, ValueError, TypeError):
+        said = json.loads(note)
+        holder = Holder(str(said["command"]), int(said["process"]), str(said["host"]), str(said["since"]))
+    except (ValueError, TypeError, KeyError, RecursionError, OverflowError):
         return Holder("another run", 0, "this computer", "")
+    return holder
 
 
 def _held(folder: Path, holder: Holder) -> ResultsError:

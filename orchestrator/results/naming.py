@@ -9,13 +9,16 @@ Whoever looks for the results of a scenario asks here, with the changes of its p
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from ..errors import ScenarioError
+from ..errors import ResultsError, ScenarioError
 from ..plan import Change, Value
 
+RESULTS = Path("results")
+"""Folder in the working folder that holds all results."""
 LONGEST = 100
 """Characters of a name; chosen: short enough for a table, and far from what disks allow (255 bytes)."""
 
@@ -33,13 +36,54 @@ def default_folder(
 
     Raises:
         ScenarioError: no folder can be called so.
+        ResultsError: see `below_results`.
     """
-    above = Path("results", file.absolute().parent.name)
+    above, stem = names_of(file)
     if name is None:
-        return above / _with_changes(f"{file.stem}{suffix}", changes)
-    if not name.strip(". ") or re.search(r'[\x00-\x1f/\\:*?"<>|]', name) or len(name.encode()) > 200:
+        return below_results(above, _with_changes(f"{stem}{suffix}", changes))
+    if not _is_name(name) or re.search(r'[\x00-\x1f/\\:*?"<>|]', name) or len(name.encode()) > 200:
         raise ScenarioError(f"--name {name}: must be the name of one folder; a path is given with --out")
-    return above / name
+    return below_results(above, name)
+
+
+def names_of(file: Path) -> tuple[str, str]:
+    """Return what results of a file are called: the name of its folder, "" of the root's, and its own.
+
+    Raises:
+        ScenarioError: no folder can be called as the file is.
+    """
+    above = Path(os.path.abspath(file)).parent.name
+    if not _is_name(file.stem) or (above and not _is_name(above)):
+        raise ScenarioError(f"{file}: no folder of results can be named after it; name one with --out")
+    return above, file.stem
+
+
+def below_results(*names: str) -> Path:
+    """Return a folder below `results`, which may itself be a link; none below it is followed.
+
+    Args:
+        names: of a folder in each other; empty ones are left out.
+
+    Raises:
+        ScenarioError: no folder can be called so.
+        ResultsError: one of them is a link.
+    """
+    place = RESULTS
+    for name in filter(None, names):
+        if not _is_name(name):
+            raise ScenarioError(f"no folder below {RESULTS} can be called {name!r}; name one with --out")
+        place /= name
+        if place.is_symlink():
+            raise ResultsError(
+                f"{place}: is a symbolic link, which is not followed below {RESULTS}; "
+                "name the folder that it leads to with --out"
+            )
+    return place
+
+
+def _is_name(text: str) -> bool:
+    """Return whether a folder can be called so: neither itself, nor the one above, nor a path."""
+    return bool(text.strip(". ")) and "/" not in text and os.sep not in text
 
 
 def _with_changes(stem: str, changes: Iterable[Change]) -> str:

@@ -13,7 +13,7 @@ from .. import checksums
 from ..errors import ResultsError
 from ..files import read_bytes, reading, reason
 from ..wording import short
-from .folder import FAILED, LARGEST, RUN_FILE, settle
+from .folder import FAILED, LARGEST, RUN_FILE, refuse_dead
 from .formats import FILES
 from .run_record import RunRecord
 
@@ -29,7 +29,7 @@ def load_record(folder: Path, *, settled: bool = False) -> dict[str, Any]:
         ResultsError: there is none, it is not what `yawbench run` writes, or the last run here has died.
     """
     if not settled:
-        settle(folder)
+        refuse_dead(folder)
     file = folder / RUN_FILE
     with reading("record of a run", file, ResultsError):
         try:

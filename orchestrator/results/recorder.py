@@ -123,7 +123,7 @@ class Recorder(Block):
         self._lock = Lock(folder)
         try:
             tidy(self._home)
-            self._file = self._path.open("wb", buffering=0)
+            self._file = self._path.open("xb", buffering=0)  # not through a link that stands there
         except OSError as error:
             self._lock.release()
             raise ResultsError(f"{folder}: results cannot be written here: {reason(error)}.") from None

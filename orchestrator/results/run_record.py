@@ -12,7 +12,7 @@ from dataclasses import asdict
 from datetime import datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt
 
@@ -110,6 +110,17 @@ class FaultRecord(_Part):
         return f"{self.on}: {self.fault}"
 
 
+class ChangeRecord(_Part):
+    """Something other than in the scenario file."""
+
+    place: str
+    value: Any
+
+
+NotFinite = Literal["nan", "inf", "-inf"]
+"""How a record holds what JSON cannot."""
+
+
 class RunRecord(_Part):
     """The record of a run."""
 
@@ -132,7 +143,7 @@ class RunRecord(_Part):
     units: dict[str, str | None] = {}  # of measurement, of time and columns
     texts: list[str] | None = None  # columns that hold text
     fmus: dict[str, FmuRecord] = {}
-    changes: list[dict[str, Any]] = []
+    changes: list[ChangeRecord] = []
     connections: list[ConnectionRecord] = []
     faults: list[FaultRecord] = []
     findings: list[FindingRecord] = []
@@ -142,8 +153,8 @@ class RunRecord(_Part):
     warnings: list[dict[str, Any]] = []
     more_warnings: NonNegativeInt = 0
     units_freed: bool = False
-    smallest: dict[str, float | str] = {}
-    largest: dict[str, float | str] = {}
+    smallest: dict[str, float | NotFinite] = {}
+    largest: dict[str, float | NotFinite] = {}
     checksums: dict[str, str] = {}  # of the keys of the record itself; see `orchestrator.checksums`
 
 

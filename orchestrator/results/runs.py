@@ -10,7 +10,7 @@ from typing import Any
 
 from ..errors import ResultsError
 from .folder import DIED, PART, RUN_FILE, RUNNING, is_dead, unfinished
-from .record_file import load_record, warn_if_unchecked
+from .record_file import check_record, load_record, warn_if_unchecked
 
 UNREADABLE = "unreadable"
 """Status of a run whose record cannot be read, or is not as it was written."""
@@ -52,8 +52,12 @@ def _runs_in(folder: Path) -> Iterator[FoundRun]:
     going = unfinished(folder)
     if going is not None:
         dead = is_dead(folder)
-        yield FoundRun(folder, DIED if dead else RUNNING, going, "it ended without a word" if dead else "")
-    if going is not None and not (folder / RUN_FILE).exists():
+        try:
+            record = check_record(going, folder / f"{RUN_FILE}{PART}")
+        except ResultsError:  # of a run that has died, perhaps before it had written its record
+            record = {}
+        yield FoundRun(folder, DIED if dead else RUNNING, record, "it ended without a word" if dead else "")
+    if going is not None and not os.path.lexists(folder / RUN_FILE):
         return
     try:
         record = load_record(folder, settled=going is not None)

@@ -6,11 +6,11 @@ import os
 from pathlib import Path
 
 from ..errors import ResultsError
-from ..files import open_regular, reason
-from ..writing import write_whole
+from ..files import reason
+from ..writing import open_own, write_whole
 from .csv_file import CsvFile
 from .digest import checksum
-from .folder import DIED, PART, RUN_FILE, is_dead, put_in_place, tidy, unfinished
+from .folder import DIED, PART, RUN_FILE, is_dead, is_final, is_regular, put_in_place, tidy, unfinished
 from .formats import FILES, RESULTS_FILE
 from .lock import Lock
 from .recorder import record_text
@@ -22,7 +22,8 @@ def salvage(folder: Path) -> tuple[Path, int]:
     """Give the run that died in a folder a record and a file of the whole rows that it wrote.
 
     They go where those of a run that failed do. Formats other than CSV can be read only whole: of them
-    nothing is kept, and the folder is as it was before the run.
+    nothing is kept, and the folder is as it was before the run. A run that had ended, and whose files had
+    yet to get their names, is kept whole, in whatever format.
 
     Returns:
         where the results are, and the number of rows.
@@ -32,14 +33,18 @@ def salvage(folder: Path) -> tuple[Path, int]:
     """
     if not is_dead(folder):
         raise ResultsError(f"{folder}: no run has died here; there is nothing to salvage")
+    path = folder / f"{RESULTS_FILE}{PART}"
     lock = Lock(folder)
     try:
-        path = folder / f"{RESULTS_FILE}{PART}"
-        rows = _keep_whole_rows(path) if path.exists() else 0
+        record = unfinished(folder) or {}
+        if is_final(folder):
+            rows = record.get("rows")
+            return put_in_place(folder), rows if isinstance(rows, int) else 0
+        rows = _keep_whole_rows(path) if is_regular(path) else 0
         if rows:
-            record = unfinished(folder) or {}
             ended = {"status": DIED, "rows": rows, "checksum": checksum(path), "error": {"message": WHY}}
-            write_whole(folder / f"{RUN_FILE}{PART}", record_text({**record, **ended}))
+            known = {name: value for name, value in record.items() if name != "results"}
+            write_whole(folder / f"{RUN_FILE}{PART}", record_text({**known, **ended}))
             return put_in_place(folder), rows
         tidy(folder)
         return folder, 0
@@ -54,17 +59,17 @@ def salvage(folder: Path) -> tuple[Path, int]:
 def _keep_whole_rows(path: Path) -> int:
     """Cut off what stands behind the last whole row; return the number of rows."""
     end = 0
-    with open_regular(path) as stream:
+    with os.fdopen(open_own(path, os.O_RDWR), "r+b") as stream:
         position = 0
         while block := stream.read(1 << 20):
             if b"\n" in block:
                 end = position + block.rfind(b"\n") + 1
             position += len(block)
-    os.truncate(path, end)
+        stream.truncate(end)
     return sum(len(time) for (time,) in CsvFile(path).blocks(["time"])) if end else 0
 
 
 def lost_format(folder: Path) -> str | None:
     """Return the file of a format other than CSV that the run that died in a folder was writing."""
     others = (name for name in FILES.values() if name != RESULTS_FILE)
-    return next((name for name in others if (folder / f"{name}{PART}").exists()), None)
+    return next((name for name in others if is_regular(folder / f"{name}{PART}")), None)

@@ -12,7 +12,8 @@ import sys
 import pytest
 
 from orchestrator.cli import main
-from orchestrator.results.lock import LOCK_FILE, Holder, Lock
+from orchestrator.results.lock import Holder, Lock
+from orchestrator.writing import LOCK_FILE
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
 

@@ -12,10 +12,13 @@ from orchestrator.errors import ResultsError, SimulationError
 from orchestrator.experiments.listing import runs_table
 from orchestrator.master.simulate import simulate
 from orchestrator.results import folder as module
-from orchestrator.results.lock import LOCK_FILE, Lock, holder_of, writing
+from orchestrator.results import recorder
+from orchestrator.results.lock import Lock, holder_of, writing
 from orchestrator.results.read import load_results
 from orchestrator.results.runs import found_runs
 from orchestrator.results.salvage import lost_format, salvage
+from orchestrator.writing import LOCK_FILE
+from tests.trees import snapshot
 
 from .fakes import Clock, Function, Stage, make_plan
 
@@ -133,7 +136,7 @@ def test_earlier_results_are_read_while_a_run_goes_on(tmp_path):
 @pytest.mark.parametrize("died_after", range(4))
 @pytest.mark.parametrize("before", ["nothing", "completed", "failed"])
 @pytest.mark.parametrize("status", ["completed", "failed"])
-def test_a_run_that_dies_while_its_files_get_their_names_is_caught_up_with(
+def test_a_run_that_dies_while_its_files_get_their_names_is_said_and_put_in_place_by_salvage(
     status, before, died_after, tmp_path, monkeypatch
 ):
     if before != "nothing":
@@ -162,6 +165,13 @@ def test_a_run_that_dies_while_its_files_get_their_names_is_caught_up_with(
         died = False
     monkeypatch.undo()
     place = tmp_path / "failed" if (status, before) == ("failed", "completed") else tmp_path
+    if died:
+        left = snapshot(tmp_path)
+        with pytest.raises(ResultsError, match=r"was stopped before its results were .*yawbench salvage"):
+            load_results(tmp_path)
+        assert "died" in [one.status for one in found_runs(tmp_path)]
+        assert snapshot(tmp_path) == left
+        assert salvage(tmp_path) == (place, load_results(place).run["rows"])
     results = load_results(tmp_path)
     if place != tmp_path:
         assert results.run["status"] == "completed"
@@ -171,6 +181,20 @@ def test_a_run_that_dies_while_its_files_get_their_names_is_caught_up_with(
     assert results["a.x"][0] == 1.0
     assert died == (died_after < 2)
     assert not [path for path in tmp_path.rglob("*") if path.name.endswith((".part", LOCK_FILE))]
+
+
+def test_the_next_run_puts_in_place_what_one_had_ended_with_before(tmp_path, monkeypatch):
+    def die(folder):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr(recorder, "put_in_place", die)
+        run(tmp_path)
+    assert names(tmp_path) == ["results.csv.part", "run.json.part"]
+    with pytest.raises(SimulationError):
+        run(tmp_path, x=lambda t: math.nan if t > 0.05 else t, wire=True)
+    assert load_results(tmp_path).run["status"] == "completed"
+    assert load_results(tmp_path / "failed").run["status"] == "failed"
 
 
 @needs_locks

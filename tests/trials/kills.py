@@ -25,9 +25,8 @@ from pathlib import Path
 from fmus.build import build_all
 from orchestrator.errors import ResultsError
 from orchestrator.results.folder import PART, RUN_FILE
-from orchestrator.results.lock import LOCK_FILE
 from orchestrator.results.read import load_results
-from orchestrator.writing import NEW
+from orchestrator.writing import LOCK_FILE, NEW
 from tests.orchestrator.test_batch_commands import SCENARIO, STUDY, UNITS
 from tests.orchestrator.test_ranking import SMALL
 from tests.orchestrator.test_tuning import SCENARIO as WHEEL

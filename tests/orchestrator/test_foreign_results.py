@@ -1,0 +1,527 @@
+"""Folders of results from somebody else: with links, foreign names and `..`, for every command.
+
+Whatever stands in such a folder, nothing outside it changes, and what only reads changes nothing at all.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from lxml import html
+
+import yawbench as yb
+from orchestrator.errors import ResultsError, ScenarioError, YawbenchError
+from orchestrator.plan import Change
+from orchestrator.results.lock import Lock, holder_of
+from orchestrator.results.naming import below_results, default_folder
+from orchestrator.results.salvage import salvage
+from orchestrator.writing import LOCK_FILE, NEW, write_whole
+from tests.trees import snapshot
+
+from . import recorded
+
+UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
+
+SCENARIO = """
+title: Half a car
+stop_time: 0.1
+step_size: 0.01
+inputs: {velocity_x: 20, friction: 0.7, sideslip: 0.001, sideslip_rate: 0}
+units:
+  driver:     {fmu: driver_sine, parameters: {frequency: 2, start_time: 0}}
+  reference:  {fmu: reference_steady_state}
+  controller: {fmu: controller_fuzzy_sideslip}
+"""
+STUDY = """
+title: Half a paper
+runs:
+  - {name: a/off, scenario: base.yaml, swap: {controller: controller_off}}
+  - {name: b, scenario: base.yaml}
+metrics: {moment: {metric: peak(yaw_moment)}}
+claims:
+  - {says: There is no moment., holds_if: [{run: a/off, metric: moment, at_most: 0}]}
+figures:
+  - {name: moments, runs: ["*"], panels: [steer_angle, yaw_moment]}
+"""
+SWEEP = """
+title: Half a sweep
+scenario: base.yaml
+axes: {speed: {vary: inputs.velocity_x, values: [20, 25]}}
+metrics: {moment: {metric: peak(yaw_moment)}}
+"""
+TUNING = """
+title: How far to turn
+runs: [{name: turned, scenario: base.yaml}]
+metrics: {steer: {metric: peak(steer_angle)}}
+derived:
+  miss:
+    says: Distance
+    expression: (turned - 0.03) * (turned - 0.03)
+    of: {turned: {run: turned, metric: steer}}
+tuning:
+  {objective: miss, population: 5, generations: 1, seed: 2,
+   laws: {wheel: {swap: {driver: driver_sine},
+                  axes: {angle: {vary: driver.amplitude, from: 0.5, to: 5, unit: deg}}}}}
+"""
+FILES = {"base.yaml": SCENARIO, "study.yaml": STUDY, "sweep.yaml": SWEEP, "tuning.yaml": TUNING}
+
+MAKES = {
+    "run": ("base.yaml",),
+    "compare": ("base.yaml", "--swap", "controller=controller_off"),
+    "converge": ("base.yaml", "--signal", "reference.yaw_rate_ref", "--halvings", "2"),
+    "study": ("study.yaml", "--jobs", "1"),
+    "report": ("study.yaml", "--jobs", "1"),
+    "sweep": ("sweep.yaml", "--jobs", "1", "--keep"),
+    "tune": ("tuning.yaml", "--jobs", "1"),
+}
+"""Commands that make runs -> what they are called with, but for --out."""
+READS: dict[str, tuple[str, ...]] = {
+    "list": ("list", "runs", "."),
+    "diff": ("diff", "theirs", "good"),
+    "plot": ("plot", "theirs"),
+    "animate": ("animate", "theirs"),
+    "animate two": ("animate", "theirs", "good"),
+    "evaluate": ("evaluate", "step-steer", "theirs"),
+    "evaluate below": ("evaluate", "step-steer", "."),
+}
+"""Commands that read results."""
+PRODUCTS = (
+    "overview.svg",
+    "overview.png",
+    "animation.html",
+    "evaluation.json",
+    "step_steer.svg",
+    "step_steer.png",
+)
+"""Files that those write where results are."""
+
+needs_links = pytest.mark.skipif(os.name == "nt", reason="links need a privilege here")
+pytestmark = needs_links
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Path:
+    """A folder of somebody's own, beside the one that is worked in."""
+    folder = tmp_path / "home"
+    folder.mkdir()
+    for name in (".bashrc", ".bashrc.part", "run.json", "results.csv", "precious"):
+        (folder / name).write_text("own\n")
+    return folder
+
+
+@pytest.fixture
+def work(tmp_path: Path, home: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder that is worked in, with good results and their like from somebody else."""
+    folder = tmp_path / "work"
+    folder.mkdir()
+    for name in ("good", "theirs"):
+        recorded.write(recorded.car(), folder / name)
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def die(folder: Path, **record: object) -> None:
+    """Let a folder look like that of a run that died with this record."""
+    text = json.dumps({**json.loads((folder / "run.json").read_text()), **record})
+    (folder / "run.json.part").write_text(text)
+
+
+def _results_elsewhere(folder: Path, home: Path) -> None:
+    die(folder, status="failed", results=".bashrc")
+    (folder / "failed").symlink_to(home)
+    shutil.copy(home / ".bashrc.part", folder)
+
+
+def _results_by_a_path(folder: Path, home: Path) -> None:
+    die(folder, status="completed", results=str(home / ".bashrc"))
+
+
+def _results_above(folder: Path, home: Path) -> None:
+    die(folder, status="completed", results=os.path.relpath(home / ".bashrc", folder))
+
+
+def _failed_elsewhere(folder: Path, home: Path) -> None:
+    die(folder, status="completed")
+    (folder / "failed").symlink_to(home)
+    shutil.copy(folder / "results.csv", folder / "results.csv.part")
+
+
+def _failed_into_a_link(folder: Path, home: Path) -> None:
+    die(folder, status="failed")
+    (folder / "failed").symlink_to(home)
+
+
+def _parts_are_links(folder: Path, home: Path) -> None:
+    for name in ("run.json", "results.csv"):
+        (folder / f"{name}.part").symlink_to(home / name)
+
+
+def _died(folder: Path, home: Path) -> None:
+    die(folder, status="running")
+    (folder / "results.csv.part").symlink_to(home / "results.csv")
+
+
+def _lock_is_a_link(folder: Path, home: Path) -> None:
+    (folder / LOCK_FILE).symlink_to(home / "precious")
+
+
+def _lock_has_another_name(folder: Path, home: Path) -> None:
+    os.link(home / "precious", folder / LOCK_FILE)
+
+
+def _lock_of_a_dead_run_is_a_link(folder: Path, home: Path) -> None:
+    die(folder, status="running")
+    (folder / LOCK_FILE).symlink_to(home / "precious")
+
+
+def _products_are_links(folder: Path, home: Path) -> None:
+    for place in (folder, folder.parent):
+        for name in PRODUCTS:
+            (place / name).symlink_to(home / "precious")
+
+
+def _drafts_are_links(folder: Path, home: Path) -> None:
+    for place in (folder, folder.parent):
+        for name in PRODUCTS:
+            (place / f"{name}{NEW}").symlink_to(home / "precious")
+
+
+def _drafts_have_another_name(folder: Path, home: Path) -> None:
+    for place in (folder, folder.parent):
+        for name in PRODUCTS:
+            os.link(home / "precious", place / f"{name}{NEW}")
+
+
+def _a_pipe_for_the_lock(folder: Path, home: Path) -> None:
+    os.mkfifo(folder / LOCK_FILE)
+    os.mkfifo(folder / "run.json.part")
+
+
+PLANTS: list[Callable[[Path, Path], None]] = [
+    _results_elsewhere, _results_by_a_path, _results_above, _failed_elsewhere, _failed_into_a_link,
+    _parts_are_links, _died, _lock_is_a_link, _lock_has_another_name, _lock_of_a_dead_run_is_a_link,
+    _products_are_links, _drafts_are_links, _drafts_have_another_name, _a_pipe_for_the_lock,
+]  # fmt: skip
+each_plant = pytest.mark.parametrize("plant", PLANTS, ids=lambda plant: plant.__name__.strip("_"))
+
+
+def without_products(tree: dict[str, tuple[int, int, object]]) -> dict[str, object]:
+    """Return a tree but for files that a reading command makes, and for the times of folders they are in."""
+    made = (*PRODUCTS, *(f"{name}{NEW}" for name in PRODUCTS))
+    return {
+        path: (mode, None if os.path.isdir(path) else time, content)
+        for path, (mode, time, content) in tree.items()
+        if os.path.basename(path) not in made
+    }
+
+
+@each_plant
+@pytest.mark.parametrize("command", READS)
+def test_a_command_that_reads_changes_nothing_but_its_own_product(command, plant, work, home, yawbench):
+    plant(work / "theirs", home)
+    outside, inside = snapshot(home), without_products(snapshot(work))
+    status, _, said = yawbench(*READS[command])
+    assert status in (0, 1, 2)
+    assert status == 0 or said
+    assert "error in yawbench" not in said
+    assert snapshot(home) == outside
+    assert without_products(snapshot(work)) == inside
+    if command in ("list", "diff"):
+        assert snapshot(work).keys() == inside.keys() | {
+            path for path in snapshot(work) if os.path.basename(path).removesuffix(NEW) in PRODUCTS
+        }
+
+
+@each_plant
+def test_the_library_reads_without_changing_anything(plant, work, home):
+    plant(work / "theirs", home)
+    before = snapshot(work, home)
+    try:
+        run = yb.open("theirs")
+        run.metrics()
+    except YawbenchError as error:
+        assert "theirs" in str(error)
+    assert snapshot(work, home) == before
+
+
+@each_plant
+def test_salvage_and_the_next_run_repair_inside_the_folder_alone(plant, work, home):
+    plant(work / "theirs", home)
+    outside = snapshot(home)
+    good = snapshot(work / "good")
+    try:
+        place, _ = salvage(work / "theirs")
+        assert place in (work / "theirs", work / "theirs" / "failed")
+        assert not place.is_symlink()
+    except ResultsError as error:
+        assert "theirs" in str(error)
+    assert snapshot(home) == outside
+    try:
+        yb.open("good").save("theirs")
+    except ResultsError as error:
+        assert "theirs: results cannot be written here: " in str(error)
+    else:
+        left = {path.name for path in (work / "theirs").iterdir()}
+        assert not left & {"run.json.part", "results.csv.part", LOCK_FILE}
+    assert snapshot(home) == outside
+    assert snapshot(work / "good") == good
+
+
+def test_what_a_dead_run_left_is_shown_and_neither_removed_nor_moved(work, home, yawbench):
+    _results_elsewhere(work / "theirs", home)
+    before = snapshot(work)
+    status, out, _ = yawbench("list", "runs")
+    assert status == 2  # no folder results here
+    status, out, _ = yawbench("list", "runs", "theirs")
+    assert status == 0
+    assert "died" in out
+    assert snapshot(work) == before
+
+
+def test_a_link_is_replaced_by_the_figure_and_its_target_left_alone(work, home, yawbench):
+    _products_are_links(work / "theirs", home)
+    assert yawbench("plot", "theirs")[0] == 0
+    assert yawbench("animate", "theirs")[0] == 0
+    assert (home / "precious").read_text() == "own\n"
+    for name in ("overview.svg", "overview.png", "animation.html"):
+        assert not (work / "theirs" / name).is_symlink()
+        assert (work / "theirs" / name).stat().st_size > 1000
+
+
+def test_a_file_that_the_user_names_may_be_a_link(work, home, yawbench):
+    (work / "page.html").symlink_to(home / "page.html")
+    assert yawbench("animate", "theirs", "--out", "page.html")[0] == 0
+    assert (work / "page.html").is_symlink()
+    assert (home / "page.html").stat().st_size > 1000
+
+
+def test_looking_who_holds_a_folder_changes_nothing_there(work):
+    lock = Lock(work / "theirs")
+    before = snapshot(work)
+    assert holder_of(work / "theirs").process == os.getpid()
+    assert snapshot(work) == before
+    lock.release()
+
+
+@pytest.mark.parametrize("note", [b"", b"[]", b"7", b'{"process": {}}', b"[" * 100_000, b'{"since": 5}'])
+def test_a_lock_that_says_nonsense_is_held_by_another_run(note, work):
+    lock = Lock(work / "theirs")
+    (work / "theirs" / LOCK_FILE).write_bytes(note)
+    assert str(holder_of(work / "theirs")).startswith("'another run'")
+    lock.release()
+
+
+def _products(folder: Path) -> list[Path]:
+    """Return what stands below a folder, relative to it."""
+    return sorted(path.relative_to(folder) for path in folder.rglob("*"))
+
+
+@pytest.fixture
+def projects(tmp_path: Path, work: Path, fmus: Path, yawbench: Callable[..., tuple[int, str, str]]):
+    """Run a command that makes runs into a folder; return status and words."""
+    for name, text in FILES.items():
+        (work / name).write_text(text)
+
+    def call(command: str, *more: object) -> tuple[int, str]:
+        status, _, said = yawbench(command, *MAKES[command], "--fmus", fmus, *more)
+        assert status in (0, 1, 2)
+        assert "error in yawbench" not in said
+        assert "Traceback" not in said
+        return status, said
+
+    return call
+
+
+@pytest.mark.parametrize("command", MAKES)
+def test_a_command_that_makes_runs_follows_no_link_where_it_writes(command, projects, work, home):
+    assert projects(command, "--out", "clean")[0] == 0
+    made = _products(work / "clean")
+    files = [path for path in made if (work / "clean" / path).is_file()]
+    folders = [path for path in made if (work / "clean" / path).is_dir()]
+
+    def planted(name: str, suffix: str = "") -> Path:
+        folder = work / name
+        for path in folders:
+            (folder / path).mkdir(parents=True)
+        folder.mkdir(exist_ok=True)
+        for number, path in enumerate(files):
+            target = home / f"{name}{number}"
+            target.write_text("own\n")
+            (folder / f"{path}{suffix}").symlink_to(target)
+        return folder
+
+    links = planted("links")
+    before = snapshot(home)
+    status, said = projects(command, "--out", "links")
+    assert snapshot(home) == before
+    if "runs.jsonl" in map(str, files):  # a journal is gone on with, not replaced
+        assert status == 2
+        assert "runs.jsonl is a symbolic link, which is not followed" in said
+        (links / "runs.jsonl").unlink()
+        status, said = projects(command, "--out", "links")
+    assert status == 0, said
+    assert snapshot(home) == before
+    assert not [path for path in links.rglob("*") if path.is_symlink()]
+
+    for suffix in (NEW, ".part"):
+        planted(suffix.strip("."), suffix)
+        before = snapshot(home)
+        projects(command, "--out", suffix.strip("."))
+        assert snapshot(home) == before
+
+    for number, path in enumerate(folders):
+        place = work / f"folder{number}"
+        (place / path.parent).mkdir(parents=True)
+        (home / f"folder{number}").mkdir()
+        (place / path).symlink_to(home / f"folder{number}", target_is_directory=True)
+        before = snapshot(home)
+        status, said = projects(command, "--out", place)
+        assert snapshot(home) == before
+        assert f"{path.name} is a symbolic link, which is not followed" in said
+
+    (work / "locked").mkdir()
+    (work / "locked" / LOCK_FILE).symlink_to(home / "precious")
+    before = snapshot(home)
+    status, said = projects(command, "--out", "locked")
+    assert status == 2
+    assert f"locked: results cannot be written here: {LOCK_FILE} is a symbolic link" in said
+    assert snapshot(home) == before
+
+
+@pytest.mark.parametrize("command", MAKES)
+def test_results_of_a_file_above_go_below_results(command, projects, work, monkeypatch):
+    sub = work / "sub"
+    sub.mkdir()
+    (work / "base").mkdir()
+    (work / "base" / "results.csv").write_text("own\n")
+    before = snapshot(work)
+    monkeypatch.chdir(sub)
+    file, *more = MAKES[command]
+    monkeypatch.setitem(MAKES, command, (f"../{file}", *more))
+    assert projects(command)[0] == 0
+    after = snapshot(work)
+    own = {path for path in after if Path(path).is_relative_to(sub)}
+    assert {path: after[path] for path in after.keys() - own} == {
+        path: before[path] for path in before.keys() - own
+    }
+    (made,) = (sub / "results").iterdir()
+    assert made.name == work.name
+
+
+def test_results_of_several_files_go_below_the_folder_given(projects, work, monkeypatch):
+    sub = work / "sub"
+    sub.mkdir()
+    monkeypatch.chdir(sub)
+    (work / "other.yaml").write_text(STUDY)
+    monkeypatch.setitem(MAKES, "report", ("../study.yaml", "../other.yaml", "--jobs", "1"))
+    before = snapshot(work)
+    assert projects("report", "--out", "all")[0] == 0
+    assert {path for path in snapshot(work) if not Path(path).is_relative_to(sub)} == {
+        path for path in before if not Path(path).is_relative_to(sub)
+    }
+    assert sorted(path.name for path in (sub / "all" / work.name).iterdir()) == ["other", "study"]
+
+
+@pytest.mark.parametrize("suffix", ["", "-compare", "-converge", "_series"])
+@pytest.mark.parametrize("changes", [(), (Change("controller", "../../off", "--swap"),)], ids=["", "changed"])
+def test_a_default_folder_is_below_results_whatever_the_path_of_the_file(suffix, changes, work):
+    for file in (
+        "../base.yaml",
+        "../../base.yaml",
+        "a/../../base.yaml",
+        "/base.yaml",
+        "./base.yaml",
+        "a/./b.yaml",
+    ):
+        folder = default_folder(Path(file), changes, suffix=suffix)
+        assert folder.parts[0] == "results"
+        assert ".." not in folder.parts
+        assert 2 <= len(folder.parts) <= 3
+
+
+@pytest.mark.parametrize("file", ["a/...yaml", "a/..yaml", "..."])
+def test_a_file_that_no_folder_can_be_called_after_is_a_sentence(file, work):
+    with pytest.raises(ScenarioError, match="no folder of results can be named after it"):
+        default_folder(Path(file))
+
+
+def test_results_may_be_a_link_and_nothing_below_it(work, home, projects):
+    (home / "disk").mkdir()
+    (work / "results").symlink_to(home / "disk")
+    assert projects("run")[0] == 0
+    assert (home / "disk" / "work" / "base" / "results.csv").is_file()
+    shutil.rmtree(home / "disk" / "work")
+    (home / "disk" / "work").symlink_to(home)
+    before = snapshot(home)
+    status, said = projects("run")
+    assert status == 2
+    assert "results/work: is a symbolic link, which is not followed below results; name the folder" in said
+    assert snapshot(home) == before
+    with pytest.raises(ResultsError, match="symbolic link"):
+        below_results("work", "other")
+
+
+def test_a_file_is_written_whole_in_the_folder_itself(work, home):
+    (work / "page.html").symlink_to(home / "precious")
+    write_whole(work / "page.html", "ours\n")
+    assert (work / "page.html").read_text() == "ours\n"
+    assert not (work / "page.html").is_symlink()
+    (work / "other.html").symlink_to(home / "precious")
+    write_whole(work / "other.html", "ours\n", named=True)
+    assert (home / "precious").read_text() == "ours\n"
+
+
+def test_only_names_of_our_formats_are_put_in_place(work):
+    folder = work / "theirs"
+    (folder / "notes.part").write_text("theirs\n")
+    die(folder, status="completed", results="notes")
+    with pytest.raises(ResultsError, match="ended without a word"):
+        yb.open(folder)
+    assert salvage(folder)[1] == 0
+    assert sorted(path.name for path in folder.iterdir()) == ["notes.part", "results.csv", "run.json"]
+    assert math.isclose(yb.open(folder).time[-1], 8.0)
+
+
+def test_results_are_read_through_links(work):
+    data = work / "data"
+    data.mkdir()
+    for name in ("run.json", "results.csv"):
+        (work / "theirs" / name).rename(data / name)
+        (work / "theirs" / name).symlink_to(data / name)
+    before = snapshot(work)
+    assert yb.open("theirs").time.size == 801
+    assert snapshot(work) == before
+
+
+def test_a_page_of_foreign_results_loads_nothing_and_runs_no_script_of_theirs(work, yawbench):
+    evil = "</script><script src='http://e.vil/x.js'></script><img src=x onerror=alert(1)>"
+    good = json.loads((work / "good" / "run.json").read_text())
+    scenario = {"title": evil, "source": evil, "file": evil, "parameters": {evil: evil}}
+    theirs = {**good, "title": evil, "scenario": scenario, "versions": {evil: evil}, "notes": [evil]}
+    theirs["fmus"] = {evil: good["fmus"]["plant"], "plant": {**good["fmus"]["plant"], "name": evil}}
+    (work / "theirs" / "run.json").write_text(json.dumps(theirs))
+    (work / "study.yaml").write_text(
+        "title: Theirs\nruns: [{name: theirs, scenario: no.yaml}, {name: good, scenario: no.yaml}]\n"
+        "metrics: {sideslip: {metric: peak(sideslip)}}\n"
+        "figures: [{name: overlay, runs: ['*'], panels: [sideslip]}]\n"
+    )
+    assert (
+        yawbench("animate", "theirs", "good", "--label", evil, "--label", "good", "--out", "a.html")[0] == 0
+    )
+    yawbench("study", "study.yaml", "--no-run", "--jobs", "1", "--out", ".")
+    assert yawbench("plot", "theirs", "--label", evil)[0] == 0
+    for name in ("a.html", "report.html"):
+        page = html.parse(str(work / name))
+        assert not [one for one in page.iter("script") if one.get("src")]
+        assert not page.xpath("//@onerror | //iframe | //object | //embed | //form | //base")
+        links = page.xpath("//@src | //@href | //@srcset | //@poster | //@action | //@data")
+        assert not [one for one in links if not one.startswith(("data:", "#")) and ":" in one]
+        text = (work / name).read_text()
+        assert "<script src" not in text
+        assert "url(http" not in text.replace("'", "").replace('"', "")
