@@ -171,7 +171,8 @@ def _component(given: Any, role: str) -> type[Component]:
     """Return the component class that a function, an object or a class stands for."""
     if arguments.is_a(given, type):
         if issubclass(given, Component):
-            return given
+            component: type[Component] = given
+            return component
         raise ScenarioError(f"{_name(given)} is a class; give an object of it, {_name(given)}()")
     if hasattr(given, "output"):
         return _of_object(given)
