@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ResultsError
 from ..files import reason
-from ..wording import printable
+from ..wording import cut, printable
 from ..writing import write_whole
 
 if TYPE_CHECKING:
@@ -65,6 +65,8 @@ QUIET = "#666666"
 CHANGED = "#A33B00"
 """The colour of what was changed against the scenario that a title names."""
 
+LONGEST = 3000
+"""Characters of a title, a note and changes in a figure; chosen: a page full, drawn in less than a second."""
 NOTE_WIDTH = 72
 """Characters of a note above a panel of half the figure's width."""
 
@@ -145,8 +147,8 @@ def frame(
         title, note: broken into lines as needed.
         changed: what was changed against the scenario that the title names; it stands below the title.
     """
-    titles, notes = textwrap.wrap(title, 95), textwrap.wrap(note, 165)
-    changes = textwrap.wrap(f"changed: {changed}", 110) if changed else []
+    titles, notes = textwrap.wrap(cut(title, LONGEST), 95), textwrap.wrap(cut(note, LONGEST), 165)
+    changes = textwrap.wrap(cut(f"changed: {changed}", LONGEST), 110) if changed else []
     for handle in handles:
         handle.set_label(literal(str(handle.get_label())))
     widths = [len(str(handle.get_label())) + 9 for handle in handles]  # characters
