@@ -6,6 +6,8 @@ import importlib
 import re
 from pathlib import Path
 
+from tests.trials import result_folders
+
 PAGE = Path(__file__).parents[2] / "docs" / "robustness.md"
 SCALES = {"MB": 10**6, "GB": 10**9}
 
@@ -16,3 +18,19 @@ def test_the_limits_on_the_page_are_those_of_the_program() -> None:
     for number, scale, module, name in rows:
         limit = getattr(importlib.import_module(module), name)
         assert limit == int(number.replace(",", "")) * SCALES.get(scale, 1), f"{module}.{name}"
+
+
+def test_the_page_tells_how_many_folders_of_results_are_tried() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    ((folders, calls, result, sentence, bad),) = re.findall(
+        r"\| ([\d,]+) \| ([\d,]+) \| ([\d,]+) \| ([\d,]+) \| (\d+) \|\n\nFound on the way", text
+    )
+    every = result_folders.cases()
+    assert f"{len(every):,} folders" in text
+    assert number(folders) == len(every[::4])
+    assert number(calls) == number(folders) * (len(result_folders.EVERY_TIME) + 2)
+    assert number(result) + number(sentence) + number(bad) == number(calls)
+
+
+def number(text: str) -> int:
+    return int(text.replace(",", ""))
