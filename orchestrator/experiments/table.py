@@ -140,11 +140,16 @@ def _parquet(findings: Findings, columns: Sequence[Column]) -> bytes:
     import pyarrow.parquet as pq
 
     fields = [pa.field(c.name, getattr(pa, c.kind)(), metadata=c.about or None) for c in columns]
-    schema = pa.schema(fields, metadata={"experiment": _description(findings)})
-    arrays = [pa.array(c.values, type=one.type) for c, one in zip(columns, fields, strict=True)]
+    schema = pa.schema(fields, metadata={"experiment": _encodable(_description(findings))})
+    arrays = [pa.array(map(_encodable, c.values), type=f.type) for c, f in zip(columns, fields, strict=True)]
     content = pa.BufferOutputStream()
     pq.write_table(pa.Table.from_arrays(arrays, schema=schema), content, compression="zstd")
     return content.getvalue().to_pybytes()
+
+
+def _encodable(value: Any) -> Any:
+    """Return a value, of a text with halves of characters written out, as `write_whole` does."""
+    return value.encode("utf-8", "backslashreplace").decode() if isinstance(value, str) else value
 
 
 def _description(findings: Findings) -> str:
