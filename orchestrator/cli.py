@@ -66,11 +66,21 @@ def _interruptible() -> Iterator[None]:
     """Let Ctrl-C and SIGTERM end the program with a word and an exit status that tells them apart."""
     try:
         yield
-    except KeyboardInterrupt as error:
-        interrupted = Interrupted.of(error)
+    except (Exception, KeyboardInterrupt) as error:
+        cause = _interruption_in(error)
+        if cause is None:
+            raise
+        interrupted = Interrupted.of(cause)
         _print_traceback(error)
         _say(interrupted.problems)
         raise SystemExit(interrupted.exit_status) from None
+
+
+def _interruption_in(error: BaseException | None) -> KeyboardInterrupt | None:
+    """Return what has interrupted the program; Python wraps it if it comes while a class is being made."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error
 
 
 def _application(arguments: Sequence[str] = ()) -> typer.Typer:

@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 import tempfile
+import threading
 import time
 import traceback
 from collections import deque
@@ -224,12 +225,16 @@ def start(process: Any) -> None:
     Daemonic processes may have no children because they could leave orphans; ours end with their caller.
     """
     settings = multiprocessing.current_process()._config  # type: ignore[attr-defined]
-    daemonic = settings.pop("daemon", None)
-    try:
-        process.start()
-    finally:
-        if daemonic is not None:
-            settings["daemon"] = daemonic
+    with _starting:
+        daemonic = settings.pop("daemon", None)
+        try:
+            process.start()
+        finally:
+            if daemonic is not None:
+                settings["daemon"] = daemonic
+
+
+_starting = threading.Lock()  # workers of a cluster start runs from several threads
 
 
 def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:

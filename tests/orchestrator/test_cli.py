@@ -133,6 +133,22 @@ def test_a_signal_ends_every_command_with_a_word_and_the_same_status(name, numbe
     assert signal.getsignal(signal.SIGTERM) is before
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="os.kill ends the process there")
+def test_a_signal_while_a_class_is_being_made_is_no_error_of_the_program(monkeypatch, capsys):
+    class Stopping:
+        def __set_name__(self, owner: type, name: str) -> None:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    def ended() -> None:
+        type("Made", (), {"attribute": Stopping()})
+
+    monkeypatch.setattr(importlib.import_module("orchestrator.commands.cache"), "cache", ended)
+    with pytest.raises(SystemExit) as end:
+        main(["cache"])
+    assert end.value.code == 143
+    assert capsys.readouterr().err == "Interrupted\n"
+
+
 @pytest.mark.parametrize("shown", ["", "1"])
 @pytest.mark.parametrize("error", [ZeroDivisionError, OSError, ScenarioError, Interrupted])
 def test_nothing_that_turns_the_text_reaches_the_terminal_even_in_a_traceback(

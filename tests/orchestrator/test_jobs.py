@@ -125,6 +125,14 @@ from orchestrator.experiments.workers import execute
 from tests.orchestrator.test_jobs import jobs, tell_and_wait
 execute(jobs(Path(sys.argv[1]), "waits"), run=tell_and_wait)
 """
+SHARING = """
+import sys
+from pathlib import Path
+from orchestrator.experiments.pool import Pool
+from tests.orchestrator.test_jobs import jobs, tell_and_wait
+with Pool(2) as pool:
+    pool.map(tell_and_wait, jobs(Path(sys.argv[1]), "waits"))
+"""
 
 
 def tell_and_wait(job):
@@ -134,12 +142,14 @@ def tell_and_wait(job):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs Linux to tell a process that its parent has ended")
-def test_a_run_ends_when_its_caller_is_killed(tmp_path):
+@pytest.mark.parametrize("program", [CALLER, SHARING], ids=["runs", "work"])
+def test_processes_end_without_a_word_when_their_caller_is_killed(program, tmp_path):
     os.mkfifo(tmp_path / "begun")
-    caller = subprocess.Popen([sys.executable, "-c", CALLER, str(tmp_path)], stdout=subprocess.PIPE)
+    command = [sys.executable, "-c", program, str(tmp_path)]
+    caller = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     (tmp_path / "begun").read_bytes()
     caller.kill()
-    assert caller.communicate() == (b"", None)  # nobody holds its output any more
+    assert caller.communicate() == (b"", b"")  # nobody holds its output any more
 
 
 def test_only_a_run_that_reached_its_end_is_read_back(tmp_path):

@@ -38,6 +38,14 @@ def pressed(yaw_rate, t):
     return 0.0
 
 
+def hanging(yaw_rate, t):
+    """A law that does not come back, so that somebody presses Ctrl-C again."""
+    os.kill(os.getpid(), signal.SIGINT)
+    os.kill(os.getpid(), signal.SIGINT)
+    while True:
+        pass
+
+
 class Object:
     inputs = ("yaw_rate",)
     outputs = ("yaw_moment",)
@@ -59,6 +67,7 @@ class Class(Off):
         (Object(), SystemExit),
         (Class, KeyboardInterrupt),
         (pressed, Interrupted),
+        (hanging, Interrupted),
     ],
 )
 def test_ctrl_c_and_exit_in_a_controller_reach_the_caller(base, controller, error):
