@@ -62,12 +62,12 @@ def test_robustness_does_not_reproduce_either(whole):
     assert len(verdicts(whole)) == len(whole["claims"]) + len(whole["checks"])
 
 
-README = (STUDY.parents[2] / "README.md").read_text(encoding="utf-8")
-SECTION = README.partition("### Paper D")[2].partition("## ")[0]
+PAGE = (STUDY.parents[2] / "docs" / "papers.md").read_text(encoding="utf-8")
+SECTION = PAGE.partition("## Paper D")[2].partition("\n## ")[0]
 TOLD = " ".join(SECTION.split())
 
 
-def test_the_readme_tells_what_the_study_found(metric):
+def test_the_page_on_papers_tells_what_the_study_found(metric):
     assert f"({metric('off', 'sideslip') / DEGREE:.0f} degrees of sideslip)" in TOLD
     assert f"({100 * metric('both', 'rms'):.1f} % RMS of the peak)" in TOLD
     assert f"({100 * metric('both', 'sideslip_rms'):.0f} % RMS)" in TOLD
@@ -78,7 +78,7 @@ def test_the_readme_tells_what_the_study_found(metric):
 
 
 @pytest.mark.exhaustive
-def test_the_readme_tells_what_becomes_of_what_the_controller_does_not_know(whole, metric_of_all):
+def test_the_page_on_papers_tells_what_becomes_of_what_the_controller_does_not_know(whole, metric_of_all):
     unknown = [run for run in whole["runs"] if run.startswith("unknown/")]
     rms, path = (max(100 * metric_of_all(run, name) for run in unknown) for name in ("rms", "path"))
     assert f"({rms:.1f} % at most), but the path leaves its own (up to {path:.0f} %)" in TOLD

@@ -231,14 +231,14 @@ def test_under_a_tenth_more_steering_the_sine_loses_the_car_without_control_alon
 
 
 ROWS = dict(zip(SCENARIOS, ("double lane change", "hand-wheel sine", "hand-wheel ramp"), strict=True))
-README = (FOLDER.parents[1] / "README.md").read_text(encoding="utf-8")
-SECTION = " ".join(README.partition("### Paper C")[2].partition("###")[0].split())
+PAGE = (FOLDER.parents[1] / "docs" / "papers.md").read_text(encoding="utf-8")
+SECTION = " ".join(PAGE.partition("## Paper C")[2].partition("\n## ")[0].split())
 
 
 def assert_rows(metric, laws, columns):
-    """Assert that the README's table has the peaks of these laws in these columns."""
+    """Assert that the page's table has the peaks of these laws in these columns."""
     for road, row in ROWS.items():
-        told = next(line for line in README.splitlines() if line.startswith(f"| {row} |"))
+        told = next(line for line in PAGE.splitlines() if line.startswith(f"| {row} |"))
         cells = [cell.strip() for cell in told.strip("|").split("|")][1:]
         assert len(cells) == 5
         assert cells[columns] == [
@@ -248,7 +248,7 @@ def assert_rows(metric, laws, columns):
         ]
 
 
-def test_the_readme_tells_what_the_study_found(metric, derived):
+def test_the_page_on_papers_tells_what_the_study_found(metric, derived):
     assert_rows(metric, LAWS, slice(3))
     assert shown(derived("advantage"), "%", digits=2) in SECTION
     aside = [
@@ -264,7 +264,7 @@ def test_the_readme_tells_what_the_study_found(metric, derived):
 
 
 @pytest.mark.exhaustive
-def test_the_readme_tells_what_its_variants_found(whole, metric_of_all):
+def test_the_page_on_papers_tells_what_its_variants_found(whole, metric_of_all):
     assert_rows(metric_of_all, ("pid_tuned", "fuzzy_pid_tuned"), slice(3, 5))
     for name in ("printed_advantage", "tuned_advantage"):
         assert shown(whole["derived"][name]["value"], "%", digits=2) in SECTION

@@ -208,7 +208,7 @@ def test_the_distribution_table_is_the_papers_in_order_and_best_in_proportion_to
     ]
     assert set(found["figures"]) == {"one_side_braked", "opposite_halves", "direct_torque"}
     assert sorted(mean, key=mean.get)[1] == "0.75_0.75"
-    told = section_of_the_readme()
+    told = section_of_the_page()
     number = {key: one["value"] for key, one in found["derived"].items()}
     assert f"the best of 26, by {100 * (number['second'] - 1):.1f} %" in told
     whole, opposite = number["order_one_side"], number["order_opposite"]
@@ -217,21 +217,21 @@ def test_the_distribution_table_is_the_papers_in_order_and_best_in_proportion_to
     assert f"a half and more ({number['order_half_and_more']:.3f})" in told
 
 
-def section_of_the_readme():
-    readme = (FOLDER.parents[1] / "README.md").read_text(encoding="utf-8")
-    return " ".join(readme.partition("### Paper B")[2].partition("###")[0].split())
+def section_of_the_page():
+    page = (FOLDER.parents[1] / "docs" / "papers.md").read_text(encoding="utf-8")
+    return " ".join(page.partition("## Paper B")[2].partition("\n## ")[0].split())
 
 
-def test_the_readme_shows_what_the_study_found(study, metric):
-    readme = (FOLDER.parents[1] / "README.md").read_text(encoding="utf-8")
+def test_the_page_on_papers_shows_what_the_study_found(study, metric):
+    page = (FOLDER.parents[1] / "docs" / "papers.md").read_text(encoding="utf-8")
     rows = dict(zip(ROADS, ("100 km/h, mu 1", "50 km/h, mu 0.3", "80 km/h, mu 0.3"), strict=True))
     for road, row in rows.items():
-        told = next(line for line in readme.splitlines() if line.startswith(f"| {row} |"))
+        told = next(line for line in page.splitlines() if line.startswith(f"| {row} |"))
         assert shown(metric(f"{road}/off", "mean"), "rad/s") in told
         for law in LAWS:
             mean, chatter = metric(f"{road}/{law}", "mean"), metric(f"{road}/{law}", "torque_chatter")
             assert f"{shown(mean, 'rad/s')}, {shown(chatter, 'N.m/s')}" in told
-    told = section_of_the_readme()
+    told = section_of_the_page()
     rms = [100 * metric(f"{road}/{law}", "rms") for road in ROADS[:2] for law in ("sign", "fuzzy")]
     assert f"(RMS error {min(rms):.1f} to {max(rms):.1f} %)" in told
     shares = [100 * study["derived"][f"{road}_torque"]["value"] for road in ("high", "low", "beyond")]
@@ -245,9 +245,9 @@ def test_the_readme_shows_what_the_study_found(study, metric):
 
 
 @pytest.mark.exhaustive
-def test_the_readme_tells_where_a_moment_by_all_wheels_ends(metric_of_all):
+def test_the_page_on_papers_tells_where_a_moment_by_all_wheels_ends(metric_of_all):
     speed = 3.6 * metric_of_all("all_wheels/low_friction/sliding_mode", "final_speed")
-    assert f"it ends at {speed:.0f} km/h" in section_of_the_readme()
+    assert f"it ends at {speed:.0f} km/h" in section_of_the_page()
 
 
 @pytest.mark.exhaustive

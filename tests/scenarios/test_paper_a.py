@@ -89,13 +89,13 @@ LOST_WITH_ONE_INPUT_OR_HARSH_STEERING = {
 }
 
 
-def test_the_verdicts_are_those_the_readme_tells(study):
+def test_the_verdicts_are_those_the_page_on_papers_tells(study):
     assert {says for says, verdict in verdicts(study).items() if verdict != "holds"} == LOST
     assert len(verdicts(study)) == 16
 
 
 @pytest.mark.exhaustive
-def test_the_verdicts_of_the_whole_study_are_those_the_readme_tells(whole):
+def test_the_verdicts_of_the_whole_study_are_those_the_page_on_papers_tells(whole):
     assert {says for says, verdict in verdicts(whole).items() if verdict != "holds"} == (
         LOST | LOST_WITH_ONE_INPUT_OR_HARSH_STEERING
     )
@@ -109,14 +109,14 @@ def rows(text):
     return [row for row in cells if row[0].endswith(("control", "fuzzy", "network"))]
 
 
-README = (STUDY.parents[2] / "README.md").read_text(encoding="utf-8")
-PROSE = " ".join(README.partition("### Paper A")[2].partition("###")[0].split())
+PAGE = (STUDY.parents[2] / "docs" / "papers.md").read_text(encoding="utf-8")
+PROSE = " ".join(PAGE.partition("## Paper A")[2].partition("\n## ")[0].split())
 
 
-def test_the_readme_tells_what_the_study_found(study, metric):
+def test_the_page_on_papers_tells_what_the_study_found(study, metric):
     experiment = load_experiment(STUDY)
     first, *_ = run_tables(judge_results(experiment, study["folder"]))
-    told = rows(README)
+    told = rows(PAGE)
     assert len(told) == 9
     found = [[cell.removesuffix(" †") for cell in row] for row in first.text()]
     assert [[*row[:3], row[-1]] for row in told] == [
@@ -130,7 +130,7 @@ def test_the_readme_tells_what_the_study_found(study, metric):
 
 
 @pytest.mark.exhaustive
-def test_the_readme_tells_what_the_variants_of_the_study_found(whole, metric_of_all):
+def test_the_page_on_papers_tells_what_the_variants_of_the_study_found(whole, metric_of_all):
     learning, frozen = (
         [f"{100 * metric_of_all(f'three_periods/15mps/{run}', f'period_{k}'):.1f}" for k in (1, 3)]
         for run in ("learning_true", "learning_false")
@@ -155,7 +155,7 @@ def test_the_readme_tells_what_the_variants_of_the_study_found(whole, metric_of_
 
 
 @pytest.mark.exhaustive
-def test_the_readme_tells_what_became_of_the_laws_with_motors_that_lag_and_tuned_alike(tmp_path):
+def test_the_page_on_papers_tells_what_became_of_the_laws_with_motors_that_lag_and_tuned_alike(tmp_path):
     found = judge_all(STUDY.with_name("laws.yaml"), tmp_path)
     assert [check["holds"] for check in found["checks"]] == [False, True, True]
 

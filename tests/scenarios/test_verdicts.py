@@ -47,8 +47,10 @@ def test_the_page_has_every_claim_of_every_study_and_sums_them_up():
     assert FILE.read_text(encoding="utf-8") == page(found)
 
 
-def test_the_readme_tells_of_verdicts_what_the_page_does():
-    section = (ROOT / "README.md").read_text(encoding="utf-8").partition("### How far the verdicts")[2]
+def test_the_page_on_papers_tells_of_verdicts_what_the_page_does():
+    section = (
+        (ROOT / "docs" / "papers.md").read_text(encoding="utf-8").partition("## How far the verdicts")[2]
+    )
     told = table_in(section.partition("\n##")[0])
     found = {title.partition(":")[0]: rows for title, rows in recorded().items()}
     assert [tuple(row) for row in told[1 : 1 + len(found)]] == summary(found)
@@ -60,13 +62,13 @@ def test_the_readme_tells_of_verdicts_what_the_page_does():
     ]
     assert told[2 + len(found) :] == decided
     total = sum(map(len, found.values()))
-    assert "Most of what the papers say thus hangs on values" in section
+    assert "Most of the papers' claims depend on values" in section
     assert total - len(decided) > total / 2
 
 
-def test_the_readme_tells_how_far_the_best_of_26_carries():
+def test_the_page_on_papers_tells_how_far_the_best_of_26_carries():
     title = next(title for title in recorded() if "table 3" in title)
     (best,) = (row for row in recorded()[title] if row.says.startswith("In proportion to load is the best"))
-    section = (ROOT / "README.md").read_text(encoding="utf-8").partition("### Paper B")[2]
-    told = " ".join(section.partition("\n###")[0].split())
+    section = (ROOT / "docs" / "papers.md").read_text(encoding="utf-8").partition("## Paper B")[2]
+    told = " ".join(section.partition("\n## ")[0].split())
     assert f"the best of 26, by {best.margin}. That is {best.kind}: it {best.region}, {best.flip}" in told
