@@ -18,13 +18,13 @@ from typing import Any
 
 from components.fmi.roles import ROLES
 from orchestrator.errors import BuildError
-from orchestrator.writing import draft_of, remove_draft
+from orchestrator.files import draft_of, remove_draft
 
 from .c.c_recipe import CRecipe, find_c_components
 from .check import defects, reference_files
 from .closure import Parts, Sources
 from .compiler import compile_launcher
-from .mark import Mark, read_mark
+from .mark import BuildStamp, read_mark
 from .packing import to_bytes
 from .presentation import CREDITS, presented
 from .recipe import TOOL, PythonRecipe, natural_name
@@ -34,7 +34,7 @@ COMPONENTS = HERE.parent / "components"
 
 Recipe = PythonRecipe | CRecipe
 """One FMU that can be built."""
-Progress = Callable[[str, str], None]
+BuildProgress = Callable[[str, str], None]
 """Called with the name of an FMU and what became of it: built, current, removed or failed."""
 
 
@@ -72,7 +72,7 @@ def build_all(
     *,
     components: Iterable[str] | None = None,
     force: bool = False,
-    progress: Progress | None = None,
+    progress: BuildProgress | None = None,
     root: Path = COMPONENTS,
 ) -> Report:
     """Build the components that have changed into `out`, all or those named (names of FMUs).
@@ -114,9 +114,9 @@ def build_all(
     return report
 
 
-def component_mark(recipe: Recipe, root: Path = COMPONENTS) -> Mark:
+def component_mark(recipe: Recipe, root: Path = COMPONENTS) -> BuildStamp:
     """Return the mark of a component of the project, still without its key."""
-    return Mark(recipe.name, key="", source=f"components/{recipe.source.relative_to(root).as_posix()}")
+    return BuildStamp(recipe.name, key="", source=f"components/{recipe.source.relative_to(root).as_posix()}")
 
 
 def build_component(
@@ -144,7 +144,7 @@ def build_component(
     source = source.resolve()
     recipe = recipe_of(source, role=role, name=name, defaults=defaults, root=root)
     target = out.absolute() / f"{recipe.name}.fmu"
-    mark = Mark(
+    mark = BuildStamp(
         recipe.name,
         key="",
         source=Path(os.path.relpath(source, target.parent.resolve())).as_posix(),
@@ -192,7 +192,7 @@ def recipe_of(
     return recipe
 
 
-def bring_up_to_date(recipe: Recipe, target: Path, mark: Mark, force: bool = False) -> bool:
+def bring_up_to_date(recipe: Recipe, target: Path, mark: BuildStamp, force: bool = False) -> bool:
     """Build an FMU unless it is current; return whether it was built. `mark` is still without its key.
 
     Raises:

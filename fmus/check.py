@@ -64,7 +64,7 @@ def _end(checker: subprocess.Popen) -> None:
 def main() -> None:
     """Answer requests until there is nobody to ask; what FMUs print goes to stderr."""
     if sys.platform == "linux":  # others may have inherited the pipe that would tell
-        from orchestrator.master.guardian import die_with_parent
+        from orchestrator.master.supervisor import die_with_parent
 
         die_with_parent()
     answers: IO[str] = os.fdopen(os.dup(1), "w")

@@ -24,7 +24,7 @@ import pythonfmu
 import vocabulary
 from orchestrator.errors import BuildError
 
-from .evidence import Looks, content_digest
+from .evidence import SourceDigests, content_digest
 
 Parts = tuple[str, ...]
 """A module's dotted name inside the package, split: ("controllers", "fnn")."""
@@ -96,7 +96,7 @@ class Sources:
             if found.file is not None:
                 evidence[str(found.file)] = found.digest
                 folders.add(found.file.parent)  # a new file in it can come before one that is known
-        self.evidence[module] = evidence | Looks().evidence(sorted(folders))
+        self.evidence[module] = evidence | SourceDigests().evidence(sorted(folders))
         return dict(sorted(files.items()))
 
     def _namesake(self, parts: Parts) -> str:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from orchestrator.cache import keep, recall
 from orchestrator.errors import BuildError
-from orchestrator.wording import printable
+from orchestrator.messages import printable
 
 HERE = Path(__file__).resolve().parent
 SOURCES = ("launcher.c", "fmi2.h", "find_python.h", "text.h")

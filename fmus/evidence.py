@@ -21,7 +21,7 @@ Evidence = Mapping[str, str]
 """What was looked at -> digest of what was found."""
 
 
-class Looks:
+class SourceDigests:
     """Digests of the present state, each found once."""
 
     def __init__(self) -> None:

@@ -15,7 +15,7 @@ _SIGN = b"yawbench "
 
 
 @dataclass(frozen=True)
-class Mark:
+class BuildStamp:
     """Where an FMU comes from, and a key of all that decided what its bytes are."""
 
     name: str
@@ -37,7 +37,7 @@ class Mark:
         return _SIGN + json.dumps(said, sort_keys=True).encode()
 
 
-def read_mark(fmu: Path) -> Mark | None:
+def read_mark(fmu: Path) -> BuildStamp | None:
     """Return the mark of an FMU that was built here, None for any other file, and for none."""
     try:
         check_regular(fmu)
@@ -48,6 +48,6 @@ def read_mark(fmu: Path) -> Mark | None:
     if not comment.startswith(_SIGN):
         return None
     try:
-        return Mark(**json.loads(comment[len(_SIGN) :]))
+        return BuildStamp(**json.loads(comment[len(_SIGN) :]))
     except (ValueError, TypeError):  # as other versions of this program wrote it
-        return Mark(fmu.stem, "", "")
+        return BuildStamp(fmu.stem, "", "")

@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from .closure import PYTHONFMU
-from .mark import Mark
+from .mark import BuildStamp
 
 DESCRIPTION = "modelDescription.xml"
 _DATE = (1980, 1, 1, 0, 0, 0)
@@ -56,7 +56,7 @@ def pack(
     return files
 
 
-def to_bytes(files: Mapping[str, bytes], mark: Mark) -> bytes:
+def to_bytes(files: Mapping[str, bytes], mark: BuildStamp) -> bytes:
     """Return the archive of `files`; its comment is the mark."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:

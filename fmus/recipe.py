@@ -16,7 +16,7 @@ from orchestrator.errors import BuildError
 
 from .closure import Parts, Sources
 from .compiler import compile_launcher, compiler_tools
-from .evidence import Looks
+from .evidence import SourceDigests
 from .packing import LIBRARIES, pack
 from .presentation import PAGE, icon
 from .staging import entry_module, missing_signals, staged, variant
@@ -61,7 +61,7 @@ class PythonRecipe:
         """Return what the key follows from, cheap to look at (see `evidence`)."""
         self._files  # noqa: B018 - found once, with its evidence
         tools = [f"tool:{file}" for file in LIBRARIES]
-        return self.sources.evidence[self.module] | Looks().evidence(
+        return self.sources.evidence[self.module] | SourceDigests().evidence(
             [*sorted(HERE.glob("*.[pch]*")), *icon(self.role), *tools, *compiler_tools()]
         )
 

@@ -97,7 +97,7 @@ def apart(*packages: str) -> Iterator[None]:
 
 
 @dataclass(frozen=True)
-class Stage:
+class StagingFolder:
     """A folder with the package of one component, for as long as the context lasts."""
 
     folder: Path
@@ -155,7 +155,7 @@ _MACHINERY = ("fmi/component.py", "fmi/variables.py")
 
 
 @contextmanager
-def staged(files: Mapping[str, str], package: str) -> Iterator[Stage]:
+def staged(files: Mapping[str, str], package: str) -> Iterator[StagingFolder]:
     """Write `files` as the package `package` into a temporary folder that can be imported from."""
     with tempfile.TemporaryDirectory(prefix="yawbench_") as temporary, apart(package):
         folder = Path(temporary).resolve()
@@ -165,7 +165,7 @@ def staged(files: Mapping[str, str], package: str) -> Iterator[Stage]:
             file.write_bytes(text.encode())
         sys.path.insert(0, str(folder))
         importlib.invalidate_caches()
-        yield Stage(folder, package)
+        yield StagingFolder(folder, package)
 
 
 def entry_module(name: str, component: type[Any]) -> str:

@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING
 
 from orchestrator.cache import cache_folder, keep, recall
 from orchestrator.errors import BuildError
-from orchestrator.plan import Built
+from orchestrator.plan import BuildInfo
 
-from .evidence import Looks, content_digest
-from .mark import Mark, read_mark
+from .evidence import SourceDigests, content_digest
+from .mark import BuildStamp, read_mark
 
 if TYPE_CHECKING:
     from .build import Recipe
@@ -36,16 +36,16 @@ _NO_KEY = "none"
 """Of sources that cannot be read or parsed."""
 
 
-class Upkeep:
+class FmuUpdater:
     """Brings FMUs up to date, each once. `tell` is called with the name of each that is built."""
 
     def __init__(self, tell: Callable[[str], None]) -> None:
         self._tell = tell
-        self._looks = Looks()
+        self._looks = SourceDigests()
         self._recipes: dict[str, Recipe] = {}
-        self._found: dict[tuple[Path, bool], tuple[Path, Built | None]] = {}
+        self._found: dict[tuple[Path, bool], tuple[Path, BuildInfo | None]] = {}
 
-    def bring(self, archive: Path, *, build: bool) -> tuple[Path, Built | None]:
+    def bring(self, archive: Path, *, build: bool) -> tuple[Path, BuildInfo | None]:
         """Return the archive to open in place of `archive`, and what it was built from if that is here.
 
         If it does not exist and cannot be built, it is returned all the same.
@@ -57,12 +57,14 @@ class Upkeep:
             self._found[archive, build] = self._bring(archive, build)
         return self._found[archive, build]
 
-    def _bring(self, archive: Path, build: bool) -> tuple[Path, Built | None]:
+    def _bring(self, archive: Path, build: bool) -> tuple[Path, BuildInfo | None]:
         places = dict.fromkeys((archive, place_of(archive.parent) / archive.name))
         marks = {place: read_mark(place) for place in places if os.path.exists(place)}
         if archive in marks and marks[archive] is None:
             return archive, None
-        found, mark = next(((p, m) for p, m in marks.items() if m), (archive, Mark(archive.stem, "", "")))
+        found, mark = next(
+            ((p, m) for p, m in marks.items() if m), (archive, BuildStamp(archive.stem, "", ""))
+        )
         key = self._key(archive, mark)
         for place, its in marks.items():
             if its and its.key == key:
@@ -74,7 +76,7 @@ class Upkeep:
         stale = bool(marks) and (key is not None or gone)
         return found, _built(mark, current=False) if stale else None
 
-    def _key(self, archive: Path, mark: Mark) -> str | None:
+    def _key(self, archive: Path, mark: BuildStamp) -> str | None:
         """Return the key that the FMU would get if it were built now, None if its source is not here."""
         entry = content_digest(str(archive).encode())
         about = asdict(replace(mark, key=""))
@@ -92,7 +94,7 @@ class Upkeep:
         keep(KEYS, entry, json.dumps(record).encode())
         return key
 
-    def _recipe(self, archive: Path, mark: Mark) -> Recipe | None:
+    def _recipe(self, archive: Path, mark: BuildStamp) -> Recipe | None:
         """Return how an FMU is built, None if its source is not here."""
         from .build import find_recipes, recipe_of  # slow to import, and not needed if all is current
 
@@ -106,7 +108,7 @@ class Upkeep:
             return None
         return recipe_of(source, role=mark.role or None, name=mark.name, defaults=mark.defaults)
 
-    def _build(self, archive: Path, mark: Mark) -> tuple[Path, Built]:
+    def _build(self, archive: Path, mark: BuildStamp) -> tuple[Path, BuildInfo]:
         from .build import bring_up_to_date, component_mark
 
         target = place_of(archive.parent) / archive.name
@@ -132,10 +134,10 @@ def in_cache(folder: Path) -> Path:
     return cache_folder() / BUILT / content_digest(str(folder).encode())
 
 
-def _built(mark: Mark, *, current: bool) -> Built:
-    return Built(mark.source, mark.key, mark.tool, current)
+def _built(mark: BuildStamp, *, current: bool) -> BuildInfo:
+    return BuildInfo(mark.source, mark.key, mark.tool, current)
 
 
-def _is_at_home(archive: Path, mark: Mark) -> bool:
+def _is_at_home(archive: Path, mark: BuildStamp) -> bool:
     """Return whether an FMU stands where it was built, so far as can be told."""
     return archive.parent.resolve() == HERE if mark.is_component else archive.parent.name == mark.home

@@ -7,6 +7,8 @@ Nobody has to look after it. Nothing in it is believed unseen: a file that was c
 made anew. Where the user's folder cannot be written (a container, another user's home), or its path
 is not plain ASCII, a temporary folder serves. The path must be plain because stock PythonFMU decodes
 nothing but `%20` in the address of its resources.
+
+A hash of this program's own code: its version tells releases apart, not what was changed since.
 """
 
 from __future__ import annotations
@@ -18,10 +20,11 @@ import re
 import tempfile
 import time
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 from .errors import ModelDescriptionError
-from .writing import fcntl, write_whole
+from .files import fcntl, write_whole
 
 _PLAIN_PATH = re.compile(r"[A-Za-z0-9_.~/\\: -]+")
 KEEP_DAYS = 60
@@ -187,3 +190,25 @@ def content_of(file: Path) -> bytes | None:
 
 def _hash(content: bytes) -> bytes:
     return hashlib.sha256(content).hexdigest()[:_DIGITS].encode()
+
+
+OF_RESULTS = ("plan.py", "scenario", "fmu", "wiring", "master", "results", "tyres")
+"""Modules and stages that have a say in what a run records; units have hashes of their own."""
+OF_METRICS = (*OF_RESULTS, "metrics")
+"""And in the numbers made of it."""
+OF_TESTS = (*OF_METRICS, "evaluation")
+"""And in what a standard test makes of it."""
+
+_HERE = Path(__file__).parent
+
+
+@cache
+def sources_hash(parts: tuple[str, ...]) -> str:
+    """Return the first twelve digits of the SHA-256 of the code of modules and folders."""
+    digest = hashlib.sha256()
+    for part in parts:
+        place = _HERE / part
+        for file in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
+            digest.update(f"{file.relative_to(_HERE).as_posix()}\0".encode())
+            digest.update(file.read_bytes())
+    return digest.hexdigest()[:12]

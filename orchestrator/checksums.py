@@ -2,6 +2,8 @@
 
 Every record and journal line that is read back carries them. They guard against editors, merges and disks,
 not against somebody who makes new ones on purpose.
+
+The checksum of a file of results.
 """
 
 from __future__ import annotations
@@ -11,10 +13,12 @@ import json
 import multiprocessing
 import warnings
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from .errors import RecordWarning
-from .wording import listed, short
+from .files import open_regular
+from .messages import listed, short
 
 KEY = "checksums"
 WHOLE = "*"
@@ -85,3 +89,17 @@ def _named(keys: list[str]) -> str:
 def _digest(value: Any) -> str:
     text = json.dumps(value, sort_keys=True)
     return f"sha256:{hashlib.sha256(text.encode()).hexdigest()[:DIGITS]}"
+
+
+def checksum(path: Path) -> str:
+    """Return the checksum of a file."""
+    digest = hashlib.sha256()
+    with open_regular(path) as stream:
+        while block := stream.read(1 << 20):
+            digest.update(block)
+    return shown(digest)
+
+
+def shown(digest: Any) -> str:
+    """Return a SHA-256 as it stands in a run's record."""
+    return f"sha256:{digest.hexdigest()}"

@@ -18,35 +18,35 @@ import typer
 from typer.core import TyperGroup
 
 from .errors import Interrupted, RecordWarning, YawbenchError
-from .master.interrupts import terminable
-from .wording import cut, printable
+from .master.process_state import terminable
+from .messages import cut, printable
 
-COMMANDS = (
-    "new",
-    "build",
-    "check",
-    "run",
-    "compare",
-    "plot",
-    "animate",
-    "converge",
-    "study",
-    "report",
-    "sweep",
-    "evaluate",
-    "drive",
-    "tune",
-    "rank",
-    "list",
-    "diff",
-    "salvage",
-    "export-ssp",
-    "second-opinion",
-    "tyre",
-    "vehicle",
-    "cache",
-)
-"""Each a module of `orchestrator.commands` with a function of the same name, `_` for `-`."""
+COMMANDS = {
+    "new": "new",
+    "build": "build",
+    "check": "check",
+    "run": "run",
+    "compare": "compare",
+    "plot": "results",
+    "animate": "results",
+    "converge": "compare",
+    "study": "experiments",
+    "report": "experiments",
+    "sweep": "experiments",
+    "evaluate": "standard_tests",
+    "drive": "standard_tests",
+    "tune": "experiments",
+    "rank": "rank",
+    "list": "list",
+    "diff": "results",
+    "salvage": "results",
+    "export-ssp": "interop",
+    "second-opinion": "interop",
+    "tyre": "vehicle_and_tyre",
+    "vehicle": "vehicle_and_tyre",
+    "cache": "build",
+}
+"""Command -> its module in `orchestrator.commands`; the function has the same name, `_` for `-`."""
 
 
 class _Commands(TyperGroup):
@@ -95,9 +95,8 @@ def _application(arguments: Sequence[str] = ()) -> typer.Typer:
     )
     app.callback()(_options)
     for name in called:
-        function = name.replace("-", "_")
-        module = importlib.import_module(f".commands.{function}", __package__)
-        app.command(name)(getattr(module, function))
+        module = importlib.import_module(f".commands.{COMMANDS[name]}", __package__)
+        app.command(name)(getattr(module, name.replace("-", "_")))
     return app
 
 

@@ -22,7 +22,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .wording import printable
+from .messages import printable
 
 if TYPE_CHECKING:
     from .plan import Finding
@@ -153,39 +153,39 @@ class BuildError(YawbenchError):
 
 
 class SimulationError(YawbenchError):
-    """A run failed: `unit` (None if the master itself failed) at `time` [s].
+    """A run failed: `instance` (None if the master itself failed) at `time` [s].
 
     >>> def careless(yaw_rate_ref, yaw_rate):
     ...     return 20000 * yaw_rate_ref / yaw_rate
     >>> try:
     ...     base.swap(controller=careless).run()
     ... except yb.SimulationError as error:
-    ...     print(error.unit, error.time, repr(error.__cause__))
+    ...     print(error.instance, error.time, repr(error.__cause__))
     controller 0.0 ZeroDivisionError('float division by zero')
     """
 
     exit_status = 1
 
-    def __init__(self, problem: str, *, unit: str | None, time: float) -> None:
+    def __init__(self, problem: str, *, instance: str | None, time: float) -> None:
         super().__init__(problem)
-        self.unit = unit
+        self.instance = instance
         self.time = time
         self.findings: tuple[Finding, ...] = ()  # on the run's course until then
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C or SIGTERM, which has ended a run of `unit` (None: between two calls) at `time` [s]."""
+    """Ctrl-C or SIGTERM, which has ended a run of `instance` (None: between two calls) at `time` [s]."""
 
     def __init__(
         self,
         problem: str | Iterable[str] = "Interrupted",
         *,
-        unit: str | None = None,
+        instance: str | None = None,
         time: float | None = None,
         number: int = signal.SIGINT,
     ) -> None:
         self.problems = [Problem(one) for one in ([problem] if isinstance(problem, str) else problem)]
-        self.unit = unit
+        self.instance = instance
         self.time = time
         self.number = number
         super().__init__("\n".join(self.problems))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 if TYPE_CHECKING:
     import numpy as np
 
-from .wording import cut
+from .messages import cut
 
 Value = float | int | bool | str
 OF_RUN = ("start_time", "stop_time", "step_size", "algorithm")
@@ -32,7 +32,7 @@ SENSING = {"sensor": "measurement", "estimator": "estimate"}
 Algorithm = Literal["jacobi", "gauss_seidel", "extrapolated"]
 
 
-class Place(NamedTuple):
+class ValueRef(NamedTuple):
     """Where an FMU keeps a scalar value."""
 
     type: str  # in the names of the functions that set and get it: "Real", "Float64", ...
@@ -75,10 +75,10 @@ class Variable:
     elements: int = 1  # of the whole array
 
     @property
-    def place(self) -> Place:
+    def place(self) -> ValueRef:
         """Where the FMU keeps it. To the functions of FMI 2.0 an enumeration is an Integer."""
         kind = self.encoding or {"Enumeration": "Integer"}.get(self.type, self.type)
-        return Place(kind, self.reference, self.element, self.elements)
+        return ValueRef(kind, self.reference, self.element, self.elements)
 
     @property
     def discrete(self) -> bool:
@@ -91,7 +91,7 @@ class Variable:
 
 
 @dataclass(frozen=True)
-class Built:
+class BuildInfo:
     """What an FMU was built from here."""
 
     source: str  # of a component: from the folder above components/; else: from the FMU's folder
@@ -116,7 +116,7 @@ class Fmu:
     once_per_process: bool = False
     fmi: int = 2  # major version of the standard
     host_packages: tuple[str, ...] = ()  # what the Python that runs it must have
-    built: Built | None = None  # None: elsewhere, or nobody has looked
+    built: BuildInfo | None = None  # None: elsewhere, or nobody has looked
     python_modules: dict[str, str] = field(default_factory=dict)
     """Of a PythonFMU unit: top-level module in resources/ -> hash of its content."""
     refused: dict[str, str] = field(default_factory=dict)
@@ -145,7 +145,7 @@ class Fmu:
 
 
 @dataclass(frozen=True, eq=False)
-class Series:
+class InputSeries:
     """Values of an input over time, from a file."""
 
     file: str  # as the scenario names it
@@ -189,7 +189,7 @@ DEFAULT = ValueOrigin("default")
 
 
 @dataclass(frozen=True)
-class Unit:
+class Instance:
     """One instance of an FMU in a scenario."""
 
     name: str
@@ -201,7 +201,7 @@ class Unit:
     """Parameter or constant -> where its value comes from."""
     tolerance: float | None = None
     """Relative, of the FMU's own solver; None: that of its default experiment, if it has one."""
-    series: dict[str, Series] = field(default_factory=dict)
+    series: dict[str, InputSeries] = field(default_factory=dict)
     """Inputs that follow a time series."""
 
     def parameter(self, name: str) -> Value | None:
@@ -231,7 +231,7 @@ class Wire:
 class Fault:
     """What goes wrong with a signal: with an output for all who take it, or with an input alone."""
 
-    unit: str
+    instance: str
     variable: str
     of_output: bool
     kind: str  # see `scenario.fault_schema.KINDS`
@@ -245,7 +245,7 @@ class Fault:
     says: str = ""  # likewise: "freeze from 2 s"
 
 
-class Faults(tuple[Mapping[str, Value], ...]):
+class FaultList(tuple[Mapping[str, Value], ...]):
     """What goes wrong at one place, one after the other: each as a file has it, without the place."""
 
     __slots__ = ()
@@ -268,17 +268,17 @@ def _said(value: Value, name: str = "") -> str:
 
 
 @dataclass(frozen=True)
-class Change:
+class Override:
     """One thing that is other than in the scenario file."""
 
     place: str  # as in --set: "plant.mass", "inputs.friction*", "stop_time"; a unit or "vehicle" for its file
-    value: Value | Faults
+    value: Value | FaultList
     origin: str  # "--set", "--swap", "study", "sweep", ...
 
     @property
     def plain(self) -> Value:
         """The value as names and records have it: faults in a line."""
-        return str(self.value) if isinstance(self.value, Faults) else self.value
+        return str(self.value) if isinstance(self.value, FaultList) else self.value
 
     @property
     def names_file(self) -> bool:
@@ -318,7 +318,7 @@ class Finding:
 class Plan:
     """Units in evaluation order, wires, and the time grid in integers."""
 
-    units: tuple[Unit, ...]
+    instances: tuple[Instance, ...]
     wires: tuple[Wire, ...]
     record: tuple[tuple[str, str], ...]  # (unit, output) in column order
     step: Fraction  # communication step size [s]
@@ -328,7 +328,7 @@ class Plan:
     title: str = ""
     scenario: dict = field(default_factory=dict)  # as run, for run.json
     notes: tuple[str, ...] = ()  # worth telling the user, but no error
-    changes: tuple[Change, ...] = ()  # against the scenario file
+    changes: tuple[Override, ...] = ()  # against the scenario file
     findings: tuple[Finding, ...] = ()  # on given values
     faults: tuple[Fault, ...] = ()  # those of one variable in the order in which they act
 

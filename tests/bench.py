@@ -20,11 +20,11 @@ from time import perf_counter, perf_counter_ns
 import numpy as np
 
 from orchestrator.interop.second_opinion import MASTERS, installed, second_opinion
-from orchestrator.master.interrupts import StopFlag
+from orchestrator.master.fmi import open_unit
 from orchestrator.master.log import Log
 from orchestrator.master.master import Master
-from orchestrator.master.opening import open_unit
-from orchestrator.master.operations import Operation
+from orchestrator.master.process_state import StopFlag
+from orchestrator.master.step_program import Operation
 from orchestrator.plan import Plan
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
@@ -70,7 +70,7 @@ def measure(plan: Plan, change: Change = lambda operation: [operation]) -> dict[
     corrupted: set[Path] = set()
     begin = perf_counter()
     try:
-        for unit in plan.units:
+        for unit in plan.instances:
             slaves[unit.name] = open_unit(unit, log, corrupted)
         opened = perf_counter()
         master = Master(plan, slaves, log, StopFlag())
@@ -102,14 +102,14 @@ def bench(path: Path) -> None:
     metered = [measure(plan, meter.around) for meter in meters]
     meter = meters[min(range(REPEATS), key=lambda i: metered[i]["step"])]
     n = min(STEPS, plan.n_steps)
-    unit_steps = sum(n // unit.period for unit in plan.units) / n
+    unit_steps = sum(n // unit.period for unit in plan.instances) / n
 
     print(f"{path}: {plan.title}")
     print(f"  {plan.algorithm}, step {float(plan.step):g} s, {n} of {plan.n_steps} steps measured\n")
     print(
         f"  {'us per call':24s}{'set':>8s}{'step':>8s}{'get':>8s}{'sum':>8s}   of its time   calls per step"
     )
-    for unit in plan.units:
+    for unit in plan.instances:
         times = [1e-3 * meter.spent[unit.name, kind] * unit.period / n for kind in ("set", "step", "get")]
         cells = "".join(f"{t:8.2f}" for t in (*times, sum(times)))
         share = 1e-6 * sum(times) / (unit.period * float(plan.step))  # of the time from call to call

@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable
 
-from orchestrator.plan import Change, Value
+from orchestrator.plan import Override, Value
 from orchestrator.scenario.overrides import read_changes
 
 
 def changed(
     swaps: Iterable[str] = (), settings: Iterable[str] = (), faults: Iterable[str] = (), **of_run: Value
-) -> tuple[Change, ...]:
+) -> tuple[Override, ...]:
     """Return what --swap, --set and --fault with these texts change, and times and the algorithm by name."""
-    named = [Change(place, value, "test") for place, value in of_run.items()]
+    named = [Override(place, value, "test") for place, value in of_run.items()]
     return (*read_changes(swaps, settings, faults), *named)

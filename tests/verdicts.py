@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from orchestrator.experiments.experiment import load_experiment
-from orchestrator.experiments.verdicts import (
+from orchestrator.experiments.verdict_tables import (
     FAILS,
     HOLDS,
     NO_FLIP,
@@ -22,8 +22,8 @@ from orchestrator.experiments.verdicts import (
     held_words,
     share,
 )
+from orchestrator.messages import listed
 from orchestrator.pages.report import found_studies
-from orchestrator.wording import listed
 from tests.checkout import ROOT
 
 FILE = ROOT / "docs" / "verdicts.md"

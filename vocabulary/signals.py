@@ -8,7 +8,7 @@ import math
 from typing import NamedTuple
 
 
-class Entry(NamedTuple):
+class SignalEntry(NamedTuple):
     """What is known of a signal."""
 
     unit: str
@@ -24,107 +24,117 @@ class Entry(NamedTuple):
     """A larger magnitude in a measurement is no car's: most likely its unit is another one. All chosen."""
 
 
-SIGNALS: dict[str, Entry] = {
-    "velocity_x": Entry(
+SIGNALS: dict[str, SignalEntry] = {
+    "velocity_x": SignalEntry(
         "m/s",
         "Longitudinal velocity v_x of the centre of mass, vehicle axes",
         "v_x",
         "Longitudinal velocity",
         largest=70.0,  # above the top speed of nearly all cars
     ),
-    "velocity_y": Entry(
+    "velocity_y": SignalEntry(
         "m/s",
         "Lateral velocity v_y of the centre of mass, vehicle axes",
         "v_y",
         "Lateral velocity",
         largest=70.0,
     ),
-    "yaw_rate": Entry("rad/s", "Yaw rate r", "r", largest=5.0),  # 4 times that of cars here that spin
-    "sideslip": Entry(
+    "yaw_rate": SignalEntry("rad/s", "Yaw rate r", "r", largest=5.0),  # 4 times that of cars here that spin
+    "sideslip": SignalEntry(
         "rad",
         "Sideslip angle beta = atan2(v_y, v_x) of the centre of mass",
         "β",
         "Sideslip angle",
         largest=math.pi,
     ),
-    "sideslip_rate": Entry("rad/s", "Time derivative of the sideslip angle", "dβ/dt"),
-    "acceleration_x": Entry(
+    "sideslip_rate": SignalEntry("rad/s", "Time derivative of the sideslip angle", "dβ/dt"),
+    "acceleration_x": SignalEntry(
         "m/s2",
         "Longitudinal acceleration of the centre of mass, vehicle axes",
         "a_x",
         "Longitudinal acceleration",
         largest=30.0,  # three times what tyres of the road give
     ),
-    "acceleration_y": Entry(
+    "acceleration_y": SignalEntry(
         "m/s2",
         "Lateral acceleration of the centre of mass, vehicle axes",
         "a_y",
         "Lateral acceleration",
         largest=30.0,
     ),
-    "roll_angle": Entry("rad", "Roll angle, positive with the left side up", "φ", largest=math.pi),
-    "roll_rate": Entry("rad/s", "Roll rate", largest=5.0),
-    "pitch_angle": Entry("rad", "Pitch angle, positive with the nose down", "θ", largest=math.pi),
-    "position_x": Entry("m", "Position of the centre of mass, earth axes, x", "x", "Longitudinal position"),
-    "position_y": Entry("m", "Position of the centre of mass, earth axes, y", "y", "Lateral position"),
-    "yaw_angle": Entry("rad", "Yaw angle psi", "ψ"),
-    "steer_angle": Entry(
+    "roll_angle": SignalEntry("rad", "Roll angle, positive with the left side up", "φ", largest=math.pi),
+    "roll_rate": SignalEntry("rad/s", "Roll rate", largest=5.0),
+    "pitch_angle": SignalEntry("rad", "Pitch angle, positive with the nose down", "θ", largest=math.pi),
+    "position_x": SignalEntry(
+        "m", "Position of the centre of mass, earth axes, x", "x", "Longitudinal position"
+    ),
+    "position_y": SignalEntry("m", "Position of the centre of mass, earth axes, y", "y", "Lateral position"),
+    "yaw_angle": SignalEntry("rad", "Yaw angle psi", "ψ"),
+    "steer_angle": SignalEntry(
         "rad",
         "Road-wheel steer angle delta of the front axle",
         "δ",
         largest=1.05,  # 60 degrees, above the lock of all cars
     ),
-    "steering_wheel_angle": Entry(
+    "steering_wheel_angle": SignalEntry(
         "rad",
         "Hand-wheel angle",
         "δ_H",
         "Hand-wheel angle",
         largest=4.0 * math.pi,  # two turns
     ),
-    "drive_force": Entry("N", "Sum of the longitudinal tyre forces the driver asks for"),
-    "friction": Entry(
+    "drive_force": SignalEntry("N", "Sum of the longitudinal tyre forces the driver asks for"),
+    "friction": SignalEntry(
         "1",
         "Friction coefficient mu of the road, as known to reference and controller",
         minimum=0.0,
         largest=2.0,
     ),
-    "friction_*": Entry("1", "Friction coefficient mu under the wheel", minimum=0.0),
-    "friction_delayed": Entry("1", "Friction coefficient mu of the road, known with a delay", minimum=0.0),
-    "slope": Entry("rad", "Angle by which the road rises along the vehicle's x axis", "θ_road"),
-    "bank": Entry("rad", "Angle by which the road rises along the vehicle's y axis, to the left", "φ_road"),
-    "wind_force_y": Entry("N", "Side force of the wind, vehicle axes, at the centre of mass", "F_wind"),
-    "wind_moment_z": Entry("N.m", "Moment of the wind about the vertical axis", "M_wind"),
-    "yaw_rate_ref": Entry("rad/s", "Yaw rate the driver asks for"),
-    "sideslip_ref": Entry("rad", "Sideslip angle the driver asks for"),
-    "yaw_acceleration_ref": Entry("rad/s2", "Time derivative of yaw_rate_ref"),
-    "sideslip_rate_ref": Entry("rad/s", "Time derivative of sideslip_ref"),
-    "yaw_moment": Entry("N.m", "Yaw moment M_z asked of the wheels' longitudinal forces", "M_z"),
-    "force_request_*": Entry(
+    "friction_*": SignalEntry("1", "Friction coefficient mu under the wheel", minimum=0.0),
+    "friction_delayed": SignalEntry(
+        "1", "Friction coefficient mu of the road, known with a delay", minimum=0.0
+    ),
+    "slope": SignalEntry("rad", "Angle by which the road rises along the vehicle's x axis", "θ_road"),
+    "bank": SignalEntry(
+        "rad", "Angle by which the road rises along the vehicle's y axis, to the left", "φ_road"
+    ),
+    "wind_force_y": SignalEntry("N", "Side force of the wind, vehicle axes, at the centre of mass", "F_wind"),
+    "wind_moment_z": SignalEntry("N.m", "Moment of the wind about the vertical axis", "M_wind"),
+    "yaw_rate_ref": SignalEntry("rad/s", "Yaw rate the driver asks for"),
+    "sideslip_ref": SignalEntry("rad", "Sideslip angle the driver asks for"),
+    "yaw_acceleration_ref": SignalEntry("rad/s2", "Time derivative of yaw_rate_ref"),
+    "sideslip_rate_ref": SignalEntry("rad/s", "Time derivative of sideslip_ref"),
+    "yaw_moment": SignalEntry("N.m", "Yaw moment M_z asked of the wheels' longitudinal forces", "M_z"),
+    "force_request_*": SignalEntry(
         "N", "Longitudinal tyre force asked for, wheel axes", "F_x", "Longitudinal force asked for"
     ),
-    "torque_request_*": Entry(
+    "torque_request_*": SignalEntry(
         "N.m", "Wheel torque asked for, positive when driving", "T", "Wheel torque asked for"
     ),
-    "wheel_torque_*": Entry("N.m", "Torque at the wheel, positive when driving", "T"),
-    "tyre_force_x_*": Entry(
+    "wheel_torque_*": SignalEntry("N.m", "Torque at the wheel, positive when driving", "T"),
+    "tyre_force_x_*": SignalEntry(
         "N", "Longitudinal tyre force, wheel axes, at the contact point", "F_x", "Longitudinal tyre force"
     ),
-    "tyre_force_y_*": Entry(
+    "tyre_force_y_*": SignalEntry(
         "N", "Lateral tyre force, wheel axes, at the contact point", "F_y", "Lateral tyre force"
     ),
-    "aligning_moment_*": Entry("N.m", "Self-aligning moment of the tyre about its vertical axis"),
-    "tyre_moment_z_*": Entry("N.m", "Moment of the tyre about its vertical axis that turns the car"),
-    "overturning_moment_*": Entry("N.m", "Overturning moment of the tyre about its longitudinal axis"),
-    "slip_stiffness_*": Entry("N", "Slope dF_x/dkappa of the tyre's force at tyre_slip_ratio; 0: not told"),
-    "tyre_slip_ratio_*": Entry("1", "Longitudinal slip that the tyre's force and slip_stiffness belong to"),
-    "slip_angle_*": Entry("rad", "Slip angle alpha = atan2(v_y, v_x) in wheel axes", "α"),
-    "inclination_angle_*": Entry(
+    "aligning_moment_*": SignalEntry("N.m", "Self-aligning moment of the tyre about its vertical axis"),
+    "tyre_moment_z_*": SignalEntry("N.m", "Moment of the tyre about its vertical axis that turns the car"),
+    "overturning_moment_*": SignalEntry("N.m", "Overturning moment of the tyre about its longitudinal axis"),
+    "slip_stiffness_*": SignalEntry(
+        "N", "Slope dF_x/dkappa of the tyre's force at tyre_slip_ratio; 0: not told"
+    ),
+    "tyre_slip_ratio_*": SignalEntry(
+        "1", "Longitudinal slip that the tyre's force and slip_stiffness belong to"
+    ),
+    "slip_angle_*": SignalEntry("rad", "Slip angle alpha = atan2(v_y, v_x) in wheel axes", "α"),
+    "inclination_angle_*": SignalEntry(
         "rad", "Inclination angle gamma of the wheel, positive: top to the right", "γ"
     ),
-    "slip_ratio_*": Entry(
+    "slip_ratio_*": SignalEntry(
         "1", "Longitudinal slip kappa = (w R - v) / max(|w R|, |v|)", "κ", "Longitudinal slip"
     ),
-    "vertical_load_*": Entry("N", "Vertical load F_z on the tyre, positive upwards", "F_z"),
-    "wheel_speed_*": Entry("rad/s", "Angular velocity w of the wheel", "ω"),
-    "wheel_velocity_*": Entry("m/s", "Longitudinal velocity v of the wheel, wheel axes"),
+    "vertical_load_*": SignalEntry("N", "Vertical load F_z on the tyre, positive upwards", "F_z"),
+    "wheel_speed_*": SignalEntry("rad/s", "Angular velocity w of the wheel", "ω"),
+    "wheel_velocity_*": SignalEntry("m/s", "Longitudinal velocity v of the wheel, wheel axes"),
 }

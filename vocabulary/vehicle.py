@@ -7,7 +7,7 @@ the same unit of measurement.
 from typing import NamedTuple
 
 
-class Quantity(NamedTuple):
+class VehicleQuantity(NamedTuple):
     """What is known of a quantity."""
 
     unit: str
@@ -25,131 +25,153 @@ DYNAMIC_INDEX = (0.4, 1.6)
 """Yaw inertia over mass times the distances of both axles from the centre of mass. Chosen: 1 is that of two
 masses at the axles; the cars in `scenarios/vehicles` have 0.61 to 1.10."""
 
-CAR: dict[str, Quantity] = {
-    "mass": Quantity("kg", "Mass m of the car as it drives", True, 1.0, plausible=(300, 5000)),
-    "sprung_mass": Quantity("kg", "Mass m_s of what the springs carry", True, 0.0, plausible=(200, 5000)),
-    "unsprung_mass": Quantity(
+CAR: dict[str, VehicleQuantity] = {
+    "mass": VehicleQuantity("kg", "Mass m of the car as it drives", True, 1.0, plausible=(300, 5000)),
+    "sprung_mass": VehicleQuantity(
+        "kg", "Mass m_s of what the springs carry", True, 0.0, plausible=(200, 5000)
+    ),
+    "unsprung_mass": VehicleQuantity(
         "kg", "Mass m_u of all wheels and what moves with them", minimum=0.0, plausible=(30, 800)
     ),
-    "unsprung_mass_front": Quantity("kg", "That of both front wheels", minimum=0.0, plausible=(15, 400)),
-    "unsprung_mass_rear": Quantity("kg", "That of both rear wheels", minimum=0.0, plausible=(15, 400)),
-    "front_unsprung_share": Quantity(
+    "unsprung_mass_front": VehicleQuantity(
+        "kg", "That of both front wheels", minimum=0.0, plausible=(15, 400)
+    ),
+    "unsprung_mass_rear": VehicleQuantity("kg", "That of both rear wheels", minimum=0.0, plausible=(15, 400)),
+    "front_unsprung_share": VehicleQuantity(
         "1", "Front part of the unsprung mass", minimum=0.0, plausible=(0.2, 0.8)
     ),
-    "front_load_share": Quantity(
+    "front_load_share": VehicleQuantity(
         "1", "Part of the weight that the front axle carries at rest", minimum=0.0, plausible=(0.2, 0.8)
     ),
-    "yaw_inertia": Quantity("kg.m2", "Yaw inertia I_z of the whole car", True, 1.0, plausible=(150, 15000)),
-    "sprung_yaw_inertia": Quantity(
+    "yaw_inertia": VehicleQuantity(
+        "kg.m2", "Yaw inertia I_z of the whole car", True, 1.0, plausible=(150, 15000)
+    ),
+    "sprung_yaw_inertia": VehicleQuantity(
         "kg.m2", "Yaw inertia of the sprung mass about its own centre", minimum=1.0, plausible=(100, 15000)
     ),
-    "roll_inertia": Quantity(
+    "roll_inertia": VehicleQuantity(
         "kg.m2", "Roll inertia I_x of the sprung mass about the roll axis", True, 1.0, plausible=(30, 5000)
     ),
-    "sprung_roll_inertia": Quantity(
+    "sprung_roll_inertia": VehicleQuantity(
         "kg.m2", "Roll inertia of the sprung mass about its own centre", True, 1.0, plausible=(20, 5000)
     ),
-    "sprung_pitch_inertia": Quantity(
+    "sprung_pitch_inertia": VehicleQuantity(
         "kg.m2", "Pitch inertia of the sprung mass about its own centre", True, 1.0, plausible=(100, 15000)
     ),
-    "sprung_roll_yaw_product": Quantity(
+    "sprung_roll_yaw_product": VehicleQuantity(
         "kg.m2",
         "Product of inertia I_xz of the sprung mass about its own centre, positive where its front is heavy "
         "on top",
     ),
-    "wheelbase": Quantity("m", "Distance L of the axles", minimum=0.1, plausible=(1.4, 5)),
-    "cg_to_front_axle": Quantity(
+    "wheelbase": VehicleQuantity("m", "Distance L of the axles", minimum=0.1, plausible=(1.4, 5)),
+    "cg_to_front_axle": VehicleQuantity(
         "m", "Distance a of the centre of mass from the front axle", True, 0.1, plausible=(0.4, 3.5)
     ),
-    "cg_to_rear_axle": Quantity(
+    "cg_to_rear_axle": VehicleQuantity(
         "m", "Distance b of the centre of mass from the rear axle", True, 0.1, plausible=(0.4, 3.5)
     ),
-    "cg_to_front_end": Quantity(
+    "cg_to_front_end": VehicleQuantity(
         "m", "Distance of the centre of mass from the front end", minimum=0.0, plausible=(0.5, 5)
     ),
-    "cg_to_rear_end": Quantity(
+    "cg_to_rear_end": VehicleQuantity(
         "m", "Distance of the centre of mass from the rear end", minimum=0.0, plausible=(0.5, 5)
     ),
-    "sprung_cg_offset": Quantity("m", "Centre of the sprung mass before that of the car"),
-    "track_width": Quantity("m", "Track d, the same for both axles", True, 0.1, plausible=(0.7, 2.3)),
-    "track_width_front": Quantity("m", "Track of the front axle", minimum=0.1, plausible=(0.7, 2.3)),
-    "track_width_rear": Quantity("m", "Track of the rear axle", minimum=0.1, plausible=(0.7, 2.3)),
-    "vehicle_width": Quantity("m", "Width of the body without mirrors", minimum=0.1, plausible=(0.9, 2.7)),
-    "cg_height": Quantity("m", "Height h of the centre of mass", True, 0.0, plausible=(0.2, 1.5)),
-    "sprung_cg_height": Quantity(
+    "sprung_cg_offset": VehicleQuantity("m", "Centre of the sprung mass before that of the car"),
+    "track_width": VehicleQuantity("m", "Track d, the same for both axles", True, 0.1, plausible=(0.7, 2.3)),
+    "track_width_front": VehicleQuantity("m", "Track of the front axle", minimum=0.1, plausible=(0.7, 2.3)),
+    "track_width_rear": VehicleQuantity("m", "Track of the rear axle", minimum=0.1, plausible=(0.7, 2.3)),
+    "vehicle_width": VehicleQuantity(
+        "m", "Width of the body without mirrors", minimum=0.1, plausible=(0.9, 2.7)
+    ),
+    "cg_height": VehicleQuantity("m", "Height h of the centre of mass", True, 0.0, plausible=(0.2, 1.5)),
+    "sprung_cg_height": VehicleQuantity(
         "m", "Height of the centre of the sprung mass", minimum=0.0, plausible=(0.2, 1.8)
     ),
-    "unsprung_height": Quantity("m", "Height of the wheels' centres", True, 0.0, plausible=(0.15, 0.6)),
-    "roll_centre_height_front": Quantity("m", "Front roll centre", True, plausible=(-0.5, 1)),
-    "roll_centre_height_rear": Quantity("m", "Rear roll centre", True, plausible=(-0.5, 1)),
-    "roll_axis_height": Quantity("m", "Roll axis below the centre of the sprung mass"),
-    "roll_arm": Quantity(
+    "unsprung_height": VehicleQuantity(
+        "m", "Height of the wheels' centres", True, 0.0, plausible=(0.15, 0.6)
+    ),
+    "roll_centre_height_front": VehicleQuantity("m", "Front roll centre", True, plausible=(-0.5, 1)),
+    "roll_centre_height_rear": VehicleQuantity("m", "Rear roll centre", True, plausible=(-0.5, 1)),
+    "roll_axis_height": VehicleQuantity("m", "Roll axis below the centre of the sprung mass"),
+    "roll_arm": VehicleQuantity(
         "m", "Height h_s of the sprung mass above the roll axis", True, 0.0, plausible=(0, 1.5)
     ),
-    "spring_stiffness_front": Quantity("N/m", "Front spring, at the wheel", True, 0.0, plausible=(3e3, 5e5)),
-    "spring_stiffness_rear": Quantity("N/m", "Rear spring, at the wheel", True, 0.0, plausible=(3e3, 5e5)),
-    "damping_front": Quantity("N.s/m", "Front damper, at the wheel", True, 0.0, plausible=(100, 5e4)),
-    "damping_rear": Quantity("N.s/m", "Rear damper, at the wheel", True, 0.0, plausible=(100, 5e4)),
-    "anti_roll_stiffness_front": Quantity(
+    "spring_stiffness_front": VehicleQuantity(
+        "N/m", "Front spring, at the wheel", True, 0.0, plausible=(3e3, 5e5)
+    ),
+    "spring_stiffness_rear": VehicleQuantity(
+        "N/m", "Rear spring, at the wheel", True, 0.0, plausible=(3e3, 5e5)
+    ),
+    "damping_front": VehicleQuantity("N.s/m", "Front damper, at the wheel", True, 0.0, plausible=(100, 5e4)),
+    "damping_rear": VehicleQuantity("N.s/m", "Rear damper, at the wheel", True, 0.0, plausible=(100, 5e4)),
+    "anti_roll_stiffness_front": VehicleQuantity(
         "N/m",
         "Front anti-roll bar, force at each wheel per difference of travel, negative for a bar that stiffens "
         "heave",
         True,
     ),
-    "anti_roll_stiffness_rear": Quantity(
+    "anti_roll_stiffness_rear": VehicleQuantity(
         "N/m",
         "Rear anti-roll bar, force at each wheel per difference of travel, negative for a bar that stiffens "
         "heave",
         True,
     ),
-    "roll_stiffness": Quantity(
+    "roll_stiffness": VehicleQuantity(
         "N.m/rad", "Roll stiffness K of the car on its tyres", True, 0.0, plausible=(5e3, 2e6)
     ),
-    "roll_stiffness_front": Quantity("N.m/rad", "That of the front axle", minimum=0.0),
-    "roll_stiffness_rear": Quantity("N.m/rad", "That of the rear axle", minimum=0.0),
-    "front_roll_share": Quantity("1", "Front part of the roll stiffness", True, 0.0),
-    "roll_damping": Quantity("N.m.s/rad", "Roll damping C of the car on its tyres", True, 0.0),
-    "roll_damping_front": Quantity("N.m.s/rad", "That of the front axle", minimum=0.0),
-    "roll_damping_rear": Quantity("N.m.s/rad", "That of the rear axle", minimum=0.0),
-    "roll_camber_front": Quantity(
+    "roll_stiffness_front": VehicleQuantity("N.m/rad", "That of the front axle", minimum=0.0),
+    "roll_stiffness_rear": VehicleQuantity("N.m/rad", "That of the rear axle", minimum=0.0),
+    "front_roll_share": VehicleQuantity("1", "Front part of the roll stiffness", True, 0.0),
+    "roll_damping": VehicleQuantity("N.m.s/rad", "Roll damping C of the car on its tyres", True, 0.0),
+    "roll_damping_front": VehicleQuantity("N.m.s/rad", "That of the front axle", minimum=0.0),
+    "roll_damping_rear": VehicleQuantity("N.m.s/rad", "That of the rear axle", minimum=0.0),
+    "roll_camber_front": VehicleQuantity(
         "1", "Roll camber of the front axle: inclination of its wheels over the body's roll angle"
     ),
-    "roll_camber_rear": Quantity(
+    "roll_camber_rear": VehicleQuantity(
         "1", "Roll camber of the rear axle: inclination of its wheels over the body's roll angle"
     ),
-    "steering_ratio": Quantity("1", "Hand-wheel angle over road-wheel angle", minimum=0.1, plausible=(1, 40)),
-    "wheel_radius": Quantity("m", "Rolling radius R of the wheels", True, 0.05, plausible=(0.15, 0.6)),
-    "wheel_inertia": Quantity("kg.m2", "Inertia J of one wheel", True, 0.01, plausible=(0.1, 10)),
-    "tyre_vertical_stiffness": Quantity("N/m", "Tyre spring k_t", True, 1.0, plausible=(3e4, 1e6)),
-    "static_load_front": Quantity("N", "Load of one front wheel at rest", minimum=0.0, plausible=(500, 3e4)),
-    "static_load_rear": Quantity("N", "Load of one rear wheel at rest", minimum=0.0, plausible=(500, 3e4)),
-    "nominal_load": Quantity("N", "Nominal load F_z0 of the tyres", minimum=1.0, plausible=(500, 3e4)),
-    "unloaded_radius": Quantity(
+    "steering_ratio": VehicleQuantity(
+        "1", "Hand-wheel angle over road-wheel angle", minimum=0.1, plausible=(1, 40)
+    ),
+    "wheel_radius": VehicleQuantity("m", "Rolling radius R of the wheels", True, 0.05, plausible=(0.15, 0.6)),
+    "wheel_inertia": VehicleQuantity("kg.m2", "Inertia J of one wheel", True, 0.01, plausible=(0.1, 10)),
+    "tyre_vertical_stiffness": VehicleQuantity("N/m", "Tyre spring k_t", True, 1.0, plausible=(3e4, 1e6)),
+    "static_load_front": VehicleQuantity(
+        "N", "Load of one front wheel at rest", minimum=0.0, plausible=(500, 3e4)
+    ),
+    "static_load_rear": VehicleQuantity(
+        "N", "Load of one rear wheel at rest", minimum=0.0, plausible=(500, 3e4)
+    ),
+    "nominal_load": VehicleQuantity("N", "Nominal load F_z0 of the tyres", minimum=1.0, plausible=(500, 3e4)),
+    "unloaded_radius": VehicleQuantity(
         "m", "Radius R_0 of the tyres without load", minimum=0.05, plausible=(0.15, 0.6)
     ),
-    "cornering_stiffness": Quantity(
+    "cornering_stiffness": VehicleQuantity(
         "N/rad", "Cornering stiffness of one tyre that knows no load", minimum=0.0, plausible=(3e3, 5e5)
     ),
-    "longitudinal_stiffness": Quantity("N", "Slip stiffness of one tyre that knows no load", minimum=0.0),
-    "cornering_stiffness_scale_front": Quantity(
+    "longitudinal_stiffness": VehicleQuantity(
+        "N", "Slip stiffness of one tyre that knows no load", minimum=0.0
+    ),
+    "cornering_stiffness_scale_front": VehicleQuantity(
         "1", "Scales the front tyres' cornering stiffness", minimum=0.0
     ),
-    "cornering_stiffness_scale_rear": Quantity(
+    "cornering_stiffness_scale_rear": VehicleQuantity(
         "1", "Scales the rear tyres' cornering stiffness", minimum=0.0
     ),
-    "cornering_stiffness_front": Quantity(
+    "cornering_stiffness_front": VehicleQuantity(
         "N/rad", "Cornering stiffness C_f of the front axle", minimum=1.0, plausible=(5e3, 1e6)
     ),
-    "cornering_stiffness_rear": Quantity(
+    "cornering_stiffness_rear": VehicleQuantity(
         "N/rad", "Cornering stiffness C_r of the rear axle", minimum=1.0, plausible=(5e3, 1e6)
     ),
-    "drag_coefficient": Quantity("1", "Drag coefficient C_D", minimum=0.0, plausible=(0, 2)),
-    "frontal_area": Quantity("m2", "Frontal area A", minimum=0.0, plausible=(0, 10)),
-    "air_density": Quantity("kg/m3", "Air density rho", minimum=0.0, plausible=(0, 2)),
-    "rolling_resistance": Quantity("1", "Rolling resistance f", minimum=0.0, plausible=(0, 0.5)),
-    "torque_limit": Quantity("N.m", "Largest torque of the motor at one wheel", minimum=0.0),
-    "drive_front_share": Quantity("1", "Part of the drive force of the front axle", minimum=0.0),
-    "brake_factor_front": Quantity("m3", "Torque of one front brake per pressure", minimum=0.0),
-    "brake_factor_rear": Quantity("m3", "Torque of one rear brake per pressure", minimum=0.0),
-    "brake_torque_limit": Quantity("N.m", "Largest brake torque of one wheel", minimum=0.0),
+    "drag_coefficient": VehicleQuantity("1", "Drag coefficient C_D", minimum=0.0, plausible=(0, 2)),
+    "frontal_area": VehicleQuantity("m2", "Frontal area A", minimum=0.0, plausible=(0, 10)),
+    "air_density": VehicleQuantity("kg/m3", "Air density rho", minimum=0.0, plausible=(0, 2)),
+    "rolling_resistance": VehicleQuantity("1", "Rolling resistance f", minimum=0.0, plausible=(0, 0.5)),
+    "torque_limit": VehicleQuantity("N.m", "Largest torque of the motor at one wheel", minimum=0.0),
+    "drive_front_share": VehicleQuantity("1", "Part of the drive force of the front axle", minimum=0.0),
+    "brake_factor_front": VehicleQuantity("m3", "Torque of one front brake per pressure", minimum=0.0),
+    "brake_factor_rear": VehicleQuantity("m3", "Torque of one rear brake per pressure", minimum=0.0),
+    "brake_torque_limit": VehicleQuantity("N.m", "Largest brake torque of one wheel", minimum=0.0),
 }

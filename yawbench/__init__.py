@@ -42,17 +42,17 @@ from orchestrator.errors import (
     YawbenchWarning,
 )
 
-from .experiment import Experiment, Runs, experiment
-from .places import Places, rank
-from .program import output, parameter, signal
-from .run import Run, open
-from .scenario import Scenario, load
+from ._controller import output, parameter, signal
+from ._experiment import Experiment, Runs, experiment
+from ._ranking import Ranking, rank
+from ._run import Run, open
+from ._scenario import Scenario, load
 
 __all__ = [
     "BuildError",
     "Experiment",
     "ModelDescriptionError",
-    "Places",
+    "Ranking",
     "RecordWarning",
     "ResultsError",
     "Run",

@@ -21,7 +21,7 @@ from typing import Any, NoReturn, TypeVar, cast
 import numpy as np
 
 from orchestrator.errors import Problem, ScenarioError
-from orchestrator.wording import listed, short, unprintable
+from orchestrator.messages import listed, short, unprintable
 
 MOST = 100_000
 """Items of one argument. Chosen: as many as an experiment may have runs."""

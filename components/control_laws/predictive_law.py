@@ -45,7 +45,7 @@ def _discrete(a: Matrix, b: float, h: float) -> tuple[Matrix, tuple[float, float
 
 
 @dataclass(frozen=True)
-class Weights:
+class CostWeights:
     """What counts alike, and how the horizon is divided."""
 
     beta_0: float  # [rad]
@@ -60,7 +60,7 @@ class Weights:
 class PredictiveLaw:
     """The quadratic program of one speed, made ready: what is left for a sample is a vector or two."""
 
-    def __init__(self, dynamics: Matrix, i_z: float, w: Weights) -> None:
+    def __init__(self, dynamics: Matrix, i_z: float, w: CostWeights) -> None:
         n = w.moves
         phi, gamma = _discrete(dynamics, w.moment_0 / i_z, w.step)
         free = [(1.0, 0.0), (0.0, 1.0)]  # e at the step for e_0 = (1, 0) and (0, 1)

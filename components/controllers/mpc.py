@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from ..cars.single_track_car import SingleTrackCar
 from ..control_laws.linear_feedback import error_dynamics
 from ..control_laws.moment_limit import limit
-from ..control_laws.predictive_law import PredictiveLaw, Weights
+from ..control_laws.predictive_law import CostWeights, PredictiveLaw
 from ..control_laws.sideslip_bound import sideslip_bound
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter, signal
@@ -53,7 +53,7 @@ class Mpc(Component):
     def configure(self) -> None:
         p = self.p
         self.car = SingleTrackCar.of(p, p.yaw_inertia)
-        self.weights = Weights(
+        self.weights = CostWeights(
             beta_0=p.sideslip_scale,
             r_0=p.yaw_rate_scale,
             moment_0=p.moment_scale,

@@ -18,7 +18,7 @@ from vocabulary.signals import SIGNALS
 from ..estimation.estimator import NAMES
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter, signal
-from ..sensing.channel import Channel, Figures
+from ..sensing.channel import Channel, ChannelSpec
 
 KNOWN = (*NAMES, "friction")
 NEEDED = ("velocity_x", "sideslip")
@@ -51,7 +51,7 @@ class Told(Component):
     outputs = tuple(output(name, f"{name}_true") for name in KNOWN)
 
     def start(self, t: float, u: list[float]) -> None:
-        figures = Figures(sample_time=self.p.sample_time, latency=self.p.latency)
+        figures = ChannelSpec(sample_time=self.p.sample_time, latency=self.p.latency)
         self.channels = [Channel(figures, 0, t, value) for value in u]
 
     def advance(self, t: float, h: float, u: list[float]) -> None:

@@ -46,7 +46,7 @@ from . import model_description
 from .roles import ROLES
 from .variables import (
     NoParameters,
-    Variable,
+    VariableSpec,
     check_parameter,
     input_variables,
     output_variables,
@@ -62,7 +62,7 @@ _CATEGORY = {
 }
 
 
-def _picker(inputs: Sequence[str | Variable]) -> Callable[[list[float]], tuple[Any, ...]]:
+def _picker(inputs: Sequence[str | VariableSpec]) -> Callable[[list[float]], tuple[Any, ...]]:
     """Return what makes one item per declared signal of a list of all inputs."""
     places: list[int | slice] = []
     end = 0
@@ -79,8 +79,8 @@ class Component(Fmi2Slave):
     """A unit of the test bench. The first line of a subclass's docstring describes its FMU."""
 
     Parameters: ClassVar[type] = NoParameters
-    inputs: ClassVar[tuple[str | Variable, ...]] = ()
-    outputs: ClassVar[tuple[str | Variable, ...]] = ()
+    inputs: ClassVar[tuple[str | VariableSpec, ...]] = ()
+    outputs: ClassVar[tuple[str | VariableSpec, ...]] = ()
     sampled: ClassVar[bool] = False
     """True for a unit that samples (controller, allocator): its outputs are discrete."""
 
@@ -93,7 +93,7 @@ class Component(Fmi2Slave):
     by_signal: ClassVar[Any]
     """Of the inputs `u`, one item per declared signal: a number, or a list of four for a `*`."""
 
-    variables: ClassVar[tuple[Variable, ...]] = ()
+    variables: ClassVar[tuple[VariableSpec, ...]] = ()
     fmu_name: ClassVar[str] = ""
     """Name of the FMU: `<role>_<file>`, unless the class itself says otherwise."""
 

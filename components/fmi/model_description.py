@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from vocabulary.units import UNITS
 
-from .variables import Variable
+from .variables import VariableSpec
 
 LOG_CATEGORIES = {
     "logStatusWarning": "Messages with the status Warning",
@@ -25,7 +25,7 @@ def to_xml(
     *,
     name: str,
     description: str,
-    variables: Sequence[Variable],
+    variables: Sequence[VariableSpec],
     credits: Mapping[str, str],
     host_packages: Sequence[str],
 ) -> Element:
@@ -81,7 +81,7 @@ def to_xml(
     return root
 
 
-def _scalar_variable(parent: Element, reference: int, v: Variable) -> None:
+def _scalar_variable(parent: Element, reference: int, v: VariableSpec) -> None:
     text = v.description
     if v.choices is not None:
         text += f" (one of: {', '.join(v.choices)})"
@@ -105,7 +105,7 @@ def _scalar_variable(parent: Element, reference: int, v: Variable) -> None:
         SubElement(tool, "variable", {key: text for key, text in said.items() if text})
 
 
-def _model_structure(parent: Element, variables: Sequence[Variable]) -> None:
+def _model_structure(parent: Element, variables: Sequence[VariableSpec]) -> None:
     index = {v.name: i for i, v in enumerate(variables, start=1)}
     outputs = [v for v in variables if v.causality == "output"]
     if not outputs:

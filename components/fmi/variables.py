@@ -23,7 +23,7 @@ class DeclarationError(TypeError):
 
 
 @dataclass(frozen=True)
-class Variable:
+class VariableSpec:
     """A variable of an FMU, ready for the model description once `*` in its name is expanded."""
 
     name: str
@@ -51,7 +51,7 @@ def signal(
     maximum: float | None = None,
     depends_on: Iterable[str] = (),
     optional: bool = False,
-) -> Variable:
+) -> VariableSpec:
     """Declare an input or output, from the signal dictionary unless unit and text are given.
 
         >>> signal("roll_angle", optional=True).unit
@@ -103,7 +103,7 @@ def signal(
     text = description or known.text  # type: ignore[union-attr]
     if minimum is None and known is not None:
         minimum = known.minimum
-    return Variable(
+    return VariableSpec(
         name,
         unit,
         text,
@@ -155,7 +155,7 @@ def _guess(name: str) -> str:
     return f"; did you mean {likely[0]!r}?" if likely else ""
 
 
-def output(name: str, *depends_on: str, unit: str | None = None, text: str | None = None) -> Variable:
+def output(name: str, *depends_on: str, unit: str | None = None, text: str | None = None) -> VariableSpec:
     """Declare an output and the inputs on which it depends directly (see `signal`).
 
     >>> output("yaw_moment", "yaw_rate_ref", "yaw_rate").depends_on
@@ -197,7 +197,7 @@ def parameter(
     _check("parameter", "source", source, str)
     _check("parameter", "minimum", minimum, float, optional=True)
     _check("parameter", "maximum", maximum, float, optional=True)
-    declared = Variable(
+    declared = VariableSpec(
         "",
         unit,
         description,
@@ -265,7 +265,7 @@ class NoParameters:
     """For a component that has none."""
 
 
-def parameter_variables(parameters: type) -> list[Variable]:
+def parameter_variables(parameters: type) -> list[VariableSpec]:
     """Return the parameters declared by a dataclass, in order.
 
     Raises:
@@ -290,7 +290,7 @@ def parameter_variables(parameters: type) -> list[Variable]:
     return variables
 
 
-def check_parameter(variable: Variable, value: Any) -> None:
+def check_parameter(variable: VariableSpec, value: Any) -> None:
     """Raise ValueError, naming the allowed values, if `value` is none of them."""
     if variable.choices is not None and value not in variable.choices:
         raise ValueError(f"{variable.name} must be one of {', '.join(variable.choices)} (got {value!r})")
@@ -302,7 +302,7 @@ def check_parameter(variable: Variable, value: Any) -> None:
         raise ValueError(f"{variable.name} must be at most {variable.maximum:g} (got {value!r})")
 
 
-def input_variables(declared: Iterable[str | Variable]) -> list[Variable]:
+def input_variables(declared: Iterable[str | VariableSpec]) -> list[VariableSpec]:
     """Return the scalar inputs of a declaration, `*` expanded, in order."""
     variables = []
     for item in declared:
@@ -315,8 +315,8 @@ def input_variables(declared: Iterable[str | Variable]) -> list[Variable]:
 
 
 def output_variables(
-    declared: Iterable[str | Variable], inputs: Iterable[str], *, discrete: bool
-) -> list[Variable]:
+    declared: Iterable[str | VariableSpec], inputs: Iterable[str], *, discrete: bool
+) -> list[VariableSpec]:
     """Return the scalar outputs of a declaration with their direct dependencies, in order.
 
     Raises:
@@ -348,7 +348,7 @@ def output_variables(
     return variables
 
 
-def _on_wheel(s: Variable, name: str) -> str:
+def _on_wheel(s: VariableSpec, name: str) -> str:
     """Return the description of one scalar, naming the wheel where there is one."""
     of_wheel = name.removesuffix("_true")
     wheel = WHEEL_NAMES.get(of_wheel[-2:]) if of_wheel[-3:-2] == "_" else None

@@ -22,7 +22,7 @@ SLACK = 1e-9
 
 
 @dataclass(frozen=True)
-class Figures:
+class ChannelSpec:
     """What a channel does to its signal; `unit` is that of the signal.
 
     Attributes:
@@ -71,7 +71,7 @@ class Channel:
         value: of the signal at the start.
     """
 
-    def __init__(self, figures: Figures, key: int, t: float, value: float) -> None:
+    def __init__(self, figures: ChannelSpec, key: int, t: float, value: float) -> None:
         self.figures, self.key, self.begin = figures, key, t
         self.signal = value
         self.filter = LowPass(figures.bandwidth, value) if figures.bandwidth else None

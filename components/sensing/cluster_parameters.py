@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from ..fmi.variables import parameter, parameter_class
-from .channel import Figures
+from .channel import ChannelSpec
 
 
-class Measured(NamedTuple):
+class MeasuredSignal(NamedTuple):
     """A signal that is measured: its unit, that of its drift, and what measures it."""
 
     unit: str
@@ -23,12 +23,12 @@ class Measured(NamedTuple):
 
 
 CHANNELS = {
-    "yaw_rate": Measured("rad/s", "rad/s2", "gyro"),
-    "acceleration_x": Measured("m/s2", "m/s3", "longitudinal accelerometer"),
-    "acceleration_y": Measured("m/s2", "m/s3", "lateral accelerometer"),
-    "steer_angle": Measured("rad", "rad/s", "hand-wheel sensor (at the road wheels)"),
-    "wheel_speed": Measured("rad/s", "rad/s2", "wheel-speed sensors"),
-    "brake_pressure": Measured("Pa", "Pa/s", "brake-pressure sensors"),
+    "yaw_rate": MeasuredSignal("rad/s", "rad/s2", "gyro"),
+    "acceleration_x": MeasuredSignal("m/s2", "m/s3", "longitudinal accelerometer"),
+    "acceleration_y": MeasuredSignal("m/s2", "m/s3", "lateral accelerometer"),
+    "steer_angle": MeasuredSignal("rad", "rad/s", "hand-wheel sensor (at the road wheels)"),
+    "wheel_speed": MeasuredSignal("rad/s", "rad/s2", "wheel-speed sensors"),
+    "brake_pressure": MeasuredSignal("Pa", "Pa/s", "brake-pressure sensors"),
 }
 """Signal, without `_*` for four wheels -> how it is measured."""
 
@@ -50,7 +50,7 @@ def parameters_of(module: str, name: str, given: Given, *, common: Mapping[str, 
     for channel, (unit, rate_unit, text) in CHANNELS.items():
         figures = given.get(channel, {})
         for figure, (unit_of_it, what, least) in _FIGURES.items():
-            default, source = figures.get(figure, (getattr(Figures(), figure), NONE))
+            default, source = figures.get(figure, (getattr(ChannelSpec(), figure), NONE))
             fields[f"{channel}_{figure}"] = parameter(
                 default,
                 {"signal": unit, "rate": rate_unit}.get(unit_of_it, unit_of_it),
@@ -91,7 +91,7 @@ COMMON = {
 """Parameters of every cluster."""
 
 
-def figures_of(p: Any) -> dict[str, Figures]:
+def figures_of(p: Any) -> dict[str, ChannelSpec]:
     """Return the figures of every channel from the parameters `p` of a cluster.
 
     Raises:
@@ -107,5 +107,5 @@ def figures_of(p: Any) -> dict[str, Figures]:
                 f"{channel}_noise needs a sample_time above 0 s, or one of the channel: noise of every "
                 "communication point would change with the step size"
             )
-        made[channel] = Figures(**own)
+        made[channel] = ChannelSpec(**own)
     return made

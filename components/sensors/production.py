@@ -29,7 +29,7 @@ from vocabulary.wheels import wheels
 
 from ..fmi.component import Component
 from ..fmi.variables import output, parameter, signal
-from ..sensing.channel import Channel, Figures
+from ..sensing.channel import Channel, ChannelSpec
 from ..sensing.cluster_parameters import Given, figures_of, parameters_of
 from ..sensing.noise import key
 
@@ -129,7 +129,7 @@ class Production(Component):
     def output(self, t: float, u: list[float]) -> list[float]:
         return [channel.received for channel in self.channels]
 
-    def _named(self) -> list[tuple[str, Figures]]:
+    def _named(self) -> list[tuple[str, ChannelSpec]]:
         """Return name and figures of every channel, in the order of the outputs."""
         named = []
         for name, figures in self.figures.items():

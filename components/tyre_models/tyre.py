@@ -15,7 +15,7 @@ from itertools import chain
 from typing import Any, ClassVar
 
 from ..fmi.component import Component
-from ..fmi.variables import Variable, output
+from ..fmi.variables import VariableSpec, output
 
 Curve = tuple[Callable[[float], float], float]
 """F_x [N] of kappa, and a slip that is surely on its stable branch, of the order of the optimum."""
@@ -23,7 +23,7 @@ Curve = tuple[Callable[[float], float], float]
 INPUTS = ("slip_angle_*", "slip_ratio_*", "vertical_load_*", "friction_*")
 
 
-def law_outputs(*names: str, inputs: Iterable[str] = INPUTS) -> tuple[Variable, ...]:
+def law_outputs(*names: str, inputs: Iterable[str] = INPUTS) -> tuple[VariableSpec, ...]:
     """Declare what the law of one wheel gives of `inputs`, in this order, and the slip that it belongs to."""
     return (*(output(name, *inputs) for name in names), output("tyre_slip_ratio_*", "slip_ratio_*"))
 

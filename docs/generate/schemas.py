@@ -12,7 +12,7 @@ from typing import Any, Literal
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from orchestrator.experiments import ranking_schema as ranking
+from orchestrator.experiments import ranking as ranking
 from orchestrator.experiments import schema as experiment
 from orchestrator.scenario import fault_schema
 from orchestrator.scenario import scenario_schema as scenario
@@ -104,7 +104,7 @@ def _kind(annotation: Any, models: list[type[BaseModel]]) -> str:
         return f"[{title(annotation)}](#{title(annotation).lower()})"
     if annotation is scenario.Endpoint:
         return "text: unit.variable"
-    if annotation is fault_schema.Place:
+    if annotation is fault_schema.FaultLocation:
         return "text: unit.variable, unit.output -> unit"
     if origin is typing.Annotated:
         return _kind(arms[0], models)

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 from components.fmi.roles import ROLES
 from fmus.build import HERE, find_components
-from orchestrator.wording import fold
+from orchestrator.messages import fold
 
 from .text import NOTE, cell, code, docstring, table
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from orchestrator.wiring import derivations
 from orchestrator.wiring.derivations import DERIVATIONS
 from vocabulary import vehicle
-from vocabulary.vehicle import CAR, Quantity
+from vocabulary.vehicle import CAR, VehicleQuantity
 
 from .text import NOTE, cell, code, docstring, table
 
@@ -30,5 +30,5 @@ def page() -> str:
     ])  # fmt: skip
 
 
-def _range(one: Quantity) -> str:
+def _range(one: VehicleQuantity) -> str:
     return "" if one.plausible is None else f"{one.plausible[0]:g} to {one.plausible[1]:g}"

@@ -20,7 +20,7 @@ from orchestrator.errors import BuildError
 from orchestrator.fmu.binary import platform
 
 from ..compiler import compile_library, compiler_command, compiler_tools, compiler_version
-from ..evidence import Looks
+from ..evidence import SourceDigests
 from ..packing import DESCRIPTION
 from ..presentation import PAGE, icon
 from .declaration import header, read_declaration
@@ -93,7 +93,7 @@ class CRecipe:
         return content.hexdigest()[:32]
 
     def evidence(self) -> dict[str, str]:
-        return Looks().evidence(
+        return SourceDigests().evidence(
             [
                 self.source,
                 self._twin,

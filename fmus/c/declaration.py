@@ -13,7 +13,7 @@ from ..staging import missing_signals
 
 
 @dataclass(frozen=True)
-class Variable:
+class CVariable:
     """A variable as the model description declares it."""
 
     name: str
@@ -25,7 +25,7 @@ class Variable:
     maximum: float | None
 
 
-def read_declaration(xml: bytes, name: str, role: Role) -> tuple[ElementTree.Element, list[Variable]]:
+def read_declaration(xml: bytes, name: str, role: Role) -> tuple[ElementTree.Element, list[CVariable]]:
     """Return the model description and its variables, after checking what the C side relies on.
 
     Raises:
@@ -58,7 +58,7 @@ def read_declaration(xml: bytes, name: str, role: Role) -> tuple[ElementTree.Ele
     return root, variables
 
 
-def _variable(element: ElementTree.Element, real: ElementTree.Element) -> Variable:
+def _variable(element: ElementTree.Element, real: ElementTree.Element) -> CVariable:
     def number(key: str) -> float | None:
         given = real.get(key)
         try:
@@ -66,7 +66,7 @@ def _variable(element: ElementTree.Element, real: ElementTree.Element) -> Variab
         except ValueError:
             raise BuildError(f"{DESCRIPTION}: {element.get('name')}: {key} is no number: {given!r}") from None
 
-    return Variable(
+    return CVariable(
         name=element.get("name") or "",
         causality=element.get("causality") or "",
         unit=real.get("unit") or "1",
@@ -77,7 +77,7 @@ def _variable(element: ElementTree.Element, real: ElementTree.Element) -> Variab
     )
 
 
-def header(variables: list[Variable], guid: str) -> str:
+def header(variables: list[CVariable], guid: str) -> str:
     """Return the text of variables.h: the variables as members of a struct, and what is declared of each."""
     members, declared = [], []
     for v in variables:

@@ -1,13 +1,19 @@
-"""`yawbench build`: make the components into FMUs."""
+"""`yawbench build`: make the components into FMUs.
+
+`yawbench cache`: what is kept to save time.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import os
+import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
-from .batch import say
+from .progress import say
 
 Components = Annotated[
     list[str] | None,
@@ -17,7 +23,7 @@ Components = Annotated[
         "default: every component.",
     ),
 ]
-Target = Annotated[
+BuildFolder = Annotated[
     Path | None,
     typer.Option(
         "--out", metavar="DIR", help="Folder for the FMUs; default: fmus/ of a checkout, else the cache."
@@ -26,7 +32,7 @@ Target = Annotated[
 Force = Annotated[bool, typer.Option("--force", help="Build even what has not changed.")]
 
 
-def build(components: Components = None, out: Target = None, force: Force = False) -> None:
+def build(components: Components = None, out: BuildFolder = None, force: Force = False) -> None:
     """Build the FMUs whose sources have changed."""
     from fmus.build import HERE, build_all, build_component, find_recipes
     from fmus.upkeep import place_of
@@ -35,7 +41,7 @@ def build(components: Components = None, out: Target = None, force: Force = Fals
     if out is None and target != HERE:
         say(f"FMUs go to {target}")
 
-    from orchestrator.wording import hint
+    from orchestrator.messages import hint
 
     known = find_recipes()
     named = list(components or ())
@@ -66,3 +72,48 @@ def tell_of_build(name: str, what: str) -> None:
     """Say what became of an FMU, unless nothing had to be done."""
     if what != "current":
         say(f"{name}: {what}")
+
+
+Action = Literal["show", "verify", "clear"]
+CacheAction = Annotated[
+    Action,
+    typer.Argument(
+        help="show: what there is, and how large; verify: look at every byte, and delete what is damaged; "
+        "clear: delete everything.",
+    ),
+]
+
+
+def cache(action: CacheAction = "show") -> None:
+    """Show, verify or clear the cache.
+
+    Unpacked FMUs, the compiled launcher, keys of sources, and FMUs whose own folder cannot be
+    written. All of it is made again when it is needed. Nothing is deleted while another command uses it.
+    """
+    from ..cache import alone_in, cache_folders
+    from ..fmu.archive import kept_in, remove
+
+    damaged, in_use = 0, False
+    for folder in cache_folders():
+        if not os.access(folder, os.R_OK | os.X_OK):
+            continue
+        print(folder)
+        with contextlib.nullcontext(True) if action == "show" else alone_in(folder) as alone:
+            for kind, entries in kept_in(folder).items():
+                size = sum(entry.size for entry in entries)
+                unwanted = [
+                    one for one in entries if action == "clear" or (action == "verify" and not one.whole())
+                ]
+                for entry in unwanted if alone else ():
+                    remove(entry.path)
+                damaged += len(unwanted)
+                also = f", {len(unwanted)} {'deleted' if alone else 'kept'}" if unwanted else ""
+                print(f"  {kind}: {len(entries)}, {size / 1e6:.1f} MB{also}")
+                if unwanted and not alone:
+                    in_use = True
+        if not alone:
+            print(f"{folder}: another command uses it, so nothing was deleted", file=sys.stderr)
+    if action == "verify":
+        print(f"damaged: {damaged}" if damaged else "everything is whole", file=sys.stderr)
+    if in_use:
+        raise typer.Exit(1)

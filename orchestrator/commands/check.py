@@ -11,16 +11,15 @@ import typer
 
 from vocabulary.wheels import WHEELS, wheels
 
+from ..messages import counted, cut, printable
 from ..plan import DEFAULT, ValueOrigin
-from ..wording import counted, cut, printable
-from .batch import say
-from .options import CHANGES, ScenarioFile, Wishes, takes
-from .planning import plan_of_scenario
+from .options import CHANGES, RunOptions, ScenarioFile, plan_of_scenario, takes
+from .progress import say
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..plan import Plan, Unit, Value, Wire
+    from ..plan import Instance, Plan, Value, Wire
 
 All = Annotated[
     bool, typer.Option("--all", help="Show every value, including those left at the defaults of the FMUs.")
@@ -34,7 +33,7 @@ PIPE_WIDTH = 140
 
 
 @takes(*CHANGES, "fmus", "no_build", "no_validate")
-def check(scenario: ScenarioFile, wishes: Wishes, all_: All = False) -> None:
+def check(scenario: ScenarioFile, wishes: RunOptions, all_: All = False) -> None:
     """Validate a scenario; show units, values, wires.
 
     Every value is shown with its origin, the units with the reason for their order, and what the
@@ -44,7 +43,7 @@ def check(scenario: ScenarioFile, wishes: Wishes, all_: All = False) -> None:
     show(plan, scenario, defaults=all_)
     for note in plan.notes:
         say(f"note: {note}")
-    for unit in plan.units:
+    for unit in plan.instances:
         for doubt in unit.fmu.doubts():
             say(f"warning: {unit.name}: {doubt}")
 
@@ -62,7 +61,7 @@ def show(plan: Plan, scenario: Path, *, defaults: bool = False) -> None:
 
 
 def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None:
-    from ..titles import changed
+    from ..labels import changed
     from ..wiring.order import evaluate
 
     console.print(printable(f"{scenario}: {plan.title}" if plan.title else f"{scenario}"))
@@ -90,7 +89,7 @@ def _print(plan: Plan, scenario: Path, console: Console, defaults: bool) -> None
     else:
         _show(console, "Wires", ("from", "to", "variables"), [(of, to, what) for of, to, _, what in wires])
     _show(console, "Faults", ("on", "what", "of"), _fault_rows(plan))
-    direct = evaluate({unit.name: unit.fmu for unit in plan.units}, plan.wires).direct
+    direct = evaluate({unit.name: unit.fmu for unit in plan.instances}, plan.wires).direct
     headings = ("unit", "after", "because its outputs follow")
     _show(console, "Why this order", headings, _order_rows(plan, direct))
     _show(
@@ -120,13 +119,13 @@ def _number(value: object) -> str:
 
 
 def _unit_rows(plan: Plan) -> Iterable[Sequence[str]]:
-    for unit in plan.units:
+    for unit in plan.instances:
         yield unit.name, unit.fmu.name, f"{_number(1000 * unit.period * plan.step)} ms"
 
 
 def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
     """Return a row for every value with its origin, and how many defaults are left out that do not matter."""
-    from ..wording import fold
+    from ..messages import fold
 
     files = plan.scenario.get("tyre_files", {})
     of_tyres = {axle: ValueOrigin("file", Path(file["file"]).name) for axle, file in files.items()}
@@ -134,7 +133,7 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
     takers: list[tuple[tuple[str, str, str], str]] = []
     hidden = 0
     cambered = {wire.source for wire in plan.wires if wire.output in CAMBER}
-    for unit in plan.units:
+    for unit in plan.instances:
         own = {v.name: unit.parameter(v.name) for v in unit.fmu.of("parameter")}
         constants = {name: value for name, value in unit.constants.items() if name not in unit.series}
         shown: list[tuple[tuple[str, str], str]] = []
@@ -153,12 +152,12 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
                     sources.setdefault((name, text, origin), unit.fmu.variables[name].source)
     rows = [*_run_rows(plan)]
     for axle, origin_of_file in of_tyres.items():
-        takes = [unit.name for unit in plan.units if origin_of_file in unit.origins.values()]
+        takes = [unit.name for unit in plan.instances if origin_of_file in unit.origins.values()]
         what = f"{files[axle]['kind']}, {files[axle]['side']}"
         rows.append((f"tyres, {axle}", what, str(origin_of_file), ", ".join(takes)))
     for key, units in _grouped(takers).items():
         rows.append((*key, ", ".join(units), *filter(None, [sources.get(key)])))
-    for unit in plan.units:
+    for unit in plan.instances:
         for name, series in unit.series.items():
             how = "held" if series.held else "linear"
             rows.append((name, f"{series.file}: {series.column}, {how}", str(unit.origins[name]), unit.name))
@@ -182,7 +181,7 @@ def _derived(plan: Plan) -> Iterable[Sequence[str]]:
     """Return what was derived of the car, each with its formula."""
     takers = _grouped(
         ((name, origin.detail), unit.name)
-        for unit in plan.units
+        for unit in plan.instances
         for name, origin in unit.origins.items()
         if origin.kind == "derived"
     )
@@ -192,17 +191,17 @@ def _derived(plan: Plan) -> Iterable[Sequence[str]]:
 def _beside_tyres(plan: Plan) -> Iterable[Sequence[str]]:
     """Yield how far the axles' cornering stiffnesses given by hand are from those of the scenario's tyres."""
     from ..errors import YawbenchError
-    from ..tyres.axle_stiffness import cornering_stiffness
+    from ..tyres.stand import cornering_stiffness
     from ..wiring.make_plan import TYRE_FORCES
     from ..wiring.parameters import STATIC_LOADS, STIFFNESSES, known_car
 
     takers = _grouped(
         ((name, float(unit.parameters[name])), unit.name)
-        for unit in plan.units
+        for unit in plan.instances
         for name in STIFFNESSES
         if name in unit.parameters and unit.origins[name].kind not in ("derived", "default")
     )
-    tyres = [u for u in plan.units if {v.name for v in u.fmu.of("output")} >= {*TYRE_FORCES}]
+    tyres = [u for u in plan.instances if {v.name for v in u.fmu.of("output")} >= {*TYRE_FORCES}]
     car = known_car(plan.scenario.get("vehicle_parameters", {})) if takers and len(tyres) == 1 else None
     if car is None or not car.values.keys() >= {*STATIC_LOADS}:
         return
@@ -220,13 +219,13 @@ def _beside_tyres(plan: Plan) -> Iterable[Sequence[str]]:
 def _idle(plan: Plan) -> list[str]:
     """Return what the vehicle file says that no unit takes."""
     given = plan.scenario.get("vehicle_parameters", {})
-    return [name for name in given if not any(unit.fmu.variables.get(name) for unit in plan.units)]
+    return [name for name in given if not any(unit.fmu.variables.get(name) for unit in plan.instances)]
 
 
-def _matters(unit: Unit, name: str) -> bool:
+def _matters(unit: Instance, name: str) -> bool:
     """Return whether a value is worth a line even if it is the FMU's own: the car, its speed, the road."""
-    from ..wiring.agreement import OF_CAR
-    from ..wiring.shared_facts import FACTS
+    from ..wiring.context import FACTS
+    from ..wiring.warnings import OF_CAR
 
     return name in OF_CAR or any(name in fact.inputs or fact.counts(unit, name) for fact in FACTS.values())
 
@@ -240,10 +239,10 @@ def _shown(value: Value | None, measure: str | None) -> str:
 
 def _wire_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
     """Yield source, target, as what the control side sees the source, and the variables."""
-    from ..wiring.seen import seen_as
-    from ..wording import fold_wires, star
+    from ..messages import fold_wires, star
+    from ..wiring.warnings import seen_as
 
-    units = {unit.name: unit.fmu.variables for unit in plan.units}
+    units = {unit.name: unit.fmu.variables for unit in plan.instances}
     for (source, target), wires in _grouped(((w.source, w.target), w) for w in plan.wires).items():
         shown = []
         examples = {name: w for w in reversed(wires) for name in (w.input, star(w.input))}
@@ -254,12 +253,12 @@ def _wire_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
             if example.converts:
                 measure = f"{of or '?'} → {measure or '?'}: {_scaled(example)}"
             shown.append(f"{ends} [{measure}]" if measure else ends)
-        yield source, target, seen_as(wires[0], plan.units), ", ".join(shown)
+        yield source, target, seen_as(wires[0], plan.instances), ", ".join(shown)
 
 
 def _fault_rows(plan: Plan) -> Iterable[Sequence[str]]:
+    from ..messages import fold
     from ..results.run_record import faults_of
-    from ..wording import fold
 
     for fault in faults_of(plan):
         yield fault["on"], fault["fault"], ", ".join(fold(fault["at"]))
@@ -280,17 +279,17 @@ def _grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
 
 
 def _order_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]]:
-    from ..wording import fold
+    from ..messages import fold
 
     before = _grouped((w.target, w) for w in direct if not _is_backward(w, plan))
-    for unit in plan.units:
+    for unit in plan.instances:
         if wires := before.get(unit.name):
             sources = dict.fromkeys(wire.source for wire in wires)
             yield unit.name, ", ".join(sources), ", ".join(fold([wire.input for wire in wires]))
 
 
 def _backward_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]]:
-    from ..wording import fold
+    from ..messages import fold
 
     backward = _grouped(((w.source, w.target), w) for w in direct if _is_backward(w, plan))
     for (source, target), wires in backward.items():
@@ -299,5 +298,5 @@ def _backward_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]
 
 def _is_backward(wire: Wire, plan: Plan) -> bool:
     """Return whether a wire leads to a unit that is evaluated before its source, or to the source itself."""
-    order = [unit.name for unit in plan.units]
+    order = [unit.name for unit in plan.instances]
     return order.index(wire.source) >= order.index(wire.target)

@@ -1,4 +1,7 @@
-"""`yawbench compare`: one scenario with several FMUs for a unit."""
+"""`yawbench compare`: one scenario with several FMUs for a unit.
+
+`yawbench converge`: the same scenario at h, h/2, h/4, ...
+"""
 
 from __future__ import annotations
 
@@ -6,9 +9,10 @@ from typing import Annotated
 
 import typer
 
-from .batch import hold, pooled, print_tables
-from .experiment import chapter_of, command_of, conduct, write_page
-from .options import MAKING, ScenarioFile, Wishes, takes
+from ..plan import Algorithm
+from .experiments import chapter_of, command_of, conduct, write_page
+from .options import CHANGES, MAKING, RunOptions, ScenarioFile, takes
+from .progress import hold, pooled, print_tables
 
 Swaps = Annotated[
     list[str],
@@ -22,7 +26,7 @@ Swaps = Annotated[
 
 
 @takes("set_", "fault", *MAKING, "jobs", "format_", "fresh")
-def compare(context: typer.Context, scenario: ScenarioFile, swap: Swaps, wishes: Wishes) -> None:
+def compare(context: typer.Context, scenario: ScenarioFile, swap: Swaps, wishes: RunOptions) -> None:
     """Run a scenario with several FMUs for a unit.
 
     report.html, which needs no server, begins with what the runs come to, side by side, and the signals
@@ -31,9 +35,9 @@ def compare(context: typer.Context, scenario: ScenarioFile, swap: Swaps, wishes:
     Without --out, results go to results/<folder of the scenario>/<its name>-compare. A run that
     fails is named and takes no other with it.
     """
-    from ..experiments.compare import comparison, comparison_table
+    from ..experiments.comparison import comparison, comparison_table
     from ..pages.comparison import comparison_facts
-    from ..results.naming import default_folder
+    from ..results.folder import default_folder
 
     folder = wishes.out or default_folder(scenario, wishes.changes, suffix="-compare")
     hold(context, folder)
@@ -44,4 +48,92 @@ def compare(context: typer.Context, scenario: ScenarioFile, swap: Swaps, wishes:
     facts = {"comparison": comparison_facts(findings)}
     write_page([chapter_of(findings, folder, command, each, shown_in=folder, **facts)], folder)
     if findings.failed:
+        raise typer.Exit(1)
+
+
+Halvings = Annotated[
+    int, typer.Option("--halvings", metavar="N", min=2, max=10, help="How often the step is halved.")
+]
+Signal = Annotated[str, typer.Option("--signal", metavar="UNIT.VARIABLE", help="What is compared.")]
+Algorithms = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--algorithm",
+        metavar="NAME",
+        help="jacobi, gauss_seidel or extrapolated; repeatable, all are compared with the first. "
+        "Default: the scenario's.",
+    ),
+]
+
+
+@takes(*CHANGES, *MAKING)
+def converge(
+    context: typer.Context,
+    scenario: ScenarioFile,
+    wishes: RunOptions,
+    halvings: Halvings = 3,
+    signal: Signal = "plant.yaw_rate",
+    algorithm: Algorithms = None,
+) -> None:
+    """Halve the step size again and again; show error and order.
+
+    The error is that against the finest run. Units with a step size of their own keep it. Runs
+    follow each other, so that their wall times can be compared. Without --out, results go to
+    results/<folder of the scenario>/<its name>-converge.
+    """
+    from dataclasses import replace
+    from typing import get_args
+
+    from ..errors import ScenarioError
+    from ..experiments.comparison import (
+        columns_of,
+        convergence_figure,
+        convergence_table,
+        measure,
+        refinements,
+    )
+    from ..experiments.record import to_csv
+    from ..figures.style import save
+    from ..files import write_whole
+    from ..messages import hint
+    from ..pages.page_parts import image_of
+    from ..results.folder import default_folder
+
+    for name in algorithm or ():
+        if name not in get_args(Algorithm):
+            guess = hint(name, get_args(Algorithm), lead="there are")
+            raise ScenarioError(f"--algorithm {name}: no such algorithm{guess}")
+    folder = wishes.out or default_folder(scenario, wishes.changes, suffix="-converge")
+    hold(context, folder)
+    wishes = replace(wishes, jobs=1, fresh=True)
+    each = pooled(context, wishes)
+    experiment = refinements(
+        scenario,
+        halvings=halvings,
+        signal=signal,
+        algorithms=algorithm or (),  # type: ignore[arg-type]
+        changes=wishes.changes,
+    )
+    findings = conduct(experiment, folder, wishes, each, record=(signal,))
+    rows = measure(findings, signal)
+    table = convergence_table(rows, experiment.spec.title)
+    write_whole(folder / "converge.csv", to_csv(columns_of(rows)))
+    print_tables([table])
+    command = command_of(
+        "converge",
+        scenario,
+        halvings=[halvings],
+        signal=[signal],
+        algorithm=algorithm,
+        **wishes.changing,
+    )
+    charts = []
+    if any(row.error for row in rows):
+        note = f"yawbench converge {scenario} · units with a step size of their own keep it"
+        figure = convergence_figure(rows, signal, experiment.spec.title, note)
+        save(figure, folder / "converge")
+        charts = [image_of(folder / "converge.svg", experiment.spec.title)]
+    facts = {"results": [table], "charts": charts}
+    write_page([chapter_of(findings, folder, command, each, shown_in=folder, **facts)], folder)
+    if any(row.failed for row in rows):
         raise typer.Exit(1)

@@ -7,8 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from .options import Wishes, takes
-from .planning import plan_of_scenario
+from .options import RunOptions, plan_of_scenario, takes
 
 Wanted = Annotated[
     Literal["runs", "scenarios", "fmus", "vehicles", "signals", "metrics"] | None,
@@ -16,7 +15,7 @@ Wanted = Annotated[
 ]
 SCENARIOS = ("a scenario", "a study file", "a sweep file")
 VEHICLES = ("a vehicle file",)
-Place = Annotated[
+ListedFolder = Annotated[
     Path | None,
     typer.Argument(
         help="Of runs, scenarios, FMUs and vehicles: the folder to look in, default results, scenarios or "
@@ -27,38 +26,46 @@ Place = Annotated[
 
 
 @takes("fmus")
-def list(wishes: Wishes, what: Wanted = None, place: Place = None) -> None:
+def list(wishes: RunOptions, what: Wanted = None, place: ListedFolder = None) -> None:
     """List runs, scenarios, FMUs, vehicles, signals or metrics.
 
     Runs are shown with when they began, their scenario, what was changed, how they ended, and the largest
     sideslip, yaw rate and lateral acceleration.
     """
-    from ..experiments import listing
-    from ..results.runs import found_runs
+    from ..experiments.tables import (
+        files_table,
+        fmus_in,
+        fmus_table,
+        metrics_table,
+        recorded_table,
+        runs_table,
+        signals_table,
+    )
+    from ..results.read import found_runs
     from ..scenario import catalogue
-    from .batch import print_tables
+    from .progress import print_tables
 
     if what is None:
-        tables = [listing.files_table(None, kinds) for kinds in (SCENARIOS, VEHICLES)]
+        tables = [files_table(None, kinds) for kinds in (SCENARIOS, VEHICLES)]
         tables[-1].notes.append("'yawbench list' also lists runs, fmus, signals and metrics.")
         print_tables(tables)
         return
     if what == "runs":
-        table = listing.runs_table(found_runs(place or Path("results")))
+        table = runs_table(found_runs(place or Path("results")))
     elif what == "scenarios":
-        table = listing.files_table(place, SCENARIOS)
+        table = files_table(place, SCENARIOS)
     elif what == "vehicles":
-        table = listing.files_table(place, VEHICLES)
+        table = files_table(place, VEHICLES)
     elif what == "metrics":
-        table = listing.metrics_table()
+        table = metrics_table()
     elif what == "signals" and place is not None:
         scenario = catalogue.find(place, "a scenario")
-        table = listing.recorded_table(plan_of_scenario(scenario, wishes))
+        table = recorded_table(plan_of_scenario(scenario, wishes))
     else:
-        found, problems = listing.fmus_in(_folder_of_fmus(place or wishes.fmus))
-        table = listing.fmus_table(found, problems)
+        found, problems = fmus_in(_folder_of_fmus(place or wishes.fmus))
+        table = fmus_table(found, problems)
         if what == "signals":
-            table = listing.signals_table(found)
+            table = signals_table(found)
     print_tables([table])
 
 

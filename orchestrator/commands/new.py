@@ -1,26 +1,199 @@
-"""`yawbench new`: files to begin with, for somebody who brings an idea."""
+"""`yawbench new`: files to begin with, for somebody who brings an idea.
+
+What there is to begin with: a unit of any role, a car, a scenario, a study, a sweep, each ready to run.
+
+What a unit of one's own may be called.
+"""
 
 from __future__ import annotations
 
 import importlib.util
+import keyword
 import os
+import re
 import shlex
 import shutil
 import sys
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Any, Literal
 
 import typer
 
-from ..scaffold.beginnings import KINDS
-
-if TYPE_CHECKING:
-    from ..scaffold.beginnings import Beginning
+from ..errors import ScenarioError
+from ..messages import listed
 
 
-Kind = Literal[KINDS]  # type: ignore[valid-type]
-What = Annotated[Kind, typer.Argument(help="What to write.", metavar="KIND")]  # type: ignore[valid-type]
-Name = Annotated[str, typer.Argument(help="Its name: lower-case letters, digits and _.", metavar="NAME")]
+def check_name(name: str, *, role: str, taken: Iterable[str]) -> None:
+    """Raise ScenarioError with one sentence if `name` cannot be that of a unit.
+
+    Args:
+        name: of the file, without the role in front.
+        role: of the unit, such as "controller".
+        taken: names of the FMUs that there are.
+    """
+    if name.startswith(f"{role}_") and name != f"{role}_":
+        raise ScenarioError(
+            f"{name!r}: leave out {role!r}, the FMU gets it by itself: {_plain(name, role)!r}"
+        )
+    if not re.fullmatch(r"[a-z][a-z0-9_]{0,49}", name) or keyword.iskeyword(name):
+        suggestion = _plain(name, role)
+        usable = re.fullmatch(r"[a-z][a-z0-9_]{0,49}", suggestion) and not keyword.iskeyword(suggestion)
+        guess = f"; for example {suggestion!r}" if usable else ""
+        raise ScenarioError(
+            f"{name!r} cannot name a {role}: use up to 50 lower-case letters, digits and _, "
+            f"a letter first, no word of Python{guess}"
+        )
+    if f"{role}_{name}" in taken:
+        raise ScenarioError(
+            f"there is a {role} {name!r} already; nothing is overwritten, choose another name"
+        )
+
+
+def _plain(name: str, role: str) -> str:
+    """Return what a name could have meant: MyIdea-2 -> my_idea_2."""
+    words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name)
+    return re.sub(r"[^a-z0-9]+", "_", words.lower()).strip("_").removeprefix(f"{role}_")
+
+
+def class_name(name: str) -> str:
+    """Return the name of a class: my_idea -> MyIdea."""
+    return "".join(part.capitalize() for part in name.split("_"))
+
+
+def title(name: str) -> str:
+    """Return a name as words: my_idea -> My idea."""
+    return name.replace("_", " ").strip().capitalize()
+
+
+Language = Literal["python", "c"]
+
+UNITS = {
+    "driver": ("driver_sine", ", parameters: {amplitude: 0.0325, frequency: 0.2, start_time: 1.0}"),
+    "reference": ("reference_steady_state", ""),
+    "controller": ("controller_fnn", ", step_size: 0.002"),
+    "allocator": ("allocator_load_proportional", ", step_size: 0.002"),
+    "wheel_control": ("wheel_control_direct", ", step_size: 0.002"),
+    "plant": ("plant_seven_dof", ""),
+    "tyre": ("tyre_dugoff", ""),
+}
+"""Unit -> FMU and what else a scenario says of it: paper A's run at 25 m/s."""
+MORE = {"road": ("road_patchwork", "")}
+"""Units which that run does without."""
+ROLES = ("controller", "driver", "reference", "tyre", "plant", "road")
+"""Units that can be begun with."""
+KINDS = (*ROLES, "vehicle", "scenario", "study", "sweep")
+"""All that can be begun with."""
+LAW = {"gain": 20000.0, "integral_gain": 50000.0, "limit": 5000.0}
+"""Gains and limit of the controller [N.m.s/rad, N.m/rad, N.m]; chosen: they hold paper A's car."""
+VEHICLES = PurePosixPath("scenarios/vehicles")
+
+
+@dataclass(frozen=True)
+class NewFiles:
+    """Files to begin with, relative to the folder of the project, and which of them are what."""
+
+    files: dict[PurePosixPath, str]
+    main: PurePosixPath  # what is run: a scenario, a study, a sweep
+    source: PurePosixPath | None = None  # of a unit: the Python file, or the folder of the C files
+    test: PurePosixPath | None = None
+
+
+def begin(kind: str, name: str, language: Language = "python", *, in_checkout: bool) -> NewFiles:
+    """Return the files of a beginning.
+
+    In a checkout of yawbench a unit stands among its own, elsewhere in folders such as `controllers` and
+    `tests`. Scenarios always stand in `scenarios`.
+    """
+    scenario = PurePosixPath("scenarios", name, "25mps.yaml")
+    shipped = "../vehicles/in_wheel_motor_car.yaml" if in_checkout else ""
+    facts: dict[str, Any] = {
+        "name": name,
+        "title": title(name),
+        "scenario": scenario.name,
+        "vehicle": f"../vehicles/{name}.yaml" if kind == "vehicle" else shipped,
+        "source_words": "the run of paper A (Yuan, Chen, Huang, Shi) at 25 m/s",
+        "units": [(unit, *UNITS[unit]) for unit in UNITS],
+    }
+    if kind in ROLES:
+        return _unit(kind, name, language, in_checkout, scenario, facts)
+    templates = {scenario: "scenario.yaml.j2"}
+    main = scenario
+    if kind == "vehicle":
+        templates[VEHICLES / f"{name}.yaml"] = "vehicle.yaml.j2"
+    elif kind != "scenario":
+        main = scenario.with_name(f"{kind}.yaml")
+        templates[main] = f"{kind}.yaml.j2"
+    return NewFiles(_rendered(templates, facts), main)
+
+
+def _unit(
+    role: str,
+    name: str,
+    language: Language,
+    in_checkout: bool,
+    scenario: PurePosixPath,
+    facts: dict[str, Any],
+) -> NewFiles:
+    """Return the source of a unit, its test and a scenario that uses it."""
+    home = PurePosixPath("components" if in_checkout else "", f"{role}s")
+    source = home / (f"{name}.py" if language == "python" else name)
+    test = PurePosixPath("tests/components" if in_checkout else "tests", f"test_{name}.py")
+    own = {"driver": ""}.get(role, (UNITS | MORE)[role][1])  # its parameters are its own
+    facts |= {
+        "role": role,
+        "fmu": f"{role}_{name}",
+        "class_name": class_name(name),
+        "components": "." if in_checkout else "components",
+        "source": source,
+        "levels": len(test.parts) - 1,
+        "source_words": f"{facts['source_words']}, with a {role} of your own",
+        "units": [(unit, *fmu) for unit, fmu in (UNITS | {role: (f"{role}_{name}", own)}).items()],
+        **LAW,
+    }
+    templates = {scenario: "scenario.yaml.j2"}
+    templates[test] = "test_controller.py.j2" if role == "controller" else "test_unit.py.j2"
+    if language == "python":
+        templates[source] = f"{role}.py.j2"
+    else:
+        templates[source / f"{name}.c"] = "controller.c.j2"
+        templates[source / "modelDescription.xml"] = "modelDescription.xml.j2"
+    return NewFiles(_rendered(templates, facts), scenario, source, test)
+
+
+def _rendered(templates: dict[PurePosixPath, str], facts: dict[str, Any]) -> dict[PurePosixPath, str]:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    loader = PackageLoader("orchestrator.commands")
+    environment = Environment(
+        loader=loader, undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True
+    )
+    return {path: environment.get_template(name).render(facts) for path, name in sorted(templates.items())}
+
+
+def write_new(files: dict[PurePosixPath, str], folder: Path, *, also: Iterable[PurePosixPath] = ()) -> None:
+    """Write files below `folder`; none if one of them, or of the places `also`, exists.
+
+    Raises:
+        ScenarioError: names what exists.
+    """
+    there = [str(path) for path in dict.fromkeys((*files, *also)) if (folder / path).exists()]
+    if there:
+        verb = "exists" if len(there) == 1 else "exist"
+        raise ScenarioError(
+            f"{folder}: {listed(there)} {verb} already; nothing is overwritten, nothing written"
+        )
+    for path, text in files.items():
+        target = folder / path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with target.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+
+
+NewKind = Literal[KINDS]  # type: ignore[valid-type]
+NewKindArgument = Annotated[NewKind, typer.Argument(help="What to write.", metavar="KIND")]  # type: ignore[valid-type]
+NewName = Annotated[str, typer.Argument(help="Its name: lower-case letters, digits and _.", metavar="NAME")]
 Written = Annotated[Literal["python", "c"], typer.Option("--language", help="Language of a controller.")]
 Project = Annotated[
     Path | None,
@@ -32,7 +205,7 @@ Project = Annotated[
 ]
 
 
-def new(kind: What, name: Name, language: Written = "python", out: Project = None) -> None:
+def new(kind: NewKindArgument, name: NewName, language: Written = "python", out: Project = None) -> None:
     """Write a starting point that works as it stands.
 
     KIND is a unit (controller, driver, reference, tyre, plant, road), written with its test and a scenario
@@ -43,9 +216,10 @@ def new(kind: What, name: Name, language: Written = "python", out: Project = Non
     from fmus.build import COMPONENTS, find_recipes
 
     from ..errors import ScenarioError
-    from ..scaffold.beginnings import begin, write_new
-    from ..scaffold.names import check_name
-    from .batch import say
+
+    pass
+    pass
+    from .progress import say
 
     check_name(name, role=kind, taken=set(find_recipes()))
     if language == "c" and kind != "controller":
@@ -65,9 +239,9 @@ def new(kind: What, name: Name, language: Written = "python", out: Project = Non
         print(shlex.join(command))
 
 
-def _next(kind: str, name: str, begun: Beginning, folder: Path, in_checkout: bool) -> list[list[str]]:
+def _next(kind: str, name: str, begun: NewFiles, folder: Path, in_checkout: bool) -> list[list[str]]:
     """Return the commands that build, test and run what has been written."""
-    from ..scaffold.beginnings import MORE, UNITS
+    pass
 
     yawbench, python = _program("yawbench"), _program("python")
     fmus = [] if in_checkout else ["--out", str(_shown(folder / "fmus"))]

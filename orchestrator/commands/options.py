@@ -1,4 +1,7 @@
-"""Arguments and options that several subcommands share."""
+"""Arguments and options that several subcommands share.
+
+The plan of the one scenario that a command is about, its FMUs up to date.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from ..plan import Change
+    from ..plan import Override, Plan
 
 
 def named(kind: str, **told: Any) -> Any:
@@ -44,7 +47,7 @@ ScenarioFile = Annotated[
 
 
 @dataclass(frozen=True)
-class Wishes:
+class RunOptions:
     """What a command is asked for by the options that it `takes`; the others stay as they are here.
 
     Raises:
@@ -172,7 +175,7 @@ class Wishes:
         return not (self.no_build or self.no_run)
 
     @functools.cached_property
-    def changes(self) -> tuple[Change, ...]:
+    def changes(self) -> tuple[Override, ...]:
         """What is changed in all runs."""
         from ..scenario.overrides import read_changes
 
@@ -211,14 +214,14 @@ class Wishes:
 
 def takes(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Let a command take options of `Wishes` behind its own, and hand them to it as `wishes`."""
-    shared = inspect.signature(Wishes, eval_str=True).parameters
+    shared = inspect.signature(RunOptions, eval_str=True).parameters
 
     def taking(command: Callable[..., None]) -> Callable[..., None]:
         own = inspect.signature(command, eval_str=True).parameters
 
         @functools.wraps(command)
         def called(**given: Any) -> None:
-            wishes = Wishes(**{name: given.pop(name) for name in names})
+            wishes = RunOptions(**{name: given.pop(name) for name in names})
             command(**given, wishes=wishes)
 
         every = [one for name, one in own.items() if name != "wishes"]
@@ -233,3 +236,21 @@ CHANGES = ("swap", "set_", "fault")
 """Options of commands that change a scenario."""
 MAKING = ("out", "fmus", "no_build", "isolate", "call_limit")
 """Options of commands that make runs."""
+
+
+def plan_of_scenario(scenario: Path, wishes: RunOptions) -> Plan:
+    """Return the plan of a scenario with all that options change in it.
+
+    Raises:
+        YawbenchError: the scenario, an option or an FMU is wrong, or a component cannot be built.
+    """
+    from ..fmu.opener import Opener
+    from ..scenario.load import load_scenario
+    from ..tyres.stand import cornering_stiffness
+    from ..wiring.make_plan import make_plan
+
+    loaded = load_scenario(scenario, changes=wishes.changes, validate=not wishes.no_validate)
+    opener = Opener(build=wishes.build)
+    return make_plan(
+        loaded, fmus=wishes.fmus, opener=opener, isolated=wishes.isolate, measure=cornering_stiffness
+    )

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .batch import bar, hold, make, pooled, print_tables, say, stoppable
-from .experiment import command_of
-from .options import MAKING, Wishes, named, takes
+from .experiments import command_of
+from .options import MAKING, RunOptions, named, takes
+from .progress import bar, hold, make, pooled, print_tables, say, stoppable
 
 if TYPE_CHECKING:
-    from ..experiments.findings import Each
-    from ..experiments.ranking_course import Ranked
-    from ..experiments.ranking_schema import EntrySpec
+    from ..experiments.outcome import Each
+    from ..experiments.ranking import EntrySpec
+    from ..experiments.ranking_scores import RankingResult
 
 RankingFile = Annotated[
     Path, named("a ranking file", help="Ranking: YAML file, or a name in scenarios/.", metavar="RANKING")
@@ -32,7 +32,7 @@ Only = Annotated[
     list[str] | None,
     typer.Option("--only", metavar="ENTRY", help="Make the runs of this entry alone. Repeatable."),
 ]
-Condition = Annotated[
+ConditionOption = Annotated[
     list[str] | None,
     typer.Option("--condition", metavar="NAME", help="Drive this condition alone. Repeatable."),
 ]
@@ -45,11 +45,11 @@ Quick = Annotated[
 @takes(*MAKING, "jobs", "scheduler", "fresh", "no_run")
 def rank(
     context: typer.Context,
-    wishes: Wishes,
+    wishes: RunOptions,
     file: RankingFile = Path("proving_ground/ranking"),
     controller: Controller = None,
     only: Only = None,
-    condition: Condition = None,
+    condition: ConditionOption = None,
     quick: Quick = False,
 ) -> None:
     """Rank controllers by sine with dwell.
@@ -61,13 +61,13 @@ def rank(
     import contextlib
 
     from ..errors import ScenarioError
-    from ..experiments.jobs import Job, Once
+    from ..experiments.jobs import Job, PlanningCache
     from ..experiments.journal import Journal
     from ..experiments.ranking import load_ranking
-    from ..experiments.ranking_course import drive_ranking
+    from ..experiments.ranking_scores import drive_ranking
     from ..experiments.ranking_tables import table_of
-    from ..results.naming import default_folder
-    from ..wording import hint
+    from ..messages import hint
+    from ..results.folder import default_folder
 
     more = dict(map(_entry, controller or ()))
     ranking = load_ranking(file, more=more, quick=quick, chosen=condition or ())
@@ -84,7 +84,7 @@ def rank(
         contextlib.closing(Journal(folder, ranking.identity, fresh=wishes.fresh)) as journal,
     ):
         ranked = drive_ranking(
-            ranking, base, journal, Once(build=wishes.build),
+            ranking, base, journal, PlanningCache(build=wishes.build),
             lambda title, jobs: make(title, jobs, wishes, journal),
             only=only or (), planning=lambda total: bar("planning", total, quiet=True),
         )  # fmt: skip
@@ -98,8 +98,8 @@ def rank(
 def _entry(given: str) -> tuple[str, EntrySpec]:
     """Return the name and the entry of a controller from the command line."""
     from ..errors import ScenarioError
-    from ..experiments.ranking_schema import UNIT, EntrySpec
-    from ..plan import Faults
+    from ..experiments.ranking import UNIT, EntrySpec
+    from ..plan import FaultList
     from ..scenario.overrides import is_path, swap_of
 
     fmu, *brought = swap_of(UNIT, given, "--controller")
@@ -107,7 +107,7 @@ def _entry(given: str) -> tuple[str, EntrySpec]:
     if is_path(str(fmu.value)) and not Path(str(fmu.value)).is_file():
         raise ScenarioError(f"--controller {fmu.value}: there is no such file")
     parameters = {
-        one.place.partition(".")[2]: one.value for one in brought if not isinstance(one.value, Faults)
+        one.place.partition(".")[2]: one.value for one in brought if not isinstance(one.value, FaultList)
     }
     words = ", ".join([name, *(f"{key} {value}" for key, value in parameters.items())])
     path = Path(str(fmu.value)).absolute() if is_path(str(fmu.value)) else fmu.value
@@ -117,17 +117,23 @@ def _entry(given: str) -> tuple[str, EntrySpec]:
     return words.replace(", ", "-").replace(" ", "="), spec
 
 
-def _write(ranked: Ranked, folder: Path, command: str, each: Each) -> None:
+def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> None:
     """Draw the pictures, write tables and page, and say where it is."""
     from ..errors import ResultsError
-    from ..experiments.expansion import FIGURES
-    from ..experiments.ranking_drawing import draw_matrix, draw_pareto, draw_run
-    from ..experiments.ranking_tables import columns_of_cells, columns_of_entries, columns_of_runs
-    from ..experiments.table import to_csv
+    from ..experiments.experiment import FIGURES
+    from ..experiments.ranking_tables import (
+        columns_of_cells,
+        columns_of_entries,
+        columns_of_runs,
+        draw_matrix,
+        draw_pareto,
+        draw_run,
+    )
+    from ..experiments.record import to_csv
     from ..figures.style import save
+    from ..files import write_whole
     from ..pages.ranking_page import ranking_page
     from ..pages.report import PAGE
-    from ..writing import write_whole
 
     kept = [
         (one.job.out, one.angle) for one in ranked.drives if one.job and one.job.keep and one.job.out.is_dir()

@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..wording import printable
-from .batch import say
-from .options import CHANGES, MAKING, ScenarioFile, Wishes, takes
-from .planning import plan_of_scenario
+from ..messages import printable
+from .options import CHANGES, MAKING, RunOptions, ScenarioFile, plan_of_scenario, takes
+from .progress import say
 
 if TYPE_CHECKING:
     from ..plan import Finding
 
-Metrics = Annotated[
+MetricsOption = Annotated[
     list[str] | None,
     typer.Option(
         "--metric",
@@ -30,7 +29,7 @@ Metrics = Annotated[
     ),
 ]
 
-Name = Annotated[
+RunName = Annotated[
     str | None,
     typer.Option("--name", metavar="NAME", help="Name of the folder for the results, below results/."),
 ]
@@ -42,7 +41,9 @@ BESIDE = 36
 
 
 @takes(*CHANGES, *MAKING, "format_", "no_validate")
-def run(scenario: ScenarioFile, wishes: Wishes, name: Name = None, metric: Metrics = None) -> None:
+def run(
+    scenario: ScenarioFile, wishes: RunOptions, name: RunName = None, metric: MetricsOption = None
+) -> None:
     """Run a scenario and write results.csv and run.json.
 
     Without --out, results go to results/<folder of the scenario>/<its name>, followed by what --swap
@@ -50,13 +51,13 @@ def run(scenario: ScenarioFile, wishes: Wishes, name: Name = None, metric: Metri
     failed run never replaces a good one: its results go to a folder failed/ below.
     """
     from ..errors import ScenarioError, SimulationError
+    from ..labels import changed, with_changes
     from ..master.isolation import opener_of
     from ..master.log import STATUS, WARNING
     from ..master.simulate import simulate
+    from ..results.folder import default_folder
+    from ..results.formats import size_note
     from ..results.lock import refuse_below_others
-    from ..results.naming import default_folder
-    from ..results.size import size_note
-    from ..titles import changed, with_changes
 
     if wishes.out and name:
         raise ScenarioError("--out names the folder and --name a part of its path: give one of them")
@@ -83,7 +84,7 @@ def run(scenario: ScenarioFile, wishes: Wishes, name: Name = None, metric: Metri
     for message in info.warnings[:SHOWN]:
         grade = "" if message.status == WARNING else f"{STATUS[message.status]}: "
         text = " ".join(message.text.split())
-        say(f"warning: {message.unit} at t = {message.time:.9g} s: {grade}{text}")
+        say(f"warning: {message.instance} at t = {message.time:.9g} s: {grade}{text}")
     if len(info.warnings) > SHOWN:
         say(f"warning: {len(info.warnings) - SHOWN} more, see {folder / 'run.json'}")
     if info.ended:
@@ -94,7 +95,7 @@ def run(scenario: ScenarioFile, wishes: Wishes, name: Name = None, metric: Metri
         from ..experiments.tables import metrics_of_run
         from ..metrics.run_metrics import columns_for
         from ..results.read import load_results
-        from .batch import print_tables
+        from .progress import print_tables
 
         needed = load_results(folder, only=lambda recorded: columns_for(recorded, metrics))
         print_tables([metrics_of_run(needed, metrics)])

@@ -12,7 +12,7 @@ from enum import Enum
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec
 
-from ..metrics.symbols import si
+from ..metrics.measures import si
 
 if TYPE_CHECKING:
     from .trace import Trace
@@ -29,7 +29,7 @@ class Verdict(str, Enum):
 
 
 @dataclass(frozen=True)
-class Quantity:
+class TestQuantity:
     """A number of a run, in SI; `unit` "%" marks a ratio that is shown in per cent."""
 
     name: str
@@ -39,7 +39,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Ruling:
+class CriterionResult:
     """The verdict of one criterion, and why."""
 
     verdict: Verdict
@@ -54,22 +54,22 @@ class NotJudged(Exception):
 
 
 @dataclass
-class Judgement:
+class Evaluation:
     """What one run comes to."""
 
     label: str
-    quantities: dict[str, Quantity] = field(default_factory=dict)  # key -> quantity
-    rulings: dict[str, Ruling] = field(default_factory=dict)  # criterion -> ruling
+    quantities: dict[str, TestQuantity] = field(default_factory=dict)  # key -> quantity
+    rulings: dict[str, CriterionResult] = field(default_factory=dict)  # criterion -> ruling
     notes: list[str] = field(default_factory=list)
 
     def add(self, key: str, name: str, value: float | None, unit: str, reading: str = "") -> None:
         """Add a quantity."""
-        self.quantities[key] = Quantity(name, None if value is None else float(value), unit, reading)
+        self.quantities[key] = TestQuantity(name, None if value is None else float(value), unit, reading)
 
     def rule(self, criterion: str, holds: bool | None, why: str) -> None:
         """Add the ruling of a criterion; `holds` None: it is not judged."""
         verdict = Verdict.NOT_JUDGED if holds is None else Verdict.PASSED if holds else Verdict.FAILED
-        self.rulings[criterion] = Ruling(verdict, why)
+        self.rulings[criterion] = CriterionResult(verdict, why)
 
     def __getitem__(self, key: str) -> float | None:
         found = self.quantities.get(key)
@@ -99,16 +99,16 @@ class Judgement:
 
 
 def evaluation(
-    fill: Callable[Concatenate[Judgement, Trace, P], None],
-) -> Callable[Concatenate[Trace, P], Judgement]:
+    fill: Callable[Concatenate[Evaluation, Trace, P], None],
+) -> Callable[Concatenate[Trace, P], Evaluation]:
     """Make a function that fills in the judgement of a run return it; NotJudged becomes a note.
 
     All of them raise ResultsError if the trace lacks a signal that the test needs.
     """
 
     @wraps(fill)
-    def evaluate(trace: Trace, *args: P.args, **kwargs: P.kwargs) -> Judgement:
-        judged = Judgement(trace.label)
+    def evaluate(trace: Trace, *args: P.args, **kwargs: P.kwargs) -> Evaluation:
+        judged = Evaluation(trace.label)
         try:
             fill(judged, trace, *args, **kwargs)
         except NotJudged as why:
@@ -119,13 +119,13 @@ def evaluation(
 
 
 @dataclass
-class Series:
+class TestSeries:
     """What all runs of a test come to together."""
 
-    runs: list[Judgement]  # in their order
+    runs: list[Evaluation]  # in their order
     summary: str  # in a sentence
     found: dict[str, Any]  # plain data, for files
-    rulings: dict[str, Ruling] = field(default_factory=dict)
+    rulings: dict[str, CriterionResult] = field(default_factory=dict)
 
 
 def overall(verdicts: Iterable[Verdict]) -> Verdict | None:

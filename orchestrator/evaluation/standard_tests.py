@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from .judgement import Judgement, Series
+    from .judgement import Evaluation, TestSeries
     from .trace import Trace
 
 
@@ -24,17 +24,17 @@ class StandardTest:
     needs_angle: bool = False  # A is known to the function
     drawing: str = ""  # module here with `draw_run` and `draw_series`
 
-    def evaluate(self, trace: Trace, angle: float | None = None) -> Judgement:
+    def evaluate(self, trace: Trace, angle: float | None = None) -> Evaluation:
         """Return what a run comes to; `angle`: A [rad], where it is known and needed."""
-        judged: Judgement = _named(self.function)(trace, *([angle] if self.needs_angle else []))
+        judged: Evaluation = _named(self.function)(trace, *([angle] if self.needs_angle else []))
         return judged
 
-    def draw(self, trace: Trace, judged: Judgement) -> Figure | None:
+    def draw(self, trace: Trace, judged: Evaluation) -> Figure | None:
         """Return the figure of a run, None if there is nothing to draw."""
         figure: Figure | None = _named(f"{self.drawing}:draw_run")(trace, judged) if self.drawing else None
         return figure
 
-    def draw_series(self, series: Series, note: str) -> Figure:
+    def draw_series(self, series: TestSeries, note: str) -> Figure:
         """Return the figure of what many runs come to; only of tests with a drawing."""
         figure: Figure = _named(f"{self.drawing}:draw_series")(series, note)
         return figure
@@ -50,27 +50,27 @@ TESTS: dict[str, StandardTest] = {
         StandardTest(
             "slowly-increasing-steer",
             "the hand-wheel angle at 0.3 g, from which sine with dwell follows (UN R140, GTR 8)",
-            "slow_steer:evaluate_slow_steer",
+            "steering_tests:evaluate_slow_steer",
             ("angle", "slope", "spread", "speed"),
         ),
         StandardTest(
             "sine-with-dwell",
             "stability and responsiveness of the regulation on stability control (UN R140, GTR 8, FMVSS 126)",
-            "dwell_run:evaluate_dwell",
+            "sine_with_dwell:evaluate_dwell",
             ("amplitude", "ratio_1000", "ratio_1750", "displacement", "sideslip", "speed_end"),
             needs_angle=True,
-            drawing="dwell_drawing",
+            drawing="sine_with_dwell_figures",
         ),
         StandardTest(
             "step-steer",
             "gains, response times, overshoots of a step of the hand wheel (after ISO 7401)",
-            "step_response:evaluate_step",
+            "steering_tests:evaluate_step",
             ("yaw_rate_gain", "yaw_rate_response", "yaw_rate_overshoot", "acceleration_y_response", "t_beta"),
         ),
         StandardTest(
             "frequency-response",
             "gains and phases over frequency, from a sweep of the hand wheel (after ISO 7401)",
-            "frequency_response:evaluate_sweep",
+            "steering_tests:evaluate_sweep",
             (
                 "yaw_rate_gain_0.2",
                 "yaw_rate_peak",
@@ -82,33 +82,33 @@ TESTS: dict[str, StandardTest] = {
         StandardTest(
             "understeer-gradient",
             "extra steering per lateral acceleration, of a slow ramp or a constant radius (after ISO 4138)",
-            "understeer:evaluate_understeer",
+            "steering_tests:evaluate_understeer",
             ("gradient", "gradient_hand", "characteristic_speed", "gradient_4", "largest"),
         ),
         StandardTest(
             "turn-response",
             "what becomes of a steady turn when the car is braked (after ISO 7975) or lifted off (ISO 9816)",
-            "turn_response:evaluate_turn",
+            "braking_and_wind:evaluate_turn",
             ("deceleration", "yaw_ratio", "yaw_ratio_peak", "a_y_ratio", "sideslip", "sideslip_peak"),
         ),
         StandardTest(
             "straight-braking",
             "stopping distance, yaw and correction on split friction (after ISO 14512) or over a jump of it",
-            "straight_braking:evaluate_braking",
+            "braking_and_wind:evaluate_braking",
             ("distance", "deceleration", "yaw_rate", "yaw_angle", "deviation", "hand", "adaptation"),
         ),
         StandardTest(
             "side-wind",
             "how far a gust blows a car off its way while the hand wheel is held (after ISO 12021)",
-            "side_wind:evaluate_side_wind",
+            "braking_and_wind:evaluate_side_wind",
             ("deviation", "yaw_angle", "yaw_rate", "acceleration_y", "sideslip"),
         ),
         StandardTest(
             "lane-change",
             "a double lane change between cones, clean or not (ISO 3888)",
-            "lane_change_run:evaluate_lane_change",
+            "lane_change:evaluate_lane_change",
             ("entry", "exit", "overrun", "sideslip", "acceleration", "hand"),
-            drawing="lane_change_drawing",
+            drawing="lane_change",
         ),
     )
 }

@@ -22,13 +22,13 @@ from typing import Any
 
 import distributed
 
+from ..cache import OF_METRICS, sources_hash
 from ..errors import ResultsError, ScenarioError
 from ..fmu.archive import open_fmu, read_archive
-from ..master.interrupts import terminable
+from ..master.process_state import terminable
+from ..messages import listed
 from ..plan import Plan
-from ..sources import OF_METRICS, sources_hash
-from ..wording import listed
-from .jobs import Job, Outcome, Told
+from .jobs import Job, OnOutcome, Outcome
 from .workers import execute
 
 TIMEOUT = 10.0
@@ -40,7 +40,7 @@ _LOCAL: dict[str, Path] = {}
 """On a worker: hash of an FMU -> where it is unpacked."""
 
 
-def run_on_cluster(jobs: Sequence[Job], done: Told, *, scheduler: str) -> None:
+def run_on_cluster(jobs: Sequence[Job], done: OnOutcome, *, scheduler: str) -> None:
     """Make all runs on the workers of a Dask scheduler.
 
     Args:
@@ -53,14 +53,14 @@ def run_on_cluster(jobs: Sequence[Job], done: Told, *, scheduler: str) -> None:
         ResultsError: the cluster was lost on the way.
         KeyboardInterrupt: Ctrl-C or SIGTERM.
     """
-    fmus = {unit.fmu.sha256: unit.fmu for job in jobs if job.plan for unit in job.plan.units}
+    fmus = {unit.fmu.sha256: unit.fmu for job in jobs if job.plan for unit in job.plan.instances}
     with _connected(scheduler) as client, terminable():
         threads = _check_workers(client, scheduler)
         client.register_plugin(_Archives({digest: read_archive(fmu.path) for digest, fmu in fmus.items()}))
         _submit_all(client, jobs, done, scheduler, AHEAD * threads)
 
 
-def _submit_all(client: Any, jobs: Sequence[Job], done: Told, scheduler: str, ahead: int) -> None:
+def _submit_all(client: Any, jobs: Sequence[Job], done: OnOutcome, scheduler: str, ahead: int) -> None:
     waiting = iter(jobs)
     named: dict[str, Job] = {}
 
@@ -105,9 +105,9 @@ def _make(job: Job) -> Outcome:
 
 def _unpacked_here(plan: Plan) -> Plan:
     units = tuple(
-        replace(unit, fmu=replace(unit.fmu, directory=_LOCAL[unit.fmu.sha256])) for unit in plan.units
+        replace(unit, fmu=replace(unit.fmu, directory=_LOCAL[unit.fmu.sha256])) for unit in plan.instances
     )
-    return replace(plan, units=units)
+    return replace(plan, instances=units)
 
 
 class _Archives(distributed.WorkerPlugin):

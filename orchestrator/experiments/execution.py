@@ -11,15 +11,15 @@ from ..errors import ResultsError, ScenarioError
 from ..metrics.run_metrics import metric, results_to_be, unit_in
 from ..plan import Plan
 from ..results.freshness import altered, staleness
-from .jobs import Job, Metrics, Outcome, Record, Told, read_back
+from .jobs import Job, MeasuredRun, MetricRequests, OnOutcome, Outcome, read_back
 from .journal import Journal
 from .workers import execute
 
-Runner = Callable[[Sequence[Job], Told], object]
+Runner = Callable[[Sequence[Job], OnOutcome], object]
 """Makes runs; see `runner_of`."""
 
 
-def left_to_do(jobs: Sequence[Job], records: Mapping[str, Record]) -> list[Job]:
+def left_to_do(jobs: Sequence[Job], records: Mapping[str, MeasuredRun]) -> list[Job]:
     """Return the runs that have not been made already, each key once, in their order.
 
     Runs that are measured are those whose key is in `records`, and that have kept results if they are to;
@@ -45,7 +45,7 @@ def left_to_do(jobs: Sequence[Job], records: Mapping[str, Record]) -> list[Job]:
     return list(left.values())
 
 
-def _other_unit(job: Job, record: Record) -> str:
+def _other_unit(job: Job, record: MeasuredRun) -> str:
     """Return which number of a run is in another unit than its plan gives it, "" if none is."""
     assert job.plan is not None
     units = _units(job.plan, job.metrics)
@@ -55,14 +55,14 @@ def _other_unit(job: Job, record: Record) -> str:
     return ""
 
 
-def _units(plan: Plan, metrics: Metrics) -> dict[str, str]:
+def _units(plan: Plan, metrics: MetricRequests) -> dict[str, str]:
     """Return the unit of every metric of a run."""
     results = results_to_be(plan)
     return {key: unit for key, name, _ in metrics if (unit := unit_in(results, metric(name))) is not None}
 
 
 def finish(
-    left: Sequence[Job], journal: Journal | None, *, runner: Runner, told: Told = lambda _: None
+    left: Sequence[Job], journal: Journal | None, *, runner: Runner, told: OnOutcome = lambda _: None
 ) -> list[Outcome]:
     """Make runs, note each in the journal, if there is one, as it ends, and return what became of them.
 

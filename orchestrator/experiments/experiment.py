@@ -1,24 +1,165 @@
-"""Reading an experiment file: runs and axes expanded into cases, every problem reported in one go."""
+"""Reading an experiment file: runs and axes expanded into cases, every problem reported in one go.
+
+Entries with `for`: the runs, claims, checks and derived numbers that each of them stands for.
+"""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
+from typing import Any, TypeVar
 
 from ..errors import ScenarioError
 from ..files import reads
-from ..plan import Change
+from ..messages import hint, short
+from ..plan import Override
 from ..scenario import overrides, yaml_lines
-from ..scenario.strict import validate
-from .changes import changes_at, changes_of_file
-from .design import Point, points
-from .expansion import MOST, NamedRun, expanded, named_runs
+from ..scenario.validation import validate
+from ..scenario.yaml_lines import Document, KeyPath
+from .axes import DesignPoint, changes_at, changes_of_file, points
+from .judged_schema import Claim, DerivedSpec
 from .names_check import check_axes, check_names
-from .schema import ExperimentSpec
+from .schema import ChoiceSpec, ExperimentSpec, RunSpec
+
+FIGURES = "figures"
+"""Folder of the figures, beside those of named runs."""
+SENTENCES = ("says", "short", "source", "note")
+"""Fields of claims and derived numbers that are for people."""
+MOST = 10_000
+"""Runs that are named. Chosen: a hundred times the largest of ours; all stand in one report."""
+LONGEST = 100
+"""Characters of a run's folder. Chosen: more do not fit into file names where a letter takes two bytes."""
+_FOLDER = re.compile(rf"[\w.+-]{{1,{LONGEST}}}")
+Texts = TypeVar("Texts", Claim, DerivedSpec)
+
+
+@dataclass(frozen=True)
+class NamedRun:
+    """One run of an experiment, wherever it stands on the axes."""
+
+    name: str  # "" if there is only one
+    label: str
+    row: str
+    scenario: Path
+    changes: tuple[Override, ...]
+
+
+@dataclass(frozen=True)
+class ForBinding:
+    """One of those that an entry stands for: what is in the place of its words in braces."""
+
+    document: Document
+    key: KeyPath  # of the entry
+    values: dict[str, str]  # in names
+    words: dict[str, str]  # in sentences
+    choices: list[ChoiceSpec]  # what the values of a run bring along
+
+    def fill(self, text: str, *where: str, sentence: bool = False) -> str:
+        """Return a text of the entry, `where` it stands there, with what its words in braces stand for."""
+        use = self.words if sentence else self.values
+        for word in re.findall(r"\{([^{}]*)\}", text):
+            if word not in use:
+                guess = hint(word, use, lead="'for' has")
+                self.document.report((*self.key, *where), f"{{{word}}} stands for nothing{guess}")
+        return re.sub(r"\{(\w+)\}", lambda match: use.get(match[1], match[0]), text)
+
+    def filled(self, entry: Texts) -> Texts:
+        """Return the entry with all its texts filled in."""
+
+        def fill(part: Any, name: str = "") -> Any:
+            if isinstance(part, dict):
+                return {k: fill(v, k) for k, v in part.items()}
+            if isinstance(part, list):
+                return [fill(v, name) for v in part]
+            return self.fill(part, sentence=name in SENTENCES) if isinstance(part, str) else part
+
+        if not self.values:
+            return entry
+        given = entry.model_dump(by_alias=True, exclude_defaults=True, exclude={"for_each"})
+        return type(entry).model_validate(fill(given))
+
+
+def fillings(
+    document: Document, key: KeyPath, for_each: Mapping[str, Mapping[str, Any]], what: str
+) -> Iterator[ForBinding]:
+    """Yield every combination of a `for`; none of too many."""
+    number = math.prod(map(len, for_each.values()))
+    if number > MOST:
+        document.report((*key, "for"), f"stands for {number} {what}; at most {MOST} are taken")
+        return
+    for combination in itertools.product(*(choices.items() for choices in for_each.values())):
+        words, choices = {}, []
+        for name, (value, chosen) in zip(for_each, combination, strict=True):
+            if isinstance(chosen, ChoiceSpec):
+                choices.append(chosen)
+                chosen = chosen.says or value
+            words[name] = chosen
+        values = dict(zip(for_each, (value for value, _ in combination), strict=True))
+        yield ForBinding(document, key, values, words, choices)
+
+
+def expanded(spec: ExperimentSpec, document: Document) -> ExperimentSpec:
+    """Return the file with one claim, check or derived number for each that an entry stands for."""
+    derived: dict[str, DerivedSpec] = {}
+    for name, number in spec.derived.items():
+        key: KeyPath = ("derived", name)
+        for one in fillings(document, key, number.for_each, "numbers"):
+            made = one.fill(name) if number.for_each else name
+            if made in derived:
+                document.report(key, f"there is already a derived number {made!r}")
+            derived[made] = one.filled(number)
+    said: dict[str, list[Claim]] = {"claims": [], "checks": []}
+    for group, every in said.items():
+        for i, claim in enumerate(getattr(spec, group)):
+            for one in fillings(document, (group, i), claim.for_each, group):
+                every.append(one.filled(claim))
+                every[-1]._number = i
+    return spec.model_copy(update={"derived": derived, **said})
+
+
+def named_runs(document: Document, i: int, entry: RunSpec) -> Iterator[NamedRun]:
+    """Yield the runs that the i-th entry stands for, none if it is wrong."""
+    key: KeyPath = ("runs", i)
+    folder, known = document.path.parent, len(document.problems)
+    for one in fillings(document, key, entry.for_each, "runs"):
+        name = one.fill(entry.name, "name")
+        _check_folder(name, one)
+        changes: dict[str, Override] = {}
+        for part in (entry, *one.choices):
+            swaps = {unit: one.fill(fmu, "swap", unit) for unit, fmu in part.swap.items()}
+            settings = {
+                place: yaml_lines.scalar(one.fill(value, "set", place)) if isinstance(value, str) else value
+                for place, value in part.set.items()
+            }
+            filled = part.model_copy(update={"swap": swaps, "set": settings})
+            for change in changes_of_file(filled, folder, "study"):
+                if change.place in changes:
+                    document.report((*key, "for"), f"{change.place} is given twice")
+                changes[change.place] = change
+        label = one.fill(entry.label, "label", sentence=True) or name
+        row = one.fill(entry.row, "row", sentence=True) or label
+        scenario = folder / one.fill(entry.scenario, "scenario")
+        if len(document.problems) > known:
+            return
+        yield NamedRun(name, label, row, scenario, tuple(changes.values()))
+
+
+def _check_folder(name: str, one: ForBinding) -> None:
+    """Report a name that cannot be that of a folder."""
+    parts = name.split("/")
+    if all(_FOLDER.fullmatch(part) and part.strip(".") for part in parts) and parts[0] != FIGURES:
+        return
+    sentence = f"{short(name)} cannot name a run: use letters, digits, . _ + - and / between folders"
+    if any(len(part) > LONGEST for part in parts):
+        sentence = f"{short(name)} is too long: at most {LONGEST} characters between two /"
+    one.document.report((*one.key, "name"), sentence)
+
 
 RUNS = "runs"
 """Folder of what runs along axes keep, beside those of named runs."""
@@ -32,8 +173,8 @@ class Case:
 
     number: int  # from 0, in the order of the design
     run: NamedRun
-    point: Point
-    changes: tuple[Change, ...]
+    point: DesignPoint
+    changes: tuple[Override, ...]
 
     @property
     def label(self) -> str:
@@ -42,17 +183,17 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Experiment:
+class LoadedExperiment:
     """An experiment that is right in itself."""
 
     path: Path
     spec: ExperimentSpec
     runs: dict[str, NamedRun]
-    for_all: tuple[Change, ...] = ()  # by the file's own `swap`, `set`, ...
-    by_options: tuple[Change, ...] = ()  # in all runs against the file
+    for_all: tuple[Override, ...] = ()  # by the file's own `swap`, `set`, ...
+    by_options: tuple[Override, ...] = ()  # in all runs against the file
 
     @property
-    def changed(self) -> tuple[Change, ...]:
+    def changed(self) -> tuple[Override, ...]:
         """What is changed in all runs."""
         return (*self.for_all, *self.by_options)
 
@@ -62,7 +203,7 @@ class Experiment:
         return f"{self.path.absolute().parent.name}/{self.path.name}"
 
     @cached_property
-    def points(self) -> list[Point]:
+    def points(self) -> list[DesignPoint]:
         """All points of the axes; without axes one, of no levels."""
         return points(self.spec)
 
@@ -75,18 +216,18 @@ class Experiment:
             for number, (run, point) in enumerate(pairs)
         ]
 
-    def setting(self, point: Point) -> Point:
+    def setting(self, point: DesignPoint) -> DesignPoint:
         """Return a point without the axes that make repeats of one and the same."""
         pairs = zip(self.spec.axes.values(), point, strict=True)
         return tuple(level for axis, level in pairs if not axis.repeats)
 
     @cached_property
-    def settings(self) -> list[Point]:
+    def settings(self) -> list[DesignPoint]:
         """All points without the axes that make repeats of one and the same, each once."""
         return list(dict.fromkeys(map(self.setting, self.points)))
 
     @property
-    def short(self) -> Experiment:
+    def short(self) -> LoadedExperiment:
         """The same with the first few of its repeats."""
         axes = {
             name: axis.model_copy(update={"values": dict(itertools.islice((axis.values or {}).items(), FEW))})
@@ -99,7 +240,7 @@ class Experiment:
     @cached_property
     def first_cases(self) -> list[Case]:
         """All runs at all settings: of repeats the first."""
-        found: dict[tuple[str, Point], Case] = {}
+        found: dict[tuple[str, DesignPoint], Case] = {}
         for case in self.cases:
             found.setdefault((case.run.name, self.setting(case.point)), case)
         return list(found.values())
@@ -116,7 +257,7 @@ class Experiment:
         axes = self.spec.axes.items()
         return next(((n, change.place) for n, axis in axes if change and change.place in axis.places), None)
 
-    def _at(self, point: Point, run: NamedRun | None = None) -> list[Change]:
+    def _at(self, point: DesignPoint, run: NamedRun | None = None) -> list[Override]:
         """Return what a point changes, in a run if one is given."""
         pairs = [
             (axis, level)
@@ -127,7 +268,7 @@ class Experiment:
 
 
 @reads("experiment file", ScenarioError)
-def load_experiment(path: Path | str, *, changes: Sequence[Change] = ()) -> Experiment:
+def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> LoadedExperiment:
     """Read a study or a sweep.
 
     Args:
@@ -156,7 +297,7 @@ def load_experiment(path: Path | str, *, changes: Sequence[Change] = ()) -> Expe
     given = {change.place: change for change in changes}
     own = changes_of_file(spec, path.parent, "sweep" if spec.axes else "study")
     for_all = tuple(one for one in own if one.place not in given)
-    experiment = Experiment(path, spec, runs, for_all, tuple(given.values()))
+    experiment = LoadedExperiment(path, spec, runs, for_all, tuple(given.values()))
     if not document.problems:
         check_axes(spec, document)
         check_names(experiment, document)

@@ -9,16 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ResultsError
-from ..figures.display import Run
 from ..figures.plots import draw
-from ..figures.style import ROW, frame, literal, new_figure, save
-from ..titles import changed
-from ..wording import counted
-from .drawing import FAILED, Drawing
-from .expansion import FIGURES
-from .findings import Each, Findings
-from .limit_drawing import Limits
-from .metric_drawing import Curves, GridLines, Map
+from ..figures.style import ROW, LabelledRun, frame, literal, new_figure, save
+from ..labels import changed
+from ..messages import counted
+from .axis_figures import FAILED, CurveDrawing, Drawing, GridLines, LimitDrawing, MapDrawing
+from .experiment import FIGURES
+from .outcome import Each, ExperimentResult
 from .schema import FigureSpec
 
 if TYPE_CHECKING:
@@ -26,11 +23,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-KINDS: dict[str, type[Drawing]] = {"curve": Curves, "map": Map, "limit": Limits, "grid": GridLines}
+KINDS: dict[str, type[Drawing]] = {
+    "curve": CurveDrawing,
+    "map": MapDrawing,
+    "limit": LimitDrawing,
+    "grid": GridLines,
+}
 PANELS_IN_A_ROW = 3
 
 
-def draw_all(findings: Findings, out: Path, each: Each = map) -> tuple[dict[str, str], list[str]]:
+def draw_all(findings: ExperimentResult, out: Path, each: Each = map) -> tuple[dict[str, str], list[str]]:
     """Draw all figures as SVG and PNG into a folder below `out`; return name -> title, and problems.
 
     Args:
@@ -52,15 +54,17 @@ def draw_all(findings: Findings, out: Path, each: Each = map) -> tuple[dict[str,
     return drawn, problems
 
 
-def title_of(findings: Findings, spec: FigureSpec) -> str:
+def title_of(findings: ExperimentResult, spec: FigureSpec) -> str:
     """Return what a figure is called."""
     return spec.title or f"{findings.spec.title}: {spec.name}"
 
 
-def runs_of(findings: Findings, spec: FigureSpec) -> list[Run]:
+def runs_of(findings: ExperimentResult, spec: FigureSpec) -> list[LabelledRun]:
     """Return the runs of an overlay that have results."""
     named = findings.experiment.matching(spec.runs)
-    return [Run(run.label, findings.results[run.name]) for run in named if run.name in findings.results]
+    return [
+        LabelledRun(run.label, findings.results[run.name]) for run in named if run.name in findings.results
+    ]
 
 
 def _draw(wanted: tuple[Any, FigureSpec, str, Path]) -> str | None:
@@ -75,7 +79,7 @@ def _draw(wanted: tuple[Any, FigureSpec, str, Path]) -> str | None:
     return None
 
 
-def draw_over_axes(findings: Findings, spec: FigureSpec) -> Figure:
+def draw_over_axes(findings: ExperimentResult, spec: FigureSpec) -> Figure:
     """Return a figure over axes.
 
     Raises:
@@ -114,7 +118,7 @@ def _legend(drawn: Sequence[Axes]) -> list[Artist]:
     return sorted(found.values(), key=lambda handle: handle.get_label() == FAILED["label"])
 
 
-def _provenance(findings: Findings) -> str:
+def _provenance(findings: ExperimentResult) -> str:
     spec = findings.spec
     fmus = [f"{name} {digest[:8]}" for name, digest in findings.fmus]
     scenarios = dict.fromkeys(run.scenario.name for run in findings.experiment.runs.values())

@@ -6,10 +6,9 @@ import itertools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from ..figures.display import digits_of, shown
-from .derived import rank_correlation
-from .judged_schema import GridSpec
-from .judging import Values
+from ..figures.style import digits_of, shown
+from .judged_schema import GridSpec, rank_correlation
+from .judging import MetricTable
 from .tables import Cell, Table
 
 
@@ -61,7 +60,7 @@ def ranked(spec: GridSpec, only: Mapping[str, Collection[str]] | None = None) ->
 
 
 def correlation(
-    spec: GridSpec, values: Values, only: Mapping[str, Collection[str]] | None = None
+    spec: GridSpec, values: MetricTable, only: Mapping[str, Collection[str]] | None = None
 ) -> float | None:
     """Return Spearman's rank correlation with the published values; None if a run is missing.
 
@@ -83,7 +82,7 @@ def correlation(
     return rank_correlation(measured, published)
 
 
-def grid_tables(spec: GridSpec, values: Values, verdicts: Mapping[tuple[str, str], str]) -> list[Table]:
+def grid_tables(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[str, str], str]) -> list[Table]:
     """Return the table of what is measured and that of what is published, in SI and three digits.
 
     A grid that says how far down its columns `holds`, one of derived numbers, or one of means over repeats,
@@ -138,7 +137,7 @@ def side_by_side(tables: Sequence[Table]) -> Table:
     return Table(ours.title, headings, [*rows], theirs.notes, numbers)
 
 
-def _told_table(spec: GridSpec, values: Values, verdicts: Mapping[tuple[str, str], str]) -> Table:
+def _told_table(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[str, str], str]) -> Table:
     """Return the table with units and confidence; if it is to say so, how far down each column holds."""
     ((_, rows),) = spec.rows.items()
     ((_, columns),) = spec.columns.items()
@@ -170,7 +169,7 @@ def _down_to(spec: GridSpec, column: str, verdicts: Mapping[tuple[str, str], str
     return "all"
 
 
-def _measured(cell: GridCell, values: Values) -> float | None:
+def _measured(cell: GridCell, values: MetricTable) -> float | None:
     value = values.get(cell.key)
     return None if value is None else value.number
 

@@ -8,31 +8,31 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..cache import OF_METRICS, OF_TESTS, sources_hash
 from ..errors import KEPT, BuildError, ResultsError, ScenarioError, YawbenchError
+from ..messages import hint
 from ..metrics.plausibility import findings_in
 from ..metrics.run_metrics import evaluate, metric
-from ..plan import Change, Plan
-from ..results.key import key_of
+from ..plan import Override, Plan
+from ..results.freshness import key_of
 from ..results.read import Results, load_results
 from ..scenario import yaml_lines
 from ..scenario.yaml_lines import Document
-from ..sources import OF_METRICS, OF_TESTS, sources_hash
-from ..wording import hint
 
 if TYPE_CHECKING:
-    from ..master.course import Opener
-    from ..scenario.scenario_schema import Scenario
+    from ..master.run_loop import OpenInstance
+    from ..scenario.scenario_schema import LoadedScenario
 
 MANY = 10
 """Problems shown; more are only counted."""
 
-Metrics = tuple[tuple[str, str, tuple[float, float] | None], ...]
+MetricRequests = tuple[tuple[str, str, tuple[float, float] | None], ...]
 """(key, metric, window) of each metric."""
-Test = tuple[str, float | None]
+TestRequest = tuple[str, float | None]
 """A standard test by its name, and A [rad] where it is known."""
 STEP_TIME = "step_time"
 """Key of the processor time of a step of the unit that is timed [s]."""
-Measured = dict[str, tuple[float, str] | None]
+MetricValues = dict[str, tuple[float, str] | None]
 """Key of a metric -> its value and unit, None where the run gives none."""
 
 
@@ -43,13 +43,13 @@ class Job:
     label: str
     scenario: Path
     out: Path
-    changes: tuple[Change, ...] = ()
+    changes: tuple[Override, ...] = ()
     fmus: Path | None = None
     record: tuple[str, ...] = ()  # unit.variable; default: what the scenario records
     format: str = "csv"  # of the results
     call_limit: float | None = None  # of a call of an FMU [s], in a process per unit; None: units share one
-    metrics: Metrics = ()  # handed back when the run ends
-    test: Test | None = None  # likewise its quantities and verdicts
+    metrics: MetricRequests = ()  # handed back when the run ends
+    test: TestRequest | None = None  # likewise its quantities and verdicts
     timed: str = ""  # likewise the time that a step of this unit takes
     keep: bool = True  # whether results are written
     plan: Plan | None = None  # once it is made
@@ -57,10 +57,10 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Record:
+class MeasuredRun:
     """What became of a run: its metrics, or why there are none."""
 
-    values: Measured
+    values: MetricValues
     problems: tuple[str, ...] = ()
     findings: tuple[str, ...] = ()  # kinds of what was remarkable in its course
     ended: str | None = None  # why a unit has ended it early
@@ -89,7 +89,7 @@ class Record:
         return "; ".join(self.problems) or self.ended
 
 
-NOT_MADE = Record({}, ("not made",), made=False)
+NOT_MADE = MeasuredRun({}, ("not made",), made=False)
 """Of a run that has no results yet."""
 
 
@@ -114,23 +114,24 @@ class Outcome:
         return "; ".join(self.problems)
 
     @property
-    def record(self) -> Record:
+    def record(self) -> MeasuredRun:
         """What became of the run, as its process says."""
         problems = tuple(text for text in self.problems if getattr(text, "kind", "") != KEPT)
-        return Record({}, problems) if problems else self.value
+        return MeasuredRun({}, problems) if problems else self.value
 
 
-Told = Callable[[Outcome], None]
+OnOutcome = Callable[[Outcome], None]
 """Told of every run that is finished, once for each job."""
 
 
-class Once:
+class PlanningCache:
     """Files read and FMUs opened once for many plans; `options`: of the `Opener`."""
 
     def __init__(self, **options: Any) -> None:
         from ..fmu.opener import Opener
 
         self._documents: dict[Path, Document] = {}
+
         self.opener = Opener(**options)
 
     def read(self, path: Path, *, what: str) -> Document:
@@ -140,17 +141,17 @@ class Once:
         return copy.deepcopy(self._documents[path])
 
 
-def planned(job: Job, once: Once | None = None) -> tuple[Scenario, Plan]:
+def planned(job: Job, once: PlanningCache | None = None) -> tuple[LoadedScenario, Plan]:
     """Return a job's scenario with all that is changed in it, and its plan; `once` for many jobs.
 
     Raises:
         YawbenchError: the scenario, an option or an FMU is wrong.
     """
     from ..scenario.load import load_scenario
-    from ..tyres.axle_stiffness import cornering_stiffness
+    from ..tyres.stand import cornering_stiffness
     from ..wiring.make_plan import make_plan
 
-    once = once or Once()
+    once = once or PlanningCache()
     scenario = load_scenario(job.scenario, changes=job.changes, read=once.read)
     isolated = job.call_limit is not None
     plan = make_plan(
@@ -169,7 +170,7 @@ def planned(job: Job, once: Once | None = None) -> tuple[Scenario, Plan]:
 def ready(
     jobs: Sequence[Job],
     *,
-    once: Once | None = None,
+    once: PlanningCache | None = None,
     progress: Callable[[int], None] = lambda done: None,
     place: Callable[[str], tuple[Hashable, str]] = lambda problem: (problem, problem),
 ) -> list[Job]:
@@ -185,7 +186,7 @@ def ready(
         BuildError: FMUs that are stale and cannot be built.
         ScenarioError: with everything that is wrong with any of them, each problem once.
     """
-    once, found = once or Once(), []
+    once, found = once or PlanningCache(), []
     problems: dict[Hashable, str] = {}
     for number, job in enumerate(jobs, start=1):
         try:
@@ -203,7 +204,7 @@ def ready(
     return found
 
 
-def keyed(job: Job, metrics: Metrics = ()) -> Job:
+def keyed(job: Job, metrics: MetricRequests = ()) -> Job:
     """Return a job that hands back metrics, with its key: jobs of one key are one run."""
     assert job.plan is not None
     also: list[Any] | None = [metrics, sources_hash(OF_METRICS)] if metrics else None
@@ -212,17 +213,17 @@ def keyed(job: Job, metrics: Metrics = ()) -> Job:
     return replace(job, metrics=metrics, key=key_of(job.plan, also))
 
 
-def run_job(job: Job, opener: Opener | None = None) -> Record:
+def run_job(job: Job, opener: OpenInstance | None = None) -> MeasuredRun:
     """Make one run in this process; `opener`: makes its instances, in place of what opens FMUs.
 
     Raises:
         YawbenchError: the scenario is wrong or the run failed.
     """
     from ..master.isolation import opener_of
+    from ..master.run_loop import StepClock, timing
     from ..master.simulate import simulate, simulate_in_memory
-    from ..master.timing import Clock, timing
 
-    plan, clock, run = job.plan or planned(job)[1], Clock(), None
+    plan, clock, run = job.plan or planned(job)[1], StepClock(), None
     with opener_of(plan, job.call_limit) as own:
         given = opener or own
         timed = timing(given, job.timed, clock) if job.timed and job.call_limit is None else given
@@ -230,7 +231,7 @@ def run_job(job: Job, opener: Opener | None = None) -> Record:
             apart = timed is own  # a clock counts in this process, and plain Python is at home there
             run = simulate(plan, job.out, opener=timed, format=job.format, apart=apart).id
             if not (job.metrics or job.test):
-                return Record({}, id=run)
+                return MeasuredRun({}, id=run)
             results = load_results(job.out)
         else:
             results = simulate_in_memory(plan, opener=timed)
@@ -240,9 +241,9 @@ def run_job(job: Job, opener: Opener | None = None) -> Record:
     return replace(record, id=run)
 
 
-def measured(results: Results, metrics: Metrics, test: Test | None = None) -> Record:
+def measured(results: Results, metrics: MetricRequests, test: TestRequest | None = None) -> MeasuredRun:
     """Return what a run that has ended comes to; of a test quantities, and verdicts as 1, 0 or None."""
-    values: Measured = {}
+    values: MetricValues = {}
     for key, name, window in metrics:
         value = evaluate(results, metric(name), window)
         short = results.ended and not window  # of a run that a unit has ended early it is another metric
@@ -250,10 +251,10 @@ def measured(results: Results, metrics: Metrics, test: Test | None = None) -> Re
     if test:
         values |= _judged(results, *test)
     kinds = dict.fromkeys(one.kind for one in findings_in(results.run) if one.time is not None)
-    return Record(values, findings=tuple(kinds), ended=results.ended)
+    return MeasuredRun(values, findings=tuple(kinds), ended=results.ended)
 
 
-def _judged(results: Results, name: str, angle: float | None) -> Measured:
+def _judged(results: Results, name: str, angle: float | None) -> MetricValues:
     from ..evaluation.judgement import Verdict
     from ..evaluation.standard_tests import TESTS
     from ..evaluation.trace import trace_of

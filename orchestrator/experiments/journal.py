@@ -16,10 +16,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .. import checksums
 from ..errors import ResultsError
-from ..files import reason
-from ..wording import counted
-from ..writing import open_own, write_whole
-from .jobs import Record
+from ..files import open_own, reason, write_whole
+from ..messages import counted
+from .jobs import MeasuredRun
 
 FILE = "runs.jsonl"
 FORMAT = 2
@@ -74,9 +73,9 @@ class _Entry(_Line):
     ended: str | None = None
 
     @property
-    def record(self) -> Record:
+    def record(self) -> MeasuredRun:
         """The same for the experiment."""
-        return Record(self.values, self.problems, self.findings, self.ended)
+        return MeasuredRun(self.values, self.problems, self.findings, self.ended)
 
 
 class Journal:
@@ -93,7 +92,7 @@ class Journal:
 
     def __init__(self, folder: Path, identity: str, *, fresh: bool = False) -> None:
         self.folder = folder
-        self.records: dict[str, Record] = {}
+        self.records: dict[str, MeasuredRun] = {}
         self._path = path = folder / FILE
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -165,7 +164,7 @@ class Journal:
         finally:
             self._file = _opened(self._path)
 
-    def add(self, key: str, record: Record, *, last: bool = True) -> None:
+    def add(self, key: str, record: MeasuredRun, *, last: bool = True) -> None:
         """Note that a run is finished.
 
         Args:

@@ -1,17 +1,158 @@
-"""The schema of what is computed of runs: metrics, grids, derived numbers, conditions on them."""
+"""The schema of what is computed of runs: metrics, grids, derived numbers, conditions on them.
+
+Numbers in files of experiments: plain ones in SI, or with their unit as text.
+
+Numbers that a study derives from several runs: expressions of their metrics, rank correlations.
+
+An expression knows numbers, the names that its `of` gives, + - * / and parentheses. Where a run is
+missing, or a divisor is zero, there is no number; never a wrong one.
+"""
 
 from __future__ import annotations
 
+import ast
+import math
+import operator
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, PlainValidator, PrivateAttr, Tag, model_validator
 
 from ..errors import ScenarioError
+from ..messages import listed, short
 from ..metrics.run_metrics import during, metric, window_of
-from ..scenario.strict import Strict
-from ..wording import listed, short
-from . import derived
-from .numbers import Quantity, is_finite, is_quantity, si_number, text_of
+from ..scenario.quantities import convert
+from ..scenario.validation import StrictModel
+
+
+def text_of(value: object) -> str:
+    """Return a plain value as a YAML file would have it."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def is_finite(value: object) -> bool:
+    """Return whether a value is a finite number."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    return abs(value) <= sys.float_info.max  # also of whole numbers that no float can hold
+
+
+def si_number(given: float | str, unit: str) -> float:
+    """Return a number in SI, given as such or as text with its unit; `%` stands for a ratio.
+
+    Raises:
+        ValueError: a sentence that says what the text should have been.
+    """
+    return float(convert(given, "1" if unit == "%" else unit) if isinstance(given, str) else given)
+
+
+def _number(value: object) -> float | int:
+    if not is_finite(value):
+        raise ValueError(f"must be a number (got {short(value)})")
+    return value  # type: ignore[return-value]
+
+
+def is_quantity(value: object) -> bool:
+    """Return whether a value is a number, or text that begins with one."""
+    return is_finite(value) or (isinstance(value, str) and re.match(r"\s*[+-]?\.?\d", value) is not None)
+
+
+def _quantity(value: object) -> float | str:
+    if not is_quantity(value):
+        raise ValueError(f"must be a number, or a number with its unit ('5 %') (got {short(value)})")
+    return value  # type: ignore[return-value]
+
+
+Number = Annotated[float | int, PlainValidator(_number)]
+QuantityText = Annotated[float | int | str, PlainValidator(_quantity)]
+"""A number in SI, or text that begins with one and ends with its unit."""
+
+
+LONGEST = 400
+"""Characters of an expression. Chosen: eight times the longest of ours; deeper ones could not be computed."""
+
+_OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+}
+
+
+def parse(text: str) -> ast.expr:
+    """Return the expression that a text holds.
+
+    Raises:
+        ValueError: it is none, or holds more than arithmetic.
+    """
+    if len(text) > LONGEST:
+        raise ValueError(f"{short(text)}: an expression has at most {LONGEST} characters")
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):  # by what is in it, by brackets
+        raise ValueError(f"{short(text)} is no expression, for example (a - b) / a") from None
+    for node in _nodes(tree):
+        plain = isinstance(node, ast.Constant) and type(node.value) in (int, float)
+        if not (plain or isinstance(node, (ast.Name, ast.BinOp, ast.UnaryOp))):
+            raise ValueError(f"{text!r}: only numbers, names, + - * / and parentheses are allowed")
+        if isinstance(node, ast.BinOp) and type(node.op) not in _OPERATIONS:
+            raise ValueError(f"{text!r}: only + - * / are allowed")
+        if isinstance(node, ast.UnaryOp) and not isinstance(node.op, ast.USub):
+            raise ValueError(f"{text!r}: only + - * / are allowed")
+    return tree
+
+
+def _nodes(tree: ast.expr) -> Iterator[ast.expr]:
+    return (node for node in ast.walk(tree) if isinstance(node, ast.expr))
+
+
+def names_in(text: str) -> list[str]:
+    """Return the names in an expression, each once."""
+    return list(dict.fromkeys(node.id for node in _nodes(parse(text)) if isinstance(node, ast.Name)))
+
+
+def calculate(text: str, values: Mapping[str, float]) -> float | None:
+    """Return the value of an expression; None if it divides by zero or is not finite.
+
+    Args:
+        text: the expression.
+        values: of every name in it.
+    """
+
+    def value_of(node: ast.expr) -> float:
+        if isinstance(node, ast.BinOp):
+            return _OPERATIONS[type(node.op)](value_of(node.left), value_of(node.right))
+        if isinstance(node, ast.UnaryOp):
+            return -value_of(node.operand)
+        if isinstance(node, ast.Name):
+            return values[node.id]
+        assert isinstance(node, ast.Constant)
+        return float(node.value)  # type: ignore[arg-type]
+
+    try:
+        number = value_of(parse(text))
+    except (ZeroDivisionError, OverflowError):
+        return None
+    return number if math.isfinite(number) else None
+
+
+def ranks(x: Sequence[float]) -> np.ndarray:
+    """Return the rank of every value, counted from 1; equal values share the mean of their ranks."""
+    array = np.asarray(x, dtype=float)
+    below = (array[:, None] > array[None, :]).sum(axis=1)
+    equal = (array[:, None] == array[None, :]).sum(axis=1)
+    return below + (equal + 1) / 2
+
+
+def rank_correlation(x: Sequence[float], y: Sequence[float]) -> float | None:
+    """Return Spearman's rank correlation of two sequences of equal length; None if one is constant."""
+    a, b = (ranks(values) - (len(values) + 1) / 2 for values in (x, y))
+    scale = math.sqrt(float(a @ a) * float(b @ b)) if len(x) > 1 else 0.0
+    return float(a @ b) / scale if scale > 0 else None
+
 
 CELLS = 10_000
 """Of a grid. Chosen: a hundred times the largest of ours."""
@@ -45,17 +186,17 @@ def _metric_name(name: str) -> str:
 
 
 Alternatives = Annotated[dict[str, str], PlainValidator(alternatives)]
-Window = Annotated[tuple[float, float], PlainValidator(_window)]
+WindowField = Annotated[tuple[float, float], PlainValidator(_window)]
 MetricName = Annotated[str, AfterValidator(_metric_name)]
 Patterns = Annotated[list[str], Field(min_length=1)]
 """Names of runs, with `*` and `?` for many."""
 
 
-class MetricSpec(Strict):
+class MetricSpec(StrictModel):
     """A number per run."""
 
     metric: MetricName = Field(description="measure(signal)")
-    window: Window | None = Field(None, description="[from, to] in s; left out: the whole run")
+    window: WindowField | None = Field(None, description="[from, to] in s; left out: the whole run")
     heading: str = Field("", description="Heading of its column; default: the formula")
 
     def during(self, lead: str = "") -> str:
@@ -69,11 +210,11 @@ def _single(value: dict[str, dict[str, str]]) -> dict[str, dict[str, str]]:
     return value
 
 
-Axis = Annotated[dict[str, Alternatives], AfterValidator(_single)]
+GridAxis = Annotated[dict[str, Alternatives], AfterValidator(_single)]
 """The name that stands for a row's or a column's value, and its values."""
 
 
-class BesideSpec(Strict):
+class BesideSpec(StrictModel):
     """A run that stands outside a grid."""
 
     run: str = Field(min_length=1)
@@ -81,7 +222,7 @@ class BesideSpec(Strict):
     published: float | None = Field(None, description="In SI")
 
 
-class GridSpec(Strict):
+class GridSpec(StrictModel):
     """A metric of many runs in rows and columns, beside what a paper prints."""
 
     title: str = Field(min_length=1)
@@ -90,8 +231,8 @@ class GridSpec(Strict):
     derived: str = Field(
         "", description="In place of metric and run: keys of `derived`, with {name} for row and column"
     )
-    rows: Axis
-    columns: Axis
+    rows: GridAxis
+    columns: GridAxis
     corner: str = Field("", description="Heading of the column of rows")
     published: list[list[float]] | None = Field(None, description="In SI, row by row")
     beside: list[BesideSpec] = Field([], description="Runs outside the grid")
@@ -120,7 +261,7 @@ class GridSpec(Strict):
         return self
 
 
-class Source(Strict):
+class MetricSource(StrictModel):
     """A metric of a run."""
 
     run: str
@@ -128,11 +269,11 @@ class Source(Strict):
 
 
 def _expression(text: str) -> str:
-    derived.parse(text)
+    parse(text)
     return text
 
 
-class DerivedSpec(Strict):
+class DerivedSpec(StrictModel):
     """A number derived from several runs: an expression of metrics, or a grid's rank correlation."""
 
     says: str = Field(description="What the number is", min_length=1)
@@ -140,13 +281,13 @@ class DerivedSpec(Strict):
         {}, alias="for", description="Key -> values; one number per combination, named in its key by {key}"
     )
     expression: Annotated[str, AfterValidator(_expression)] | None = None
-    of: dict[str, Source] = Field({}, description="Name in the expression -> metric of a run")
+    of: dict[str, MetricSource] = Field({}, description="Name in the expression -> metric of a run")
     rank_correlation: str | None = Field(None, description="Grid whose order is compared with the paper's")
     only: dict[str, Alternatives] = Field(
         {}, description="Rows or columns of the grid -> those of their values that count"
     )
     unit: str = Field("1", description="Of the expression's value; '%' shows a ratio in per cent")
-    published: Quantity | None = Field(None, description="What the paper prints, in SI or with its unit")
+    published: QuantityText | None = Field(None, description="What the paper prints, in SI or with its unit")
 
     @model_validator(mode="after")
     def _complete(self) -> DerivedSpec:
@@ -154,7 +295,7 @@ class DerivedSpec(Strict):
             raise ValueError("needs exactly one of expression and rank_correlation")
         if self.only and self.rank_correlation is None:
             raise ValueError("only: belongs to a rank_correlation")
-        for name in derived.names_in(self.expression) if self.expression else ():
+        for name in names_in(self.expression) if self.expression else ():
             if name not in self.of:
                 raise ValueError(f"expression: {name} stands for nothing; 'of' has {listed(self.of)}")
         if self.published is not None:
@@ -165,7 +306,7 @@ class DerivedSpec(Strict):
         return self
 
 
-class Reference(Strict):
+class MetricReference(StrictModel):
     """A metric of another run as a bound."""
 
     run: str
@@ -181,13 +322,13 @@ def _bound(value: object) -> Any:
 
 Bound = Annotated[
     Annotated[float | int | str, PlainValidator(_bound), Tag("number")]
-    | Annotated[Reference, Tag("reference")],
-    Discriminator(lambda value: "reference" if isinstance(value, (dict, Reference)) else "number"),
+    | Annotated[MetricReference, Tag("reference")],
+    Discriminator(lambda value: "reference" if isinstance(value, (dict, MetricReference)) else "number"),
 ]
 """A number in SI, a number with its unit ('5 %'), or another run's metric."""
 
 
-class Condition(Strict):
+class Condition(StrictModel):
     """A comparison of a metric of a run, or of a derived number, with exactly one bound."""
 
     run: str = Field("", description="Name of a run; with `*` every run that fits; left out: every run")
@@ -218,21 +359,21 @@ class Condition(Strict):
 
     def __str__(self) -> str:
         bound = self.bound
-        if isinstance(bound, Reference):
+        if isinstance(bound, MetricReference):
             factor = "" if bound.times == 1 else f"{bound.times:g} × "
             bound = factor + (bound.run if bound.metric == self.metric else f"{bound.metric} of {bound.run}")
         of = self.derived or (f"{self.run}: {self.metric}" if self.run else self.metric)
         return f"{of} {OPERATORS[self.operator]} {bound}"
 
 
-class Judged(Strict):
+class Assertion(StrictModel):
     """What is said of runs, and the comparisons that decide whether it is so."""
 
     says: str = Field(description="In words", min_length=1)
     holds_if: list[Condition] = Field(description="All must be true", min_length=1)
 
 
-class Claim(Judged):
+class Claim(Assertion):
     """What somebody says, and the comparisons that decide whether it holds."""
 
     for_each: dict[str, Alternatives] = Field(
@@ -251,7 +392,7 @@ class Claim(Judged):
         return otherwise if self._number is None else self._number
 
 
-class LimitSpec(Judged):
+class LimitSpec(Assertion):
     """The largest value of an axis up to which all conditions hold, for each setting of the others."""
 
     of: str = Field(description="The axis; its values must be numbers")

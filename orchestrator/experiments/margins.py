@@ -62,7 +62,7 @@ def margin(gaps: Sequence[Gap | None], chosen: Sequence[Gap | None] | None = Non
 
 
 @dataclass(frozen=True)
-class Spot:
+class PointVerdict:
     """The verdict and the margin at one point."""
 
     holds: bool | None
@@ -70,12 +70,12 @@ class Spot:
 
 
 @dataclass(frozen=True)
-class Stop:
+class LevelVerdict:
     """A level of one open value, all others as chosen."""
 
     words: str
     place: float | None  # the number, in the unit of the line; None: it is none
-    spot: Spot
+    spot: PointVerdict
 
 
 @dataclass(frozen=True)
@@ -91,15 +91,15 @@ class Flip:
 
 
 @dataclass(frozen=True)
-class Line:
+class OpenValueScan:
     """One open value from end to end of its range."""
 
     open_value: str
     says: str
     unit: str  # of the numbers; "" if they have none
     factor: float  # of a place to the number that is shown
-    chosen: Stop
-    stops: tuple[Stop, ...]  # without the chosen one
+    chosen: LevelVerdict
+    stops: tuple[LevelVerdict, ...]  # without the chosen one
 
     @property
     def margins(self) -> tuple[float, float] | None:
@@ -131,13 +131,13 @@ class Line:
 
     def words(self, place: float) -> str:
         """Return a place as people read it."""
-        from ..figures.display import digits_of
+        from ..figures.style import digits_of
 
         unit = f" {self.unit}" if self.unit not in ("", "1") else ""
         return f"{digits_of(place * self.factor)}{unit}"
 
 
-def _between(a: Stop, b: Stop) -> float:
+def _between(a: LevelVerdict, b: LevelVerdict) -> float:
     """Return where the margin goes through zero between two stops, by a straight line."""
     assert a.place is not None
     assert b.place is not None
@@ -151,9 +151,9 @@ def _between(a: Stop, b: Stop) -> float:
 class Region:
     """What becomes of a verdict when the open values are others than those chosen."""
 
-    chosen: Spot
-    points: tuple[Spot, ...]  # of a Latin hypercube over all open values together
-    lines: tuple[Line, ...]  # of one open value each
+    chosen: PointVerdict
+    points: tuple[PointVerdict, ...]  # of a Latin hypercube over all open values together
+    lines: tuple[OpenValueScan, ...]  # of one open value each
 
     @property
     def holding(self) -> int:

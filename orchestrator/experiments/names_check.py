@@ -6,16 +6,15 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from ..scenario.yaml_lines import Document, Key
-from ..wording import hint
-from .design import RUN, levels_of
+from ..messages import hint
+from ..scenario.yaml_lines import Document, KeyPath
+from .axes import RUN, levels_of
 from .grids import cells
-from .judged_schema import Reference
-from .numbers import text_of
+from .judged_schema import MetricReference, text_of
 from .schema import ExperimentSpec, FigureSpec
 
 if TYPE_CHECKING:
-    from .experiment import Experiment
+    from .experiment import LoadedExperiment
 
 COLUMNS = (RUN, "status", "reason", "findings", "key")
 """Columns of the table beside the axes and the metrics."""
@@ -36,7 +35,7 @@ def check_axes(spec: ExperimentSpec, document: Document) -> None:
                 document.report((group, name), f"{name!r} is the name of another column of the table")
 
 
-def check_names(experiment: Experiment, document: Document) -> None:
+def check_names(experiment: LoadedExperiment, document: Document) -> None:
     """Report every name of a run, metric, axis or number that does not exist, or not there."""
     spec, runs = experiment.spec, experiment.runs
     known: dict[str, tuple[Mapping[str, object], str]] = {
@@ -69,7 +68,7 @@ def check_names(experiment: Experiment, document: Document) -> None:
             _check_places(spec, document, i, figure)
 
 
-def _names(spec: ExperimentSpec) -> Iterator[tuple[str, str, Key]]:
+def _names(spec: ExperimentSpec) -> Iterator[tuple[str, str, KeyPath]]:
     """Yield (what, its name, where) of all that is named, but for patterns of runs."""
     for i, table in enumerate(spec.tables):
         for k, name in enumerate(table.metrics):
@@ -104,7 +103,9 @@ def _names(spec: ExperimentSpec) -> Iterator[tuple[str, str, Key]]:
                 yield what, name, ("figures", i, what)
 
 
-def _names_of_conditions(experiment: Experiment, document: Document) -> Iterator[tuple[str, str, Key]]:
+def _names_of_conditions(
+    experiment: LoadedExperiment, document: Document
+) -> Iterator[tuple[str, str, KeyPath]]:
     """Yield the names in conditions likewise; report one that lacks its run."""
     for key, condition in experiment.spec.conditions():
         if condition.derived:
@@ -116,12 +117,12 @@ def _names_of_conditions(experiment: Experiment, document: Document) -> Iterator
         if condition.run and not experiment.matching([condition.run]):
             yield "run", condition.run, (*key, "run")
         yield "metric", condition.metric, (*key, "metric")
-        if isinstance(condition.bound, Reference):
+        if isinstance(condition.bound, MetricReference):
             yield "run", condition.bound.run, (*key, condition.operator, "run")
             yield "metric", condition.bound.metric, (*key, condition.operator, "metric")
 
 
-def _patterns(spec: ExperimentSpec) -> Iterator[tuple[Sequence[str], Key]]:
+def _patterns(spec: ExperimentSpec) -> Iterator[tuple[Sequence[str], KeyPath]]:
     """Yield (patterns of runs, what has them)."""
     for name, axis in spec.axes.items():
         yield axis.runs, ("axes", name)
@@ -143,7 +144,7 @@ def _check_correlations(spec: ExperimentSpec, document: Document) -> None:
             continue
         axes = {**grid.rows, **grid.columns}
         for axis, counted in number.only.items():
-            where: Key = ("derived", name, "only", axis)
+            where: KeyPath = ("derived", name, "only", axis)
             if axis not in axes:
                 document.report(where, f"there is no axis {axis!r}{hint(axis, axes, lead='the grid has')}")
                 continue

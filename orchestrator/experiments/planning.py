@@ -14,20 +14,18 @@ from ..plan import Fmu, Plan
 from ..results.read import Results
 from ..scenario import quantities
 from ..scenario.yaml_lines import dotted
-from ..wiring.shared_facts import FACTS
-from .axis_schema import AxisSpec
-from .design import Level
-from .experiment import RUNS, Case, Experiment
-from .jobs import Job, Metrics, Once, keyed, ready
-from .judged_schema import MetricSpec, Reference
-from .numbers import si_number
+from ..wiring.context import FACTS
+from .axes import AxisSpec, Level
+from .experiment import RUNS, Case, LoadedExperiment
+from .jobs import Job, MetricRequests, PlanningCache, keyed, ready
+from .judged_schema import MetricReference, MetricSpec, si_number
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedExperiment:
     """An experiment whose cases can all start."""
 
-    experiment: Experiment
+    experiment: LoadedExperiment
     jobs: list[Job]  # of the cases, in their order
     units: dict[str, str]  # axis of numbers -> measurement unit in tables, an SI unit; "" if it has none
     metric_units: dict[str, str]  # key of a metric -> its unit
@@ -58,12 +56,12 @@ def number_of(axis: AxisSpec, level: Level, unit: str) -> float:
     return float(quantities.convert(f"{level.value!r} {axis.unit}", unit))
 
 
-def metrics_of(experiment: Experiment) -> Metrics:
+def metrics_of(experiment: LoadedExperiment) -> MetricRequests:
     """Return the metrics of an experiment as jobs have them."""
     return tuple((key, spec.metric, spec.window) for key, spec in experiment.spec.metrics.items())
 
 
-def jobs_of(experiment: Experiment, out: Path, *, keep: bool = True, **of_jobs: Any) -> list[Job]:
+def jobs_of(experiment: LoadedExperiment, out: Path, *, keep: bool = True, **of_jobs: Any) -> list[Job]:
     """Return a job for every case; runs along axes hand back metrics, named runs keep their results.
 
     Args:
@@ -83,13 +81,13 @@ def jobs_of(experiment: Experiment, out: Path, *, keep: bool = True, **of_jobs: 
 
 
 def plan_experiment(
-    experiment: Experiment,
+    experiment: LoadedExperiment,
     out: Path,
     *,
-    once: Once | None = None,
+    once: PlanningCache | None = None,
     progress: Callable[[int], None] = lambda done: None,
     **of_jobs: Any,
-) -> Planned:
+) -> PlannedExperiment:
     """Plan all cases (see `ready`); without metrics the experiment gets the standard ones that runs record.
 
     Args:
@@ -125,11 +123,11 @@ def plan_experiment(
         jobs = [replace(job, out=job.out / job.key[:12]) for job in jobs]
     else:
         jobs = [keyed(job) for job in jobs]
-    used = {unit.fmu.sha256: unit.fmu for plan in plans for unit in plan.units}
-    return Planned(experiment, jobs, units, metric_units, used)
+    used = {unit.fmu.sha256: unit.fmu for plan in plans for unit in plan.instances}
+    return PlannedExperiment(experiment, jobs, units, metric_units, used)
 
 
-def _metric_units(experiment: Experiment, made_up: list[Results]) -> dict[str, str]:
+def _metric_units(experiment: LoadedExperiment, made_up: list[Results]) -> dict[str, str]:
     """Return the unit of every metric; `made_up`: results without rows.
 
     Raises:
@@ -155,13 +153,13 @@ def _metric_units(experiment: Experiment, made_up: list[Results]) -> dict[str, s
     return units
 
 
-def _bounds(experiment: Experiment, units: dict[str, str]) -> Iterable[tuple[str, str, float | str]]:
+def _bounds(experiment: LoadedExperiment, units: dict[str, str]) -> Iterable[tuple[str, str, float | str]]:
     """Yield (place, unit, bound) of all bounds in the file whose unit is known."""
     spec = experiment.spec
     for key, condition in spec.conditions():
         derived = spec.derived.get(condition.derived)
         unit = derived.unit if derived else units.get(condition.metric)
-        if unit is not None and not isinstance(condition.bound, Reference):
+        if unit is not None and not isinstance(condition.bound, MetricReference):
             yield dotted(key), unit, condition.bound
     for i, figure in enumerate(spec.figures):
         for name in ("largest", "mark"):
@@ -169,13 +167,13 @@ def _bounds(experiment: Experiment, units: dict[str, str]) -> Iterable[tuple[str
                 yield f"figures[{i}].{name}", units[figure.metric], given
 
 
-def _units(experiment: Experiment, every: list[Plan]) -> dict[str, str]:
+def _units(experiment: LoadedExperiment, every: list[Plan]) -> dict[str, str]:
     """Return the measurement unit of every axis of numbers.
 
     Raises:
         ScenarioError: the unit that the file names does not fit; a run would have said so before.
     """
-    plans = {tuple(unit.fmu.sha256 for unit in plan.units): plan for plan in every}.values()
+    plans = {tuple(unit.fmu.sha256 for unit in plan.instances): plan for plan in every}.values()
     return {
         name: next((unit for plan in plans if (unit := _unit(axis, plan))), "")
         for name, axis in experiment.spec.axes.items()
@@ -189,8 +187,8 @@ def _unit(axis: AxisSpec, plan: Plan) -> str | None:
     if (name or holder) in ("stop_time", "step_size"):
         return "s"
     if holder in FACTS:
-        return FACTS[holder].unit
-    for unit in plan.units:
+        return FACTS[holder].instance
+    for unit in plan.instances:
         given = unit.constants if holder == "inputs" else unit.parameters
         if holder not in ("inputs", "vehicle", unit.name):
             continue

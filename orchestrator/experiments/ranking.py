@@ -1,4 +1,23 @@
-"""A ranking: which controllers drive through which conditions of sine with dwell, as jobs.
+"""The schema of a ranking: controllers and conditions as data, and the cars that the conditions are of.
+
+    title: Where controllers stand
+    step_size: 0.0025
+    stop_time: 5.5
+    every: 2                           # of the regulation's amplitudes, from the last one down
+    cars:
+      hard: {title: hard, vehicle: ../vehicles/hard.yaml, slow_steer: slowly_increasing_steer.yaml}
+    conditions:
+      hard: {title: "hard, dry", car: hard, scenario: sine_with_dwell.yaml}
+      noise:
+        {title: "hard, sensors", car: hard, scenario: sensors.yaml, repeats: {sensor.seed: [1, 2, 3]}}
+    entries:
+      pid: {title: PID, fmu: controller_pid, source: paper C}
+    more_entries: [tuned.yaml]         # files of entries alone
+
+A condition changes a scenario as an entry of a study does. An entry puts its FMU in the place of the unit
+`controller` and gives it parameters, the same in all conditions.
+
+A ranking: which controllers drive through which conditions of sine with dwell, as jobs.
 
 Every run is one of the engine of all experiments: planned before the first starts, made in a process of its
 own, noted in the journal as it ends, not made again by the same build. A is found once for each car, on a dry
@@ -13,27 +32,127 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, field_validator, model_validator
 
 from .. import checksums
 from ..errors import ResultsError, ScenarioError
-from ..evaluation.dwell_series import amplitudes
-from ..evaluation.judgement import Judgement, NotJudged
-from ..evaluation.slow_steer import characteristic_angle
+from ..evaluation.judgement import Evaluation, NotJudged
+from ..evaluation.sine_with_dwell import amplitudes
+from ..evaluation.steering_tests import characteristic_angle
 from ..files import reads
-from ..plan import Change, Plan, Value
+from ..messages import hint
+from ..plan import Override, Plan, Value
 from ..scenario import overrides, yaml_lines
-from ..scenario.strict import validate
-from ..wording import hint
-from .axis_schema import Changes
-from .changes import changes_of_file
-from .driven_series import AMPLITUDE, SIDES, slow_steer_jobs, steered
-from .jobs import Job, Metrics, Once, Record, keyed, ready
-from .ranking_schema import UNIT, ConditionSpec, EntriesSpec, EntrySpec, RankingSpec
+from ..scenario.scenario_schema import Scalar
+from ..scenario.validation import StrictModel, Time, validate
+from .axes import OverrideSpec, changes_of_file
+from .jobs import Job, MeasuredRun, MetricRequests, PlanningCache, keyed, ready
+from .standard_test_runs import AMPLITUDE, SIDES, slow_steer_jobs, steered
+
+UNIT = "controller"
+"""The unit whose place all entries take."""
+NAME = r"^[\w.+-]+$"
+
+
+class CarSpec(OverrideSpec):
+    """A car, and how its characteristic angle A is found."""
+
+    title: str = Field(min_length=1, description="Its words")
+    slow_steer: str = Field(min_length=1, description="Scenario of slowly increasing steer, for A")
+
+
+class ConditionSpec(OverrideSpec):
+    """What all controllers are put into: a car, a scenario of sine with dwell, what is changed in it."""
+
+    title: str = Field(min_length=1, description="Its words")
+    short: str = Field("", description="Words for the head of a column; default: all of them")
+    car: str = Field(min_length=1, description="Key of `cars`")
+    scenario: str = Field(min_length=1, description="Scenario of one run, relative to this file")
+    dry: bool = Field(True, description="Responsiveness counts, which the regulation asks of dry roads")
+    mirrored: bool = Field(True, description="Left and right are alike: left first stands for both")
+    every: int | None = Field(None, ge=1, description="In place of the ranking's")
+    repeats: dict[str, list[Scalar]] = Field({}, description="unit.parameter -> values, such as seeds")
+    seen: bool = Field(False, description="By the search that tuned gains")
+    quick: bool = Field(False, description="Driven by --quick, with the last amplitude alone")
+
+    @property
+    def heading(self) -> str:
+        """Its words at the head of a column."""
+        return (self.short or self.title) + (" *" if self.seen else "")
+
+    @field_validator("repeats")
+    @classmethod
+    def _one_place(cls, given: dict[str, list[Scalar]]) -> dict[str, list[Scalar]]:
+        if len(given) > 1 or not all(given.values()):
+            raise ValueError("repeats: one unit.parameter with its values")
+        return given
+
+
+class EntrySpec(StrictModel):
+    """A controller."""
+
+    title: str = Field(min_length=1, description="What tables call it")
+    fmu: str = Field(min_length=1, description="Name of its FMU, or a path relative to the file")
+    parameters: dict[str, Scalar] = Field({}, description="Parameter -> value; default: as they are")
+    source: str = Field(min_length=1, description="Where it is from, and its gains")
+    gains: Literal["authors", "tuned"] = Field("authors", description="Whose gains they are")
+
+
+class EntriesSpec(StrictModel):
+    """A file of entries alone: written by hand, or by `yawbench tune`, with checksums then."""
+
+    entries: dict[str, EntrySpec] = Field(min_length=1, description="Name -> controller")
+    checksums: dict[str, str] = Field({}, description="Of entries that `yawbench tune` has written")
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """What checksums are of: the entries as they stand."""
+        return {name: one.model_dump(exclude_defaults=True) for name, one in self.entries.items()}
+
+    @property
+    def edited(self) -> str:
+        """What is not as `yawbench tune` has written it, in words, "" if all is."""
+        if self.checksums:
+            words = checksums.what_changed(self.content, self.checksums)
+            return f"{words} since `yawbench tune` wrote it" if words else ""
+        if any(one.gains == "tuned" for one in self.entries.values()):
+            return "has no checksums, so its tuned gains are taken as they are"
+        return ""
+
+
+class RankingSpec(StrictModel):
+    """A file of a ranking."""
+
+    title: str = Field(min_length=1)
+    source: str = Field("", description="Of the test that everything is judged by")
+    notes: list[str] = Field([], description="What a reader of its page has to know")
+    step_size: Time | None = Field(None, description="In place of the scenarios'")
+    stop_time: Time | None = Field(None, description="In place of the scenarios'")
+    every: int = Field(1, ge=1, description="Every so many of the amplitudes, from the last one down")
+    cars: dict[str, CarSpec] = Field(min_length=1, description="Name -> car")
+    conditions: dict[str, ConditionSpec] = Field(min_length=1, description="Name -> condition")
+    entries: dict[str, EntrySpec] = Field({}, description="Name -> controller")
+    more_entries: list[str] = Field([], description="Files of entries, relative to this one")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> RankingSpec:
+        for name, condition in self.conditions.items():
+            if condition.car not in self.cars:
+                known = ", ".join(self.cars)
+                raise ValueError(
+                    f"conditions.{name}.car: there is no car {condition.car!r}; there are {known}"
+                )
+        if not self.entries and not self.more_entries:
+            raise ValueError("has no entries")
+        return self
+
 
 RUNS = "runs"
 """Folder of the results that are kept: of every cell's last amplitude."""
 SERIES, SLOW = "sine-with-dwell", "slowly-increasing-steer"
-METRICS: Metrics = (
+METRICS: MetricRequests = (
     ("effort", "effort(yaw_moment)", None),
     ("chatter", "total_variation_rate(yaw_moment)", None),
 )
@@ -50,7 +169,7 @@ RECORDED = (
 
 
 @dataclass(frozen=True)
-class Ranking:
+class LoadedRanking:
     """A ranking as its file has it, and which part of it is wanted."""
 
     path: Path
@@ -79,22 +198,22 @@ class Ranking:
         """Names of the cars that they are of."""
         return list(dict.fromkeys(one.car for one in self.conditions.values()))
 
-    def changes(self, *parts: Changes, stop: bool = True) -> tuple[Change, ...]:
+    def changes(self, *parts: OverrideSpec, stop: bool = True) -> tuple[Override, ...]:
         """Return the changes of the ranking itself and of parts of its file; the last of a place counts."""
         own = [
-            Change(name, float(value), "ranking")
+            Override(name, float(value), "ranking")
             for name, value in (("step_size", self.spec.step_size), ("stop_time", self.spec.stop_time))
             if value is not None and (stop or name != "stop_time")
         ]
         return (*own, *(one for part in parts for one in changes_of_file(part, self.path.parent, "ranking")))
 
-    def changes_of_entry(self, name: str) -> list[Change]:
+    def changes_of_entry(self, name: str) -> list[Override]:
         """Return the changes that put an entry into a scenario."""
         spec, folder = self.entries[name]
         given = {f"{UNIT}.{parameter}": value for parameter, value in spec.parameters.items()}
         return overrides.changes_of({UNIT: spec.fmu}, given, folder, "ranking")
 
-    def changes_of_condition(self, name: str) -> tuple[Change, ...]:
+    def changes_of_condition(self, name: str) -> tuple[Override, ...]:
         """Return the changes that a condition makes in its scenario."""
         condition = self.spec.conditions[name]
         return self.changes(self.spec.cars[condition.car], condition)
@@ -107,7 +226,7 @@ def load_ranking(
     more: Mapping[str, EntrySpec] | None = None,
     quick: bool = False,
     chosen: Sequence[str] = (),
-) -> Ranking:
+) -> LoadedRanking:
     """Read a ranking.
 
     Args:
@@ -148,10 +267,10 @@ def load_ranking(
             raise ScenarioError(
                 f"{path}: there is no condition {name!r}{hint(name, spec.conditions, lead='known')}"
             )
-    return Ranking(path, spec, entries, quick, tuple(chosen), tuple(edited))
+    return LoadedRanking(path, spec, entries, quick, tuple(chosen), tuple(edited))
 
 
-def jobs_for_angles(ranking: Ranking, base: Job, once: Once) -> dict[str, list[Job]]:
+def jobs_for_angles(ranking: LoadedRanking, base: Job, once: PlanningCache) -> dict[str, list[Job]]:
     """Return car -> the runs of slowly increasing steer that A follows from; `base`: as in `plan_drives`.
 
     Raises:
@@ -168,7 +287,7 @@ def jobs_for_angles(ranking: Ranking, base: Job, once: Once) -> dict[str, list[J
     return found
 
 
-def angle_of(records: Sequence[Record], car: str) -> float:
+def angle_of(records: Sequence[MeasuredRun], car: str) -> float:
     """Return A of a car [rad] from its runs of slowly increasing steer.
 
     Raises:
@@ -177,7 +296,7 @@ def angle_of(records: Sequence[Record], car: str) -> float:
     judged = []
     for record in records:
         found = record.values.get("angle")
-        one = Judgement(car)
+        one = Evaluation(car)
         one.notes += [record.reason or "0.375 g is not reached"]
         one.add("angle", "", found[0] if found else None, "rad")
         judged.append(one)
@@ -188,7 +307,7 @@ def angle_of(records: Sequence[Record], car: str) -> float:
 
 
 @dataclass(frozen=True)
-class Drive:
+class RankingRun:
     """One run of a cell."""
 
     entry: str
@@ -210,7 +329,7 @@ class Drive:
         return abs(self.amplitude) / self.angle
 
 
-def drives_of(ranking: Ranking, angles: Mapping[str, float]) -> list[Drive]:
+def drives_of(ranking: LoadedRanking, angles: Mapping[str, float]) -> list[RankingRun]:
     """Return all runs, condition by condition; `angles`: car -> A [rad]."""
     found = []
     for (name, condition), entry in product(ranking.conditions.items(), ranking.entries):
@@ -221,19 +340,19 @@ def drives_of(ranking: Ranking, angles: Mapping[str, float]) -> list[Drive]:
         sides = SIDES[:1] if condition.mirrored else SIDES
         repeats = next(iter(condition.repeats.values()), [None])
         found += [
-            Drive(entry, name, sign * rung, angle, repeat, rung == rungs[-1])
+            RankingRun(entry, name, sign * rung, angle, repeat, rung == rungs[-1])
             for (_, sign), repeat, rung in product(sides, repeats, rungs)
         ]
     return found
 
 
 def plan_drives(
-    ranking: Ranking,
-    drives: Sequence[Drive],
+    ranking: LoadedRanking,
+    drives: Sequence[RankingRun],
     base: Job,
-    once: Once,
+    once: PlanningCache,
     progress: Callable[[int], None] = lambda done: None,
-) -> list[Drive]:
+) -> list[RankingRun]:
     """Return runs with their jobs; `base` holds what all jobs share, and the folder of all results.
 
     Raises:
@@ -243,7 +362,7 @@ def plan_drives(
     for drive in drives:
         condition = ranking.spec.conditions[drive.condition]
         value = drive.repeat
-        repeated = [Change(place, value, "ranking") for place in condition.repeats if value is not None]
+        repeated = [Override(place, value, "ranking") for place in condition.repeats if value is not None]
         changes = (
             *ranking.changes_of_condition(drive.condition),
             *ranking.changes_of_entry(drive.entry),
@@ -263,10 +382,10 @@ def plan_drives(
     return [replace(drive, job=job) for drive, job in zip(drives, made, strict=True)]
 
 
-def _metrics(plan: Plan | None) -> Metrics:
+def _metrics(plan: Plan | None) -> MetricRequests:
     assert plan is not None
     driver = AMPLITUDE.partition(".")[0]
-    begins = next(unit.parameter(STEERING_BEGINS) for unit in plan.units if unit.name == driver)
+    begins = next(unit.parameter(STEERING_BEGINS) for unit in plan.instances if unit.name == driver)
     first, last = float(begins or 0.0), plan.time(plan.n_steps)
     return (("intervention", INTERVENTION, (first, last) if first < last else None), *METRICS)
 

@@ -14,39 +14,36 @@ from functools import cached_property
 from pathlib import Path
 
 from ..errors import ScenarioError
-from ..metrics.run_metrics import Value
-from ..plan import DEFAULT, OF_RUN, TYRES, Change, Plan, Unit, Variable
+from ..messages import hint, listed
+from ..metrics.run_metrics import MetricValue
+from ..plan import DEFAULT, OF_RUN, TYRES, Instance, Override, Plan, Variable
 from ..plan import Value as Given
-from ..wiring.shared_facts import FACTS
-from ..wording import hint, listed
-from .changes import changes_at
-from .design import Level, latin_hypercube, levels_of
-from .expansion import NamedRun
-from .experiment import RUNS, Experiment
-from .findings import Findings, derive
+from ..wiring.context import FACTS
+from .axes import Level, OpenValueSpec, OpenVariantSpec, changes_at, latin_hypercube, levels_of
+from .experiment import RUNS, LoadedExperiment, NamedRun
 from .grids import ranked
-from .jobs import Job, Once, Record, keyed, ready
-from .judged_schema import Claim, Reference
-from .judging import Judgement, judge
-from .margins import TIMES, Line, Region, Spot, Stop
-from .planning import Planned, metrics_of, number_of
-from .region_schema import OpenValueSpec, OpenVariantSpec
+from .jobs import Job, MeasuredRun, PlanningCache, keyed, ready
+from .judged_schema import Claim, MetricReference
+from .judging import ClaimResult, judge
+from .margins import TIMES, LevelVerdict, OpenValueScan, PointVerdict, Region
+from .outcome import ExperimentResult, derive
+from .planning import PlannedExperiment, metrics_of, number_of
 
 ORIGIN = "region"
 """Of changes that open values make."""
 
-Place = tuple[tuple[str, Level], ...]
+RegionPoint = tuple[tuple[str, Level], ...]
 """Open value -> its level, of those that are not as chosen."""
-Cell = tuple[str, Place]
+RegionCell = tuple[str, RegionPoint]
 """A run, and the open values that change it."""
-Key = tuple[str, int]
+RegionKey = tuple[str, int]
 """Of what is judged: `claims` or `checks`, and its number."""
 
 
 def found_at(plan: Plan, place: str) -> tuple[Given, str] | None:
     """Return what a run has at a place as changes name it, and its unit; None: it has no such place."""
     holder, _, name = place.partition(".")
-    units = {unit.name: unit for unit in plan.units}
+    units = {unit.name: unit for unit in plan.instances}
     if not name and holder in units:
         return units[holder].fmu.name, ""
     if place == "vehicle" and plan.scenario.get("vehicle"):
@@ -59,7 +56,7 @@ def found_at(plan: Plan, place: str) -> tuple[Given, str] | None:
         return dict(zip(OF_RUN, values, strict=True))[place], "s"
     if holder in units and name == "step_size":
         return float(units[holder].period * plan.step), "s"
-    for unit in plan.units:
+    for unit in plan.instances:
         for variable in unit.fmu.variables.values():
             given = {**unit.parameters, **unit.constants}.get(variable.name, variable.start)
             if given is not None and _names(holder, name, unit, variable):
@@ -67,7 +64,7 @@ def found_at(plan: Plan, place: str) -> tuple[Given, str] | None:
     return None
 
 
-def _names(holder: str, name: str, unit: Unit, variable: Variable) -> bool:
+def _names(holder: str, name: str, unit: Instance, variable: Variable) -> bool:
     """Return whether a place, `holder.name`, is a variable of a unit."""
     if holder in FACTS:
         fact = FACTS[holder]
@@ -83,21 +80,21 @@ def _names(holder: str, name: str, unit: Unit, variable: Variable) -> bool:
     )
 
 
-class Runs:
+class RegionRuns:
     """What open values make of the runs of an experiment.
 
     Args:
         planned: the experiment, without axes, with a plan for every run.
     """
 
-    def __init__(self, planned: Planned) -> None:
+    def __init__(self, planned: PlannedExperiment) -> None:
         assert planned.experiment.spec.region is not None
         self.planned = planned
-        self.experiment: Experiment = planned.experiment
+        self.experiment: LoadedExperiment = planned.experiment
         self.open_values = planned.experiment.spec.region.open_values
         self.plans = {job.label: job.plan for job in planned.jobs if job.plan is not None}
         self.jobs = {job.label: job for job in planned.jobs}
-        self._cells: dict[Cell, Cell] = {}
+        self._cells: dict[RegionCell, RegionCell] = {}
 
     @cached_property
     def touched(self) -> dict[str, list[str]]:
@@ -122,7 +119,7 @@ class Runs:
 
     def _touches_none(self, name: str) -> str:
         places = self.open_values[name].places
-        units = dict.fromkeys(unit.name for plan in self.plans.values() for unit in plan.units)
+        units = dict.fromkeys(unit.name for plan in self.plans.values() for unit in plan.instances)
         missing = next((place for place in places if place.partition(".")[0] not in units), "")
         guess = hint(missing.partition(".")[0], units, lead="units") if missing else ""
         return (
@@ -154,7 +151,7 @@ class Runs:
         named = variant.scenario.replace("{scenario}", run.scenario.stem)
         return self.experiment.path.parent / named if named else run.scenario
 
-    def changes(self, name: str, place: Place) -> tuple[Path, list[Change]]:
+    def changes(self, name: str, place: RegionPoint) -> tuple[Path, list[Override]]:
         """Return the scenario that a run has at a point, and what is changed in it besides."""
         run, changes = self.experiment.runs[name], []
         scenario = run.scenario
@@ -163,14 +160,14 @@ class Runs:
             if one.times:
                 for where in one.vary:
                     own = self.own_value(run.name, where)
-                    changes.append(Change(where, float(own or 0.0) * float(level.value), ORIGIN))
+                    changes.append(Override(where, float(own or 0.0) * float(level.value), ORIGIN))
                 continue
             if one.kind == "variant" and one.variants[str(level.value)].scenario:
                 scenario = self._scenario(one.variants[str(level.value)], run)
             changes += changes_at(one, level, self.experiment.path.parent, ORIGIN)
         return scenario, changes
 
-    def cell(self, name: str, place: Place) -> Cell:
+    def cell(self, name: str, place: RegionPoint) -> RegionCell:
         """Return a run at a point, by what changes it there."""
         if (name, place) not in self._cells:
             other = (one for one in place if name in self.touched[one[0]] and self._is_other(name, one))
@@ -224,12 +221,12 @@ class Runs:
 
 
 @dataclass(frozen=True)
-class Asked:
+class RegionQuestion:
     """A claim or check, the runs it speaks of, and where it is to be judged."""
 
     claim: Claim
     runs: tuple[str, ...]
-    points: list[Place]  # of the Latin hypercube
+    points: list[RegionPoint]  # of the Latin hypercube
     lines: dict[str, list[Level]]  # open value that it depends on -> its levels
 
 
@@ -237,11 +234,11 @@ class Asked:
 class RegionPlan:
     """All runs of a region, ready to start."""
 
-    runs: Runs
-    asked: dict[Key, Asked]
-    jobs: dict[Cell, Job]
+    runs: RegionRuns
+    asked: dict[RegionKey, RegionQuestion]
+    jobs: dict[RegionCell, Job]
 
-    def cells(self, asked: Asked) -> Iterator[Cell]:
+    def cells(self, asked: RegionQuestion) -> Iterator[RegionCell]:
         """Yield every run at every point that a claim is judged at."""
         along = (((key, level),) for key, levels in asked.lines.items() for level in levels)
         for place in itertools.chain(asked.points, along):
@@ -249,7 +246,11 @@ class RegionPlan:
 
 
 def plan_region(
-    planned: Planned, folder: Path, *, once: Once, progress: Callable[[int], None] = lambda done: None
+    planned: PlannedExperiment,
+    folder: Path,
+    *,
+    once: PlanningCache,
+    progress: Callable[[int], None] = lambda done: None,
 ) -> RegionPlan:
     """Plan the runs that judge all claims over the region; checks are judged where these suffice.
 
@@ -262,12 +263,12 @@ def plan_region(
     Raises:
         ScenarioError: an open value touches no run, or a level of it is none that a run can take.
     """
-    runs = Runs(planned)
+    runs = RegionRuns(planned)
     spec = runs.experiment.spec
     assert spec.region is not None
     continuous = [one.continuous for one in runs.open_values.values()]
     hypercube = latin_hypercube(continuous, spec.region.points, spec.region.seed)
-    asked: dict[Key, Asked] = {}
+    asked: dict[RegionKey, RegionQuestion] = {}
     for group, claims in (("claims", spec.claims), ("checks", spec.checks)):
         for number, claim in enumerate(claims):
             asked[group, number] = _asked(runs, claim, hypercube)
@@ -300,7 +301,7 @@ def plan_region(
     return RegionPlan(runs, known, dict(zip(wanted, made, strict=True)))
 
 
-def _asked(runs: Runs, claim: Claim, hypercube: list[tuple[Level, ...]]) -> Asked:
+def _asked(runs: RegionRuns, claim: Claim, hypercube: list[tuple[Level, ...]]) -> RegionQuestion:
     names = runs_of(runs.experiment, claim)
     lines = {
         key: levels_of(one.stepped)
@@ -309,10 +310,12 @@ def _asked(runs: Runs, claim: Claim, hypercube: list[tuple[Level, ...]]) -> Aske
         and any(name in runs.touched[key] for name in names)
     }
     points = (zip(runs.open_values, point, strict=True) for point in hypercube)
-    return Asked(claim, names, [tuple(one for one in point if one[0] in lines) for point in points], lines)
+    return RegionQuestion(
+        claim, names, [tuple(one for one in point if one[0] in lines) for point in points], lines
+    )
 
 
-def runs_of(experiment: Experiment, claim: Claim) -> tuple[str, ...]:
+def runs_of(experiment: LoadedExperiment, claim: Claim) -> tuple[str, ...]:
     """Return the names of all runs that decide on a claim."""
     spec, found = experiment.spec, dict[str, None]()
     for condition in claim.holds_if:
@@ -324,12 +327,14 @@ def runs_of(experiment: Experiment, claim: Claim) -> tuple[str, ...]:
                 found |= dict.fromkeys(cell.run for cell in among)
         else:
             found |= dict.fromkeys(run.name for run in experiment.matching([condition.run]))
-        if isinstance(condition.bound, Reference):
+        if isinstance(condition.bound, MetricReference):
             found[condition.bound.run] = None
     return tuple(found)
 
 
-def judge_region(plan: RegionPlan, findings: Findings, records: Mapping[str, Record]) -> dict[Key, Region]:
+def judge_region(
+    plan: RegionPlan, findings: ExperimentResult, records: Mapping[str, MeasuredRun]
+) -> dict[RegionKey, Region]:
     """Return what becomes of every verdict over the region.
 
     Args:
@@ -345,25 +350,35 @@ def judge_region(plan: RegionPlan, findings: Findings, records: Mapping[str, Rec
 
 
 def _judged(
-    plan: RegionPlan, asked: Asked, chosen: Judgement, findings: Findings, records: Mapping[str, Record]
+    plan: RegionPlan,
+    asked: RegionQuestion,
+    chosen: ClaimResult,
+    findings: ExperimentResult,
+    records: Mapping[str, MeasuredRun],
 ) -> Region:
     runs = plan.runs
     words = {run.name: run.row for run in findings.experiment.runs.values()}
 
-    def spot(place: Place) -> Spot:
+    def spot(place: RegionPoint) -> PointVerdict:
         values = {}
         for name in asked.runs:
             cell = runs.cell(name, place)
             record = records[plan.jobs[cell].key] if cell[1] else None
             for key in findings.spec.metrics:
                 measured = record and record.values.get(key)
-                value = Value(*measured) if measured else None if record else findings.values.get((name, key))
+                value = (
+                    MetricValue(*measured)
+                    if measured
+                    else None
+                    if record
+                    else findings.values.get((name, key))
+                )
                 if value is not None:
                     values[name, key] = value
         found = judge(asked.claim, values, words, derive(findings.spec, values))
-        return Spot(found.holds, found.margin_from(chosen))
+        return PointVerdict(found.holds, found.margin_from(chosen))
 
-    here = Spot(chosen.holds, chosen.margin)
+    here = PointVerdict(chosen.holds, chosen.margin)
     lines = []
     for key, levels in asked.lines.items():
         one = runs.open_values[key]
@@ -372,14 +387,18 @@ def _judged(
             place = ((key, level),)
             if any(runs.cell(name, place)[1] for name in asked.runs):  # else it is the chosen level
                 number = runs.number(key, level) if one.numeric else None
-                stops.append(Stop(level.words, number, spot(place)))
+                stops.append(LevelVerdict(level.words, number, spot(place)))
         unit, factor = _shown(runs, key, asked.runs) if one.numeric else ("", 1.0)
         at = runs.chosen_number(key, asked.runs) if one.numeric else None
-        lines.append(Line(key, one.says or key, unit, factor, Stop("as chosen", at, here), tuple(stops)))
+        lines.append(
+            OpenValueScan(
+                key, one.says or key, unit, factor, LevelVerdict("as chosen", at, here), tuple(stops)
+            )
+        )
     return Region(here, tuple(spot(place) for place in asked.points), tuple(lines))
 
 
-def _shown(runs: Runs, key: str, names: Iterable[str]) -> tuple[str, float]:
+def _shown(runs: RegionRuns, key: str, names: Iterable[str]) -> tuple[str, float]:
     """Return the unit in which an open value is shown, and the factor of its numbers to that.
 
     Factors become numbers where all runs that they are judged by have one in common; else they are

@@ -136,25 +136,24 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from ..figures.plots import OVERVIEW
 from ..scenario.scenario_schema import Scalar
-from ..scenario.strict import Strict
-from ..scenario.yaml_lines import Key
-from .axis_schema import MOST, AxisSpec, Changes, DesignAxisSpec
+from ..scenario.validation import StrictModel
+from ..scenario.yaml_lines import KeyPath
+from .axes import MOST, AxisSpec, DesignAxisSpec, OverrideSpec, RegionSpec
 from .judged_schema import (
+    Assertion,
     Claim,
     Condition,
     DerivedSpec,
     GridSpec,
-    Judged,
     LimitSpec,
     MetricSpec,
     Patterns,
+    QuantityText,
     alternatives,
 )
-from .numbers import Quantity
-from .region_schema import RegionSpec
 
 
-class ChoiceSpec(Changes):
+class ChoiceSpec(OverrideSpec):
     """A value of a `for` of runs, with what it changes."""
 
     says: str = Field("", description="What texts call it; default: the value")
@@ -170,7 +169,7 @@ def _choices(value: object) -> Any:
 Choices = Annotated[dict[str, ChoiceSpec], BeforeValidator(_choices)]
 
 
-class RunSpec(Changes):
+class RunSpec(OverrideSpec):
     """One run, or with `for` one per combination."""
 
     name: str = Field(description="Name of the run and of its folder, e.g. 25mps/fnn", min_length=1)
@@ -182,7 +181,7 @@ class RunSpec(Changes):
     row: str = Field("", description="What tables call it; default: the label")
 
 
-class LawSpec(Changes):
+class LawSpec(OverrideSpec):
     """What is tuned of a law, and what is changed for it."""
 
     axes: dict[str, AxisSpec] = Field(description="Name -> what is sought, from and to", min_length=1)
@@ -195,7 +194,7 @@ class LawSpec(Changes):
         return self
 
 
-class TuningSpec(Strict):
+class TuningSpec(StrictModel):
     """A search for the values that make an objective least, by one budget for all laws."""
 
     objective: str = Field(description="Key of `derived`; the least is the best")
@@ -219,7 +218,7 @@ class TuningSpec(Strict):
         return self
 
 
-class TableSpec(Strict):
+class TableSpec(StrictModel):
     """A table of metrics, one row per run."""
 
     title: str = ""
@@ -227,7 +226,7 @@ class TableSpec(Strict):
     metrics: list[str] = Field(description="Keys of `metrics`, one column each", min_length=1)
 
 
-class FigureSpec(Strict):
+class FigureSpec(StrictModel):
     """A figure: several runs laid over each other, or a metric or a limit over one or two axes."""
 
     name: str = Field(description="Name of its files", pattern=r"^[\w.+-]+$")
@@ -247,8 +246,8 @@ class FigureSpec(Strict):
     lines: str = Field("", description="Axis with a line per value, of curves and limits")
     only: dict[str, list[Scalar]] = Field({}, description="Axis -> those of its values that are drawn")
     scale: Literal["linear", "log"] = Field("linear", description="Of the metric")
-    largest: Quantity | None = Field(None, description="Where the metric's scale ends")
-    mark: Quantity | None = Field(None, description="A value of the metric to draw a line at")
+    largest: QuantityText | None = Field(None, description="Where the metric's scale ends")
+    mark: QuantityText | None = Field(None, description="A value of the metric to draw a line at")
 
     @property
     def panel_axis(self) -> str:
@@ -298,7 +297,7 @@ def _list_of_runs(value: object) -> Any:
     return value
 
 
-class ExperimentSpec(Changes):
+class ExperimentSpec(OverrideSpec):
     """A file of an experiment."""
 
     title: str = Field(min_length=1)
@@ -354,9 +353,9 @@ class ExperimentSpec(Changes):
             for i, one in enumerate(said):
                 yield group, one.number(i), one
 
-    def conditions(self) -> Iterator[tuple[Key, Condition]]:
+    def conditions(self) -> Iterator[tuple[KeyPath, Condition]]:
         """Yield every condition of claims, checks and limits, with its place in the file."""
-        judged: list[tuple[str, str | int, Judged]] = [*self.said()]
+        judged: list[tuple[str, str | int, Assertion]] = [*self.said()]
         judged += [("limits", name, limit) for name, limit in self.limits.items()]
         for group, which, one in judged:
             for k, condition in enumerate(one.holds_if):

@@ -1,29 +1,47 @@
-"""Tables for people, on the terminal or in a page, from one description."""
+"""Tables for people, on the terminal or in a page, from one description.
+
+Tables of what there is: runs below a folder, scenarios, vehicles, FMUs, signals, metrics.
+"""
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
-from ..figures.display import shown
+import numpy as np
+
+from vocabulary.wheels import WHEELS
+
+from ..errors import ModelDescriptionError, ScenarioError
+from ..figures.style import shown
+from ..fmu.archive import open_fmu
+from ..labels import changed, changes_in, with_changes
+from ..messages import printable, star
+from ..metrics.measures import catalogue as measures
+from ..metrics.measures import symbol
 from ..metrics.plausibility import findings_in, first_of_each
-from ..metrics.run_metrics import Value, evaluate_all, metric
-from ..titles import changes_in, with_changes
-from ..wording import printable
+from ..metrics.run_metrics import STANDARD, MetricValue, columns_of, evaluate_all, metric
+from ..plan import Fmu, Plan
+from ..results.read import FoundRun, Results
+from ..scenario import catalogue, yaml_lines
 
 if TYPE_CHECKING:
     import rich.console
 
     from ..results.read import Results
 
+
 MARK = "†"
 """Behind the name of a run whose course had something remarkable."""
 MIN_HEADING = 12
 """Characters of a heading over numbers before it is broken at a space."""
 
-Cell = str | Value | None
+Cell = str | MetricValue | None
 """Words, a number with its unit, or nothing."""
 
 
@@ -43,13 +61,13 @@ class Table:
 
     def is_number(self, column: int) -> bool:
         """Return whether a column holds numbers, and so is set flush right."""
-        return column in self.numbers or any(isinstance(row[column], Value) for row in self.rows)
+        return column in self.numbers or any(isinstance(row[column], MetricValue) for row in self.rows)
 
 
 def _shown(cell: Cell) -> str:
     if cell is None:
         return "-"
-    return shown(cell.number, cell.unit, half=cell.half) if isinstance(cell, Value) else printable(cell)
+    return shown(cell.number, cell.unit, half=cell.half) if isinstance(cell, MetricValue) else printable(cell)
 
 
 def for_terminal(table: Table) -> rich.console.Group:
@@ -99,3 +117,143 @@ def metrics_of_run(results: Results, names: Sequence[str]) -> Table:
     missing = [name for name in names if name not in values]
     notes = [f"No number for {', '.join(missing)}."] if missing else []
     return Table(title, ["metric", "", "value"], rows, notes)
+
+
+PEAKS = ("sideslip", "yaw_rate", "acceleration_y")
+"""Signals whose largest values tell in a list how a run has ended."""
+
+
+def runs_table(runs: Sequence[FoundRun]) -> Table:
+    """Return a table of runs: when, of what, what was changed, how they ended, a few metrics."""
+    peaks = [metric(f"peak({signal})") for signal in PEAKS]
+    headings = ["run", "begun", "scenario", "changed", "status", *(one.formula for one in peaks)]
+    table = Table("", headings)
+    for run in runs:
+        file = Path(str((run.record.get("scenario") or {}).get("file") or ""))
+        scenario = "/".join([*file.parts[-2:-1], file.stem])
+        cells: list[Cell] = [
+            str(run.folder), _local(run.record.get("started")), scenario or None,
+            changed(changes_in(run.record)) or None, run.status, *(_peak(run.record, s) for s in PEAKS),
+        ]  # fmt: skip
+        table.rows.append(cells)
+    table.notes = [f"{run.folder}: {_one_line(run.problem)}" for run in runs if run.problem]
+    return table
+
+
+def _local(started: Any) -> str | None:
+    """Return a moment as people here write it."""
+    try:
+        return datetime.fromisoformat(str(started)).astimezone().strftime("%Y-%m-%d %H:%M")
+    except ValueError:
+        return None
+
+
+def _peak(record: dict[str, Any], signal: str) -> MetricValue | None:
+    """Return the largest absolute value of a signal, by the record alone."""
+    units = {name: unit or "" for name, unit in (record.get("units") or {}).items()}
+    columns = {name: np.empty(0) for name in units if name != "time"}
+    found = columns_of(Results(Path(), np.empty(0), columns, units, record), signal)
+    ends = [record.get(end, {}).get(name) for name in found for end in ("smallest", "largest")]
+    numbers = [float(end) for end in ends if isinstance(end, (int, float, str))]
+    if not numbers or any(map(math.isnan, numbers)):
+        return None
+    return MetricValue(max(map(abs, numbers)), units[found[0]] or "1")
+
+
+def files_table(folder: Path | None, kinds: Sequence[str]) -> Table:
+    """Return a table of YAML files of some kinds (`strict.KINDS`) and SSP archives.
+
+    Those below a folder by their paths; without one, those that commands take by name.
+
+    Raises:
+        ScenarioError: there is no such folder, or no such file in it.
+    """
+    if folder is not None and not folder.is_dir():
+        raise ScenarioError(f"{folder}: there is no such folder")
+    table = Table("", ["name" if folder is None else "file", "kind", "title"])
+    rows: dict[str, Sequence[Cell]] = {}
+    for base in catalogue.folders() if folder is None else [folder]:
+        for path, kind in catalogue.files(base, kinds):
+            archive = path.suffix == ".ssp"
+            data = None if archive else yaml_lines.read(path, what="file").data
+            title = str(data.get("title") or "") if isinstance(data, dict) else ""
+            by_name = folder is None and kind in catalogue.COMMANDS
+            name = path.relative_to(base).with_suffix("").as_posix() if by_name else str(path)
+            rows.setdefault(name, [name, "SSP archive" if archive else kind.partition(" ")[2], title or None])
+    table.rows = [*rows.values()]
+    if not table.rows:
+        where = folder or " and ".join(map(str, catalogue.folders()))
+        raise ScenarioError(f"{where}: holds no file that is {' or '.join(kinds)}")
+    return table
+
+
+def fmus_in(folder: Path) -> tuple[list[Fmu], list[str]]:
+    """Return the FMUs in a folder, and what is wrong with those that cannot be used."""
+    found: list[Fmu] = []
+    problems: list[str] = []
+    for path in sorted(folder.glob("*.fmu")):
+        try:
+            found.append(open_fmu(path))
+        except ModelDescriptionError as error:  # noqa: PERF203 - the others are listed all the same
+            problems += error.problems
+    return found, problems
+
+
+def fmus_table(fmus: Sequence[Fmu], problems: Sequence[str]) -> Table:
+    """Return a table of FMUs."""
+    table = Table("", ["FMU", "description", "parameters", "made by"], notes=list(problems), numbers={2})
+    for fmu in fmus:
+        count = str(len(fmu.of("parameter")))
+        table.rows.append([fmu.name, _one_line(fmu.description) or None, count, fmu.generation_tool or None])
+    return table
+
+
+def signals_table(fmus: Sequence[Fmu]) -> Table:
+    """Return a table of the signals that FMUs exchange: who gives and who takes them, wheels as one."""
+    given: dict[str, list[str]] = {}
+    taken: dict[str, list[str]] = {}
+    about: dict[str, tuple[str, str]] = {}
+    for fmu in fmus:
+        for users, causality in ((given, "output"), (taken, "input")):
+            for variable in fmu.of(causality):
+                name = star(variable.name) if variable.name.endswith(WHEELS) else variable.name
+                about.setdefault(name, (variable.unit or "", star(_one_line(variable.description))))
+                users.setdefault(name, []).append(fmu.name)
+    table = Table("", ["signal", "", "unit", "given by", "taken by", "description"])
+    for name in sorted(about):
+        unit, text = about[name]
+        users_of = [_some(dict.fromkeys(users.get(name, ()))) for users in (given, taken)]
+        sign = symbol(name)
+        table.rows.append([name, sign if sign != name else None, unit or None, *users_of, text or None])
+    return table
+
+
+def recorded_table(plan: Plan) -> Table:
+    """Return a table of the signals that a run of a plan records."""
+    table = Table(plan.title, ["signal", "", "unit", "description"])
+    units = {unit.name: unit for unit in plan.instances}
+    for unit, name in plan.record:
+        variable, sign = units[unit].fmu.variables[name], symbol(name)
+        text = _one_line(variable.description) or None
+        table.rows.append([f"{unit}.{name}", sign if sign != name else None, variable.unit, text])
+    return table
+
+
+def metrics_table() -> Table:
+    """Return a table of all measures of a signal x."""
+    table = Table("", ["metric", "what it is", "", "unit", "needs"])
+    for one in measures():
+        table.rows.append([f"{one.name}(x)", one.definition, one.formula, one.unit, one.needs or None])
+    table.notes = [f"'standard' stands for {', '.join(STANDARD)}."]
+    return table
+
+
+def _some(names: Sequence[str] | dict[str, None]) -> str | None:
+    """Return names, the first of many."""
+    listed = list(names)
+    more = f" and {len(listed) - 2} more" if len(listed) > 3 else ""
+    return ", ".join(listed[:2] if more else listed) + more or None
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

@@ -21,13 +21,12 @@ from typing import TYPE_CHECKING, Any
 
 from .. import checksums
 from ..errors import ScenarioError
-from ..metrics.run_metrics import Value
-from .axis_schema import Changes, DesignAxisSpec, VariantSpec
-from .design import level_at
-from .experiment import Experiment
-from .findings import Findings, derive
-from .judging import Values
-from .table import Column
+from ..metrics.run_metrics import MetricValue
+from .axes import DesignAxisSpec, OverrideSpec, VariantSpec, level_at
+from .experiment import LoadedExperiment
+from .judging import MetricTable
+from .outcome import ExperimentResult, derive
+from .record import TableColumn
 from .tables import Table
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ TRIAL = "trial"
 ENTRIES = "entries.yaml"
 """What is found as entries of a ranking, in the folder of the results."""
 
-Judged = Callable[[Experiment], Findings]
+JudgeExperiment = Callable[[LoadedExperiment], ExperimentResult]
 """Makes those runs of an experiment that are left, and returns what it comes to."""
 
 
@@ -61,7 +60,7 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Tuned:
+class TunedLaw:
     """A law and all that was tried of it, in order; the first has the middle of all ranges."""
 
     law: str
@@ -73,7 +72,7 @@ class Tuned:
         return min(self.trials, key=lambda trial: trial.cost)
 
 
-def tuning_of(experiment: Experiment) -> TuningSpec:
+def tuning_of(experiment: LoadedExperiment) -> TuningSpec:
     """Return what an experiment asks to be tuned.
 
     Raises:
@@ -84,7 +83,7 @@ def tuning_of(experiment: Experiment) -> TuningSpec:
     return experiment.spec.tuning
 
 
-def search(experiment: Experiment, judged: Judged) -> list[Tuned]:
+def search(experiment: LoadedExperiment, judged: JudgeExperiment) -> list[TunedLaw]:
     """Return what the search of every law has tried.
 
     Args:
@@ -120,23 +119,25 @@ def search(experiment: Experiment, judged: Judged) -> list[Tuned]:
             costs, [(0.0, 1.0)] * len(axes), init=first, maxiter=tuning.generations - 1, rng=chance,
             tol=0.0, atol=0.0, polish=False, vectorized=True, updating="deferred",
         )  # fmt: skip
-        found.append(Tuned(name, trials))
+        found.append(TunedLaw(name, trials))
     return found
 
 
-def best_of(experiment: Experiment, found: Sequence[Tuned]) -> Experiment:
+def best_of(experiment: LoadedExperiment, found: Sequence[TunedLaw]) -> LoadedExperiment:
     """Return the runs of what was best of every law."""
     laws = tuning_of(experiment).laws
     return _trials(experiment, {one.law: _changes(laws[one.law], one.best.values) for one in found})
 
 
-def _fixed(experiment: Experiment, judged: Judged) -> Values:
+def _fixed(experiment: LoadedExperiment, judged: JudgeExperiment) -> MetricTable:
     """Return the metrics of the runs that no law drives."""
     left = _trials(experiment, {"as they stand": VariantSpec.model_validate({})}, driven=False)
     return judged(left).values if left.runs else {}
 
 
-def _trials(experiment: Experiment, tried: dict[str, VariantSpec], *, driven: bool = True) -> Experiment:
+def _trials(
+    experiment: LoadedExperiment, tried: dict[str, VariantSpec], *, driven: bool = True
+) -> LoadedExperiment:
     """Return an experiment of the runs that laws drive, or of the others, at each trial: its only axis."""
     drives = experiment.matching(tuning_of(experiment).runs)
     runs = {name: run for name, run in experiment.runs.items() if (run in drives) == driven}
@@ -158,16 +159,16 @@ def _changes(law: LawSpec, values: dict[str, float]) -> VariantSpec:
     """Return a law's own changes with the values that are tried."""
     units = {place: axis.unit for axis in law.axes.values() for place in axis.vary}
     tried = {place: f"{x!r} {unit}" if (unit := units[place]) else x for place, x in values.items()}
-    own = {name: getattr(law, name) for name in Changes.model_fields}
+    own = {name: getattr(law, name) for name in OverrideSpec.model_fields}
     return VariantSpec.model_construct(**{**own, "set": {**law.set, **tried}})
 
 
-def _objective(experiment: Experiment, values: Values) -> float | None:
+def _objective(experiment: LoadedExperiment, values: MetricTable) -> float | None:
     found = derive(experiment.spec, values).get(tuning_of(experiment).objective)
     return None if found is None or not math.isfinite(found.number) else found.number
 
 
-def tuning_table(experiment: Experiment, found: Sequence[Tuned]) -> Table:
+def tuning_table(experiment: LoadedExperiment, found: Sequence[TunedLaw]) -> Table:
     """Return the table of laws: the objective amid the ranges, the least, and where it was found."""
     tuning = tuning_of(experiment)
     spec = experiment.spec.derived[tuning.objective]
@@ -175,7 +176,7 @@ def tuning_table(experiment: Experiment, found: Sequence[Tuned]) -> Table:
     table = Table(f"{spec.says}: {budget}", ["law", "middle of the ranges", "found", "with"])
     for one in found:
         first, best = (
-            "failed" if trial.objective is None else Value(trial.objective, spec.unit)
+            "failed" if trial.objective is None else MetricValue(trial.objective, spec.unit)
             for trial in (one.trials[0], one.best)
         )
         units = {place: axis.unit for axis in tuning.laws[one.law].axes.values() for place in axis.vary}
@@ -186,7 +187,7 @@ def tuning_table(experiment: Experiment, found: Sequence[Tuned]) -> Table:
     return table
 
 
-def entries_of(experiment: Experiment, found: Sequence[Tuned]) -> dict[str, dict[str, Any]]:
+def entries_of(experiment: LoadedExperiment, found: Sequence[TunedLaw]) -> dict[str, dict[str, Any]]:
     """Return what is found as entries of a ranking: name -> title, FMU, parameters, where they are from."""
     tuning = tuning_of(experiment)
     entries = {}
@@ -213,7 +214,7 @@ def entries_text(entries: dict[str, dict[str, Any]], command: str) -> str:
 
     from ruamel.yaml import YAML
 
-    from .ranking_schema import EntriesSpec
+    from .ranking import EntriesSpec
 
     yaml: Any = YAML(typ="safe", pure=True)
     yaml.default_flow_style, yaml.sort_base_mapping_type_on_output, yaml.width = False, False, 110
@@ -222,24 +223,23 @@ def entries_text(entries: dict[str, dict[str, Any]], command: str) -> str:
     return f"# Written by: {command}\n{stream.getvalue()}"
 
 
-def columns_of(found: Sequence[Tuned]) -> list[Column]:
+def columns_of(found: Sequence[TunedLaw]) -> list[TableColumn]:
     """Return all trials as columns: law, generation, objective, and every place that any law varies."""
     rows = [(one.law, trial) for one in found for trial in one.trials]
     places = dict.fromkeys(place for _, trial in rows for place in trial.values)
     return [
-        Column("law", "string", [law for law, _ in rows]),
-        Column("generation", "int64", [trial.generation for _, trial in rows]),
-        Column("objective", "float64", [trial.objective for _, trial in rows]),
-        *(Column(place, "float64", [trial.values.get(place) for _, trial in rows]) for place in places),
+        TableColumn("law", "string", [law for law, _ in rows]),
+        TableColumn("generation", "int64", [trial.generation for _, trial in rows]),
+        TableColumn("objective", "float64", [trial.objective for _, trial in rows]),
+        *(TableColumn(place, "float64", [trial.values.get(place) for _, trial in rows]) for place in places),
     ]
 
 
-def history_figure(experiment: Experiment, found: Sequence[Tuned], note: str) -> Figure:
+def history_figure(experiment: LoadedExperiment, found: Sequence[TunedLaw], note: str) -> Figure:
     """Return the least objective so far over the number of trials, a line per law."""
     from matplotlib.lines import Line2D
 
-    from ..figures.display import shown_unit
-    from ..figures.style import frame, line_style, new_figure
+    from ..figures.style import frame, line_style, new_figure, shown_unit
 
     with new_figure() as figure:
         axes = figure.subplots()

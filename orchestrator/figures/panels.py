@@ -4,6 +4,8 @@ A panel is named by what it shows: a signal (over its reference, where the run r
 `<signal>_error`, `path`, one signal over another (`yaw_rate(sideslip)`), or a signal of four wheels
 (`wheel_torque_*`: one panel with four lines for one run, four panels for several). A panel whose
 signals no run has does not exist.
+
+When runs were faulty, as spans behind the lines of panels over time.
 """
 
 from __future__ import annotations
@@ -12,23 +14,84 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from vocabulary.wheels import WHEEL_NAMES, wheels
 
 from ..errors import ScenarioError
+from ..messages import cut, fold, hint
+from ..metrics.measures import variable_of, words
 from ..metrics.run_metrics import columns_of, reference_of
-from ..metrics.symbols import variable_of, words
-from ..wording import cut, fold, hint
-from .display import Run, digits_of, in_formula, shown_unit
 from .portrait import curves_of, draw_portrait, signals_of, spread_rows
-from .spans import Span, mark, spans_of
-from .style import REFERENCE, ROW, WIDTH, line_style, literal, note_above
+from .style import (
+    REFERENCE,
+    ROW,
+    WIDTH,
+    LabelledRun,
+    digits_of,
+    in_formula,
+    line_style,
+    literal,
+    note_above,
+    shown_unit,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+
+FAULTY = "#F7DDC8"
+"""The colour of a span; pale enough for all lines and the grid."""
+SPAN: dict[str, Any] = {"color": FAULTY, "linewidth": 8.0, "linestyle": "-", "solid_capstyle": "butt"}
+"""How a legend shows it."""
+NAMED = 4
+"""Faults that a legend names; of more it says how many there are. Chosen: a legend is no table."""
+
+
+class FaultSpan(NamedTuple):
+    """A fault of a run: from when until when [s], and what it is."""
+
+    begin: float
+    end: float
+    says: str
+
+
+def spans_of(runs: Sequence[LabelledRun]) -> list[FaultSpan]:
+    """Return the faults of runs, each once; that not all have is said with the label."""
+    found: dict[FaultSpan, list[str]] = {}
+    for label, results in runs:
+        for fault in results.record.faults if results.time.size else ():
+            begin, end = fault.begin, fault.until
+            first, last = results.time[0], results.time[-1]
+            span = FaultSpan(
+                float(first if begin is None else max(begin, first)),
+                float(last if end is None else min(end, last)),
+                fault.words,
+            )
+            if span.begin < span.end:
+                found.setdefault(span, []).append(label)
+    return [
+        span if len(labels) == len(runs) else span._replace(says=f"{', '.join(labels)}: {span.says}")
+        for span, labels in found.items()
+    ]
+
+
+def mark(axes: Axes, spans: Sequence[FaultSpan]) -> None:
+    """Draw spans behind all lines of axes over time; the limits stay."""
+    limits = axes.get_xlim()
+    for begin, end in dict.fromkeys((span.begin, span.end) for span in spans):
+        axes.axvspan(begin, end, facecolor=FAULTY, edgecolor="none", zorder=0)
+    axes.set_xlim(limits)
+
+
+def in_legend(spans: Sequence[FaultSpan]) -> list[str]:
+    """Return what a legend says of spans, none if there are none."""
+    if len(spans) > NAMED:
+        return [f"{len(spans)} faults"]
+    return [span.says for span in spans]
+
 
 POINTS = 1500
 """Buckets a line is thinned to; each keeps its smallest and its largest value."""
@@ -59,7 +122,7 @@ class Panel:
     rows: int = 1
 
 
-def panels_of(runs: Sequence[Run], name: str, *, whole: bool = False) -> list[Panel]:
+def panels_of(runs: Sequence[LabelledRun], name: str, *, whole: bool = False) -> list[Panel]:
     """Return the panels that a name stands for: none if no run has the signals, four for wheels.
 
     `whole`: no run leaves the axes, however far it goes.
@@ -87,7 +150,7 @@ def panels_of(runs: Sequence[Run], name: str, *, whole: bool = False) -> list[Pa
     ]
 
 
-def shown_by(runs: Sequence[Run], names: Sequence[str], *, whole: bool = False) -> list[Panel]:
+def shown_by(runs: Sequence[LabelledRun], names: Sequence[str], *, whole: bool = False) -> list[Panel]:
     """Return all panels that the names stand for, in order (see `panels_of`)."""
     panels = [panel for name in names for panel in panels_of(runs, name, whole=whole)]
     spans = spans_of(runs)
@@ -96,7 +159,7 @@ def shown_by(runs: Sequence[Run], names: Sequence[str], *, whole: bool = False) 
     return [replace(panel, draw=_marked(panel.draw, spans)) if panel.over_time else panel for panel in panels]
 
 
-def _marked(draw: Callable[[Axes], None], spans: Sequence[Span]) -> Callable[[Axes], None]:
+def _marked(draw: Callable[[Axes], None], spans: Sequence[FaultSpan]) -> Callable[[Axes], None]:
     def fill(axes: Axes) -> None:
         draw(axes)
         mark(axes, spans)
@@ -104,7 +167,7 @@ def _marked(draw: Callable[[Axes], None], spans: Sequence[Span]) -> Callable[[Ax
     return fill
 
 
-def check_panels(runs: Sequence[Run], names: Sequence[str], *, option: str = "--panel ") -> None:
+def check_panels(runs: Sequence[LabelledRun], names: Sequence[str], *, option: str = "--panel ") -> None:
     """Make sure that every name stands for a panel of at least one run.
 
     Args:
@@ -127,7 +190,7 @@ def check_panels(runs: Sequence[Run], names: Sequence[str], *, option: str = "--
         raise ScenarioError(problems)
 
 
-def _draw_signal(axes: Axes, runs: Sequence[Run], name: str, whole: bool) -> None:
+def _draw_signal(axes: Axes, runs: Sequence[LabelledRun], name: str, whole: bool) -> None:
     """Draw a signal of all runs over its reference, and limit the axes to what can be read."""
     lines = []
     for number, run in enumerate(runs):
@@ -170,7 +233,7 @@ def _limit(axes: Axes, scale: float, lines: list[tuple[str, float]], unit: str) 
     note_above(axes, f"beyond the axes: {note}")
 
 
-def _draw_error(axes: Axes, runs: Sequence[Run], signal: str, whole: bool) -> None:
+def _draw_error(axes: Axes, runs: Sequence[LabelledRun], signal: str, whole: bool) -> None:
     """Draw the tracking error in per cent of the reference's peak."""
     peaks = []
     for number, run in enumerate(runs):
@@ -183,7 +246,7 @@ def _draw_error(axes: Axes, runs: Sequence[Run], signal: str, whole: bool) -> No
         _limit(axes, max(SEEN_ERROR, min(peak for _, peak in peaks)), peaks, "%")
 
 
-def _error(run: Run, signal: str) -> np.ndarray | None:
+def _error(run: LabelledRun, signal: str) -> np.ndarray | None:
     columns = columns_of(run.results, signal)
     reference = reference_of(run.results, columns[0]) if columns else None
     if not reference or _peak(run.results[reference]) == 0:
@@ -192,7 +255,7 @@ def _error(run: Run, signal: str) -> np.ndarray | None:
     return (run.results[columns[0]] - wanted) / _peak(wanted)
 
 
-def _draw_wheels(axes: Axes, run: Run, name: str) -> None:
+def _draw_wheels(axes: Axes, run: LabelledRun, name: str) -> None:
     columns = columns_of(run.results, name)
     unit = run.results.units[columns[0]]
     for k, (column, wheel) in enumerate(zip(columns, WHEEL_NAMES, strict=True)):
@@ -204,12 +267,12 @@ def _draw_wheels(axes: Axes, run: Run, name: str) -> None:
     )  # fmt: skip
 
 
-def _path_columns(run: Run) -> tuple[str, str] | None:
+def _path_columns(run: LabelledRun) -> tuple[str, str] | None:
     x, y = columns_of(run.results, "position_x"), columns_of(run.results, "position_y")
     return (x[0], y[0]) if x and y else None
 
 
-def draw_path(axes: Axes, runs: Sequence[Run], *, room: float = PATH_ROOM) -> None:
+def draw_path(axes: Axes, runs: Sequence[LabelledRun], *, room: float = PATH_ROOM) -> None:
     """Draw the paths seen from above; the lateral axis is stretched as far as the shape needs it.
 
     Args:

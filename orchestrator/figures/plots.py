@@ -11,11 +11,9 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ResultsError
-from ..titles import changed_each, changes_in
-from .display import Run, digits_of
-from .panels import Panel, shown_by
-from .spans import SPAN, in_legend, spans_of
-from .style import REFERENCE, ROW, frame, line_style, new_figure, reference_words
+from ..labels import changed_each, changes_in
+from .panels import SPAN, Panel, in_legend, shown_by, spans_of
+from .style import REFERENCE, ROW, LabelledRun, digits_of, frame, line_style, new_figure, reference_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,7 +32,7 @@ OVERVIEW = (
 
 
 def draw(
-    runs: Sequence[Run],
+    runs: Sequence[LabelledRun],
     panels: Sequence[str] = OVERVIEW,
     *,
     title: str | None = None,
@@ -89,7 +87,7 @@ def draw(
     return figure
 
 
-def nothing_recorded(run: Run) -> str:
+def nothing_recorded(run: LabelledRun) -> str:
     """Return a sentence on a run that has ended before there was anything to draw."""
     error = run.results.record.error
     why = f": {' '.join(error.message.split())}" if error and error.message else ""
@@ -111,7 +109,7 @@ def _pair(left: Panel, right: Panel) -> bool:
     return not left.wide and not right.wide and left.over_time == right.over_time
 
 
-def legend_of(runs: Sequence[Run], drawn: Iterable[Axes]) -> list[tuple[str, dict[str, Any]]]:
+def legend_of(runs: Sequence[LabelledRun], drawn: Iterable[Axes]) -> list[tuple[str, dict[str, Any]]]:
     """Return label and look of what a legend explains: the runs if there are several, pale lines, spans."""
     styles = [(run.label, line_style(k)) for k, run in enumerate(runs) if len(runs) > 1]
     if says := reference_words(line for axes in drawn for line in axes.get_lines()):
@@ -119,18 +117,18 @@ def legend_of(runs: Sequence[Run], drawn: Iterable[Axes]) -> list[tuple[str, dic
     return styles + [(says, SPAN) for says in in_legend(spans_of(runs))]
 
 
-def title_of(runs: Sequence[Run]) -> str:
+def title_of(runs: Sequence[LabelledRun]) -> str:
     """Return the title of the runs' scenario, or a general one where they differ."""
     titles = {run.results.record.title or "" for run in runs}
     return (titles.pop() if len(titles) == 1 else "") or "Comparison of runs"
 
 
-def changes_of(runs: Sequence[Run]) -> str:
+def changes_of(runs: Sequence[LabelledRun]) -> str:
     """Return what was changed for the runs against their scenarios, in words."""
     return changed_each([(run.label, changes_in(run.results.run)) for run in runs])
 
 
-def provenance(runs: Sequence[Run]) -> str:
+def provenance(runs: Sequence[LabelledRun]) -> str:
     """Return where the figure comes from: version, source, algorithm, step, FMUs with their hashes."""
     records = [run.results.record for run in runs]
     sources = dict.fromkeys(str(record.scenario.get("source") or "") for record in records)

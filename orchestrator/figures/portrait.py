@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..metrics.measures import words
 from ..metrics.run_metrics import columns_of, reference_of
-from ..metrics.symbols import words
 from ..results.read import Results
-from .display import Run, digits_of, in_formula, shown_unit
-from .style import REFERENCE, line_style, literal, note_above
+from .style import REFERENCE, LabelledRun, digits_of, in_formula, line_style, literal, note_above, shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +30,7 @@ MARGIN = 1.2
 
 
 @dataclass(frozen=True)
-class Curve:
+class PortraitCurve:
     """A run's y over x, both as shown, and its references if it has both."""
 
     number: int
@@ -47,7 +46,7 @@ def signals_of(name: str) -> tuple[str, str] | None:
     return (match[2], match[1]) if match else None
 
 
-def curves_of(runs: Sequence[Run], x: str, y: str) -> list[Curve]:
+def curves_of(runs: Sequence[LabelledRun], x: str, y: str) -> list[PortraitCurve]:
     """Return the curves of the runs that recorded both signals."""
     curves = []
     for number, (label, results) in enumerate(runs):
@@ -58,7 +57,9 @@ def curves_of(runs: Sequence[Run], x: str, y: str) -> list[Curve]:
         reference = None
         if wanted[0] and wanted[1]:
             reference = _shown(results, wanted[0]), _shown(results, wanted[1])
-        curves.append(Curve(number, label, _shown(results, across[0]), _shown(results, up[0]), reference))
+        curves.append(
+            PortraitCurve(number, label, _shown(results, across[0]), _shown(results, up[0]), reference)
+        )
     return curves
 
 
@@ -72,7 +73,7 @@ def spread_rows(results: Results, most: int) -> np.ndarray:
     return np.append(np.arange(0, size - 1, max(1, size // most)), size - 1)
 
 
-def draw_portrait(axes: Axes, runs: Sequence[Run], x: str, y: str) -> None:
+def draw_portrait(axes: Axes, runs: Sequence[LabelledRun], x: str, y: str) -> None:
     """Draw y over x of all runs."""
     curves = curves_of(runs, x, y)
     drawn: list[tuple[np.ndarray, np.ndarray]] = []
@@ -105,7 +106,10 @@ def _alike(one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarr
 
 
 def _limit(
-    axes: Axes, curves: Sequence[Curve], references: Sequence[tuple[np.ndarray, np.ndarray]], units: list[str]
+    axes: Axes,
+    curves: Sequence[PortraitCurve],
+    references: Sequence[tuple[np.ndarray, np.ndarray]],
+    units: list[str],
 ) -> None:
     """Keep the axes to what is near; say how far the others go."""
     reach = [np.array([np.max(np.abs(curve.x)), np.max(np.abs(curve.y))]) for curve in curves]

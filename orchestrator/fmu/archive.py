@@ -5,6 +5,8 @@ description as this program needs it (parsing it anew costs 15 to 50 ms) and eve
 appears under its name in one rename, complete, so processes that unpack the same archive at the
 same time cannot meet a half one. A file that was changed, cut off or deleted since is found by its
 hash, which costs a millisecond per FMU, and put back.
+
+What the cache holds, seen from outside: kinds of entries, their sizes, whether they are whole.
 """
 
 from __future__ import annotations
@@ -23,15 +25,16 @@ import tempfile
 import time
 import zipfile
 import zlib
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path, PurePosixPath
 
-from ..cache import KEEP_DAYS, cache_folders, hold
+from ..cache import KEEP_DAYS, cache_folders, content_of, hold
 from ..errors import ModelDescriptionError
 from ..files import PACKED, TooLargeError, check_archive, read_bytes, reason
+from ..messages import closest, listed
 from ..plan import Fmu
-from ..wording import closest, listed
 from . import description as fmu_description
 from .binary import binary_problem
 
@@ -231,3 +234,57 @@ def _prune(folder: Path) -> None:
                 shutil.rmtree(entry, ignore_errors=True)
         except OSError:
             continue
+
+
+@dataclass(frozen=True)
+class CacheEntry:
+    """A file or folder of the cache."""
+
+    path: Path
+    whole: Callable[[], bool]
+
+    @property
+    def size(self) -> int:
+        """Of all its files [B]."""
+        files = self.path.rglob("*") if self.path.is_dir() else [self.path]
+        return sum(file.lstat().st_size for file in files if not file.is_dir())
+
+
+def kept_in(folder: Path) -> dict[str, list[CacheEntry]]:
+    """Return kind -> entries of a folder of the cache; nothing else that lies there is ours."""
+    found: dict[str, list[CacheEntry]] = {
+        "unpacked FMUs": [],
+        "launchers": [_file(file) for file in folder.glob("launcher/*")],
+        "keys of sources": [_file(file) for file in folder.glob("keys/*")],
+        "FMUs": [CacheEntry(file, partial(_zip_is_whole, file)) for file in folder.glob("fmus/*/*.fmu")],
+        "left over": [],
+    }
+    for path in folder.iterdir():
+        match = re.fullmatch(r"[0-9a-f]{32}-(\d+)", path.name)
+        if match and int(match[1]) == FORMAT:
+            found["unpacked FMUs"].append(CacheEntry(path, partial(_entry_is_whole, path)))
+        elif match or path.name.startswith(".unpacking-"):
+            found["left over"].append(CacheEntry(path, lambda: True))  # of other versions, or ended half-way
+    return {kind: entries for kind, entries in found.items() if entries}
+
+
+def _file(file: Path) -> CacheEntry:
+    return CacheEntry(file, lambda: content_of(file) is not None)
+
+
+def _entry_is_whole(entry: Path) -> bool:
+    return whole_entry(entry) is not None
+
+
+def _zip_is_whole(file: Path) -> bool:
+    with contextlib.suppress(zipfile.BadZipFile, OSError), zipfile.ZipFile(file) as archive:
+        return archive.testzip() is None
+    return False
+
+
+def remove(path: Path) -> None:
+    """Delete an entry, also while somebody uses it."""
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)

@@ -6,8 +6,8 @@ import platform as machine
 import re
 import sys
 
+from ..messages import listed, short
 from ..plan import Fmu
-from ..wording import listed, short
 
 _ALWAYS = ("EnterInitializationMode", "ExitInitializationMode", "DoStep", "FreeInstance")
 CORE = {

@@ -1,22 +1,245 @@
-"""An FMU's model description as `plan.Fmu`, read by fmpy, checked for what this master supports."""
+"""An FMU's model description as `plan.Fmu`, read by fmpy, checked for what this master supports.
+
+The scalar variables of a model description, whichever version of FMI it is written in.
+
+A guard against units that would silently run each other's code.
+
+All PythonFMU units of a process share one interpreter: of two modules with one name, the second is
+never loaded. Units made by `yawbench build` carry names that no other content has; units from
+elsewhere may not.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import io
+import itertools
 import math
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 from ..errors import ModelDescriptionError
-from ..plan import Fmu, UnitDefinition, Variable
-from ..wording import short
-from .binary import binary_of, lacking
-from .scalars import scalars
-from .shadowing import hashes_of_modules
+from ..messages import short
+from ..plan import Fmu, UnitDefinition, Value, Variable
+from .binary import INTEGERS, binary_of, lacking
+
+_KINDS = {"Float32": "Real", "Float64": "Real"} | dict.fromkeys(INTEGERS, "Integer")
+"""Type of FMI 3.0 -> what it is to a scenario; others are called alike."""
+_REFUSED = {
+    "Binary": "is Binary, which is not supported",
+    "Clock": "is a Clock, which is not supported",
+}
+MOST = 100_000
+"""Elements of an array, beyond which it is not supported. Chosen: more than any interface has."""
+
+
+def scalars(description: Any, root: ElementTree.Element) -> tuple[dict[str, Variable], dict[str, str]]:
+    """Return the variables by name, arrays element by element, and why others cannot be used.
+
+    Args:
+        description: fmpy's.
+        root: of the same model description.
+    """
+    variables: dict[str, Variable] = {}
+    refused: dict[str, str] = {}
+    elements = {e.get("name"): e for e in root.iterfind("ModelVariables/*")}
+    modern = description.fmiVersion != "2.0"
+    follows, definitions = _dependencies(description), _definitions(description)
+    for v in description.modelVariables:
+        element = elements[v.alias.name if v.alias else v.name]
+        if why := _reason(v):
+            refused[v.name] = why
+            continue
+        declared = v.declaredType
+        kind = _KINDS.get(v.type, v.type)
+        unit = v.unit or (declared.unit if declared else None)
+        said = _said(element)
+        choices = tuple(said["choices"].split(", ")) if "choices" in said else ()
+        items = (
+            {i.name: int(i.value) for i in declared.items} if v.type == "Enumeration" and declared else None
+        )
+        names = element_names(v.name, v.shape or ())
+        starts = _starts(v, kind, element, len(names))
+        limits = element if modern else v  # fmpy does not read those of all types of FMI 3.0
+        for i, name in enumerate(names):
+            variables.setdefault(
+                name,
+                Variable(
+                    name=name,
+                    reference=v.valueReference,
+                    type=kind,
+                    causality=v.causality,
+                    variability=v.variability,
+                    unit=unit,
+                    start=starts[i],
+                    minimum=_limit(limits, declared, "min"),
+                    maximum=_limit(limits, declared, "max"),
+                    description=(v.description or "").removesuffix(f" (one of: {', '.join(choices)})"),
+                    depends_on=follows.get(id(v.alias or v)) if v.causality == "output" else None,
+                    choices=choices or None,
+                    items=items,
+                    optional=v.causality == "input" and "optional" in said,
+                    source=said.get("source", ""),
+                    definition=definitions.get(unit),
+                    encoding=("Int64" if kind == "Enumeration" else v.type) if modern else None,
+                    element=i,
+                    elements=len(names),
+                ),
+            )
+    return variables, refused
+
+
+def element_names(name: str, shape: tuple[int, ...]) -> list[str]:
+    """Return the names of an array's elements, row by row, counted from 1; a scalar's own name."""
+    if not shape:
+        return [name]
+    places = itertools.product(*(range(1, n + 1) for n in shape))
+    return [f"{name}[{','.join(map(str, place))}]" for place in places]
+
+
+def _reason(v: Any) -> str | None:
+    """Return why a variable cannot be used, None if it can."""
+    if v.type in _REFUSED:
+        return _REFUSED[v.type]
+    if v.clocks:
+        return "belongs to a Clock, which is not supported"
+    if math.prod(v.shape or ()) > MOST:
+        return f"has {math.prod(v.shape)} elements; supported are {MOST}"
+    if v.alias and v.causality == "input":
+        return f"is another name of {v.alias.name}: use that"
+    return None
+
+
+def _dependencies(description: Any) -> dict[int, tuple[str, ...] | None]:
+    """Return what each output follows: the names of inputs, None if it is not said."""
+
+    def names(known: Any) -> Iterator[str]:
+        for v in known:
+            if v.causality == "input":
+                yield from element_names(v.name, v.shape or ())
+
+    return {
+        id(unknown.variable): None if unknown.dependencies is None else tuple(names(unknown.dependencies))
+        for unknown in description.outputs
+    }
+
+
+def _definitions(description: Any) -> dict[str | None, UnitDefinition]:
+    """Return what the description defines in base units, by the name of the unit."""
+    return {
+        unit.name: UnitDefinition(
+            (base.kg, base.m, base.s, base.A, base.K, base.mol, base.cd, base.rad), base.factor, base.offset
+        )
+        for unit in description.unitDefinitions
+        if (base := unit.baseUnit) is not None
+    }
+
+
+def _said(element: ElementTree.Element) -> dict[str, str]:
+    """Return what our own units say of a variable beyond the standard: optional, choices, source."""
+    said = element.find("Annotations/Tool[@name='yawbench']/variable")
+    return {} if said is None else said.attrib
+
+
+def _starts(v: Any, kind: str, element: ElementTree.Element, count: int) -> list[Value | None]:
+    """Return the start value of every element; one value stands for all."""
+    texts: list[str | None]
+    if not v.shape:
+        texts = [v.start]
+    elif kind == "String":
+        texts = [start.get("value") for start in element.iterfind("Start")]
+    else:
+        texts = list((v.start or "").split())
+    if len(texts) == 1:
+        texts *= count
+    if texts and len(texts) != count:
+        raise ValueError(f"{v.name!r} has {len(texts)} start values for {count} elements")
+    return [_value(kind, text) for text in texts] or [None] * count
+
+
+def _value(kind: str, text: str | None) -> Value | None:
+    if text is None or kind == "String":
+        return text
+    if kind == "Boolean":
+        return text in ("true", "1")
+    return float(text) if kind == "Real" else int(text)
+
+
+def _limit(v: Mapping[str, str] | Any, declared: Any, which: str) -> float | None:
+    own = v.get(which) if isinstance(v, ElementTree.Element) else getattr(v, which)
+    text = own or (getattr(declared, which) if declared else None)
+    return None if text is None else float(text)
+
+
+def shadowed_modules(fmus: Mapping[str, Fmu], *, isolated: bool = False) -> list[str]:
+    """Return a sentence for every unit that would run another unit's, or this program's, module.
+
+    Args:
+        fmus: unit -> FMU.
+        isolated: each unit has a process of its own, and so no other's modules.
+    """
+    problems = []
+    seen: dict[str, tuple[str, str]] = {}
+    for unit, fmu in fmus.items():
+        for module, content in fmu.python_modules.items():
+            other, its_content = seen.setdefault(module, (unit, content))
+            if its_content != content and not isolated:
+                problems.append(
+                    f"{unit} ({fmu.name}) would run code of {other} ({fmus[other].name}): both FMUs bring "
+                    f"a Python module {module!r}, and a process has room for one; rebuild one of them "
+                    "with another module name, or run with --isolate"
+                )
+            elif module in sys.stdlib_module_names:
+                problems.append(
+                    f"{unit} ({fmu.name}) would run other code: its Python module {module!r} has the name "
+                    "of one of Python's own; rebuild it with another module name"
+                )
+            elif _loaded_from_elsewhere(module, content, fmu.directory):
+                problems.append(
+                    f"{unit} ({fmu.name}) would run other code: another Python module {module!r} is loaded "
+                    "in this process already; rebuild it with another module name"
+                )
+    return problems
+
+
+def _loaded_from_elsewhere(module: str, content: str, directory: Path) -> bool:
+    """Return whether `module` is loaded, from other content than this unit's."""
+    homes = [home for home in _homes(module) if not home.is_relative_to(directory)]
+    return any(_content(home, module) != content for home in homes)
+
+
+def _homes(module: str) -> list[Path]:
+    """Return the folders that a loaded module comes from: several if it is a folder without __init__.py."""
+    loaded = sys.modules.get(module)
+    file = getattr(loaded, "__file__", None)
+    if file is not None:
+        return [Path(file).parents[1 if Path(file).name == "__init__.py" else 0]]
+    return [Path(folder).parent for folder in getattr(loaded, "__path__", ())]
+
+
+def _content(home: Path, module: str) -> str | None:
+    """Return the hash of a module's files in a folder; None if they cannot be read."""
+    package = home / module
+    files = package.rglob("*.py") if package.is_dir() else [home / f"{module}.py"]
+    try:
+        return hashes_of_modules({f.relative_to(home).as_posix(): f.read_bytes() for f in files}).get(module)
+    except OSError:
+        return None
+
+
+def hashes_of_modules(files: Mapping[str, bytes]) -> dict[str, str]:
+    """Return the top-level Python modules among files, by their paths, each with a hash of its content."""
+    hashes: dict[str, Any] = {}
+    for name in sorted(files):
+        if name.endswith(".py"):
+            digest = hashes.setdefault(name.partition("/")[0].removesuffix(".py"), hashlib.sha256())
+            digest.update(name.encode() + b"\0" + files[name] + b"\0")
+    return {module: digest.hexdigest() for module, digest in hashes.items()}
+
 
 SUPPORTED = "supported are FMI 2.0 and 3.0 for co-simulation"
 

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 import fmus
 
 from ..errors import ModelDescriptionError
-from ..plan import Built, Fmu
+from ..messages import closest, listed, printable, short
+from ..plan import BuildInfo, Fmu
 from ..scenario.overrides import is_path
-from ..wording import closest, listed, printable, short
 from .archive import open_fmu
 
 if TYPE_CHECKING:
-    from fmus.upkeep import Upkeep
+    from fmus.upkeep import FmuUpdater
 
 
 HOME = Path(fmus.__file__).resolve().parent
@@ -51,14 +51,14 @@ class Opener:
         self.build = build
         self._tell = tell
         self._given = dict(opened or {})
-        self._opened: dict[tuple[Path, Built | None, bool], Fmu] = {}
-        self._built: dict[Path, Built | None] = {}
+        self._opened: dict[tuple[Path, BuildInfo | None, bool], Fmu] = {}
+        self._built: dict[Path, BuildInfo | None] = {}
 
     @cached_property
-    def _upkeep(self) -> Upkeep:
-        from fmus.upkeep import Upkeep
+    def _upkeep(self) -> FmuUpdater:
+        from fmus.upkeep import FmuUpdater
 
-        return Upkeep(lambda name: self._tell(f"{name}: built"))
+        return FmuUpdater(lambda name: self._tell(f"{name}: built"))
 
     def bring(self, archive: Path, *, build: bool = True) -> Path:
         """Return the archive to open in place of `archive`, built if need be; it may not exist.

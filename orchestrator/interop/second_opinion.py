@@ -23,7 +23,7 @@ import numpy as np
 from ..errors import WiringError
 from ..plan import Plan
 from ..processes import how_it_ended, python
-from .masters.request import Recording, Request
+from .masters import Recording, Request
 from .ssp_write import write_ssp
 
 AGREEMENT = 1e-9
@@ -68,7 +68,7 @@ MASTERS = (
 
 
 @dataclass(frozen=True)
-class Opinion:
+class SecondOpinion:
     """What another master made of a system, beside what ours made of the same archive."""
 
     master: OtherMaster
@@ -100,7 +100,7 @@ def second_opinion(
     masters: Sequence[OtherMaster] = MASTERS,
     pinned: bool = True,
     said: Callable[[str], None] = lambda text: None,
-) -> list[Opinion]:
+) -> list[SecondOpinion]:
     """Run a plan in other masters and compare.
 
     Args:
@@ -124,10 +124,10 @@ def second_opinion(
     ours: dict[bool, tuple[Request, dict[str, Recording]]] = {}
     opinions = []
     for master in masters:
-        one_step = master.one_step and any(unit.period > 1 for unit in plan.units)
+        one_step = master.one_step and any(unit.period > 1 for unit in plan.instances)
         if not installed(master):
             says = f"{master.package} is not installed: pip install 'yawbench[interop]'"
-            opinions.append(Opinion(master, one_step, says))
+            opinions.append(SecondOpinion(master, one_step, says))
             continue
         if one_step not in ours:
             request = _request(plan, one_step, folder)
@@ -140,20 +140,20 @@ def second_opinion(
         said(master.title)
         theirs = _recordings(master.module, request, pinned, folder)
         if isinstance(theirs, str):
-            opinions.append(Opinion(master, one_step, theirs))
+            opinions.append(SecondOpinion(master, one_step, theirs))
             continue
         seconds = {f"theirs{key}": recording.seconds for key, recording in theirs.items()}
         seconds |= {f"ours{key}": recording.seconds for key, recording in own.items()}
         gaps = differences(request, own[""].values, theirs[""].values)
         still = still_signals(request, own[""].values)
-        opinions.append(Opinion(master, one_step, differences=gaps, seconds=seconds, still=still))
+        opinions.append(SecondOpinion(master, one_step, differences=gaps, seconds=seconds, still=still))
     return opinions
 
 
 def _request(plan: Plan, one_step: bool, folder: Path) -> Request:
     """Write the archive; return what is to be run."""
     if one_step:
-        plan = replace(plan, units=tuple(replace(unit, period=1) for unit in plan.units))
+        plan = replace(plan, instances=tuple(replace(unit, period=1) for unit in plan.instances))
     path = folder / ("one_step.ssp" if one_step else "system.ssp")
     write_ssp(plan, path)
     return Request(str(path), float(plan.step), plan.n_steps, _columns(plan))
@@ -161,7 +161,7 @@ def _request(plan: Plan, one_step: bool, folder: Path) -> Request:
 
 def _columns(plan: Plan) -> list[tuple[str, str]]:
     """Return what is compared: every recorded output of type Real."""
-    units = {unit.name: unit.fmu for unit in plan.units}
+    units = {unit.name: unit.fmu for unit in plan.instances}
     return [(u, name) for u, name in plan.record if units[u].variables[name].type == "Real"]
 
 
@@ -184,7 +184,7 @@ def _run(module: str, request: Request, folder: Path) -> Recording | str:
     asked, answered = folder / "request.json", folder / "recording.npz"
     request.write(asked)
     answered.unlink(missing_ok=True)
-    command = python("orchestrator.interop.masters.drive", module, asked, answered)
+    command = python("orchestrator.interop.masters", module, asked, answered)
     environment = os.environ | {"TMPDIR": str(folder)}  # Ecos leaves what it has unpacked
     try:
         done = subprocess.run(command, capture_output=True, timeout=LIMIT, env=environment, check=False)

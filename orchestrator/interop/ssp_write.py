@@ -8,6 +8,8 @@ the name of a structure is an identifier to other programs.
 Only what is connected has a connector. A constant is a parameter value by the name of its input:
 that is how libcosim and Ecos take it, and fmpy gives an input connector without a connection the
 value of another one. Equal plans give equal bytes.
+
+A plan as far as OMSimulator can run it: it reads no texts, no steps of units, no transformations.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ import re
 import unicodedata
 import zipfile
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from fractions import Fraction
 from importlib.metadata import version
 from pathlib import Path
@@ -26,11 +29,14 @@ from typing import Literal
 from lxml import etree
 from lxml.etree import SubElement, _Element
 
-from ..errors import ResultsError
+from ..errors import ResultsError, WiringError
+from ..files import write_whole
 from ..fmu.archive import read_archive
-from ..plan import Fmu, Plan, Unit, Value, Variable, Wire
-from ..scenario.measurement_units import BASE_UNITS, Measure, measure_of
-from ..scenario.ssp_names import (
+from ..labels import with_changes
+from ..messages import fold, listed
+from ..plan import Fmu, Instance, Plan, Value, Variable, Wire
+from ..scenario.quantities import BASE_UNITS, Unit, measure_of
+from ..scenario.ssp_archive import (
     DESCRIPTION_FILE,
     NAMESPACES,
     OMS,
@@ -45,9 +51,7 @@ from ..scenario.ssp_names import (
     SSD,
     SSV,
 )
-from ..titles import with_changes
-from ..wording import fold, listed
-from ..writing import write_whole
+from ..wiring.connections import conversion_between
 
 _FILE_TIME = (1980, 1, 1, 0, 0, 0)
 
@@ -63,7 +67,7 @@ def write_ssp(plan: Plan, path: Path, standard: Version = "1.0", *, named: bool 
         ResultsError: it cannot be written, or not in XML.
         ModelDescriptionError: an FMU is not there any more.
     """
-    followed = [f"{unit.name}.{name}" for unit in plan.units for name in unit.series]
+    followed = [f"{unit.name}.{name}" for unit in plan.instances for name in unit.series]
     if followed:
         raise ResultsError(f"{path}: an archive has no place for the time series of {listed(fold(followed))}")
     sources = _sources(plan)
@@ -77,7 +81,7 @@ def write_ssp(plan: Plan, path: Path, standard: Version = "1.0", *, named: bool 
         with zipfile.ZipFile(content, "w") as archive:
             _put(archive, DESCRIPTION_FILE, description)
             for sha256, source in sorted(sources.items(), key=lambda item: item[1]):
-                fmu = next(unit.fmu for unit in plan.units if unit.fmu.sha256 == sha256)
+                fmu = next(unit.fmu for unit in plan.instances if unit.fmu.sha256 == sha256)
                 _put(archive, source, read_archive(fmu.path))
         write_whole(path, content.getvalue(), named=named)
     except OSError as error:
@@ -161,16 +165,16 @@ def _add_connection(above: _Element, wire: Wire) -> None:
         SubElement(connection, f"{{{SSC}}}LinearTransformation", scale)
 
 
-def _in_order_of_scenario(plan: Plan) -> list[Unit]:
+def _in_order_of_scenario(plan: Plan) -> list[Instance]:
     """Return the units as the scenario lists them: of equals, the first is evaluated first."""
     given = list(plan.scenario.get("units", ()))
-    return sorted(plan.units, key=lambda unit: given.index(unit.name) if unit.name in given else len(given))
+    return sorted(plan.instances, key=lambda one: given.index(one.name) if one.name in given else len(given))
 
 
 def _sources(plan: Plan) -> dict[str, str]:
     """Return where in the archive each FMU is, by its hash; names without a character to be escaped."""
     sources: dict[str, str] = {}
-    for unit in plan.units:
+    for unit in plan.instances:
         stem = re.sub(r"[^A-Za-z0-9_-]", "_", unit.fmu.name)
         source = f"{RESOURCES}/{stem}.fmu"
         if source in sources.values() and unit.fmu.sha256 not in sources:
@@ -181,10 +185,10 @@ def _sources(plan: Plan) -> dict[str, str]:
 
 def _add_component(
     elements: _Element,
-    unit: Unit,
+    unit: Instance,
     plan: Plan,
     source: str,
-    spelled: Mapping[str, Measure],
+    spelled: Mapping[str, Unit],
     enumerations: dict[str, Mapping[str, int]],
 ) -> None:
     component = SubElement(
@@ -222,9 +226,7 @@ def _add_component(
         hint.set("value", _decimal(unit.period * plan.step))
 
 
-def _add_values(
-    above: _Element, values: Mapping[str, Value], fmu: Fmu, spelled: Mapping[str, Measure]
-) -> None:
+def _add_values(above: _Element, values: Mapping[str, Value], fmu: Fmu, spelled: Mapping[str, Unit]) -> None:
     parameter_set = SubElement(above, f"{{{SSV}}}ParameterSet", version="1.0", name=PARAMETER_SET)
     parameters = SubElement(parameter_set, f"{{{SSV}}}Parameters")
     present = []
@@ -248,16 +250,16 @@ def _text(variable: Variable, value: Value) -> str:
     return str(value)
 
 
-def _spelled_units(plan: Plan) -> dict[str, Measure]:
+def _spelled_units(plan: Plan) -> dict[str, Unit]:
     """Return the units of measurement that appear in the plan, as far as all FMUs mean the same by them."""
-    meant: dict[str, set[Measure | None]] = {}
-    for variable in (v for unit in plan.units for v in unit.fmu.variables.values() if v.unit):
+    meant: dict[str, set[Unit | None]] = {}
+    for variable in (v for unit in plan.instances for v in unit.fmu.variables.values() if v.unit):
         meant.setdefault(str(variable.unit), set()).add(measure_of(variable.unit, variable.definition))
     only = {name: next(iter(measures)) for name, measures in sorted(meant.items()) if len(measures) == 1}
     return {name: measure for name, measure in only.items() if measure is not None}
 
 
-def _add_units(above: _Element, spelled: Mapping[str, Measure]) -> None:
+def _add_units(above: _Element, spelled: Mapping[str, Unit]) -> None:
     if not spelled:
         return
     units = SubElement(above, f"{{{SSD if above.tag.startswith('{' + SSD) else SSV}}}Units")
@@ -317,3 +319,54 @@ def _decimal(seconds: Fraction) -> str:
     if Fraction(text) != seconds:
         raise ValueError(f"a step of {text} s that has more digits is not the same in other programs")
     return text
+
+
+UNREAD = ("String", "Enumeration")
+"""Types of values that it does not read."""
+
+
+def for_omsimulator(plan: Plan) -> tuple[Plan, list[str]]:
+    """Return the plan without what OMSimulator refuses, and a remark for everything left out that matters.
+
+    Raises:
+        WiringError: a connection has a gain of its own, which it would pass over without a word.
+    """
+    fmus = {unit.name: unit.fmu.variables for unit in plan.instances}
+
+    def by_units(wire: Wire) -> bool:
+        source, target = fmus[wire.source][wire.output], fmus[wire.target][wire.input]
+        known = source.unit is not None and target.unit is not None
+        return not wire.converts or (known and conversion_between(source, target) == (wire.gain, wire.offset))
+
+    problems = [
+        f"{wire.source}.{wire.output} to {wire.target}.{wire.input}: OMSimulator knows no gain and offset "
+        "of a connection, only the units of its ends"
+        for wire in plan.wires
+        if not by_units(wire)
+    ]
+    if problems:
+        raise WiringError(problems)
+    notes = []
+    slow = [unit.name for unit in plan.instances if unit.period > 1]
+    if slow:
+        notes.append(f"OMSimulator steps all units alike: the steps of {listed(slow)} are left out")
+    texts = [f"{one.name}.{name} = {text!r}" for one in plan.instances for name, text in _texts(one).items()]
+    if texts:
+        notes.append(f"OMSimulator takes no texts from an archive; set there: {listed(texts)}")
+    wires = tuple(replace(wire, gain=1.0, offset=0.0) for wire in plan.wires)
+    units = tuple(_without_texts(unit) for unit in plan.instances)
+    return replace(plan, instances=units, wires=wires), notes
+
+
+def _texts(unit: Instance) -> dict[str, Value]:
+    """Return the texts, and items of enumerations, that the FMU would not have by itself."""
+    given, variables = {**unit.parameters, **unit.constants}, unit.fmu.variables
+    return {k: v for k, v in given.items() if variables[k].type in UNREAD and v != variables[k].start}
+
+
+def _without_texts(unit: Instance) -> Instance:
+    parameters, constants = (
+        {name: value for name, value in given.items() if unit.fmu.variables[name].type not in UNREAD}
+        for given in (unit.parameters, unit.constants)
+    )
+    return replace(unit, period=1, parameters=parameters, constants=constants)

@@ -29,7 +29,7 @@ from ..plan import Algorithm
 
 
 @dataclass(frozen=True)
-class Relation:
+class WireTiming:
     """All that a wire's weights depend on. Periods in communication steps."""
 
     source_period: int
@@ -40,7 +40,7 @@ class Relation:
 
 
 @dataclass(frozen=True)
-class Weights:
+class CouplingWeights:
     """Of the source's last sample, its sample before, and that of the target's last step."""
 
     now: float = 1.0
@@ -48,25 +48,25 @@ class Weights:
     kept: float = 0.0
 
 
-def weights(algorithm: Algorithm, relation: Relation, k: int) -> Weights:
+def weights(algorithm: Algorithm, relation: WireTiming, k: int) -> CouplingWeights:
     """Return the weights of a wire for the step of its target that ends at `k`.
 
     `k` is a communication point at which the target ends a step. They repeat after the least
     common multiple of both periods.
     """
     if algorithm != "extrapolated":
-        return Weights()
+        return CouplingWeights()
     n, m = relation.source_period, relation.target_period
     last = _last_sample(relation, k)
     ahead = (k if relation.direct else k - m / 2) - last
     if relation.discrete:
-        return Weights() if ahead >= 0 else Weights(0.0, 1.0)
+        return CouplingWeights() if ahead >= 0 else CouplingWeights(0.0, 1.0)
     if ahead == 0:
-        return Weights()
+        return CouplingWeights()
     if m > n and not relation.direct:
         apart = last - _last_sample(relation, k - m)
-        return Weights(1.0 + ahead / apart, 0.0, -ahead / apart)
-    return Weights(1.0 + ahead / n, -ahead / n)
+        return CouplingWeights(1.0 + ahead / apart, 0.0, -ahead / apart)
+    return CouplingWeights(1.0 + ahead / n, -ahead / n)
 
 
 def halves_ahead(algorithm: Algorithm, period: int, *, direct: bool) -> int:
@@ -75,7 +75,7 @@ def halves_ahead(algorithm: Algorithm, period: int, *, direct: bool) -> int:
     return held.get(algorithm, 2 * period if direct else period)
 
 
-def _last_sample(relation: Relation, k: int) -> int:
+def _last_sample(relation: WireTiming, k: int) -> int:
     """Return the communication point of the source's last sample when the target steps to `k`."""
     n = relation.source_period
     return k - k % n if relation.earlier else k - 1 - (k - 1) % n

@@ -17,12 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SimulationError
+from ..messages import listed
 from ..plan import Value, Variable, Wire
-from ..wording import listed
+from .instance import ExperimentSetup, Status
 from .log import FATAL, OK, STATUS, WARNING, Log, known
-from .memory import Memory, Station, by_type
-from .operations import getting
-from .slave import Experiment, Status
+from .signal_pool import InstanceSlot, SignalPool, by_type
+from .step_program import getting
 
 PASSES = 100
 TOLERANCE = 1e-9
@@ -32,12 +32,12 @@ FMU that computes in single precision makes of it."""
 NAMED = 4
 """Variables named in a sentence."""
 
-Check = Callable[[str, str, Status], None]
+StatusCheck = Callable[[str, str, Status], None]
 """Called with a unit, what was done and the status after every call; raises if that is the end."""
 
 
 @dataclass
-class Movement:
+class UnsettledWire:
     """A wire whose value still changes."""
 
     wire: str
@@ -56,7 +56,7 @@ class Movement:
         return f"{self.wire} ({self.old!r}, then {self.new!r})"
 
 
-def initialize(memory: Memory, check: Check, log: Log) -> int:
+def initialize(memory: SignalPool, check: StatusCheck, log: Log) -> int:
     """Initialize all units and return the number of passes it took.
 
     Raises:
@@ -65,10 +65,10 @@ def initialize(memory: Memory, check: Check, log: Log) -> int:
     """
     plan = memory.plan
     for station in memory.stations:
-        tolerance = station.unit.tolerance or station.unit.fmu.tolerance
-        experiment = Experiment(plan.time(0), plan.time(plan.n_steps), tolerance)
+        tolerance = station.instance.tolerance or station.instance.fmu.tolerance
+        experiment = ExperimentSetup(plan.time(0), plan.time(plan.n_steps), tolerance)
         check(station.name, "initialization", station.slave.setup(experiment))
-        _put(station, station.unit.parameters, "setting parameters", check)
+        _put(station, station.instance.parameters, "setting parameters", check)
         _put(station, _known_inputs(memory, station), "setting inputs", check)
         check(station.name, "initialization", station.slave.enter())
         _check_parameters(station, check, log)
@@ -78,7 +78,7 @@ def initialize(memory: Memory, check: Check, log: Log) -> int:
         if not moving:
             break
     if any(movement.large for movement in moving):
-        raise SimulationError(_unsettled(moving), unit=None, time=plan.time(0))
+        raise SimulationError(_unsettled(moving), instance=None, time=plan.time(0))
     for station in memory.stations:
         check(station.name, "initialization", station.slave.exit())
         _get(memory, station, check)
@@ -87,9 +87,9 @@ def initialize(memory: Memory, check: Check, log: Log) -> int:
     return number
 
 
-def _put(station: Station, given: Mapping[str, Value], what: str, check: Check) -> None:
+def _put(station: InstanceSlot, given: Mapping[str, Value], what: str, check: StatusCheck) -> None:
     """Set variables; elements of an array that are not given keep their start values."""
-    variables = station.unit.fmu.variables
+    variables = station.instance.fmu.variables
     arrays = {variables[name].reference for name in given if variables[name].elements > 1}
     others = (v for v in variables.values() if v.reference in arrays) if arrays else ()
     values = {v.name: v.start for v in others if v.start is not None} | dict(given)
@@ -98,7 +98,7 @@ def _put(station: Station, given: Mapping[str, Value], what: str, check: Check) 
         check(station.name, what, status)
 
 
-def _known_inputs(memory: Memory, station: Station) -> dict[str, Value]:
+def _known_inputs(memory: SignalPool, station: InstanceSlot) -> dict[str, Value]:
     """Return constants and the outputs of earlier units; others keep the start value of the FMU."""
     known: dict[str, Value] = {}
     values = memory.taken(station).tolist()
@@ -108,13 +108,13 @@ def _known_inputs(memory: Memory, station: Station) -> dict[str, Value]:
     return known | memory.given_others(station)
 
 
-def _check_parameters(station: Station, check: Check, log: Log) -> None:
+def _check_parameters(station: InstanceSlot, check: StatusCheck, log: Log) -> None:
     """Read all parameters back; raise SimulationError if one does not have the value that was set.
 
     It is a warning if the FMU does not tell: so it may be that all is well.
     """
     told: list[str] = []
-    for chosen, status, lost in _read_back(station, station.unit.parameters, check, log):
+    for chosen, status, lost in _read_back(station, station.instance.parameters, check, log):
         if status > WARNING:
             names = listed([v.name for v in chosen][:NAMED]) + (" and others" if len(chosen) > NAMED else "")
             text = f"whether {names} took the value that was set is not known: reading returned"
@@ -125,22 +125,22 @@ def _check_parameters(station: Station, check: Check, log: Log) -> None:
         what = "a parameter" if len(told) == 1 else "parameters"
         raise SimulationError(
             f"{station.name}: {what} did not take the value that was set: {listed(told[:NAMED])}{more}",
-            unit=station.name, time=log.time.value,
+            instance=station.name, time=log.time.value,
         )  # fmt: skip
 
 
-def _check_constants(station: Station, check: Check, log: Log) -> None:
+def _check_constants(station: InstanceSlot, check: StatusCheck, log: Log) -> None:
     """Read constant inputs back; warn of others, for an FMU may rightly take inputs only when it steps."""
-    for _, _, lost in _read_back(station, station.unit.constants, check, log):
+    for _, _, lost in _read_back(station, station.instance.constants, check, log):
         for name, found, asked in lost:
             log.add(station.name, WARNING, "", f"the constant {name} reads back as {found}, not {asked}")
 
 
 def _read_back(
-    station: Station, given: Mapping[str, Value], check: Check, log: Log
+    station: InstanceSlot, given: Mapping[str, Value], check: StatusCheck, log: Log
 ) -> Iterator[tuple[list[Variable], Status, list[tuple[str, str, str]]]]:
     """Yield variables of one type, the status of reading them, and which differ: name, found, asked."""
-    for chosen in by_type(station.unit.fmu.variables[name] for name in given):
+    for chosen in by_type(station.instance.fmu.variables[name] for name in given):
         with log.deaf():
             raw, values = station.slave.fetch([v.place for v in chosen])
         status = known(raw)
@@ -169,11 +169,11 @@ def _shown(variable: Variable, value: Value) -> str:
     return names.get(value, repr(value))
 
 
-def _comes_before(memory: Memory, wire: Wire | None, station: Station) -> bool:
+def _comes_before(memory: SignalPool, wire: Wire | None, station: InstanceSlot) -> bool:
     return wire is None or memory.of[wire.source].position < station.position
 
 
-def _renew(memory: Memory, s: Station, check: Check) -> list[Movement]:
+def _renew(memory: SignalPool, s: InstanceSlot, check: StatusCheck) -> list[UnsettledWire]:
     """Bring a unit's inputs and outputs up to date; return the wires that have changed.
 
     A value that is not finite yet is not passed on: the loop may still heal it.
@@ -182,7 +182,9 @@ def _renew(memory: Memory, s: Station, check: Check) -> list[Movement]:
     new = np.where(np.isfinite(new) | np.isnan(s.u), new, s.u)
     changed = np.flatnonzero(new.view(np.int64) != s.u.view(np.int64))
     moving = [
-        Movement(f"{wire.source}.{wire.output} -> {s.name}.{s.inputs[i].name}", float(s.u[i]), float(new[i]))
+        UnsettledWire(
+            f"{wire.source}.{wire.output} -> {s.name}.{s.inputs[i].name}", float(s.u[i]), float(new[i])
+        )
         for i in changed
         if (wire := s.wires[i]) is not None
     ]
@@ -195,7 +197,9 @@ def _renew(memory: Memory, s: Station, check: Check) -> list[Movement]:
     return moving
 
 
-def _renew_others(memory: Memory, s: Station, check: Check, moving: list[Movement]) -> bool:
+def _renew_others(
+    memory: SignalPool, s: InstanceSlot, check: StatusCheck, moving: list[UnsettledWire]
+) -> bool:
     """Do the same for what is not Real; add to `moving` and return whether anything has changed."""
     changed = set()
     given = memory.given_others(s)
@@ -207,21 +211,21 @@ def _renew_others(memory: Memory, s: Station, check: Check, moving: list[Movemen
         changed.add(variable.place[:2])
         if wire is not None:
             text = f"{wire.source}.{wire.output} -> {s.name}.{variable.name}"
-            moving.append(Movement(text, "" if old is None else old, value))
+            moving.append(UnsettledWire(text, "" if old is None else old, value))
     if changed:  # of an array all elements
         names = [v.name for v, _ in s.other_inputs if v.place[:2] in changed]
         _put(s, {name: given[name] for name in names}, "setting inputs", check)
     return bool(changed)
 
 
-def _get(memory: Memory, s: Station, check: Check) -> None:
+def _get(memory: SignalPool, s: InstanceSlot, check: StatusCheck) -> None:
     for operation in getting(memory, s):
         check(s.name, "reading outputs", operation.call() or OK)
     if s.outputs and s.output_faults is not None:
         s.output_faults.begin(s.y)
 
 
-def _unsettled(moving: list[Movement]) -> str:
+def _unsettled(moving: list[UnsettledWire]) -> str:
     large = [str(movement) for movement in moving if movement.large]
     more = f" and {len(large) - 4} more" if len(large) > 4 else ""
     return (

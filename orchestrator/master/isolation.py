@@ -3,25 +3,31 @@
 To the master an isolated unit is a `Slave` like any other. Its numbers are those of the same unit in
 this process, for the process at the other end runs the same `unit.FmuSlave` on the same values. Setting
 inputs waits for the step and outputs come back with it, so a unit costs one exchange per step.
+
+The process of an isolated unit: it does with the FMU what the master asks for, and nothing else.
+
+It ends when the master does, and with it all that the FMU has started (see `guardian`).
 """
 
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import SimulationError
-from ..plan import Place, Plan, Unit, Value
-from .exchange import GET, SET, STEP, Board, rebuilt
+from ..errors import SimulationError, YawbenchError
+from ..plan import Instance, Plan, Value, ValueRef
+from .fmi import SLAVES, open_unit
+from .instance import Buffers, CtypesInstance, ExperimentSetup, FmuInstance, Status, StepCalls
+from .ipc import FAILED, GET, REPLY, SET, STEP, LogRelay, PipeChannel, SharedBuffer, rebuilt, told
 from .log import FATAL, OK, PROCESS, WARNING, Log, known
-from .opening import SLAVES, open_unit
-from .operations import copying
-from .process import Lost, UnitProcess
-from .slave import Buffers, Calls, Experiment, Slave, Status
+from .process_state import ProcessState, flush_output
+from .step_program import copying
+from .supervisor import InstanceProcess, ProcessLost, stand_guard
 
 CALL_LIMIT = 10.0
 """Time that a call of an FMU may take [s]; chosen: ten thousand times what a step takes, and still
@@ -31,10 +37,10 @@ _PARTS = {SET: ("set", "Set{}"), STEP: ("step", "DoStep"), GET: ("get", "Get{}")
 """Part of an exchange -> kind of the master's operation, and function of the FMU."""
 
 
-class IsolatedSlave:
+class IsolatedInstance:
     """An instance of an FMU in a process of its own."""
 
-    def __init__(self, unit: Unit, log: Log, process: UnitProcess) -> None:
+    def __init__(self, unit: Instance, log: Log, process: InstanceProcess) -> None:
         """Let the process load the library and instantiate.
 
         Raises:
@@ -42,7 +48,7 @@ class IsolatedSlave:
         """
         self.name = unit.name
         self._log = log
-        self._process: UnitProcess | None = process
+        self._process: InstanceProcess | None = process
         self._stepping = False
         self._part = ""
         self._answered = 0
@@ -50,12 +56,12 @@ class IsolatedSlave:
         process.log = log
         try:
             process.wait_until_ready()
-        except Lost as lost:
+        except ProcessLost as lost:
             raise self._refused(f"{unit.name}: {lost.in_('its start')}") from None
         try:
             # what the process needs of the FMU, which leaves out some hundred variables
             failed = process.ask("open", replace(unit, fmu=replace(unit.fmu, variables={}), series={}))
-        except Lost as lost:
+        except ProcessLost as lost:
             reason = lost.in_(f"{self._prefix}Instantiate or before")
             raise self._refused(f"{unit.name}: {unit.fmu.path} cannot be instantiated: {reason}") from None
         if failed is not None:
@@ -63,12 +69,12 @@ class IsolatedSlave:
             raise rebuilt(failed)
 
     def _refused(self, sentence: str) -> SimulationError:
-        return SimulationError(sentence, unit=self.name, time=0.0)
+        return SimulationError(sentence, instance=self.name, time=0.0)
 
-    def connect(self, buffers: Buffers) -> Calls:
+    def connect(self, buffers: Buffers) -> StepCalls:
         inputs, input_places, outputs, output_places, time, step = buffers
         assert self._process is not None
-        board = Board(self._process.memory, len(input_places), len(output_places))
+        board = SharedBuffer(self._process.memory, len(input_places), len(output_places))
         self._board = board
         self._ask("", None, "connect", list(input_places), list(output_places))
         board.step.value = step.value
@@ -105,7 +111,7 @@ class IsolatedSlave:
             return self._exchange(parts) if parts else OK
 
         self._flush: Callable[[], Status] = flush
-        return Calls(set_inputs, take_step, get_outputs)
+        return StepCalls(set_inputs, take_step, get_outputs)
 
     def _exchange(self, parts: int) -> Status:
         if self._process is None:
@@ -115,7 +121,7 @@ class IsolatedSlave:
             self._answered += 256
             if self._board.answer.value != self._answered + answer:
                 raise self._process.garbled(f"byte {answer}")
-        except Lost as lost:
+        except ProcessLost as lost:
             self._part, function = _PARTS.get(self._board.part.value, ("", ""))
             return self._lose(lost, function and self._prefix + function.format(self._real))
         if answer == OK:
@@ -126,18 +132,18 @@ class IsolatedSlave:
     def part(self, kind: str) -> str:
         return self._part or kind
 
-    def put(self, places: Sequence[Place], values: Sequence[Value]) -> Status:
+    def put(self, places: Sequence[ValueRef], values: Sequence[Value]) -> Status:
         status = self._flush() if self._stepping else OK  # inputs are set in the order of the calls
         if status > WARNING:
             return status
         function = f"{self._prefix}Set{places[0].type}"
         return max(status, known(self._ask(function, FATAL, "put", list(places), list(values))))
 
-    def fetch(self, places: Sequence[Place]) -> tuple[Status, list[Value]]:
+    def fetch(self, places: Sequence[ValueRef]) -> tuple[Status, list[Value]]:
         failed: tuple[Status, list[Value]] = (FATAL, [0] * len(places))
         return self._ask(f"{self._prefix}Get{places[0].type}", failed, "fetch", list(places))
 
-    def setup(self, experiment: Experiment) -> Status:
+    def setup(self, experiment: ExperimentSetup) -> Status:
         return self._ask(f"{self._prefix}SetupExperiment", FATAL, "setup", experiment)
 
     def enter(self) -> Status:
@@ -161,11 +167,11 @@ class IsolatedSlave:
         self._part = ""
         try:
             return self._process.ask(request, *arguments)
-        except Lost as lost:
+        except ProcessLost as lost:
             self._lose(lost, function)
             return failed
 
-    def _lose(self, lost: Lost, function: str) -> Status:
+    def _lose(self, lost: ProcessLost, function: str) -> Status:
         """Tell how the process was lost."""
         self._process = None
         said = self._log.errors(self.name)
@@ -179,7 +185,7 @@ class IsolatedSlave:
             return
         try:
             process.ask("free")
-        except Lost as lost:  # the results are not the worse for it
+        except ProcessLost as lost:  # the results are not the worse for it
             said = lost.in_(f"{self._prefix}Terminate or {self._prefix}FreeInstance")
             self._log.add(self.name, WARNING, PROCESS, said)
         else:
@@ -192,7 +198,7 @@ _BYTES = [bytes([parts]) for parts in range(SET + STEP + GET + 1)]
 class Isolation(contextlib.ExitStack):
     """Opens units (see `simulate.Opener`) in processes of their own; all end with the `with` block."""
 
-    def __init__(self, units: Sequence[Unit], limit: float = CALL_LIMIT) -> None:
+    def __init__(self, units: Sequence[Instance], limit: float = CALL_LIMIT) -> None:
         """Say which units there will be, for their processes to start at the same time.
 
         Args:
@@ -201,19 +207,21 @@ class Isolation(contextlib.ExitStack):
         super().__init__()
         self._units = units
         self._limit = limit
-        self._processes: dict[str, UnitProcess] = {}
+        self._processes: dict[str, InstanceProcess] = {}
 
-    def __call__(self, unit: Unit, log: Log, corrupted: set[Path]) -> Slave:
+    def __call__(self, unit: Instance, log: Log, corrupted: set[Path]) -> FmuInstance:
         """Return the unit's instance. One that returns Fatal spoils no other: they share nothing."""
         if not self._processes:
             for each in self._units:
-                self._processes[each.name] = process = UnitProcess(len(each.fmu.variables), self._limit)
+                self._processes[each.name] = process = InstanceProcess(len(each.fmu.variables), self._limit)
                 self.callback(process.close)
-        return IsolatedSlave(unit, log, self._processes[unit.name])
+        return IsolatedInstance(unit, log, self._processes[unit.name])
 
 
 @contextlib.contextmanager
-def opener_of(plan: Plan, call_limit: float | None) -> Iterator[Callable[[Unit, Log, set[Path]], Slave]]:
+def opener_of(
+    plan: Plan, call_limit: float | None
+) -> Iterator[Callable[[Instance, Log, set[Path]], FmuInstance]]:
     """Yield what opens the units of a plan: in this process, or isolated if calls have a limit [s].
 
     Raises:
@@ -224,5 +232,97 @@ def opener_of(plan: Plan, call_limit: float | None) -> Iterator[Callable[[Unit, 
         return
     if sys.platform == "win32":
         raise SimulationError("--isolate needs Linux or macOS.", unit=None, time=0.0)
-    with Isolation(plan.units, call_limit) as isolation:
+    with Isolation(plan.instances, call_limit) as isolation:
         yield isolation
+
+
+class InstanceServer:
+    """One FMU instance and the requests that concern it."""
+
+    def __init__(self, channel: PipeChannel, memory: int) -> None:
+        self._channel = channel
+        self._memory = memory
+        self._log = LogRelay(channel, timed=False)
+        self._surroundings: ProcessState | None = ProcessState()  # until it is stepped
+        self._slave: CtypesInstance
+
+    def serve(self) -> None:
+        """Answer until there is no master any more, or in a copy that the FMU has made of this process."""
+        hear, say, answers = self._channel.hear, self._channel.say, [bytes([i]) for i in range(256)]
+        process, count = os.getpid(), 0
+        while (asked := hear()) is not None:
+            parts = asked if asked <= SET | STEP | GET else 0
+            if parts:
+                answer, count = self.exchange(parts), count + 256
+            else:
+                name, arguments = self._channel.ordered()
+                reply = getattr(self if hasattr(self, name) else self._slave, name)(*arguments)
+                if self._surroundings is not None:
+                    self._surroundings.restore("", self._log)
+            if os.getpid() != process:
+                return
+            if parts:
+                self._answer.value = count + answer
+                say(answers[answer])
+            else:
+                self._channel.send(REPLY, reply)
+
+    def exchange(self, parts: int) -> int:
+        """Do parts of a step in order; return the worst status, and 16 times the part it belongs to.
+
+        Nothing is done after a status worse than Warning.
+        """
+        answer = OK
+        for part, call in self._calls:
+            if not parts & part:
+                continue
+            self._part.value = part
+            status = known(call())
+            if status > answer % 16:
+                answer = 16 * part + status
+            if status > WARNING:
+                break
+        self._part.value = 0
+        return answer
+
+    def open(self, unit: Instance) -> dict[str, Any] | None:
+        """Instantiate the FMU; return what there is to tell if that fails."""
+        try:
+            self._slave = open_unit(unit, self._log, set())
+        except YawbenchError as error:
+            return told(error)
+        return None
+
+    def connect(self, input_places: Sequence[ValueRef], output_places: Sequence[ValueRef]) -> None:
+        board = SharedBuffer(self._memory, len(input_places), len(output_places))
+        calls = self._slave.connect(
+            Buffers(board.inputs, input_places, board.outputs, output_places, board.time, board.step)
+        )
+        self._part = board.part
+        self._answer = board.answer
+        self._calls = ((SET, calls.set), (STEP, calls.step), (GET, calls.get))
+
+    def exit(self) -> int:
+        self._surroundings = None
+        return self._slave.exit()
+
+    def free(self) -> None:
+        """End the instance, and what its library has still to print."""
+        self._slave.free()
+        self._log.finish()
+        flush_output()
+
+
+def main(*descriptors: str) -> None:
+    """Serve the master at the other ends of two pipes, with memory that is shared with it."""
+    reading, writing, memory = map(int, descriptors)
+    stand_guard(reading, (writing, memory))
+    channel = PipeChannel(reading, writing)
+    channel.send(REPLY, "ready")
+    try:
+        InstanceServer(channel, memory).serve()
+    except Exception as error:
+        with contextlib.suppress(OSError):
+            channel.send(FAILED, f"{type(error).__name__}: {error}")
+        os._exit(1)
+    os._exit(0)

@@ -42,7 +42,7 @@ def known(status: int) -> int:
 class Message:
     """One message of a unit; `time` [s] is the communication point before it, if none is said."""
 
-    unit: str
+    instance: str
     time: float
     status: int
     category: str
@@ -91,12 +91,14 @@ class Log:
     def errors(self, unit: str) -> list[Message]:
         """Return the unit's messages with a status worse than Warning, without tracebacks."""
         return [
-            m for m in self.messages if m.unit == unit and m.status > WARNING and m.category != "traceback"
+            m
+            for m in self.messages
+            if m.instance == unit and m.status > WARNING and m.category != "traceback"
         ]
 
     def tracebacks(self, unit: str) -> list[str]:
         """Return the full Python tracebacks that the unit has logged."""
-        return [m.text for m in self.messages if m.unit == unit and m.category == "traceback"]
+        return [m.text for m in self.messages if m.instance == unit and m.category == "traceback"]
 
     def warnings(self, ended_by: str | None = None) -> Iterable[Message]:
         """Return what the units said while the run went on, after what the master had to say.
@@ -109,7 +111,7 @@ class Log:
         chosen = (
             m
             for m in self.messages
-            if m.status == WARNING or (m.unit != ended_by and m.category != "traceback")
+            if m.status == WARNING or (m.instance != ended_by and m.category != "traceback")
         )
         return sorted(chosen, key=lambda m: m.category != MASTER)
 
@@ -118,7 +120,7 @@ class Log:
         warnings = list(self.warnings(ended_by))
         return {
             "warnings": [
-                {"unit": m.unit, "time": m.time, "status": STATUS[m.status], "text": m.text}
+                {"unit": m.instance, "time": m.time, "status": STATUS[m.status], "text": m.text}
                 for m in warnings[:WRITTEN]
             ],
             "more_warnings": max(0, len(warnings) - WRITTEN) + self.dropped,

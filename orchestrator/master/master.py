@@ -21,26 +21,25 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from ..errors import Interrupted, SimulationError
+from ..messages import listed
 from ..plan import Plan, Value
-from ..wording import listed
 from .initialization import initialize
-from .interrupts import StopFlag
+from .instance import Buffers, FmuInstance, Status
 from .log import DISCARD, MASTER, OK, WARNING, Log, describe
-from .memory import Memory
-from .operations import Operation, Programs
-from .slave import Buffers, Slave, Status
-from .surroundings import Copies, Surroundings, suspects
+from .process_state import Copies, ProcessState, StopFlag, suspects
+from .signal_pool import SignalPool
+from .step_program import Operation, StepProgram
 
 ALMOST = 1e-6
 """Part of a step by which an FMU may be short of its end; chosen: rounding of its own times."""
 
 
-class Ended(Exception):
-    """A unit wants the run to end, which is no failure: `unit`, at `time` [s]."""
+class EndRequested(Exception):
+    """A unit wants the run to end, which is no failure: `instance`, at `time` [s]."""
 
-    def __init__(self, reason: str, *, unit: str, time: float) -> None:
+    def __init__(self, reason: str, *, instance: str, time: float) -> None:
         super().__init__(reason)
-        self.unit = unit
+        self.instance = instance
         self.time = time
 
 
@@ -50,7 +49,7 @@ class Master:
     def __init__(
         self,
         plan: Plan,
-        slaves: Mapping[str, Slave],
+        slaves: Mapping[str, FmuInstance],
         log: Log,
         stop: StopFlag,
         reached: ctypes.c_int64 | None = None,
@@ -69,15 +68,15 @@ class Master:
         log.time.value = plan.time(0)
         self._reached = ctypes.c_int64(-1) if reached is None else reached
         self.passes = 0
-        self.memory = memory = Memory(plan, slaves)
-        slow = {s.unit.period for s in memory.stations} - {1}
+        self.memory = memory = SignalPool(plan, slaves)
+        slow = {s.instance.period for s in memory.stations} - {1}
         self._clocks = {1: log.time} | {period: ctypes.c_double(0.0) for period in slow}
         for s in memory.stations:
-            period = s.unit.period
+            period = s.instance.period
             size = ctypes.c_double(float(period * plan.step))
             into, of = [v.place for v in s.inputs], [v.place for v in s.outputs]
             s.calls = s.slave.connect(Buffers(s.u, into, s.y, of, self._clocks[period], size))
-        self.programs = Programs(memory)
+        self.programs = StepProgram(memory)
         self._operations: dict[int, list[Operation]] = {}  # of the stretch being stepped, by phase
         real = [memory.index[key] for key in plan.record if key in memory.index]
         self._recorded = np.array([memory.time_at, *real], np.intp)
@@ -88,9 +87,9 @@ class Master:
         """Outputs that are recorded and on no wire, all of whose values have been finite so far."""
         self._expected = np.arange(memory.n_outputs)  # to be finite
         self._ones = np.ones(memory.n_outputs)
-        self._ending: Ended | None = None
+        self._ending: EndRequested | None = None
         self._points: Iterator[int] = iter(())  # left to be stepped to
-        self._surroundings = Surroundings()
+        self._surroundings = ProcessState()
         self._copies = copies or Copies()
 
     def initialize(self, row: np.ndarray, others: list[list[Value]]) -> None:
@@ -164,13 +163,13 @@ class Master:
         if not self._surroundings.arithmetic_changed():
             return
         time = self.plan.time(since)
-        among = suspects(self.plan.units)
+        among = suspects(self.plan.instances)
         self._surroundings.restore("", self.log)
         self.completed = self._reached.value = since
         raise SimulationError(
             f"after t = {time:.9g} s a unit ({listed(among, last='or')}) changed how numbers are rounded, "
             "flushed to zero or trapped, also for all others; with --isolate it does so for itself alone",
-            unit=among[0] if len(among) == 1 else None,
+            instance=among[0] if len(among) == 1 else None,
             time=time,
         )
 
@@ -204,26 +203,26 @@ class Master:
         """Judge a call of the step from `k` - 1 to `k` that did not return OK."""
         operation = self.operation_of(k, call)
         assert operation is not None
-        station = self.memory.of[operation.unit]
+        station = self.memory.of[operation.instance]
         kind = station.slave.part(operation.kind)
         status = station.slave.note(status)
         if status == WARNING:
-            self._note_warning(operation.unit, WORDS[kind])
+            self._note_warning(operation.instance, WORDS[kind])
             return
         self._check_finite(k)  # a value that went wrong upstream explains this failure
-        time = self.plan.time(k - station.unit.period)
+        time = self.plan.time(k - station.instance.period)
         if status == DISCARD and kind == "step" and (reached := station.slave.ended()) is not None:
-            self._end(k, operation.unit, time if math.isnan(reached) else reached)
+            self._end(k, operation.instance, time if math.isnan(reached) else reached)
             return
-        sentence = describe(operation.unit, WORDS[kind], time, status, self.log)
-        raise self._failure(sentence, operation.unit, time)
+        sentence = describe(operation.instance, WORDS[kind], time, status, self.log)
+        raise self._failure(sentence, operation.instance, time)
 
     def _end(self, k: int, unit: str, time: float) -> None:
         """End the run because a unit wants to: now, or after this step if it has done all of it."""
         now = self.log.time.value
-        said = [" ".join(m.text.split()) for m in self.log.messages if m.unit == unit and m.time >= now]
+        said = [" ".join(m.text.split()) for m in self.log.messages if m.instance == unit and m.time >= now]
         reason = f": {said[-1]}" if said else ", without a reason"
-        ending = Ended(f"{unit} ended the run at t = {time:.9g} s{reason}", unit=unit, time=time)
+        ending = EndRequested(f"{unit} ended the run at t = {time:.9g} s{reason}", instance=unit, time=time)
         if time < self.plan.time(k) - ALMOST * float(self.plan.step):
             raise ending
         self._ending = self._ending or ending
@@ -233,11 +232,11 @@ class Master:
         """Return what ends the run because of a unit."""
         if self.stop.requested:
             return self.stop.interrupted(f": {sentence}", unit=unit, time=time)
-        return SimulationError(sentence, unit=unit, time=time)
+        return SimulationError(sentence, instance=unit, time=time)
 
     def _note_warning(self, unit: str, what: str) -> None:
         """Keep a Warning of a unit that has said nothing so far."""
-        if not any(m.unit == unit and m.category != MASTER for m in self.log.warnings()):
+        if not any(m.instance == unit and m.category != MASTER for m in self.log.warnings()):
             self.log.add(unit, WARNING, "", f"{what}: the FMU returned Warning and gave no reason")
 
     def _check_finite(self, k: int) -> None:
@@ -262,7 +261,7 @@ class Master:
                     f"{wire.source}: {wire.output} is {_spelled(value)} at t = {time:.9g} s, "
                     f"on the wire {wire.source}.{wire.output} -> {wire.target}.{wire.input}"
                 )
-            raise SimulationError(problem, unit=wire.source, time=time)
+            raise SimulationError(problem, instance=wire.source, time=time)
         for (unit, name), at in list(self._spare.items()):
             if not math.isfinite(value := memory.pool[at]):
                 del self._spare[unit, name]

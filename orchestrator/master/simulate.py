@@ -21,21 +21,21 @@ from ..errors import (
     SimulationError,
     YawbenchError,
 )
-from ..metrics.plausibility import Watch
+from ..messages import printable
+from ..metrics.plausibility import PlausibilityWatch
 from ..plan import Finding, Plan
 from ..results.columnar import MemoryRecorder
 from ..results.folder import COMPLETED, RUNNING
 from ..results.formats import recorder_of
-from ..results.key import key_of
+from ..results.freshness import key_of
 from ..results.read import Results
 from ..results.recorder import Recorder
 from ..results.run_record import run_record
-from ..wording import printable
-from .apart import CourseApart, can_be_apart
-from .course import Course, Opener, Progress
-from .interrupts import StopFlag, interrupts
+from .child_run import ChildRun, can_be_apart
+from .fmi import open_unit
 from .log import Log, Message
-from .opening import open_unit
+from .process_state import StopFlag, interrupts
+from .run_loop import OpenInstance, RunLoop, RunProgress
 
 IN_MEMORY = 16 * 10**9
 """Bytes that the results of a run may take in memory. Chosen: what a desktop computer has."""
@@ -60,8 +60,8 @@ def simulate(
     plan: Plan,
     out: Path | str,
     *,
-    progress: Progress | None = None,
-    opener: Opener = open_unit,
+    progress: RunProgress | None = None,
+    opener: OpenInstance = open_unit,
     format: str = "csv",
     apart: bool = False,
 ) -> RunInfo:
@@ -90,7 +90,7 @@ def simulate(
         ResultsError: nothing can be written to `out`, or the format needs a package that is missing.
     """
     recorder = recorder_of(format)(Path(out), *_columns(plan))
-    run = Run(plan, recorder, progress, apart=apart and can_be_apart())
+    run = Simulation(plan, recorder, progress, apart=apart and can_be_apart())
     run.make(opener)
     return RunInfo(
         Path(out),
@@ -106,7 +106,7 @@ def simulate(
 
 
 def simulate_in_memory(
-    plan: Plan, *, progress: Progress | None = None, opener: Opener = open_unit
+    plan: Plan, *, progress: RunProgress | None = None, opener: OpenInstance = open_unit
 ) -> Results:
     """Run a plan and return its results; nothing is written.
 
@@ -122,20 +122,20 @@ def simulate_in_memory(
             "write them to a file"
         )
     recorder = MemoryRecorder(*_columns(plan))
-    Run(plan, recorder, progress, apart=False).make(opener)
+    Simulation(plan, recorder, progress, apart=False).make(opener)
     assert recorder.results is not None
     return recorder.results
 
 
 def _columns(plan: Plan) -> tuple[list[str], list[bool], dict[str, str | None]]:
     """Return the names of the recorded columns, which are Real, and their units."""
-    units = {unit.name: unit for unit in plan.units}
+    units = {unit.name: unit for unit in plan.instances}
     recorded = {f"{unit}.{name}": units[unit].fmu.variables[name] for unit, name in plan.record}
     units_of = {"time": "s", **{column: variable.unit for column, variable in recorded.items()}}
     return list(recorded), [variable.type == "Real" for variable in recorded.values()], units_of
 
 
-class Run:
+class Simulation:
     """One run of a plan into a recorder.
 
     Args:
@@ -143,19 +143,19 @@ class Run:
     """
 
     def __init__(
-        self, plan: Plan, recorder: Recorder | MemoryRecorder, progress: Progress | None, *, apart: bool
+        self, plan: Plan, recorder: Recorder | MemoryRecorder, progress: RunProgress | None, *, apart: bool
     ) -> None:
         self.plan = plan
         self.recorder = recorder
-        self.watch = Watch(plan)
+        self.watch = PlausibilityWatch(plan)
         recorder.looks.append(self.watch.look)
         self.log = Log()
         self.id = uuid.uuid4().hex[:12]
         self._key = key_of(plan)
         self._apart = apart
         self._stop = StopFlag()
-        course = CourseApart if apart else Course
-        self.course: Course = course(plan, recorder, self.log, self._stop, progress)
+        course = ChildRun if apart else RunLoop
+        self.course: RunLoop = course(plan, recorder, self.log, self._stop, progress)
         self._saved = False
         self._ended_by: str | None = None  # unit
         self._started = datetime.now(timezone.utc)
@@ -166,7 +166,7 @@ class Run:
     def wall_time(self) -> float:
         return time.perf_counter() - self._began
 
-    def make(self, opener: Opener) -> None:
+    def make(self, opener: OpenInstance) -> None:
         """Go from beginning to end; write what there is however it ends, before units are freed."""
         with interrupts(self._stop, self._abandon):
             try:
@@ -226,7 +226,7 @@ class Run:
         }
         if self.course.ended is not None:
             ended["ended"] = {
-                "unit": self.course.ended.unit,
+                "unit": self.course.ended.instance,
                 "time": self.course.ended.time,
                 "message": str(self.course.ended),
             }

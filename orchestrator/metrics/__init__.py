@@ -1,5 +1,5 @@
 """Stage five: what a run is judged by."""
 
-from .measures import Entry, catalogue
+from .measures import MeasureEntry, catalogue
 
-__all__ = ["Entry", "catalogue"]
+__all__ = ["MeasureEntry", "catalogue"]

@@ -3,6 +3,8 @@
 All functions take time `t` [s] and samples of equal shape (n,), n >= 2, in SI units, and give SI
 units. Integrals are taken by the trapezoidal rule, so uneven samples are right too. Measures of the
 phase plane take the signal and its rate: the recorded one, else the difference quotient.
+
+Signals in symbols and words: what the field calls a variable of the signal dictionary.
 """
 
 from __future__ import annotations
@@ -11,9 +13,15 @@ import inspect
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
+
+from vocabulary.signals import SIGNALS
+from vocabulary.wheels import WHEEL_NAMES
+
+from ..scenario.quantities import conversion, measure_of, parse_unit
 
 SETTLING_BAND = 0.05
 """Half-width of the band a settled signal stays in, relative to the reference's peak."""
@@ -291,7 +299,7 @@ def time_beyond(t: np.ndarray, x: np.ndarray, x_rate: np.ndarray) -> float:
 
 
 @dataclass(frozen=True)
-class Entry:
+class MeasureEntry:
     """A measure as a table of the documentation shows it."""
 
     name: str
@@ -311,10 +319,10 @@ _UNITS = {
 _NEEDS = {"x_ref": "a reference", "x_rate": "its rate"}
 
 
-def catalogue() -> list[Entry]:
+def catalogue() -> list[MeasureEntry]:
     """Return all measures with their definitions, formulas and units."""
     return [
-        Entry(
+        MeasureEntry(
             name,
             one.definition,
             one.formula.replace("{x_ref}", "x_ref").replace("{x}", "x"),
@@ -323,3 +331,45 @@ def catalogue() -> list[Entry]:
         )
         for name, one in MEASURES.items()
     ]
+
+
+SI = ("1", "s", "m", "kg", "N", "Pa", "rad", "m/s", "rad/s", "m/s2", "rad/s2", "N.m")
+"""Units that the signals of the dictionary have."""
+
+
+@cache
+def si_of(unit: str) -> tuple[str, float]:
+    """Return the unit of the dictionary that measures the same, and the factor to it."""
+    measure = measure_of(unit)
+    for si in SI if measure is not None and unit not in SI else ():
+        factors = conversion(measure, parse_unit(si))  # type: ignore[arg-type]
+        if factors is not None and factors[1] == 0.0:
+            return si, factors[0]
+    return unit, 1.0
+
+
+def si(unit: str) -> str:
+    """Return the unit of a number as files have it: there a ratio has the unit 1, not per cent."""
+    return "1" if unit == "%" else unit
+
+
+def variable_of(column: str) -> str:
+    """Return the variable's name of `unit.variable`, or the name itself."""
+    return column.rpartition(".")[2]
+
+
+def symbol(signal: str) -> str:
+    """Return the symbol of a signal, or its name where the field has none."""
+    name = variable_of(signal)
+    if name.endswith("_ref"):
+        return f"{symbol(name.removesuffix('_ref'))}_ref"
+    return (SIGNALS[name].symbol if name in SIGNALS else "") or name
+
+
+def words(signal: str) -> str:
+    """Return the signal in words, with a capital; of one wheel with that: "Wheel torque, front left"."""
+    name = variable_of(signal)
+    if name[-2:] in WHEEL_NAMES and name[-3:-2] == "_":
+        return f"{words(f'{name[:-2]}*')}, {WHEEL_NAMES[name[-2:]]}"
+    known = SIGNALS[name].words if name in SIGNALS else ""
+    return known or name.replace("_*", "").replace("_", " ").capitalize()

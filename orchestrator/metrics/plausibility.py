@@ -20,12 +20,12 @@ from vocabulary.wheels import WHEEL_NAMES, wheels
 from ..plan import Finding, Plan
 from .run_metrics import columns_of, results_to_be
 
-Signals = Sequence[np.ndarray]
+SignalArrays = Sequence[np.ndarray]
 """The values of a check's signals over a block, in their order; shape (rows,) each."""
 
 
 @dataclass(frozen=True)
-class Check:
+class PlausibilityCheck:
     """What counts as remarkable: some value of signals beyond a limit.
 
     `says` may hold `{limit}`, `{value}`, `{size}` (without its sign), `{time}`, `{column}` and `{wheel}`.
@@ -33,7 +33,7 @@ class Check:
 
     kind: str
     signals: tuple[str, ...]  # of the dictionary; with `*` every wheel is looked at for itself
-    value: Callable[[Signals], np.ndarray]
+    value: Callable[[SignalArrays], np.ndarray]
     limit: float  # remarkable are values above it, in the unit that `says` uses
     says: str
     why: str  # where the limit comes from
@@ -41,43 +41,43 @@ class Check:
     over_friction: bool = False  # the value is divided by the highest friction of the road
 
 
-def _degrees(x: Signals) -> np.ndarray:
+def _degrees(x: SignalArrays) -> np.ndarray:
     return np.degrees(np.abs(x[0]))
 
 
-CHECKS: tuple[Check, ...] = (
-    Check(
+CHECKS: tuple[PlausibilityCheck, ...] = (
+    PlausibilityCheck(
         "spin", ("sideslip",), _degrees, 45.0,
         "the car spins: its sideslip angle passes {limit} degrees at {time} s and reaches {value} degrees",
         "chosen: more than front wheels can be steered against",
     ),
-    Check(
+    PlausibilityCheck(
         "wheel lift", ("vertical_load_*",), itemgetter(0), 1.0,
         "the {wheel} wheel lifts off at {time} s",
         "chosen: a load of less than 1 N is none", below=True,
     ),
-    Check(
+    PlausibilityCheck(
         "roll over", ("roll_angle",), _degrees, 15.0,
         "the car leans {value} degrees, beyond what models with linear springs are valid for "
         "({limit} degrees, at {time} s)",
         "chosen: bump stops, which the models leave out, are reached before it",
     ),
-    Check(
+    PlausibilityCheck(
         "backwards", ("velocity_x",), itemgetter(0), -0.1,
         "the car rolls backwards from {time} s, at up to {size} m/s",
         "chosen: above the creep of a car that has stopped", below=True,
     ),
-    Check(
+    PlausibilityCheck(
         "speed", ("velocity_x",), lambda x: np.abs(x[0]), 70.0,
         "the car is faster than {limit} m/s (252 km/h): {value} m/s at {time} s",
         "chosen: above the top speed of the cars that the papers speak of",
     ),
-    Check(
+    PlausibilityCheck(
         "steer angle", ("steer_angle",), _degrees, 60.0,
         "the front wheels are steered by {value} degrees, more than {limit} at {time} s",
         "chosen: above the steering lock of passenger cars, 35 to 50 degrees",
     ),
-    Check(
+    PlausibilityCheck(
         "grip", ("acceleration_x", "acceleration_y"), lambda x: np.hypot(*x) / G, 1.5,
         "the car accelerates by {value} times what the road's friction gives, from {time} s beyond {limit}",
         "chosen: tyres of the catalogue reach 1.2 of the friction they are told", over_friction=True,
@@ -86,12 +86,12 @@ CHECKS: tuple[Check, ...] = (
 """What is looked at after every run."""
 
 
-class Watch:
+class PlausibilityWatch:
     """Looks at the rows of a run as they come, and tells what was remarkable in them."""
 
-    def __init__(self, plan: Plan, checks: Iterable[Check] = CHECKS) -> None:
+    def __init__(self, plan: Plan, checks: Iterable[PlausibilityCheck] = CHECKS) -> None:
         results = results_to_be(plan)
-        units = {unit.name: unit.fmu.variables for unit in plan.units}
+        units = {unit.name: unit.fmu.variables for unit in plan.instances}
         reals = [f"{unit}.{name}" for unit, name in plan.record if units[unit][name].type == "Real"]
         place = {column: 1 + k for k, column in enumerate(reals)}
         friction = _highest_friction(plan)
@@ -118,7 +118,9 @@ class Watch:
 class _Seen:
     """What one check has seen so far of its columns."""
 
-    def __init__(self, check: Check, columns: Sequence[str], places: list[int], scale: float) -> None:
+    def __init__(
+        self, check: PlausibilityCheck, columns: Sequence[str], places: list[int], scale: float
+    ) -> None:
         self.check = check
         self.columns = columns
         self._places = places
@@ -151,9 +153,9 @@ class _Seen:
         return Finding(self.check.kind, column, value, self._time, says)
 
 
-def _ranges(plan: Plan) -> Iterator[Check]:
+def _ranges(plan: Plan) -> Iterator[PlausibilityCheck]:
     """Yield a check for every recorded output that its FMU, or one that it feeds, states limits for."""
-    units = {unit.name: unit.fmu.variables for unit in plan.units}
+    units = {unit.name: unit.fmu.variables for unit in plan.instances}
     limits = {(unit, name): [units[unit][name]] for unit, name in plan.record}
     for wire in plan.wires:
         if (wire.source, wire.output) in limits and not wire.converts:
@@ -167,18 +169,20 @@ def _ranges(plan: Plan) -> Iterator[Check]:
                 says = "{column} is {value} at {time} s, beyond the {limit} that its model is valid for"
                 # a little beyond is rounding
                 margin = 1e-9 * max(1.0, abs(limit)) * (-1 if below else 1)
-                yield Check("range", (f"{unit}.{name}",), itemgetter(0), limit + margin, says, why, below)
+                yield PlausibilityCheck(
+                    "range", (f"{unit}.{name}",), itemgetter(0), limit + margin, says, why, below
+                )
 
 
 def _highest_friction(plan: Plan) -> float | None:
     """Return the highest friction that units are told; None if it is no constant, or not told at all."""
     known = [
         float(value)
-        for unit in plan.units
+        for unit in plan.instances
         for name, value in unit.constants.items()
         if name in ("friction", *wheels("friction_*"))
     ]
-    driven = [wire.input for wire in plan.wires] + [name for unit in plan.units for name in unit.series]
+    driven = [wire.input for wire in plan.wires] + [name for unit in plan.instances for name in unit.series]
     varies = any(name.startswith("friction") for name in driven)
     return max(known, default=0.0) or None if not varies else None
 

@@ -27,11 +27,10 @@ import numpy as np
 from vocabulary.wheels import WHEELS, wheels
 
 from ..errors import ScenarioError
+from ..messages import closest, fold, hint, listed, short
 from ..plan import SENSING
 from ..scenario.quantities import convert
-from ..wording import closest, fold, hint, listed, short
-from .measures import MEASURES, Measure
-from .symbols import si_of, symbol, variable_of, words
+from .measures import MEASURES, Measure, si_of, symbol, variable_of, words
 
 if TYPE_CHECKING:
     from ..plan import Plan
@@ -61,7 +60,7 @@ STANDARD = (
 
 AT_A_TIME = "value"
 """The measure of a point of time; all others are of a stretch."""
-Window = tuple[float, float]
+TimeWindow = tuple[float, float]
 """From, to [s]; equal: a point of time."""
 
 
@@ -72,7 +71,7 @@ class Metric:
     name: str
     measure: Measure
     signal: str
-    window: Window | None = None  # in place of the whole run
+    window: TimeWindow | None = None  # in place of the whole run
     other: str = ""  # the reference, in place of the signal's own; or what is subtracted
 
     @property
@@ -122,7 +121,7 @@ def _times_seconds(unit: str, power: int) -> str:
 
 
 @dataclass(frozen=True)
-class Value:
+class MetricValue:
     """What a metric comes to in one run: SI; `unit` "%" marks a ratio that is shown in per cent.
 
     Of several repeats it is the mean, and `half` half the width of its confidence interval.
@@ -133,7 +132,7 @@ class Value:
     half: float = 0.0
 
 
-def during(window: Window | None, lead: str = "") -> str:
+def during(window: TimeWindow | None, lead: str = "") -> str:
     """Return a window as the end of a phrase: ", 1 to 6 s", after a `lead` such as "from "; ", at 2 s"."""
     if window is None:
         return ""
@@ -141,7 +140,7 @@ def during(window: Window | None, lead: str = "") -> str:
     return f", at {first:g} s" if first == last else f", {lead}{first:g} to {last:g} s"
 
 
-def window_of(text: str) -> Window:
+def window_of(text: str) -> TimeWindow:
     """Return the window [s] written as `from 1 s to 3 s`, `1 to 3 s` or `at 2 s`.
 
     Raises:
@@ -228,7 +227,7 @@ def _column(results: Results, name: str) -> str | None:
     return found[0] if len(found) == 1 and np.issubdtype(results.columns[found[0]].dtype, np.number) else None
 
 
-def evaluate(results: Results, chosen: Metric, window: Window | None = None) -> Value | None:
+def evaluate(results: Results, chosen: Metric, window: TimeWindow | None = None) -> MetricValue | None:
     """Return a metric of a run over the whole run or a window [s], if none is given the metric's own.
 
     None if the run has no such signal or does not last for the window: part of it is another metric.
@@ -258,7 +257,7 @@ def evaluate(results: Results, chosen: Metric, window: Window | None = None) -> 
     number = float(np.max(numbers))  # a NaN of one wheel is not lost
     if math.isnan(number):
         return None
-    return Value(number, chosen.unit(si_of(results.units[signals[0][0]])[0]))
+    return MetricValue(number, chosen.unit(si_of(results.units[signals[0][0]])[0]))
 
 
 def results_to_be(plan: Plan) -> Results:
@@ -266,7 +265,7 @@ def results_to_be(plan: Plan) -> Results:
     from ..results.read import Results
     from ..results.run_record import connections_of
 
-    units = {unit.name: unit for unit in plan.units}
+    units = {unit.name: unit for unit in plan.instances}
     variables = {f"{u}.{name}": units[u].fmu.variables[name] for u, name in plan.record}
     columns = {name: np.empty(0, float if v.type != "String" else str) for name, v in variables.items()}
     names = {name: {"name": unit.fmu.name} for name, unit in units.items()}
@@ -285,7 +284,7 @@ def check_metrics(plan: Plan, chosen: Iterable[Metric]) -> None:
         raise ScenarioError(problems)
 
 
-def why_none(results: Results, one: Metric, window: Window | None, end: float) -> str:
+def why_none(results: Results, one: Metric, window: TimeWindow | None, end: float) -> str:
     """Return why there is no such metric of a run that lasts until `end` [s], "" if there is one."""
     missing = [s for s in filter(None, (one.signal, one.other)) if not columns_of(results, s)]
     if missing:
@@ -396,7 +395,7 @@ def reference_of(results: Results, column: str) -> str | None:
     return having[0] if len(having) == 1 else None
 
 
-def evaluate_all(results: Results, names: Iterable[str] = STANDARD) -> dict[str, Value]:
+def evaluate_all(results: Results, names: Iterable[str] = STANDARD) -> dict[str, MetricValue]:
     """Return those of the metrics that the run has the signals for."""
     values = {name: evaluate(results, metric(name)) for name in names}
     return {name: value for name, value in values.items() if value is not None}

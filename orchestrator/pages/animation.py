@@ -4,28 +4,225 @@
     {{ fragment(runs) }}        as often as there are animations
 
 What is drawn is what was recorded, thinned; between two moments kept the browser interpolates.
+
+What an animation shows of a run: the car's motion and forces over at most 600 recorded moments.
 """
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
-from dataclasses import asdict
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from importlib.resources import files
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
+from vocabulary.lane_change import Lane, lanes_of
 from vocabulary.wheels import WHEELS
 
 from ..errors import ResultsError
-from ..figures.display import shown_unit
-from ..figures.style import LINES, line_style
+from ..figures.style import LINES, line_style, shown_unit
+from ..messages import listed
+from ..metrics.run_metrics import columns_of
 from ..results.read import Results
-from ..wording import listed
-from .animation_frames import Frames, frames_of
+from .friction_map import FrictionPatch, ground_of
 from .rendering import render
+
+STANDS = 0.5
+"""Speed below which a car goes nowhere and its sideslip angle tells nothing [m/s]; chosen: below any walk."""
+FRAMES = 600
+"""Moments kept of a run; chosen: 75 per second of an 8 s manoeuvre, more than a screen shows."""
+OVERHANG_FRONT, OVERHANG_REAR = 0.85, 1.0
+"""Outline beyond the axles [m], where no driver knows its car's ends; chosen: a saloon."""
+BESIDE = 0.2
+"""Body's width beyond the track width [m]; chosen: a tyre's width."""
+USUAL = {"cg_to_front_axle": 1.3, "cg_to_rear_axle": 1.4, "track_width": 1.55}
+"""The car of a plant that tells no sizes [m]; chosen: a mid-size car."""
+
+POSE = ("position_x", "position_y", "yaw_angle")
+ROUNDABOUT = ("velocity_x", "velocity_y", "path_offset")
+"""Signals that are not shown as they are."""
+SIGNALS = ("sideslip", "yaw_rate", "steer_angle", "yaw_moment", "cone_overrun", *ROUNDABOUT)
+
+
+@dataclass(frozen=True)
+class CarOutline:
+    """A car seen from above: its axles and ends from the centre of mass, its widths [m]."""
+
+    front_axle: float
+    rear_axle: float
+    track: float
+    front_end: float
+    rear_end: float
+    width: float
+
+
+@dataclass(frozen=True)
+class Frames:
+    """A run at the moments kept.
+
+    `channels` are SI arrays of one length: time, x, y, yaw, and as recorded speed, sideslip, yaw_rate,
+    steer_angle, yaw_moment, cone_overrun, path_y (the path the driver follows, at x), and per wheel
+    `force_x_fl` .. `force_y_rr` (vehicle axes) and `grip_fl` .. `grip_rr` (friction times load).
+    """
+
+    car: CarOutline
+    channels: dict[str, np.ndarray]
+    lanes: tuple[Lane, ...]
+    ground: tuple[FrictionPatch, ...]
+    notes: tuple[str, ...]  # what could not be drawn
+    failed: bool = False
+
+
+def frames_of(results: Results) -> Frames:
+    """Return the frames of a run; those of a failed run end where its position was last a number.
+
+    Raises:
+        ResultsError: the position or the yaw angle was not recorded, or of no moment at all.
+    """
+    time, (x, y, yaw) = _pose(results)
+    kept = thinned(time)
+    time, x, y, yaw = time[kept], x[kept], y[kept], yaw[kept]
+    channels = {"time": time, "x": x, "y": y, "yaw": yaw}
+    others = {name: values[kept] for name in SIGNALS if (values := _signal(results, name)) is not None}
+    if (along := others.get("velocity_x")) is not None:
+        channels["speed"] = np.hypot(along, others["velocity_y"]) if "velocity_y" in others else along
+        if "sideslip" in others:
+            stands = np.abs(channels["speed"]) < STANDS
+            others["sideslip"] = np.where(stands, math.nan, others["sideslip"])
+    if "path_offset" in others:
+        channels["path_y"] = y - others["path_offset"]
+    channels |= {name: values for name, values in others.items() if name not in ROUNDABOUT}
+    forces = _forces(results, kept, others.get("steer_angle", np.zeros(kept.size)))
+    grip = _grip(results, kept)
+    notes = []
+    if not forces:
+        notes.append("tyre forces were not recorded")
+    elif "steer_angle" not in others:
+        notes.append("the steer angle was not recorded: the front wheels are drawn straight")
+    if forces and not grip:
+        notes.append("friction or vertical loads were not recorded: no friction circles")
+    car, known = _car(results)
+    if not known:
+        notes.append("the plant tells no sizes: a mid-size car is drawn")
+    if failed := results.record.status not in ("", "completed"):
+        notes.append(f"the run did not end as planned; shown until {time[-1]:.2f} s")
+    elif results.ended:
+        notes.append(results.ended)
+    lanes = next(filter(None, map(lanes_of, _parameters(results, "driver"))), [])
+    ranges = [(float(values.min()), float(values.max())) for values in (x, y)]
+    grounds = (ground_of(road, *ranges) for road in _parameters(results, "road"))
+    ground = next(filter(None, grounds), [])
+    return Frames(car, channels | forces | grip, tuple(lanes), tuple(ground), tuple(notes), failed)
+
+
+def thinned(time: np.ndarray, most: int = FRAMES) -> np.ndarray:
+    """Return the indices of at most so many rows [at least 2], even in time, the ends among them."""
+    if time.size <= most:
+        return np.arange(time.size)
+    wanted = np.linspace(time[0], time[-1], most)
+    after = np.clip(np.searchsorted(time, wanted), 1, time.size - 1)
+    nearest = after - (wanted - time[after - 1] < time[after] - wanted)
+    nearest[0], nearest[-1] = 0, time.size - 1
+    return np.unique(nearest)
+
+
+def rotated(along: np.ndarray, across: np.ndarray, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return a vector given in axes turned by `angle` [rad] in the axes they were turned from."""
+    c, s = np.cos(angle), np.sin(angle)
+    return along * c - across * s, along * s + across * c
+
+
+def _pose(results: Results) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Return time, and x, y, yaw from the start to where one of them ends to be a number."""
+    pose = [_signal(results, name) for name in POSE]
+    there = [values for values in pose if values is not None]
+    if len(there) < len(pose):
+        missing = [name for name, values in zip(POSE, pose, strict=True) if values is None]
+        verb = "was" if len(missing) == 1 else "were"
+        raise ResultsError(
+            f"{results.file}: cannot be animated: {listed(missing)} {verb} not recorded; "
+            f"a car seen from above needs {listed(POSE)}."
+        )
+    sound = np.all(np.isfinite([results.time, *there]), axis=0)
+    rows = sound.size if sound.all() else int(np.argmin(sound))
+    if rows == 0:
+        raise ResultsError(f"{results.file}: cannot be animated: no moment with a position was recorded.")
+    x, y, yaw = (values[:rows] for values in there)
+    return results.time[:rows], [x, y, np.unwrap(yaw)]
+
+
+def _signal(results: Results, name: str) -> np.ndarray | None:
+    columns = columns_of(results, name)
+    return results.columns[columns[0]] if columns else None
+
+
+def _forces(results: Results, kept: np.ndarray, steer: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the tyre forces in vehicle axes, N."""
+    along, across = columns_of(results, "tyre_force_x_*"), columns_of(results, "tyre_force_y_*")
+    if not along or not across:
+        return {}
+    forces = {}
+    for wheel, x, y in zip(WHEELS, along, across, strict=True):
+        angle = steer if wheel.startswith("f") else np.zeros(kept.size)
+        pair = rotated(results.columns[x][kept], results.columns[y][kept], angle)
+        forces[f"force_x_{wheel}"], forces[f"force_y_{wheel}"] = pair
+    return forces
+
+
+def _grip(results: Results, kept: np.ndarray) -> dict[str, np.ndarray]:
+    """Return friction times load of every wheel, N: the radius of its friction circle."""
+    loads, forces = columns_of(results, "vertical_load_*"), columns_of(results, "tyre_force_x_*")
+    if not loads or not forces:
+        return {}
+    grip = {}
+    for wheel, load, force in zip(WHEELS, loads, forces, strict=True):
+        friction = _friction(results, wheel, tyre=force.partition(".")[0])
+        if friction is None:
+            return {}
+        mu = np.broadcast_to(np.asarray(friction, float), results.time.shape)[kept]
+        grip[f"grip_{wheel}"] = mu * np.maximum(results.columns[load][kept], 0.0)
+    return grip
+
+
+def _friction(results: Results, wheel: str, *, tyre: str) -> np.ndarray | float | None:
+    """Return the friction at a wheel: as a road recorded it, or the constant that the tyre was given."""
+    if (recorded := _signal(results, f"friction_{wheel}")) is not None:
+        return recorded
+    fmu = results.record.fmus.get(tyre)
+    constants = fmu.constants if fmu else {}
+    friction = constants.get(f"friction_{wheel}", constants.get("friction"))
+    return float(friction) if isinstance(friction, (int, float)) else None
+
+
+def _parameters(results: Results, role: str) -> Iterator[Mapping[str, Any]]:
+    """Yield the parameters of the units of a role."""
+    for unit in results.units_of_role(role):
+        fmu = results.record.fmus[unit]
+        yield {**fmu.defaults, **fmu.parameters}
+
+
+def _car(results: Results) -> tuple[CarOutline, bool]:
+    """Return the car's sizes, and False if the plant tells none of them."""
+    told: dict[str, float] = {}
+    for known in _parameters(results, "plant"):
+        told |= {
+            name: float(value)
+            for name, value in known.items()
+            if name in USUAL and isinstance(value, (int, float)) and math.isfinite(value) and value > 0
+        }
+    front, rear, track = (told.get(name, usual) for name, usual in USUAL.items())
+    ends = {"front": front + OVERHANG_FRONT, "rear": rear + OVERHANG_REAR, "width": track + BESIDE}
+    for known in _parameters(results, "driver"):  # whom the cones are measured with
+        if lanes_of(known):
+            ends["width"] = float(known["vehicle_width"])
+            ends["front"] = float(known.get("cg_to_front_end", ends["front"]))
+            ends["rear"] = float(known.get("cg_to_rear_end", ends["rear"]))
+    return CarOutline(front, rear, track, ends["front"], ends["rear"], ends["width"]), bool(told)
+
 
 SCRIPTS = ("frames", "draw", "scene", "close_up", "strip", "player")
 READOUTS = (
@@ -44,10 +241,10 @@ NAMED = 6
 MOST = len(LINES)
 """Runs in one animation: as many as there are colours."""
 
-Runs = Sequence[tuple[str, Results]]
+NamedRuns = Sequence[tuple[str, Results]]
 
 
-def fragment(runs: Runs, *, title: str = "") -> Markup:
+def fragment(runs: NamedRuns, *, title: str = "") -> Markup:
     """Return the animation of up to seven runs (label, results) as a part of a page; it waits to be played.
 
     Raises:
@@ -65,7 +262,7 @@ def assets() -> Markup:
     return Markup(f"<style>\n{style}</style>\n<script>\n(() => {{\n'use strict';\n{script}}})();\n</script>")
 
 
-def page(runs: Runs, *, title: str = "", below: str = "", changed: str = "") -> str:
+def page(runs: NamedRuns, *, title: str = "", below: str = "", changed: str = "") -> str:
     """Return a page of its own; it plays by itself unless the reader has asked for less motion.
 
     Args:
@@ -81,7 +278,7 @@ def page(runs: Runs, *, title: str = "", below: str = "", changed: str = "") -> 
     return render("animation_page.html.j2", assets=assets(), below=below, changed=changed, **facts)
 
 
-def _facts(runs: Runs, title: str, *, alone: bool = False) -> dict[str, Any]:
+def _facts(runs: NamedRuns, title: str, *, alone: bool = False) -> dict[str, Any]:
     if not 1 <= len(runs) <= MOST:
         raise ResultsError(f"an animation shows one to {MOST} runs, not {len(runs)}.")
     shown = [(label, frames_of(results)) for label, results in runs]

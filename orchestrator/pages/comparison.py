@@ -1,18 +1,225 @@
-"""What a comparison's page begins with: metrics with their differences, the signals that differ most."""
+"""What a comparison's page begins with: metrics with their differences, the signals that differ most.
+
+What differs between two runs: what they were made of; in which signals, when and how far they part.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from ..experiments.findings import Findings
+import numpy as np
+
+from vocabulary.wheels import WHEELS
+
+from ..experiments.outcome import ExperimentResult
 from ..experiments.tables import Table, marked, remarks
-from ..figures.display import Run, digits_of, shown, shown_unit
-from ..metrics.run_metrics import Value, metric
-from ..metrics.symbols import variable_of
-from .divergence import SAME, SEEN, Divergence, Parting, divergence
-from .facts import Figure, figure_of
+from ..figures.style import LabelledRun, digits_of, shown, shown_unit
+from ..labels import changed, changes_in
+from ..messages import counted, star
+from ..metrics.measures import variable_of
+from ..metrics.run_metrics import MetricValue, metric
+from ..results.read import Results
+from .page_parts import PageFigure, figure_of
+
+SAME = 1e-9
+"""A difference over the signal's peak that is none; chosen: far above rounding, far below any physics."""
+SEEN = 0.01
+"""A difference over the signal's peak that a reader of curves sees; chosen: a line's width in a figure."""
+
+
+@dataclass(frozen=True)
+class SignalDifference:
+    """A signal that two runs do not share: when they part, and how far apart they get."""
+
+    signal: str  # unit.variable, four wheels as one with `*`
+    targets: tuple[str, ...]  # units that take it as an input
+    first: float  # s
+    seen: float | None  # s; when they differ by SEEN of the signal's peak; None: never
+    largest: float  # in the signal's unit
+    largest_at: float  # s
+    unit: str
+    relative: float = 1.0  # the largest difference over the signal's peak
+
+
+@dataclass(frozen=True)
+class RunComparison:
+    """All signals that differ, those that part first in front; and what could not be compared."""
+
+    partings: tuple[SignalDifference, ...]
+    compared: int  # signals
+    notes: tuple[str, ...]
+
+
+def divergence(one: Results, other: Results) -> RunComparison:
+    """Compare all signals that both runs recorded, at the times that both have.
+
+    Signals that part at the same time stand in the order of evaluation, so that causes come first.
+    """
+    rows, others = _common(one.time, other.time)
+    notes = [
+        f"only {which} recorded {', '.join(dict.fromkeys(star(name) for name in missing))}"
+        for which, missing in (
+            ("the first", [name for name in one if name not in other]),
+            ("the other", [name for name in other if name not in one]),
+        )
+        if missing
+    ]
+    if rows.size < max(one.time.size, other.time.size):
+        notes.append(f"compared at the {rows.size} times that both runs have")
+    shared = [name for name in one if name in other]
+    time = one.time[rows]
+    found: dict[str, SignalDifference] = {}
+    for name in shared if rows.size else []:
+        parting = _parting(name, time, one.columns[name][rows], other.columns[name][others], one)
+        if parting is not None:
+            known = found.get(parting.signal)
+            found[parting.signal] = parting if known is None else _together(known, parting)
+    order = {unit: i for i, unit in enumerate(one.run.get("evaluation_order", []))}
+    ranked = sorted(
+        found.values(), key=lambda p: (p.first, order.get(p.signal.partition(".")[0], len(order)))
+    )
+    return RunComparison(tuple(ranked), len(shared), tuple(notes))
+
+
+def _common(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows of both at which the times are the same to a nanosecond."""
+    _, rows, others = np.intersect1d(
+        np.round(one * 1e9).astype(np.int64), np.round(other * 1e9).astype(np.int64), return_indices=True
+    )
+    return rows, others
+
+
+def _parting(
+    name: str, time: np.ndarray, a: np.ndarray, b: np.ndarray, run: Results
+) -> SignalDifference | None:
+    if not (np.issubdtype(a.dtype, np.number) and np.issubdtype(b.dtype, np.number)):
+        unlike = np.flatnonzero(a.astype(str) != b.astype(str))
+        if not unlike.size:
+            return None
+        first = float(time[unlike[0]])
+        return SignalDifference(star(name), targets_of(run.run, name), first, first, float("nan"), first, "")
+    with np.errstate(invalid="ignore"):
+        apart = np.abs(a - b)
+    apart = np.where(np.isnan(a) & np.isnan(b), 0.0, np.where(np.isnan(apart), np.inf, apart))
+    sizes = np.abs(np.concatenate([a, b]))
+    sizes = sizes[np.isfinite(sizes)]
+    peak = float(sizes.max()) if sizes.size else 0.0
+    unlike = np.flatnonzero(apart > SAME * peak)
+    if not unlike.size:
+        return None
+    visible = np.flatnonzero(apart > SEEN * peak)
+    largest = int(np.argmax(apart))
+    return SignalDifference(
+        signal=star(name) if name[-2:] in WHEELS else name,
+        targets=targets_of(run.run, name),
+        first=float(time[unlike[0]]),
+        seen=float(time[visible[0]]) if visible.size else None,
+        largest=float(apart[largest]),
+        largest_at=float(time[largest]),
+        unit=run.units[name],
+        relative=float(apart[largest]) / peak,
+    )
+
+
+def _together(one: SignalDifference, other: SignalDifference) -> SignalDifference:
+    """Return one parting of two wheels: the earliest moments, the largest difference."""
+    widest = max(one, other, key=lambda parting: parting.largest)
+    seen = [parting.seen for parting in (one, other) if parting.seen is not None]
+    return SignalDifference(
+        one.signal, one.targets, min(one.first, other.first), min(seen, default=None),
+        widest.largest, widest.largest_at, one.unit, widest.relative,
+    )  # fmt: skip
+
+
+def targets_of(run: Mapping[str, Any], signal: str) -> tuple[str, ...]:
+    """Return the units that take a recorded signal, as the run's record says."""
+    wires = run.get("connections", [])
+    return tuple(dict.fromkeys(wire["to"].partition(".")[0] for wire in wires if wire["from"] == signal))
+
+
+OF_RUN = ("status", "title", "algorithm", "step_size", "stop_time", "rows")
+"""Parts of a record that stand in the table by themselves."""
+
+
+class RecordDifference(NamedTuple):
+    """A part of two records that is not the same; None where a record has no such part."""
+
+    place: str
+    one: Any
+    other: Any
+
+
+def differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[RecordDifference]:
+    """Return what differs between the records of two runs: scenario, units, wires, versions."""
+    first, second = dict(_facts(one)), dict(_facts(other))
+    exchanged = tuple(f"{unit}." for unit in _names(one) if _names(one)[unit] != _names(other).get(unit))
+    both = first.keys() & second.keys()
+    return [
+        RecordDifference(place, first.get(place), second.get(place))
+        for place in dict.fromkeys([*first, *second])
+        # units of two kinds share few parameters; that one of them has others is no news
+        if first.get(place) != second.get(place) and (place in both or not place.startswith(exchanged))
+    ]
+
+
+def _names(run: Mapping[str, Any]) -> dict[str, Any]:
+    return {unit: fmu.get("name") for unit, fmu in run.get("fmus", {}).items()}
+
+
+def _facts(run: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield place and value of everything that may differ."""
+    scenario = run.get("scenario", {})
+    yield "scenario", scenario.get("file")
+    yield "vehicle file", scenario.get("vehicle")
+    yield "changed", changed(changes_in(run)) or None
+    for key in OF_RUN:
+        yield key, run.get(key)
+    for unit, fmu in run.get("fmus", {}).items():
+        yield unit, f"{fmu.get('name')} ({str(fmu.get('sha256', ''))[:8]})"
+        yield f"{unit}.step_size", fmu.get("step_size")
+        for kind in ("defaults", "parameters", "constants"):
+            for name, value in fmu.get(kind, {}).items():
+                yield f"{unit}.{name}", value
+    for wire in run.get("connections", []):
+        text = wire if isinstance(wire, str) else f"{wire.get('from')} -> {wire.get('to')}"
+        yield text, "connected"
+    for fault in run.get("faults", []):
+        yield f"fault of {fault.get('on')}", fault.get("fault")
+    yield from run.get("versions", {}).items()
+
+
+def differences_table(found: list[RecordDifference], one: str, other: str) -> Table:
+    """Return the table of what differs between two runs called so."""
+    rows: list[Any] = [[place, _text(a), _text(b)] for place, a, b in found]
+    return Table("What the runs were made of", ["", one, other], rows)
+
+
+def _text(value: Any) -> str | None:
+    if isinstance(value, bool) or not isinstance(value, float):
+        return None if value is None else str(value)
+    return f"{value:.10g}"
+
+
+def partings_table(found: RunComparison, one: Results, other: Results) -> Table:
+    """Return the table of signals in which the results of two runs part, the earliest first."""
+    headings = ["signal", "differs from", "visibly from", "largest difference", "at"]
+    table = Table("What came out", headings, notes=list(found.notes))
+    for parting in found.partings:
+        table.rows.append([
+            parting.signal,
+            MetricValue(parting.first, "s"),
+            None if parting.seen is None else MetricValue(parting.seen, "s"),
+            None if math.isnan(parting.largest) else MetricValue(parting.largest, parting.unit or "1"),
+            MetricValue(parting.largest_at, "s"),
+        ])  # fmt: skip
+    ends = {f"{run.time[-1]:.6g} s" for run in (one, other) if run.time.size}
+    table.notes += [f"The runs end at {' and '.join(sorted(ends))}."] if len(ends) > 1 else []
+    table.notes.append(f"{counted(found.compared, 'signal')} compared; the others are the same to the end.")
+    return table
+
 
 MOST_DIFFERENT = 6
 """Signals drawn that differ most; chosen: three rows of two panels are one screen."""
@@ -39,10 +246,10 @@ class MetricCell(NamedTuple):
     best: bool
 
 
-def comparison_facts(findings: Findings) -> dict[str, Any] | None:
+def comparison_facts(findings: ExperimentResult) -> dict[str, Any] | None:
     """Return what a page says that compares the runs with the first one; None if none has results."""
     runs = [
-        Run(run.label, findings.results[name])
+        LabelledRun(run.label, findings.results[name])
         for name, run in findings.experiment.runs.items()
         if name in findings.results
     ]
@@ -60,7 +267,7 @@ def comparison_facts(findings: Findings) -> dict[str, Any] | None:
     }
 
 
-def metric_rows(findings: Findings) -> list[dict[str, Any]]:
+def metric_rows(findings: ExperimentResult) -> list[dict[str, Any]]:
     """Return the metrics of all runs with results, each with its difference from the first."""
     rows = []
     idle = _idle(findings)
@@ -81,7 +288,7 @@ def metric_rows(findings: Findings) -> list[dict[str, Any]]:
     return rows
 
 
-def _idle(findings: Findings) -> set[int]:
+def _idle(findings: ExperimentResult) -> set[int]:
     """Return the numbers of runs in which nothing controls: some signal has no effort or chatter at all."""
     of_control = [
         key
@@ -92,7 +299,7 @@ def _idle(findings: Findings) -> set[int]:
     return {k for k, values in enumerate(found) if any(one is not None and one.number == 0 for one in values)}
 
 
-def _best(values: Sequence[Value | None], apart: Collection[int]) -> int | None:
+def _best(values: Sequence[MetricValue | None], apart: Collection[int]) -> int | None:
     """Return the number of the run whose value is the least, as it reads; None if no single one is.
 
     Args:
@@ -107,7 +314,7 @@ def _best(values: Sequence[Value | None], apart: Collection[int]) -> int | None:
     return None if shown(first, unit) == shown(second, unit) else best
 
 
-def _most_different(runs: Sequence[Run], found: Sequence[Divergence]) -> Figure | None:
+def _most_different(runs: Sequence[LabelledRun], found: Sequence[RunComparison]) -> PageFigure | None:
     """Return the signals in which any run differs most from the first, relative to their peaks."""
     apart: dict[str, float] = {}
     for parting in (parting for one in found for parting in one.partings):
@@ -118,7 +325,7 @@ def _most_different(runs: Sequence[Run], found: Sequence[Divergence]) -> Figure 
     return figure_of(("most", "", runs, names, ()), whole=True)
 
 
-def difference(first: Value | None, other: Value | None) -> str:
+def difference(first: MetricValue | None, other: MetricValue | None) -> str:
     """Return how a value differs from the first, with its sign; per cents differ by points."""
     if first is None or other is None:
         return ""
@@ -132,7 +339,7 @@ def difference(first: Value | None, other: Value | None) -> str:
     return f"{'+' if apart > 0 else '−'}{size} {'points' if unit == '%' else unit}".rstrip()
 
 
-def _parted(label: str, first: str, found: Divergence) -> dict[str, Any]:
+def _parted(label: str, first: str, found: RunComparison) -> dict[str, Any]:
     return {
         "title": f"{label} against {first}",
         "summary": parting_summary(found),
@@ -142,7 +349,7 @@ def _parted(label: str, first: str, found: Divergence) -> dict[str, Any]:
     }
 
 
-def parting_summary(found: Divergence) -> str:
+def parting_summary(found: RunComparison) -> str:
     """Return in a sentence which signals part first."""
     if not found.compared:
         return "The runs have no signal in common."
@@ -163,7 +370,7 @@ def parting_summary(found: Divergence) -> str:
     return f"The first to differ is {first.signal}, at {first.first:g} s{then}. {told}"
 
 
-def parting_table(partings: Sequence[Parting]) -> Table:
+def parting_table(partings: Sequence[SignalDifference]) -> Table:
     """Return a table of signals that differ, in the order in which they part."""
     headings = ["signal", "goes to", "differs from", "seen from", "largest difference", "at"]
     table = Table("", headings, numbers={2, 3, 4, 5} if partings else set())

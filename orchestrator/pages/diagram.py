@@ -2,18 +2,71 @@
 
 On the diagonal, signals run from a unit sideways into the column of the unit that takes them: above the
 diagonal to later units, below it back to earlier ones. Both drawings show the same wires.
+
+The system of one run or of several alike: its units, what may stand for each, what flows between them.
 """
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from markupsafe import Markup
 
 from ..figures.style import line_style
-from .system import Block, System
+from ..messages import fold_wires
+from ..plan import Plan
+
+
+@dataclass(frozen=True)
+class DiagramBlock:
+    """A unit and the FMUs that stand for it in one run or another."""
+
+    name: str
+    fmus: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class SystemDiagram:
+    """Blocks in the order of the scenario, and the signals from one to another."""
+
+    blocks: tuple[DiagramBlock, ...]
+    signals: dict[tuple[str, str], tuple[str, ...]]  # (source, target) -> names, four wheels as one with `*`
+
+    def sources_of(self, target: str) -> list[str]:
+        """Return the units that a unit has inputs from, in order."""
+        return [block.name for block in self.blocks if (block.name, target) in self.signals]
+
+
+def system_of(plans: Iterable[Plan]) -> SystemDiagram:
+    """Return what the plans have together; they have the same units."""
+    fmus: dict[str, dict[str, None]] = {}
+    wires: dict[tuple[str, str], dict[tuple[str, str], None]] = {}
+    for plan in plans:
+        by_name = {unit.name: unit for unit in plan.instances}
+        for name in [*plan.scenario.get("units", {}), *by_name]:
+            if name in by_name:
+                fmus.setdefault(name, {})[by_name[name].fmu.name] = None
+        for wire in plan.wires:
+            wires.setdefault((wire.source, wire.target), {})[wire.output, wire.input] = None
+    signals = {
+        ends: tuple(
+            output if output == name else f"{output} → {name}" for output, name in fold_wires(list(pairs))
+        )
+        for ends, pairs in wires.items()
+    }
+    return SystemDiagram(tuple(DiagramBlock(name, tuple(found)) for name, found in fmus.items()), signals)
+
+
+def systems_of(plans: Sequence[Plan]) -> list[tuple[SystemDiagram, list[int]]]:
+    """Return one system for each set of units that the plans have, with the numbers of its plans."""
+    groups: dict[frozenset[str], list[int]] = {}
+    for number, plan in enumerate(plans):
+        groups.setdefault(frozenset(unit.name for unit in plan.instances), []).append(number)
+    return [(system_of([plans[k] for k in numbers]), numbers) for numbers in groups.values()]
+
 
 WIDE = 0.62
 """Width of a character over the font size, of the widest usual sans-serif font (DejaVu Sans)."""
@@ -30,7 +83,7 @@ BLOCK = {"rx": 5, "fill": "#eef4fa", "stroke": "#0072B2", "stroke_width": 1.6}
 LABEL = {"rx": 2, "fill": "#ffffff", "stroke": "#c9c9c9", "stroke_width": 0.8}
 BUS = "#555555"
 
-Parts = list[Markup]
+DiagramParts = list[Markup]
 
 
 def _tag(name: str, content: str = "", **attributes: Any) -> Markup:
@@ -46,7 +99,7 @@ def _width(texts: Sequence[str], size: float) -> float:
     return max((len(text) for text in texts), default=0) * size * WIDE
 
 
-def _lines(x: float, y: float, texts: Sequence[str], size: float, **look: Any) -> Parts:
+def _lines(x: float, y: float, texts: Sequence[str], size: float, **look: Any) -> DiagramParts:
     """Return lines of text from the top y on."""
     return [
         _tag("text", text, x=x, y=y + (i * LEADING + 0.95) * size, font_size=size, **look)
@@ -73,19 +126,19 @@ def _box(x: float, y: float, width: float, height: float, look: Mapping[str, Any
     return _tag("rect", x=x, y=y, width=width, height=height, **look)
 
 
-def _svg(kind: str, width: float, height: float, title: str, parts: Parts) -> Markup:
+def _svg(kind: str, width: float, height: float, title: str, parts: DiagramParts) -> Markup:
     frame = {"viewBox": f"0 0 {width:.0f} {height:.0f}", "style": f"max-width:{width:.0f}px", "class": kind}
     about = {"role": "img", "aria_label": title, "font_family": "system-ui, sans-serif"}
     return _tag("svg", Markup("\n").join(parts), **frame, **about)
 
 
-def _block_size(block: Block) -> tuple[float, float]:
+def _block_size(block: DiagramBlock) -> tuple[float, float]:
     """Return the width and height of a block's text."""
     width = max(_width([block.name], NAME) * 1.05, _width(block.fmus, SMALL))
     return width, LEADING * (NAME + SMALL * len(block.fmus))
 
 
-def diagonal(system: System, title: str) -> Markup:
+def diagonal(system: SystemDiagram, title: str) -> Markup:
     """Return the diagram with units on the diagonal, for wide pages."""
     blocks, count = system.blocks, len(system.blocks)
     place = {block.name: i for i, block in enumerate(blocks)}
@@ -99,8 +152,8 @@ def diagonal(system: System, title: str) -> Markup:
     top = [1 + sum(heights[:i]) + GAP * i for i in range(count)]
     middle_x = [x + w / 2 for x, w in zip(left, widths, strict=True)]
     middle_y = [y + h / 2 for y, h in zip(top, heights, strict=True)]
-    lines: Parts = []
-    labels: Parts = []
+    lines: DiagramParts = []
+    labels: DiagramParts = []
     for (i, j), names in cells.items():
         if i == j:
             continue
@@ -128,7 +181,7 @@ LANE = 11
 """Distance of lanes [px]."""
 
 
-def stack(system: System, title: str) -> Markup:
+def stack(system: SystemDiagram, title: str) -> Markup:
     """Return the diagram with one unit below the other, for phones and print.
 
     Each source has a lane on the right; an arrow into a unit points at the line that says what it brings.
@@ -139,7 +192,7 @@ def stack(system: System, title: str) -> Markup:
     lane = {name: right + 14 + LANE * k for k, name in enumerate(sources)}
     leaves: dict[str, float] = {}
     enters: dict[str, list[float]] = {name: [] for name in sources}
-    drawn: Parts = []
+    drawn: DiagramParts = []
     y = 1.0
     for block in system.blocks:
         content: list[tuple[str, float, dict[str, Any], str]] = []
@@ -160,7 +213,7 @@ def stack(system: System, title: str) -> Markup:
                 enters[source].append(line_y + 0.6 * size)
             line_y += LEADING * size
         y += height + 12
-    lines: Parts = []
+    lines: DiagramParts = []
     for k, name in enumerate(sources):
         style = line_style(k)
         dash = style["linestyle"][1] if isinstance(style["linestyle"], tuple) else ()
@@ -175,6 +228,6 @@ def stack(system: System, title: str) -> Markup:
     return _svg("stack", STACK, y - 11, title, lines + drawn)
 
 
-def diagrams(system: System, title: str) -> Markup:
+def diagrams(system: SystemDiagram, title: str) -> Markup:
     """Return both drawings; the page's style shows the one that fits."""
     return diagonal(system, title) + stack(system, title)

@@ -17,11 +17,11 @@ from pathlib import Path
 
 from vocabulary.wheels import WHEEL_NAMES, WHEELS
 
-from ..plan import DEFAULT, Plan, Unit, Value, Variable
-from ..scenario.load import Scenario
-from ..scenario.yaml_lines import Document, Key
-from ..wiring.shared_facts import facts_of
-from ..wording import fold
+from ..messages import fold
+from ..plan import DEFAULT, Instance, Plan, Value, Variable
+from ..scenario.load import LoadedScenario
+from ..scenario.yaml_lines import Document, KeyPath
+from ..wiring.context import facts_of
 
 PAPER, LITERATURE, CHOSEN, ERRATUM, VARIED, NEUTRAL = (
     "paper", "literature", "chosen", "erratum", "varied", "neutral",
@@ -30,46 +30,48 @@ _COMMENT = re.compile(r"#\s*(.*?)\s*$")
 
 
 @dataclass(frozen=True)
-class Origin:
+class ValueSource:
     """Where a value comes from: its kind, and the words of the source."""
 
     kind: str
     says: str
 
 
-VARIED_BY_STUDY = Origin(VARIED, "set by the study")
+VARIED_BY_STUDY = ValueSource(VARIED, "set by the study")
 
 
 @dataclass
-class Parameter:
+class PageParameter:
     """A parameter in all runs of a study."""
 
     name: str
     meaning: str
     unit: str
-    default: Origin  # of the FMU's own value
-    given: Origin | None = None  # of the value that the scenario or the vehicle file gives
+    default: ValueSource  # of the FMU's own value
+    given: ValueSource | None = None  # of the value that the scenario or the vehicle file gives
     set_by_study: bool = False
     values: dict[str, None] = field(default_factory=dict)  # as text, each once
 
     @property
-    def origin(self) -> Origin:
+    def origin(self) -> ValueSource:
         """Where the value comes from that stands where the study sets no other."""
         return self.given or self.default
 
 
 @dataclass
-class Group:
+class ParameterGroup:
     """The parameters of a vehicle file, of a unit's FMU, or the constants of a scenario."""
 
     title: str
     below: str
-    parameters: dict[str, Parameter] = field(default_factory=dict)
+    parameters: dict[str, PageParameter] = field(default_factory=dict)
 
-    def note(self, name: str, variable: Variable, meaning: str, value: str, origin: Origin | None) -> None:
+    def note(
+        self, name: str, variable: Variable, meaning: str, value: str, origin: ValueSource | None
+    ) -> None:
         """Note the value of a variable in one run, and where that comes from; None: from the FMU."""
         default = origin_of(variable.source)
-        row = self.parameters.setdefault(name, Parameter(name, meaning, variable.unit or "", default))
+        row = self.parameters.setdefault(name, PageParameter(name, meaning, variable.unit or "", default))
         row.values[value] = None
         if origin is not None and origin.kind == VARIED:
             row.set_by_study = True
@@ -77,9 +79,9 @@ class Group:
             row.given = row.given or origin
 
 
-def origin_of(source: str, otherwise: str = "") -> Origin:
+def origin_of(source: str, otherwise: str = "") -> ValueSource:
     """Return what a source says as an origin; one that names no kind is of the kind that is given."""
-    return Origin(_first_word(source) or otherwise or (LITERATURE if source else NEUTRAL), source)
+    return ValueSource(_first_word(source) or otherwise or (LITERATURE if source else NEUTRAL), source)
 
 
 def _first_word(source: str) -> str:
@@ -87,27 +89,27 @@ def _first_word(source: str) -> str:
     return word[0] if word and word[0] in (PAPER, ERRATUM, CHOSEN) else ""
 
 
-def said_in(comment: str, file: str) -> Origin:
+def said_in(comment: str, file: str) -> ValueSource:
     """Return what a comment says of a value, "its unit, remarks; source", in a file with a source."""
     parts = comment.split("; ")
     begin = next((i for i, part in enumerate(parts) if _first_word(part)), 0)
     return origin_of("; ".join(parts[begin:]), _first_word(file) or NEUTRAL)
 
 
-def groups_of(runs: Sequence[tuple[Scenario, Plan]]) -> list[Group]:
+def groups_of(runs: Sequence[tuple[LoadedScenario, Plan]]) -> list[ParameterGroup]:
     """Return all parameters of the runs: the vehicles', then those of every unit's FMUs, then constants."""
-    vehicles: dict[str, Group] = {}
-    units: dict[tuple[str, str], Group] = {}
-    constants = Group("Constant inputs", "no unit gives them")
+    vehicles: dict[str, ParameterGroup] = {}
+    units: dict[tuple[str, str], ParameterGroup] = {}
+    constants = ParameterGroup("Constant inputs", "no unit gives them")
     order: dict[str, None] = {}
     linecache.checkcache()
     for scenario, plan in runs:
-        by_name = {unit.name: unit for unit in plan.units}
+        by_name = {unit.name: unit for unit in plan.instances}
         for name in [name for name in scenario.units if name in by_name]:
             order[name] = None
             unit = by_name[name]
             own = units.setdefault(
-                (name, unit.fmu.name), Group(f"{name}: {unit.fmu.name}", unit.fmu.description)
+                (name, unit.fmu.name), ParameterGroup(f"{name}: {unit.fmu.name}", unit.fmu.description)
             )
             for variable in unit.fmu.of("parameter"):
                 from_vehicle = (
@@ -125,12 +127,12 @@ def groups_of(runs: Sequence[tuple[Scenario, Plan]]) -> list[Group]:
     return [group for group in (*vehicles.values(), *ordered, constants) if group.parameters]
 
 
-def _vehicle_group(scenario: Scenario, file: Path) -> Group:
+def _vehicle_group(scenario: LoadedScenario, file: Path) -> ParameterGroup:
     vehicle = scenario.vehicle_file
-    return Group(f"The car: {vehicle.title or file.stem}", f"{file.name}; {vehicle.source}")
+    return ParameterGroup(f"The car: {vehicle.title or file.stem}", f"{file.name}; {vehicle.source}")
 
 
-def _constants(group: Group, scenario: Scenario, unit: Unit) -> None:
+def _constants(group: ParameterGroup, scenario: LoadedScenario, unit: Instance) -> None:
     """Note the constants of a unit; four wheels that are alike as one name that ends with `*`."""
     alike: dict[str, list[str]] = {}
     for name, value in unit.constants.items():
@@ -147,7 +149,7 @@ def _constants(group: Group, scenario: Scenario, unit: Unit) -> None:
             group.note(f"{unit.name}.{name}", variable, meaning, value_text, origin)
 
 
-def _origin_of_constant(scenario: Scenario, unit: Unit, name: str) -> Origin | None:
+def _origin_of_constant(scenario: LoadedScenario, unit: Instance, name: str) -> ValueSource | None:
     """Return where the value of an input comes from, None if its FMU gives it."""
     origin = unit.origins.get(name, DEFAULT)
     if origin.kind == "scenario":
@@ -163,7 +165,7 @@ def _names(pattern: str, unit: str, name: str) -> bool:
     return fnmatchcase(whole, pattern)
 
 
-def _origin(scenario: Scenario, unit: Unit, name: str) -> Origin | None:
+def _origin(scenario: LoadedScenario, unit: Instance, name: str) -> ValueSource | None:
     """Return where a value comes from if the scenario or the vehicle gives it, None if the FMU does."""
     origin = unit.origins.get(name, DEFAULT)
     if origin == DEFAULT:
@@ -174,18 +176,18 @@ def _origin(scenario: Scenario, unit: Unit, name: str) -> Origin | None:
         words = re.sub(rf"^{re.escape(measure)}(?![\w/.])[,;]?\s*", "", words)
         return said_in(words, scenario.vehicle_file.source)
     if origin.kind == "derived":
-        return Origin(NEUTRAL, str(origin))
+        return ValueSource(NEUTRAL, str(origin))
     if origin.kind == "scenario":
         own = name in scenario.units[unit.name].parameters
-        key: Key = ("units", unit.name, "parameters", name) if own else (_fact(scenario, name),)
+        key: KeyPath = ("units", unit.name, "parameters", name) if own else (_fact(scenario, name),)
         return _said(scenario, key)
     if origin.kind == "file":
         of_tyres = any(origin.detail == file.path.name for file in scenario.tyre_files.values())
-        return Origin(LITERATURE, f"{'tyre property ' if of_tyres else ''}file {origin}")
+        return ValueSource(LITERATURE, f"{'tyre property ' if of_tyres else ''}file {origin}")
     return VARIED_BY_STUDY
 
 
-def _said(scenario: Scenario, key: Key) -> Origin:
+def _said(scenario: LoadedScenario, key: KeyPath) -> ValueSource:
     """Return what the scenario says of a value where it stands, beside it or above its unit."""
     words = _beside(scenario.document, key)
     if key[0] == "units":
@@ -193,19 +195,19 @@ def _said(scenario: Scenario, key: Key) -> Origin:
     return said_in(words or scenario.source, scenario.source)
 
 
-def _fact(scenario: Scenario, name: str) -> str:
+def _fact(scenario: LoadedScenario, name: str) -> str:
     """Return the fact of the scenario that gives a parameter or an input, "" if none does."""
     facts = (fact for fact, one, _, _ in facts_of(scenario) if name in (*one.inputs, *one.parameters))
     return next(facts, "")
 
 
-def _beside(document: Document, key: Key) -> str:
+def _beside(document: Document, key: KeyPath) -> str:
     """Return the comment in the line of a value, nothing if there is none."""
     match = _COMMENT.search(linecache.getline(str(document.path), document.lines.get(key, 0)))
     return match[1] if match else ""
 
 
-def _above(document: Document, key: Key) -> str:
+def _above(document: Document, key: KeyPath) -> str:
     """Return the comment lines right above a key."""
     number = document.lines.get(key, 1) - 1
     found: list[str] = []
@@ -222,7 +224,7 @@ def text_of(value: Value | None) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def count_kinds(groups: Iterable[Group]) -> dict[str, int]:
+def count_kinds(groups: Iterable[ParameterGroup]) -> dict[str, int]:
     """Return how many parameters there are of each kind of origin."""
     kinds = Counter(one.origin.kind for group in groups for one in group.parameters.values())
     return {kind: kinds[kind] for kind in (PAPER, ERRATUM, CHOSEN, LITERATURE, NEUTRAL) if kind in kinds}

@@ -11,26 +11,27 @@ from typing import Any
 
 from markupsafe import Markup
 
-from ..experiments.expansion import FIGURES
+from ..experiments.experiment import FIGURES
 from ..experiments.jobs import STEP_TIME
-from ..experiments.ranking_course import Ranked
-from ..experiments.ranking_drawing import RUN, degrees, place_words, sign_of
-from ..experiments.ranking_schema import EntrySpec
+from ..experiments.ranking import EntrySpec
+from ..experiments.ranking_scores import Digits, EntryScore, RankingCell, RankingResult, deciding_digits
 from ..experiments.ranking_tables import (
     RULE,
+    RUN,
     UNITS,
+    degrees,
+    place_words,
     row_of,
     runs_table,
+    sign_of,
     spread,
     table_of,
     words_of,
 )
-from ..experiments.standings import Cell, Digits, Standing, deciding_digits
 from ..experiments.tables import Table
-from ..plan import FAULTS, Change
-from ..titles import changed
-from .facts import anchor, made_by
-from .panel_images import Image, image_of
+from ..labels import changed
+from ..plan import FAULTS, Override
+from .page_parts import FigureImage, anchor, image_of, made_by
 from .rendering import render, style
 
 STATES = {
@@ -43,7 +44,7 @@ OTHERS = ("speed_lost", "intervention", "chatter")
 """Numbers of a cell that are told beside margin and sideslip."""
 
 
-def ranking_page(ranked: Ranked, folder: Path, command: str) -> str:
+def ranking_page(ranked: RankingResult, folder: Path, command: str) -> str:
     """Return the page as HTML.
 
     Args:
@@ -83,11 +84,11 @@ def ranking_page(ranked: Ranked, folder: Path, command: str) -> str:
     )
 
 
-def _image(file: Path, title: str) -> Image | None:
+def _image(file: Path, title: str) -> FigureImage | None:
     return image_of(file, title) if file.is_file() else None
 
 
-def _row(ranked: Ranked, one: Standing, after: list[str], digits: Digits) -> dict[str, Any]:
+def _row(ranked: RankingResult, one: EntryScore, after: list[str], digits: Digits) -> dict[str, Any]:
     """Return a controller's row of the first table."""
     row = row_of(one, digits)
     texts = Table("", after, [[row[heading] for heading in after]]).text()[0]
@@ -110,11 +111,11 @@ def _row(ranked: Ranked, one: Standing, after: list[str], digits: Digits) -> dic
     }
 
 
-def _id(cell: Cell) -> str:
+def _id(cell: RankingCell) -> str:
     return anchor(f"{cell.entry} in {cell.condition}")
 
 
-def _cell(ranked: Ranked, one: Standing, cell: Cell, folder: Path) -> dict[str, Any]:
+def _cell(ranked: RankingResult, one: EntryScore, cell: RankingCell, folder: Path) -> dict[str, Any]:
     """Return what stands behind a cell: its numbers, all its runs, its figure, its command."""
     condition = ranked.ranking.conditions[cell.condition]
     kept = next((run.drive for run in cell.runs if run.drive.job and run.drive.job.keep), None)
@@ -148,13 +149,13 @@ def _text(number: float | None, unit: str) -> str | None:
     return None if number is None else Table("", [""], [[words_of(number, unit)]]).text()[0][0]
 
 
-def again_command(ranked: Ranked, cell: Cell, folder: Path) -> str:
+def again_command(ranked: RankingResult, cell: RankingCell, folder: Path) -> str:
     """Return the command that makes a cell's runs again, beside those that are there."""
     chosen = ["--only", cell.entry, "--condition", cell.condition, "--out", str(folder / "again")]
     return shlex.join(["yawbench", "rank", str(ranked.ranking.path), *chosen])
 
 
-def series_command(ranked: Ranked, cell: Cell) -> str:
+def series_command(ranked: RankingResult, cell: RankingCell) -> str:
     """Return the command that drives the regulation's whole series of a cell, with a figure of every run."""
     ranking = ranked.ranking
     condition = ranking.spec.conditions[cell.condition]
@@ -170,7 +171,7 @@ def series_command(ranked: Ranked, cell: Cell) -> str:
     return shlex.join(words)
 
 
-def _option(change: Change) -> list[str]:
+def _option(change: Override) -> list[str]:
     """Return a change as an option of the command line."""
     if change.place == "vehicle":
         return ["--vehicle", os.path.relpath(str(change.value))]
@@ -180,7 +181,7 @@ def _option(change: Change) -> list[str]:
     return ["--swap" if change.swaps else "--set", f"{change.place}={text}"]
 
 
-def _conditions(ranked: Ranked) -> Table:
+def _conditions(ranked: RankingResult) -> Table:
     """Return what the conditions are."""
     ranking = ranked.ranking
     headings = ["condition", "car", "A", "scenario", "changed", "runs of a controller", "responsiveness"]
@@ -196,7 +197,7 @@ def _conditions(ranked: Ranked) -> Table:
     return table
 
 
-def _entries(ranked: Ranked) -> Table:
+def _entries(ranked: RankingResult) -> Table:
     """Return who the controllers are."""
     table = Table("", ["controller", "name", "FMU", "parameters", "gains", "source"])
     for one in ranked.standings:

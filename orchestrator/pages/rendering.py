@@ -9,8 +9,8 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from ..experiments.verdicts import FAILS, HOLDS, NOT_JUDGED, UNDECIDED
-from ..wording import printable
+from ..experiments.verdict_tables import FAILS, HOLDS, NOT_JUDGED, UNDECIDED
+from ..messages import printable
 
 SIGNS = {
     HOLDS: ("good", "✓"),

@@ -1,16 +1,297 @@
-"""The page of an experiment, or of several: one file, made from what stands on disk."""
+"""An experiment as a chapter of a page: verdicts, system, figures, tables, parameters, how to repeat it.
+
+The page of an experiment, or of several: one file, made from what stands on disk.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..errors import ScenarioError
+from ..experiments.experiment import FIGURES
+from ..experiments.figures import runs_of, title_of
+from ..experiments.jobs import Job, PlanningCache
+from ..experiments.judging import LEVEL, ClaimResult
+from ..experiments.outcome import Each, ExperimentResult
+from ..experiments.tables import Cell, Table
+from ..experiments.verdict_tables import (
+    HOLDS,
+    counts_of,
+    derived_tables,
+    heading,
+    limit_tables,
+    line_table,
+    margin_words,
+    reach,
+    region_table,
+    region_words,
+    run_tables,
+    verdict,
+)
+from ..figures import plots
+from ..figures.style import LabelledRun
+from ..labels import changed
+from ..messages import counted
+from ..metrics.run_metrics import evaluate, metric
+from ..plan import Plan
+from ..results.read import Results
 from ..scenario import catalogue, yaml_lines
+from ..scenario.load import LoadedScenario, load_scenario
 from .animation import assets
-from .facts import made_by
+from .diagram import diagrams, systems_of
+from .page_parts import (
+    Animation,
+    FigureImage,
+    anchor,
+    animation_of,
+    figure_of,
+    fmus_of,
+    image_of,
+    made_by,
+    programs_of,
+)
+from .provenance import count_kinds, groups_of
 from .rendering import render, style
+
+
+def chapter(
+    findings: ExperimentResult,
+    *,
+    command: str,
+    stale: dict[str, str],
+    folder: Path,
+    shown_in: Path,
+    each: Each = map,
+) -> dict[str, Any]:
+    """Return what an experiment's chapter says.
+
+    Args:
+        findings: the experiment and what it comes to.
+        command: that makes it.
+        stale: run -> why its results are not those of its plan.
+        folder: of its results and figures.
+        shown_in: folder of the page.
+        each: how to draw many panels.
+    """
+    experiment, spec = findings.experiment, findings.spec
+    name = anchor(f"{experiment.path.absolute().parent.name} {experiment.path.stem}")
+    plans = plans_of(findings)
+    groups = groups_of([plan for _, plan in plans])
+    made = runs_made(findings)
+    failed = findings.failed
+    return {
+        "id": name,
+        "title": spec.title,
+        "source": spec.source,
+        "changed": changed(experiment.by_options),
+        "counts": counts_of(findings.claims),
+        "reach": reach(findings),
+        "conclusions": conclusions(findings),
+        "claims": [judged(one) for one in findings.claims],
+        "checks": [judged(one) for one in findings.checks],
+        "region": region_table(findings) if findings.regions else None,
+        "limits": limit_tables(findings),
+        "systems": systems(plans, spec.title),
+        "animation": animation(findings),
+        "figures": figures(findings, name, _beside(folder / FIGURES, shown_in), each),
+        "charts": charts(findings, folder / FIGURES),
+        "tables": [*run_tables(findings), *derived_tables(findings, apart=True)],
+        "definitions": definitions(findings),
+        "groups": groups,
+        "kinds": count_kinds(groups),
+        "failed": failed,
+        "stale": stale,
+        "remarkable": findings.remarkable() if spec.axes else "",
+        "repeats": repeats(findings),
+        "command": command,
+        "folder": str(folder),
+        "settings": settings(findings),
+        "grid": grid_of_times(made),
+        "runs": len(findings.records),
+        "not_made": findings.not_made,
+        "fmus": fmus_of(made),
+        "programs": programs_of(made),
+    }
+
+
+def runs_made(findings: ExperimentResult) -> list[Results | Plan]:
+    """Return the results of all runs, along axes the plans of those that have been made."""
+    if not findings.spec.axes or findings.planned is None:
+        return [*findings.results.values()]
+    jobs = zip(findings.planned.jobs, findings.records, strict=True)
+    return [job.plan for job, record in jobs if job.plan and record.made]
+
+
+def repeats(findings: ExperimentResult) -> str:
+    """Return what numbers over repeats are, in a sentence; "" without repeats."""
+    spec = findings.spec
+    if not spec.repeats:
+        return ""
+    number = math.prod(spec.axes[name].length or 1 for name in spec.repeats)
+    said = " and ".join(spec.axes[name].says or name for name in spec.repeats)
+    sure = f"the interval that holds the true mean with {100 * LEVEL:.0f} % confidence (Student)"
+    return (
+        f"Numbers with ± are means over {number} repeats ({said}), with {sure}. "
+        "A verdict whose threshold lies inside reads undecided."
+    )
+
+
+def plans_of(findings: ExperimentResult) -> list[tuple[Job, tuple[LoadedScenario, Plan]]]:
+    """Return jobs with scenario and plan: of all named runs; along axes the first with each set of FMUs."""
+    jobs: dict[Any, Job] = {}
+    for job in findings.planned.jobs if findings.planned else ():
+        fmus = tuple(unit.fmu.sha256 for unit in job.plan.instances) if job.plan else ()
+        jobs.setdefault((job.scenario, fmus) if findings.spec.axes else job.label, job)
+    once = PlanningCache()
+    return [
+        (job, (load_scenario(job.scenario, changes=job.changes, read=once.read), job.plan))
+        for job in jobs.values()
+        if job.plan is not None
+    ]
+
+
+def conclusions(findings: ExperimentResult) -> list[dict[str, Any]]:
+    """Return what an overview tells: claims and checks that do not hold or are undecided.
+
+    Over a region claims that hold are told, too, and robust verdicts come first.
+    """
+    told = [
+        judged(one)
+        for one in findings.judgements
+        if verdict(one) != HOLDS or (one.group == "claims" and one.region)
+    ]
+    return sorted(told, key=lambda one: not one["robust"])
+
+
+def judged(one: ClaimResult) -> dict[str, Any]:
+    """Return a claim with what was measured and its verdict."""
+    return {
+        "says": one.said.says,
+        "source": one.said.source,
+        "measured": one.measured,
+        "conditions": [str(condition) for condition in one.said.holds_if],
+        "verdict": verdict(one),
+        "margin": margin_words(one),
+        "region": region_words(one),
+        "agreeing": one.region and 100 * one.region.agreeing,
+        "robust": one.region is not None and one.region.robust,
+        "lines": line_table(one) if one.region else None,
+        "note": one.said.note,
+    }
+
+
+def systems(plans: Sequence[tuple[Job, tuple[LoadedScenario, Plan]]], title: str) -> list[dict[str, Any]]:
+    """Return a drawing for each set of units, and of which scenarios it is."""
+    drawn = []
+    for system, numbers in systems_of([plan for _, (_, plan) in plans]):
+        files = dict.fromkeys(plans[k][0].scenario.name for k in numbers)
+        drawn.append({"drawing": diagrams(system, title), "runs": ", ".join(files)})
+    return drawn
+
+
+LIVELY = tuple(map(metric, ("peak(sideslip)", "peak(yaw_rate)")))
+"""What tells how much happens in a run, the first that all have."""
+
+
+def animation(findings: ExperimentResult) -> Animation | None:
+    """Return the animation of the figure with a path in which most happens, all of its runs."""
+    found = [
+        (figure, runs)
+        for figure in findings.spec.figures
+        if "path" in figure.panels and (runs := runs_of(findings, figure))
+    ]
+    for figure, runs in sorted(found, key=lambda one: -_liveliest(one[1])):
+        if seen := animation_of(runs, figure.title or plots.title_of(runs)):
+            return seen
+    return None
+
+
+def _liveliest(runs: Sequence[LabelledRun]) -> float:
+    """Return the largest sideslip of any run, or the largest yaw rate; 0 if neither is known."""
+    for one in LIVELY:
+        values = [value.number for run in runs if (value := evaluate(run.results, one))]
+        if values:
+            return max(values)
+    return 0.0
+
+
+def figures(findings: ExperimentResult, chapter: str, files: str, each: Each = map) -> list[Any]:
+    """Return the overlays, those that runs have results for."""
+    wanted = []
+    for spec in findings.spec.figures:
+        runs = runs_of(findings, spec)
+        paths = tuple(f"{files}/{spec.name}.{kind}" for kind in ("svg", "png"))
+        if runs:
+            title = title_of(findings, spec)
+            wanted.append((f"{chapter}-{anchor(spec.name)}", title, runs, spec.panels, paths))
+    return [figure for figure in each(figure_of, wanted) if figure is not None]
+
+
+def charts(findings: ExperimentResult, folder: Path) -> list[FigureImage]:
+    """Return the figures over axes, those that have been drawn, as images."""
+    found = []
+    for spec in findings.spec.figures:
+        file = folder / f"{spec.name}.svg"
+        if spec.kind != "overlay" and file.is_file():
+            found.append(image_of(file, title_of(findings, spec)))
+    return found
+
+
+def definitions(findings: ExperimentResult) -> list[dict[str, str]]:
+    """Return how every metric of the study is defined."""
+    every = [(spec, metric(spec.metric)) for spec in findings.spec.metrics.values()]
+    return [
+        {
+            "heading": heading(spec),
+            "definition": f"{chosen.definition}{spec.during('from ')}",
+            "formula": chosen.formula,
+        }
+        for spec, chosen in every
+    ]
+
+
+def settings(findings: ExperimentResult) -> Table:
+    """Return how every run differs from its scenario; along axes how many runs of it ended how."""
+    statuses = list(dict.fromkeys(record.status for record in findings.records)) if findings.spec.axes else []
+    headings = ["run", "scenario", "changed", "faults", *statuses]
+    rows: list[list[Cell]] = []
+    for run in findings.experiment.runs.values():
+        results = findings.results.get(run.name)
+        faults = "; ".join(fault.words for fault in results.record.faults) if results else ""
+        ended = Counter(findings.record(one).status for one in findings.experiment.cases if one.run == run)
+        rows.append([
+            run.name or None, run.scenario.name, changed(run.changes) or None, faults or None,
+            *(str(ended[status]) for status in statuses),
+        ])  # fmt: skip
+    kept = [k for k in range(len(headings)) if any(row[k] is not None for row in rows)]
+    numbers = {place for place, k in enumerate(kept) if headings[k] in statuses}
+    return Table("", [headings[k] for k in kept], [[row[k] for k in kept] for row in rows], [], numbers)
+
+
+def grid_of_times(runs: Iterable[Results | Plan]) -> list[str]:
+    """Return algorithm, step and end of the runs, each combination once, as plans or records say."""
+    found: Counter[str] = Counter()
+    for one in runs:
+        algorithm: str
+        if isinstance(one, Plan):
+            algorithm, step, end = one.algorithm, float(one.step), one.time(one.n_steps)
+        else:
+            algorithm, step, end = one.record.algorithm, one.record.step_size, one.record.stop_time
+        found[f"{algorithm}, {1000 * step:g} ms, until {end:g} s"] += 1
+    return [f"{text} ({counted(count, 'run')})" for text, count in found.items()]
+
+
+def _beside(path: Path, folder: Path) -> str:
+    """Return a path as a reader of a page in a folder finds it."""
+    try:
+        return path.resolve().relative_to(folder.resolve()).as_posix()
+    except ValueError:
+        return path.as_posix()
+
 
 PAGE = "report.html"
 """Name of the page."""

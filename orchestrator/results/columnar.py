@@ -1,4 +1,7 @@
-"""Recording by columns, in memory: for good, or for formats that write columns."""
+"""Recording by columns, in memory: for good, or for formats that write columns.
+
+Results that are in memory written to a folder, as a run would have written them.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from ..plan import Value
-from .formats import plain
+from .formats import plain, recorder_of
 from .read import Results
-from .recorder import Block, Recorder
+from .recorder import BLOCK, Recorder, RowBlock
 
 
 class Columns:
@@ -54,7 +57,7 @@ class Columns:
         return np.array(values) if values else np.empty(0)
 
 
-class MemoryRecorder(Block):
+class MemoryRecorder(RowBlock):
     """A run's results in memory alone, as if they had been written and read back."""
 
     folder = place = None
@@ -106,3 +109,26 @@ class ColumnRecorder(Recorder):
 
     def _make_room(self, needed: int) -> bool:
         return False  # half a file of columns is no use
+
+
+def write_results(results: Results, folder: Path, *, format: str = "csv") -> None:
+    """Write columns and record into a folder; results that stand there are replaced as a whole.
+
+    Raises:
+        ScenarioError: there is no such format.
+        ResultsError: they cannot be written.
+    """
+    names = list(results)
+    real = [np.issubdtype(results[name].dtype, np.number) for name in names]
+    recorder = recorder_of(format)(folder, names, real, results.units)
+    numbers = np.column_stack([results.time, *(results[n] for n, r in zip(names, real, strict=True) if r)])
+    others = [*zip(*(results[n].tolist() for n, r in zip(names, real, strict=True) if not r), strict=True)]
+    try:
+        for first in range(0, len(numbers), BLOCK):
+            block = numbers[first : first + BLOCK]
+            recorder.lay(block)
+            recorder.others += [list(row) for row in others[first : first + len(block)]]
+            recorder.write(len(block))
+        recorder.finish(results.run)
+    finally:
+        recorder.close()

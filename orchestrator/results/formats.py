@@ -1,8 +1,13 @@
-"""The formats of recorded results: what each one's file is called, who writes and who reads it."""
+"""The formats of recorded results: what each one's file is called, who writes and who reads it.
+
+How much room the results of a run will take.
+"""
 
 from __future__ import annotations
 
 import importlib
+import math
+import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,10 +17,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from ..errors import ResultsError, ScenarioError
-from ..wording import hint
+from ..messages import hint
+from ..plan import Plan
 
 if TYPE_CHECKING:
     from .recorder import Recorder
+
 
 RESULTS_FILE = "results.csv"
 
@@ -32,8 +39,8 @@ class Format:
 
 FORMATS = {
     "csv": Format(RESULTS_FILE, "recorder.Recorder", "csv_file.CsvFile", 17),
-    "parquet": Format("results.parquet", "parquet.ParquetRecorder", "parquet.ParquetFile", 7),
-    "mf4": Format("results.mf4", "mdf.MdfRecorder", "mdf.MdfFile", 5),
+    "parquet": Format("results.parquet", "parquet_and_mdf.ParquetRecorder", "parquet_and_mdf.ParquetFile", 7),
+    "mf4": Format("results.mf4", "parquet_and_mdf.MdfRecorder", "parquet_and_mdf.MdfFile", 5),
 }
 """CSV is the default: every program reads it, and it survives a kill."""
 FILES = {name: one.file for name, one in FORMATS.items()}
@@ -73,7 +80,7 @@ def recorder_of(name: str) -> type[Recorder]:
     return _class(FORMATS[check_format(name)].recorder)
 
 
-def source_of(path: Path, texts: Sequence[str] | None = None) -> Source:
+def source_of(path: Path, texts: Sequence[str] | None = None) -> ResultsSource:
     """Return a file of results, to be read.
 
     Args:
@@ -93,7 +100,7 @@ def _class(place: str) -> Any:
     return getattr(importlib.import_module(f".{module}", __package__), name)
 
 
-class Source(Protocol):
+class ResultsSource(Protocol):
     """A file of results that is read in blocks of rows.
 
     Its methods raise OSError or ValueError if the file is not what a run writes.
@@ -109,3 +116,44 @@ class Source(Protocol):
 def plain(array: np.ndarray) -> np.ndarray:
     """Return a column as results have it: float64, or text."""
     return array.astype(str) if array.dtype.kind in "OSU" else array.astype(float, copy=False)
+
+
+HUGE = 2e9
+"""Bytes from which on a run says so before it starts; chosen: what takes a minute to read back."""
+
+
+def expected_size(plan: Plan, format: str) -> int:
+    """Return about how many bytes the results of a run will take in a format."""
+    return (plan.n_steps + 1) * (len(plan.record) + 1) * FORMATS[format].bytes
+
+
+def size_note(plan: Plan, folder: Path, format: str) -> str | None:
+    """Return a warning of results that are huge or will not fit into `folder`, None of others."""
+    size, free = expected_size(plan, format), _free(folder)
+    if size < HUGE and size <= free:
+        return None
+    note = (
+        f"{folder / FORMATS[format].file} will take about {_shown(size)} "
+        f"({plan.n_steps + 1} rows of {len(plan.record)} variables)"
+    )
+    if size > free:
+        note += f", and {_shown(free)} are free there"
+    shorter = "name the variables that you need under 'record:' in the scenario"
+    if format == "csv":
+        return f"{note}; {shorter}, or take --format parquet ({_shown(expected_size(plan, 'parquet'))})"
+    return f"{note}; {shorter}"
+
+
+def _free(folder: Path) -> float:
+    """Return the free bytes of the disk that a folder is on or will be made on."""
+    absolute = folder.absolute()
+    try:
+        return shutil.disk_usage(
+            next(place for place in (absolute, *absolute.parents) if place.exists())
+        ).free
+    except OSError:
+        return math.inf
+
+
+def _shown(size: float) -> str:
+    return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.0f} MB"

@@ -1,23 +1,57 @@
-"""Whether recorded results are those that a run made now would give: same scenario, FMUs and programs."""
+"""Whether recorded results are those that a run made now would give: same scenario, FMUs and programs.
+
+What tells two runs apart: a hash of everything that their numbers follow from.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import astuple
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
 from .. import checksums
+from ..cache import OF_RESULTS, sources_hash
+from ..checksums import checksum
 from ..errors import ResultsError
 from ..plan import Plan
-from .digest import checksum
 from .folder import COMPLETED, RUN_FILE, is_dead
 from .formats import RESULTS_FILE
-from .key import key_of
 from .read import load_results
-from .record_file import load_record
-from .run_record import PROGRAMS, run_record, units_of
+from .run_record import PROGRAMS, connections_of, load_record, run_record, units_of, version_of
+
+
+def key_of(plan: Plan, also: Any = None) -> str:
+    """Return the key of the run that a plan describes; runs of one key are one run.
+
+    It is made of the content of its FMUs, all parameters and constants, wires, faults, the time grid, the
+    algorithm, what is recorded under which title, and the program's versions and code.
+
+    Args:
+        plan: of the run.
+        also: what else the numbers follow from, such as the metrics made of the results.
+    """
+    content = {
+        "versions": [*map(version_of, PROGRAMS), sources_hash(OF_RESULTS)],
+        "title": plan.title,
+        "units": [
+            [u.name, u.fmu.sha256, u.period, u.tolerance, u.parameters, u.constants] for u in plan.instances
+        ],
+        "series": [
+            [u.name, name, s.sha256, s.column, s.held] for u in plan.instances for name, s in u.series.items()
+        ],
+        "wires": connections_of(plan),
+        "faults": [list(astuple(fault)) for fault in plan.faults],
+        "record": plan.record,
+        "time": [str(plan.start), str(plan.step), plan.n_steps],
+        "algorithm": plan.algorithm,
+        "also": also,
+    }
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
+
 
 COMPARED = {
     "algorithm": "the algorithm has changed",

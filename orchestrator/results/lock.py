@@ -19,15 +19,14 @@ from datetime import datetime
 from pathlib import Path
 
 from ..errors import ResultsError
-from ..files import reason
-from ..writing import LOCK_FILE, claim, fcntl, lock_note, refuse_links_within
+from ..files import LOCK_FILE, claim, fcntl, lock_note, reason, refuse_links_within
 
 LOOKS = 100
 """Times that a lock is asked for again, 10 ms apart; chosen: runs whose command was killed end sooner."""
 
 
 @dataclass(frozen=True)
-class Holder:
+class LockHolder:
     """A command that writes into a folder."""
 
     command: str
@@ -36,7 +35,7 @@ class Holder:
     since: str  # ISO 8601
 
     @classmethod
-    def here(cls) -> Holder:
+    def here(cls) -> LockHolder:
         """Return this process."""
         name = Path(sys.argv[0]).stem if sys.argv else ""
         command = shlex.join(["yawbench" if name in ("", "cli", "-c") else name, *sys.argv[1:]])
@@ -48,7 +47,7 @@ class Holder:
         return f"{command!r} (process {self.process} on {self.host}, since {self.since[11:19]})"
 
 
-class Lock:
+class FolderLock:
     """The hold of a folder, until it is released. The folder is made if it does not exist.
 
     Raises:
@@ -66,7 +65,7 @@ class Lock:
             home.mkdir(parents=True, exist_ok=True)
             self._descriptor = _claimed(self._path)
             os.ftruncate(self._descriptor, 0)
-            os.write(self._descriptor, json.dumps(asdict(Holder.here())).encode())
+            os.write(self._descriptor, json.dumps(asdict(LockHolder.here())).encode())
         except FileExistsError:
             raise ResultsError(
                 f"{folder}: results cannot be written here: it is no folder; name another with --out."
@@ -113,7 +112,7 @@ def writing(*folders: Path) -> Iterator[None]:
     with contextlib.ExitStack() as stack:
         for folder in {folder.resolve(): folder for folder in folders}.values():
             refuse_below_others(folder)
-            stack.callback(Lock(folder).release)
+            stack.callback(FolderLock(folder).release)
         yield
 
 
@@ -129,23 +128,23 @@ def refuse_below_others(folder: Path) -> None:
             raise _held(above, holder)
 
 
-def holder_of(folder: Path) -> Holder | None:
+def holder_of(folder: Path) -> LockHolder | None:
     """Return who writes into a folder, None if nobody does. Nothing is changed there."""
     note = lock_note(folder)
     return None if note is None else _said(note)
 
 
-def _said(note: bytes) -> Holder:
+def _said(note: bytes) -> LockHolder:
     """Return what a lock file says of its holder, who may not have come to say it."""
     try:
         said = json.loads(note)
-        holder = Holder(str(said["command"]), int(said["process"]), str(said["host"]), str(said["since"]))
+        holder = LockHolder(str(said["command"]), int(said["process"]), str(said["host"]), str(said["since"]))
     except (ValueError, TypeError, KeyError, RecursionError, OverflowError):
-        return Holder("another run", 0, "this computer", "")
+        return LockHolder("another run", 0, "this computer", "")
     return holder
 
 
-def _held(folder: Path, holder: Holder) -> ResultsError:
+def _held(folder: Path, holder: LockHolder) -> ResultsError:
     return ResultsError(
         f"{folder}: {holder} is writing here; wait for it, or give another folder with --out."
     )

@@ -1,7 +1,16 @@
-"""Reading back what a run has recorded: run.json of one folder, and the results beside it."""
+"""Reading back what a run has recorded: run.json of one folder, and the results beside it.
+
+The runs whose results stand below a folder.
+
+Long results thinned while they are read, for drawings in which every peak stays.
+
+Of each stretch of rows those are kept in which a column, or a signal's distance from its reference, is
+smallest or largest, and the first and last. The rows are kept whole: values of one moment stay together.
+"""
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -12,16 +21,113 @@ from typing import Any
 
 import numpy as np
 
+from ..checksums import checksum
 from ..errors import ResultsError
 from ..files import check_regular, reads, reason
-from ..scenario.measurement_units import conversion, measure_of
-from ..wording import fold, listed, short
-from .digest import checksum
-from .folder import COMPLETED, RUN_FILE
+from ..messages import fold, listed, short
+from ..scenario.quantities import conversion, measure_of
+from .folder import COMPLETED, DIED, PART, RUN_FILE, RUNNING, is_dead, unfinished
 from .formats import FILES, RESULTS_FILE, source_of
-from .record_file import load_record, warn_if_unchecked
-from .run_record import ConnectionRecord, RunRecord
-from .thinning import thinned
+from .run_record import ConnectionRecord, RunRecord, check_record, load_record, warn_if_unchecked
+
+UNREADABLE = "unreadable"
+"""Status of a run whose record cannot be read, or is not as it was written."""
+
+
+@dataclass(frozen=True)
+class FoundRun:
+    """A run by its folder and its record."""
+
+    folder: Path
+    status: str  # "completed", "failed", "interrupted", "running", "died", or UNREADABLE
+    record: dict[str, Any]
+    problem: str = ""  # why it has no results, or none to the end
+
+
+def found_runs(folder: Path) -> list[FoundRun]:
+    """Return all runs in and below a folder, the earliest first.
+
+    Raises:
+        ResultsError: there is no such folder, or no run in it.
+    """
+    if not folder.is_dir():
+        raise ResultsError(f"{folder}: there is no such folder; name one that holds results")
+    found = [run for place in _folders(folder) for run in _runs_in(place)]
+    if not found:
+        raise ResultsError(f"{folder}: holds no results; make some with 'yawbench run SCENARIO'")
+    return sorted(found, key=lambda run: (str(run.record.get("started") or ""), run.folder))
+
+
+def _folders(folder: Path) -> Iterator[Path]:
+    for place, below, files in os.walk(folder):
+        below.sort()
+        if not {RUN_FILE, f"{RUN_FILE}{PART}"}.isdisjoint(files):
+            yield Path(place)
+
+
+def _runs_in(folder: Path) -> Iterator[FoundRun]:
+    """Yield the run whose results stand in a folder, and the one that goes on or has died there."""
+    going = unfinished(folder)
+    if going is not None:
+        dead = is_dead(folder)
+        try:
+            record = check_record(going, folder / f"{RUN_FILE}{PART}")
+        except ResultsError:  # of a run that has died, perhaps before it had written its record
+            record = {}
+        yield FoundRun(folder, DIED if dead else RUNNING, record, "it ended without a word" if dead else "")
+    if going is not None and not os.path.lexists(folder / RUN_FILE):
+        return
+    try:
+        record = load_record(folder, settled=going is not None)
+        warn_if_unchecked(record, folder)
+    except ResultsError as error:
+        yield FoundRun(folder, UNREADABLE, {}, str(error))
+        return
+    problem = str((record.get("error") or {}).get("message") or "")
+    yield FoundRun(folder, str(record.get("status") or ""), record, problem)
+
+
+LONG = 200_000
+"""Rows from which on results are thinned; chosen: ten times those of the papers' longest run."""
+STRETCHES = 1500
+"""Stretches that a run is divided into: as many as a line drawn over the width of a page has points."""
+
+
+def thinned(
+    blocks: Iterator[list[np.ndarray]], columns: Sequence[str], rows: int
+) -> Iterator[list[np.ndarray]]:
+    """Yield the blocks of rows without those that a drawing can do without.
+
+    Args:
+        blocks: arrays of equal length, one for each column.
+        columns: their names.
+        rows: in all blocks, as far as is known; short results are left as they are.
+    """
+    if rows < LONG:
+        yield from blocks
+        return
+    length = -(-rows // STRETCHES)
+    place = {name: i for i, name in enumerate(columns)}
+    errors = [(i, place[r]) for name, i in place.items() if (r := _reference(name, columns)) is not None]
+    for block in blocks:
+        numbers = [i for i, column in enumerate(block) if column.dtype.kind == "f"]
+        distances = [block[i] - block[k] for i, k in errors if i in numbers and k in numbers]
+        seen = np.vstack([*(block[i] for i in numbers), *distances])
+        kept = np.zeros(len(block[0]), dtype=bool)
+        for begin in range(0, len(kept), length):
+            part = seen[:, begin : begin + length]
+            gaps = np.isnan(part)
+            kept[begin + np.where(gaps, np.inf, part).argmin(axis=1)] = True
+            kept[begin + np.where(gaps, -np.inf, part).argmax(axis=1)] = True
+            kept[begin + gaps.argmax(axis=1)] = True  # the first gap, else the first row
+            kept[begin + part.shape[1] - 1] = True
+        yield [column[kept] for column in block]
+
+
+def _reference(name: str, columns: Sequence[str]) -> str | None:
+    """Return the only column that holds the reference of a signal."""
+    found = [other for other in columns if other.partition(".")[2] == f"{name.partition('.')[2]}_ref"]
+    return found[0] if len(found) == 1 and name.partition(".")[2] else None
 
 
 @dataclass(frozen=True)

@@ -22,21 +22,19 @@ from typing import Any
 
 import numpy as np
 
-from ..checksums import with_checksums
+from ..checksums import checksum, shown, with_checksums
 from ..errors import ResultsError
-from ..files import reason
+from ..files import reason, write_whole
 from ..plan import Value
-from ..writing import write_whole
-from .digest import checksum, shown
 from .folder import PART, RUN_FILE, RUNNING, put_in_place, tidy
 from .formats import RESULTS_FILE
-from .lock import Lock
+from .lock import FolderLock
 
 BLOCK = 512
 """Rows kept in memory before they are written."""
 
 
-class Block:
+class RowBlock:
     """The rows that a run has made last. Fill `rows` (and `others`), then call `write`.
 
     Args:
@@ -86,7 +84,7 @@ class Block:
             look(rows)
 
 
-class Recorder(Block):
+class Recorder(RowBlock):
     """The results of one run on disk. Call `write` for every block; at the end `finish`.
 
     Args:
@@ -120,7 +118,7 @@ class Recorder(Block):
         self._home = folder.absolute()  # an FMU may change the working directory
         self._path = self._home / f"{self.file}{PART}"
         self._run_path = self._home / f"{RUN_FILE}{PART}"
-        self._lock = Lock(folder)
+        self._lock = FolderLock(folder)
         try:
             tidy(self._home)
             self._file = self._path.open("xb", buffering=0)  # not through a link that stands there

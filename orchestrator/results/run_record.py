@@ -1,10 +1,13 @@
 """What run.json says about a run: everything needed to repeat and to judge it.
 
 `RunRecord` is the one definition: what a run writes has its fields, and what is read back is checked by it.
+
+The record of a run, run.json, read back: every part that is used is of the kind that a run writes.
 """
 
 from __future__ import annotations
 
+import json
 import math
 import platform
 from collections.abc import Mapping
@@ -12,12 +15,19 @@ from dataclasses import asdict
 from datetime import datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt
+from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, ValidationError
 
-from ..plan import DEFAULT, Plan, Series, Unit, Wire
-from ..sources import OF_RESULTS, sources_hash
+from .. import checksums
+from ..cache import OF_RESULTS, sources_hash
+from ..errors import ResultsError
+from ..files import read_bytes, reading, reason
+from ..messages import short
+from ..plan import DEFAULT, InputSeries, Instance, Plan, Wire
+from .folder import FAILED, LARGEST, RUN_FILE, refuse_dead
+from .formats import FILES
 
 PROGRAMS = ("yawbench", "fmpy", "pythonfmu", "numpy")
 """Packages that have a say in the numbers."""
@@ -165,7 +175,7 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
         status: "completed", "failed" or "interrupted".
         started: when the run began, with a time zone.
     """
-    units = {unit.name: unit for unit in plan.units}
+    units = {unit.name: unit for unit in plan.instances}
     return {
         "status": status,
         "error": None,
@@ -193,14 +203,14 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
 
 def units_of(plan: Plan) -> dict[str, str | None]:
     """Return the measurement units of time and of all that is recorded."""
-    units = {unit.name: unit for unit in plan.units}
+    units = {unit.name: unit for unit in plan.instances}
     columns = {f"{u}.{name}": units[u].fmu.variables[name].unit for u, name in plan.record}
     return {"time": "s", **columns}
 
 
 def connections_of(plan: Plan) -> list[dict[str, Any]]:
     """Return the wires of a plan: from, to, and where a number is converted how and into which unit."""
-    units = {unit.name: unit for unit in plan.units}
+    units = {unit.name: unit for unit in plan.instances}
     return [_connection(wire, units) for wire in plan.wires]
 
 
@@ -211,11 +221,11 @@ def faults_of(plan: Plan) -> list[dict[str, Any]]:
         begin = None if fault.begin == -math.inf else fault.begin
         end = None if fault.end == math.inf else fault.end
         new: dict[str, Any] = {"on": fault.place, "fault": fault.says, "from": begin, "until": end, "at": []}
-        found.setdefault((fault.place, fault.says), new)["at"].append(f"{fault.unit}.{fault.variable}")
+        found.setdefault((fault.place, fault.says), new)["at"].append(f"{fault.instance}.{fault.variable}")
     return list(found.values())
 
 
-def _connection(wire: Wire, units: Mapping[str, Unit]) -> dict[str, Any]:
+def _connection(wire: Wire, units: Mapping[str, Instance]) -> dict[str, Any]:
     ends = {"from": f"{wire.source}.{wire.output}", "to": f"{wire.target}.{wire.input}"}
     if not wire.converts:
         return ends
@@ -223,7 +233,7 @@ def _connection(wire: Wire, units: Mapping[str, Unit]) -> dict[str, Any]:
     return ends | {"gain": wire.gain, "offset": wire.offset} | ({"unit": unit} if unit else {})
 
 
-def _fmu(unit: Unit, plan: Plan) -> dict[str, Any]:
+def _fmu(unit: Instance, plan: Plan) -> dict[str, Any]:
     fmu = unit.fmu
     return {
         "name": fmu.name,
@@ -243,7 +253,7 @@ def _fmu(unit: Unit, plan: Plan) -> dict[str, Any]:
     } | ({"series": {name: _series(one) for name, one in unit.series.items()}} if unit.series else {})
 
 
-def _series(series: Series) -> dict[str, Any]:
+def _series(series: InputSeries) -> dict[str, Any]:
     how = "held" if series.held else "linear"
     return {"file": series.file, "column": series.column, "interpolation": how, "sha256": series.sha256}
 
@@ -265,3 +275,68 @@ def version_of(package: str) -> str:
         return version(package)
     except PackageNotFoundError:
         return "unknown"
+
+
+def load_record(folder: Path, *, settled: bool = False) -> dict[str, Any]:
+    """Return the record of the run whose results stand in a folder.
+
+    Args:
+        folder: of the results.
+        settled: read the record of earlier results though the last run has died.
+
+    Raises:
+        ResultsError: there is none, it is not what `yawbench run` writes, or the last run here has died.
+    """
+    if not settled:
+        refuse_dead(folder)
+    file = folder / RUN_FILE
+    with reading("record of a run", file, ResultsError):
+        try:
+            run = json.loads(read_bytes(file, largest=LARGEST).decode())
+        except FileNotFoundError:
+            failed = f"; those of a run that failed: {folder / FAILED}" if (folder / FAILED).exists() else ""
+            raise ResultsError(
+                f"{folder}: no results here, {RUN_FILE} is missing; make them with "
+                f"'yawbench run SCENARIO --out {folder}'{failed}."
+            ) from None
+        except NotADirectoryError:
+            holds = f", {folder.parent}" if folder.name in (RUN_FILE, *FILES.values()) else ""
+            raise ResultsError(
+                f"{folder}: is a file; name the folder that holds the results{holds}."
+            ) from None
+        except (OSError, ValueError) as error:
+            raise ResultsError(f"{file}: cannot be read: {reason(error)}") from None
+        return check_record(run, file)
+
+
+def warn_if_unchecked(run: Mapping[str, Any], folder: Path) -> None:
+    """Tell the user of a record without checksums."""
+    if not checksums.has_checksums(run):
+        checksums.warn(
+            f"{folder / RUN_FILE}: has no checksums, it is of an earlier version or was changed; "
+            "its units and names are taken as they are"
+        )
+
+
+def check_record(run: Any, file: Path) -> dict[str, Any]:
+    """Return the content of a record.
+
+    Raises:
+        ResultsError: it was changed, or something in it is not what a run writes.
+    """
+    if not isinstance(run, dict):
+        raise ResultsError(f"{file}: is not the record of a run.")
+    if words := checksums.changed_since(run):
+        raise ResultsError(
+            f"{file}: is not what its run has written: {words}; run it again, or remove "
+            f"{checksums.KEY!r} if you have changed the file yourself."
+        )
+    try:
+        RunRecord.model_validate(run)
+    except ValidationError as errors:
+        first, *others = errors.errors(include_url=False)
+        place = ".".join(map(str, first["loc"]))
+        more = f" ({len(others)} more like it)" if others else ""
+        wrong = f"{place}: {first['msg'].lower().partition(' or instance')[0]} (got {short(first['input'])})"
+        raise ResultsError(f"{file}: is not the record of a run: {wrong}{more}.") from None
+    return run

@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from ..checksums import checksum
 from ..errors import ResultsError
-from ..files import reason
-from ..writing import open_own, write_whole
+from ..files import open_own, reason, write_whole
 from .csv_file import CsvFile
-from .digest import checksum
 from .folder import DIED, PART, RUN_FILE, is_dead, is_final, is_regular, put_in_place, tidy, unfinished
 from .formats import FILES, RESULTS_FILE
-from .lock import Lock
+from .lock import FolderLock
 from .recorder import record_text
 
 WHY = "the process of this run ended without a word"
@@ -34,7 +33,7 @@ def salvage(folder: Path) -> tuple[Path, int]:
     if not is_dead(folder):
         raise ResultsError(f"{folder}: no run has died here; there is nothing to salvage")
     path = folder / f"{RESULTS_FILE}{PART}"
-    lock = Lock(folder)
+    lock = FolderLock(folder)
     try:
         record = unfinished(folder) or {}
         if is_final(folder):

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from ..errors import ScenarioError
 from ..files import TEXT, read_bytes
-from ..wording import hint, listed, short
-from .strict import KINDS
+from ..messages import hint, listed, short
+from .validation import KINDS
 
 FOLDER = "scenarios"
 SHIPPED = Path(__file__).resolve().parents[2] / FOLDER

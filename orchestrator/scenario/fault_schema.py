@@ -21,10 +21,10 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 from pydantic import Field, PlainSerializer, PlainValidator, model_validator
 
-from ..plan import FAULT_WORDS, NO_FAULTS, Faults, Value, fault_line
-from ..wording import short
+from ..messages import short
+from ..plan import FAULT_WORDS, NO_FAULTS, FaultList, Value, fault_line
 from . import quantities, yaml_lines
-from .strict import Instant, Strict, Time
+from .validation import Instant, StrictModel, Time
 
 EVERY = Fraction(1, 100)
 """Time from one message to the next [s]. Chosen: what the buses of cars have."""
@@ -36,7 +36,7 @@ KindName = Literal[
 
 
 @dataclass(frozen=True)
-class Kind:
+class FaultKind:
     """A kind of fault: what becomes of a signal x, and what it is told."""
 
     does: str
@@ -49,45 +49,47 @@ class Kind:
     shared: bool = False  # it takes share
 
 
-KINDS: dict[str, Kind] = {
-    "bias": Kind("x + value", "{x}"),
-    "gain": Kind("x * value", "1"),
-    "drift": Kind("x + value * (time since the fault began)", "{x}/s"),
-    "noise": Kind(
+KINDS: dict[str, FaultKind] = {
+    "bias": FaultKind("x + value", "{x}"),
+    "gain": FaultKind("x * value", "1"),
+    "drift": FaultKind("x + value * (time since the fault began)", "{x}/s"),
+    "noise": FaultKind(
         "x + value * normally distributed numbers, a new one every message", "{x}", least=0, drawn=True
     ),
-    "freeze": Kind("the x at which the fault began"),
-    "value": Kind("value", "{x}"),
-    "dropout": Kind("a share of the messages is lost, the last x before holds", drawn=True, shared=True),
-    "outlier": Kind("a share of the messages is x + value or x - value", "{x}", drawn=True, shared=True),
-    "delay": Kind("the x of so long ago", "s", least=0),
-    "saturation": Kind("x, but at most value and at least -value", "{x}", least=0),
-    "loss": Kind(
+    "freeze": FaultKind("the x at which the fault began"),
+    "value": FaultKind("value", "{x}"),
+    "dropout": FaultKind("a share of the messages is lost, the last x before holds", drawn=True, shared=True),
+    "outlier": FaultKind("a share of the messages is x + value or x - value", "{x}", drawn=True, shared=True),
+    "delay": FaultKind("the x of so long ago", "s", least=0),
+    "saturation": FaultKind("x, but at most value and at least -value", "{x}", least=0),
+    "loss": FaultKind(
         "of an actuator: x without this part of it, by default nothing is left", "1", 1.0, least=0, most=1
     ),
-    "stuck": Kind("of an actuator: value, by default the x at which the fault began", "{x}", needs=False),
+    "stuck": FaultKind(
+        "of an actuator: value, by default the x at which the fault began", "{x}", needs=False
+    ),
 }
 """Kind -> what it does. A line more here and in `master.faulting` is a kind more."""
 assert tuple(KINDS) == get_args(KindName)
 
 
-class Place(NamedTuple):
+class FaultLocation(NamedTuple):
     """Where a fault is: at a variable of a unit, or on the wires from there to a unit."""
 
-    unit: str
+    instance: str
     variable: str
     target: str = ""
     input: str = "*"
 
     def __str__(self) -> str:
         to = f".{self.input}" if self.input != "*" else ""
-        return f"{self.unit}.{self.variable}" + (f" -> {self.target}{to}" if self.target else "")
+        return f"{self.instance}.{self.variable}" + (f" -> {self.target}{to}" if self.target else "")
 
 
 _PLACE = re.compile(r"\s*(\w+)\.([^\s>]+?)\s*(?:->\s*(\w+)(?:\.(\S+))?\s*)?")
 
 
-def place_of(value: object) -> Place:
+def place_of(value: object) -> FaultLocation:
     """Return a place as written.
 
     Raises:
@@ -98,17 +100,17 @@ def place_of(value: object) -> Place:
         raise ValueError(
             f"must be unit.output, unit.input or unit.output -> unit, with at most one * (got {short(value)})"
         )
-    return Place(found[1], found[2], found[3] or "", found[4] or "*")
+    return FaultLocation(found[1], found[2], found[3] or "", found[4] or "*")
 
 
-def read_line(line: str) -> Faults:
+def read_line(line: str) -> FaultList:
     """Return the faults that a line gives, as written behind a place.
 
     Raises:
         ValueError: something stands there twice.
     """
     if line.strip() == NO_FAULTS:
-        return Faults()
+        return FaultList()
     items = []
     for text in line.split(";"):
         head, *rest = re.split(rf"(?:^|\s+)({'|'.join(FAULT_WORDS)})\s+", text.strip())
@@ -119,7 +121,7 @@ def read_line(line: str) -> Faults:
                 raise ValueError(f"has {name} twice")
             item[name] = yaml_lines.scalar(given.strip())
         items.append(item)
-    return Faults(items)
+    return FaultList(items)
 
 
 def _value(value: object) -> float | str | None:
@@ -136,19 +138,19 @@ def _share(value: object) -> float:
     return float(value)
 
 
-PlaceText = Annotated[Place, PlainValidator(place_of), PlainSerializer(str)]
+FaultLocationText = Annotated[FaultLocation, PlainValidator(place_of), PlainSerializer(str)]
 FaultValue = Annotated[float | str, PlainValidator(_value)]
 Share = Annotated[float, PlainValidator(_share)]
 
 
-class FaultSpec(Strict):
+class FaultSpec(StrictModel):
     """What goes wrong with a signal, for a time.
 
     Kinds are bias, gain, drift, noise, freeze, value, dropout, outlier, delay and saturation, of actuators
     also loss and stuck.
     """
 
-    on: PlaceText = Field(description="unit.output, unit.input or unit.output -> unit")
+    on: FaultLocationText = Field(description="unit.output, unit.input or unit.output -> unit")
     kind: KindName = Field(description="What becomes of the signal")
     value: FaultValue | None = Field(None, description="As the kind has it, with its unit or in the signal's")
     share: Share | None = Field(None, description="Of the messages, of dropout and outlier")
@@ -189,10 +191,10 @@ class FaultSpec(Strict):
         return fault_line(self.item)
 
 
-def by_place(faults: Iterable[FaultSpec]) -> dict[str, Faults]:
+def by_place(faults: Iterable[FaultSpec]) -> dict[str, FaultList]:
     """Return place -> the faults there."""
-    found: dict[str, Faults] = {}
+    found: dict[str, FaultList] = {}
     for fault in faults:
         place = str(fault.on)
-        found[place] = Faults((*found.get(place, ()), fault.item))
+        found[place] = FaultList((*found.get(place, ()), fault.item))
     return found

@@ -9,27 +9,27 @@ from pathlib import Path
 
 from ..errors import ScenarioError
 from ..files import reads
-from ..plan import Change
-from ..wording import hint, listed
-from . import overrides, quantities, strict, yaml_lines
-from .scenario_schema import Connection, Endpoint, Scenario, ScenarioSpec, Vehicle, endpoint
+from ..messages import hint, listed
+from ..plan import Override
+from . import overrides, quantities, validation, yaml_lines
+from .scenario_schema import Connection, Endpoint, LoadedScenario, ScenarioSpec, Vehicle, endpoint
 from .tir import TyreFile, read_tir
-from .yaml_lines import Document, Key
+from .yaml_lines import Document, KeyPath
 
 STEPS = 1_000_000_000
 """Steps of a run. Chosen: a computer makes about as many in a day."""
 
-__all__ = ["Connection", "Endpoint", "Scenario", "ScenarioSpec", "load_scenario"]
+__all__ = ["Connection", "Endpoint", "LoadedScenario", "ScenarioSpec", "load_scenario"]
 
 
 @reads("scenario file", ScenarioError)
 def load_scenario(
     path: Path | str,
     *,
-    changes: Sequence[Change] = (),
+    changes: Sequence[Override] = (),
     read: Callable[..., Document] = yaml_lines.read,
     validate: bool = True,
-) -> Scenario:
+) -> LoadedScenario:
     """Read a scenario file, or an SSP archive.
 
     Args:
@@ -52,8 +52,8 @@ def load_scenario(
     if not validate:
         overrides.leave_unvalidated(document)
 
-    file = strict.validate(ScenarioSpec, document)
-    vehicle = strict.validate(Vehicle, vehicle_document)
+    file = validation.validate(ScenarioSpec, document)
+    vehicle = validation.validate(Vehicle, vehicle_document)
     if isinstance(document.data, dict):
         _check_time_grid(document)
         _check_unit_names(document)
@@ -61,7 +61,7 @@ def load_scenario(
     problems = document.sentences() + vehicle_document.sentences()
     if problems or file is None or vehicle is None:
         raise ScenarioError(problems)
-    return Scenario.model_construct(
+    return LoadedScenario.model_construct(
         **dict(file),
         document=document,
         vehicle_document=vehicle_document,
@@ -135,7 +135,7 @@ def _check_time_grid(document: Document) -> None:
         steps = float((stop - (start or 0)) / step)
         document.report(("stop_time",), f"a run has at most {STEPS:,} steps (this would have {steps:.3g})")
         return
-    times: list[tuple[Key, object]] = [(("stop_time",), None if stop is None else stop - (start or 0))]
+    times: list[tuple[KeyPath, object]] = [(("stop_time",), None if stop is None else stop - (start or 0))]
     units = data.get("units")
     for name, unit in units.items() if isinstance(units, dict) else ():
         if isinstance(unit, dict):
@@ -175,7 +175,7 @@ def _check_unit_names(document: Document) -> None:
     units = data.get("units")
     if not isinstance(units, dict):
         return
-    named: list[tuple[Key, object]] = []
+    named: list[tuple[KeyPath, object]] = []
     connections, record = data.get("connections"), data.get("record")
     for i, connection in enumerate(connections if isinstance(connections, list) else ()):
         if isinstance(connection, dict):
@@ -192,6 +192,6 @@ def _units_in(value: object) -> list[str]:
     if isinstance(value, list):
         return [name for name in value if isinstance(name, str)]
     try:
-        return [endpoint(value).unit]
+        return [endpoint(value).instance]
     except ValueError:
         return []

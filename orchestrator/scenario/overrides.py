@@ -23,11 +23,11 @@ from pathlib import Path
 from typing import Any, cast
 
 from ..errors import Problem, ScenarioError
-from ..plan import FACTS, FAULTS, OF_RUN, TYRES, Change, Faults, Value
-from ..wording import hint, listed
+from ..messages import hint, listed
+from ..plan import FACTS, FAULTS, OF_RUN, TYRES, FaultList, Override, Value
 from . import yaml_lines
 from .fault_schema import place_of, read_line
-from .yaml_lines import Document, Key
+from .yaml_lines import Document, KeyPath
 
 HOLDERS = ("vehicle", "inputs")
 """Words that `--set` understands in place of a unit."""
@@ -44,7 +44,7 @@ def is_path(fmu: str) -> bool:
 
 def read_changes(
     swaps: Iterable[str] = (), settings: Iterable[str] = (), faults: Iterable[str] = ()
-) -> tuple[Change, ...]:
+) -> tuple[Override, ...]:
     """Return what the options of a command line change.
 
     Args:
@@ -56,7 +56,7 @@ def read_changes(
     Raises:
         ScenarioError: with every option that is none.
     """
-    changes: list[Change] = []
+    changes: list[Override] = []
     problems: list[str | Problem] = []
     for text in swaps:
         unit, equals, fmu = (part.strip() for part in text.partition("="))
@@ -73,7 +73,7 @@ def read_changes(
         else:
             sentence = f"write --set UNIT.PARAMETER=VALUE, or {listed((*OF_RUN, *FACTS), last='or')}=VALUE"
             problems.append(f"--set {text}: {sentence}")
-    at: dict[str, Faults] = {}
+    at: dict[str, FaultList] = {}
     for text in faults:
         place, colon, line = (part.strip() for part in text.partition(":"))
         if not (place and colon and line):
@@ -84,14 +84,14 @@ def read_changes(
         except ScenarioError as error:
             problems += error.problems
             continue
-        at[one.place] = Faults((*at.get(one.place, ()), *cast(Faults, one.value)))
-    changes += [Change(place, given, "--fault") for place, given in at.items()]
+        at[one.place] = FaultList((*at.get(one.place, ()), *cast(FaultList, one.value)))
+    changes += [Override(place, given, "--fault") for place, given in at.items()]
     if problems:
         raise ScenarioError(problems)
     return tuple(changes)
 
 
-def setting(place: str, value: Value, origin: str) -> Change:
+def setting(place: str, value: Value, origin: str) -> Override:
     """Return the change of a place to a value as it is written: faults come in a line, and leave as data.
 
     Raises:
@@ -99,8 +99,8 @@ def setting(place: str, value: Value, origin: str) -> Change:
     """
     holder, _, at = place.partition(".")
     if holder != FAULTS or not at:
-        return Change(place, value, origin)
-    change = Change(f"{FAULTS}.{spelled(at)}", str(value), origin)
+        return Override(place, value, origin)
+    change = Override(f"{FAULTS}.{spelled(at)}", str(value), origin)
     try:
         return replace(change, value=read_line(str(value)))
     except ValueError as error:
@@ -109,7 +109,7 @@ def setting(place: str, value: Value, origin: str) -> Change:
 
 def changes_of(
     swaps: Mapping[str, str], settings: Mapping[str, Value], folder: Path, origin: str
-) -> list[Change]:
+) -> list[Override]:
     """Return the changes that a file in a folder gives as unit -> FMU (see `swap_of`) and place -> value."""
     changes = [
         setting(place, str(folder / str(value)) if place.split(".")[0] == TYRES else value, origin)
@@ -122,28 +122,28 @@ def changes_of(
     return changes
 
 
-def changes_of_run(spec: Any, origin: str) -> list[Change]:
+def changes_of_run(spec: Any, origin: str) -> list[Override]:
     """Return the changes that the fields `stop_time`, `step_size` and `algorithm` of a file's part give."""
     given = [(place, getattr(spec, place, None)) for place in OF_RUN]
     return [
-        Change(place, float(value) if isinstance(value, Fraction) else value, origin)
+        Override(place, float(value) if isinstance(value, Fraction) else value, origin)
         for place, value in given
         if value is not None
     ]
 
 
-def swap_of(unit: str, text: str, origin: str) -> list[Change]:
+def swap_of(unit: str, text: str, origin: str) -> list[Override]:
     """Return the changes of `fmu:parameter=value:parameter=value` for a unit, first its FMU."""
     match = re.fullmatch(r"(.*?)((?::\w+=[^:]*)*)", text, re.DOTALL)
     assert match is not None
     given = (one.partition("=") for one in match[2].split(":")[1:])
-    brought = [Change(f"{unit}.{name}", yaml_lines.scalar(value), origin) for name, _, value in given]
-    return [Change(unit, match[1], origin), *brought]
+    brought = [Override(f"{unit}.{name}", yaml_lines.scalar(value), origin) for name, _, value in given]
+    return [Override(unit, match[1], origin), *brought]
 
 
 def apply_changes(
-    document: Document, vehicle: Document, changes: Iterable[Change]
-) -> tuple[dict[str, str], tuple[Change, ...]]:
+    document: Document, vehicle: Document, changes: Iterable[Override]
+) -> tuple[dict[str, str], tuple[Override, ...]]:
     """Enter changes into a scenario and its vehicle file; report those that do not fit.
 
     Of several changes of a place the last one counts.
@@ -152,7 +152,7 @@ def apply_changes(
         unit -> the FMU that the file names, of all that are swapped; the changes that make a difference.
     """
     replaced: dict[str, str] = {}
-    effective: list[Change] = []
+    effective: list[Override] = []
     units = _mapping(document.data, "units")
     for change in {change.place: change for change in changes}.values():
         holder, _, name = change.place.partition(".")
@@ -186,14 +186,14 @@ def apply_changes(
     return replaced, tuple(effective)
 
 
-def apply_vehicle(document: Document, changes: Iterable[Change]) -> None:
+def apply_vehicle(document: Document, changes: Iterable[Override]) -> None:
     """Name another vehicle file, relative to the working directory, where a change asks for it."""
     for change in changes:
         if change.place == "vehicle":
             _put(document, ("vehicle",), change, os.path.abspath(str(change.value)))
 
 
-def _put_tyres(document: Document, vehicle: Document, change: Change) -> bool:
+def _put_tyres(document: Document, vehicle: Document, change: Override) -> bool:
     """Name other tyre property files, relative to the working directory; return whether they are others."""
     file = os.path.abspath(str(change.value))
     axle = change.place.removeprefix(f"{TYRES}.")
@@ -216,12 +216,12 @@ def spelled(place: str) -> str:
         return place
 
 
-def _put_faults(document: Document, change: Change, place: str) -> bool:
+def _put_faults(document: Document, change: Override, place: str) -> bool:
     """Give a place other faults than the file does, behind those of other places; return whether they are."""
     given = document.data.get(FAULTS) or []
     if not isinstance(given, list):
         return True  # the schema will say what is wrong
-    assert isinstance(change.value, Faults)
+    assert isinstance(change.value, FaultList)
     items = [{"on": place, **item} for item in change.value]
     places = [spelled(str(one.get("on"))) if isinstance(one, dict) else None for one in given]
     there = [i for i, at in enumerate(places) if at == place]
@@ -243,7 +243,7 @@ def leave_unvalidated(document: Document) -> None:
             spec["validate"] = False
 
 
-def apply_to_all_runs(document: Document, changes: Iterable[Change]) -> None:
+def apply_to_all_runs(document: Document, changes: Iterable[Override]) -> None:
     """Enter changes into the `swap` and `set` of a file that has many runs of a scenario."""
     for change in changes:
         if change.place in OF_RUN:
@@ -254,10 +254,10 @@ def apply_to_all_runs(document: Document, changes: Iterable[Change]) -> None:
             _put(document, ("swap" if change.swaps else "set", change.place), change)
 
 
-def _swap(document: Document, unit: str, change: Change) -> bool:
+def _swap(document: Document, unit: str, change: Override) -> bool:
     """Replace the FMU of a unit; return whether it is another one."""
     fmu = str(change.value)
-    key: Key = ("units", unit, "fmu")
+    key: KeyPath = ("units", unit, "fmu")
     before = document.data["units"][unit].get("fmu")
     if is_path(fmu):
         fmu = os.path.abspath(fmu)
@@ -266,7 +266,7 @@ def _swap(document: Document, unit: str, change: Change) -> bool:
     return _put(document, key, change, fmu)
 
 
-def _put(document: Document, key: Key, change: Change, value: Any = None) -> bool:
+def _put(document: Document, key: KeyPath, change: Override, value: Any = None) -> bool:
     """Give the value at a key, a change's own if no other is given; return whether it was another before."""
     holder = document.data
     for part in key[:-1]:

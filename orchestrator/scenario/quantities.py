@@ -1,6 +1,15 @@
 """Quantities with a unit, as people write them: '90 km/h', '5 deg', '12 bar', '2 N.m/deg'.
 
 A lone `g` is a gram where a mass is meant, else standard gravity, 9.80665 m/s2.
+
+Units of measurement by what they mean: 'N.m', 'km/h', 'm/s2', or as an FMU defines them.
+
+A unit is a product of powers: symbols of the table below, most with a decimal prefix, joined by
+`.` (also `*`, a raised dot or a space), each with an exponent (`m2`, `m^2`, `s-1`), divided by `/`;
+a denominator of several symbols stands in parentheses or behind a `/` each. It stands for powers of
+kg, m, s, A, K, mol, cd, rad (FMI 2.0.4, section 2.2.2), a factor and an offset. Factors are exact
+fractions, with powers of pi beside them, so that 90 km/h is 25 m/s to the last bit. What an FMU
+defines goes before the table; where both agree but for rounding, the table has more digits.
 """
 
 from __future__ import annotations
@@ -9,14 +18,199 @@ import math
 import re
 import sys
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cache
 
+from ..messages import closest, listed, short
 from ..plan import UnitDefinition
-from ..wording import closest, listed, short
-from .measurement_units import Measure, UnknownUnitError, conversion, measure_of, parse_unit
 
-LONGEST = 1e9
+BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+Powers = tuple[int, int, int, int, int, int, int, int]  # of BASE_UNITS
+
+_NONE: Powers = (0,) * 8
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit of measurement: a value times `factor * pi**pi`, plus `offset`, is one in base units."""
+
+    factor: Fraction
+    pi: int
+    powers: Powers
+    offset: Fraction = Fraction(0)
+
+    def __mul__(self, other: Unit) -> Unit:
+        powers = tuple(a + b for a, b in zip(self.powers, other.powers, strict=True))
+        return Unit(self.factor * other.factor, self.pi + other.pi, powers)  # type: ignore[arg-type]
+
+    def __pow__(self, n: int) -> Unit:
+        if n == 1:
+            return self
+        powers = tuple(n * a for a in self.powers)
+        return Unit(self.factor**n, self.pi * n, powers)  # type: ignore[arg-type]
+
+
+def _unit(factor: int | str = 1, pi: int = 0, **powers: int) -> Unit:
+    return Unit(Fraction(factor), pi, tuple(powers.get(n, 0) for n in BASE_UNITS))  # type: ignore[arg-type]
+
+
+_PREFIXED = {
+    "m": _unit(m=1),
+    "g": _unit("1/1000", kg=1),
+    "s": _unit(s=1),
+    "A": _unit(A=1),
+    "K": _unit(K=1),
+    "mol": _unit(mol=1),
+    "cd": _unit(cd=1),
+    "rad": _unit(rad=1),
+    "Hz": _unit(s=-1),
+    "N": _unit(kg=1, m=1, s=-2),
+    "Nm": _unit(kg=1, m=2, s=-2),
+    "Pa": _unit(kg=1, m=-1, s=-2),
+    "J": _unit(kg=1, m=2, s=-2),
+    "W": _unit(kg=1, m=2, s=-3),
+    "V": _unit(kg=1, m=2, s=-3, A=-1),
+    "bar": _unit(100_000, kg=1, m=-1, s=-2),
+    "l": _unit("1/1000", m=3),
+}
+_PLAIN = {
+    "1": _unit(),
+    "%": _unit("1/100"),
+    "min": _unit(60, s=1),
+    "h": _unit(3600, s=1),
+    "t": _unit(1000, kg=1),
+    "deg": _unit("1/180", 1, rad=1),
+    "°": _unit("1/180", 1, rad=1),
+    "rev": _unit(2, 1, rad=1),
+    "rpm": _unit("1/30", 1, rad=1, s=-1),
+    "degC": replace(_unit(K=1), offset=Fraction("273.15")),
+    "°C": replace(_unit(K=1), offset=Fraction("273.15")),
+}
+_PREFIXES = {
+    "G": Fraction(10**9),
+    "M": Fraction(10**6),
+    "k": Fraction(1000),
+    "c": Fraction(1, 100),
+    "m": Fraction(1, 1000),
+    "u": Fraction(1, 10**6),
+    "µ": Fraction(1, 10**6),
+    "n": Fraction(1, 10**9),
+}
+ROUNDING = 1e-6
+"""Relative difference up to which two definitions are the same unit; chosen: definitions are often
+written with seven digits, and no two units lie that close together."""
+
+_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+_TOKEN = re.compile(r"(?P<symbol>[A-Za-zµ°%]+|1)(?:\^?(?P<power>-?\d{1,2}))?|(?P<mark>[./()*·])|\s+")
+
+
+class UnknownUnitError(ValueError):
+    """A text is no unit."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(f"{short(text)} is not a unit")
+
+
+LONGEST_UNIT = 60
+"""Characters of a unit; chosen: three times the longest that makes sense."""
+
+
+def parse_unit(text: str) -> Unit:
+    """Return what the unit `text` means.
+
+    Raises:
+        ValueError: not a unit.
+    """
+    if len(text) > LONGEST_UNIT:
+        raise UnknownUnitError(text)
+    plain = text.translate(_SUPERSCRIPTS).replace("μ", "µ")
+    tokens: list[Unit | str] = []
+    position = 0
+    while position < len(plain):
+        match = _TOKEN.match(plain, position)
+        if match is None:
+            raise UnknownUnitError(text)
+        position = match.end()
+        if match["symbol"]:
+            tokens.append(_symbol(match["symbol"], text) ** int(match["power"] or 1))
+        elif match["mark"]:
+            tokens.append("." if match["mark"] in "*·" else match["mark"])
+    measure, rest = _product(tokens, text)
+    if rest:
+        raise UnknownUnitError(text)
+    return measure
+
+
+def _symbol(symbol: str, text: str) -> Unit:
+    known = _PLAIN.get(symbol) or _PREFIXED.get(symbol)
+    if known is not None:
+        return known
+    prefix, base = _PREFIXES.get(symbol[0]), _PREFIXED.get(symbol[1:])
+    if prefix is None or base is None:
+        raise UnknownUnitError(text)
+    return Unit(prefix, 0, _NONE) * base
+
+
+def _product(tokens: list[Unit | str], text: str) -> tuple[Unit, list[Unit | str]]:
+    """Return the product at the head of `tokens`, and what follows it."""
+    result, tokens = _factor(tokens, text)
+    divided = False
+    while tokens and tokens[0] != ")":
+        mark = tokens[0]
+        if mark in (".", "/"):
+            tokens = tokens[1:]
+        if mark != "/" and divided:
+            raise ValueError(f"{text!r} is ambiguous: put the denominator in parentheses")
+        factor, tokens = _factor(tokens, text)
+        divided = divided or mark == "/"
+        result = result * (factor**-1 if mark == "/" else factor)
+    return result, tokens
+
+
+def _factor(tokens: list[Unit | str], text: str) -> tuple[Unit, list[Unit | str]]:
+    if tokens and isinstance(tokens[0], Unit):
+        return tokens[0], tokens[1:]
+    if tokens and tokens[0] == "(":
+        inner, rest = _product(tokens[1:], text)
+        if rest and rest[0] == ")":
+            return inner, rest[1:]
+    raise UnknownUnitError(text)
+
+
+@cache
+def measure_of(unit: str | None, definition: UnitDefinition | None = None) -> Unit | None:
+    """Return what a unit means that an FMU declares, None if neither the FMU nor the table says."""
+    try:
+        known = parse_unit(unit) if unit else None
+    except ValueError:
+        known = None
+    if definition is None:
+        return known
+    factor, offset = definition.factor, definition.offset
+    if not (factor and math.isfinite(factor) and math.isfinite(offset)):
+        return known
+    defined = Unit(Fraction(repr(factor)), 0, definition.powers, Fraction(repr(offset)))  # type: ignore[arg-type]
+    return known if known is not None and conversion(defined, known) == (1.0, 0.0) else defined
+
+
+def conversion(source: Unit, target: Unit) -> tuple[float, float] | None:
+    """Return gain and offset that make a number in `source` one in `target`, None if they do not fit.
+
+    They are 1 and 0 exactly where both mean the same (see `ROUNDING`).
+    """
+    if source.powers != target.powers:
+        return None
+    try:
+        gain = float(source.factor / target.factor) * math.pi ** (source.pi - target.pi)
+        offset = float((source.offset - target.offset) / target.factor) / math.pi**target.pi
+    except OverflowError:  # by definitions of FMUs
+        return None
+    same = math.isclose(gain, 1.0, rel_tol=ROUNDING) and abs(offset) <= ROUNDING
+    return (1.0, 0.0) if same else (gain, offset)
+
+
+LONGEST_QUANTITY = 1e9
 """The longest time that is taken for one [s]."""
 WRITTEN = 200
 """Characters of a quantity. Chosen: ten times the longest that makes sense."""
@@ -83,7 +277,7 @@ def convert(text: str, unit: str | None, definition: UnitDefinition | None = Non
     return value
 
 
-def _source(given: str, target: Measure) -> Measure:
+def _source(given: str, target: Unit) -> Unit:
     """Return what a unit means where a quantity is wanted in another: `g` of an acceleration is gravity.
 
     Raises:
@@ -92,7 +286,7 @@ def _source(given: str, target: Measure) -> Measure:
     return _GRAVITY if given == "g" and target.powers == _GRAVITY.powers else parse_unit(given)
 
 
-def gain_and_offset(given: str, target: Measure) -> tuple[float, float] | None:
+def gain_and_offset(given: str, target: Unit) -> tuple[float, float] | None:
     """Return what makes a number in a unit one in another, None if they do not fit or one is no unit."""
     try:
         return conversion(_source(given, target), target)
@@ -100,7 +294,7 @@ def gain_and_offset(given: str, target: Measure) -> tuple[float, float] | None:
         return None
 
 
-def converted(number: Fraction, source: Measure, target: Measure) -> Fraction | float:
+def converted(number: Fraction, source: Unit, target: Unit) -> Fraction | float:
     """Return a number in `source` as one in `target`, a unit of the same powers.
 
     It is exact where that can be, and infinite where no float is as large.
@@ -116,7 +310,7 @@ def converted(number: Fraction, source: Measure, target: Measure) -> Fraction | 
     return exact if turns == 0 else value
 
 
-def _guess(given: str, unit: str, target: Measure) -> str:
+def _guess(given: str, unit: str, target: Unit) -> str:
     """Return "; did you mean ...?" for what is no unit, or the units that fit."""
     fitting = _spellings(unit, target)
     plain = {re.sub(r"[^a-z0-9]", "", name.lower()): name for name in reversed([*_COMMON, *fitting])}
@@ -124,7 +318,7 @@ def _guess(given: str, unit: str, target: Measure) -> str:
     return f"; did you mean {likely!r}?" if likely else f": use {listed(fitting, last='or')}"
 
 
-def _spellings(unit: str, target: Measure) -> list[str]:
+def _spellings(unit: str, target: Unit) -> list[str]:
     """Return units that fit, the one in question first."""
     fitting = [name for name in _COMMON if parse_unit(name).powers == target.powers]
     if target.powers == _GRAVITY.powers:
@@ -159,8 +353,8 @@ def instant(value: object) -> Fraction:
         ValueError: not a time.
     """
     time = _time(value)
-    if abs(time) > LONGEST:
-        raise ValueError(f"must be a time of at most {LONGEST:g} s (got {value!r})")
+    if abs(time) > LONGEST_QUANTITY:
+        raise ValueError(f"must be a time of at most {LONGEST_QUANTITY:g} s (got {value!r})")
     return time
 
 
@@ -171,8 +365,8 @@ def seconds(value: object) -> Fraction:
         ValueError: not a positive time.
     """
     time = _time(value)
-    if not 0 < time <= LONGEST:
-        limit = f" and at most {LONGEST:g} s" if time > 0 else ""
+    if not 0 < time <= LONGEST_QUANTITY:
+        limit = f" and at most {LONGEST_QUANTITY:g} s" if time > 0 else ""
         raise ValueError(f"must be a time above 0 s{limit} (got {value!r})")
     if time < SHORTEST:
         raise ValueError(f"must be a time of at least {float(SHORTEST):g} s (got {value!r})")

@@ -24,13 +24,13 @@ from pydantic import (
     model_validator,
 )
 
-from ..plan import Algorithm, Change, Value
-from ..wording import short
+from ..messages import short
+from ..plan import Algorithm, Override, Value
 from . import overrides
 from .fault_schema import FaultSpec
-from .strict import Instant, Strict, Time
 from .tir import TyreFile
-from .yaml_lines import Document, Key
+from .validation import Instant, StrictModel, Time
+from .yaml_lines import Document, KeyPath
 
 AXLES = ("front", "rear")
 
@@ -38,11 +38,11 @@ AXLES = ("front", "rear")
 class Endpoint(NamedTuple):
     """A variable of a unit, or with a `*` several of them."""
 
-    unit: str
+    instance: str
     variable: str
 
     def __str__(self) -> str:
-        return f"{self.unit}.{self.variable}"
+        return f"{self.instance}.{self.variable}"
 
 
 def endpoint(value: object) -> Endpoint:
@@ -108,12 +108,12 @@ Scalar = Annotated[Value, PlainValidator(_plain)]
 Tolerance = Annotated[float, PlainValidator(_tolerance)]
 Tyres = Annotated[dict[str, str], PlainValidator(_tyres)]
 Variables = Annotated[Endpoint, PlainValidator(endpoint)]
-Source = Annotated[Endpoint | list[str] | None, PlainValidator(_source)]
-Target = Annotated[Endpoint | list[str], PlainValidator(_end)]
+SourceEndpoint = Annotated[Endpoint | list[str] | None, PlainValidator(_source)]
+TargetEndpoint = Annotated[Endpoint | list[str], PlainValidator(_end)]
 UnitName = Annotated[str, AfterValidator(_unit_name)]
 
 
-class TextSpec(Strict):
+class TextSpec(StrictModel):
     """The text of a file, UTF-8, in place of a value: for parameters that are text, as a road's patches."""
 
     file: str = Field(description="Path, relative to the scenario", min_length=1)
@@ -128,7 +128,7 @@ ParameterValue = Annotated[
 ]
 
 
-class UnitSpec(Strict):
+class UnitSpec(StrictModel):
     """One unit as the scenario gives it."""
 
     fmu: str = Field(description="Name of an FMU in fmus/, or the path of any .fmu", min_length=1)
@@ -142,7 +142,7 @@ class UnitSpec(Strict):
     )
 
 
-class SeriesSpec(Strict):
+class SeriesSpec(StrictModel):
     """A time series from a file, CSV, Parquet or ASAM MDF 4, in place of a constant.
 
     Headers may name units (`delta [deg]`), and values are converted to that of the input. Under
@@ -169,7 +169,7 @@ InputValue = Annotated[
 ]
 
 
-class Connection(Strict):
+class Connection(StrictModel):
     """Connections beyond equal names; `*` in both ends connects everything that matches in pairs.
 
     Numbers are converted from the output's unit into the input's. With `gain` or `offset` the units do
@@ -183,8 +183,8 @@ class Connection(Strict):
     `from: null` leaves inputs without a source, whatever outputs there are.
     """
 
-    source: Source = Field(alias="from", description="unit.output, or units in order, or null")
-    target: Target = Field(alias="to", description="unit.input, or units")
+    source: SourceEndpoint = Field(alias="from", description="unit.output, or units in order, or null")
+    target: TargetEndpoint = Field(alias="to", description="unit.input, or units")
     gain: float | None = Field(None, description="Factor in place of the conversion of units")
     offset: float | None = Field(None, description="Added after the factor")
 
@@ -209,7 +209,7 @@ class Connection(Strict):
         return (1.0 if self.gain is None else self.gain, 0.0 if self.offset is None else self.offset)
 
 
-class Vehicle(Strict):
+class Vehicle(StrictModel):
     """A vehicle file: parameters that every unit takes if it declares them."""
 
     title: str = ""
@@ -220,7 +220,7 @@ class Vehicle(Strict):
     parameters: dict[str, Scalar] = Field({}, description="Parameter name -> value")
 
 
-class ScenarioSpec(Strict):
+class ScenarioSpec(StrictModel):
     """A scenario file with all changes applied.
 
     Every input has one source: what `connections` names; else a constant whose key names the unit
@@ -252,7 +252,7 @@ class ScenarioSpec(Strict):
     faults: list[FaultSpec] = Field([], description="What goes wrong with signals, and when")
 
 
-class Scenario(ScenarioSpec):
+class LoadedScenario(ScenarioSpec):
     """A scenario as loaded: its file, what came with it, and where every value stands, for messages."""
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
@@ -265,7 +265,7 @@ class Scenario(ScenarioSpec):
     """Axle -> its tyre property file; every unit takes the parameters it declares. Empty: none."""
     replaced: dict[str, str]
     """Unit -> the FMU that the file names, for units that are swapped."""
-    changes: tuple[InstanceOf[Change], ...]
+    changes: tuple[InstanceOf[Override], ...]
     """What is other than in the file."""
     explicit: bool
     """Whether only what `connections` names is connected, and start values stand for the rest.
@@ -279,7 +279,7 @@ class Scenario(ScenarioSpec):
         return self.document.path
 
     @property
-    def tyres_place(self) -> tuple[Document, Key]:
+    def tyres_place(self) -> tuple[Document, KeyPath]:
         """Where the tyre property files are named, for messages."""
         return (self.vehicle_document if self.tyres is None else self.document), ("tyres",)
 

@@ -1,6 +1,8 @@
 """The members of an SSP archive: descriptions as XML, and what its FMUs declare.
 
 Nothing is unpacked to disk, and no address leads out of the archive.
+
+Names that the SSP archives written here and those read here have in common.
 """
 
 from __future__ import annotations
@@ -20,9 +22,9 @@ from lxml.etree import _Element
 
 from ..errors import Problem
 from ..files import PACKED, TooLargeError, check_archive, read_bytes, reason
+from ..messages import short
 from ..plan import UnitDefinition
-from ..wording import short
-from .measurement_units import BASE_UNITS, Measure, measure_of
+from .quantities import BASE_UNITS, Unit, measure_of
 
 LARGEST = 100_000_000
 """Bytes that a description may take, unpacked. Chosen: a thousand times what one of ours takes."""
@@ -30,7 +32,7 @@ LARGEST = 100_000_000
 _DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, ValueError, RuntimeError, NotImplementedError)
 
 
-class Refused(Exception):
+class SspError(Exception):
     """What cannot be read, in one sentence, and the element that says so."""
 
     def __init__(self, sentence: str, element: _Element | None = None) -> None:
@@ -45,7 +47,7 @@ class Refused(Exception):
         return Problem(str(self), file=path)
 
 
-class Declared(NamedTuple):
+class SspVariable(NamedTuple):
     """A variable as an FMU declares it."""
 
     causality: str
@@ -53,12 +55,12 @@ class Declared(NamedTuple):
     definition: UnitDefinition | None = None
 
     @property
-    def measure(self) -> Measure | None:
+    def measure(self) -> Unit | None:
         """What its unit means, None if it has none or one that nobody knows."""
         return measure_of(self.unit, self.definition)
 
 
-class Archive:
+class SspArchive:
     """An SSP archive, read into memory.
 
     Raises:
@@ -70,17 +72,17 @@ class Archive:
         try:
             raw = read_bytes(path, largest=PACKED)
         except FileNotFoundError:
-            raise Refused(f"no such {what}") from None
+            raise SspError(f"no such {what}") from None
         except (OSError, ValueError) as error:
-            raise Refused(f"cannot read this {what}: {reason(error)}") from None
+            raise SspError(f"cannot read this {what}: {reason(error)}") from None
         try:
             self._archive = zipfile.ZipFile(io.BytesIO(raw))
             check_archive(self._archive)
         except TooLargeError as error:
-            raise Refused(f"cannot read this {what}: {error}") from None
+            raise SspError(f"cannot read this {what}: {error}") from None
         except _DAMAGE as error:
-            raise Refused(f"no {what}, or damaged: {error}") from None
-        self._variables: dict[str, dict[str, Declared]] = {}
+            raise SspError(f"no {what}, or damaged: {error}") from None
+        self._variables: dict[str, dict[str, SspVariable]] = {}
 
     def member(self, element: _Element) -> str:
         """Return the member that the `source` of an element means.
@@ -92,12 +94,12 @@ class Archive:
         try:
             address = urlsplit(source)
         except ValueError:
-            raise Refused(f"source {short(source)} is no address", element) from None
+            raise SspError(f"source {short(source)} is no address", element) from None
         member = posixpath.normpath(unquote(address.path))
         if address.scheme or address.netloc or not source or member.startswith(("/", "..")):
-            raise Refused(f"source {source!r} is not in the archive", element)
+            raise SspError(f"source {source!r} is not in the archive", element)
         if element.get("sourceBase", "SSD") != "SSD":
-            raise Refused(
+            raise SspError(
                 f"source {source!r} is in a component: only members of the archive are read", element
             )
         return member
@@ -110,19 +112,19 @@ class Archive:
         """
         try:
             if self._archive.getinfo(member).file_size > LARGEST:
-                raise Refused(f"{member} is larger than {LARGEST // 10**6} MB")
+                raise SspError(f"{member} is larger than {LARGEST // 10**6} MB")
             root = etree.fromstring(self._archive.read(member), _parser(), base_url=member)
         except KeyError:
-            raise Refused(f"no SSP archive, or not all of it: there is no {member}") from None
+            raise SspError(f"no SSP archive, or not all of it: there is no {member}") from None
         except etree.XMLSyntaxError as error:
-            raise Refused(f"{member} is not well-formed: {error.msg}") from None
+            raise SspError(f"{member} is not well-formed: {error.msg}") from None
         except _DAMAGE as error:
-            raise Refused(f"{member} is damaged: {error}") from None
+            raise SspError(f"{member} is damaged: {error}") from None
         if root.tag != tag:
-            raise Refused(f"{member} is no {etree.QName(tag).localname} of SSP 1.0")
+            raise SspError(f"{member} is no {etree.QName(tag).localname} of SSP 1.0")
         return root
 
-    def variables(self, member: str, component: _Element) -> dict[str, Declared]:
+    def variables(self, member: str, component: _Element) -> dict[str, SspVariable]:
         """Return the variables of an FMU; none if it cannot be read, as opening it will say.
 
         Raises:
@@ -135,13 +137,13 @@ class Archive:
                     description = etree.fromstring(fmu.read("modelDescription.xml"), _parser())
             except (KeyError, *_DAMAGE, etree.XMLSyntaxError):
                 if member not in self._archive.namelist():
-                    raise Refused(f"there is no {member} in the archive", component) from None
+                    raise SspError(f"there is no {member} in the archive", component) from None
                 description = etree.Element("none")
             self._variables[member] = dict(_declared(description))
         return self._variables[member]
 
 
-def _declared(description: _Element) -> Iterator[tuple[str, Declared]]:
+def _declared(description: _Element) -> Iterator[tuple[str, SspVariable]]:
     """Yield the variables of a model description of FMI 2.0 or 3.0."""
     types = {
         str(one.get("name")): (one if one.get("unit") else next(iter(one), one)).get("unit")
@@ -153,7 +155,7 @@ def _declared(description: _Element) -> Iterator[tuple[str, Declared]]:
         unit = None
         if kind is not None:
             unit = kind.get("unit") or types.get(str(kind.get("declaredType")))
-        declared = Declared(variable.get("causality", "local"), unit, definitions.get(str(unit)))
+        declared = SspVariable(variable.get("causality", "local"), unit, definitions.get(str(unit)))
         yield str(variable.get("name")), declared
 
 
@@ -173,3 +175,28 @@ def unit_definitions(units: Iterable[_Element]) -> dict[str, UnitDefinition]:
 
 def _parser() -> etree.XMLParser:
     return etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True)
+
+
+DESCRIPTION_FILE = "SystemStructure.ssd"
+RESOURCES = "resources"
+PARAMETER_SET = "scenario"
+"""One set for all components: other programs apply a set by its name."""
+
+SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
+SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
+SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+SSM = "http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
+OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
+OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
+OWN = "urn:yawbench:ssp:1"
+NAMESPACES = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP, "oms": OMS, "yawbench": OWN}
+"""All declared at the root, with the prefixes that libcosim and Ecos take for granted: they compare
+text, and libcosim takes a declaration further down for content."""
+
+FMU_TYPE = "application/x-fmu-sharedlibrary"
+VALUES_TYPE = "application/x-ssp-parameter-set"
+MAPPING_TYPE = "application/x-ssp-parameter-mapping"
+
+OSP_ANNOTATION = "com.opensimulationplatform"
+OMS_ANNOTATION = "org.openmodelica"
+OWN_ANNOTATION = "yawbench"

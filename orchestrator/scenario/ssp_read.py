@@ -8,36 +8,101 @@ lack them.
 
 What has no counterpart here is refused by name: signal dictionaries, mappings in connections,
 components that are no FMUs.
+
+What the connections of an SSP archive do to numbers: units of connectors, linear transformations.
+
+On every connection a number is first converted from the unit of its start into that of its end, unless
+the connection suppresses that, and then transformed. A connector without a unit has that of its FMU's
+variable, a system's that of what it is connected to.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from lxml.etree import _Element
 
-from ..wording import fold, listed
+from ..messages import fold, listed
 from .overrides import RESERVED
-from .ssp_archive import Archive, Refused
-from .ssp_names import DESCRIPTION_FILE, OMS, OSP, OWN, SSD
-from .ssp_scale import AS_IT_IS, automatic, scale
-from .ssp_structure import End, Structure, read_structure
-from .ssp_structure import Path as ElementPath
-from .ssp_values import Given, number, read_values
+from .quantities import Unit, conversion
+from .ssp_archive import DESCRIPTION_FILE, OMS, OSP, OWN, SSD, SspArchive, SspError
+from .ssp_structure import (
+    ElementPath,
+    SspEnd,
+    SspStructure,
+    SspValue,
+    linear,
+    number,
+    read_structure,
+    read_values,
+)
 from .yaml_lines import Document
+
+Scale = tuple[float, float]
+"""Gain and offset."""
+
+AS_IT_IS: Scale = (1.0, 0.0)
+
+
+def scale(structure: SspStructure, chain: Sequence[SspEnd]) -> Scale:
+    """Return what becomes of a number on its way, from what gives it through connectors to what takes it.
+
+    Raises:
+        Refused: units that do not fit, or a transformation that is not linear.
+    """
+    total = AS_IT_IS
+    measure: Unit | None = None
+    connection: _Element | None = None
+    for end in chain:
+        outside, inside = structure.unit_outside(end), structure.unit_inside(end)
+        if end is chain[0]:
+            stops = [inside, outside]
+        else:
+            connection = structure.sources[end][1]
+            if connection.get("suppressUnitConversion") in ("true", "1"):
+                measure = None
+            total, measure = _converted(total, measure, outside, end, connection)
+            total = _then(total, linear(connection))
+            stops = [inside]
+        for stop in stops:
+            total, measure = _converted(total, measure, stop, end, connection)
+    return total
+
+
+def automatic(structure: SspStructure, source: SspEnd, target: SspEnd) -> Scale | None:
+    """Return what a wire does by itself, of what the two FMUs declare; None if it is refused."""
+    of, to = (structure.components[end.element].variables.get(end.name) for end in (source, target))
+    if of is None or to is None or of.measure is None or to.measure is None:
+        return AS_IT_IS
+    return conversion(of.measure, to.measure)
+
+
+def _converted(
+    total: Scale, measure: Unit | None, target: Unit | None, end: SspEnd, element: _Element | None
+) -> tuple[Scale, Unit | None]:
+    if measure is None or target is None:
+        return total, target or measure
+    between = conversion(measure, target)
+    if between is None:
+        raise SspError(f"the units on the way to {end} differ", element)
+    return _then(total, between), target
+
+
+def _then(first: Scale, second: Scale) -> Scale:
+    return second[0] * first[0], second[0] * first[1] + second[1]
 
 
 def read(path: Path, *, what: str = "SSP archive") -> Document:
     """Read the archive `path`; whatever is wrong with it stands in the document's problems."""
     document = Document(path)
     try:
-        document.data = _scenario(Archive(path, what=what), document)
-    except Refused as refused:
+        document.data = _scenario(SspArchive(path, what=what), document)
+    except SspError as refused:
         document.note(refused.problem(path))
     return document
 
@@ -52,12 +117,12 @@ def missing_times(document: Document) -> list[str]:
     ]
 
 
-def _scenario(archive: Archive, document: Document) -> dict[str, Any]:
+def _scenario(archive: SspArchive, document: Document) -> dict[str, Any]:
     """Return what a scenario file of this system would hold."""
     root = archive.xml(DESCRIPTION_FILE, f"{{{SSD}}}SystemStructureDescription")
     system = root.find(f"{{{SSD}}}System")
     if system is None:
-        raise Refused(f"{DESCRIPTION_FILE} holds no system")
+        raise SspError(f"{DESCRIPTION_FILE} holds no system")
     structure = read_structure(archive, system)
     names = _unit_names(structure, document)
     values = read_values(archive, structure)
@@ -104,7 +169,7 @@ def _title(root: _Element) -> str:
     return name if own is None else own.get("title", name)
 
 
-def _unit_names(structure: Structure, document: Document) -> dict[ElementPath, str]:
+def _unit_names(structure: SspStructure, document: Document) -> dict[ElementPath, str]:
     """Return what each component is called as a unit: as in the archive, where that can name a unit."""
     names: dict[ElementPath, str] = {}
     for path, component in structure.components.items():
@@ -112,7 +177,7 @@ def _unit_names(structure: Structure, document: Document) -> dict[ElementPath, s
         if name[0].isdigit() or name in RESERVED:
             name = f"_{name}"
         if name in names.values():
-            raise Refused(f"two components would be called {name!r} as units", component.element)
+            raise SspError(f"two components would be called {name!r} as units", component.element)
         names[path] = name
     renamed = [f"{name} ({'.'.join(path)})" for path, name in names.items() if path != (name,)]
     if renamed:
@@ -120,7 +185,9 @@ def _unit_names(structure: Structure, document: Document) -> dict[ElementPath, s
     return names
 
 
-def _values_through_connectors(structure: Structure, given: Mapping[End, Given]) -> dict[End, Given]:
+def _values_through_connectors(
+    structure: SspStructure, given: Mapping[SspEnd, SspValue]
+) -> dict[SspEnd, SspValue]:
     """Return the values, with those that a system's connector passes on in place of a component's own."""
     passed = {}
     for end in structure.sources:
@@ -132,7 +199,7 @@ def _values_through_connectors(structure: Structure, given: Mapping[End, Given])
     return {**given, **passed}
 
 
-def _passed_on(structure: Structure, given: Given, connector: End, end: End) -> Given:
+def _passed_on(structure: SspStructure, given: SspValue, connector: SspEnd, end: SspEnd) -> SspValue:
     """Return a value that a system's connector has as it arrives at a component."""
     ways = structure.upstream(end)
     way = scale(structure, [*reversed(ways[: ways.index(connector) + 1]), end])
@@ -140,13 +207,13 @@ def _passed_on(structure: Structure, given: Given, connector: End, end: End) -> 
         return given
     value = given.for_variable(structure.connector(connector))
     if not isinstance(value, float):
-        raise Refused(f"{end}: only numbers can be converted on the way from {connector}", given.parameter)
+        raise SspError(f"{end}: only numbers can be converted on the way from {connector}", given.parameter)
     return replace(given, value=way[0] * value + way[1], unit=None, factor=1.0, offset=0.0)
 
 
 def _connections(
-    structure: Structure, names: Mapping[ElementPath, str]
-) -> tuple[list[dict[str, Any]], set[End]]:
+    structure: SspStructure, names: Mapping[ElementPath, str]
+) -> tuple[list[dict[str, Any]], set[SspEnd]]:
     """Return the connections from component to component, and what they drive."""
     connections: list[dict[str, Any]] = []
     driven = set()

@@ -2,32 +2,48 @@
 
 A connection's ends are called start and end, but that says nothing of its direction: the kinds of its
 connectors do. Seen from inside a system, its own inputs give values and its outputs take them.
+
+The values that an SSP archive binds to variables, by name, of inner systems and then of outer ones.
+
+Of several values for one variable that of the outermost system counts, and on one level the last. A
+name that nothing has is passed over, as the standard has it, but not without a word.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Any, NamedTuple
 
 from lxml import etree
 from lxml.etree import _Element
 
 from ..plan import UnitDefinition
-from .measurement_units import Measure
-from .ssp_archive import Archive, Declared, Refused, unit_definitions
-from .ssp_names import FMU_TYPE, SSD
+from .quantities import Unit, converted, measure_of
+from .ssp_archive import (
+    FMU_TYPE,
+    MAPPING_TYPE,
+    SSD,
+    SSM,
+    SSV,
+    VALUES_TYPE,
+    SspArchive,
+    SspError,
+    SspVariable,
+    unit_definitions,
+)
 
-Path = tuple[str, ...]
+ElementPath = tuple[str, ...]
 """Of an element: the names of the systems it is in, below the outermost, then its own."""
 
 _GIVES = {"output": True, "calculatedParameter": True, "input": False, "parameter": False}
 
 
-class End(NamedTuple):
+class SspEnd(NamedTuple):
     """A connector of an element, or a variable of a component."""
 
-    element: Path
+    element: ElementPath
     name: str
 
     def __str__(self) -> str:
@@ -35,63 +51,63 @@ class End(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Component:
+class SspComponent:
     """An FMU in a system."""
 
-    path: Path
+    path: ElementPath
     element: _Element
     member: str
-    variables: dict[str, Declared]
+    variables: dict[str, SspVariable]
 
 
 @dataclass
-class Structure:
+class SspStructure:
     """Everything that a system and the systems in it hold."""
 
-    components: dict[Path, Component] = field(default_factory=dict)
-    systems: dict[Path, _Element] = field(default_factory=dict)
+    components: dict[ElementPath, SspComponent] = field(default_factory=dict)
+    systems: dict[ElementPath, _Element] = field(default_factory=dict)
     """From the inside out: the outermost is the last."""
-    connectors: dict[Path, dict[str, Declared]] = field(default_factory=dict)
+    connectors: dict[ElementPath, dict[str, SspVariable]] = field(default_factory=dict)
     """Of each element, by name: kind and unit, as far as the archive says them."""
-    sources: dict[End, tuple[End, _Element]] = field(default_factory=dict)
+    sources: dict[SspEnd, tuple[SspEnd, _Element]] = field(default_factory=dict)
     """What gives an end its value, and the connection that says so."""
 
-    def unit_inside(self, end: End) -> Measure | None:
+    def unit_inside(self, end: SspEnd) -> Unit | None:
         """Return the unit of a variable as its FMU declares it, or if it does not, that of the connector."""
         known = self.components[end.element].variables if end.element in self.components else {}
         return (known[end.name].measure if end.name in known else None) or self.connector(end).measure
 
-    def unit_outside(self, end: End) -> Measure | None:
+    def unit_outside(self, end: SspEnd) -> Unit | None:
         """Return the unit of a connector, or if it has none, that of the variable behind it."""
         return self.connector(end).measure or self.unit_inside(end)
 
-    def connector(self, end: End) -> Declared:
+    def connector(self, end: SspEnd) -> SspVariable:
         """Return what the archive says of a connector; nothing, if that is nothing."""
-        return self.connectors[end.element].get(end.name, Declared(""))
+        return self.connectors[end.element].get(end.name, SspVariable(""))
 
-    def upstream(self, end: End) -> list[End]:
+    def upstream(self, end: SspEnd) -> list[SspEnd]:
         """Return what an end takes its value from: connectors of systems, then perhaps a component's output.
 
         Raises:
             Refused: connections go round in a circle.
         """
-        found: list[End] = []
+        found: list[SspEnd] = []
         while end in self.sources:
             end, connection = self.sources[end]
             if end in found:
-                raise Refused(f"connections go round in a circle through {end}", connection)
+                raise SspError(f"connections go round in a circle through {end}", connection)
             found.append(end)
             if end.element in self.components:
                 break
         return found
 
-    def find(self, path: Path, name: str) -> End | None:
+    def find(self, path: ElementPath, name: str) -> SspEnd | None:
         """Return what a hierarchical name means in the element `path`, None if there is no such variable."""
         if path in self.components:
             known = self.components[path].variables
-            return End(path, name) if name in known or not known else None
+            return SspEnd(path, name) if name in known or not known else None
         if name in self.connectors[path]:
-            return End(path, name)
+            return SspEnd(path, name)
         for inner in (*self.components, *self.systems):
             if inner[:-1] == path and inner and name.startswith(f"{inner[-1]}."):
                 found = self.find(inner, name[len(inner[-1]) + 1 :])
@@ -100,23 +116,23 @@ class Structure:
         return None
 
 
-def read_structure(archive: Archive, system: _Element) -> Structure:
+def read_structure(archive: SspArchive, system: _Element) -> SspStructure:
     """Read a system.
 
     Raises:
         Refused: it holds what has no counterpart here.
     """
-    structure = Structure()
+    structure = SspStructure()
     definitions = unit_definitions(system.iterfind(f"../{{{SSD}}}Units/*"))
     _add_system(structure, archive, system, (), definitions)
     return structure
 
 
 def _add_system(
-    structure: Structure,
-    archive: Archive,
+    structure: SspStructure,
+    archive: SspArchive,
     system: _Element,
-    path: Path,
+    path: ElementPath,
     definitions: Mapping[str, UnitDefinition],
 ) -> None:
     structure.connectors[path] = _connectors(system, definitions)
@@ -124,7 +140,7 @@ def _add_system(
     for one in system.iterfind(f"{{{SSD}}}Elements/*"):
         kind, name = etree.QName(one).localname, one.get("name", "")
         if not name or name in names:
-            raise Refused(f"two elements are called {name!r}" if name else "an element has no name", one)
+            raise SspError(f"two elements are called {name!r}" if name else "an element has no name", one)
         names.add(name)
         inner = (*path, name)
         if kind == "System":
@@ -133,62 +149,62 @@ def _add_system(
             structure.components[inner] = _component(archive, one, inner)
             structure.connectors[inner] = _connectors(one, definitions)
         elif kind == "SignalDictionaryReference":
-            raise Refused(f"a signal dictionary ({name}) is not supported", one)
+            raise SspError(f"a signal dictionary ({name}) is not supported", one)
         else:
-            raise Refused(f"an element of kind {kind} ({name}) is not supported", one)
+            raise SspError(f"an element of kind {kind} ({name}) is not supported", one)
     for connection in system.iterfind(f"{{{SSD}}}Connections/{{{SSD}}}Connection"):
         source, sink = _directed(structure, connection, path)
         before, _ = structure.sources.setdefault(sink, (source, connection))
         if before != source:
-            raise Refused(f"{sink} has more than one source: {before} and {source}", connection)
+            raise SspError(f"{sink} has more than one source: {before} and {source}", connection)
     structure.systems[path] = system
 
 
-def _connectors(element: _Element, definitions: Mapping[str, UnitDefinition]) -> dict[str, Declared]:
+def _connectors(element: _Element, definitions: Mapping[str, UnitDefinition]) -> dict[str, SspVariable]:
     found = {}
     for one in element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector"):
         unit = next((kind.get("unit") for kind in one if kind.get("unit")), None)
-        found[str(one.get("name"))] = Declared(one.get("kind", ""), unit, definitions.get(str(unit)))
+        found[str(one.get("name"))] = SspVariable(one.get("kind", ""), unit, definitions.get(str(unit)))
     return found
 
 
-def _component(archive: Archive, element: _Element, path: Path) -> Component:
+def _component(archive: SspArchive, element: _Element, path: ElementPath) -> SspComponent:
     name, kind, source = ".".join(path), element.get("type", FMU_TYPE), element.get("source", "")
     if kind != FMU_TYPE or not source.lower().endswith(".fmu"):
-        raise Refused(
+        raise SspError(
             f"component {name!r} is no FMU (type {kind}, source {source!r}): only FMUs are supported", element
         )
     implementation = element.get("implementation", "any")
     if implementation not in ("any", "CoSimulation"):
-        raise Refused(f"component {name!r} wants {implementation}: only CoSimulation is supported", element)
+        raise SspError(f"component {name!r} wants {implementation}: only CoSimulation is supported", element)
     member = archive.member(element)
-    return Component(path, element, member, archive.variables(member, element))
+    return SspComponent(path, element, member, archive.variables(member, element))
 
 
-def _directed(structure: Structure, connection: _Element, path: Path) -> tuple[End, End]:
+def _directed(structure: SspStructure, connection: _Element, path: ElementPath) -> tuple[SspEnd, SspEnd]:
     """Return what gives and what takes a value by a connection in the system `path`."""
     start, end = (_end(structure, connection, which, path) for which in ("start", "end"))
     start_gives, end_gives = (_gives(structure, one, path) for one in (start, end))
     if start_gives is not None and start_gives == end_gives:
         what = "gives a value" if start_gives else "takes a value"
-        raise Refused(f"cannot connect {start} and {end}: each {what}", connection)
+        raise SspError(f"cannot connect {start} and {end}: each {what}", connection)
     return (end, start) if start_gives is False or end_gives else (start, end)
 
 
-def _end(structure: Structure, connection: _Element, which: str, path: Path) -> End:
+def _end(structure: SspStructure, connection: _Element, which: str, path: ElementPath) -> SspEnd:
     element, name = connection.get(f"{which}Element"), connection.get(f"{which}Connector", "")
     inner = (*path, element) if element else path
     if inner not in structure.connectors:
-        raise Refused(f"a connection names {element!r}: there is no such component", connection)
+        raise SspError(f"a connection names {element!r}: there is no such component", connection)
     if inner not in structure.components and name not in structure.connectors[inner]:
         system = f"the system {'.'.join(inner)}" if inner else "the system"
-        raise Refused(
+        raise SspError(
             f"a connection names the connector {name!r}: {system} has none of this name", connection
         )
-    return End(inner, name)
+    return SspEnd(inner, name)
 
 
-def _gives(structure: Structure, end: End, path: Path) -> bool | None:
+def _gives(structure: SspStructure, end: SspEnd, path: ElementPath) -> bool | None:
     """Return whether an end gives a value in the system `path`, None if nothing says so."""
     kind = structure.connector(end).causality
     if end.element in structure.components:
@@ -196,3 +212,175 @@ def _gives(structure: Structure, end: End, path: Path) -> bool | None:
         kind = declared.causality if declared else kind
     gives = _GIVES.get(kind)
     return gives if gives is None or end.element != path else not gives
+
+
+@dataclass(frozen=True)
+class SspValue:
+    """A value as the archive gives it."""
+
+    value: Any
+    unit: str | None
+    parameter: _Element
+    definition: UnitDefinition | None = None  # of the unit, if the archive gives one
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def for_variable(self, declared: SspVariable | None) -> Any:
+        """Return what a scenario file would say for a variable: a plain value, or one with its unit.
+
+        Raises:
+            Refused: a transformation of what is no number, or of a unit that does not fit.
+        """
+        value = self._in_unit_of(declared)
+        if (self.factor, self.offset) == (1.0, 0.0):
+            return value
+        if isinstance(value, (bool, str)):
+            raise SspError(
+                f"{self._name}: a LinearTransformation is for numbers (got {value})", self.parameter
+            )
+        result = self.factor * value + self.offset
+        if isinstance(value, float):
+            return result
+        if not result.is_integer():
+            raise SspError(f"{self._name}: {result:g} is no whole number", self.parameter)
+        return int(result)
+
+    def _in_unit_of(self, declared: SspVariable | None) -> Any:
+        """Return the value converted, or with its unit where that does not fit, for wiring to refuse it."""
+        unit = declared.unit if declared else None
+        if not isinstance(self.value, float) or self.unit is None or unit is None or self.unit == unit:
+            return self.value
+        source, target = measure_of(self.unit, self.definition), declared.measure if declared else None
+        if source is None or target is None or source.powers != target.powers:
+            return f"{self.value!r} {self.unit}"
+        return float(converted(Fraction(repr(self.value)), source, target))
+
+    @property
+    def _name(self) -> str:
+        return f"parameter {self.parameter.get('name')!r}"
+
+
+@dataclass
+class SspValues:
+    """What is given to variables and connectors, and the names that nothing has."""
+
+    given: dict[SspEnd, SspValue] = field(default_factory=dict)
+    unknown: list[str] = field(default_factory=list)
+
+
+def read_values(archive: SspArchive, structure: SspStructure) -> SspValues:
+    """Return everything that is bound in a structure.
+
+    Raises:
+        Refused: values that cannot be read.
+    """
+    values = SspValues()
+    elements = {path: one.element for path, one in structure.components.items()}
+    for path, element in (elements | structure.systems).items():  # outer ones last
+        for name, given in _bound(archive, element):
+            end = structure.find(path, name)
+            if end is not None:
+                values.given[end] = given
+            else:
+                values.unknown.append(str(SspEnd(path, name)))
+    return values
+
+
+def _bound(archive: SspArchive, element: _Element) -> Iterator[tuple[str, SspValue]]:
+    """Yield the names that an element's bindings give values to."""
+    for binding in element.iterfind(f"{{{SSD}}}ParameterBindings/{{{SSD}}}ParameterBinding"):
+        _check_type(binding, VALUES_TYPE)
+        values = binding.find(f"{{{SSD}}}ParameterValues/{{{SSV}}}ParameterSet")
+        if values is None:
+            if not binding.get("source"):
+                raise SspError("parameters are bound that are nowhere", binding)
+            values = archive.xml(archive.member(binding), f"{{{SSV}}}ParameterSet")
+        mapping = _mapping(archive, binding)
+        definitions = unit_definitions(values.iterfind(f"{{{SSV}}}Units/*"))
+        for parameter in values.iterfind(f"{{{SSV}}}Parameters/{{{SSV}}}Parameter"):
+            name, given = binding.get("prefix", "") + parameter.get("name", ""), _value(parameter)
+            given = replace(given, definition=definitions.get(str(given.unit)))
+            if mapping is None:
+                yield name, given
+            for entry in (mapping or {}).get(name, ()):
+                yield entry.get("target", ""), _transformed(given, entry)
+
+
+def _mapping(archive: SspArchive, binding: _Element) -> dict[str, list[_Element]] | None:
+    """Return the entries of a binding's mapping by the name they are for, None if it has none."""
+    mapping = binding.find(f"{{{SSD}}}ParameterMapping")
+    if mapping is None:
+        return None
+    _check_type(mapping, MAPPING_TYPE)
+    content = mapping.find(f"{{{SSM}}}ParameterMapping")
+    if content is None:
+        content = archive.xml(archive.member(mapping), f"{{{SSM}}}ParameterMapping")
+    entries: dict[str, list[_Element]] = {}
+    for entry in content.iterfind(f"{{{SSM}}}MappingEntry"):
+        entries.setdefault(entry.get("source", ""), []).append(entry)
+    return entries
+
+
+def _check_type(element: _Element, allowed: str) -> None:
+    if element.get("type", allowed) != allowed:
+        raise SspError(f"{element.get('type')} is not supported: only {allowed} is", element)
+
+
+def _transformed(given: SspValue, entry: _Element) -> SspValue:
+    """Return a value with what a mapping does to it."""
+    if entry.get("suppressUnitConversion") in ("true", "1"):
+        given = replace(given, unit=None)
+    factor, offset = linear(entry)
+    return replace(given, factor=factor, offset=offset)
+
+
+def linear(element: _Element) -> tuple[float, float]:
+    """Return factor and offset by which a connection or a mapping transforms numbers.
+
+    Raises:
+        Refused: its transformation is of another kind, or one of them is no number.
+    """
+    for one in element.iterchildren("{*}*"):
+        kind = etree.QName(one).localname
+        if kind == "LinearTransformation":
+            return number(one, "factor", 1.0), number(one, "offset", 0.0)
+        if kind.endswith("Transformation"):
+            raise SspError(f"{kind} is not supported: only LinearTransformation is", one)
+    return 1.0, 0.0
+
+
+def _value(parameter: _Element) -> SspValue:
+    for kind in parameter.iterchildren("{*}*"):
+        name, text = etree.QName(kind).localname, kind.get("value", "")
+        try:
+            if name == "Real":
+                return SspValue(float(text), kind.get("unit"), parameter)
+            if name == "Integer":
+                return SspValue(int(text), None, parameter)
+            if name == "Boolean":
+                meant = {"true": True, "1": True, "false": False, "0": False}[text.strip()]
+                return SspValue(meant, None, parameter)
+        except (ValueError, KeyError):
+            raise SspError(
+                f"parameter {parameter.get('name')!r}: {text!r} is not of type {name}", parameter
+            ) from None
+        if name in ("String", "Enumeration"):
+            return SspValue(text, None, parameter)
+        if name == "Binary":
+            raise SspError(f"parameter {parameter.get('name')!r} is Binary: not supported", parameter)
+    raise SspError(f"parameter {parameter.get('name')!r} has no value", parameter)
+
+
+def number(element: _Element, attribute: str, default: float | None = None) -> float:
+    """Return an attribute's number; what is read from its shortest decimal is exact.
+
+    Raises:
+        Refused: it is none.
+    """
+    text = element.get(attribute)
+    if text is None and default is not None:
+        return default
+    try:
+        return float(text or "")
+    except ValueError:
+        raise SspError(f"{attribute} {text or ''!r} is no number", element) from None

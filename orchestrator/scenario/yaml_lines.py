@@ -9,8 +9,8 @@ from typing import Any
 
 from ..errors import Problem, ScenarioError
 from ..files import TEXT, read_bytes, reason
-from ..plan import Change
-from ..wording import closest, listed, short, unprintable
+from ..messages import closest, listed, short, unprintable
+from ..plan import Override
 
 PROBLEMS = 200
 """Problems of one file that are told. Chosen: nobody mends more before looking again."""
@@ -22,7 +22,7 @@ ALIASED = 100_000
 """Values that the aliases of a file may repeat: aliases of aliases multiply, and a few lines could fill
 the memory. Chosen: a hundred times what a study of a hundred runs needs."""
 
-Key = tuple[str | int, ...]
+KeyPath = tuple[str | int, ...]
 """Where a value stands: ('connections', 3, 'from')."""
 
 
@@ -32,15 +32,15 @@ class Document:
 
     path: Path
     data: Any = None
-    lines: dict[Key, int] = field(default_factory=dict)
-    overrides: dict[Key, Change] = field(default_factory=dict)
+    lines: dict[KeyPath, int] = field(default_factory=dict)
+    overrides: dict[KeyPath, Override] = field(default_factory=dict)
     """Values that do not come from the file -> what gave them."""
     problems: dict[Problem, None] = field(default_factory=dict)
     """Each once."""
     notes: list[str] = field(default_factory=list)
     """Remarks on what is no mistake, for the plan."""
 
-    def report(self, key: Key, sentence: str) -> None:
+    def report(self, key: KeyPath, sentence: str) -> None:
         """Note a problem with the value (or the missing value) at `key`."""
         self.note(self.problem(key, sentence))
 
@@ -55,7 +55,7 @@ class Document:
             more = f"there may be more; these are the first {PROBLEMS} problems"
             raise ScenarioError([*self.sentences(), Problem(more, file=self.path)])
 
-    def problem(self, key: Key, sentence: str) -> Problem:
+    def problem(self, key: KeyPath, sentence: str) -> Problem:
         """Return a problem with the value at `key`: of its line, or of the change that it came from."""
         change = self.override(key)
         if change is not None:
@@ -63,21 +63,21 @@ class Document:
         line = next((self.lines[key[:n]] for n in range(len(key), -1, -1) if key[:n] in self.lines), 1)
         return Problem(sentence, file=self.path, line=line, place=dotted(key))
 
-    def override(self, key: Key) -> Change | None:
+    def override(self, key: KeyPath) -> Override | None:
         """Return the change that gave the value at `key`, None if the file did."""
         for n in range(len(key), 0, -1):
             if key[:n] in self.overrides:
                 return self.overrides[key[:n]]
         return None
 
-    def remove(self, key: Key, i: int) -> None:
+    def remove(self, key: KeyPath, i: int) -> None:
         """Take item `i` out of the list at `key`, whose later items move up with their lines and changes."""
         holder = self.data
         for part in key:
             holder = holder[part]
         del holder[i]
         n = len(key)
-        of_both: tuple[dict[Key, Any], ...] = (self.lines, self.overrides)
+        of_both: tuple[dict[KeyPath, Any], ...] = (self.lines, self.overrides)
         for kept in of_both:
             for place in [place for place in kept if place[:n] == key and place[n:] >= (i,)]:
                 value, at = kept.pop(place), place[n]
@@ -90,7 +90,7 @@ class Document:
         return sorted(self.problems, key=lambda problem: problem.line or 0)
 
 
-def dotted(key: Key) -> str:
+def dotted(key: KeyPath) -> str:
     """Return 'connections[3].from' for ('connections', 3, 'from')."""
     text = ""
     for part in key:
@@ -201,7 +201,7 @@ def _limit_depth(yaml: Any) -> None:
 
 
 class _TooMuchError(Exception):
-    def __init__(self, key: Key, sentence: str) -> None:
+    def __init__(self, key: KeyPath, sentence: str) -> None:
         super().__init__(sentence)
         self.key = key
 
@@ -223,7 +223,7 @@ class _Reader:
     seen: set[int] = field(default_factory=set)
     repeated: int = 0
 
-    def value(self, node: Any, key: Key, above: tuple[int, ...]) -> Any:
+    def value(self, node: Any, key: KeyPath, above: tuple[int, ...]) -> Any:
         if id(node) in above:
             self.document.report(key, "this alias contains itself")
             return None
@@ -243,7 +243,7 @@ class _Reader:
             return self._scalar(node, kind, key)
         return (self._sequence if node.id == "sequence" else self._mapping)(node, key, above)
 
-    def _scalar(self, node: Any, kind: str, key: Key) -> Any:
+    def _scalar(self, node: Any, kind: str, key: KeyPath) -> Any:
         if kind not in ("int", "float", "bool", "null"):
             self._check_text(node.value, key)
             return node.value
@@ -257,11 +257,11 @@ class _Reader:
             return None
         return value
 
-    def _check_text(self, text: str, key: Key) -> None:
+    def _check_text(self, text: str, key: KeyPath) -> None:
         if (character := unprintable(text)) is not None:
             self.document.report(key, f"holds the control character {character}")
 
-    def _sequence(self, node: Any, key: Key, above: tuple[int, ...]) -> list[Any]:
+    def _sequence(self, node: Any, key: KeyPath, above: tuple[int, ...]) -> list[Any]:
         items = []
         for i, item in enumerate(node.value):
             below = (*key, i)
@@ -269,7 +269,7 @@ class _Reader:
             items.append(self.value(item, below, above))
         return items
 
-    def _mapping(self, node: Any, key: Key, above: tuple[int, ...]) -> dict[str, Any]:
+    def _mapping(self, node: Any, key: KeyPath, above: tuple[int, ...]) -> dict[str, Any]:
         path, lines, note = self.document.path, self.document.lines, self.document.note
         mapping: dict[str, Any] = {}
         for name, item in node.value:

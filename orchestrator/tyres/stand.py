@@ -1,25 +1,37 @@
-"""A tyre FMU by itself: its forces at slips, slip angles and loads that are given, and their slopes."""
+"""A tyre FMU by itself: its forces at slips, slip angles and loads that are given, and their slopes.
+
+The cornering stiffness of a scenario's own tyres at given loads.
+
+What tyre people expect to see of a tyre, in one figure.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..errors import ScenarioError
+from ..figures.style import QUIET, ROW, frame, line_style, new_figure
 from ..fmu.opener import Opener, find_fmu, find_folder
 from ..master.simulate import simulate_in_memory
-from ..plan import Fmu, Plan, Series, Unit
+from ..messages import listed
+from ..plan import Fmu, InputSeries, Instance, Plan, Value
 from ..scenario import yaml_lines
 from ..scenario.load import load_scenario
 from ..scenario.overrides import is_path
 from ..scenario.yaml_lines import Document
 from ..wiring.make_plan import make_plan
-from ..wording import listed
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 FOR_FILES = "tyre_magic_formula_62_transient"
 """The FMU on which a tyre property file is looked at: it tells relaxation lengths, too."""
@@ -34,7 +46,7 @@ SMALL = 1e-4
 """Slip [1] and slip angle [rad] to each side of zero for stiffnesses."""
 
 
-class State(NamedTuple):
+class WheelState(NamedTuple):
     """How a wheel stands and rolls: slip angle [rad], longitudinal slip [1] of the interface, load [N]."""
 
     alpha: float = 0.0
@@ -43,16 +55,16 @@ class State(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Stand:
+class TyreStand:
     """A tyre on a stand, front left unless another wheel is named."""
 
     plan: Plan
     wheel: str = WHEEL
 
     @property
-    def unit(self) -> Unit:
+    def unit(self) -> Instance:
         """The tyre."""
-        return self.plan.units[0]
+        return self.plan.instances[0]
 
     @property
     def nominal_load(self) -> float:
@@ -60,7 +72,7 @@ class Stand:
         given = self.unit.parameter("fnomin_front") or self.unit.parameter("nominal_load")
         return float(given) if given else 4000.0
 
-    def measure(self, states: Sequence[State]) -> dict[str, np.ndarray]:
+    def measure(self, states: Sequence[WheelState]) -> dict[str, np.ndarray]:
         """Return every output of the wheel, by its name without the wheel; shape (n,), SI.
 
         The wheel rolls on in every state until forces that lag have settled.
@@ -81,12 +93,12 @@ class Stand:
         }
         times = 2.0 * np.arange(len(states))
         series = {
-            f"{name}_{self.wheel}": Series("stand", name, "", True, times, values)
+            f"{name}_{self.wheel}": InputSeries("stand", name, "", True, times, values)
             for name, values in given.items()
             if f"{name}_{self.wheel}" in self.unit.constants
         }
         unit = replace(self.unit, series=series)
-        results = simulate_in_memory(replace(self.plan, units=(unit,), n_steps=2 * len(states)))
+        results = simulate_in_memory(replace(self.plan, instances=(unit,), n_steps=2 * len(states)))
         columns = [
             f"{unit.name}.{v.name}" for v in unit.fmu.of("output") if v.name.endswith(f"_{self.wheel}")
         ]
@@ -94,19 +106,19 @@ class Stand:
         return {c.partition(".")[2].removesuffix(f"_{self.wheel}"): results[c][at_end] for c in columns}
 
 
-def stiffnesses(stand: Stand, loads: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+def stiffnesses(stand: TyreStand, loads: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
     """Return dF_x/dkappa [N] and -dF_y/dalpha [N/rad] at zero slip for some loads; shape (n,) each."""
     slopes = []
     for force, sign, states in (
-        ("tyre_force_x", 1.0, [State(0.0, k, load) for load in loads for k in (-SMALL, SMALL)]),
-        ("tyre_force_y", -1.0, [State(a, 0.0, load) for load in loads for a in (-SMALL, SMALL)]),
+        ("tyre_force_x", 1.0, [WheelState(0.0, k, load) for load in loads for k in (-SMALL, SMALL)]),
+        ("tyre_force_y", -1.0, [WheelState(a, 0.0, load) for load in loads for a in (-SMALL, SMALL)]),
     ):
         found = stand.measure(states)[force].reshape(-1, 2)
         slopes.append(sign * (found[:, 1] - found[:, 0]) / (2.0 * SMALL))
     return slopes[0], slopes[1]
 
 
-def put_on_stand(source: str, *, friction: float, fmus: Path | None, build: bool) -> Stand:
+def put_on_stand(source: str, *, friction: float, fmus: Path | None, build: bool) -> TyreStand:
     """Return a tyre on a stand.
 
     Args:
@@ -132,7 +144,7 @@ def put_on_stand(source: str, *, friction: float, fmus: Path | None, build: bool
         "inputs": {name: friction if name.startswith("friction") else 0.0 for name in inputs},
         **({"tyres": os.path.abspath(source)} if file else {}),
     }
-    return Stand(make_plan(load_scenario(place, read=reader_of(data)), opener=opener))
+    return TyreStand(make_plan(load_scenario(place, read=reader_of(data)), opener=opener))
 
 
 def open_given(
@@ -167,3 +179,107 @@ def reader_of(data: dict[str, Any]) -> Callable[..., Document]:
         return Document(path, data=data) if what == "scenario file" else yaml_lines.read(path, what=what)
 
     return read
+
+
+def cornering_stiffness(tyres: Instance, loads: Mapping[str, float]) -> dict[str, float]:
+    """Return the cornering stiffness [N/rad] of one tyre on some wheels, each under its load [N].
+
+    The road is what the unit is told of it; where a wire tells that, and of the motion, the tyre rolls
+    straight ahead on a dry road, friction 1.
+
+    Raises:
+        SimulationError: the FMU failed.
+        ValueError: it cannot be stepped beside the run.
+    """
+    pass  # needs numpy, which most plans can do without
+
+    if tyres.fmu.once_per_process:
+        raise ValueError(f"{tyres.fmu.name} can be instantiated only once per process")
+    inputs: dict[str, Value] = {
+        v.name: 1.0 if v.name.startswith("friction") else 0.0 for v in tyres.fmu.of("input")
+    }
+    unit = replace(tyres, constants=inputs | tyres.constants, series={}, period=1)
+    record = tuple((unit.name, v.name) for v in unit.fmu.of("output"))
+    plan = Plan((unit,), (), record, Fraction(1), 1, "jacobi", title=unit.name)
+    return {wheel: float(stiffnesses(TyreStand(plan, wheel), [load])[1][0]) for wheel, load in loads.items()}
+
+
+OF_NOMINAL = (0.5, 1.0, 1.5, 2.0)
+"""Loads of the curves over the nominal one."""
+ANGLES = (0.0, 2.0, 4.0, 7.0, 12.0)
+"""Slip angles of the friction ellipse [deg]."""
+LARGEST_ANGLE, LARGEST_SLIP = np.radians(15.0), 0.5
+"""Ends of the curves [rad], [1]."""
+POINTS = 151
+
+
+def draw_tyre(stand: TyreStand, title: str, note: str) -> Figure:
+    """Return the figure of a tyre: forces, aligning moment, friction ellipse, stiffnesses, relaxation.
+
+    Raises:
+        SimulationError: the FMU failed.
+    """
+    nominal = stand.nominal_load
+    loads = [share * nominal for share in OF_NOMINAL]
+    angles = np.linspace(-LARGEST_ANGLE, LARGEST_ANGLE, POINTS)
+    slips = np.linspace(-LARGEST_SLIP, LARGEST_SLIP, POINTS)
+    around = np.sort(
+        np.concatenate([-np.geomspace(1e-3, 0.98, POINTS), [0.0], np.geomspace(1e-3, 0.95, POINTS)])
+    )
+    with new_figure() as figure:
+        grid = figure.add_gridspec(3, 2)
+        axes = [figure.add_subplot(grid[i // 2, i % 2]) for i in range(6)]
+        over_angle = [stand.measure([WheelState(alpha, 0.0, load) for alpha in angles]) for load in loads]
+        over_slip = [stand.measure([WheelState(0.0, kappa, load) for kappa in slips]) for load in loads]
+        names = [f"F_z = {load / 1e3:.3g} kN" for load in loads]
+        degrees = np.degrees(angles)
+        _curves(axes[0], degrees, [y["tyre_force_y"] / 1e3 for y in over_angle], names)
+        axes[0].set(title="Lateral force", xlabel="slip angle [°]", ylabel="F_y [kN]")
+        if "aligning_moment" in over_angle[0]:
+            _curves(axes[1], degrees, [y["aligning_moment"] for y in over_angle], names)
+        else:
+            _nothing(axes[1], "this tyre tells no aligning moment")
+        axes[1].set(title="Aligning moment", xlabel="slip angle [°]", ylabel="M_z [N·m]")
+        _curves(axes[2], slips, [y["tyre_force_x"] / 1e3 for y in over_slip], names)
+        axes[2].set(title="Longitudinal force", xlabel="slip κ [1]", ylabel="F_x [kN]")
+        for number, angle in enumerate(ANGLES):
+            y = stand.measure([WheelState(np.radians(angle), kappa, nominal) for kappa in around])
+            style = line_style(number)
+            axes[3].plot(y["tyre_force_x"] / 1e3, -y["tyre_force_y"] / 1e3, **style, label=f"{angle:g}°")
+        inside: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 0.17), "ncols": 3}
+        axes[3].legend(title="slip angle", fontsize=7.5, title_fontsize=7.5, **inside)
+        axes[3].set(title=f"Combined slip at {nominal / 1e3:.3g} kN", xlabel="F_x [kN]", ylabel="-F_y [kN]")
+        _over_load(stand, axes[4], axes[5], np.linspace(0.05, OF_NOMINAL[-1], 60) * nominal)
+        handles = [axes[0].plot([], [], **line_style(i), label=name)[0] for i, name in enumerate(names)]
+        frame(figure, 3 * 1.25 * ROW, handles, title, note)
+    return figure
+
+
+def _over_load(stand: TyreStand, left: Axes, right: Axes, loads: np.ndarray) -> None:
+    k_x, k_y = stiffnesses(stand, list(loads))
+    left.plot(loads / 1e3, k_x / 1e3, **line_style(0), label="∂F_x/∂κ [kN]")
+    left.plot(loads / 1e3, k_y / 1e3, **line_style(1), label="-∂F_y/∂α [kN/rad]")
+    left.legend(fontsize=7.5, loc="upper left")
+    left.set(title="Stiffnesses at zero slip", xlabel="load F_z [kN]", ylabel="")
+    at_rest = stand.measure([WheelState(0.0, 0.0, load) for load in loads])
+    lengths = [(f"relaxation_length_{axis}", f"σ_{axis}") for axis in "xy"]
+    for number, (name, label) in enumerate(lengths):
+        if name in at_rest:
+            right.plot(loads / 1e3, at_rest[name], **line_style(number), label=label)
+    if right.get_lines():
+        right.legend(fontsize=7.5, loc="upper left")
+        right.set_ylim(bottom=0.0)
+    else:
+        _nothing(right, "this tyre's forces do not lag")
+    right.set(title="Relaxation lengths", xlabel="load F_z [kN]", ylabel="σ [m]")
+
+
+def _curves(axes: Axes, x: np.ndarray, every: Sequence[np.ndarray], names: Sequence[str]) -> None:
+    for number, (y, name) in enumerate(zip(every, names, strict=True)):
+        axes.plot(x, y, **line_style(number), label=name)
+
+
+def _nothing(axes: Axes, why: str) -> None:
+    axes.text(0.5, 0.5, why, transform=axes.transAxes, ha="center", color=QUIET)
+    axes.xaxis.set_visible(False)
+    axes.yaxis.set_visible(False)

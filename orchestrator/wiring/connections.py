@@ -3,6 +3,8 @@
 An input that its unit declares as optional, and that nothing drives, keeps its start value: it counts
 among the constants, so it is shown and recorded like them. So does any input in an SSP archive, where
 nothing is connected by equal names.
+
+Whether an output can feed an input, with what gain and offset: types, units of measurement, items.
 """
 
 from __future__ import annotations
@@ -12,21 +14,69 @@ from dataclasses import replace
 from graphlib import CycleError
 from itertools import pairwise
 
-from ..plan import DEFAULT, Series, Value, Variable, Wire
+from ..messages import fold, hint, listed
+from ..plan import DEFAULT, InputSeries, Value, Variable, Wire
 from ..scenario.load import Connection, Endpoint
-from ..scenario.yaml_lines import Key, dotted
-from ..wording import fold, hint, listed
+from ..scenario.quantities import conversion, measure_of
+from ..scenario.yaml_lines import KeyPath, dotted
 from .constants import Constant, Input, constants
-from .fitting import alike, contradicts_its_name, conversion_between, difference, fits
-from .opened_system import System
+from .context import WiringContext, matching
 from .order import in_order
-from .patterns import matching
+
+
+def conversion_between(source: Variable, target: Variable) -> tuple[float, float] | None:
+    """Return gain and offset from one end's unit to the other's, None if they do not fit.
+
+    A unit that an end does not declare is taken to be the other's.
+    """
+    if source.unit is None or target.unit is None:
+        return 1.0, 0.0
+    if (source.unit, source.definition) == (target.unit, target.definition):
+        return 1.0, 0.0
+    measures = measure_of(source.unit, source.definition), measure_of(target.unit, target.definition)
+    if measures[0] is None or measures[1] is None:
+        return (1.0, 0.0) if source.unit == target.unit else None
+    return conversion(measures[0], measures[1])
+
+
+def contradicts_its_name(variable: Variable) -> bool:
+    usual, defined = measure_of(variable.unit), measure_of(variable.unit, variable.definition)
+    return usual is not None and usual != defined
+
+
+def difference(
+    source: Variable, target: Variable, scale: tuple[float, float] | None
+) -> tuple[str, str | None, str | None] | None:
+    """Return in what two ends differ that cannot be connected, and what each has of it."""
+    if source.type != target.type:
+        return "types", source.type, target.type
+    if scale is None:
+        return "units", source.unit, target.unit
+    items = source.items or {}, target.items or {}
+    if source.type == "Enumeration" and not items[0].items() <= items[1].items():
+        of, to = (listed(f"{name} {value}" for name, value in each.items()) for each in items)
+        return "enumerations", of, to
+    return None
+
+
+def alike(output: str, name: str) -> bool:
+    """Return whether an output may be what an input of another name means: names share a word.
+
+    A unit of measurement alone says nothing, and a reference is not the value that should follow it.
+    """
+    words = [{word for word in one.split("_") if len(word) > 2} for one in (output, name)]
+    return bool(words[0] & words[1]) and ("ref" in words[0]) == ("ref" in words[1])
+
+
+def fits(source: Variable, target: Variable) -> bool:
+    alike = source.type == target.type and (source.unit is None) == (target.unit is None)
+    return alike and conversion_between(source, target) is not None
 
 
 class Connector:
     """Finds every input's source."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: WiringContext) -> None:
         self._system = system
         self._scenario = system.scenario
         self._fmus = system.fmus
@@ -37,12 +87,12 @@ class Connector:
         for unit, outputs in self._outputs.items():
             for name in outputs:
                 self._having.setdefault(name, []).append(unit)
-        self._preferring: dict[str, list[tuple[list[str], Key]]] = {}  # unit -> lists of sources
-        self._preferred: dict[str, list[tuple[str, Key]]] = {}  # unit -> sources of equal names, in order
+        self._preferring: dict[str, list[tuple[list[str], KeyPath]]] = {}  # unit -> lists of sources
+        self._preferred: dict[str, list[tuple[str, KeyPath]]] = {}  # unit -> sources of equal names, in order
         self._refused: set[Input] = set()  # by equal names
         self._fitting: dict[object, dict[str, list[str]]] = {}  # kind of an input -> see `_fitting_outputs`
 
-    def connect(self) -> tuple[list[Wire], dict[str, dict[str, Value | Series]]]:
+    def connect(self) -> tuple[list[Wire], dict[str, dict[str, Value | InputSeries]]]:
         """Return all wires, and each unit's constants and time series."""
         wires = self._by_connections()
         self._put_in_order()
@@ -50,7 +100,7 @@ class Connector:
         own = {target for target, constant in given.items() if constant.of_unit}
         self._note_overruled(own - wires.keys())
         ambiguous = self._by_names(wires, own | self._refused)
-        values: dict[Input, Value | Series] = {}
+        values: dict[Input, Value | InputSeries] = {}
         for target, constant in self._given(given, wires).items():
             values[target] = constant.value
             self._system.origins[target[0]][target[1]] = constant.origin
@@ -66,7 +116,7 @@ class Connector:
                     self._report(("units", unit), self._undriven(unit, variable))
         fitted = [self._fitted(wire, key) for wire, key in wires.values()]
         self._note_units(wire for wire, key in wires.values() if self._scale(key) is None)
-        by_unit: dict[str, dict[str, Value | Series]] = {unit: {} for unit in self._fmus}
+        by_unit: dict[str, dict[str, Value | InputSeries]] = {unit: {} for unit in self._fmus}
         for (unit, name), value in values.items():
             by_unit[unit][name] = value
         return fitted, by_unit
@@ -86,11 +136,11 @@ class Connector:
         """Return whether only the scenario's connections count for the inputs of a unit."""
         return self._scenario.explicit and unit not in self._scenario.replaced
 
-    def _by_connections(self) -> dict[Input, tuple[Wire, Key]]:
+    def _by_connections(self) -> dict[Input, tuple[Wire, KeyPath]]:
         """Return the wires that the scenario names, each with the key it comes from."""
-        wires: dict[Input, tuple[Wire, Key]] = {}
+        wires: dict[Input, tuple[Wire, KeyPath]] = {}
         for i, connection in enumerate(self._scenario.connections):
-            key: Key = ("connections", i)
+            key: KeyPath = ("connections", i)
             for wire in self._expand(connection, key):
                 other, its_key = wires.setdefault((wire.target, wire.input), (wire, key))
                 if other is not wire:
@@ -101,7 +151,7 @@ class Connector:
                     )
         return wires
 
-    def _expand(self, connection: Connection, key: Key) -> list[Wire]:
+    def _expand(self, connection: Connection, key: KeyPath) -> list[Wire]:
         """Return the wires of a connection; lists of units and null are kept for equal names."""
         ends = connection.source, connection.target
         if isinstance(ends[1], list):
@@ -116,7 +166,7 @@ class Connector:
             self._refused.update((target, name) for name in inputs.values())
             return []
         one = ends[0] if isinstance(ends[0], Endpoint) else None
-        sources = [one.unit] if one else list(ends[0])
+        sources = [one.instance] if one else list(ends[0])
         from_pattern = one.variable if one else "*"
         if target in sources:
             self._report(key, f"connects {target} to itself")
@@ -124,7 +174,7 @@ class Connector:
         self._refuse_twice(sources, (*key, "from"))
         found = [(source, matching(from_pattern, self._outputs[source])) for source in sources]
         if one and not found[0][1]:
-            self._no_such((*key, "from"), one.unit, from_pattern, "output")
+            self._no_such((*key, "from"), one.instance, from_pattern, "output")
         outputs: dict[str, tuple[str, str]] = {}  # part -> unit and output, of the first unit that has it
         for source, named in found:
             outputs = {part: (source, name) for part, name in named.items()} | outputs
@@ -142,11 +192,11 @@ class Connector:
             self._report(key, f"nothing matches: in 'from' the * can be {given}, in 'to' {wanted}")
         return [Wire(source, output, target, name) for (source, output), name in pairs]
 
-    def _refuse_twice(self, names: list[str], key: Key) -> None:
+    def _refuse_twice(self, names: list[str], key: KeyPath) -> None:
         if twice := next((name for name in names if names.count(name) > 1), None):
             self._report(key, f"names {twice} twice")
 
-    def _prefer(self, sources: list[str], targets: list[str], key: Key) -> None:
+    def _prefer(self, sources: list[str], targets: list[str], key: KeyPath) -> None:
         """Keep which sources go first for units; report lists that mean nothing."""
         for end, names in (("from", sources), ("to", targets)):
             self._refuse_twice(names, (*key, end))
@@ -164,8 +214,8 @@ class Connector:
     def _put_in_order(self) -> None:
         """Put the sources that a unit prefers in the one order that agrees with every list of them."""
         for unit, lists in self._preferring.items():
-            keys: dict[str, Key] = {}
-            edges: dict[tuple[str, str], Key] = {}
+            keys: dict[str, KeyPath] = {}
+            edges: dict[tuple[str, str], KeyPath] = {}
             for sources, key in lists:
                 for source in sources:
                     keys.setdefault(source, key)
@@ -179,7 +229,7 @@ class Connector:
                 self._report(lists[-1][1], f"{unit} cannot prefer {listed(circle)}")
             self._preferred[unit] = [(source, keys[source]) for source in order]
 
-    def _no_such(self, key: Key, unit: str, pattern: str, kind: str) -> None:
+    def _no_such(self, key: KeyPath, unit: str, pattern: str, kind: str) -> None:
         """Report a pattern without a match, or note it if the FMU that was replaced has one."""
         if self._system.had([unit], pattern, kind):
             self._notes.append(f"{dotted(key[:2])} is left out: {unit} has no {kind} {pattern!r} any more")
@@ -194,7 +244,7 @@ class Connector:
         names = fold([v.name for v in self._fmus[unit].of(kind)])
         self._report(key, f"{unit} has no {kind} {pattern!r}{hint(pattern, names, lead='it has')}")
 
-    def _by_names(self, wires: dict[Input, tuple[Wire, Key]], taken: Set[Input]) -> set[Input]:
+    def _by_names(self, wires: dict[Input, tuple[Wire, KeyPath]], taken: Set[Input]) -> set[Input]:
         """Add the wires of equal names but to inputs `taken`; return those with more than one candidate."""
         ambiguous = set()
         for unit, inputs in self._inputs.items():
@@ -215,7 +265,7 @@ class Connector:
                     )
         return ambiguous
 
-    def _sources(self, unit: str, name: str) -> tuple[list[str], Key]:
+    def _sources(self, unit: str, name: str) -> tuple[list[str], KeyPath]:
         """Return the units that an input takes the output of its name from, and the key that says so."""
         having = [source for source in self._having.get(name, ()) if source != unit]
         for preferred, key in self._preferred.get(unit, ()):
@@ -224,7 +274,7 @@ class Connector:
         return having, ("units", unit)
 
     def _given(
-        self, given: Mapping[Input, Constant], wires: Mapping[Input, tuple[Wire, Key]]
+        self, given: Mapping[Input, Constant], wires: Mapping[Input, tuple[Wire, KeyPath]]
     ) -> dict[Input, Constant]:
         """Return the constants without those for inputs that a wire drives, which are reported.
 
@@ -265,11 +315,11 @@ class Connector:
             }
         return self._fitting[kind]
 
-    def _scale(self, key: Key) -> tuple[float, float] | None:
+    def _scale(self, key: KeyPath) -> tuple[float, float] | None:
         """Return the gain and offset that the connection at `key` gives, None if it gives none."""
         return self._scenario.connections[key[1]].scale if key[0] == "connections" else None  # type: ignore[index]
 
-    def _fitted(self, wire: Wire, key: Key) -> Wire:
+    def _fitted(self, wire: Wire, key: KeyPath) -> Wire:
         """Return a wire with what it does to numbers; report ends that do not fit."""
         source, target = self._outputs[wire.source][wire.output], self._inputs[wire.target][wire.input]
         between, given = conversion_between(source, target), self._scale(key)

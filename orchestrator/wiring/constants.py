@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from ..plan import Series, Value, ValueOrigin
+from ..messages import fold, hint
+from ..plan import InputSeries, Value, ValueOrigin
 from ..scenario.scenario_schema import SeriesSpec
-from ..scenario.yaml_lines import Key
-from ..wording import fold, hint
-from .opened_system import System
+from ..scenario.yaml_lines import KeyPath
+from .context import WiringContext, facts_of, matching
 from .parameters import origin, value_for
-from .patterns import matching
-from .shared_facts import facts_of
 
 Input = tuple[str, str]  # unit, variable
 
@@ -25,8 +23,8 @@ FACT, INPUTS, CHANGED_FACT, CHANGED_INPUTS = range(4)
 class Constant:
     """What the scenario gives to one input."""
 
-    value: Value | Series
-    key: Key
+    value: Value | InputSeries
+    key: KeyPath
     origin: ValueOrigin
     of_unit: bool  # the key names the unit, so it goes before equal names
     exact: bool  # the key is no pattern
@@ -43,7 +41,7 @@ class Constant:
         return self.level in (FACT, CHANGED_FACT)
 
 
-def constants(system: System) -> dict[Input, Constant]:
+def constants(system: WiringContext) -> dict[Input, Constant]:
     """Return what `inputs` and facts give to each input."""
     scenario, fmus, inputs = system.scenario, system.fmus, system.inputs
     read = None
@@ -54,7 +52,7 @@ def constants(system: System) -> dict[Input, Constant]:
     found = dict(_of_facts(system))
     fact_changed = any(one.level == CHANGED_FACT for one in found.values())
     for pattern, raw in scenario.inputs.items():
-        key: Key = ("inputs", pattern)
+        key: KeyPath = ("inputs", pattern)
         prefix, _, rest = pattern.partition(".")
         of_unit = prefix in fmus
         units, name_pattern = ([prefix], rest) if of_unit else (list(fmus), pattern)
@@ -66,7 +64,7 @@ def constants(system: System) -> dict[Input, Constant]:
             system.report(key, f"no input matches{hint(name_pattern, names, lead='there are')}")
         for (unit, name), part in parts.items():
             variable = inputs[unit][name]
-            value: Value | Series = 0
+            value: Value | InputSeries = 0
             try:
                 if isinstance(raw, SeriesSpec):
                     assert read is not None
@@ -88,11 +86,11 @@ def constants(system: System) -> dict[Input, Constant]:
     return found
 
 
-def _of_facts(system: System) -> Iterator[tuple[Input, Constant]]:
+def _of_facts(system: WiringContext) -> Iterator[tuple[Input, Constant]]:
     """Yield what facts give to inputs."""
     scenario, known = system.scenario, system.inputs
     for name, fact, raw, changed in facts_of(scenario):
-        key: Key = (name,)
+        key: KeyPath = (name,)
         takers = [(unit, one) for unit, inputs in known.items() for one in fact.inputs if one in inputs]
         if fact.inputs and not takers:
             if not changed and any(system.had(known, one, "input") for one in fact.inputs):

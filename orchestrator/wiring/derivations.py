@@ -123,7 +123,7 @@ NEUTRAL = {"front_unsprung_share": 0.5}
 
 
 @dataclass(frozen=True)
-class Car:
+class CarQuantities:
     """What is known of a car: numbers in SI by name, and of those that were derived the formula."""
 
     values: dict[str, float]
@@ -132,7 +132,7 @@ class Car:
     """Names that formulas were made of."""
 
 
-def car_of(given: Mapping[str, float]) -> Car:
+def car_of(given: Mapping[str, float]) -> CarQuantities:
     """Return all that follows from what is given of a car.
 
     Args:
@@ -149,7 +149,7 @@ def car_of(given: Mapping[str, float]) -> Car:
             values[one.name], formulas[one.name] = value[0], one.formula
             used.update(one.inputs)
             found = True
-    return Car(values, formulas, frozenset(used))
+    return CarQuantities(values, formulas, frozenset(used))
 
 
 def contradictions(given: Mapping[str, float]) -> list[tuple[str, str]]:

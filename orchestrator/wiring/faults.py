@@ -7,23 +7,24 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from ..messages import fold, hint, listed
 from ..plan import Fault, Variable, Wire
-from ..scenario.fault_schema import EVERY, KINDS, FaultSpec, Place
-from ..scenario.load import Scenario
+from ..scenario.fault_schema import EVERY, KINDS, FaultLocation, FaultSpec
+from ..scenario.load import LoadedScenario
 from ..scenario.quantities import convert
-from ..scenario.yaml_lines import Key, dotted
-from ..wording import fold, hint, listed
-from .opened_system import System
-from .patterns import match, matching
+from ..scenario.yaml_lines import KeyPath, dotted
+from .context import WiringContext, match, matching
 
 
-def faults_of(system: System, wires: Sequence[Wire], record: Iterable[tuple[str, str]]) -> tuple[Fault, ...]:
+def faults_of(
+    system: WiringContext, wires: Sequence[Wire], record: Iterable[tuple[str, str]]
+) -> tuple[Fault, ...]:
     """Return the faults of a scenario."""
     scenario = system.scenario
     found: list[Fault] = []
     record = set(record)
     for i, spec in enumerate(scenario.faults):
-        key: Key = ("faults", i)
+        key: KeyPath = ("faults", i)
         at = _Finder(system, wires, record, key).at(spec)
         for unit, name, of_output in at:
             variable = system.fmus[unit].variables[name]
@@ -35,7 +36,7 @@ def faults_of(system: System, wires: Sequence[Wire], record: Iterable[tuple[str,
             except ValueError as error:
                 system.report((*key, "value"), f"{unit}.{name}: {error}")
                 continue
-            before = sum((f.unit, f.variable, f.of_output) == (unit, name, of_output) for f in found)
+            before = sum((f.instance, f.variable, f.of_output) == (unit, name, of_output) for f in found)
             found.append(_fault(spec, unit, name, of_output, value, before))
         if at and spec.begin is not None and spec.begin >= scenario.stop_time:
             ends = f"the run ends at {float(scenario.stop_time):g} s"
@@ -84,7 +85,7 @@ def _value(spec: FaultSpec, variable: Variable) -> float | None:
     return value
 
 
-def _said(scenario: Scenario, key: Key) -> str:
+def _said(scenario: LoadedScenario, key: KeyPath) -> str:
     change = scenario.document.override(key)
     return str(change) if change else f"{dotted(key)} ({scenario.faults[key[1]].on})"  # type: ignore[index]
 
@@ -93,21 +94,22 @@ def _said(scenario: Scenario, key: Key) -> str:
 class _Finder:
     """Finds what a fault acts on."""
 
-    system: System
+    system: WiringContext
     wires: Sequence[Wire]
     record: set[tuple[str, str]]
-    key: Key
+    key: KeyPath
 
     def at(self, spec: FaultSpec) -> list[tuple[str, str, bool]]:
         """Return unit, variable and whether it is an output of all that the fault acts on."""
         place = spec.on
-        for unit in filter(None, (place.unit, place.target)):
+        for unit in filter(None, (place.instance, place.target)):
             if unit not in self.system.fmus:
                 self._report(f"there is no unit {unit!r}{hint(unit, self.system.fmus, lead='units')}")
                 return []
         if place.target:
             return self._on_wires(spec)
-        return self._on_outputs(place.unit, place.variable) or self._on_inputs(place.unit, place.variable)
+        signal = place.instance, place.variable
+        return self._on_outputs(*signal) or self._on_inputs(*signal)
 
     def _on_outputs(self, unit: str, pattern: str) -> list[tuple[str, str, bool]]:
         names = matching(pattern, self.system.outputs[unit]).values()
@@ -129,23 +131,23 @@ class _Finder:
 
     def _on_wires(self, spec: FaultSpec) -> list[tuple[str, str, bool]]:
         place = spec.on
-        between = [w for w in self.wires if (w.source, w.target) == (place.unit, place.target)]
+        between = [w for w in self.wires if (w.source, w.target) == (place.instance, place.target)]
         found = [
             w for w in between
             if match(place.variable, w.output) is not None and match(place.input, w.input) is not None
         ]  # fmt: skip
         if not found:
-            if {place.unit, place.target} & self.system.scenario.replaced.keys():
+            if {place.instance, place.target} & self.system.scenario.replaced.keys():
                 self._left_out()
                 return []
             self._report(
-                f"no wire leads from {place.unit}.{place.variable} to {place.target}{self._way(place)}"
+                f"no wire leads from {place.instance}.{place.variable} to {place.target}{self._way(place)}"
             )
         return [(w.target, w.input, False) for w in found]
 
-    def _way(self, place: Place) -> str:
+    def _way(self, place: FaultLocation) -> str:
         """Return what there is in place of a wire from a place to its target."""
-        of = [w for w in self.wires if w.source == place.unit]
+        of = [w for w in self.wires if w.source == place.instance]
         if targets := dict.fromkeys(w.target for w in of if match(place.variable, w.output) is not None):
             return f"; it goes to {listed(targets)}"
         there = fold([w.output for w in of if w.target == place.target])

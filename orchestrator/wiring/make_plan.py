@@ -9,11 +9,15 @@ value that an FMU carries for an input is never used in silence.
 Units of measurement fit if they have one dimension, and the wire converts; where an FMU declares none,
 nothing can be checked and a note says so. Types must be equal, and an enumeration's items must all be
 among those of the input it feeds, with the same numbers.
+
+Functions that an FMU's library lacks and a plan needs.
+
+What is recorded: the variables that the scenario's patterns mean.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -21,35 +25,99 @@ from pathlib import Path
 from vocabulary.wheels import WHEELS
 
 from ..errors import BuildError, ModelDescriptionError, Problem, WiringError, YawbenchError
+from ..fmu.binary import CORE
+from ..fmu.description import shadowed_modules
 from ..fmu.opener import Opener, find_fmu, find_folder, host_needs, stale_fmus
-from ..fmu.shadowing import shadowed_modules
-from ..plan import Fmu, Plan, Series, Unit, Value, ValueOrigin, Wire
-from ..scenario.load import Scenario
+from ..messages import closest, fold, hint, listed
+from ..plan import Fmu, InputSeries, Instance, Plan, Value, ValueOrigin, Variable, Wire
+from ..scenario.load import LoadedScenario
 from ..scenario.overrides import is_path
-from ..wording import listed
-from .agreement import remarks
 from .connections import Connector
+from .context import WiringContext, match
 from .faults import faults_of
-from .functions import missing_functions
-from .opened_system import System
 from .order import evaluate
 from .parameters import STATIC_LOADS, STIFFNESSES, Parameters
-from .recording import recorded
-from .seen import exact
+from .warnings import exact, remarks
+
+
+def missing_functions(
+    units: Iterable[Instance], wires: Sequence[Wire], record: Sequence[tuple[str, str]]
+) -> list[str]:
+    """Return a sentence for every function that is lacking; one that nothing asks for may be."""
+    problems = []
+    for unit in units:
+        if not unit.fmu.lacking:
+            continue
+        needed: dict[str, list[str]] = {f"fmi{unit.fmu.fmi}{name}": [] for name in CORE[unit.fmu.fmi]}
+        given = [*unit.parameters, *unit.constants, *(w.input for w in wires if w.target == unit.name)]
+        asked = [
+            *(w.output for w in wires if w.source == unit.name),
+            *(n for u, n in record if u == unit.name),
+        ]
+        for verb, names in (("Set", given), ("Get", asked)):
+            for name in dict.fromkeys(names):
+                kind = unit.fmu.variables[name].place.type
+                needed.setdefault(f"fmi{unit.fmu.fmi}{verb}{kind}", []).append(name)
+        for function, names in needed.items():
+            if function in unit.fmu.lacking:
+                purpose = f", which {listed(names)} needs" if names else ""
+                problems.append(f"{unit.name}: the library of {unit.fmu.name} lacks {function}{purpose}")
+    return problems
+
+
+def recorded(system: WiringContext) -> tuple[tuple[str, str], ...]:
+    """Return (unit, variable) of each column, in the order of the scenario's list or units.
+
+    Without a list these are all outputs but text.
+    """
+    fmus, record = system.fmus, system.scenario.record
+    if record is None:
+        return tuple((unit, v.name) for unit, fmu in fmus.items() for v in _usual(fmu))
+    chosen: dict[tuple[str, str], None] = {}
+    for i, (unit, pattern) in enumerate(record):
+        units = list(fmus) if unit == "*" else [unit]
+        found = _matching(units, fmus, pattern, _usual) or _matching(units, fmus, pattern, _all)
+        chosen.update(dict.fromkeys(found))
+        if found:
+            continue
+        if system.had(units, pattern):
+            system.notes.append(f"record[{i}] is left out: {unit} has no variable {pattern!r} any more")
+            continue
+        usual, every = ([v.name for u in units for v in of(fmus[u])] for of in (_usual, _all))
+        names = every if closest(pattern, usual) is None and closest(pattern, every) else usual
+        who = "no unit has a" if unit == "*" else f"{unit} has no"
+        more = hint(pattern, fold(list(dict.fromkeys(names))), lead="its outputs are")
+        system.report(("record", i), f"{who} variable {pattern!r} to record{more}")
+    return tuple(chosen)
+
+
+def _usual(fmu: Fmu) -> list[Variable]:
+    return [v for v in fmu.of("output") if v.type != "String"]
+
+
+def _all(fmu: Fmu) -> list[Variable]:
+    return list(fmu.variables.values())
+
+
+def _matching(
+    units: Iterable[str], fmus: Mapping[str, Fmu], pattern: str, of: Callable[[Fmu], list[Variable]]
+) -> list[tuple[str, str]]:
+    return [(unit, v.name) for unit in units for v in of(fmus[unit]) if match(pattern, v.name) is not None]
+
 
 TYRE_FORCES = tuple(f"tyre_force_y_{wheel}" for wheel in WHEELS)
 """Outputs by which tyres are known."""
-Measure = Callable[[Unit, Mapping[str, float]], Mapping[str, float]]
+TyreMeasurement = Callable[[Instance, Mapping[str, float]], Mapping[str, float]]
 """Returns the cornering stiffness [N/rad] of one tyre on some wheels: of a unit, by wheel -> load [N]."""
 
 
 def make_plan(
-    scenario: Scenario,
+    scenario: LoadedScenario,
     *,
     fmus: Path | None = None,
     opener: Opener | None = None,
     isolated: bool = False,
-    measure: Measure | None = None,
+    measure: TyreMeasurement | None = None,
 ) -> Plan:
     """Open the scenario's FMUs and connect them.
 
@@ -100,7 +168,7 @@ def make_plan(
     notes += exact(list(units.values()), wires)
     findings = remarks(scenario, units)
     return Plan(
-        units=tuple(units[name] for name in evaluation.order),
+        instances=tuple(units[name] for name in evaluation.order),
         wires=_sorted(wires, evaluation.order, opened),
         record=record,
         step=scenario.step_size,
@@ -117,7 +185,10 @@ def make_plan(
 
 
 def _take_from_tyres(
-    scenario: Scenario, units: dict[str, Unit], distributed: Parameters, measure: Measure | None
+    scenario: LoadedScenario,
+    units: dict[str, Instance],
+    distributed: Parameters,
+    measure: TyreMeasurement | None,
 ) -> list[Problem]:
     """Give units the cornering stiffnesses of axles that tyres at static loads have; return what is wrong."""
     if not distributed.lacking:
@@ -151,27 +222,27 @@ def _take_from_tyres(
 
 
 def _unit(
-    system: System, name: str, parameters: dict[str, Value], inputs: Mapping[str, Value | Series]
-) -> Unit:
+    system: WiringContext, name: str, parameters: dict[str, Value], inputs: Mapping[str, Value | InputSeries]
+) -> Instance:
     """Return a unit with the values of its parameters and of the inputs that no unit drives."""
     spec, step, start = (
         system.scenario.units[name],
         system.scenario.step_size,
         float(system.scenario.start_time),
     )
-    return Unit(
+    return Instance(
         name,
         system.fmus[name],
         period=int((spec.step_size or step) / step),
         parameters=parameters,
-        constants={key: v.first(start) if isinstance(v, Series) else v for key, v in inputs.items()},
+        constants={key: v.first(start) if isinstance(v, InputSeries) else v for key, v in inputs.items()},
         origins=system.origins[name],
         tolerance=spec.tolerance,
-        series={key: v for key, v in inputs.items() if isinstance(v, Series)},
+        series={key: v for key, v in inputs.items() if isinstance(v, InputSeries)},
     )
 
 
-def _misplaced(scenario: Scenario) -> list[str]:
+def _misplaced(scenario: LoadedScenario) -> list[str]:
     """Return a sentence for every swap by an FMU whose name begins with that of another unit."""
     found = []
     for change in scenario.changes:
@@ -182,7 +253,7 @@ def _misplaced(scenario: Scenario) -> list[str]:
     return found
 
 
-def _open_all(scenario: Scenario, fmus: Path | None, opener: Opener) -> System:
+def _open_all(scenario: LoadedScenario, fmus: Path | None, opener: Opener) -> WiringContext:
     """Return a scenario with the FMU of each unit."""
     document = scenario.document
     problems: dict[Problem, None] = {}
@@ -216,10 +287,10 @@ def _open_all(scenario: Scenario, fmus: Path | None, opener: Opener) -> System:
         raise BuildError(not_built)
     if problems:
         raise ModelDescriptionError(problems)
-    return System(scenario, found, replaced)
+    return WiringContext(scenario, found, replaced)
 
 
-def _check_instances(system: System) -> None:
+def _check_instances(system: WiringContext) -> None:
     """Report an FMU used by two units though it allows one instance per process."""
     first: dict[str, str] = {}
     for name, fmu in system.fmus.items():

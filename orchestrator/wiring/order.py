@@ -26,8 +26,8 @@ from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from itertools import chain
 
+from ..messages import star
 from ..plan import Fmu, Wire
-from ..wording import star
 
 Node = tuple[str, str]  # unit, variable
 Edge = tuple[str, str]  # source unit, target unit
@@ -46,7 +46,7 @@ UNSAID = ""
 
 
 @dataclass(frozen=True)
-class Evaluation:
+class EvaluationOrder:
     """The order of the units, and why."""
 
     order: tuple[str, ...]
@@ -77,7 +77,7 @@ class _Following:
         return chain(self.unsaid, self.said.get(name, ()))
 
 
-def evaluate(fmus: Mapping[str, Fmu], wires: Sequence[Wire]) -> Evaluation:
+def evaluate(fmus: Mapping[str, Fmu], wires: Sequence[Wire]) -> EvaluationOrder:
     """Find the evaluation order of the units `fmus`, given in the order of the scenario."""
     following = {unit: _Following(fmu) for unit, fmu in fmus.items()}
     direct = [wire for wire in wires if any(following[wire.target].outputs(wire.input))]
@@ -90,7 +90,7 @@ def evaluate(fmus: Mapping[str, Fmu], wires: Sequence[Wire]) -> Evaluation:
     order = _unit_order(list(fmus), weights, cycles)
     position = {name: i for i, name in enumerate(order)}
     backward = [wire for wire in direct if position[wire.source] >= position[wire.target]]
-    return Evaluation(tuple(order), tuple(direct), tuple(backward), tuple(sure), tuple(possible))
+    return EvaluationOrder(tuple(order), tuple(direct), tuple(backward), tuple(sure), tuple(possible))
 
 
 def _variable_graph(following: Mapping[str, _Following], wires: Iterable[Wire], *, assume: bool) -> Graph:

@@ -17,14 +17,13 @@ from vocabulary.vehicle import CAR
 
 from ..files import TEXT, read_bytes
 from ..fmu.binary import integer_limits
+from ..messages import closest, fold, hint, listed, short
 from ..plan import DEFAULT, Fmu, Value, ValueOrigin, Variable
 from ..scenario import quantities
 from ..scenario.scenario_schema import TextSpec
-from ..scenario.yaml_lines import Document, Key
-from ..wording import closest, fold, hint, listed, short
-from .derivations import Car, car_of, contradictions
-from .opened_system import System
-from .shared_facts import facts_of
+from ..scenario.yaml_lines import Document, KeyPath
+from .context import WiringContext, facts_of
+from .derivations import CarQuantities, car_of, contradictions
 
 STIFFNESSES = ("cornering_stiffness_front", "cornering_stiffness_rear")
 STATIC_LOADS = ("static_load_front", "static_load_rear")
@@ -96,7 +95,7 @@ def _other(variable: Variable, given: Value) -> Value:
     return given
 
 
-def origin(document: Document, key: Key) -> ValueOrigin:
+def origin(document: Document, key: KeyPath) -> ValueOrigin:
     """Return where the value at a key comes from: the file's kind, or what changed it."""
     change = document.override(key)
     return ValueOrigin(change.origin if change else "vehicle" if key[0] == "parameters" else "scenario")
@@ -105,12 +104,12 @@ def origin(document: Document, key: Key) -> ValueOrigin:
 class Parameters:
     """The parameters of all units: their own, then the vehicle's for those that declare them."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: WiringContext) -> None:
         self._system = system
         self._scenario = system.scenario
         self._fmus = system.fmus
         self._given: dict[str, dict[str, Value]] = {unit: {} for unit in system.fmus}
-        self.car = Car({})
+        self.car = CarQuantities({})
         self.lacking: dict[str, list[str]] = {}
         """Unit -> those of `STIFFNESSES` that only the tyres at their static loads can tell it."""
 
@@ -134,7 +133,7 @@ class Parameters:
         unit: str,
         name: str,
         raw: Value,
-        place: tuple[Document, Key],
+        place: tuple[Document, KeyPath],
         came: ValueOrigin | None = None,
         says: str = "",
     ) -> None:
@@ -149,7 +148,7 @@ class Parameters:
     def _takers(self, name: str) -> list[str]:
         return [unit for unit, fmu in self._fmus.items() if _is_parameter(fmu, name)]
 
-    def _give_own(self, unit: str, name: str, raw: Value | TextSpec, key: Key) -> None:
+    def _give_own(self, unit: str, name: str, raw: Value | TextSpec, key: KeyPath) -> None:
         """Give a unit its own value, or the text of a file."""
         fmu, place = self._fmus[unit], (self._scenario.document, key)
         if not _is_parameter(fmu, name):
@@ -266,7 +265,7 @@ class Parameters:
                     "follow from: give them there, or to this unit",
                 )
 
-    def _is_left_out(self, unit: str, name: str, key: Key) -> bool:
+    def _is_left_out(self, unit: str, name: str, key: KeyPath) -> bool:
         """Return whether a value was meant for the FMU that an option has replaced."""
         if unit not in self._scenario.replaced or self._scenario.document.override(key):
             return False
@@ -288,7 +287,7 @@ def _text_of(path: Path) -> str:
         raise ValueError((error.strerror or "cannot be read").lower()) from None
 
 
-def known_car(given: Mapping[str, Value]) -> Car:
+def known_car(given: Mapping[str, Value]) -> CarQuantities:
     """Return what follows from the values of a vehicle file, which fit the quantities of a car."""
     of_car = {name: raw for name, raw in given.items() if name in CAR}
     return car_of({name: float(value_for(_quantity(name), raw)) for name, raw in of_car.items()})

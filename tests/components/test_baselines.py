@@ -12,7 +12,7 @@ from scipy.optimize import nnls
 
 from components.cars.single_track_car import SingleTrackCar
 from components.control_laws.linear_feedback import error_dynamics, optimal_gains
-from components.control_laws.predictive_law import PredictiveLaw, Weights, _discrete
+from components.control_laws.predictive_law import CostWeights, PredictiveLaw, _discrete
 from components.control_laws.sideslip_bound import sideslip_bound
 from components.controllers.dead_band import DeadBand, beyond
 from components.controllers.lqr import Lqr
@@ -80,7 +80,7 @@ def test_an_inverse_is_one():
 @pytest.mark.parametrize("car", CARS.values(), ids=CARS)
 def test_far_from_limits_a_long_prediction_is_the_regulator_of_the_sampled_car(car):
     a, step = error_dynamics(car, 25.0), 0.05
-    weights = Weights(**SCALES, penalty=1.0, step=step, moves=60, steps_per_move=1)
+    weights = CostWeights(**SCALES, penalty=1.0, step=step, moves=60, steps_per_move=1)
     law = PredictiveLaw(a, car.i_z, weights)
     phi, gamma = _discrete(a, weights.moment_0 / car.i_z, step)
     b = np.array(gamma).reshape(2, 1)
@@ -94,7 +94,7 @@ def test_far_from_limits_a_long_prediction_is_the_regulator_of_the_sampled_car(c
 def test_the_moments_of_the_program_are_the_best_that_are_allowed():
     """Against all moments of a fine grid, by simulating the prediction."""
     car = CARS["understeering"]
-    w = Weights(**SCALES, penalty=10.0, step=0.02, moves=2, steps_per_move=5)
+    w = CostWeights(**SCALES, penalty=10.0, step=0.02, moves=2, steps_per_move=5)
     a, b = error_dynamics(car, 25.0), w.moment_0 / car.i_z
     phi, gamma = map(np.array, _discrete(a, b, w.step))
     most, bound, beta_ref = 3000.0, 0.05, 0.01

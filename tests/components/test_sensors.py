@@ -8,7 +8,7 @@ from statistics import correlation, fmean, pstdev
 
 import pytest
 
-from components.sensing.channel import Channel, Figures
+from components.sensing.channel import Channel, ChannelSpec
 from components.sensing.cluster_parameters import CHANNELS
 from components.sensing.noise import key, normal, uniform
 from components.sensors.ideal import Ideal
@@ -104,7 +104,7 @@ def test_messages_are_the_same_for_any_step(h):
     """Sampled at 10 ms with all there is; the signal is a straight line, which every step describes."""
 
     def messages(step: float) -> list[float]:
-        channel = Channel(Figures(21.0, 1.01, 0.3, 0.1, 0.5, 40.0, 1e-3, 0.01), 7, 0.0, 0.0)
+        channel = Channel(ChannelSpec(21.0, 1.01, 0.3, 0.1, 0.5, 40.0, 1e-3, 0.01), 7, 0.0, 0.0)
         seen = []
         for k in range(round(0.5 / step)):
             channel.advance(k * step, step, 20.0 * (k + 1) * step)

@@ -17,9 +17,9 @@ from fmus.build import find_components
 from orchestrator.cli import _application
 from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.fmu.archive import open_fmu
+from orchestrator.messages import fold
 from orchestrator.metrics.measures import MEASURES
 from orchestrator.scenario.scenario_schema import ScenarioSpec
-from orchestrator.wording import fold
 from tests.checkout import ROOT
 from vocabulary.signals import SIGNALS
 

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from fmus.build import find_recipes
 from orchestrator.commands.build import build
 from orchestrator.errors import BuildError
-from orchestrator.writing import claim
+from orchestrator.files import claim
 
 APP = typer.Typer()
 APP.command()(build)

@@ -329,7 +329,7 @@ def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path, monkeypatch):
     def refuse(*args, **kwargs):
         raise PermissionError(13, "Permission denied", str(tmp_path))
 
-    monkeypatch.setattr("orchestrator.writing.claim", refuse)
+    monkeypatch.setattr("orchestrator.files.claim", refuse)
     with pytest.raises(BuildError) as caught:
         build_all(tmp_path, components=["tyre_linear"], force=True)
     assert caught.value.problems == [

@@ -15,8 +15,8 @@ from fmus.build import HERE as FMUS
 from fmus.build import build_all, build_component
 from fmus.c.c_recipe import TO_WINDOWS
 from fmus.mark import read_mark
+from orchestrator.commands.new import begin
 from orchestrator.errors import BuildError
-from orchestrator.scaffold.beginnings import begin
 from tests.fmus.bare import ERROR, OK, Fmu, Refused, Unit
 from tests.fmus.programs import run
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.evidence import Looks
+from fmus.evidence import SourceDigests
 from tests.checkout import ROOT, copy_checkout, run_in
 
 DRIVER = "title: Driver\nstop_time: 0.01\nstep_size: 0.001\nunits: {driver: {fmu: driver_sine}}\n"
@@ -242,17 +242,17 @@ def test_nobody_waits_for_the_builder_if_everything_is_current(project):
 def test_an_edit_that_leaves_size_and_time_alone_is_noticed(tmp_path):
     file = tmp_path / "a.py"
     file.write_text("1")
-    evidence = Looks().evidence([file, tmp_path, "env:YAWBENCH_X"])
+    evidence = SourceDigests().evidence([file, tmp_path, "env:YAWBENCH_X"])
     times = file.stat()
     file.write_text("2")
     os.utime(file, ns=(times.st_atime_ns, times.st_mtime_ns))
-    assert not Looks().confirm(evidence)
+    assert not SourceDigests().confirm(evidence)
     file.write_text("1")
-    assert Looks().confirm(evidence)
+    assert SourceDigests().confirm(evidence)
     (tmp_path / "__pycache__").mkdir()
-    assert Looks().confirm(evidence)
+    assert SourceDigests().confirm(evidence)
     (tmp_path / "b.py").touch()
-    assert not Looks().confirm(evidence)
+    assert not SourceDigests().confirm(evidence)
 
 
 def test_a_file_that_comes_before_a_known_one_makes_an_fmu_stale(project):

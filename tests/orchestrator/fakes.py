@@ -7,9 +7,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from orchestrator.master.instance import ExperimentSetup, FmuInstance, StepCalls
 from orchestrator.master.log import ERROR, OK, Log
-from orchestrator.master.slave import Calls, Experiment, Slave
-from orchestrator.plan import Algorithm, Fault, Fmu, Place, Plan, Unit, Variable, Wire
+from orchestrator.plan import Algorithm, Fault, Fmu, Instance, Plan, ValueRef, Variable, Wire
 
 
 class Behaviour:
@@ -34,7 +34,7 @@ class Behaviour:
 class FakeSlave:
     """A slave that runs a behaviour and writes down in `calls` what it was asked to do."""
 
-    def __init__(self, unit: Unit, behaviour: Behaviour, log: Log) -> None:
+    def __init__(self, unit: Instance, behaviour: Behaviour, log: Log) -> None:
         self.name = unit.name
         self.behaviour = behaviour
         self.log = log
@@ -48,7 +48,7 @@ class FakeSlave:
         self.time = 0.0
         self.started = False
 
-    def connect(self, buffers) -> Calls:
+    def connect(self, buffers) -> StepCalls:
         inputs, input_places, outputs, output_places, time, step = buffers
         input_names = self._named(input_places)
         output_names = self._named(output_places)
@@ -73,7 +73,7 @@ class FakeSlave:
             outputs[:] = [self.values[name] for name in output_names]
             return OK
 
-        return Calls(set_inputs, take_step, get_outputs)
+        return StepCalls(set_inputs, take_step, get_outputs)
 
     def _refresh(self) -> None:
         if not self.started:
@@ -83,20 +83,20 @@ class FakeSlave:
     def part(self, kind: str) -> str:
         return kind
 
-    def _named(self, places: Sequence[Place]) -> list[str]:
+    def _named(self, places: Sequence[ValueRef]) -> list[str]:
         return [self.names[place.reference] for place in places]
 
-    def put(self, places: Sequence[Place], values: Sequence[Any]) -> int:
+    def put(self, places: Sequence[ValueRef], values: Sequence[Any]) -> int:
         names = self._named(places)
         self.calls.append(("put", places[0].type, tuple(names), tuple(values)))
         self.values.update(zip(names, values, strict=True))
         return OK
 
-    def fetch(self, places: Sequence[Place]) -> tuple[int, list[Any]]:
+    def fetch(self, places: Sequence[ValueRef]) -> tuple[int, list[Any]]:
         self._refresh()
         return OK, [self.values[name] for name in self._named(places)]
 
-    def setup(self, experiment: Experiment) -> int:
+    def setup(self, experiment: ExperimentSetup) -> int:
         self.calls.append(("setup", experiment.start, experiment.stop))
         return OK
 
@@ -157,7 +157,7 @@ def make_plan(
 ) -> Plan:
     """Return a plan of fake units in the order given; wires are written `a.x -> b.y [gain offset]`."""
     made = tuple(
-        Unit(
+        Instance(
             name, make_fmu(name, b), (periods or {}).get(name, 1),
             dict((parameters or {}).get(name, {})), dict((constants or {}).get(name, {})),
         )
@@ -190,7 +190,7 @@ class Stage:
         self.units = units
         self.slaves: dict[str, FakeSlave] = {}
 
-    def __call__(self, unit: Unit, log: Log, corrupted: set[Path]) -> Slave:
+    def __call__(self, unit: Instance, log: Log, corrupted: set[Path]) -> FmuInstance:
         slave = FakeSlave(unit, self.units[unit.name], log)
         self.slaves[unit.name] = slave
         return slave

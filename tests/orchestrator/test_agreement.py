@@ -9,7 +9,7 @@ import pytest
 from orchestrator.errors import WiringError
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
-from orchestrator.wiring.seen import seen_as
+from orchestrator.wiring.warnings import seen_as
 from tests.changed import changed
 from vocabulary.wheels import WHEELS
 
@@ -70,7 +70,7 @@ def remarks(*settings, **values):
 
 
 def values(made, unit):
-    one = next(one for one in made.units if one.name == unit)
+    one = next(one for one in made.instances if one.name == unit)
     return {**one.parameters, **one.constants}
 
 
@@ -143,7 +143,7 @@ def test_a_reference_that_is_told_another_friction_than_the_roads_is_named_unles
     late = "connections:\n  - {from: road.friction_delayed, to: reference.friction}\n"
     told = plan(facts="friction: 0.5", more=road + late)
     (wire,) = (w for w in told.wires if w.target == "reference")
-    assert seen_as(wire, told.units) == "late truth"
+    assert seen_as(wire, told.instances) == "late truth"
 
 
 def test_a_fact_in_the_wrong_unit_is_refused():

@@ -12,8 +12,8 @@ import sys
 import pytest
 
 from orchestrator.cli import main
-from orchestrator.results.lock import Holder, Lock
-from orchestrator.writing import LOCK_FILE
+from orchestrator.files import LOCK_FILE
+from orchestrator.results.lock import FolderLock, LockHolder
 
 UNITS = ("driver_sine", "reference_steady_state", "controller_off", "controller_fuzzy_sideslip")
 
@@ -238,7 +238,7 @@ WRITERS = {
 def held(folder):
     """The lock on a folder that another is writing."""
     (folder / "sweep.yaml").write_text(SWEEP)
-    return Lock(folder / "o")
+    return FolderLock(folder / "o")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="folders cannot be locked")
@@ -247,7 +247,7 @@ def test_a_command_leaves_a_folder_alone_that_another_is_writing(command, yawben
     before = sorted((folder / "o").iterdir())
     status, out, said = yawbench(command, *WRITERS[command], "--out", "o")
     assert (status, out) == (2, "")
-    assert f"o: {Holder.here()}".partition(", since")[0] in said
+    assert f"o: {LockHolder.here()}".partition(", since")[0] in said
     assert said.endswith("is writing here; wait for it, or give another folder with --out.\n")
     assert sorted((folder / "o").iterdir()) == before
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import ResultsError
-from orchestrator.evaluation.side_wind import evaluate_side_wind
-from orchestrator.evaluation.straight_braking import evaluate_braking
+from orchestrator.evaluation.braking_and_wind import evaluate_braking, evaluate_side_wind
 from orchestrator.evaluation.trace import Trace
 
 from .test_sine_with_dwell import as_sampled

@@ -11,8 +11,8 @@ import pytest
 
 from orchestrator.cache import cache_folder, keep, recall
 from orchestrator.cli import main
+from orchestrator.files import write_whole
 from orchestrator.fmu.archive import open_fmu
-from orchestrator.writing import write_whole
 
 from .fake_fmus import make_fmu
 

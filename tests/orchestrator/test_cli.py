@@ -16,7 +16,7 @@ import typer
 from orchestrator import cli
 from orchestrator.cli import COMMANDS, _application, main
 from orchestrator.errors import Interrupted, ScenarioError
-from orchestrator.wording import printable
+from orchestrator.messages import printable
 
 
 def say(capsys, *arguments):
@@ -94,7 +94,7 @@ def test_a_command_imports_what_it_needs_itself():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(done.stderr.split())
     assert "orchestrator.commands.list" in loaded
-    assert not {f"orchestrator.commands.{name}" for name in COMMANDS if name != "list"} & loaded
+    assert not {f"orchestrator.commands.{name}" for name in COMMANDS.values() if name != "list"} & loaded
 
 
 def test_a_working_folder_that_is_gone_is_one_sentence(tmp_path):
@@ -123,7 +123,7 @@ def test_a_signal_ends_every_command_with_a_word_and_the_same_status(name, numbe
     def ended() -> None:
         os.kill(os.getpid(), number)
 
-    module = importlib.import_module(f"orchestrator.commands.{name.replace('-', '_')}")
+    module = importlib.import_module(f"orchestrator.commands.{COMMANDS[name]}")
     monkeypatch.setattr(module, name.replace("-", "_"), ended)
     before = signal.getsignal(signal.SIGTERM)
     with pytest.raises(SystemExit) as end:
@@ -142,7 +142,7 @@ def test_a_signal_while_a_class_is_being_made_is_no_error_of_the_program(monkeyp
     def ended() -> None:
         type("Made", (), {"attribute": Stopping()})
 
-    monkeypatch.setattr(importlib.import_module("orchestrator.commands.cache"), "cache", ended)
+    monkeypatch.setattr(importlib.import_module("orchestrator.commands.build"), "cache", ended)
     with pytest.raises(SystemExit) as end:
         main(["cache"])
     assert end.value.code == 143

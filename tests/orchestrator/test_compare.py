@@ -10,18 +10,18 @@ from types import SimpleNamespace
 import pytest
 from matplotlib.figure import Figure
 
-from orchestrator.commands.recorded import distinct
+from orchestrator.commands.results import distinct
 from orchestrator.errors import ScenarioError
-from orchestrator.experiments.compare import FIGURES, comparison_table, of_runs, variants
-from orchestrator.experiments.expansion import NamedRun
+from orchestrator.experiments.comparison import FIGURES, comparison_table, of_runs, variants
+from orchestrator.experiments.experiment import NamedRun
 from orchestrator.experiments.figures import draw_all
-from orchestrator.experiments.findings import judge_results
 from orchestrator.experiments.jobs import Job, Outcome
 from orchestrator.experiments.judged_schema import MetricSpec
+from orchestrator.experiments.outcome import judge_results
 from orchestrator.experiments.record import write_findings
 from orchestrator.experiments.schema import ExperimentSpec
-from orchestrator.figures.panels import Run, shown_by
-from orchestrator.metrics.run_metrics import Value
+from orchestrator.figures.panels import LabelledRun, shown_by
+from orchestrator.metrics.run_metrics import MetricValue
 from orchestrator.pages.comparison import comparison_facts, metric_rows
 from tests.changed import changed
 
@@ -191,7 +191,7 @@ def stars(*values: tuple[float, ...]) -> list[list[int]]:
     names = ("rms_error(yaw_rate)", "effort(yaw_moment)", "total_variation_rate(yaw_moment)")
     runs = [str(k) for k in range(len(values))]
     known = {
-        (run, name): Value(x, "1")
+        (run, name): MetricValue(x, "1")
         for run, row in zip(runs, values, strict=True)
         for name, x in zip(names, row, strict=True)
     }
@@ -215,7 +215,9 @@ def test_the_best_is_marked_where_it_reads_better_and_doing_nothing_wins_no_effo
 
 
 def test_no_run_leaves_the_axes_of_the_signals_that_differ_most(tmp_path):
-    lost = [Run(name, car(gain)) for name, gain in (("a", 1.0), ("b", 40.0), ("c", 50.0), ("d", 60.0))]
+    lost = [
+        LabelledRun(name, car(gain)) for name, gain in (("a", 1.0), ("b", 40.0), ("c", 50.0), ("d", 60.0))
+    ]
     for whole in (True, False):
         (panel,) = shown_by(lost, ["sideslip"], whole=whole)
         axes = Figure().add_subplot()

@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import ResultsError, ScenarioError
-from orchestrator.experiments.compare import of_runs
-from orchestrator.experiments.converge import (
+from orchestrator.experiments.comparison import (
     columns_of,
     convergence_figure,
     convergence_table,
     measure,
+    of_runs,
     refinements,
 )
-from orchestrator.experiments.expansion import NamedRun
-from orchestrator.experiments.findings import judge_results
+from orchestrator.experiments.experiment import NamedRun
 from orchestrator.experiments.jobs import Job, Outcome
-from orchestrator.experiments.table import to_csv
+from orchestrator.experiments.outcome import judge_results
+from orchestrator.experiments.record import to_csv
 from tests.changed import changed
 
 from .recorded import results, write

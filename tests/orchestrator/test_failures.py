@@ -149,7 +149,7 @@ def test_an_error_after_which_a_unit_went_on_is_reported_and_not_taken_for_the_r
     units = {"source": Clock(x=lambda t: 10.0 * t), "target": Passing()}
     opener = Opener(units, "target", answering(OK, (ERROR, "a glitch, never mind")))
     info = simulate(make_plan(units, ["source.x -> target.x"]), tmp_path, opener=opener)
-    assert [(m.unit, m.time, m.text) for m in info.warnings] == [("target", 0.2, "a glitch, never mind")]
+    assert [(m.instance, m.time, m.text) for m in info.warnings] == [("target", 0.2, "a glitch, never mind")]
     assert [w["status"] for w in load_results(tmp_path).run["warnings"]] == ["Error"]
 
 
@@ -183,7 +183,7 @@ def test_a_warning_is_reported_and_the_run_goes_on(tmp_path):
     units = {"source": Clock(x=lambda t: 10.0 * t), "target": Passing()}
     opener = Opener(units, "target", answering(WARNING, (WARNING, "getting warm")))
     info = simulate(make_plan(units, ["source.x -> target.x"]), tmp_path, opener=opener)
-    assert [(m.unit, m.time, m.text) for m in info.warnings] == [("target", 0.2, "getting warm")]
+    assert [(m.instance, m.time, m.text) for m in info.warnings] == [("target", 0.2, "getting warm")]
     results = load_results(tmp_path)
     assert len(results.time) == 11
     assert results.run["warnings"] == [
@@ -197,7 +197,7 @@ def test_a_warning_without_a_message_is_reported_too(tmp_path):
         make_plan(units, ["source.x -> target.x"]), tmp_path,
         opener=Opener(units, "target", answering(WARNING)),
     )  # fmt: skip
-    assert [(m.unit, m.text) for m in info.warnings] == [
+    assert [(m.instance, m.text) for m in info.warnings] == [
         ("target", "step: the FMU returned Warning and gave no reason")
     ]
 
@@ -220,7 +220,7 @@ def test_an_instance_that_cannot_be_made_frees_those_made_before(tmp_path):
 
     def opener(unit, log, corrupted):
         if unit.name == "target":
-            raise SimulationError("target: cannot be instantiated: no licence", unit="target", time=0.0)
+            raise SimulationError("target: cannot be instantiated: no licence", instance="target", time=0.0)
         return stage(unit, log, corrupted)
 
     with pytest.raises(SimulationError, match="no licence"):
@@ -284,7 +284,7 @@ def test_a_value_on_no_wire_that_is_not_finite_is_a_warning_with_its_first_time(
     }
     plan = make_plan(units, ["source.x -> target.x"], algorithm=algorithm)
     info = simulate(plan, tmp_path, opener=Stage(units))
-    said = [(m.unit, m.time, m.text) for m in info.warnings]
+    said = [(m.instance, m.time, m.text) for m in info.warnings]
     assert said == [("source", time, "spare is not a number; it is on no wire")]
     results = load_results(tmp_path)
     assert results.run["status"] == "completed"

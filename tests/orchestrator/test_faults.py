@@ -13,20 +13,18 @@ from matplotlib.colors import to_hex
 
 import yawbench as yb
 from orchestrator.cli import main
-from orchestrator.commands.experiment import command_of
+from orchestrator.commands.experiments import command_of
 from orchestrator.errors import ScenarioError, YawbenchError
 from orchestrator.experiments.experiment import load_experiment
-from orchestrator.figures.panels import Run
+from orchestrator.figures.panels import FAULTY, LabelledRun
 from orchestrator.figures.plots import draw
-from orchestrator.figures.spans import FAULTY
-from orchestrator.master.faulting import Counted, disturbance
-from orchestrator.master.interrupts import StopFlag
+from orchestrator.master.fault_injection import CountedNoise, disturbance
 from orchestrator.master.log import Log
 from orchestrator.master.master import Master
+from orchestrator.master.process_state import StopFlag
 from orchestrator.master.simulate import simulate, simulate_in_memory
-from orchestrator.plan import Change, Fault
-from orchestrator.results.freshness import staleness
-from orchestrator.results.key import key_of
+from orchestrator.plan import Fault, Override
+from orchestrator.results.freshness import key_of, staleness
 from orchestrator.results.read import load_results
 from orchestrator.scenario.fault_schema import KINDS
 from orchestrator.scenario.load import load_scenario
@@ -212,10 +210,12 @@ def test_what_is_random_disturbs_a_run_as_it_is_drawn(kind, algorithm):
 
 def test_numbers_are_those_of_their_message_whatever_was_asked_before():
     fault = Fault("a", "x", True, "noise", 1.0, every=0.01, stream=2**63 + 5)
-    forth, back = (Counted(fault, lambda made: made.standard_normal(1024)) for _ in range(2))
+    forth, back = (CountedNoise(fault, lambda made: made.standard_normal(1024)) for _ in range(2))
     times = [-0.02, 0.0, 0.07, 0.29, 12.0, 1e6]
     assert [forth.at(t) for t in times] == [back.at(t) for t in reversed(times)][::-1]
-    assert Counted(replace(fault, stream=1), lambda made: made.standard_normal(1024)).at(0.0) != forth.at(0.0)
+    assert CountedNoise(replace(fault, stream=1), lambda made: made.standard_normal(1024)).at(
+        0.0
+    ) != forth.at(0.0)
 
 
 # What it costs
@@ -226,8 +226,8 @@ def operations(faults, algorithm):
     made = make_plan(units, WIRES, algorithm=algorithm, faults=faults)
     stage = Stage(units)
     log = Log()
-    slaves = {unit.name: stage(unit, log, set()) for unit in made.units}
-    return [(op.unit, op.kind) for op in Master(made, slaves, log, StopFlag()).programs.at(1)]
+    slaves = {unit.name: stage(unit, log, set()) for unit in made.instances}
+    return [(op.instance, op.kind) for op in Master(made, slaves, log, StopFlag()).programs.at(1)]
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
@@ -305,7 +305,7 @@ def test_an_option_and_a_file_say_the_same(folder):
         "gyro", "yaw_rate", True, "freeze", None, 0.5, 1.5, place="gyro.yaw_rate",
         says="freeze from 0.5 s until 1.5 s",
     )  # fmt: skip
-    assert (noisy.unit, noisy.variable, noisy.of_output, noisy.every) == (
+    assert (noisy.instance, noisy.variable, noisy.of_output, noisy.every) == (
         "gyro",
         "yaw_rate_true",
         False,
@@ -393,7 +393,7 @@ def test_what_a_fault_never_reaches_is_noted(folder):
     make_fmu(Path("fmus/controller_off.fmu"), outputs=[out("yaw_moment", unit="N.m")])
     without = SCENARIO.replace("  - {from: [gyro], to: [law]}\n", "")
     gone = planned("gyro.yaw_rate -> law: freeze", text=without,
-                   changes=[Change("law", "controller_off", "--swap")])  # fmt: skip
+                   changes=[Override("law", "controller_off", "--swap")])  # fmt: skip
     assert gone.faults == ()
     assert "--fault gyro.yaw_rate -> law: freeze is left out: there is no such signal any more" in gone.notes
 
@@ -506,14 +506,14 @@ def test_figures_mark_when_runs_were_faulty_and_the_legend_says_how():
     healthy, broken = car(), car(1.2)
     fault = {"on": "gyro.yaw_rate", "fault": "freeze from 2 s", "from": 2.0, "until": None, "at": []}
     broken.run["faults"] = [fault]
-    figure = draw([Run("healthy", healthy), Run("broken", broken)], ["sideslip", "path"])
+    figure = draw([LabelledRun("healthy", healthy), LabelledRun("broken", broken)], ["sideslip", "path"])
     legend = [text.get_text() for box in figure.legends for text in box.get_texts()]
     assert legend[-1] == "broken: gyro.yaw_rate: freeze from 2 s"
     over_time, path = figure.axes
     (span,) = [p for p in over_time.patches if to_hex(p.get_facecolor()) == FAULTY.lower()]
     assert (span.get_x(), span.get_x() + span.get_width()) == (2.0, 8.0)
     assert not path.patches
-    alone = draw([Run("broken", broken)], ["sideslip"])
+    alone = draw([LabelledRun("broken", broken)], ["sideslip"])
     assert [text.get_text() for box in alone.legends for text in box.get_texts()][-1] == (
         "gyro.yaw_rate: freeze from 2 s"
     )

@@ -9,15 +9,14 @@ import sys
 import pytest
 
 from orchestrator.errors import ResultsError, SimulationError
-from orchestrator.experiments.listing import runs_table
+from orchestrator.experiments.tables import runs_table
+from orchestrator.files import LOCK_FILE
 from orchestrator.master.simulate import simulate
 from orchestrator.results import folder as module
 from orchestrator.results import recorder
-from orchestrator.results.lock import Lock, holder_of, writing
-from orchestrator.results.read import load_results
-from orchestrator.results.runs import found_runs
+from orchestrator.results.lock import FolderLock, holder_of, writing
+from orchestrator.results.read import found_runs, load_results
 from orchestrator.results.salvage import lost_format, salvage
-from orchestrator.writing import LOCK_FILE
 from tests.trees import snapshot
 
 from .fakes import Clock, Function, Stage, make_plan
@@ -229,13 +228,13 @@ def test_a_folder_below_one_that_another_process_writes_is_refused(tmp_path):
 
 @needs_locks
 def test_a_look_at_a_lock_does_not_take_it(tmp_path):
-    lock = Lock(tmp_path)
+    lock = FolderLock(tmp_path)
     assert holder_of(tmp_path) is not None
     lock.release()
     assert holder_of(tmp_path) is None
     (tmp_path / LOCK_FILE).write_text("what a killed process has left")
     assert holder_of(tmp_path) is None
-    Lock(tmp_path).release()
+    FolderLock(tmp_path).release()
     assert names(tmp_path) == []
 
 
@@ -276,4 +275,4 @@ def test_a_pipe_in_place_of_a_file_of_ours_keeps_nobody_waiting(name, tmp_path):
 
 def test_a_name_that_is_too_long_for_a_folder_is_one_sentence(tmp_path):
     with pytest.raises(ResultsError, match=r"results cannot be written here: File name too long\."):
-        Lock(tmp_path / ("n" * 300))
+        FolderLock(tmp_path / ("n" * 300))

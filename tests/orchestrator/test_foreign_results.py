@@ -17,11 +17,11 @@ from lxml import html
 
 import yawbench as yb
 from orchestrator.errors import ResultsError, ScenarioError, YawbenchError
-from orchestrator.plan import Change
-from orchestrator.results.lock import Lock, holder_of
-from orchestrator.results.naming import below_results, default_folder
+from orchestrator.files import LOCK_FILE, NEW, write_whole
+from orchestrator.plan import Override
+from orchestrator.results.folder import below_results, default_folder
+from orchestrator.results.lock import FolderLock, holder_of
 from orchestrator.results.salvage import salvage
-from orchestrator.writing import LOCK_FILE, NEW, write_whole
 from tests.trees import snapshot
 
 from . import recorded
@@ -302,7 +302,7 @@ def test_a_file_that_the_user_names_may_be_a_link(work, home, yawbench):
 
 
 def test_looking_who_holds_a_folder_changes_nothing_there(work):
-    lock = Lock(work / "theirs")
+    lock = FolderLock(work / "theirs")
     before = snapshot(work)
     assert holder_of(work / "theirs").process == os.getpid()
     assert snapshot(work) == before
@@ -311,7 +311,7 @@ def test_looking_who_holds_a_folder_changes_nothing_there(work):
 
 @pytest.mark.parametrize("note", [b"", b"[]", b"7", b'{"process": {}}', b"[" * 100_000, b'{"since": 5}'])
 def test_a_lock_that_says_nonsense_is_held_by_another_run(note, work):
-    lock = Lock(work / "theirs")
+    lock = FolderLock(work / "theirs")
     (work / "theirs" / LOCK_FILE).write_bytes(note)
     assert str(holder_of(work / "theirs")).startswith("'another run'")
     lock.release()
@@ -429,7 +429,9 @@ def test_results_of_several_files_go_below_the_folder_given(projects, work, monk
 
 
 @pytest.mark.parametrize("suffix", ["", "-compare", "-converge", "_series"])
-@pytest.mark.parametrize("changes", [(), (Change("controller", "../../off", "--swap"),)], ids=["", "changed"])
+@pytest.mark.parametrize(
+    "changes", [(), (Override("controller", "../../off", "--swap"),)], ids=["", "changed"]
+)
 def test_a_default_folder_is_below_results_whatever_the_path_of_the_file(suffix, changes, work):
     for file in (
         "../base.yaml",

@@ -14,7 +14,7 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
 from orchestrator.master.simulate import simulate, simulate_in_memory
-from orchestrator.results import parquet
+from orchestrator.results import parquet_and_mdf
 from orchestrator.results.columnar import MemoryRecorder
 from orchestrator.results.formats import FILES, recorder_of
 from orchestrator.results.read import load_results
@@ -87,7 +87,7 @@ def test_results_in_memory_are_those_on_disk(tmp_path):
 
 
 def test_parquet_files_carry_units_and_row_groups(tmp_path, monkeypatch):
-    monkeypatch.setattr(parquet.ParquetRecorder, "CHUNK", BLOCK)
+    monkeypatch.setattr(parquet_and_mdf.ParquetRecorder, "CHUNK", BLOCK)
     record(tmp_path, 3 * BLOCK + 1, "parquet")
     file = pq.ParquetFile(tmp_path / "results.parquet")
     units = {field.name: field.metadata[b"unit"].decode() for field in file.schema_arrow}
@@ -161,7 +161,7 @@ def test_a_run_in_memory_that_fails_says_nothing_of_files():
 def test_a_disk_without_room_is_one_sentence_and_keeps_the_earlier_results(name, tmp_path, monkeypatch):
     import resource
 
-    monkeypatch.setattr(parquet.ParquetRecorder, "CHUNK", BLOCK)
+    monkeypatch.setattr(parquet_and_mdf.ParquetRecorder, "CHUNK", BLOCK)
     simulate(plan(50), tmp_path, opener=Stage(units()), format=name)
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (9_000, limits[1]))

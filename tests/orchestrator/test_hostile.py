@@ -12,10 +12,10 @@ import sys
 import numpy as np
 import pytest
 
-from orchestrator.master import process
-from orchestrator.master.exchange import FAILED, LOG, REPLY, Channel, Garbled
+from orchestrator.master import supervisor
+from orchestrator.master.ipc import FAILED, LOG, REPLY, PipeChannel, ProtocolError
 from orchestrator.master.log import Log
-from orchestrator.master.process import Lost, UnitProcess
+from orchestrator.master.supervisor import InstanceProcess, ProcessLost
 from orchestrator.results.read import load_results
 
 from ..trials.hostile_fmus import VALUES_OF, Case, attack, make_files
@@ -81,15 +81,15 @@ class _Pretender:
 @pytest.fixture
 def pretend(monkeypatch):
     """Ask a process that has said something else; return the sentence on how it was lost."""
-    monkeypatch.setattr(process.subprocess, "Popen", _Pretender)
+    monkeypatch.setattr(supervisor.subprocess, "Popen", _Pretender)
 
     def ask(said, *, stays=False, ask="ready"):
         monkeypatch.setattr(_Pretender, "said", said)
         monkeypatch.setattr(_Pretender, "stays", stays)
-        monkeypatch.setattr(process, "LOOK_EVERY", 1)
-        unit = UnitProcess(3, limit=0.01)
+        monkeypatch.setattr(supervisor, "LOOK_EVERY", 1)
+        unit = InstanceProcess(3, limit=0.01)
         unit.log = Log()
-        with pytest.raises(Lost) as lost:
+        with pytest.raises(ProcessLost) as lost:
             unit._answer(0.01, REPLY)
         return lost.value.in_("fmi2DoStep")
 
@@ -141,9 +141,9 @@ def test_random_bytes_in_the_pipe_never_pass_for_an_answer(pretend):
 
 def test_a_record_that_is_too_long_or_cannot_be_written_is_refused():
     reading, writing = os.pipe()
-    channel = Channel(reading, writing)
+    channel = PipeChannel(reading, writing)
     for content in ("x" * (1 << 26), {1, 2}):
-        with pytest.raises(Garbled):
+        with pytest.raises(ProtocolError):
             channel.send(REPLY, content)
     channel.close()
 

@@ -12,17 +12,16 @@ import pytest
 
 from orchestrator import files
 from orchestrator.cli import main
-from orchestrator.commands.batch import print_tables, say
 from orchestrator.commands.check import show
+from orchestrator.commands.progress import print_tables, say
 from orchestrator.errors import ScenarioError, YawbenchError
-from orchestrator.experiments.derived import parse
-from orchestrator.experiments.experiment import Experiment, load_experiment
-from orchestrator.experiments.findings import judge_results
+from orchestrator.experiments.experiment import LoadedExperiment, load_experiment
+from orchestrator.experiments.judged_schema import parse
+from orchestrator.experiments.outcome import judge_results
 from orchestrator.experiments.schema import ExperimentSpec
 from orchestrator.experiments.tables import Table
 from orchestrator.files import reading
-from orchestrator.pages.chapter import chapter
-from orchestrator.pages.report import report_page
+from orchestrator.pages.report import chapter, report_page
 from orchestrator.scenario import yaml_lines
 from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import read_changes
@@ -269,7 +268,7 @@ def test_what_an_escape_sequence_would_do_never_reaches_the_terminal(
 def test_pages_hold_no_escape_sequences_and_no_html_of_users() -> None:
     table = Table(ESCAPES, [ESCAPES], [[ESCAPES]], [ESCAPES])
     spec = ExperimentSpec.model_validate({"title": ESCAPES, "runs": [{"name": "a", "scenario": "a.yaml"}]})
-    findings = judge_results(Experiment(Path("a.yaml"), spec, {}), Path("none"))
+    findings = judge_results(LoadedExperiment(Path("a.yaml"), spec, {}), Path("none"))
     facts = chapter(findings, command=ESCAPES, stale={}, folder=Path("none"), shown_in=Path("none"))
     text = report_page([facts | {"comparison": None, "results": [table]}])
     assert text.count("&lt;script&gt;") >= 6

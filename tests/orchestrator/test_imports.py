@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import functools
 import sys
-from collections import Counter
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -19,20 +18,7 @@ PRODUCT = ("components", "vocabulary", "fmus", "orchestrator", "yawbench")
 ROOT = Path(__file__).parents[2]
 ORCHESTRATOR = Path(__file__).parents[2] / "orchestrator"
 STAGES = (
-    {
-        "errors",
-        "wording",
-        "plan",
-        "sources",
-        "cache",
-        "checksums",
-        "files",
-        "titles",
-        "writing",
-        "processes",
-        "spawning",
-        "quiet",
-    },  # what all share
+    {"errors", "messages", "plan", "labels", "cache", "checksums", "files", "processes", "quiet"},
     {"scenario"},
     {"fmu"},
     {"wiring"},
@@ -43,7 +29,7 @@ STAGES = (
     {"tyres"},  # measures for `experiments` what units want to know of their tyres
     {"evaluation"},
     {"experiments"},
-    {"interop", "scaffold", "vehicles"},
+    {"interop", "vehicles"},
     {"pages"},
     {"commands"},
     {"cli"},
@@ -182,13 +168,3 @@ def test_no_module_imports_itself_by_way_of_others():
     files = modules()
     sorter = TopologicalSorter({name: needs(name, files) for name in files})
     sorter.prepare()  # a CycleError names the circle
-
-
-def test_no_name_of_a_module_is_used_twice():
-    """But for those of commands and of the library, which are called after what users call."""
-    names = Counter(
-        path.stem
-        for name, path in modules().items()
-        if path.stem != "__init__" and not name.startswith(("orchestrator.commands.", "yawbench."))
-    )
-    assert [name for name, count in names.items() if count > 1] == []

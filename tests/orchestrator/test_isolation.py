@@ -12,11 +12,11 @@ import pytest
 
 from fmus.build import build_component
 from orchestrator.cli import main
+from orchestrator.commands.new import begin
 from orchestrator.errors import SimulationError
 from orchestrator.master.isolation import Isolation
 from orchestrator.master.simulate import simulate
 from orchestrator.results.read import load_results
-from orchestrator.scaffold.beginnings import begin
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
@@ -81,7 +81,7 @@ def test_isolated_units_give_the_same_numbers_to_the_last_bit(algorithm, fmus, t
     ]
     plan = plan_of(fmus, stop_time=0.3, algorithm=algorithm, faults=faults)
     simulate(plan, tmp_path / "together")
-    with Isolation(plan.units) as isolation:
+    with Isolation(plan.instances) as isolation:
         simulate(plan, tmp_path / "apart", opener=isolation)
     together, apart = ((tmp_path / name / "results.csv").read_bytes() for name in ("together", "apart"))
     assert together == apart
@@ -89,7 +89,7 @@ def test_isolated_units_give_the_same_numbers_to_the_last_bit(algorithm, fmus, t
 
 def test_no_process_outlives_a_run(fmus, tmp_path):
     plan = plan_of(fmus, stop_time=0.01)
-    with Isolation(plan.units) as isolation:
+    with Isolation(plan.instances) as isolation:
         simulate(plan, tmp_path, opener=isolation)
         processes = [process._popen for process in isolation._processes.values()]
     assert len(processes) == len(UNITS)
@@ -106,11 +106,11 @@ def test_units_end_when_the_master_is_killed(fmus, tmp_path):
         "from orchestrator.master.simulate import simulate\n"
         f"short = [Change('stop_time', 0.01, 'test')]\n"
         f"plan = make_plan(load_scenario({str(CAR)!r}, changes=short), fmus=Path({str(fmus)!r}))\n"
-        "isolation = Isolation(plan.units)\n"
+        "isolation = Isolation(plan.instances)\n"
         f"simulate(plan, {str(tmp_path)!r}, opener=isolation)\n"
-        "again = Isolation(plan.units)\n"
+        "again = Isolation(plan.instances)\n"
         "from orchestrator.master.log import Log\n"
-        "[again(unit, Log(), set()) for unit in plan.units]\n"
+        "[again(unit, Log(), set()) for unit in plan.instances]\n"
         "print(*(p._popen.pid for p in again._processes.values()), flush=True)\n"
         "os.kill(os.getpid(), signal.SIGKILL)\n"
     )
@@ -185,13 +185,13 @@ def test_a_failure_in_an_isolated_unit_is_the_sentence_of_one_that_is_not(fmus, 
     for opened in (None, Isolation):
         plan = plan_of(fmus, stop_time=0.01)
         broken = {"plant": {"mass": -1.0}}
-        units = [u for u in plan.units if u.name in broken]
+        units = [u for u in plan.instances if u.name in broken]
         units[0].parameters.update(broken["plant"])
         with pytest.raises(SimulationError) as error:
             if opened is None:
                 simulate(plan, tmp_path / "a")
             else:
-                with opened(plan.units) as isolation:
+                with opened(plan.instances) as isolation:
                     simulate(plan, tmp_path / "a", opener=isolation)
         sentences.append(error.value.problems[0])
     assert sentences[0] == sentences[1]
@@ -211,9 +211,9 @@ def test_a_limit_that_is_no_time_is_refused(option, says, capsys):
 
 NOBODY = """
 import os, threading
-from orchestrator.master.exchange import Channel
-from orchestrator.master.interrupts import StopFlag
-from orchestrator.master.stepping import _tell_where
+from orchestrator.master.ipc import Channel
+from orchestrator.master.process_state import StopFlag
+from orchestrator.master.child_run import _tell_where
 nobody, writing = os.pipe()
 os.close(nobody)
 asking, ask = os.pipe()

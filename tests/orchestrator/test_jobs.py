@@ -12,8 +12,7 @@ import pytest
 
 from orchestrator.errors import ResultsError, ScenarioError, SimulationError, YawbenchError
 from orchestrator.experiments.jobs import Job, read_back, ready
-from orchestrator.experiments.pool import Pool
-from orchestrator.experiments.workers import execute
+from orchestrator.experiments.workers import Pool, execute
 from orchestrator.results.read import load_results
 
 from .recorded import car, write
@@ -28,7 +27,7 @@ def record(job):
 def obey(job):
     """Do what the label says."""
     if job.label == "fails":
-        raise SimulationError("plant: step failed at t = 1 s", unit="plant", time=1.0)
+        raise SimulationError("plant: step failed at t = 1 s", instance="plant", time=1.0)
     if job.label == "wrong":
         raise ScenarioError(["first problem", "second problem"])
     if job.label == "dies":
@@ -128,7 +127,7 @@ execute(jobs(Path(sys.argv[1]), "waits"), run=tell_and_wait)
 SHARING = """
 import sys
 from pathlib import Path
-from orchestrator.experiments.pool import Pool
+from orchestrator.experiments.workers import Pool
 from tests.orchestrator.test_jobs import jobs, tell_and_wait
 with Pool(2) as pool:
     pool.map(tell_and_wait, jobs(Path(sys.argv[1]), "waits"))

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from orchestrator.experiments.listing import runs_table
+from orchestrator.experiments.tables import runs_table
 from orchestrator.metrics.run_metrics import columns_for, evaluate_all
-from orchestrator.pages.divergence import differences
-from orchestrator.results.read import load_results
-from orchestrator.results.runs import UNREADABLE, found_runs
+from orchestrator.pages.comparison import differences
+from orchestrator.results.read import UNREADABLE, found_runs, load_results
 from tests.fmu_copies import put_fmus
 
 from .recorded import car, write

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import SimulationError
-from orchestrator.master import master, operations
+from orchestrator.master import master, step_program
 from orchestrator.master.simulate import simulate
 from orchestrator.results.read import load_results
 
@@ -77,7 +77,7 @@ def test_periods_without_a_common_factor_keep_few_programs_and_change_no_number(
     made = []
 
     def programs(memory):
-        made.append(operations.Programs(memory))
+        made.append(step_program.StepProgram(memory))
         return made[-1]
 
     def positions():
@@ -89,9 +89,9 @@ def test_periods_without_a_common_factor_keep_few_programs_and_change_no_number(
         )  # fmt: skip
         return results["mass.x"], results["late.x"]
 
-    monkeypatch.setattr(master, "Programs", programs)
+    monkeypatch.setattr(master, "StepProgram", programs)
     usual = positions()
-    monkeypatch.setattr(operations, "KEPT", 5)
+    monkeypatch.setattr(step_program, "KEPT", 5)
     few = positions()
     assert (made[0].cycle, len(made[0]._made), len(made[1]._made)) == (1001, 1001, 5)
     assert len(made[1]._gathers) <= 5

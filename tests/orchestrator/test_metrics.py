@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import ScenarioError
-from orchestrator.figures.display import digits_of, shown, shown_unit
-from orchestrator.figures.panels import Run, shown_by
+from orchestrator.figures.panels import LabelledRun, shown_by
+from orchestrator.figures.style import digits_of, shown, shown_unit
 from orchestrator.metrics import catalogue, measures
-from orchestrator.metrics.run_metrics import AT_A_TIME, STANDARD, Value, evaluate, evaluate_all, metric
+from orchestrator.metrics.run_metrics import AT_A_TIME, STANDARD, MetricValue, evaluate, evaluate_all, metric
 from vocabulary.wheels import WHEELS
 
 from .recorded import UNITS, car, results
@@ -258,15 +258,17 @@ def test_the_output_that_feeds_an_input_is_the_signal_of_that_name():
         {"from": "plant.yaw_rate", "to": "driver.turn", "gain": -1.0, "offset": 0.0, "unit": "rad/s"},
     ]
     run = replace(run, run={**run.run, "connections": wires})
-    assert evaluate(run, metric("peak(yaw_moment)")) == Value(2 * T[-1], "N.m")
-    assert evaluate(run, metric("peak(sideslip)")) == Value(pytest.approx(np.radians(T[-1])), "rad")
+    assert evaluate(run, metric("peak(yaw_moment)")) == MetricValue(2 * T[-1], "N.m")
+    assert evaluate(run, metric("peak(sideslip)")) == MetricValue(pytest.approx(np.radians(T[-1])), "rad")
     assert evaluate(run, metric("peak(turn)")) is None  # another sign is another signal
-    assert [panel.name for panel in shown_by([Run("a", run)], ["yaw_moment", "turn"])] == ["yaw_moment"]
+    assert [panel.name for panel in shown_by([LabelledRun("a", run)], ["yaw_moment", "turn"])] == [
+        "yaw_moment"
+    ]
 
 
 def test_values_in_other_units_are_measured_and_drawn_in_si():
     run = results({"mine.yaw_moment": T}, T, {"mine.yaw_moment": "kN.m"})
-    assert evaluate(run, metric("peak(yaw_moment)")) == Value(pytest.approx(1000 * T[-1]), "N.m")
+    assert evaluate(run, metric("peak(yaw_moment)")) == MetricValue(pytest.approx(1000 * T[-1]), "N.m")
     assert shown_unit("kN.m") == ("N·m", 1000.0)
     assert shown_unit("deg") == ("°", pytest.approx(1.0))
     assert shown_unit("widgets") == ("widgets", 1.0)
@@ -348,7 +350,9 @@ def test_wheels_are_compared_in_pairs_and_units_converted():
         f"{unit}.load_{w}": k * f * T for k, w in enumerate(WHEELS) for unit, f in [("a", 1), ("b", 2)]
     }
     run = results(columns, T, {name: "N" if name[0] == "a" else "kN" for name in columns})
-    assert evaluate(run, metric("peak(a.load_* - b.load_*)")) == Value(pytest.approx(1999.0 * 3 * 2), "N")
+    assert evaluate(run, metric("peak(a.load_* - b.load_*)")) == MetricValue(
+        pytest.approx(1999.0 * 3 * 2), "N"
+    )
 
 
 @pytest.mark.parametrize(

@@ -5,15 +5,15 @@ from pathlib import Path
 import pytest
 
 from orchestrator.errors import ScenarioError
-from orchestrator.plan import Change
-from orchestrator.results.naming import LONGEST, default_folder
+from orchestrator.plan import Override
+from orchestrator.results.folder import LONGEST, default_folder
 
 FILE = Path("scenarios/paper/25mps.yaml")
 
 
 def folder(*changes, **given):
     return default_folder(
-        FILE, [Change(place, value, "--set") for place, value in changes], **given
+        FILE, [Override(place, value, "--set") for place, value in changes], **given
     ).as_posix()
 
 

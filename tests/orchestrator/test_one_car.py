@@ -142,7 +142,7 @@ pytestmark = pytest.mark.usefixtures("cache")
 
 
 def unit(plan, name):
-    return next(one for one in plan.units if one.name == name)
+    return next(one for one in plan.instances if one.name == name)
 
 
 def test_a_unit_takes_what_it_declares_and_what_follows(plan):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.plan import Fmu, Variable, Wire
-from orchestrator.wiring.order import Evaluation, evaluate
+from orchestrator.wiring.order import EvaluationOrder, evaluate
 
 
 def fmu(inputs: str = "", **outputs: str | None) -> Fmu:
@@ -37,7 +37,7 @@ def by_names(fmus: dict[str, Fmu]) -> list[Wire]:
     ]
 
 
-def evaluated(**fmus: Fmu) -> Evaluation:
+def evaluated(**fmus: Fmu) -> EvaluationOrder:
     return evaluate(fmus, by_names(fmus))
 
 

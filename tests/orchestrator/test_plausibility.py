@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from orchestrator.experiments.tables import MARK, marked, remarks
-from orchestrator.metrics.plausibility import CHECKS, Watch, findings_in, first_of_each
-from orchestrator.plan import Finding, Fmu, Plan, Unit, Variable, Wire
+from orchestrator.metrics.plausibility import CHECKS, PlausibilityWatch, findings_in, first_of_each
+from orchestrator.plan import Finding, Fmu, Instance, Plan, Variable, Wire
 from vocabulary.wheels import WHEELS
 
 from .recorded import car
@@ -26,14 +26,14 @@ def plan(**outputs):
     variables = {name: variable(name, **about) for name, about in outputs.items()}
     fmu = Fmu("plant_x", Path("x.fmu"), Path("x"), "", "", "x", "", variables)
     tyre = replace(fmu, name="tyre_x", variables={"friction_fl": variable("friction_fl", "input")})
-    units = (Unit("plant", fmu, 1, {}, {}), Unit("tyre", tyre, 1, {}, {"friction_fl": 0.5}))
+    units = (Instance("plant", fmu, 1, {}, {}), Instance("tyre", tyre, 1, {}, {"friction_fl": 0.5}))
     record = tuple(("plant", name) for name in outputs)
     return Plan(units, (), record, Fraction(1, 100), 100, "jacobi")
 
 
 def found(made, *columns, blocks=4):
     """Return the findings on columns that come in blocks, by kind."""
-    watch = Watch(made)
+    watch = PlausibilityWatch(made)
     time = np.linspace(0.0, 1.0, len(columns[0]))
     for rows in np.array_split(np.column_stack([time, *columns]), blocks):
         watch.look(rows)

@@ -10,7 +10,7 @@ import yaml
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from orchestrator.wiring.parameters import known_car
-from orchestrator.wiring.plausible_car import remarks_on_values
+from orchestrator.wiring.warnings import remarks_on_values
 from tests.changed import changed
 from tests.commands import status_of
 from vocabulary.vehicle import CAR, DYNAMIC_INDEX

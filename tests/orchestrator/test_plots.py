@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import ResultsError, ScenarioError
-from orchestrator.figures.panels import Run, check_panels, thinned
+from orchestrator.figures.panels import LabelledRun, check_panels, thinned
 from orchestrator.figures.plots import draw, provenance, title_of
 from orchestrator.figures.style import LINES, NOTE_WIDTH, REFERENCE, save
-from orchestrator.wording import printable
+from orchestrator.messages import printable
 
 from .recorded import car, results
 
@@ -30,11 +30,15 @@ def legend(figure):
     return [text.get_text() for box in figure.legends for text in box.get_texts()]
 
 
-SEVERAL = [Run("no control", car(2.4)), Run("fuzzy", car(1.2)), Run("neural", car(1.02))]
+SEVERAL = [
+    LabelledRun("no control", car(2.4)),
+    LabelledRun("fuzzy", car(1.2)),
+    LabelledRun("neural", car(1.02)),
+]
 
 
 def test_the_overview_of_a_car_has_the_papers_panels_in_order():
-    figure = draw([Run("run", car())])
+    figure = draw([LabelledRun("run", car())])
     assert names(figure) == [
         "steer_angle", "sideslip", "yaw_rate", "acceleration_y", "yaw_moment", "wheel_torque_*", "path",
     ]  # fmt: skip
@@ -42,30 +46,30 @@ def test_the_overview_of_a_car_has_the_papers_panels_in_order():
 
 def test_a_panel_without_its_signal_is_left_out():
     t = np.linspace(0, 1, 11)
-    figure = draw([Run("run", results({"plant.yaw_rate": t, "plant.position_x": t}, t))])
+    figure = draw([LabelledRun("run", results({"plant.yaw_rate": t, "plant.position_x": t}, t))])
     assert names(figure) == ["yaw_rate"]
 
 
 def test_a_run_with_none_of_the_signals_is_an_error():
     with pytest.raises(ResultsError, match="nothing to draw, no run recorded any of steer_angle"):
-        draw([Run("run", results({"plant.other": [0.0, 1.0]}))])
+        draw([LabelledRun("run", results({"plant.other": [0.0, 1.0]}))])
 
 
 def test_angles_are_drawn_in_degrees_and_named_so():
     run = car()
-    axes = panel(draw([Run("run", run)]), "steer_angle")
+    axes = panel(draw([LabelledRun("run", run)]), "steer_angle")
     assert axes.get_title(loc="left") == r"Steer angle $δ$ in °"
     assert np.max(axes.get_lines()[0].get_ydata()) == pytest.approx(np.degrees(0.03), rel=1e-3)
 
 
 def test_speeds_are_drawn_in_kilometres_per_hour():
-    axes = panel(draw([Run("run", car())], ["velocity_x"]), "velocity_x")
+    axes = panel(draw([LabelledRun("run", car())], ["velocity_x"]), "velocity_x")
     assert axes.get_title(loc="left").endswith("in km/h")
     assert axes.get_lines()[0].get_ydata()[0] == pytest.approx(90.0)
 
 
 def test_a_signal_with_a_reference_is_drawn_over_it():
-    lines = panel(draw([Run("run", car(1.5))]), "sideslip").get_lines()
+    lines = panel(draw([LabelledRun("run", car(1.5))]), "sideslip").get_lines()
     assert [line.get_label() == "reference" for line in lines] == [True, False]
     assert lines[0].get_zorder() <= lines[1].get_zorder()
     assert lines[0].get_linewidth() > 2 * lines[1].get_linewidth()
@@ -80,7 +84,7 @@ def test_runs_with_one_reference_share_its_line():
 def test_runs_with_references_of_their_own_show_each_in_the_runs_colour():
     slow = car(1.0)
     slow.columns["reference.sideslip_ref"] = 1.5 * slow.columns["reference.sideslip_ref"]
-    figure = draw([SEVERAL[1], Run("slow", slow)])
+    figure = draw([SEVERAL[1], LabelledRun("slow", slow)])
     pale = [line for line in panel(figure, "sideslip").get_lines() if line.get_label() == "reference"]
     assert [line.get_color() for line in pale] == [LINES[0]["color"], LINES[1]["color"]]
     assert legend(figure)[-1] == "wide and pale: the run's own reference"
@@ -89,7 +93,7 @@ def test_runs_with_references_of_their_own_show_each_in_the_runs_colour():
 def test_a_reference_that_several_runs_share_is_drawn_once_beside_that_of_another():
     slow = car(1.0)
     slow.columns["reference.sideslip_ref"] = 1.5 * slow.columns["reference.sideslip_ref"]
-    figure = draw([SEVERAL[0], Run("slow", slow), SEVERAL[1], SEVERAL[2]])
+    figure = draw([SEVERAL[0], LabelledRun("slow", slow), SEVERAL[1], SEVERAL[2]])
     pale = [line for line in panel(figure, "sideslip").get_lines() if line.get_label() == "reference"]
     assert [line.get_color() for line in pale] == [REFERENCE["color"], LINES[1]["color"]]
 
@@ -97,7 +101,9 @@ def test_a_reference_that_several_runs_share_is_drawn_once_beside_that_of_anothe
 def test_an_angle_that_passes_half_a_turn_is_not_joined_across_the_panel():
     t = np.linspace(0.0, 4.0, 401)
     angle = np.angle(np.exp(1j * np.pi * 0.6 * t))  # beyond half a turn at 1.67 s
-    (line,) = panel(draw([Run("run", results({"plant.sideslip": angle}, t))], ["sideslip"]), "sideslip").lines
+    (line,) = panel(
+        draw([LabelledRun("run", results({"plant.sideslip": angle}, t))], ["sideslip"]), "sideslip"
+    ).lines
     drawn = line.get_ydata()
     assert np.isnan(drawn).sum() == 1
     assert np.nanmax(np.abs(np.diff(drawn))) < 2.0
@@ -105,13 +111,13 @@ def test_an_angle_that_passes_half_a_turn_is_not_joined_across_the_panel():
 
 def test_a_panel_without_a_unit_ends_its_title_without_a_comma():
     slips = {f"plant.slip_ratio_{w}": [0.0, 0.1] for w in ("fl", "fr", "rl", "rr")}
-    figure = draw([Run("a", results(slips)), Run("b", results(slips))], ["slip_ratio_*"])
+    figure = draw([LabelledRun("a", results(slips)), LabelledRun("b", results(slips))], ["slip_ratio_*"])
     assert panel(figure, "slip_ratio_rl").get_title(loc="left") == "Longitudinal slip, rear left"
 
 
 def test_a_long_note_on_lost_cars_is_broken_into_lines():
-    lost = [Run(f"a car with a rather long name, number {k}", car(40.0 + k)) for k in range(3)]
-    held = [Run(f"held {k}", car(1.1)) for k in range(3)]  # no more may leave the axes than stay
+    lost = [LabelledRun(f"a car with a rather long name, number {k}", car(40.0 + k)) for k in range(3)]
+    held = [LabelledRun(f"held {k}", car(1.1)) for k in range(3)]  # no more may leave the axes than stay
     axes = panel(draw([*lost, *held], ["sideslip"]), "sideslip")
     rows = axes.texts[0].get_text().splitlines()
     assert len(rows) > 1
@@ -127,7 +133,7 @@ def test_runs_differ_in_colour_and_in_dash_pattern():
 
 
 def test_wheels_of_one_run_share_a_panel_with_a_legend():
-    axes = panel(draw([Run("run", car())]), "wheel_torque_*")
+    axes = panel(draw([LabelledRun("run", car())]), "wheel_torque_*")
     assert len(axes.get_lines()) == 4
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["fl", "fr", "rl", "rr"]
 
@@ -140,26 +146,26 @@ def test_wheels_of_several_runs_have_a_panel_each():
 
 
 def test_the_error_panel_is_in_per_cent_of_the_references_peak():
-    axes = panel(draw([Run("run", car(1.5))], ["sideslip_error"]), "sideslip_error")
+    axes = panel(draw([LabelledRun("run", car(1.5))], ["sideslip_error"]), "sideslip_error")
     assert np.max(axes.get_lines()[0].get_ydata()) == pytest.approx(50.0, rel=1e-3)
 
 
 def test_a_lost_car_leaves_the_axes_and_the_figure_says_so():
-    figure = draw([Run("lost", car(40.0)), Run("held", car(1.1))], ["sideslip"])
+    figure = draw([LabelledRun("lost", car(40.0)), LabelledRun("held", car(1.1))], ["sideslip"])
     axes = panel(figure, "sideslip")
     assert axes.get_ylim()[1] < 3 * np.degrees(1.1 * 0.6 * 0.03)
     assert [text.get_text() for text in axes.texts] == ["beyond the axes: lost, up to 41.3 °"]
 
 
 def test_a_car_beyond_a_tiny_reference_stays_in_the_axes_with_another_that_is():
-    figure = draw([Run("none", car(24.0)), Run("held", car(6.0))], ["sideslip"])
+    figure = draw([LabelledRun("none", car(24.0)), LabelledRun("held", car(6.0))], ["sideslip"])
     axes = panel(figure, "sideslip")
     assert axes.get_ylim()[1] > np.degrees(24.0 * 0.6 * 0.03)
     assert not axes.texts
 
 
 def test_a_lost_car_alone_is_shown_whole():
-    axes = panel(draw([Run("lost", car(40.0))], ["sideslip"]), "sideslip")
+    axes = panel(draw([LabelledRun("lost", car(40.0))], ["sideslip"]), "sideslip")
     assert axes.get_ylim()[1] > np.degrees(40 * 0.6 * 0.03)
     assert not axes.texts
 
@@ -167,7 +173,7 @@ def test_a_lost_car_alone_is_shown_whole():
 def path_of(length, breadth):
     x = np.linspace(0, length, 101)
     y = breadth * np.sin(np.linspace(0, np.pi, 101))
-    return draw([Run("run", results({"plant.position_x": x, "plant.position_y": y}))], ["path"])
+    return draw([LabelledRun("run", results({"plant.position_x": x, "plant.position_y": y}))], ["path"])
 
 
 def test_a_broad_path_is_drawn_to_scale():
@@ -204,12 +210,12 @@ def test_title_and_provenance_come_from_the_runs_records():
 def test_a_run_that_ended_early_is_named():
     failed = car()
     failed.run["status"] = "failed"
-    assert provenance([Run("third try", failed)]).endswith("ended early: third try")
+    assert provenance([LabelledRun("third try", failed)]).endswith("ended early: third try")
 
 
 def test_nothing_of_the_head_covers_a_panel():
     labels = ["a controller with a rather long name indeed", "another one of about that length", "short"]
-    runs = [Run(label, run.results) for label, run in zip(labels * 2, SEVERAL * 2, strict=True)]
+    runs = [LabelledRun(label, run.results) for label, run in zip(labels * 2, SEVERAL * 2, strict=True)]
     figure = draw(runs, title="A title of two lines " * 8)
     figure.draw_without_rendering()
     renderer = figure.canvas.get_renderer()
@@ -248,7 +254,7 @@ def test_a_figure_that_cannot_be_written_is_one_sentence(tmp_path):
 
 
 def test_a_title_that_the_font_cannot_show_is_no_warning(tmp_path):
-    figure = draw([Run("run", car())], title="日本")
+    figure = draw([LabelledRun("run", car())], title="日本")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         save(figure, tmp_path / "overview")
@@ -256,7 +262,7 @@ def test_a_title_that_the_font_cannot_show_is_no_warning(tmp_path):
 
 def test_a_portrait_shows_one_signal_over_the_other_with_references_and_ends():
     run = car(0.9)
-    figure = draw([Run("a", run)], ["yaw_rate(sideslip)"])
+    figure = draw([LabelledRun("a", run)], ["yaw_rate(sideslip)"])
     (axes,) = figure.axes
     reference, curve, end = axes.get_lines()
     degrees = 180 / np.pi
@@ -269,25 +275,27 @@ def test_a_portrait_shows_one_signal_over_the_other_with_references_and_ends():
 
 
 def test_a_portrait_of_a_lost_car_leaves_the_axes_to_the_one_that_is_not():
-    axes = draw([Run("lost", car(60.0)), Run("held", car(0.9))], ["yaw_rate(sideslip)"]).axes[0]
+    axes = draw([LabelledRun("lost", car(60.0)), LabelledRun("held", car(0.9))], ["yaw_rate(sideslip)"]).axes[
+        0
+    ]
     held = 180 / np.pi * np.max(np.abs(car(0.9)["plant.sideslip"]))
     assert held < axes.get_xlim()[1] < 2 * held
     assert any("lost, up to" in text.get_text() for text in axes.texts)
 
 
 def test_portraits_stand_side_by_side_and_keep_the_labels_of_their_axes():
-    figure = draw([Run("a", car())], ["yaw_rate(sideslip)", "sideslip(yaw_rate)", "yaw_rate"])
+    figure = draw([LabelledRun("a", car())], ["yaw_rate(sideslip)", "sideslip(yaw_rate)", "yaw_rate"])
     left, right, below = figure.axes
     assert left.get_xlabel() and right.get_xlabel() and below.get_xlabel() == "$t$ in s"
 
 
 def test_a_portrait_of_a_signal_that_was_not_recorded_does_not_exist():
     with pytest.raises(ResultsError):
-        draw([Run("a", car())], ["yaw_rate(roll_angle)"])
+        draw([LabelledRun("a", car())], ["yaw_rate(roll_angle)"])
 
 
 def test_a_panel_that_no_run_has_is_refused_with_the_likely_one() -> None:
-    runs = [Run("a", car())]
+    runs = [LabelledRun("a", car())]
     check_panels(runs, ["sideslip", "sideslip_error", "yaw_rate(sideslip)"])
     with pytest.raises(ScenarioError) as caught:
         check_panels(runs, ["sidslip", "sideslip_eror", "sideslip"])
@@ -302,7 +310,7 @@ def test_a_run_that_ended_at_its_start_is_one_sentence(rows):
     ended = results({name: np.zeros(rows) for name in ("plant.yaw_rate", "plant.sideslip")}, np.zeros(rows))
     ended.run.update(status="failed", error={"message": "plant: initialization failed"})
     with pytest.raises(ResultsError) as caught:
-        draw([Run("good", car()), Run("ended", ended)])
+        draw([LabelledRun("good", car()), LabelledRun("ended", ended)])
     assert caught.value.problems == [
         "made_up: nothing to draw, this run ended at its start: plant: initialization failed."
     ]
@@ -312,7 +320,7 @@ def test_a_run_that_ended_at_its_start_is_one_sentence(rows):
     "label", ["\x1b[31mred", "a\x00b", "\u202eturned", "\ufffe\uffff", "\ud800", "<&>\"'"]
 )
 def test_a_figure_is_valid_svg_whatever_characters_a_label_has(label, tmp_path):
-    runs = [Run(label, car(1.2)), Run("other", car(2.4))]
+    runs = [LabelledRun(label, car(1.2)), LabelledRun("other", car(2.4))]
     figures = {"plot": draw(runs, title=label), "portrait": draw(runs, ["yaw_rate(sideslip)"], title=label)}
     for name, figure in figures.items():
         svg, png = save(figure, tmp_path / name)

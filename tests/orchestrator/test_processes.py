@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.processes import python
-from orchestrator.spawning import SafeSpawnContext, _off_path, safe_path
+from orchestrator.processes import SafeSpawnContext, _off_path, python, safe_path
 
 SCENARIO = "fuzzy_feedback/single_sine"
 SHADOWED = ("json", "numpy", "socket", "selectors", "struct", "signal", "pickle", "multiprocessing", "random")

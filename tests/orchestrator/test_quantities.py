@@ -9,8 +9,7 @@ import pytest
 
 from orchestrator.plan import UnitDefinition
 from orchestrator.scenario import quantities
-from orchestrator.scenario.measurement_units import conversion, measure_of, parse_unit
-from orchestrator.scenario.quantities import convert, seconds
+from orchestrator.scenario.quantities import conversion, convert, measure_of, parse_unit, seconds
 
 
 @pytest.mark.parametrize(

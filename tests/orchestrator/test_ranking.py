@@ -14,19 +14,18 @@ from pathlib import Path
 import pytest
 
 from orchestrator.errors import RecordWarning
-from orchestrator.experiments.jobs import Record
-from orchestrator.experiments.ranking import Drive, load_ranking
-from orchestrator.experiments.ranking_schema import EntrySpec
-from orchestrator.experiments.standings import (
+from orchestrator.experiments.jobs import MeasuredRun
+from orchestrator.experiments.ranking import EntrySpec, RankingRun, load_ranking
+from orchestrator.experiments.ranking_scores import (
     UNHELD,
     WORST,
-    Cell,
-    Driven,
-    Standing,
+    EntryScore,
+    RankedRun,
+    RankingCell,
     deciding_digits,
     placed,
 )
-from orchestrator.figures.display import shown
+from orchestrator.figures.style import shown
 from tests.commands import status_of
 
 ROOT = Path(__file__).parents[2]
@@ -37,14 +36,14 @@ GOOD = {"stability": 1.0, "responsiveness": 1.0, "ratio_1000": 0.05, "ratio_1750
 
 def driven(multiple: float = 5.0, *, repeat: int | None = None, dry: bool = True, **numbers: float | None):
     """Return a run of a multiple of A that passes, but for what is given."""
-    drive = Drive("x", "c", multiple * A, A, repeat)
+    drive = RankingRun("x", "c", multiple * A, A, repeat)
     known = {key: None if x is None else (x, "1") for key, x in {**GOOD, **numbers}.items()}
-    return Driven(drive, dry, Record(known))
+    return RankedRun(drive, dry, MeasuredRun(known))
 
 
-def standing(name: str, *cells: list[Driven]) -> Standing:
+def standing(name: str, *cells: list[RankedRun]) -> EntryScore:
     spec = EntrySpec(title=name, fmu="f", parameters={}, source="made up", gains="authors")
-    return Standing(name, spec, {str(k): Cell(name, str(k), runs) for k, runs in enumerate(cells)})
+    return EntryScore(name, spec, {str(k): RankingCell(name, str(k), runs) for k, runs in enumerate(cells)})
 
 
 def test_a_run_that_meets_the_criteria_with_much_sideslip_has_spun_and_does_not_pass():
@@ -52,8 +51,8 @@ def test_a_run_that_meets_the_criteria_with_much_sideslip_has_spun_and_does_not_
     spun = driven(sideslip=radians(21.0))
     assert (spun.met, spun.passed, spun.verdict) == (True, False, "spun")
     assert not driven(stability=0.0).met
-    assert Cell("x", "c", [driven(), spun]).state == "spun"
-    assert Cell("x", "c", [driven(stability=0.0), spun]).state == "failed"
+    assert RankingCell("x", "c", [driven(), spun]).state == "spun"
+    assert RankingCell("x", "c", [driven(stability=0.0), spun]).state == "failed"
 
 
 @pytest.mark.parametrize("far", [0.0, None])
@@ -72,10 +71,10 @@ def test_the_margin_is_that_of_the_nearer_limit_in_points():
 
 def test_a_cell_tells_how_sure_the_mean_over_its_seeds_is():
     runs = [driven(m, repeat=r, ratio_1750=0.01 * r * m) for r in (1, 2, 3) for m in (1.0, 2.0)]
-    margin = Cell("x", "c", runs).margin
+    margin = RankingCell("x", "c", runs).margin
     assert margin.mean == pytest.approx(20.0 - 4.0)  # the least of every seed: 18, 16, 14
     assert margin.half == pytest.approx(4.302653 * 2.0 / 3**0.5, rel=1e-6)  # t of two degrees of freedom
-    assert Cell("x", "c", [driven(), driven(6.0)]).margin.half == 0.0
+    assert RankingCell("x", "c", [driven(), driven(6.0)]).margin.half == 0.0
 
 
 def test_places_go_by_conditions_passed_then_runs_then_sideslip():
@@ -113,7 +112,7 @@ def test_numbers_that_decide_places_read_differently():
 
 
 def test_an_entry_without_a_run_is_missing_and_has_no_place():
-    missing = Driven(Drive("x", "c", A, A), True, None)
+    missing = RankedRun(RankingRun("x", "c", A, A), True, None)
     first, last = placed([standing("lacks", [driven()], [driven(), missing]), standing("has", [driven()])])
     assert (first.entry, first.place) == ("has", 1)
     assert (last.entry, last.place, last.missing) == ("lacks", None, 1)
@@ -122,8 +121,8 @@ def test_an_entry_without_a_run_is_missing_and_has_no_place():
 
 
 def test_a_run_that_broke_off_counts_as_lost():
-    lost = Driven(Drive("x", "c", A, A), True, Record({}, ("the controller has crashed",)))
-    cell = Cell("x", "c", [driven(), lost])
+    lost = RankedRun(RankingRun("x", "c", A, A), True, MeasuredRun({}, ("the controller has crashed",)))
+    cell = RankingCell("x", "c", [driven(), lost])
     assert cell.state == "failed"
     assert cell.margin.mean == pytest.approx(100 * (0.20 - UNHELD))
     assert "the controller has crashed" in lost.verdict

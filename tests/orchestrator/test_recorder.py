@@ -10,12 +10,12 @@ import pytest
 from pydantic import BaseModel
 
 from orchestrator.errors import ResultsError, SimulationError
+from orchestrator.files import write_whole
 from orchestrator.master.simulate import simulate
 from orchestrator.results import recorder as module
 from orchestrator.results.read import load_results
 from orchestrator.results.recorder import BLOCK, Recorder, record_text
 from orchestrator.results.run_record import RunRecord
-from orchestrator.writing import write_whole
 
 from .fakes import Clock, Function, Stage, make_plan
 

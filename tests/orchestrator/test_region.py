@@ -13,12 +13,12 @@ from lxml import html
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.experiment import load_experiment
-from orchestrator.experiments.findings import Findings
-from orchestrator.experiments.jobs import Once, Record
-from orchestrator.experiments.margins import Gap, Region, Spot, margin
+from orchestrator.experiments.jobs import MeasuredRun, PlanningCache
+from orchestrator.experiments.margins import Gap, PointVerdict, Region, margin
+from orchestrator.experiments.outcome import ExperimentResult
 from orchestrator.experiments.planning import plan_experiment
 from orchestrator.experiments.region import judge_region, plan_region, runs_of
-from orchestrator.experiments.verdicts import region_words, verdict
+from orchestrator.experiments.verdict_tables import region_words, verdict
 from tests.checkout import ROOT
 
 SCENARIO = """
@@ -64,7 +64,7 @@ UNITS = ("driver_sine",)
 def judged(tmp_path, fmus):
     """Judge the study, texts of it replaced, with the closed form in place of runs."""
 
-    def judge(*changes: tuple[str, str], failing=lambda peak: False) -> Findings:
+    def judge(*changes: tuple[str, str], failing=lambda peak: False) -> ExperimentResult:
         text = STUDY
         for old, new in changes:
             assert old in text
@@ -73,19 +73,19 @@ def judged(tmp_path, fmus):
         (tmp_path / "sine.yaml").write_text(SCENARIO)
         (tmp_path / "double.yaml").write_text(SCENARIO.replace("0.05", "0.1"))
         experiment = load_experiment(tmp_path / "study.yaml")
-        once = Once()
+        once = PlanningCache()
         planned = plan_experiment(experiment, tmp_path / "o", fmus=fmus, once=once)
 
-        def record(job) -> Record:
-            own = job.plan.units[0].parameters
+        def record(job) -> MeasuredRun:
+            own = job.plan.instances[0].parameters
             peak = own["amplitude"] / own.get("steering_ratio", 1.0)
-            return Record({}, ("it failed",)) if failing(peak) else Record({"peak": (peak, "rad")})
+            return MeasuredRun({}, ("it failed",)) if failing(peak) else MeasuredRun({"peak": (peak, "rad")})
 
-        findings = Findings(experiment, [record(job) for job in planned.jobs], {}, planned)
+        findings = ExperimentResult(experiment, [record(job) for job in planned.jobs], {}, planned)
         plan = plan_region(planned, tmp_path / "o", once=once)
         records = {job.key: record(job) for job in plan.jobs.values()}
         regions = judge_region(plan, findings, records)
-        return Findings(experiment, findings.records, {}, planned, regions)
+        return ExperimentResult(experiment, findings.records, {}, planned, regions)
 
     return judge
 
@@ -232,11 +232,11 @@ def test_a_margin_is_a_share_of_the_threshold_and_of_the_number_where_that_is_ze
 
 
 def test_the_spread_is_how_far_the_worst_tenth_comes_towards_the_threshold():
-    points = tuple(Spot(m > 0, m) for m in (0.5, 0.4, 0.3, 0.2, 0.1, -0.1, 0.6, 0.7, 0.8, 0.9))
-    assert Region(Spot(True, 0.5), points, ()).spread == pytest.approx(0.6)
-    assert not Region(Spot(True, 0.5), points, ()).decided
-    assert Region(Spot(True, 0.05), points[:5] * 2, ()).spread == 0.0
-    assert Region(Spot(False, -0.5), points, ()).spread == pytest.approx(1.4)
+    points = tuple(PointVerdict(m > 0, m) for m in (0.5, 0.4, 0.3, 0.2, 0.1, -0.1, 0.6, 0.7, 0.8, 0.9))
+    assert Region(PointVerdict(True, 0.5), points, ()).spread == pytest.approx(0.6)
+    assert not Region(PointVerdict(True, 0.5), points, ()).decided
+    assert Region(PointVerdict(True, 0.05), points[:5] * 2, ()).spread == 0.0
+    assert Region(PointVerdict(False, -0.5), points, ()).spread == pytest.approx(1.4)
 
 
 def test_study_makes_the_runs_of_the_region_once_and_quick_leaves_them_out(

@@ -8,14 +8,14 @@ import pytest
 
 from components.sensing.noise import key, normal
 from orchestrator.errors import ScenarioError
-from orchestrator.experiments.confidence import interval
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.figures import draw_over_axes
-from orchestrator.experiments.findings import judge_records
 from orchestrator.experiments.jobs import run_job
+from orchestrator.experiments.judging import interval
+from orchestrator.experiments.outcome import judge_records
 from orchestrator.experiments.planning import plan_experiment
-from orchestrator.experiments.verdicts import HOLDS, UNDECIDED, limit_tables, run_tables, verdict
-from orchestrator.metrics.run_metrics import Value
+from orchestrator.experiments.verdict_tables import HOLDS, UNDECIDED, limit_tables, run_tables, verdict
+from orchestrator.metrics.run_metrics import MetricValue
 
 SCENARIO = """
 title: A car that turns, and its gyro
@@ -102,7 +102,7 @@ def test_numbers_over_repeats_are_means_with_their_confidence(findings):
     over = interval(told(range(1, 5)))
     value = findings.values["right/noisy", "last"]
     assert (value.number, value.half) == pytest.approx((over.mean, over.half))
-    assert findings.values["weak/quiet", "last"] == Value(0.5, "rad/s")
+    assert findings.values["weak/quiet", "last"] == MetricValue(0.5, "rad/s")
     assert findings.derived["share/right/noisy"].half == pytest.approx(over.half)
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import ResultsError
-from orchestrator.results import thinning
+from orchestrator.results import read
 from orchestrator.results.csv_file import BLOCK, CsvFile
 from orchestrator.results.read import load_results
 
@@ -197,9 +197,9 @@ def test_a_long_run_is_thinned_to_rows_that_hold_every_peak(folder, monkeypatch)
     np.savetxt(folder / "results.csv", table, "%.17g", ",", header="time,a.x,b.x_ref,a.gap", comments="")
     (folder / "run.json").write_text(json.dumps({"status": "completed", "rows": rows}))
     assert len(load_results(folder, thin=True).time) == rows  # a drawing of this is quick
-    monkeypatch.setattr(thinning, "LONG", 1000)
+    monkeypatch.setattr(read, "LONG", 1000)
     thin = load_results(folder, thin=True)
-    assert len(thin.time) < 10 * thinning.STRETCHES < rows
+    assert len(thin.time) < 10 * read.STRETCHES < rows
     assert {1.234, 30.001, 20.002, 0.777, 0.0, time[-1]} <= set(thin.time)
     kept = np.searchsorted(time, thin.time)
     for name, values in (("a.x", signal), ("b.x_ref", reference), ("a.gap", gap)):

@@ -14,7 +14,7 @@ import pytest
 from fmus.build import build_component
 from orchestrator.cli import main
 from orchestrator.master import log
-from orchestrator.master.opening import open_unit
+from orchestrator.master.fmi import open_unit
 from orchestrator.master.simulate import simulate
 from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
@@ -417,7 +417,7 @@ def repeat_runs(scenario, fmus, out):
     early = look()
     for _ in range(250):
         run()
-    return untouched, early, look(), len(plan.units)
+    return untouched, early, look(), len(plan.instances)
 
 
 @pytest.mark.exhaustive

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 
 from orchestrator.cli import main
-from orchestrator.commands.second_opinion import show
+from orchestrator.commands.interop import show
 from orchestrator.errors import WiringError
 from orchestrator.interop import second_opinion as module
-from orchestrator.interop.masters.request import Recording, Request
+from orchestrator.interop.masters import Recording, Request
 from orchestrator.interop.second_opinion import (
     AGREEMENT,
     MASTERS,
-    Opinion,
     OtherMaster,
+    SecondOpinion,
     differences,
     second_opinion,
     still_signals,
@@ -107,7 +107,7 @@ def test_a_master_that_gives_up_its_values_half_way_does_not_agree():
 
 
 def test_names_with_brackets_are_printed_whole(capsys):
-    show([Opinion(MASTERS[0], False, "", {"a.force[front]": 0.0}, {"theirs": 1e-6, "ours": 1e-6})])
+    show([SecondOpinion(MASTERS[0], False, "", {"a.force[front]": 0.0}, {"theirs": 1e-6, "ours": 1e-6})])
     assert "a.force[front]" in capsys.readouterr().out
 
 
@@ -131,10 +131,10 @@ def test_signals_that_do_not_change_are_told(capsys):
     still = still_signals(request, own)
     assert still == ("a.rounded", "b.zero_fl", "b.zero_fr")
     gaps = differences(request, own, own)
-    show([Opinion(MASTERS[0], False, "", gaps, {"theirs": 1e-6, "ours": 1e-6}, still)])
+    show([SecondOpinion(MASTERS[0], False, "", gaps, {"theirs": 1e-6, "ours": 1e-6}, still)])
     said = capsys.readouterr().out
     assert "Constant during the run, so their agreement says little: 3 of 4 signals, a.rounded" in said
-    show([Opinion(MASTERS[0], False, "", gaps, {"theirs": 1e-6, "ours": 1e-6})])
+    show([SecondOpinion(MASTERS[0], False, "", gaps, {"theirs": 1e-6, "ours": 1e-6})])
     assert "Constant" not in capsys.readouterr().out
 
 

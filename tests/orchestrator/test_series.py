@@ -16,12 +16,12 @@ from orchestrator.cli import main
 from orchestrator.errors import RecordWarning, ResultsError, YawbenchError
 from orchestrator.interop.ssp_write import write_ssp
 from orchestrator.master.simulate import simulate
-from orchestrator.plan import Plan, Series
+from orchestrator.plan import InputSeries, Plan
 from orchestrator.results.freshness import staleness
 from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
-from orchestrator.wiring.series_file import SeriesFile
+from orchestrator.wiring.series import SeriesFile
 from vocabulary.wheels import WHEELS
 
 from .fake_fmus import Var, make_fmu, out
@@ -49,12 +49,12 @@ class Witness(Behaviour):
         return {"y": u["end"]}
 
 
-def ramp(*, held: bool = False) -> Series:
-    return Series("f.csv", "c", "0", held, np.array([0.0, 0.3, 2.0]), np.array([1.0, 4.0, -13.0]))
+def ramp(*, held: bool = False) -> InputSeries:
+    return InputSeries("f.csv", "c", "0", held, np.array([0.0, 0.3, 2.0]), np.array([1.0, 4.0, -13.0]))
 
 
-def texts(*values: object) -> Series:
-    return Series("f.csv", "c", "0", True, np.array([0.0, 0.25, 0.5]), np.array(values, dtype=object))
+def texts(*values: object) -> InputSeries:
+    return InputSeries("f.csv", "c", "0", True, np.array([0.0, 0.25, 0.5]), np.array(values, dtype=object))
 
 
 def run(algorithm: str, period: int, tmp_path: Path, *, held: bool = False) -> list[tuple]:
@@ -70,7 +70,7 @@ def run(algorithm: str, period: int, tmp_path: Path, *, held: bool = False) -> l
         step="1/8", n_steps=12, algorithm=algorithm, periods={"w": period},  # type: ignore[arg-type]
         constants={"w": {name: one.first(0.0) for name, one in series.items()}},
     )  # fmt: skip
-    plan.units[0].series.update(series)
+    plan.instances[0].series.update(series)
     simulate(plan, tmp_path, opener=Stage({"w": witness}))
     return witness.seen
 
@@ -99,12 +99,12 @@ def test_a_held_series_keeps_each_value_until_the_next(tmp_path):
 def test_an_instant_given_in_decimals_counts_as_reached(tmp_path):
     """0.1 + 0.2 is more than 0.3 in binary numbers, and 3 x 0.1 too."""
     witness = Witness()
-    series = Series("f", "c", "0", True, np.array([0.0, 0.1 + 0.2]), np.array([0.0, 1.0]))
+    series = InputSeries("f", "c", "0", True, np.array([0.0, 0.1 + 0.2]), np.array([0.0, 1.0]))
     plan = fake_plan(
         {"w": witness}, step="1/10", n_steps=4, algorithm="gauss_seidel",
         constants={"w": {"middle": 0.0, "end": 0.0, "count": 0, "word": ""}},
     )  # fmt: skip
-    plan.units[0].series.update(middle=series)
+    plan.instances[0].series.update(middle=series)
     simulate(plan, tmp_path, opener=Stage({"w": witness}))
     assert [one[1] for one in witness.seen] == [0.0, 0.0, 1.0, 1.0]
 
@@ -132,7 +132,7 @@ def test_an_integrated_series_is_of_second_order_when_extrapolated(algorithm, or
     for n in (10, 20):
         units = {"a": Area()}
         plan = fake_plan(units, step=f"1/{n}", n_steps=n, algorithm=algorithm, constants={"a": {"rate": 1.0}})
-        plan.units[0].series.update(rate=Series("f", "c", "0", False, times, np.exp(times)))
+        plan.instances[0].series.update(rate=InputSeries("f", "c", "0", False, times, np.exp(times)))
         simulate(plan, tmp_path / str(n), opener=Stage(units))
         error.append(abs(load_results(tmp_path / str(n))["a.x"][-1] - (math.e - 1)))
     assert math.log2(error[0] / error[1]) == pytest.approx(order, abs=0.1)
@@ -195,7 +195,7 @@ def problem(path: Path) -> str:
 
 
 def test_columns_are_read_relative_to_the_scenario_in_units_and_types_of_the_inputs(folder: Path) -> None:
-    (plant,) = plan_of(scenario()).units
+    (plant,) = plan_of(scenario()).instances
     steer = plant.series["steer_angle"]
     assert steer.times.tolist() == [0.0, 0.5, 1.0]
     assert steer.values.tolist() == pytest.approx([0.0, math.pi / 2, math.pi])
@@ -227,12 +227,12 @@ def test_recorded_results_are_a_source_with_their_units(form, folder, monkeypatc
 
     units = {"driver": Clock()}
     plan = fake_plan(units, step="1/10", n_steps=10)
-    variables = plan.units[0].fmu.variables
+    variables = plan.instances[0].fmu.variables
     object.__setattr__(variables["angle"], "unit", "deg")
     simulate(plan, folder / "recorded", opener=Stage(units), format=form)
     file = f"../recorded/results.{form}"
     path = scenario(plant_steer_angle=f"{{file: {file}, column: driver.angle}}")
-    (plant,) = plan_of(path).units
+    (plant,) = plan_of(path).instances
     assert plant.series["steer_angle"].values[-1] == pytest.approx(math.pi / 2)
     assert plant.series["steer_angle"].times[-1] == pytest.approx(1.0)
 
@@ -312,11 +312,11 @@ def test_what_is_wrong_with_a_series_is_said_before_the_run(given: str, says: st
 def test_a_series_may_hold_its_ends_and_a_held_one_reaches_one_interval_on(folder: Path) -> None:
     (folder / "runs/short.csv").write_text("time,x\n0.25,1\n0.5,2\n")
     hold = "{file: short.csv, column: x, extrapolate: hold}"
-    (plant,) = plan_of(scenario(plant_steer_angle=hold)).units
+    (plant,) = plan_of(scenario(plant_steer_angle=hold)).instances
     assert plant.series["steer_angle"].at(np.array([0.0, 0.375, 9.0])).tolist() == [1.0, 1.5, 2.0]
     (folder / "runs/short.csv").write_text("time,x\n0,1\n0.5,2\n")
     held = "{file: short.csv, column: x, interpolation: held}"
-    assert plan_of(scenario(plant_steer_angle=held)).units[0].series["steer_angle"].held
+    assert plan_of(scenario(plant_steer_angle=held)).instances[0].series["steer_angle"].held
 
 
 def test_an_archive_for_other_programs_has_no_place_for_a_series(folder: Path) -> None:

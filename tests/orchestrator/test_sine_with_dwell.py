@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 
 from components.drivers.sine_with_dwell import SineWithDwellParameters, sine_with_dwell
-from orchestrator.evaluation.dwell_run import evaluate_dwell
-from orchestrator.evaluation.dwell_series import amplitudes, is_series, judge_series
-from orchestrator.evaluation.judgement import Judgement, NotJudged, Verdict
-from orchestrator.evaluation.slow_steer import G, characteristic_angle, evaluate_slow_steer
+from orchestrator.evaluation.judgement import Evaluation, NotJudged, Verdict
+from orchestrator.evaluation.sine_with_dwell import amplitudes, evaluate_dwell, is_series, judge_series
 from orchestrator.evaluation.standard_tests import TESTS
+from orchestrator.evaluation.steering_tests import G, characteristic_angle, evaluate_slow_steer
 from orchestrator.evaluation.trace import Trace, load_mapping, load_trace
 from orchestrator.figures.style import save
 from tests.commands import status_of
@@ -73,7 +72,7 @@ def trace(
     return Trace("made up", t, signals, **{"mass": 1800.0, **more})
 
 
-def verdicts(judged: Judgement) -> dict[str, str]:
+def verdicts(judged: Evaluation) -> dict[str, str]:
     return {name: ruling.verdict.value for name, ruling in judged.rulings.items()}
 
 
@@ -273,7 +272,7 @@ def test_a_series_passes_only_if_no_run_is_missing_fails_or_is_not_judged():
         made = []
         for side in (1.0, -1.0):
             for amplitude in amplitudes(A):
-                judged = Judgement(f"{degrees(side * amplitude):.0f}")
+                judged = Evaluation(f"{degrees(side * amplitude):.0f}")
                 judged.add("amplitude", "amplitude", side * amplitude, "rad")
                 judged.rule("stability", True, "")
                 judged.rule("responsiveness", True, "")

@@ -8,8 +8,8 @@ from collections import namedtuple
 import pytest
 
 from orchestrator.cli import main
-from orchestrator.results import size
-from orchestrator.results.size import expected_size, size_note
+from orchestrator.results import formats
+from orchestrator.results.formats import expected_size, size_note
 from tests.fmu_copies import put_fmus
 
 from .fakes import Clock, make_plan
@@ -46,7 +46,7 @@ def test_results_that_do_not_fit_are_announced_whatever_their_size(plan_of, tmp_
 
 
 def test_run_tells_before_it_starts(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(size, "HUGE", 1000)
+    monkeypatch.setattr(formats, "HUGE", 1000)
     put_fmus(tmp_path, components=["driver_sine"])
     (tmp_path / "a.yaml").write_text("stop_time: 1\nstep_size: 0.01\nunits: {driver: {fmu: driver_sine}}\n")
     out = tmp_path / "out"

@@ -6,23 +6,23 @@ import shutil
 
 import pytest
 
-from orchestrator import sources
+from orchestrator import cache
 
 
 @pytest.fixture
 def copy(tmp_path, monkeypatch):
     """A copy of the code in place of the program's own."""
-    here = sources._HERE
+    here = cache._HERE
     shutil.copytree(here, tmp_path / "copy", ignore=shutil.ignore_patterns("__pycache__"))
-    monkeypatch.setattr(sources, "_HERE", tmp_path / "copy")
-    sources.sources_hash.cache_clear()
+    monkeypatch.setattr(cache, "_HERE", tmp_path / "copy")
+    cache.sources_hash.cache_clear()
     yield tmp_path / "copy"
-    sources.sources_hash.cache_clear()
+    cache.sources_hash.cache_clear()
 
 
 def hashes():
-    sources.sources_hash.cache_clear()
-    return sources.sources_hash(sources.OF_RESULTS), sources.sources_hash(sources.OF_METRICS)
+    cache.sources_hash.cache_clear()
+    return cache.sources_hash(cache.OF_RESULTS), cache.sources_hash(cache.OF_METRICS)
 
 
 def test_code_that_has_a_say_in_the_numbers_changes_the_hash_and_no_other(copy):

@@ -15,11 +15,10 @@ from lxml import etree
 
 from orchestrator.cli import main
 from orchestrator.errors import ResultsError, YawbenchError
-from orchestrator.interop.omsimulator import for_omsimulator
-from orchestrator.interop.ssp_write import write_ssp
+from orchestrator.interop.ssp_write import for_omsimulator, write_ssp
 from orchestrator.master.simulate import simulate
 from orchestrator.scenario.load import load_scenario
-from orchestrator.scenario.ssp_names import DESCRIPTION_FILE, SSC, SSD, SSM, SSV
+from orchestrator.scenario.ssp_archive import DESCRIPTION_FILE, SSC, SSD, SSM, SSV
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 
@@ -100,7 +99,7 @@ def bound(inner, **attributes):
 
 
 def unit_of(plan, name):
-    return next(unit for unit in plan.units if unit.name == name)
+    return next(unit for unit in plan.instances if unit.name == name)
 
 
 def problem(archive, fmus, **options):
@@ -118,8 +117,8 @@ def test_a_round_trip_gives_the_same_numbers_to_the_last_bit(scenario, fmus, tmp
     back = make_plan(load_scenario(tmp_path / "system.ssp"))
     assert back.n_steps == plan.n_steps
     assert back.algorithm == plan.algorithm == "extrapolated"
-    assert [unit.constants for unit in back.units] == [unit.constants for unit in plan.units]
-    assert [unit.period for unit in back.units] == [unit.period for unit in plan.units]
+    assert [unit.constants for unit in back.units] == [unit.constants for unit in plan.instances]
+    assert [unit.period for unit in back.units] == [unit.period for unit in plan.instances]
     assert results_of(back, tmp_path / "back") == results_of(plan, tmp_path / "plan")
 
 
@@ -282,7 +281,7 @@ def test_names_that_cannot_name_a_unit_are_changed(feedback, fmus, tmp_path):
         own.remove(record)
     path = redescribed(path, tmp_path / "recorded.ssp", root)
     plan = make_plan(load_scenario(path), fmus=fmus)
-    assert {unit.name for unit in plan.units} == {
+    assert {unit.name for unit in plan.instances} == {
         "driver",
         "reference",
         "controller",

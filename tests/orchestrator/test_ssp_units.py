@@ -9,11 +9,10 @@ from pathlib import Path
 import pytest
 
 from orchestrator.errors import YawbenchError
-from orchestrator.interop.omsimulator import for_omsimulator
-from orchestrator.interop.ssp_write import system_structure, write_ssp
+from orchestrator.interop.ssp_write import for_omsimulator, system_structure, write_ssp
 from orchestrator.plan import Plan, Wire
 from orchestrator.scenario.load import load_scenario
-from orchestrator.scenario.ssp_names import SSC, SSD, SSV
+from orchestrator.scenario.ssp_archive import SSC, SSD, SSV
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
 
@@ -171,7 +170,7 @@ def test_a_value_at_a_systems_connector_is_converted_on_its_way(tmp_path):
         connectors=connector("u", "input", "deg"),
         bindings=bindings,
     )
-    (b,) = plan_of(path).units
+    (b,) = plan_of(path).instances
     assert b.constants == {"x": pytest.approx(10 * math.pi / 2 + 0.5)}
 
 

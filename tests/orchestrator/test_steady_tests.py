@@ -12,18 +12,15 @@ from scipy.signal import lsim
 
 import yawbench as yb
 from components.drivers.sine_sweep import SineSweepParameters, sweep
-from orchestrator.evaluation.frequency_response import evaluate_sweep
-from orchestrator.evaluation.judgement import Judgement, Verdict
-from orchestrator.evaluation.lane_change_run import evaluate_lane_change
-from orchestrator.evaluation.lane_change_series import highest_clean, judge_entry_speeds
-from orchestrator.evaluation.step_response import evaluate_step
+from orchestrator.evaluation.braking_and_wind import evaluate_turn
+from orchestrator.evaluation.judgement import Evaluation, Verdict
+from orchestrator.evaluation.lane_change import evaluate_lane_change, highest_clean, judge_entry_speeds
+from orchestrator.evaluation.steering_tests import evaluate_step, evaluate_sweep, evaluate_understeer
 from orchestrator.evaluation.trace import Trace, trace_of
-from orchestrator.evaluation.turn_response import evaluate_turn
-from orchestrator.evaluation.understeer import evaluate_understeer
 from orchestrator.results.read import Results
 from orchestrator.scenario.catalogue import SHIPPED
 from orchestrator.scenario.load import load_scenario
-from orchestrator.tyres.axle_stiffness import cornering_stiffness
+from orchestrator.tyres.stand import cornering_stiffness
 from orchestrator.wiring.make_plan import make_plan
 from vocabulary.wheels import WHEELS
 
@@ -127,7 +124,7 @@ def test_the_understeer_gradient_does_not_depend_on_what_is_held(sampling, held)
 def theory() -> tuple[float, float, float, float]:
     """Return wheelbase, stability factor K, steering ratio and speed; stiffness of the tyres."""
     plan = make_plan(load_scenario(SHIPPED / "proving_ground" / "step_steer.yaml"))
-    units = {unit.name: unit for unit in plan.units}
+    units = {unit.name: unit for unit in plan.instances}
     car = units["plant"].parameters
     m, a, b = (car[name] for name in ("mass", "cg_to_front_axle", "cg_to_rear_axle"))
     loads = {"fl": m * 9.81 * b / (a + b) / 2, "rl": m * 9.81 * a / (a + b) / 2}
@@ -212,7 +209,7 @@ def test_what_is_always_clean_or_never_ends_at_the_bounds():
 
 def test_a_series_counts_no_clean_run_above_one_that_was_not():
     def run(speed, clean):
-        judged = Judgement(f"{speed}")
+        judged = Evaluation(f"{speed}")
         judged.add("entry", "speed", speed, "m/s")
         judged.rule("clean", clean, "")
         return judged

@@ -15,25 +15,23 @@ from lxml import html
 from rich.console import Console
 
 from orchestrator.errors import ScenarioError
-from orchestrator.experiments.derived import calculate, rank_correlation
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.figures import draw_all
-from orchestrator.experiments.findings import judge_results
 from orchestrator.experiments.grids import correlation
 from orchestrator.experiments.jobs import Job, Outcome
-from orchestrator.experiments.judged_schema import Claim, GridSpec
+from orchestrator.experiments.judged_schema import Claim, GridSpec, calculate, rank_correlation
 from orchestrator.experiments.judging import judge
+from orchestrator.experiments.outcome import judge_results
 from orchestrator.experiments.planning import jobs_of
 from orchestrator.experiments.record import write_findings
 from orchestrator.experiments.tables import Table, for_terminal
-from orchestrator.experiments.verdicts import claim_tables, derived_tables, run_tables, share
-from orchestrator.figures.display import Run, shown
-from orchestrator.metrics.run_metrics import Value
+from orchestrator.experiments.verdict_tables import claim_tables, derived_tables, run_tables, share
+from orchestrator.figures.style import LabelledRun, shown
+from orchestrator.metrics.run_metrics import MetricValue
 from orchestrator.pages.animation import MOST
-from orchestrator.pages.chapter import animation, chapter
-from orchestrator.pages.facts import animation_of
-from orchestrator.pages.report import report_page
-from orchestrator.plan import Change
+from orchestrator.pages.page_parts import animation_of
+from orchestrator.pages.report import animation, chapter, report_page
+from orchestrator.plan import Override
 from tests.pages.made_up import data_in
 
 from .recorded import car, write
@@ -157,7 +155,9 @@ def test_numbers_that_decide_a_verdict_read_differently(value, bound, expected):
     condition = {"run": "a", "metric": "far", "below": {"run": "b", "metric": "far"}}
     claim = Claim.model_validate({"says": "Less.", "holds_if": [condition]})
     found = judge(
-        claim, {("a", "far"): Value(value, "m"), ("b", "far"): Value(bound, "m")}, {"a": "held", "b": "free"}
+        claim,
+        {("a", "far"): MetricValue(value, "m"), ("b", "far"): MetricValue(bound, "m")},
+        {"a": "held", "b": "free"},
     )
     assert (found.holds, found.measured) == (value < bound, (expected,))
 
@@ -166,12 +166,12 @@ def test_a_number_beside_a_threshold_that_it_misses_by_little_is_told_from_it():
     claim = Claim.model_validate(
         {"says": "No more.", "holds_if": [{"run": "a", "metric": "x", "at_most": "5 %"}]}
     )
-    found = judge(claim, {("a", "x"): Value(0.0500004, "%")}, {"a": "held"})
+    found = judge(claim, {("a", "x"): MetricValue(0.0500004, "%")}, {"a": "held"})
     assert (found.holds, found.measured) == (False, ("5.00004 % (held)",))
     angle = Claim.model_validate(
         {"says": "No more.", "holds_if": [{"run": "a", "metric": "x", "at_most": "0.0002 deg"}]}
     )
-    (text,) = judge(angle, {("a", "x"): Value(np.radians(3e-4), "rad")}, {"a": "held"}).measured
+    (text,) = judge(angle, {("a", "x"): MetricValue(np.radians(3e-4), "rad")}, {"a": "held"}).measured
     assert not text.startswith("<")
 
 
@@ -200,7 +200,7 @@ figures:
 
 
 def test_runs_beyond_those_that_an_animation_can_show_are_named():
-    seen = animation_of([Run(str(k), car(1.0 + k)) for k in range(MOST + 2)], "Many")
+    seen = animation_of([LabelledRun(str(k), car(1.0 + k)) for k in range(MOST + 2)], "Many")
     assert seen is not None
     assert len(data_in(seen.drawing)["runs"]) == MOST
     assert seen.left_out == f"{MOST} and {MOST + 1}: an animation shows up to {MOST} runs"
@@ -213,9 +213,9 @@ def test_for_stands_for_one_run_per_combination(study, tmp_path):
     assert (run.label, run.row) == ("neural network", "25 m/s, neural network")
     assert run.scenario == tmp_path / "25mps.yaml"
     assert run.changes == (
-        Change("driver.amplitude", 0.03, "study"),
-        Change("controller.learning", True, "study"),
-        Change("controller", "controller_fnn", "study"),
+        Override("driver.amplitude", 0.03, "study"),
+        Override("controller.learning", True, "study"),
+        Override("controller", "controller_fnn", "study"),
     )
     assert (runs["slow"].label, runs["slow"].row) == ("slow", "slow")
 
@@ -223,12 +223,12 @@ def test_for_stands_for_one_run_per_combination(study, tmp_path):
 def test_a_run_becomes_a_job_with_a_folder_of_its_own(study, tmp_path):
     *_, job = jobs_of(study(), tmp_path / "out")
     assert job.out == tmp_path / "out" / "slow"
-    assert job.changes == (Change("stop_time", 2.0, "study"), Change("algorithm", "jacobi", "study"))
+    assert job.changes == (Override("stop_time", 2.0, "study"), Override("algorithm", "jacobi", "study"))
 
 
 def test_an_fmu_given_by_its_path_is_relative_to_the_study_file(study, tmp_path):
     run = study(('"controller_{controller}"', '"mine/{controller}.fmu"')).runs["15mps/fnn"]
-    assert run.changes[-1] == Change("controller", str(tmp_path / "mine/fnn.fmu"), "study")
+    assert run.changes[-1] == Override("controller", str(tmp_path / "mine/fnn.fmu"), "study")
 
 
 def test_all_problems_of_a_study_are_reported_at_once(study):
@@ -334,7 +334,7 @@ def test_a_run_that_ended_early_counts_as_failed(study, out):
 
 
 def test_operators_and_factors_compare_as_they_say():
-    values = {("a", "m"): Value(1.0, "N.m"), ("b", "m"): Value(2.0, "N.m")}
+    values = {("a", "m"): MetricValue(1.0, "N.m"), ("b", "m"): MetricValue(2.0, "N.m")}
 
     def holds(**condition):
         claim = Claim(says="x", holds_if=[{"run": "a", "metric": "m", **condition}])
@@ -523,7 +523,9 @@ def test_what_is_wrong_with_grids_and_derived_numbers_is_said(with_grid, old, ne
 
 
 def test_a_long_heading_over_numbers_is_broken_on_the_terminal():
-    table = Table("", ["run", "controller_sliding_mode switching=saturation"], [["a", Value(1.0, "N.m")]])
+    table = Table(
+        "", ["run", "controller_sliding_mode switching=saturation"], [["a", MetricValue(1.0, "N.m")]]
+    )
     (shape,) = for_terminal(table).renderables
     assert str(shape.columns[1].header) == "controller_sliding_mode\nswitching=saturation"
 
@@ -644,9 +646,9 @@ def test_a_rank_correlation_may_be_that_of_part_of_a_grid():
         "beside": [{"run": "aside", "says": "aside", "published": 9.0}],
     })  # fmt: skip
     numbers = {"1_1": 1, "1_2": 2, "2_1": 4, "2_2": 3, "3_1": 9, "3_2": 0, "aside": 20}
-    values = {(run, "m"): Value(float(number), "1") for run, number in numbers.items()}
+    values = {(run, "m"): MetricValue(float(number), "1") for run, number in numbers.items()}
     assert correlation(spec, values, {"i": ["1"]}) == pytest.approx(1.0)
     assert correlation(spec, values, {"i": ["2", "3"], "k": ["1"]}) == pytest.approx(1.0)
     assert correlation(spec, values, {"i": ["2", "3"]}) == pytest.approx(-0.4)
     assert correlation(spec, values) < 1.0
-    assert correlation(spec, {("1_1", "m"): Value(1.0, "1")}, {"i": ["1"]}) is None
+    assert correlation(spec, {("1_1", "m"): MetricValue(1.0, "1")}, {"i": ["1"]}) is None

@@ -17,7 +17,7 @@ from lxml import html
 from fmus.build import build_component
 from orchestrator.cli import main
 from orchestrator.errors import RecordWarning, ResultsError
-from orchestrator.experiments.jobs import Record
+from orchestrator.experiments.jobs import MeasuredRun
 from orchestrator.experiments.journal import Journal
 from orchestrator.results.read import load_results
 
@@ -330,15 +330,15 @@ def test_a_folder_of_another_sweep_is_refused(moods, yawbench, tmp_path):
 
 def test_a_line_that_a_kill_has_cut_off_is_dropped(tmp_path):
     first = Journal(tmp_path, "a/b.yaml")
-    first.add("one", Record({"x": (float("inf"), "s"), "y": None, "z": (0.1, "m")}))
-    first.add("two", Record({}, ("plant: step failed", "and more")))
-    first.add("four", Record({"x": None}, findings=("spin",), ended="plant: ended the run at t = 1 s"))
+    first.add("one", MeasuredRun({"x": (float("inf"), "s"), "y": None, "z": (0.1, "m")}))
+    first.add("two", MeasuredRun({}, ("plant: step failed", "and more")))
+    first.add("four", MeasuredRun({"x": None}, findings=("spin",), ended="plant: ended the run at t = 1 s"))
     first.close()
     with (tmp_path / "runs.jsonl").open("ab") as stream:
         stream.write(b'{"key": "three", "val')
     again = Journal(tmp_path, "a/b.yaml")
     assert again.records == first.records
-    again.add("three", Record({"x": (1.0, "s")}))
+    again.add("three", MeasuredRun({"x": (1.0, "s")}))
     again.close()
     last = Journal(tmp_path, "a/b.yaml")
     assert list(last.records) == ["one", "two", "four", "three"]
@@ -359,8 +359,8 @@ def test_a_journal_without_checksums_is_of_an_earlier_version(tmp_path):
 
 
 RECORDS = {
-    "one": Record({"slip": (0.0302, "rad"), "moment": (12.0, "N.m")}),
-    "two": Record({"slip": None, "moment": (13.0, "N.m")}, findings=("spin",)),
+    "one": MeasuredRun({"slip": (0.0302, "rad"), "moment": (12.0, "N.m")}),
+    "two": MeasuredRun({"slip": None, "moment": (13.0, "N.m")}, findings=("spin",)),
 }
 
 
@@ -419,7 +419,7 @@ def test_a_changed_head_of_a_journal_is_said_and_its_runs_are_kept(tmp_path):
 
 def test_a_path_that_is_no_utf_8_comes_back_from_the_journal(tmp_path):
     made = Journal(tmp_path, "a/b.yaml")
-    made.add("one", Record({}, ("/home/\udcff: no such file",)))
+    made.add("one", MeasuredRun({}, ("/home/\udcff: no such file",)))
     made.close()
     again = Journal(tmp_path, "a/b.yaml")
     again.close()

@@ -9,14 +9,13 @@ import pyarrow.parquet as pq
 import pytest
 
 from orchestrator.errors import ResultsError
+from orchestrator.experiments.axis_figures import boundary, edges
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.figures import draw_over_axes
-from orchestrator.experiments.findings import Findings
-from orchestrator.experiments.jobs import Job, Record, measured
-from orchestrator.experiments.limits import limit_table, limits_of
-from orchestrator.experiments.metric_drawing import boundary, edges
-from orchestrator.experiments.planning import Planned
-from orchestrator.experiments.table import columns_of, to_pandas, write_table
+from orchestrator.experiments.jobs import Job, MeasuredRun, measured
+from orchestrator.experiments.outcome import ExperimentResult, limit_table, limits_of
+from orchestrator.experiments.planning import PlannedExperiment
+from orchestrator.experiments.record import columns_of, to_pandas, write_table
 
 from .fakes import Clock, make_plan
 from .recorded import car
@@ -67,9 +66,11 @@ def swept(tmp_path):
             jobs.append(Job("", tmp_path, tmp_path, plan=plan, key=f"{number:032}"))
             found = value(*(level.value for level in point))
             values = {} if found is None else {"sideslip": (math.radians(found), "rad")}
-            records.append(Record(values, () if values else ("plant: it failed",)))
+            records.append(MeasuredRun(values, () if values else ("plant: it failed",)))
         units = {"friction": "1", "speed": "m/s"}
-        return Findings(sweep, records, {}, Planned(sweep, jobs, units, {"sideslip": "rad"}, {}))
+        return ExperimentResult(
+            sweep, records, {}, PlannedExperiment(sweep, jobs, units, {"sideslip": "rad"}, {})
+        )
 
     return make
 

@@ -9,8 +9,7 @@ import pytest
 from scipy.stats import qmc
 
 from orchestrator.errors import ScenarioError
-from orchestrator.experiments.axis_schema import AxisSpec
-from orchestrator.experiments.design import level_at
+from orchestrator.experiments.axes import AxisSpec, level_at
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.planning import plan_experiment
 from tests.changed import changed
@@ -143,14 +142,14 @@ def test_plans_hold_what_the_axes_say(sweep, fmus, tmp_path):
     )
     planned = planned_of(sweep(text=text), fmus)
     assert len(planned.jobs) == 16
-    units = [{unit.name: unit for unit in run.plan.units} for run in planned.jobs]
+    units = [{unit.name: unit for unit in run.plan.instances} for run in planned.jobs]
     assert [unit["reference"].constants["velocity_x"] for unit in units] == [10.0] * 8 + [20.0] * 8
     assert {(u["driver"].parameters["amplitude"], u["driver"].parameters["start_time"]) for u in units} == {
         (0.01, 0.01), (0.05, 0.05),
     }  # fmt: skip
     assert [unit["reference"].parameters["mass"] for unit in units[:2]] == [1100, 1500]
     assert [unit["controller"].parameters.get("moment_range") for unit in units[:4]] == [None, None, 500, 500]
-    assert planned.units == {"amplitude": "m/s", "both": "rad"}
+    assert planned.instances == {"amplitude": "m/s", "both": "rad"}
     assert planned.number("amplitude", planned.experiment.points[0][0]) == 10.0
     assert len({run.key for run in planned.jobs}) == 16
 
@@ -164,7 +163,7 @@ def test_steps_and_algorithms_can_be_varied(sweep, fmus, tmp_path):
     assert [(float(run.plan.step), run.plan.algorithm) for run in planned.jobs] == [
         (0.01, "jacobi"), (0.01, "extrapolated"), (0.005, "jacobi"), (0.005, "extrapolated"),
     ]  # fmt: skip
-    assert planned.units == {"amplitude": "s"}
+    assert planned.instances == {"amplitude": "s"}
     assert planned.number("amplitude", planned.experiment.points[-1][0]) == 0.005
 
 
@@ -175,7 +174,7 @@ def test_a_variant_changes_several_things_at_once(sweep, fmus, tmp_path):
     )
     loaded = sweep((AMPLITUDE, "{vary: driver.frequency, values: [1, 2]}"), (CONTROL, variants))
     first, second = (
-        {unit.name: unit for unit in run.plan.units} for run in planned_of(loaded, fmus).jobs[:2]
+        {unit.name: unit for unit in run.plan.instances} for run in planned_of(loaded, fmus).jobs[:2]
     )
     assert first["controller"].fmu.name == "controller_fuzzy_sideslip"
     assert "amplitude" not in first["driver"].parameters
@@ -324,7 +323,7 @@ def test_options_change_all_runs_as_the_file_would(sweep, tmp_path, fmus):
         changes=changed([f"controller={fmus / 'controller_off.fmu'}"]),
     )  # fmt: skip
     for run in planned_of(swapped, fmus).jobs:
-        assert {unit.name: unit.fmu.name for unit in run.plan.units}["controller"] == "controller_off"
+        assert {unit.name: unit.fmu.name for unit in run.plan.instances}["controller"] == "controller_off"
 
 
 @pytest.mark.parametrize(

@@ -10,12 +10,12 @@ import pytest
 
 from orchestrator.experiments import figures as sweep_figures
 from orchestrator.figures import plots
-from orchestrator.figures.panels import Run
+from orchestrator.figures.panels import LabelledRun
 from orchestrator.figures.plots import draw
 from orchestrator.figures.style import save
-from orchestrator.plan import Change
+from orchestrator.labels import changed, changed_each, changes_in, with_changes
+from orchestrator.plan import Override
 from orchestrator.results.read import load_results
-from orchestrator.titles import changed, changed_each, changes_in, with_changes
 
 from .recorded import car
 
@@ -110,15 +110,15 @@ def test_everything_made_of_a_run_names_all_that_was_changed(yawbench, tmp_path,
 def test_the_figure_of_a_sweep_names_what_options_changed(yawbench, fmus, tmp_path):
 
     from orchestrator.experiments.experiment import load_experiment
-    from orchestrator.experiments.findings import judge_records
-    from orchestrator.experiments.jobs import Record
+    from orchestrator.experiments.jobs import MeasuredRun
+    from orchestrator.experiments.outcome import judge_records
     from orchestrator.experiments.planning import plan_experiment
     from tests.changed import changed as given
 
     (tmp_path / "sweep.yaml").write_text(SWEEP)
     sweep = load_experiment(tmp_path / "sweep.yaml", changes=given(settings=["inputs.friction*=0.3"]))
     planned = plan_experiment(sweep, tmp_path, fmus=fmus)
-    records = {job.key: Record({"sideslip": (0.1, "rad")}) for job in planned.jobs}
+    records = {job.key: MeasuredRun({"sideslip": (0.1, "rad")}) for job in planned.jobs}
     figure = sweep_figures.draw_over_axes(judge_records(planned, records), sweep.spec.figures[0])
     assert "changed: inputs.friction* = 0.3" in texts(figure)
 
@@ -130,45 +130,45 @@ def made(*changes):
     return results
 
 
-ICE = Change("inputs.friction*", 0.3, "--set")
-OFF = Change("controller", "mine/controller_off.fmu", "--swap")
-SLOW = Change("plant.initial_speed", "50 km/h", "--set")
+ICE = Override("inputs.friction*", 0.3, "--set")
+OFF = Override("controller", "mine/controller_off.fmu", "--swap")
+SLOW = Override("plant.initial_speed", "50 km/h", "--set")
 
 
 def test_an_overlay_names_what_was_changed_for_all_and_for_each():
-    figure = draw([Run("a", made(ICE, OFF)), Run("b", made(ICE, SLOW))])
+    figure = draw([LabelledRun("a", made(ICE, OFF)), LabelledRun("b", made(ICE, SLOW))])
     said = "inputs.friction* = 0.3; a: controller_off for controller; b: plant.initial_speed = 50 km/h"
     assert f"changed: {said}" in texts(figure)
 
 
 def test_a_figure_with_a_title_of_its_own_names_changes_at_its_foot():
-    figure = draw([Run("a", made(ICE)), Run("b", made(OFF))], title="Figure 7")
+    figure = draw([LabelledRun("a", made(ICE)), LabelledRun("b", made(OFF))], title="Figure 7")
     foot = flat(figure.texts[-1].get_text())
     assert "changed: a: inputs.friction* = 0.3; b: controller_off for controller" in foot
 
 
 def test_a_long_list_of_changes_is_wrapped_and_never_cut(tmp_path):
-    many = [Change(f"controller.gain_{k}", k / 7, "--set") for k in range(40)]
-    figure = draw([Run("a", made(*many))])
+    many = [Override(f"controller.gain_{k}", k / 7, "--set") for k in range(40)]
+    figure = draw([LabelledRun("a", made(*many))])
     save(figure, tmp_path / "long")
     assert all(f"controller.gain_{k} = " in texts(figure) for k in range(40))
     assert max(len(line) for text in figure.texts for line in text.get_text().splitlines()) <= 165
 
 
 def test_dollars_in_titles_and_labels_are_no_formulas(tmp_path):
-    results = [made(Change("driver.name", "$x_{", "--set")), made()]
+    results = [made(Override("driver.name", "$x_{", "--set")), made()]
     for one in results:
         one.run["title"] = r"Costs $5_{ and $\frac"
-    figure = draw([Run("$a_{$", results[0]), Run(r"$\b$", results[1])])
+    figure = draw([LabelledRun("$a_{$", results[0]), LabelledRun(r"$\b$", results[1])])
     save(figure, tmp_path / "dollars")
     assert (tmp_path / "dollars.png").stat().st_size > 0
 
 
 def test_changes_are_told_in_words():
     assert changed([OFF, ICE]) == "controller_off for controller, inputs.friction* = 0.3"
-    assert changed([Change("plant.locked", True, "--set")]) == "plant.locked = true"
-    assert changed([Change("step_size", 0.002, "study")]) == "step_size = 0.002 s"
-    assert changed([Change("vehicle", "/cars/saloon.yaml", "sweep")]) == "vehicle file saloon.yaml"
+    assert changed([Override("plant.locked", True, "--set")]) == "plant.locked = true"
+    assert changed([Override("step_size", 0.002, "study")]) == "step_size = 0.002 s"
+    assert changed([Override("vehicle", "/cars/saloon.yaml", "sweep")]) == "vehicle file saloon.yaml"
     assert with_changes("Lane change", [ICE]) == "Lane change (changed: inputs.friction* = 0.3)"
     assert with_changes("Lane change", []) == "Lane change"
     assert changed_each([("a", [ICE]), ("b", [ICE])]) == "inputs.friction* = 0.3"
@@ -183,8 +183,8 @@ def test_a_record_of_another_shape_names_no_changes():
 def test_the_record_of_a_swap_reads_back_as_it_was(yawbench, tmp_path):
     yawbench("run", SCENARIO, "--swap", "controller=controller_off", "--set", "stop_time=0.01", "--out", "r")
     assert changes_in(load_results(tmp_path / "r").run) == (
-        Change("controller", "controller_off", "--swap"),
-        Change("stop_time", 0.01, "--set"),
+        Override("controller", "controller_off", "--swap"),
+        Override("stop_time", 0.01, "--set"),
     )
 
 

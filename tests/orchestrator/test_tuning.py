@@ -10,9 +10,9 @@ from lxml import html
 from ruamel.yaml import YAML
 
 from orchestrator.cli import main
-from orchestrator.experiments.ranking_schema import EntriesSpec
+from orchestrator.experiments.ranking import EntriesSpec
 from orchestrator.scenario import yaml_lines
-from orchestrator.scenario.strict import validate
+from orchestrator.scenario.validation import validate
 
 SCENARIO = """
 title: A steering wheel

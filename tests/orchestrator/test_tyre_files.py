@@ -14,8 +14,8 @@ from orchestrator.errors import ScenarioError, WiringError
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.planning import plan_experiment
 from orchestrator.interop.ssp_write import write_ssp
-from orchestrator.results.key import key_of
-from orchestrator.results.naming import default_folder
+from orchestrator.results.folder import default_folder
+from orchestrator.results.freshness import key_of
 from orchestrator.results.read import load_results
 from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import changes_of, read_changes
@@ -72,7 +72,7 @@ def yawbench(arguments):
 
 
 def parameters(planned, unit="tyre"):
-    return {u.name: u.parameters for u in planned.units}[unit]
+    return {u.name: u.parameters for u in planned.instances}[unit]
 
 
 def test_every_unit_takes_what_it_declares_for_both_axles(folder, fmus):
@@ -82,7 +82,7 @@ def test_every_unit_takes_what_it_declares_for_both_axles(folder, fmus):
     assert (control["pkx1_front"], control["pkx1_rear"]) == (18.0, 25.0)
     assert "pky1_front" not in control
     assert not set(parameters(planned, "plant")) & set(tyre)
-    origins = {u.name: u.origins for u in planned.units}
+    origins = {u.name: u.origins for u in planned.instances}
     assert (str(origins["tyre"]["pky1_front"]), str(origins["tyre"]["pky1_rear"])) == (
         "soft.tir",
         "stiff.tir",

@@ -7,8 +7,7 @@ import pytest
 
 from components.tyres.magic_formula_62 import MagicFormula62
 from orchestrator.scenario.tir import read_tir
-from orchestrator.tyres.stand import State, put_on_stand, stiffnesses
-from orchestrator.tyres.tyre_drawing import draw_tyre
+from orchestrator.tyres.stand import WheelState, draw_tyre, put_on_stand, stiffnesses
 from tests.commands import status_of
 from tests.components.stand import Stand as Bench
 
@@ -16,10 +15,10 @@ from .tir_files import write
 
 UNITS = ("tyre_magic_formula_62", "tyre_magic_formula_62_transient", "tyre_dugoff", "controller_off")
 STATES = [
-    State(0.05, 0.02, 3000.0),
-    State(-0.1, -0.3, 5000.0),
-    State(0.2, 0.4, 6000.0),
-    State(0.0, 0.0, 4000.0),
+    WheelState(0.05, 0.02, 3000.0),
+    WheelState(-0.1, -0.3, 5000.0),
+    WheelState(0.2, 0.4, 6000.0),
+    WheelState(0.0, 0.0, 4000.0),
 ]
 
 

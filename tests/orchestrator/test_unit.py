@@ -10,10 +10,10 @@ import fmpy
 import pytest
 
 from orchestrator.errors import ModelDescriptionError, SimulationError
+from orchestrator.master.fmi import open_unit
 from orchestrator.master.isolation import Isolation
-from orchestrator.master.opening import open_unit
 from orchestrator.master.simulate import simulate
-from orchestrator.plan import Fmu, Plan, Unit, Variable, Wire
+from orchestrator.plan import Fmu, Instance, Plan, Variable, Wire
 from orchestrator.results.read import load_results
 
 HERE = Path(__file__).parent
@@ -52,8 +52,8 @@ CONSTANTS = {"Real_in": 0.75, "Integer_in": -21, "Boolean_in": True, "String_in"
 def chain(fmu, answer=0, algorithm="extrapolated"):
     """Two units of one FMU, the second fed by the first."""
     units = (
-        Unit("a", fmu, 1, {"answer": 0}, dict(CONSTANTS)),
-        Unit("b", fmu, 1, {"answer": answer}, {}),
+        Instance("a", fmu, 1, {"answer": 0}, dict(CONSTANTS)),
+        Instance("b", fmu, 1, {"answer": answer}, {}),
     )
     wires = tuple(Wire("a", f"{kind}_out", "b", f"{kind}_in") for kind in TYPES)
     record = tuple((unit, f"{kind}_out") for unit in "ab" for kind in TYPES)
@@ -102,7 +102,7 @@ def test_a_failed_instance_is_ended_as_the_standard_allows(fmu, held, answer, en
 
 def test_a_warning_with_printf_arguments_is_readable(fmu, held, tmp_path):
     info = simulate(chain(fmu, 1), tmp_path / "out")
-    assert [(m.unit, m.time, m.text) for m in info.warnings] == [
+    assert [(m.instance, m.time, m.text) for m in info.warnings] == [
         ("b", 0.25, "valve 3 of b is 99.5% open, größer als gedacht")
     ]
     assert counters(fmu) == [2, 2, 2]
@@ -112,7 +112,7 @@ def test_a_warning_with_printf_arguments_is_readable(fmu, held, tmp_path):
 @pytest.mark.parametrize("answer", [-1, 42])
 def test_a_number_that_is_no_status_ends_the_run(fmu, answer, isolated, tmp_path):
     plan = chain(fmu, answer)
-    with Isolation(plan.units) as isolation, pytest.raises(SimulationError) as caught:
+    with Isolation(plan.instances) as isolation, pytest.raises(SimulationError) as caught:
         simulate(plan, tmp_path / "out", opener=isolation if isolated else open_unit)
     assert "b: step failed at t = 0.25 s: " in str(caught.value)
     assert load_results(tmp_path / "out").time[-1] == 0.25
@@ -123,18 +123,18 @@ def test_a_number_that_is_no_status_ends_the_run(fmu, answer, isolated, tmp_path
 )
 def test_an_instance_that_cannot_be_ended_is_reported(fmu, held, answer, word, ended, tmp_path):
     info = simulate(chain(fmu, AT_THE_END + answer), tmp_path / "out")
-    assert [(m.unit, m.text) for m in info.warnings] == [("b", f"fmi2Terminate returned {word}")]
+    assert [(m.instance, m.text) for m in info.warnings] == [("b", f"fmi2Terminate returned {word}")]
     assert counters(fmu) == ended  # after Fatal no function of any instance may be called
     assert load_results(tmp_path / "out").run["status"] == "completed"
 
 
 def test_an_fmu_that_refuses_to_be_instantiated_says_why(fmu, held, tmp_path):
     plan = chain(fmu)
-    refusing = replace(plan.units[1], fmu=replace(fmu, guid="{refuse}"))
+    refusing = replace(plan.instances[1], fmu=replace(fmu, guid="{refuse}"))
     with pytest.raises(
         SimulationError, match=r"^b: .*foreign\.fmu cannot be instantiated: no licence in the shop$"
     ):
-        simulate(replace(plan, units=(plan.units[0], refusing)), tmp_path / "out")
+        simulate(replace(plan, instances=(plan.instances[0], refusing)), tmp_path / "out")
     assert counters(fmu) == [1, 0, 1]
 
 

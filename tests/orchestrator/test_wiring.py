@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from orchestrator.errors import ModelDescriptionError, WiringError, YawbenchError
-from orchestrator.plan import Change, Plan, Unit, Wire
+from orchestrator.plan import Instance, Override, Plan, Wire
 from orchestrator.scenario.load import load_scenario
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
@@ -108,14 +108,14 @@ def problems(path: Path, kind: type[YawbenchError] = WiringError, **options: Any
     return caught.value.problems
 
 
-def unit(made: Plan, name: str) -> Unit:
-    return next(u for u in made.units if u.name == name)
+def unit(made: Plan, name: str) -> Instance:
+    return next(u for u in made.instances if u.name == name)
 
 
 def test_the_plan_holds_units_wires_and_the_time_grid() -> None:
     made = plan()
-    assert [u.name for u in made.units] == ["driver", "plant", "controller", "tyre"]
-    assert [u.period for u in made.units] == [1, 1, 2, 1]
+    assert [u.name for u in made.instances] == ["driver", "plant", "controller", "tyre"]
+    assert [u.period for u in made.instances] == [1, 1, 2, 1]
     assert (made.step, made.n_steps, made.algorithm) == (Fraction(1, 1000), 8000, "extrapolated")
     assert Wire("driver", "steer_angle", "plant", "steer_angle") in made.wires
     assert Wire("driver", "steer_angle", "controller", "steer_angle") in made.wires
@@ -128,7 +128,7 @@ def test_the_plan_holds_units_wires_and_the_time_grid() -> None:
 
 def test_wires_are_in_the_order_of_their_targets() -> None:
     made = plan()
-    names = [u.name for u in made.units]
+    names = [u.name for u in made.instances]
     places = [
         (names.index(w.target), list(unit(made, w.target).fmu.variables).index(w.input)) for w in made.wires
     ]
@@ -138,8 +138,8 @@ def test_wires_are_in_the_order_of_their_targets() -> None:
 def test_every_input_has_exactly_one_source() -> None:
     made = plan()
     sources = [(w.target, w.input) for w in made.wires]
-    sources += [(u.name, name) for u in made.units for name in u.constants]
-    inputs = [(u.name, v.name) for u in made.units for v in u.fmu.of("input")]
+    sources += [(u.name, name) for u in made.instances for name in u.constants]
+    inputs = [(u.name, v.name) for u in made.instances for v in u.fmu.of("input")]
     assert sorted(sources) == sorted(inputs)
 
 
@@ -952,8 +952,8 @@ def test_every_value_says_where_it_comes_from(folder: Path) -> None:
 def test_a_plan_names_what_is_other_than_in_the_scenario_file() -> None:
     made = plan(settings=["inputs.friction*=0.3", "driver.amplitude=0.05", "driver.amplitude=0.1"])
     assert made.changes == (
-        Change("inputs.friction*", 0.3, "--set"),
-        Change("driver.amplitude", 0.1, "--set"),
+        Override("inputs.friction*", 0.3, "--set"),
+        Override("driver.amplitude", 0.1, "--set"),
     )
 
 

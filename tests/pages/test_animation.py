@@ -12,8 +12,7 @@ import pytest
 
 from components.driving.track import LaneChangeParameters
 from orchestrator.cli import main
-from orchestrator.pages.animation import assets, fragment, page
-from orchestrator.pages.animation_frames import FRAMES
+from orchestrator.pages.animation import FRAMES, assets, fragment, page
 from tests.orchestrator.recorded import write
 
 from .browser import DESK, PHONE, Browser

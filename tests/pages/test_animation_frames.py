@@ -11,8 +11,16 @@ import pytest
 
 from components.driving.track import LaneChangeParameters, Track
 from orchestrator.errors import ResultsError
-from orchestrator.pages.animation import data_of, force_scale, page, still_of
-from orchestrator.pages.animation_frames import FRAMES, frames_of, rotated, thinned
+from orchestrator.pages.animation import (
+    FRAMES,
+    data_of,
+    force_scale,
+    frames_of,
+    page,
+    rotated,
+    still_of,
+    thinned,
+)
 from tests.orchestrator.recorded import car
 from vocabulary.lane_change import lanes_of
 from vocabulary.wheels import WHEELS

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.metrics.run_metrics import Value
-from orchestrator.pages.comparison import difference, parting_summary
-from orchestrator.pages.divergence import SAME, divergence, targets_of
+from orchestrator.metrics.run_metrics import MetricValue
+from orchestrator.pages.comparison import SAME, difference, divergence, parting_summary, targets_of
 from tests.orchestrator.recorded import car, results
 
 T = np.linspace(0.0, 1.0, 101)
@@ -101,11 +100,11 @@ def test_signals_of_one_run_alone_are_named():
 @pytest.mark.parametrize(
     ("first", "second", "text"),
     [
-        (Value(2.0, "m/s2"), Value(2.5, "m/s2"), "+0.500 m/s²"),
-        (Value(1.4, "%"), Value(0.2, "%"), "−120 points"),
-        (Value(0.1, "rad"), Value(0.1, "rad"), "the same"),
-        (Value(1.0, "s"), Value(float("inf"), "s"), ""),
-        (None, Value(1.0, "s"), ""),
+        (MetricValue(2.0, "m/s2"), MetricValue(2.5, "m/s2"), "+0.500 m/s²"),
+        (MetricValue(1.4, "%"), MetricValue(0.2, "%"), "−120 points"),
+        (MetricValue(0.1, "rad"), MetricValue(0.1, "rad"), "the same"),
+        (MetricValue(1.0, "s"), MetricValue(float("inf"), "s"), ""),
+        (None, MetricValue(1.0, "s"), ""),
     ],
 )
 def test_differences_carry_their_sign_and_unit(first, second, text):

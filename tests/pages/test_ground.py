@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.pages.animation import data_of, page
-from orchestrator.pages.animation_frames import frames_of
-from orchestrator.pages.ground import MOST, clipped, ground_of
+from orchestrator.pages.animation import data_of, frames_of, page
+from orchestrator.pages.friction_map import MOST, clipped, ground_of
 from vocabulary.friction_table import table_of
 from vocabulary.patches import friction_at, inside_polygon, patches_of
 

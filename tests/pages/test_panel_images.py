@@ -7,11 +7,11 @@ from urllib.parse import unquote
 import pytest
 from lxml import etree
 
-from orchestrator.figures.panels import Run
-from orchestrator.pages.panel_images import address_of, in_html, panel_images
+from orchestrator.figures.panels import LabelledRun
+from orchestrator.pages.page_parts import address_of, in_html, panel_images
 from tests.orchestrator.recorded import car
 
-RUNS = [Run("off <b>", car(2.4)), Run("fuzzy & neural", car(1.02, chatter=300.0))]
+RUNS = [LabelledRun("off <b>", car(2.4)), LabelledRun("fuzzy & neural", car(1.02, chatter=300.0))]
 
 
 def svg_of(image) -> etree._Element:
@@ -59,7 +59,7 @@ def test_panels_of_one_scale_keep_the_same_limits():
 
 
 def test_a_panel_stays_small_even_if_its_signal_chatters():
-    (image,), _ = panel_images([Run("long", car(n=80_001, chatter=500.0))], ["yaw_moment"])
+    (image,), _ = panel_images([LabelledRun("long", car(n=80_001, chatter=500.0))], ["yaw_moment"])
     assert len(image.address) < 60_000
 
 

@@ -8,20 +8,19 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.checksums import checksum
 from orchestrator.pages.provenance import (
     CHOSEN,
     ERRATUM,
     LITERATURE,
     NEUTRAL,
     PAPER,
-    Origin,
+    ValueSource,
     groups_of,
     origin_of,
     said_in,
 )
-from orchestrator.results.digest import checksum
-from orchestrator.results.freshness import staleness
-from orchestrator.results.key import key_of
+from orchestrator.results.freshness import key_of, staleness
 from orchestrator.results.recorder import record_text
 from orchestrator.results.run_record import run_record
 from orchestrator.scenario.load import load_scenario
@@ -71,16 +70,19 @@ parameters:
     ],
 )
 def test_the_first_word_of_a_source_says_what_it_is(source, kind):
-    assert origin_of(source) == Origin(kind, source)
+    assert origin_of(source) == ValueSource(kind, source)
 
 
 @pytest.mark.parametrize(
     ("comment", "origin"),
     [
-        ("axle; chosen: that of the tyres; rounded", Origin(CHOSEN, "chosen: that of the tyres; rounded")),
-        ("erratum: printed as 12", Origin(ERRATUM, "erratum: printed as 12")),
-        ("wheelbase 3.05 m, chosen by nobody", Origin(PAPER, "wheelbase 3.05 m, chosen by nobody")),
-        ("", Origin(PAPER, "")),
+        (
+            "axle; chosen: that of the tyres; rounded",
+            ValueSource(CHOSEN, "chosen: that of the tyres; rounded"),
+        ),
+        ("erratum: printed as 12", ValueSource(ERRATUM, "erratum: printed as 12")),
+        ("wheelbase 3.05 m, chosen by nobody", ValueSource(PAPER, "wheelbase 3.05 m, chosen by nobody")),
+        ("", ValueSource(PAPER, "")),
     ],
 )
 def test_a_comment_says_where_a_value_comes_from_or_else_its_file_does(comment, origin):
@@ -127,7 +129,7 @@ def test_a_unit_s_parameters_come_from_the_scenario_or_else_from_the_fmu(groups)
     assert reference["sideslip_limit"].origin.says == "chosen: wide"
     assert "mass" not in reference
     learning = groups["controller: controller_fnn"]["learning_rate"]
-    assert (learning.origin, list(learning.values)) == (Origin(PAPER, "paper A, equation (35)"), ["2"])
+    assert (learning.origin, list(learning.values)) == (ValueSource(PAPER, "paper A, equation (35)"), ["2"])
     assert learning.meaning == "Learning rate alpha"
 
 

@@ -15,7 +15,7 @@ from lxml import html
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError
 from orchestrator.experiments.experiment import load_experiment
-from orchestrator.experiments.verdicts import share
+from orchestrator.experiments.verdict_tables import share
 from orchestrator.pages.report import found_studies
 from orchestrator.results.recorder import record_text
 

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from orchestrator.pages.diagram import diagonal, diagrams, stack
-from orchestrator.pages.system import system_of, systems_of
-from orchestrator.plan import Fmu, Plan, Unit, Wire
+from orchestrator.pages.diagram import diagonal, diagrams, stack, system_of, systems_of
+from orchestrator.plan import Fmu, Instance, Plan, Wire
 from vocabulary.wheels import WHEELS
 
 
@@ -27,7 +26,7 @@ def plan(controller: str = "controller_off", *, extra: bool = False) -> Plan:
     if extra:
         wires.append(Wire("road", "friction", "controller", "friction"))
     fmus = {name: Fmu(fmu, Path(fmu), Path(fmu), "0" * 64, "", fmu, "", {}) for name, fmu in names.items()}
-    units = tuple(Unit(name, fmus[name], 1, {}, {}) for name in reversed(names))  # evaluation order
+    units = tuple(Instance(name, fmus[name], 1, {}, {}) for name in reversed(names))  # evaluation order
     scenario = {"units": dict.fromkeys(names)}
     return Plan(
         units, tuple(wires), (), Fraction(1, 1000), 1000, "extrapolated", title="made up", scenario=scenario

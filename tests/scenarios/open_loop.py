@@ -88,7 +88,7 @@ class Missed:
 def known_car(name: str) -> dict[str, float]:
     """Return the parameters of the estimator in a scenario of real signals, as a run gives them."""
     plan = yb.load(f"real_signals/{name}").plan()
-    (unit,) = (unit for unit in plan.units if unit.name == "estimator")
+    (unit,) = (unit for unit in plan.instances if unit.name == "estimator")
     return {k: float(v) for k, v in unit.parameters.items() if k not in ("initial_friction",)}
 
 

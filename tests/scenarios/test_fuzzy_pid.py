@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from orchestrator.experiments.experiment import load_experiment
-from orchestrator.experiments.findings import derive
 from orchestrator.experiments.jobs import Job
+from orchestrator.experiments.outcome import derive
 from orchestrator.experiments.workers import execute
-from orchestrator.figures.display import shown
-from orchestrator.metrics.run_metrics import Value
+from orchestrator.figures.style import shown
+from orchestrator.metrics.run_metrics import MetricValue
 from orchestrator.results.read import load_results
 from tests.changed import changed
 from tests.commands import status_of
@@ -90,7 +90,7 @@ def test_the_gains_of_the_study_are_those_that_tuning_prefers(whole):
         for run, of in (("off", "off"), ("tuned", controller)):
             for road in SCENARIOS:
                 for key, found in whole["runs"][f"{road}/{of}"]["metrics"].items():
-                    values[f"{road}/{run}", key] = Value(found["value"], found["unit"])
+                    values[f"{road}/{run}", key] = MetricValue(found["value"], found["unit"])
         return derive(spec, values)[spec.tuning.objective].number
 
     assert cost("off") == pytest.approx(1.0)

@@ -8,9 +8,9 @@ import pytest
 
 import yawbench as yb
 from orchestrator.experiments.experiment import load_experiment
-from orchestrator.experiments.findings import judge_results
-from orchestrator.experiments.verdicts import run_tables
-from orchestrator.figures.display import shown
+from orchestrator.experiments.outcome import judge_results
+from orchestrator.experiments.verdict_tables import run_tables
+from orchestrator.figures.style import shown
 from tests.studies import check_figures, judge_all, judge_some, verdicts
 from tests.verdicts import recorded
 

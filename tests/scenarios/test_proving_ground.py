@@ -7,14 +7,14 @@ from math import degrees, radians
 import pytest
 
 import yawbench as yb
-from orchestrator.evaluation.dwell_run import evaluate_dwell
-from orchestrator.evaluation.judgement import Judgement, Verdict
-from orchestrator.evaluation.lane_change_run import evaluate_lane_change
-from orchestrator.evaluation.slow_steer import evaluate_slow_steer
+from orchestrator.evaluation.judgement import Evaluation, Verdict
+from orchestrator.evaluation.lane_change import evaluate_lane_change
+from orchestrator.evaluation.sine_with_dwell import evaluate_dwell
+from orchestrator.evaluation.steering_tests import evaluate_slow_steer
 from orchestrator.evaluation.trace import trace_of
-from orchestrator.plan import Change
+from orchestrator.plan import Override
 from orchestrator.scenario.catalogue import SHIPPED
-from yawbench.scenario import Scenario
+from yawbench._scenario import Scenario
 
 pytestmark = pytest.mark.exhaustive
 
@@ -24,11 +24,11 @@ A = {"large_saloon": 44.5, "saloon75": 35.9, "hard": 30.2}
 
 def scenario(name: str, vehicle: str) -> Scenario:
     base = yb.load(f"proving_ground/{name}")
-    change = Change("vehicle", str(SHIPPED / "vehicles" / f"{vehicle}.yaml"), "test")
+    change = Override("vehicle", str(SHIPPED / "vehicles" / f"{vehicle}.yaml"), "test")
     return Scenario(base.path, (change,), base.programs)
 
 
-def dwell(amplitude: float, controller: str = "off", **settings: object) -> Judgement:
+def dwell(amplitude: float, controller: str = "off", **settings: object) -> Evaluation:
     """Return what saloon75 comes to with an amplitude [deg]."""
     made = scenario("sine_with_dwell", "saloon75").swap(controller=f"controller_{controller}")
     run = made.set({"driver.amplitude": radians(amplitude), **settings}).run()

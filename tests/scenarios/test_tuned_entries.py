@@ -10,7 +10,7 @@ from ruamel.yaml import YAML
 
 import yawbench as yb
 from orchestrator.cli import main
-from orchestrator.experiments.design import level_at
+from orchestrator.experiments.axes import level_at
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.tuning import DIGITS, tuning_of
 from orchestrator.scenario.catalogue import SHIPPED
@@ -49,7 +49,7 @@ def test_what_was_found_lies_in_its_ranges_about_the_authors_gains(law):
     assert given.keys() == spec.set.keys() | sought.keys()
     assert given == given | spec.set
     plan = yb.load("proving_ground/sine_with_dwell").swap(controller=FOUND[law]["fmu"]).set(given).plan()
-    (variables,) = (unit.fmu.variables for unit in plan.units if unit.name == "controller")
+    (variables,) = (unit.fmu.variables for unit in plan.instances if unit.name == "controller")
     for place, axis in sought.items():
         assert given[place] == float(f"{given[place]:.{DIGITS}g}")
         assert axis.start <= given[place] <= axis.end

@@ -16,10 +16,20 @@ from orchestrator.errors import WiringError
 from orchestrator.fmu.opener import Opener
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.scenario.load import load_scenario
-from orchestrator.tyres.axle_stiffness import cornering_stiffness
+from orchestrator.tyres.stand import cornering_stiffness
 from orchestrator.vehicles import handling
-from orchestrator.vehicles.handling import SAMPLE, TURN_SPEED, Handling, fit, handling_of, modes_of
-from orchestrator.vehicles.proving import PLANTS, STEP, TestTrack, fitting_plant
+from orchestrator.vehicles.handling import (
+    PLANTS,
+    SAMPLE,
+    STEP,
+    TURN_SPEED,
+    Handling,
+    TestTrack,
+    fit,
+    fitting_plant,
+    handling_of,
+    modes_of,
+)
 from orchestrator.wiring.derivations import car_of
 from orchestrator.wiring.make_plan import make_plan
 from tests.changed import changed
@@ -80,7 +90,7 @@ def test_a_reference_is_told_the_slope_of_the_tyres_formula_at_the_static_loads(
     p = YAML(typ="safe").load(file("mid_size").read_text())["parameters"]
     loads = car_of({key: float(value) for key, value in p.items()}).values
     plan = steady_turn(fmus, vehicle=str(file("mid_size")))
-    told = next(unit for unit in plan.units if unit.name == "reference").parameters
+    told = next(unit for unit in plan.instances if unit.name == "reference").parameters
     for axle in ("front", "rear"):
         scale = {f"cornering_stiffness_scale_{axle}": p[f"cornering_stiffness_scale_{axle}"]}
         of_tyre = coefficients(MagicFormulaParameters(**scale), axle)
@@ -227,7 +237,7 @@ def test_every_car_of_the_library_is_whole_and_says_where_it_comes_from(name):
 def test_every_car_of_the_library_fits_every_plant(fmus, name):
     for plant in PLANTS:
         plan = track(fmus, name, plant).plan({"fmu": "driver_sine"}, 20.0, STEP)
-        of_plant = next(unit for unit in plan.units if unit.name == "plant")
+        of_plant = next(unit for unit in plan.instances if unit.name == "plant")
         by_default = {v.name for v in of_plant.fmu.of("parameter")} - of_plant.parameters.keys()
         assert not {key for key in by_default if key in CAR and CAR[key].needed}
         assert plan.findings == ()

@@ -136,7 +136,7 @@ def load(file: Path, kind: str, once: Any) -> None:
     """Read a file as the commands do, up to where runs would begin."""
     from orchestrator.experiments.experiment import load_experiment
     from orchestrator.metrics.run_metrics import evaluate_all
-    from orchestrator.plan import Change
+    from orchestrator.plan import Override
     from orchestrator.results.read import load_results
     from orchestrator.scenario.load import load_scenario
     from orchestrator.wiring.make_plan import make_plan
@@ -155,7 +155,7 @@ def load(file: Path, kind: str, once: Any) -> None:
         uses = (one for one in sorted(file.parents[1].rglob("*.yaml")) if _uses(one, name))
         base = next(uses, file.parents[1] / "fnn_sideslip" / "25mps.yaml")
         make_plan(
-            load_scenario(base, changes=(Change("vehicle", str(file), "test"),)), fmus=fmus, opener=opener
+            load_scenario(base, changes=(Override("vehicle", str(file), "test"),)), fmus=fmus, opener=opener
         )
     else:
         make_plan(load_scenario(file), fmus=fmus, opener=opener)
@@ -193,9 +193,9 @@ def work(pipe: Connection, group: str, numbers: list[int], seed: int, folder: Pa
     os.environ.update(box.environment())
     tempfile.tempdir = None
     os.chdir(box.work)
-    from orchestrator.experiments.jobs import Once
+    from orchestrator.experiments.jobs import PlanningCache
 
-    once = Once()
+    once = PlanningCache()
     sys.unraisablehook = lambda _: None  # as in the command line
     outcome_of(lambda: load(box.scenarios / "fnn_sideslip" / "25mps.yaml", "scenario", once))  # modules, FMUs
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))

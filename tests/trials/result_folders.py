@@ -33,10 +33,10 @@ from typing import Any
 import yawbench as yb
 from orchestrator.cli import main as yawbench
 from orchestrator.errors import YawbenchError
+from orchestrator.files import LOCK_FILE
+from orchestrator.messages import printable
+from orchestrator.results.columnar import write_results
 from orchestrator.results.formats import FILES
-from orchestrator.results.write import write_results
-from orchestrator.wording import printable
-from orchestrator.writing import LOCK_FILE
 from tests.orchestrator import recorded
 from tests.trees import snapshot
 

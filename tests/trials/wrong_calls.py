@@ -31,7 +31,7 @@ from pathlib import Path
 from typing import Any
 
 import yawbench as yb
-from orchestrator.wording import unprintable
+from orchestrator.messages import unprintable
 
 from .wrong_values import TEXTS, WRONG, plant_links
 
@@ -340,11 +340,11 @@ def b_fault(kind: str, name: str, **more: Any) -> Callable[[Any], Any]:
 
 def plan_all(axes: Mapping[Any, Any]) -> None:
     """Make an experiment, and plan its runs as `run` does before it makes them."""
-    from orchestrator.experiments.jobs import Once
+    from orchestrator.experiments.jobs import PlanningCache
     from orchestrator.experiments.planning import plan_experiment
 
     made = yb.experiment(BENCH.base, axes, metrics="peak(sideslip)")
-    plan_experiment(made.design, made.base.path.parent, once=Once(**made.base._opening()))
+    plan_experiment(made.design, made.base.path.parent, once=PlanningCache(**made.base._opening()))
 
 
 def rank(name: str, **more: Any) -> Callable[[Any], Any]:

@@ -182,7 +182,7 @@ def test_what_python_code_raises_is_the_cause(base):
     with pytest.raises(yb.SimulationError, match=r"controller: .*ZeroDivisionError") as caught:
         base.swap(controller=broken).run()
     assert isinstance(caught.value.__cause__, ZeroDivisionError)
-    assert caught.value.unit == "controller"
+    assert caught.value.instance == "controller"
     assert caught.value.time == pytest.approx(1.0, abs=0.003)
 
 

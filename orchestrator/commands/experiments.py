@@ -1,0 +1,343 @@
+"""The course of every command that makes the runs of an experiment: plan, make, judge, draw, write.
+
+`yawbench study`: run all that a study file names and judge its claims.
+
+`yawbench sweep`: one scenario over many conditions.
+
+`yawbench report`: one page that reproduces the papers.
+
+`yawbench tune`: the parameters of one or several laws, sought by one objective and one budget.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..messages import counted, listed
+from .options import CHANGES, MAKING, RunOptions, named, takes
+from .progress import bar, hold, make, pooled, print_tables, say, say_failed, stoppable
+
+if TYPE_CHECKING:
+    from ..experiments.experiment import LoadedExperiment
+    from ..experiments.jobs import PlanningCache
+    from ..experiments.outcome import Each, ExperimentResult
+    from ..experiments.planning import PlannedExperiment
+
+
+def conduct(
+    experiment: LoadedExperiment, folder: Path, wishes: RunOptions, each: Each, **of_jobs: Any
+) -> ExperimentResult:
+    """Make the runs that have not been made already, judge them, draw the figures and write it all down.
+
+    Args:
+        experiment: as loaded.
+        folder: of its results.
+        wishes: of the user.
+        each: how to read the results of all runs, and how to draw all figures.
+        of_jobs: fields of all jobs in place of their defaults.
+
+    Raises:
+        YawbenchError: a run cannot start; none has been.
+        typer.Exit: Ctrl-C.
+    """
+    from ..errors import YawbenchError
+    from ..experiments.figures import draw_all
+    from ..experiments.jobs import PlanningCache
+    from ..experiments.journal import Journal
+    from ..experiments.outcome import judge_records, judge_results
+    from ..experiments.planning import plan_experiment
+    from ..experiments.record import write_findings
+    from ..fmu.opener import stale_fmus
+    from ..labels import changed
+
+    if wishes.quick and experiment.spec.repeats:
+        experiment = experiment.short
+    planned: PlannedExperiment | None = None
+    once = PlanningCache(build=wishes.build)
+    with stoppable(folder):
+        try:
+            with bar("planning", len(experiment.cases), quiet=True) as planning:
+                planned = plan_experiment(
+                    experiment, folder, once=once, progress=planning, keep=wishes.keep,
+                    **wishes.of_jobs | of_jobs,
+                )  # fmt: skip
+        except YawbenchError:
+            if not wishes.no_run or experiment.spec.axes:
+                raise  # else scenarios or FMUs are not here: results can be judged without them
+        if planned:
+            experiment = planned.experiment
+            for note in stale_fmus(planned.fmus.values()):
+                say(f"note: {note}")
+        if experiment.by_options:
+            say(f"changed: {changed(experiment.by_options)}")
+        if planned and experiment.spec.axes:
+            with contextlib.closing(Journal(folder, experiment.identity, fresh=wishes.fresh)) as journal:
+                make(experiment.spec.title, planned.jobs, wishes, journal)
+                findings = judge_records(planned, journal.records)
+        else:
+            outcomes = make(experiment.spec.title, planned.jobs, wishes) if planned else []
+            findings = judge_results(experiment, folder, outcomes, planned=planned, each=each)
+        drawn, problems = draw_all(findings, folder, each=each)
+        if planned and experiment.spec.region and not wishes.quick:
+            findings = _over_region(planned, findings, folder, wishes, once)
+        write_findings(findings, drawn, folder)
+    for problem in problems:
+        say(problem)
+    if findings.not_made:
+        say(f"{findings.not_made} of {counted(len(findings.records), 'run')} not made yet")
+    if experiment.spec.axes:  # others have been named as they failed
+        say_failed(findings.failed)
+        if found := findings.remarkable():
+            say(f"note: {found}")
+    return findings
+
+
+def _over_region(
+    planned: PlannedExperiment,
+    findings: ExperimentResult,
+    folder: Path,
+    wishes: RunOptions,
+    once: PlanningCache,
+) -> ExperimentResult:
+    """Return the findings with what becomes of their verdicts over the region; the journal knows its runs."""
+    from ..experiments.execution import left_to_do
+    from ..experiments.journal import Journal
+    from ..experiments.region import judge_region, plan_region
+
+    experiment = planned.experiment
+    with bar("planning", 0, quiet=True) as planning:
+        plan = plan_region(planned, folder, once=once, progress=planning)
+    jobs = {job.key: job for job in plan.jobs.values()}
+    with contextlib.closing(Journal(folder, experiment.identity, fresh=wishes.fresh)) as journal:
+        if wishes.no_run and (left := left_to_do(list(jobs.values()), journal.records)):
+            say(f"note: {counted(len(left), 'run')} of the region not made yet; it is left out")
+            return findings
+        make(f"{experiment.spec.title}, region of its verdicts", list(jobs.values()), wishes, journal)
+        records = journal.records
+    failed = {jobs[key].label: str(records[key].reason) for key in jobs if not records[key].ok}
+    say_failed(failed)
+    if failed:
+        say(f"{len(failed)} of {len(jobs)} runs of the region failed; they count as another verdict")
+    return replace(findings, regions=judge_region(plan, findings, records))
+
+
+def chapter_of(
+    findings: ExperimentResult, folder: Path, command: str, each: Each, *, shown_in: Path, **more: Any
+) -> dict[str, Any]:
+    """Return the chapter of an experiment in a page that lies in a folder; `more`: facts of its own."""
+    from ..pages.report import chapter
+    from ..results.folder import RUN_FILE
+    from ..results.freshness import staleness
+
+    jobs = findings.planned.jobs if findings.planned and not findings.spec.axes else []
+    out_of_date = {
+        job.label: why
+        for job in jobs
+        if job.plan and (job.out / RUN_FILE).is_file() and (why := staleness(job.plan, job.out))
+    }
+    with stoppable(folder):
+        facts = chapter(
+            findings, command=command, stale=out_of_date, folder=folder, shown_in=shown_in, each=each
+        )
+    for name, why in out_of_date.items():
+        say(f"{name}: not what a run would give now: {why}")
+    return facts | {"comparison": None, "results": []} | more
+
+
+def command_of(preset: str, path: Path, *, quick: bool = False, **options: Iterable[object] | None) -> str:
+    """Return the command line that makes an experiment again; `options`: name -> what it was given."""
+    import shlex
+
+    flags = ["--quick"] if quick else []
+    given = [(f"--{name}", str(value)) for name, values in options.items() for value in values or ()]
+    return shlex.join(["yawbench", preset, str(path), *flags, *itertools.chain.from_iterable(given)])
+
+
+def write_page(chapters: Sequence[dict[str, Any]], folder: Path) -> None:
+    """Write the page of chapters into a folder and say where it is."""
+    import os
+
+    from ..files import write_whole
+    from ..pages.report import PAGE, RANKING, report_page
+
+    page = folder / PAGE
+    ranking = Path(os.path.relpath(RANKING, folder)).as_posix() if RANKING.is_file() else ""
+    write_whole(page, report_page(chapters, ranking))
+    say(f"The page: {page} ({page.stat().st_size / 1e6:.1f} MB)")
+
+
+def of_files(context: typer.Context, files: Sequence[Path], wishes: RunOptions) -> None:
+    """Conduct the experiments of files; tables of a single one go to the terminal, all to one page.
+
+    Raises:
+        YawbenchError: a file or a run of it is wrong.
+        typer.Exit: a run failed.
+    """
+    import os
+
+    from ..errors import ScenarioError
+    from ..experiments.experiment import load_experiment
+    from ..experiments.verdict_tables import all_tables, counts_of, reach, tally_words
+    from ..results.folder import default_folder, names_of
+    from .progress import print_tables
+
+    changes, out = wishes.changes, wishes.out
+    experiments = [load_experiment(file, changes=changes) for file in files]
+    if tuned := [str(one.path) for one in experiments if one.spec.tuning]:
+        raise ScenarioError([f"{file}: a tuning file; it is for `yawbench tune`" for file in tuned])
+    if out is None:
+        folders = [default_folder(file, changes) for file in files]
+        page = folders[0] if len(folders) == 1 else Path(os.path.commonpath(folders))
+    else:
+        page = out
+        below = [out.joinpath(*names_of(file)) for file in files]
+        folders = [out] if len(files) == 1 else below
+    for folder in dict.fromkeys(folders):
+        if len(sharing := [str(f) for f, of in zip(files, folders, strict=True) if of == folder]) > 1:
+            raise ScenarioError(
+                f"{listed(sharing, last='and')} would share the results folder {folder}; name them apart, or "
+                "report on them one by one, with --out"
+            )
+    hold(context, *folders)
+    each = pooled(context, wishes)
+    chapters, failed = [], False
+    for experiment, folder in zip(experiments, folders, strict=True):
+        findings = conduct(experiment, folder, wishes, each)
+        command = command_of(
+            "study" if experiment.spec.runs else "sweep",
+            experiment.path,
+            quick=wishes.quick and (experiment.spec.region is not None or bool(experiment.spec.repeats)),
+            **wishes.changing,
+        )
+        chapters.append(chapter_of(findings, folder, command, each, shown_in=page))
+        failed = failed or bool(findings.failed) or bool(findings.not_made)
+        if len(files) == 1:
+            print_tables(all_tables(findings))
+        if verdicts := tally_words(counts_of(findings.claims)):
+            where = reach(findings)
+            say(f"{experiment.spec.title}: {verdicts}" + f" ({where})" * bool(where))
+    write_page(chapters, page)
+    if failed:
+        raise typer.Exit(1)
+
+
+StudyFile = Annotated[
+    Path, named("a study file", help="Study: YAML file, or a name in scenarios/.", metavar="STUDY")
+]
+
+
+@takes(*CHANGES, *MAKING, "jobs", "scheduler", "format_", "quick", "fresh", "no_run")
+def study(context: typer.Context, file: StudyFile, wishes: RunOptions) -> None:
+    """Run a study: tables, figures, a verdict per claim.
+
+    Begin with report.html. Without --out, results go to results/<folder of the study>/<its name>. Every
+    run has a process of its own; one that fails is named in the table and takes no other with it. Runs
+    that have been made already, of the same scenario, FMUs and program, are not made again. If the file
+    has a region, claims are also judged over the open values there: how far each verdict carries.
+    """
+    of_files(context, [file], wishes)
+
+
+SweepFile = Annotated[
+    Path, named("a sweep file", help="Sweep: YAML file, or a name in scenarios/.", metavar="SWEEP")
+]
+
+
+@takes(*CHANGES, *MAKING, "jobs", "scheduler", "keep", "format_", "fresh", "no_run")
+def sweep(context: typer.Context, file: SweepFile, wishes: RunOptions) -> None:
+    """Run a scenario over a grid, list or Latin hypercube.
+
+    Its metrics become a table, limits, curves and maps. Without --out, results go to
+    results/<folder of the sweep file>/<its name>: report.html; table.csv and table.parquet, one row per
+    run; figures. Every run has a process of its own. An interrupted sweep goes on where it was; nothing
+    that is finished is run again.
+    """
+    of_files(context, [file], wishes)
+
+
+Studies = Annotated[
+    list[Path] | None,
+    named("a study file", help="Studies: YAML files, or names; default: all in scenarios/.", metavar="STUDY"),
+]
+
+
+@takes(*MAKING, "jobs", "format_", "quick", "fresh", "no_run")
+def report(context: typer.Context, wishes: RunOptions, studies: Studies = None) -> None:
+    """Write one page that reproduces the papers.
+
+    report.html: per study the verdicts, system, figures, tables, parameters and their source. One file
+    that needs no server; figures lie beside it as SVG and PNG. Runs whose results are missing, or were
+    made from another scenario or FMU, are made first. Without --out, the page of one study lies in its
+    folder below results/, that of several in results/. Regions take most of the time, half an
+    hour on two cores for all studies in scenarios/; --quick leaves them out.
+    """
+    from ..pages.report import found_studies
+
+    paths = list(dict.fromkeys(studies or found_studies()))
+    of_files(context, paths, wishes)
+
+
+TuningFile = Annotated[
+    Path, named("a tuning file", help="Tuning: YAML file, or a name in scenarios/.", metavar="TUNING")
+]
+
+
+@takes(*CHANGES, *MAKING, "jobs", "scheduler", "fresh")
+def tune(context: typer.Context, file: TuningFile, wishes: RunOptions) -> None:
+    """Seek the parameters that minimize an objective.
+
+    Every law of the file has the same objective, search (differential evolution) and budget. Without
+    --out, results go to results/<folder of the tuning file>/<its name>: report.html; trials.csv, one row per
+    trial; the history as a figure; where the file asks for it, entries.yaml for a ranking. An interrupted
+    search goes on where it was; with the same seed, and whatever the number of workers, it finds the same.
+    """
+    from dataclasses import replace
+
+    from ..experiments.experiment import load_experiment
+    from ..experiments.record import to_csv
+    from ..experiments.tuning import (
+        ENTRIES,
+        best_of,
+        columns_of,
+        entries_of,
+        entries_text,
+        history_figure,
+        search,
+        tuning_of,
+        tuning_table,
+    )
+    from ..figures.style import save
+    from ..files import write_whole
+    from ..pages.page_parts import image_of
+    from ..results.folder import default_folder
+
+    experiment = load_experiment(file, changes=wishes.changes)
+    folder = wishes.out or default_folder(file, wishes.changes)
+    hold(context, folder)
+    each = pooled(context, wishes)
+
+    def judged(trials: LoadedExperiment) -> ExperimentResult:
+        nonlocal wishes
+        findings = conduct(trials, folder, wishes, each)
+        wishes = replace(wishes, fresh=False)
+        return findings
+
+    found = search(experiment, judged)
+    findings = judged(best_of(experiment, found))
+    table = tuning_table(experiment, found)
+    write_whole(folder / "trials.csv", to_csv(columns_of(found)))
+    print_tables([table])
+    command = command_of("tune", file, **wishes.changing)
+    if tuning_of(experiment).entries:
+        write_whole(folder / ENTRIES, entries_text(entries_of(experiment, found), command))
+    save(history_figure(experiment, found, command), folder / "history")
+    charts = [image_of(folder / "history.svg", experiment.spec.title)]
+    facts = {"results": [table], "charts": charts}
+    write_page([chapter_of(findings, folder, command, each, shown_in=folder, **facts)], folder)

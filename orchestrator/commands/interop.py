@@ -1,0 +1,147 @@
+"""`yawbench second-opinion`: the same scenario in masters that others wrote.
+
+`yawbench export-ssp`: a scenario as an archive that other programs can run.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from .options import CHANGES, RunOptions, ScenarioFile, plan_of_scenario, takes
+from .progress import print_tables, say
+
+if TYPE_CHECKING:
+    from ..interop.second_opinion import SecondOpinion
+
+
+Masters = Annotated[
+    list[str] | None,
+    typer.Option("--master", metavar="NAME", help="libcosim, Ecos or fmpy; repeatable. Default: all."),
+]
+Pinned = Annotated[
+    bool, typer.Option("--one-core/--no-one-core", help="Measure every master also on one processor core.")
+]
+
+
+@takes(*CHANGES, "fmus", "no_build")
+def second_opinion(
+    scenario: ScenarioFile, wishes: RunOptions, master: Masters = None, one_core: Pinned = True
+) -> None:
+    """Run a scenario in libcosim, Ecos and fmpy, and compare.
+
+    Every signal, and the time per step. Exit status 1 if one that should agree does not: libcosim
+    and Ecos run what `jacobi` runs here.
+    """
+    from ..errors import ScenarioError, SimulationError
+    from ..interop.second_opinion import MASTERS, second_opinion
+    from ..labels import changed, faults_of
+    from ..messages import hint
+
+    known = {one.title.lower(): one for one in MASTERS}
+    for name in master or ():
+        if name.lower() not in known:
+            raise ScenarioError(f"--master {name}: there is no such master{hint(name, known, lead='known')}")
+    chosen = [known[name.lower()] for name in master or known]
+    plan = plan_of_scenario(scenario, wishes)
+    if plan.faults:
+        raise ScenarioError(f"{scenario}: other masters know nothing of faults; leave out {faults_of(plan)}")
+    if plan.changes:
+        say(f"changed: {changed(plan.changes)}")
+    with tempfile.TemporaryDirectory(prefix="yawbench-") as folder:
+        try:
+            opinions = second_opinion(
+                plan,
+                Path(folder),
+                masters=chosen,
+                pinned=one_core,
+                said=lambda text: say(f"running in {text}"),
+            )
+        except RuntimeError as error:
+            raise SimulationError(str(error), instance=None, time=0.0) from None
+    show(opinions)
+    wrong = [one for one in opinions if not one.agrees and one.master.title != "fmpy"]
+    if wrong:
+        names = " and ".join(one.master.title for one in wrong)
+        raise SimulationError(f"{scenario}: no agreement with {names}, see above", instance=None, time=0.0)
+
+
+def show(opinions: list[SecondOpinion]) -> None:
+    """Print the differences by signal, the times per step, and what has to be known."""
+    from ..experiments.tables import Table
+    from ..messages import printable
+
+    found = [one for one in opinions if not one.problem]
+    if found:
+        names = [one.master.title for one in found]
+        columns = set(range(1, len(found) + 1))
+        apart = Table("Largest difference / range", ["signal", *names], numbers=columns)
+        for signal in found[0].differences:
+            apart.rows.append([signal, *(f"{one.differences[signal]:.1e}" for one in found)])
+        apart.rows.append(["largest", *(f"{one.largest:.1e}" for one in found)])
+        keys = list(found[0].seconds)
+        times = Table("us per communication step", ["master", *keys], numbers=set(range(1, len(keys) + 1)))
+        for one in found:
+            times.rows.append([one.master.title, *(f"{1e6 * one.seconds[key]:.0f}" for key in keys)])
+        print_tables([apart, times])
+        _show_still(found[0])
+    for one in opinions:
+        if one.problem:
+            print(printable(f"{one.master.title}: {one.problem}"))
+        elif one.one_step or one.master.note:
+            step = "compared with one step for all units: " if one.one_step else ""
+            print(printable(f"{one.master.title}: {step}{one.master.note}"))
+
+
+def _show_still(one: SecondOpinion) -> None:
+    """Say of how many signals the comparison says little, since they do not change during the run."""
+    from ..messages import counted, fold, listed, printable
+
+    if one.still:
+        share = f"{len(one.still)} of {counted(len(one.differences), 'signal')}"
+        names = listed(fold(list(one.still)))
+        print(printable(f"Constant during the run, so their agreement says little: {share}, {names}."))
+
+
+ArchiveOption = Annotated[
+    Path | None, typer.Option("--out", metavar="FILE", help="The archive; default: <scenario>.ssp, here.")
+]
+
+
+Standard = Annotated[Literal["1.0", "2.0"], typer.Option("--standard", help="Version of SSP.")]
+For = Annotated[
+    Literal["all", "omsimulator"],
+    typer.Option("--for", help="Leave out what OMSimulator refuses, and say what that is."),
+]
+
+
+@takes(*CHANGES, "fmus", "no_build")
+def export_ssp(
+    scenario: ScenarioFile,
+    wishes: RunOptions,
+    out: ArchiveOption = None,
+    for_: For = "all",
+    standard: Standard = "1.0",
+) -> None:
+    """Write a scenario and its FMUs as an SSP archive.
+
+    SSP: System Structure and Parameterization. `yawbench run` reads it back and gives the same numbers.
+    """
+    from ..interop.ssp_write import for_omsimulator, write_ssp
+    from ..labels import faults_of
+
+    plan = plan_of_scenario(scenario, wishes)
+    notes = list(plan.notes)
+    if plan.faults:
+        notes.append(f"faults are not part of the archive: {faults_of(plan)}")
+    if for_ == "omsimulator":
+        plan, more = for_omsimulator(plan)
+        notes += more
+    for note in notes:
+        say(f"note: {note}")
+    path = out or Path(f"{scenario.stem}.ssp")
+    write_ssp(plan, path, standard, named=out is not None)
+    say(f"{path}: {len(plan.instances)} units, {len(plan.wires)} connections")

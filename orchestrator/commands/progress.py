@@ -1,0 +1,201 @@
+"""What the commands that make several runs share: progress, tables on the terminal."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from ..errors import Interrupted
+from ..messages import counted, printable
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..experiments.jobs import Job, Outcome
+    from ..experiments.journal import Journal
+    from ..experiments.outcome import Each
+    from ..experiments.tables import Table
+    from .options import RunOptions
+
+WIDTH = 140
+"""Of tables that go into a file or a pipe."""
+SHOWN = 10
+"""Failed runs named on the terminal; all are in the table."""
+
+
+def say(text: str) -> None:
+    """Write a message for the user, apart from what the command gives out."""
+    print(printable(text), file=sys.stderr, flush=True)
+
+
+def hold(context: typer.Context, *folders: Path) -> None:
+    """Claim folders for this command until it has ended.
+
+    Raises:
+        ResultsError: another command is writing there, or nothing can be written.
+    """
+    from ..results.lock import writing
+
+    context.with_resource(writing(*folders))
+
+
+def pooled(context: typer.Context, wishes: RunOptions) -> Each:
+    """Return a `map` that spreads work over processes until this command has ended.
+
+    Raises:
+        YawbenchError: this process may not open as many files as that takes.
+    """
+    from ..experiments.workers import Pool
+
+    return context.with_resource(Pool(wishes.jobs)).map
+
+
+@contextlib.contextmanager
+def stoppable(folder: Path) -> Iterator[None]:
+    """Let Ctrl-C and SIGTERM end the command with a word on what has been recorded.
+
+    Raises:
+        Interrupted: with that word.
+    """
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        number = Interrupted.of(error).number
+        raise Interrupted(f"Interrupted; what was recorded until then: {folder}", number=number) from None
+
+
+def make(
+    title: str, jobs: Sequence[Job], wishes: RunOptions, journal: Journal | None = None
+) -> list[Outcome]:
+    """Make those of some runs that are left, tell of them, and return what became of them.
+
+    Args:
+        title: what they are.
+        jobs: with plans and keys.
+        wishes: of the user.
+        journal: knows what is finished, and notes what ends; without one the results on disk tell, and every
+            run has a line of its own.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C.
+        YawbenchError: the journal cannot be written, or there is no such cluster.
+    """
+    from ..experiments.execution import finish, left_to_do, runner_of
+
+    if wishes.no_run and journal is None:
+        return []
+    again = wishes.fresh and journal is None
+    left = list(jobs) if again else left_to_do(jobs, journal.records if journal else {})
+    total = len({(job.key, job.out) for job in jobs})
+    done = total - len(left)
+    before = "" if not done else ", all finished before" if done == total else f", {done} finished before"
+    say(f"{title}: {counted(len(jobs), 'run')}{before}")
+    if wishes.no_run or not left:
+        return []
+    with reported("runs", total, done, each=journal is None) as told:
+        return finish(left, journal, runner=runner_of(wishes.jobs, wishes.scheduler), told=told)
+
+
+def say_failed(failed: Mapping[str, str]) -> None:
+    """Say which runs failed; `failed`: words for each -> why."""
+    for words, why in list(failed.items())[:SHOWN]:
+        say(f"{words} failed: {why}")
+    if len(failed) > SHOWN:
+        say(f"{len(failed) - SHOWN} more failed")
+
+
+@contextlib.contextmanager
+def reported(
+    title: str, total: int, done: int = 0, *, each: bool = True
+) -> Iterator[Callable[[Outcome], None]]:
+    """Tell of runs as they end: a bar on a terminal, elsewhere a line each or a line now and then.
+
+    Args:
+        title: of the bar.
+        total: runs in all.
+        done: how many of them are finished already.
+        each: whether to write a line for each run; else for every tenth of those that are left.
+    """
+    width, count = len(str(total)), done
+    with bar(title, total, done, quiet=each) as progress:
+
+        def told(outcome: Outcome) -> None:
+            nonlocal count
+            count += 1
+            progress(count)
+            if each:
+                ended = f"{outcome.seconds:.1f} s" if outcome.ok else f"failed: {outcome.reason}"
+                say(f"[{count:{width}}/{total}] {outcome.job.label}: {ended}")
+
+        yield told
+
+
+@contextlib.contextmanager
+def bar(title: str, total: int, done: int = 0, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
+    """Show progress and the time left: a bar on a terminal, elsewhere a line now and then, or none."""
+    if not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
+        yield (lambda count: None) if quiet else _lines(total, done)
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("left"),
+        TimeRemainingColumn(), TextColumn("so far"), TimeElapsedColumn(),
+    )  # fmt: skip
+    # time left from the pace of the last runs; they differ less than their number
+    with Progress(*columns, console=Console(stderr=True), transient=True, speed_estimate_period=120) as shown:
+        task = shown.add_task(printable(title).replace("[", r"\["), total=total, completed=done)
+        yield lambda count: shown.update(task, completed=count)
+
+
+def _lines(total: int, done: int) -> Callable[[int], None]:
+    """Return what writes a line for every tenth of the runs that are left."""
+    began, last = time.monotonic(), done
+
+    def told(count: int) -> None:
+        nonlocal last
+        if count < total and 10 * (count - last) < total - done:
+            return
+        last = count
+        left = (time.monotonic() - began) / (count - done) * (total - count)
+        say(f"[{count:{len(str(total))}}/{total}]" + (f" {left:.0f} s left" if count < total else ""))
+
+    return told
+
+
+def save_figure(figure: Figure, wanted: Path | None, default: Path) -> None:
+    """Save a figure as `.svg` and `.png` and say where; what is wanted may have either ending, or none."""
+    from ..figures.style import save
+
+    stem = wanted or default
+    if stem.suffix.lower() in (".svg", ".png"):
+        stem = stem.with_suffix("")
+    svg, png = save(figure, stem)
+    say(f"{svg}, {png.name}")
+
+
+def print_tables(tables: Iterable[Table]) -> None:
+    """Print tables on the standard output, as wide as the terminal."""
+    from rich.console import Console
+
+    from ..experiments.tables import for_terminal
+
+    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else WIDTH)
+    for table in tables:
+        console.print()
+        console.print(for_terminal(table))

@@ -1,0 +1,233 @@
+"""Recorded runs that a command is given as folders of results or as scenarios.
+
+`yawbench plot`: draw figures of recorded results, or of a scenario's run.
+
+`yawbench animate`: runs seen from above, as a page that needs no server.
+
+`yawbench diff`: what differs between two runs.
+
+`yawbench salvage`: keep what a run recorded whose process was killed.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import CHANGES, MAKING, RunOptions, takes
+
+RunSources = Annotated[
+    list[Path],
+    typer.Argument(help="Folders of results, or scenarios; several are overlaid.", metavar="RESULTS..."),
+]
+Labels = Annotated[
+    list[str] | None,
+    typer.Option("--label", metavar="TEXT", help="Label of a run in the legend, in the order of RESULTS."),
+]
+
+
+def recorded(sources: Sequence[Path], wishes: RunOptions) -> list[Path]:
+    """Return the folders of all results, after making the runs of scenarios that have none.
+
+    Raises:
+        ScenarioError: a scenario or an option is wrong.
+    """
+    from ..errors import ScenarioError
+    from ..experiments.jobs import Job, PlanningCache, ready
+    from ..experiments.workers import execute
+    from ..fmu.opener import stale_fmus
+    from ..results.folder import default_folder
+    from ..results.freshness import staleness
+    from ..scenario import catalogue
+    from .progress import reported, say, stoppable
+
+    sources = [one if os.path.exists(one) else catalogue.named(one) or one for one in sources]
+    scenarios = [one for one in sources if one.suffix in catalogue.ENDINGS and not os.path.isdir(one)]
+    if wishes.changes and not scenarios:
+        raise ScenarioError("--swap, --set and --fault change a scenario; only folders of results are given")
+    given = [Job(one.stem, one, Path(), wishes.changes, **wishes.of_jobs) for one in scenarios]
+    jobs = {}
+    for job in ready(given, once=PlanningCache(build=wishes.build)):
+        assert job.plan is not None
+        jobs[job.scenario] = replace(job, out=default_folder(job.scenario, job.plan.changes))
+    for note in stale_fmus(unit.fmu for job in jobs.values() if job.plan for unit in job.plan.instances):
+        say(f"note: {note}")
+    stale = [job for job in jobs.values() if job.plan and staleness(job.plan, job.out)]
+    with stoppable(Path("results")), reported("", len(stale)) as told:
+        outcomes = execute(stale, done=told)
+    for outcome in outcomes:
+        if not outcome.ok:
+            raise typer.Exit(outcome.exit_status)
+    return [jobs[source].out if source in jobs else source for source in sources]
+
+
+def distinct(folders: Sequence[Path]) -> list[str]:
+    """Return the shortest ends of the paths that tell the folders apart."""
+    parts = [folder.absolute().parts for folder in folders]
+    longest = max(len(p) for p in parts)
+    for n in range(1, longest + 1):
+        names = ["/".join(p[-n:]) for p in parts]
+        if len(set(names)) == len(names):
+            return names
+    return ["/".join(p[-1:]) for p in parts]
+
+
+def labels_of(folders: Sequence[Path], given: Sequence[str] | None) -> list[str]:
+    """Return what the legend calls each run: the labels given, or `distinct`.
+
+    Raises:
+        ScenarioError: there are not as many labels as folders.
+    """
+    from ..errors import ScenarioError
+    from ..messages import counted
+
+    if given and len(given) != len(folders):
+        counts = f"{counted(len(given), 'label')}, {counted(len(folders), 'folder')}"
+        raise ScenarioError(f"--label: needs one for each folder of results ({counts})")
+    return list(given or distinct(folders))
+
+
+def folder_of_all(folders: Sequence[Path]) -> Path:
+    """Return where what shows all runs goes: the folder of the only one, or the one that holds them all."""
+    if len(folders) == 1:
+        return folders[0]
+    return Path(os.path.commonpath([folder.absolute().parent for folder in folders]))
+
+
+Panels = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--panel",
+        metavar="NAME",
+        help="A signal (yaw_rate, plant.roll_angle, wheel_torque_*), its error (sideslip_error), one over "
+        "another (yaw_rate(sideslip)) or path; repeatable. Default: all the papers draw.",
+    ),
+]
+
+
+@takes(*CHANGES, *MAKING)
+def plot(sources: RunSources, wishes: RunOptions, label: Labels = None, panel: Panels = None) -> None:
+    """Draw runs, one or several overlaid.
+
+    Figures are written as SVG and PNG. A scenario is run first if its results (those of `yawbench
+    run` without --out) are missing or were made from another scenario or FMU. Without --out, the
+    figure of one run goes into its folder, that of several into the folder that holds them all.
+    """
+    from ..experiments.comparison import FIGURES
+    from ..figures.panels import LabelledRun, check_panels, shown_by
+    from ..figures.plots import OVERVIEW, draw
+    from ..figures.style import save
+    from ..results.read import load_results
+    from .progress import say
+
+    pass
+
+    folders = recorded(sources, wishes)
+    labels = labels_of(folders, label)
+    runs = [
+        LabelledRun(name, load_results(folder, thin=True))
+        for name, folder in zip(labels, folders, strict=True)
+    ]
+    check_panels(runs, panel or ())
+    figures: dict[str, Sequence[str]] = {"overview": panel or OVERVIEW}
+    if len(runs) > 1 and not panel:
+        figures = {name: panels for name, panels in FIGURES.items() if shown_by(runs, panels)}
+    for name, panels in figures.items():
+        paths = save(draw(runs, panels), (wishes.out or folder_of_all(folders)) / name)
+        say(f"{paths[0]}, {paths[1].name}")
+
+
+Page = Annotated[Path | None, typer.Option("--out", metavar="FILE.html", help="The page to write.")]
+
+
+@takes(*CHANGES, "fmus", "no_build")
+def animate(sources: RunSources, wishes: RunOptions, label: Labels = None, out: Page = None) -> None:
+    """Write a page that animates runs seen from above.
+
+    Cars, paths, lanes, patches of the road, steer angles, tyre forces and their friction circles; of at
+    most seven runs.
+    A scenario is run first if its results are missing or were made from another scenario or FMU.
+    Without --out, the page of one run is animation.html in its folder; that of several lies in the
+    folder that holds them all.
+    """
+    from ..errors import ResultsError, ScenarioError
+    from ..files import write_whole
+    from ..labels import changed_each, changes_in
+    from ..pages.animation import MOST, page
+    from ..results.read import load_results
+    from .progress import say
+
+    pass
+
+    if len(sources) > MOST:
+        raise ScenarioError(f"an animation shows up to {MOST} runs, not {len(sources)}")
+    folders = recorded(sources, wishes)
+    runs = list(zip(labels_of(folders, label), map(load_results, folders), strict=True))
+    titles = [results.record.title or name for name, results in runs]
+    changed = changed_each([(name, changes_in(results.run)) for name, results in runs])
+    if len(runs) == 1:
+        text = page(runs, title=titles[0], changed=changed)
+    else:
+        text = page(runs, below="; ".join(dict.fromkeys(titles)), changed=changed)
+    file = out or folder_of_all(folders) / "animation.html"
+    try:
+        write_whole(file, text, named=out is not None)
+    except OSError as error:
+        raise ResultsError(f"{file}: the page cannot be written: {error.strerror or error}.") from None
+    say(f"{file}: {len(text.encode()) / 1000:.0f} kB")
+
+
+One = Annotated[Path, typer.Argument(help="Folder of results.", metavar="RUN")]
+Other = Annotated[Path, typer.Argument(help="Folder of the results to compare it with.", metavar="RUN")]
+
+
+def diff(one: One, other: Other) -> None:
+    """Show what differs between two runs.
+
+    First what they were made of: scenario, parameters, FMUs, connections, versions of programs. Then
+    their results, signal by signal: from when on they differ, from when on a curve shows it (1 % of the
+    signal's largest value), and by how much at most.
+    """
+    from ..pages.comparison import differences, differences_table, divergence, partings_table
+    from ..results.read import load_results
+    from .progress import print_tables, say
+
+    pass
+
+    first, second = load_results(one), load_results(other)
+    found, parted = differences(first.run, second.run), divergence(first, second)
+    if found:
+        print_tables([differences_table(found, *distinct([one, other]))])
+    if parted.partings or parted.notes:
+        print_tables([partings_table(parted, first, second)])
+    if not (found or parted.partings or parted.notes):
+        say("The runs are the same, in what they were made of and in every number.")
+
+
+Folders = Annotated[list[Path], typer.Argument(help="Folders of runs that died.", metavar="FOLDER...")]
+
+
+def salvage(folders: Folders) -> None:
+    """Recover what runs recorded before they died.
+
+    Killed processes leave files that end in .part. The whole rows among them become results with the
+    status "died"; if results of an earlier run stand in the folder they go to failed/ beside those, which
+    can then be read again. Of Parquet and MDF, which can be read only whole, nothing is kept.
+    """
+    from ..messages import counted
+    from ..results.salvage import lost_format, salvage
+    from .progress import say
+
+    for folder in folders:
+        lost = lost_format(folder)
+        place, rows = salvage(folder)
+        if rows:
+            say(f"{place}: {counted(rows, 'row')}")
+        else:
+            why = f"{lost} can be read only whole" if lost else "it had written no row"
+            say(f"{folder}: nothing of the run could be kept: {why}")

@@ -1,0 +1,392 @@
+"""`yawbench drive`: all runs that a standard test asks for, made and evaluated.
+
+`yawbench evaluate`: what a standard test makes of recorded or measured runs.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from ..evaluation.standard_tests import TESTS
+from .options import CHANGES, MAKING, RunOptions, takes
+from .progress import hold, make, say, stoppable
+
+if TYPE_CHECKING:
+    from ..evaluation.judgement import Evaluation, TestSeries
+    from ..evaluation.standard_tests import StandardTest
+    from ..evaluation.trace import MappingSpec, Trace
+    from ..experiments.jobs import Job, PlanningCache
+    from ..plan import Override
+
+
+GROUND = "proving_ground"
+"""Folder of the scenarios of standard tests."""
+
+TestToDrive = Annotated[
+    Literal["sine-with-dwell", "iso-3888-1", "iso-3888-2"], typer.Argument(help="The test.", metavar="TEST")
+]
+ScenarioOption = Annotated[
+    str | None,
+    typer.Option(
+        "--scenario", metavar="SCENARIO", help="Scenario of one run; default: the test's in proving_ground."
+    ),
+]
+Slow = Annotated[
+    str | None,
+    typer.Option(
+        "--slow-steer",
+        metavar="SCENARIO",
+        help="Scenario of slowly increasing steer, for A; default: proving_ground/slowly_increasing_steer.",
+    ),
+]
+VehicleOption = Annotated[
+    str | None,
+    typer.Option("--vehicle", metavar="FILE", help="Vehicle file, or the name of one as in list."),
+]
+StartAngle = Annotated[
+    str | None,
+    typer.Option("--angle", metavar="ANGLE", help="A in place of runs that find it, such as '35.8 deg'."),
+]
+DriveFigures = Annotated[bool, typer.Option("--figures", help="Draw every run, not the series alone.")]
+
+
+@takes(*CHANGES, *MAKING, "jobs", "fresh")
+def drive(
+    context: typer.Context,
+    test: TestToDrive,
+    wishes: RunOptions,
+    vehicle: VehicleOption = None,
+    scenario: ScenarioOption = None,
+    slow_steer: Slow = None,
+    angle: StartAngle = None,
+    figures: DriveFigures = False,
+) -> None:
+    """Drive a standard test with all its runs and evaluate it.
+
+    Sine with dwell: slowly increasing steer to both sides gives A, from which the amplitudes follow, left
+    first and right first. Without --out, results go to results/<folder of the scenario>/<its name>_series.
+    An interrupted series goes on where it was; nothing that is finished is run again. Of a car that rolls
+    over, what it has recorded until then is judged, as far as it goes.
+
+    Lane changes of ISO 3888: the highest speed at the first cones at which no cone is touched, to half a
+    kilometre per hour, from the scenario's own speed in steps and halves.
+    """
+    from ..errors import ScenarioError
+    from ..experiments.jobs import Job, PlanningCache
+    from ..experiments.standard_test_runs import AMPLITUDE, SPEED
+    from ..results.folder import default_folder
+    from ..scenario import catalogue
+
+    changes = (*_vehicle(vehicle), *wishes.changes)
+    one_run = catalogue.find(scenario or f"{GROUND}/{test.replace('-', '_')}", "a scenario")
+    folder = wishes.out or default_folder(one_run, changes, suffix="_series")
+    base = Job("", one_run, folder, changes, **wishes.of_jobs | {"format": "parquet"})
+    once = PlanningCache(build=wishes.build)
+    given = {change.place for change in changes}
+    if test == "sine-with-dwell":
+        if AMPLITUDE in given:
+            raise ScenarioError(f"{AMPLITUDE}: the series itself says which amplitudes are driven")
+        slow = catalogue.find(slow_steer or f"{GROUND}/slowly_increasing_steer", "a scenario")
+        hold(context, folder)
+        status = _drive_dwell(base, slow, once, angle, wishes, figures=figures)
+    else:
+        if angle or slow_steer:
+            raise ScenarioError(f"{test} needs no A: leave --angle and --slow-steer away")
+        if given & {SPEED, "stop_time"}:
+            raise ScenarioError(f"{SPEED} and stop_time: the series itself says at what speeds is driven")
+        hold(context, folder)
+        status = _drive_lane_change(base, once, wishes, figures=figures)
+    if status:
+        raise typer.Exit(status)
+
+
+def _drive_dwell(
+    base: Job, slow: Path, once: PlanningCache, angle: str | None, wishes: RunOptions, *, figures: bool
+) -> int:
+    """Make and evaluate the series of sine with dwell; return the exit status.
+
+    Raises:
+        ResultsError: A is not known.
+        typer.Exit: slowly increasing steer has failed.
+    """
+    import math
+
+    from ..errors import ResultsError
+    from ..evaluation.judgement import NotJudged
+    from ..evaluation.sine_with_dwell import judge_series
+    from ..evaluation.standard_tests import TESTS
+    from ..evaluation.steering_tests import characteristic_angle, evaluate_slow_steer
+    from ..experiments.standard_test_runs import dwell_jobs, slow_steer_jobs, traces
+
+    pass
+
+    chosen = TESTS["sine-with-dwell"]
+    known = angle_of(angle)
+    if known is None:
+        name = "slowly_increasing_steer"
+        found = slow_steer_jobs(replace(base, label=name, scenario=slow, out=base.out / name), once)
+        if status := _make("slowly increasing steer", found, base, wishes):
+            raise typer.Exit(status)
+        try:
+            known = characteristic_angle([evaluate_slow_steer(trace) for trace in traces(found)])
+        except NotJudged as why:
+            raise ResultsError(str(why)) from None
+    say(f"A = {math.degrees(known):.1f} degrees")
+    ladder = dwell_jobs(base, known, once)
+    status = _make("sine with dwell", ladder, base, wishes)
+    recorded = traces(ladder)
+    judged = [chosen.evaluate(trace, known) for trace in recorded]
+    series = judge_series(judged, known)
+    EvaluatedRuns(chosen, recorded, judged, series, known, base.out).conclude(each=figures)
+    return status
+
+
+def _drive_lane_change(base: Job, once: PlanningCache, wishes: RunOptions, *, figures: bool) -> int:
+    """Make and evaluate the runs to the highest clean entry speed; return the exit status."""
+    from ..evaluation.standard_tests import TESTS
+    from ..experiments.standard_test_runs import entry_speeds
+
+    pass
+
+    chosen = TESTS["lane-change"]
+    failed: list[int] = []
+
+    def made(job: Job) -> bool:
+        status = _make(f"{job.label} km/h", [job], base, wishes)
+        failed.extend([status] if status else [])
+        return not status
+
+    traces, series = entry_speeds(base, once, made)
+    judged = [chosen.evaluate(trace) for trace in traces]
+    EvaluatedRuns(chosen, traces, judged, series, None, base.out).conclude(each=figures)
+    return max(failed, default=0)
+
+
+def _vehicle(given: str | None) -> tuple[Override, ...]:
+    """Return the change of the vehicle file.
+
+    Raises:
+        ScenarioError: there is no such file.
+    """
+    from ..plan import Override
+    from ..scenario import catalogue
+
+    if given is None:
+        return ()
+    return (Override("vehicle", str(catalogue.find(given, "a vehicle file").resolve()), "--vehicle"),)
+
+
+def _make(title: str, jobs: Sequence[Job], base: Job, wishes: RunOptions) -> int:
+    """Make the runs that are left; return the exit status, not 0 if one of them failed.
+
+    Raises:
+        typer.Exit: Ctrl-C.
+    """
+    with stoppable(base.out):
+        outcomes = make(title, jobs, wishes)
+    return max((one.exit_status for one in outcomes if not one.ok), default=0)
+
+
+TestName = Literal[tuple(TESTS)]  # type: ignore[valid-type]
+TestToEvaluate = Annotated[TestName, typer.Argument(help="The test.", metavar="TEST")]  # type: ignore[valid-type]
+EvaluatedSources = Annotated[
+    list[Path],
+    typer.Argument(
+        help="Folders of results, also with runs in folders below; or with --signals files of columns.",
+        metavar="RESULTS...",
+    ),
+]
+SignalsOption = Annotated[
+    Path | None,
+    typer.Option("--signals", metavar="FILE", help="Mapping: which columns of measured files are what."),
+]
+SlowSteer = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--slow-steer", metavar="RESULTS", help="Runs of slowly increasing steer, for A. Repeatable."
+    ),
+]
+CharacteristicAngle = Annotated[
+    str | None,
+    typer.Option("--angle", metavar="ANGLE", help="A, the hand-wheel angle at 0.3 g, such as '35.8 deg'."),
+]
+EvaluationFigures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw every run.")]
+OutFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", metavar="DIR", help="Folder for evaluation.json and figures; default: that of the run(s)."
+    ),
+]
+
+FILE = "evaluation.json"
+
+
+def evaluate(
+    test: TestToEvaluate,
+    sources: EvaluatedSources,
+    slow_steer: SlowSteer = None,
+    angle: CharacteristicAngle = None,
+    signals: SignalsOption = None,
+    figures: EvaluationFigures = True,
+    out: OutFile = None,
+) -> None:
+    """Evaluate runs as a standard test says.
+
+    Every quantity, a verdict per criterion with its reason, a figure per run; also of measured data.
+    Of sine with dwell, A comes from runs of slowly increasing steer (--slow-steer) or is given
+    (--angle); several runs are judged as a series. Exit status 1 if nothing could be judged.
+    """
+    from ..evaluation.sine_with_dwell import is_series, judge_series
+    from ..evaluation.trace import load_mapping, load_trace
+    from ..results.folder import below_results
+    from .progress import say
+    from .results import distinct, folder_of_all
+
+    chosen = TESTS[test]
+    mapping = load_mapping(signals) if signals else None
+    places = [place for source in sources for place in _runs(source, mapping)]
+    labels = distinct(places) if len(places) > 1 else [str(places[0])]
+    known = _angle(angle, slow_steer, mapping, chosen)
+    traces = [load_trace(place, mapping, label) for place, label in zip(places, labels, strict=True)]
+    judged = [chosen.evaluate(trace, known) for trace in traces]
+    series = judge_series(judged, known) if known and is_series(judged) else None
+    recorded_here = all(place.is_dir() for place in places)
+    folder = out or (folder_of_all(places) if recorded_here else below_results("evaluation"))
+    EvaluatedRuns(chosen, traces, judged, series, known, folder).conclude(
+        each=figures, together=out is not None
+    )
+    if all(one.judges_nothing for one in judged):
+        say(f"{chosen.name}: nothing could be judged, see above")
+        raise typer.Exit(1)
+
+
+@dataclass(frozen=True)
+class EvaluatedRuns:
+    """What the runs of a test come to, one by one and together."""
+
+    test: StandardTest
+    traces: list[Trace]
+    judged: list[Evaluation]
+    series: TestSeries | None
+    angle: float | None  # A [rad]
+    folder: Path  # of evaluation.json and of the figure of the series
+
+    def conclude(self, *, each: bool, together: bool = False) -> None:
+        """Draw, write and print it.
+
+        Args:
+            each: draw every run, too.
+            together: into the folder, not beside its results.
+        """
+        from ..experiments.verdict_tables import run_table, runs_table
+        from ..files import write_whole
+        from ..messages import counted
+        from .progress import print_tables, say
+
+        drawn = self._draw(each=each, together=together)
+        data = {
+            "test": self.test.name,
+            "A": self.angle,
+            "runs": [one.as_data() for one in self.judged],
+            "series": self.series.found if self.series else None,
+        }
+        write_whole(self.folder / FILE, json.dumps(data, indent=1))
+        if len(self.judged) == 1:
+            table = run_table(self.judged[0], self.test.says)
+        else:
+            table = runs_table(self.series.runs if self.series else self.judged, self.test, self.series)
+        print_tables([table])
+        also = f", {counted(drawn, 'figure')}" if drawn else ""
+        say(f"{self.folder / FILE}{also}")
+
+    def _draw(self, *, each: bool, together: bool) -> int:
+        """Draw runs, beside their results or together, and the series; return how many figures."""
+        from ..figures.style import save
+
+        stem = self.test.name.replace("-", "_")
+        count = 0
+        for number, (trace, judged) in enumerate(zip(self.traces, self.judged, strict=True), start=1):
+            figure = self.test.draw(trace, judged) if each else None
+            if figure is None:
+                continue
+            beside = None if together else trace.folder
+            name = stem if beside or len(self.traces) == 1 else f"{stem}_{number}"
+            save(figure, (beside or self.folder) / name)
+            count += 1
+        if self.series and self.test.drawing:
+            save(self.test.draw_series(self.series, str(self.folder)), self.folder / f"{stem}_series")
+            count += 1
+        return count
+
+
+def _runs(source: Path, mapping: MappingSpec | None) -> list[Path]:
+    """Return the folders of the runs in and below a folder, or the file itself."""
+    from ..errors import ResultsError
+    from ..results.folder import COMPLETED
+    from ..results.read import UNREADABLE, found_runs
+    from .progress import say
+
+    if not source.is_dir():
+        if not source.exists():
+            raise ResultsError(f"{source}: there is no such folder or file")
+        return [source]
+    runs = found_runs(source)
+    found = [run.folder for run in runs if run.status == COMPLETED]
+    unreadable = [run.problem for run in runs if run.status == UNREADABLE]
+    if not found:
+        raise ResultsError(unreadable or f"{source}: holds no run that was completed")
+    for problem in unreadable:
+        say(f"note: left out: {problem}")
+    return found
+
+
+def angle_of(given: str | None) -> float | None:
+    """Return A [rad] as an option gives it, None if it does not.
+
+    Raises:
+        ScenarioError: it is no such angle.
+    """
+    from ..errors import ScenarioError
+    from ..scenario.quantities import convert
+
+    if given is None:
+        return None
+    try:
+        angle = float(convert(given, "rad"))
+    except ValueError as error:
+        raise ScenarioError(f"--angle: {error}") from None
+    if not 0 < angle < 2 * math.pi:
+        raise ScenarioError(f"--angle: must be between 0 and 360 degrees (got {given})")
+    return angle
+
+
+def _angle(
+    given: str | None, slow_steer: list[Path] | None, mapping: MappingSpec | None, test: StandardTest
+) -> float | None:
+    """Return A [rad], None if it is neither given nor needed."""
+    from ..errors import ResultsError, ScenarioError
+    from ..evaluation.judgement import NotJudged
+    from ..evaluation.steering_tests import characteristic_angle, evaluate_slow_steer
+    from ..evaluation.trace import load_trace
+    from .progress import say
+
+    if given and slow_steer:
+        raise ScenarioError("--angle and --slow-steer both say what A is: give one of them")
+    if (given or slow_steer) and not test.needs_angle:
+        raise ScenarioError(f"{test.name} needs no A: leave --angle and --slow-steer away")
+    if not slow_steer:
+        return angle_of(given)
+    places = [place for source in slow_steer for place in _runs(source, mapping)]
+    try:
+        angle = characteristic_angle([evaluate_slow_steer(load_trace(p, mapping)) for p in places])
+    except NotJudged as why:
+        raise ResultsError(str(why)) from None
+    say(f"A = {math.degrees(angle):.1f} degrees, from {len(places)} of slowly increasing steer")
+    return angle

@@ -1,0 +1,297 @@
+"""Straight-ahead braking on split friction, or over a jump of friction.
+
+From the brake's beginning on (the driver's force falls below zero; where that is not recorded, the
+deceleration exceeds 1 m/s2), until the car has stopped:
+
+    stopping distance      way of the centre of mass
+    mean deceleration      ((0.8 v_0)^2 - (0.1 v_0)^2) / (2 way in between)
+    yaw                    largest yaw rate, within the first second and in all, and largest yaw angle
+    deviation              largest distance from the line along which the car went
+    hand wheel             largest angle, and rate over 0.1 s
+    sideslip               largest above 10 km/h: below, it says nothing
+
+Where the road under the front wheels changes meanwhile, the friction jumps:
+
+    before, after          mean deceleration over the 0.5 s before it, and from 0.5 to 1 s after it
+    adaptation             from the jump until nine tenths of that change, deceleration as mean over 0.1 s
+    yaw                    largest yaw rate within the second after it
+
+Source: after ISO 14512, Passenger cars - Straight-ahead braking on surfaces with split coefficient of
+friction - Open-loop test procedure, from memory of the standard; a driver who corrects makes it closed loop.
+The mean deceleration is that of UN Regulation No. 13-H. The numbers of the jump are ours: the regulation
+asks that brakes of an anti-lock system adapt "within a reasonable time".
+
+Braking or lifting off in a turn: what becomes of a steady turn while the hand wheel is held.
+
+Steady state: means over the last 0.5 s before the action, with the radius R_0 = v_0 / r_0. 1 s after it:
+
+    yaw rate ratio     r / (v / R_0)     1: still the same circle, more: turns in, less: pushes out
+    a_y ratio          a_y / (v^2 / R_0)
+    deceleration       mean over that second
+    sideslip           change against the steady state
+
+and the largest of the yaw rate ratio within that second.
+
+Source: after ISO 7975, Passenger cars - Braking in a turn - Open-loop test method, and ISO 9816 (power-off
+reactions), from memory of the standards.
+
+A gust of side wind while the hand wheel is held: how far the car is blown off its way.
+
+From the wind's beginning on, while the hand wheel is held, relative to the way the car went before (means
+over 0.5 s):
+
+    after 2 s        distance from that line, yaw angle
+    within 2 s       largest yaw rate and lateral acceleration, their instants, largest sideslip
+
+Positive: to the left. The wind begins where the road unit tells a side force, in measurements the signal
+`wind_force_y` likewise.
+
+Source: after ISO 12021, Road vehicles - Sensitivity to lateral wind - Open-loop test method using wind
+generator input, from memory of the standard: 100 km/h, a zone of wind of 25 m, the hand wheel held, evaluated
+over 2 s.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..metrics.measures import running_integral
+from .judgement import Evaluation, NotJudged, evaluation
+from .trace import Trace, at, first_crossing, refuse_opposed, running_mean
+
+BRAKED = 1.0
+"""Deceleration of the brake's beginning where the pedal is not recorded [m/s2]."""
+STOPPED = 0.1
+"""Speed below which a car has stopped [m/s]; chosen."""
+UPPER, LOWER = 0.8, 0.1
+"""Speeds over v_0 between which the mean deceleration is taken: UN R13-H."""
+SLOW = 10.0 / 3.6
+"""Speed above which sideslip counts [m/s]; chosen."""
+MEAN = 0.1
+"""Width of the mean for rates and decelerations [s]; chosen."""
+JUMP = 0.05
+"""Change of the friction of both front wheels that is a jump [1]; chosen."""
+BEFORE_BRAKING, LATE, LATER, ADAPTED = 0.5, 0.5, 1.0, 0.9
+"""Stretches before and after a jump [s], and the share of the change at which brakes have adapted."""
+
+
+@evaluation
+def evaluate_braking(judged: Evaluation, trace: Trace) -> None:
+    """Return stopping distance, decelerations, yaw, correction by the hand wheel; those of a jump."""
+    t, v_x, r = trace.time, trace["velocity_x"], trace["yaw_rate"]
+    speed = np.hypot(v_x, trace["velocity_y"]) if "velocity_y" in trace else v_x
+    begin = _begin(trace)
+    way = running_integral(t, speed)
+    way = way - at(t, way, begin)
+    v_0 = at(t, speed, begin)
+    stop = first_crossing(t, -speed, -STOPPED, begin)
+    end = float(t[-1]) if stop is None else stop
+    judged.add("speed", "speed at the brake's beginning", v_0, "m/s")
+    judged.add("begin", "the brake's beginning", begin, "s")
+    distance = None if stop is None else at(t, way, stop)
+    judged.add("distance", "stopping distance", distance, "m", "way of the centre of mass")
+    if stop is None:
+        judged.notes.append(f"the car has not stopped by {end:.2f} s: {3.6 * at(t, speed, end):.0f} km/h")
+    judged.add("deceleration", "mean deceleration", _mean_deceleration(t, speed, way, v_0, begin), "m/s2",
+               "from 0.8 to 0.1 of the speed (UN R13-H)")  # fmt: skip
+    during = (t >= begin) & (t <= end)
+    first = during & (t <= begin + 1.0)
+    turned = trace["yaw_angle"] if "yaw_angle" in trace else running_integral(t, r)
+    judged.add("yaw_rate_first", "largest yaw rate in the first second", _most(r, first), "rad/s")
+    judged.add("yaw_rate", "largest yaw rate", _most(r, during), "rad/s")
+    judged.add("yaw_angle", "largest yaw angle", _most(turned - at(t, turned, begin), during), "rad")
+    judged.add("deviation", "largest distance from the line", _deviation(trace, begin, during), "m")
+    if "steering_wheel_angle" in trace:
+        even = trace.even
+        hand = even["steering_wheel_angle"]
+        turning = running_mean(np.gradient(hand, even.time), MEAN, even.rate)
+        within = (even.time >= begin) & (even.time <= end)
+        correction = hand - at(even.time, hand, begin)
+        judged.add("hand", "largest correction of the hand wheel", _most(correction, within), "rad")
+        judged.add("hand_rate", "its largest rate", _most(turning, within), "rad/s", f"mean over {MEAN:g} s")
+    if "sideslip" in trace:
+        fast = during & (speed > SLOW)
+        judged.add("sideslip", "peak sideslip", _most(trace["sideslip"], fast), "rad", "above 10 km/h")
+    _add_jump(judged, trace, begin, end)
+
+
+def _begin(trace: Trace) -> float:
+    """Return the instant at which the brake is pressed [s]."""
+    t = trace.time
+    if "drive_force" in trace:
+        pressed = np.flatnonzero(trace["drive_force"] < 0.0)
+        if pressed.size:
+            return float(t[pressed[0]])
+    elif "acceleration_x" in trace:
+        found = first_crossing(t, -trace["acceleration_x"], BRAKED, float(t[0]))
+        if found is not None:
+            return found
+    else:
+        raise NotJudged("neither drive_force nor acceleration_x is recorded, of which one tells the brake")
+    raise NotJudged("the car is not braked")
+
+
+def _most(x: np.ndarray, where: np.ndarray) -> float | None:
+    return float(np.abs(x[where]).max()) if where.any() else None
+
+
+def _mean_deceleration(
+    t: np.ndarray, speed: np.ndarray, way: np.ndarray, v_0: float, begin: float
+) -> float | None:
+    instants = [first_crossing(t, -speed, -share * v_0, begin) for share in (UPPER, LOWER)]
+    if None in instants:
+        return None
+    one, other = (at(t, way, instant or 0.0) for instant in instants)
+    return v_0**2 * (UPPER**2 - LOWER**2) / (2.0 * (other - one))
+
+
+def _deviation(trace: Trace, begin: float, during: np.ndarray) -> float | None:
+    """Return the largest distance [m] from the line along which the car went when it was braked."""
+    if not {"position_x", "position_y", "yaw_angle"} <= set(trace.signals):
+        return None
+    t = trace.time
+    x, y = (trace[name] - at(t, trace[name], begin) for name in ("position_x", "position_y"))
+    course = at(t, trace["yaw_angle"], begin)
+    if "velocity_y" in trace:
+        course += math.atan2(at(t, trace["velocity_y"], begin), at(t, trace["velocity_x"], begin))
+    return _most(y * math.cos(course) - x * math.sin(course), during)
+
+
+def _add_jump(judged: Evaluation, trace: Trace, begin: float, end: float) -> None:
+    """Add what becomes of the car where the friction under both front wheels jumps, if it does."""
+    if not {"friction_fl", "friction_fr", "acceleration_x"} <= set(trace.signals):
+        return
+    t = trace.time
+    frictions = [trace[name] for name in ("friction_fl", "friction_fr")]
+    changed = [np.abs(mu - mu[np.searchsorted(t, begin)]) > JUMP for mu in frictions]
+    found = np.flatnonzero(changed[0] & changed[1] & (t > begin) & (t < end))
+    if not found.size:
+        return
+    jump = float(t[found[0]])
+    mu = [float(np.mean([one[k] for one in frictions])) for k in (found[0] - 1, found[0])]
+    judged.add("jump", "the friction jumps", jump, "s", f"from {mu[0]:.2f} to {mu[1]:.2f} in front")
+    judged.add("jump_speed", "speed there", at(t, trace["velocity_x"], jump), "m/s")
+    even = trace.even
+    slowing = running_mean(-even["acceleration_x"], MEAN, even.rate)
+    before = even.time >= max(jump - BEFORE_BRAKING, begin)
+    before &= even.time < jump - 0.5 * MEAN
+    after = (even.time >= jump + LATE) & (even.time <= min(jump + LATER, end))
+    means = [float(slowing[part].mean()) if part.any() else None for part in (before, after)]
+    judged.add(
+        "deceleration_before", "mean deceleration before it", means[0], "m/s2", f"{BEFORE_BRAKING:g} s"
+    )
+    judged.add("deceleration_after", "mean deceleration after it", means[1], "m/s2",
+               f"{LATE:g} to {LATER:g} s after it")  # fmt: skip
+    adapted = None
+    if means[0] is not None and means[1] is not None and abs(means[1] - means[0]) > 0.0:
+        share = (slowing - means[0]) / (means[1] - means[0])
+        instant = first_crossing(even.time, share, ADAPTED, jump)
+        adapted = None if instant is None else instant - jump
+    judged.add("adaptation", "time of adaptation", adapted, "s", f"{100 * ADAPTED:g} % of the change")
+    near = (t >= jump) & (t <= min(jump + 1.0, end))
+    judged.add("jump_yaw_rate", "largest yaw rate after it", _most(trace["yaw_rate"], near), "rad/s", "1 s")
+
+
+BEFORE_ACTION, AFTER_ACTION = 0.5, 1.0
+"""Stretch of the steady state before the action, and instant after it [s]."""
+STEADY = 0.03
+"""Range of the yaw rate over that stretch, over its mean, beyond which it is no steady turn; chosen."""
+
+
+@evaluation
+def evaluate_turn(judged: Evaluation, trace: Trace, action: float | None = None) -> None:
+    """Return the ratios at 1 s after the action [s], by default that which the driver unit tells."""
+    t, v, r, a_y = trace.time, trace["velocity_x"], trace["yaw_rate"], trace["acceleration_y"]
+    now = trace.told("action_time", "when the pedals change") if action is None else action
+    before = (t >= now - BEFORE_ACTION) & (t <= now)
+    if now - BEFORE_ACTION < t[0] or now + AFTER_ACTION > t[-1] or np.count_nonzero(before) < 5:
+        raise NotJudged(
+            f"the record has no {BEFORE_ACTION:g} s before and {AFTER_ACTION:g} s after {now:g} s"
+        )
+    v_0, r_0 = float(v[before].mean()), float(r[before].mean())
+    if abs(r_0) < 1e-3 or np.ptp(r[before]) > STEADY * abs(r_0):
+        raise NotJudged(f"the turn is not steady before {now:g} s")
+    if "steering_wheel_angle" in trace:
+        refuse_opposed(trace["steering_wheel_angle"][before], r[before], "yaw rate")
+    side, radius = math.copysign(1.0, r_0), v_0 / abs(r_0)
+    judged.add("radius", "radius of the steady turn", side * radius, "m", "v / r, positive: to the left")
+    judged.add("speed", "speed of the steady turn", v_0, "m/s")
+    judged.add("acceleration", "lateral acceleration of the steady turn", float(a_y[before].mean()), "m/s2")
+    later = at(t, v, now + AFTER_ACTION)
+    judged.add(
+        "deceleration",
+        f"mean deceleration over {AFTER_ACTION:g} s",
+        (at(t, v, now) - later) / AFTER_ACTION,
+        "m/s2",
+    )
+    ratio = side * r * radius / np.maximum(v, 0.1)
+    judged.add(
+        "yaw_ratio",
+        f"yaw rate ratio after {AFTER_ACTION:g} s",
+        at(t, ratio, now + AFTER_ACTION),
+        "1",
+        "r R_0 / v",
+    )
+    during = (t >= now) & (t <= now + AFTER_ACTION)
+    judged.add(
+        "yaw_ratio_peak", f"largest yaw rate ratio within {AFTER_ACTION:g} s", float(ratio[during].max()), "1"
+    )
+    aside = side * at(t, a_y, now + AFTER_ACTION) * radius / max(later, 0.1) ** 2
+    judged.add(
+        "a_y_ratio", f"lateral acceleration ratio after {AFTER_ACTION:g} s", aside, "1", "a_y R_0 / v^2"
+    )
+    if "sideslip" in trace:
+        change = at(t, trace["sideslip"], now + AFTER_ACTION) - float(trace["sideslip"][before].mean())
+        judged.add("sideslip", f"change of sideslip after {AFTER_ACTION:g} s", change, "rad")
+        peak = float(np.abs(trace["sideslip"][t >= now]).max())
+        judged.add("sideslip_peak", "peak sideslip from the action on", peak, "rad")
+
+
+AFTER_GUST, BEFORE_GUST = 2.0, 0.5
+"""Time over which is evaluated, and before the wind, of the means [s]."""
+HELD = math.radians(1.0)
+"""Range of the hand wheel beyond which it is not held [rad]; chosen: a loose grip."""
+
+
+@evaluation
+def evaluate_side_wind(judged: Evaluation, trace: Trace) -> None:
+    """Return what a gust does to a car within 2 s."""
+    t, wind = trace.time, trace["wind_force_y"]
+    x, y, psi = trace["position_x"], trace["position_y"], trace["yaw_angle"]
+    blown = np.flatnonzero(wind != 0.0)
+    if not blown.size:
+        raise NotJudged("no wind blows")
+    begin = float(t[blown[0]])
+    before = (t >= begin - BEFORE_GUST) & (t < begin)
+    if begin - BEFORE_GUST < t[0] or begin + AFTER_GUST > t[-1] or np.count_nonzero(before) < 5:
+        raise NotJudged(
+            f"the record has no {BEFORE_GUST:g} s before and {AFTER_GUST:g} s after {begin:.2f} s"
+        )
+    during = (t >= begin) & (t <= begin + AFTER_GUST)
+    judged.add("begin", "the wind's beginning", begin, "s")
+    judged.add("speed", "speed there", at(t, trace["velocity_x"], begin), "m/s")
+    strongest = int(np.argmax(np.abs(wind)))
+    judged.add("force", "largest side force of the wind", float(wind[strongest]), "N")
+    course = math.atan2(*(float(np.polyfit(t[before], line[before], 1)[0]) for line in (y, x)))
+    off = (y - at(t, y, begin)) * math.cos(course) - (x - at(t, x, begin)) * math.sin(course)
+    reading = f"{AFTER_GUST:g} s after the wind's beginning"
+    judged.add("deviation", "lateral deviation", at(t, off, begin + AFTER_GUST), "m", reading)
+    turned = at(t, psi, begin + AFTER_GUST) - float(psi[before].mean())
+    judged.add("yaw_angle", "change of the yaw angle", turned, "rad", reading)
+    for name, says, unit in (
+        ("yaw_rate", "largest yaw rate", "rad/s"),
+        ("acceleration_y", "largest lateral acceleration", "m/s2"),
+        ("sideslip", "largest change of sideslip", "rad"),
+    ):
+        if name == "sideslip" and name not in trace:
+            continue
+        values = np.where(during, trace[name] - float(trace[name][before].mean()), 0.0)
+        k = int(np.argmax(np.abs(values)))
+        judged.add(name, says, float(values[k]), unit, f"within {AFTER_GUST:g} s")
+        if name != "sideslip":
+            judged.add(f"{name}_at", "its instant", float(t[k]) - begin, "s", "after the wind's beginning")
+    if "steering_wheel_angle" in trace and np.ptp(trace["steering_wheel_angle"][during]) > HELD:
+        turned_by = math.degrees(float(np.ptp(trace["steering_wheel_angle"][during])))
+        judged.notes.append(f"the hand wheel is not held: it moves by {turned_by:.0f} degrees")

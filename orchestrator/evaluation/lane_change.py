@@ -1,0 +1,239 @@
+"""A double lane change between cones: was it clean, and how fast.
+
+Clean: no part of the body is beyond a row of cones, as the driver unit tells in `cone_overrun`, and all of
+it has passed the last ones. What scores is the highest speed at the first cones at which the track is
+driven clean (`lane_change_series`).
+
+Source: ISO 3888-1 and ISO 3888-2, Passenger cars - Test track for a severe lane-change manoeuvre.
+
+The highest speed at which a track between cones is driven clean, over many runs.
+
+From the first speed on in steps, up while runs are clean, else down until one is; then the middle of the
+last two speeds, until they differ by no more than the resolution. Whatever is not clean counts as such: a
+cone touched, a car that rolls over, a record that ends too early.
+
+Source: ISO 3888-2 leaves the score to who drives; the highest clean entry speed is the common one.
+
+Figures of a lane change: a run seen from above between its cones, and a series over the entry speed.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vocabulary.lane_change import Lane, lanes_of
+
+from ..figures.style import CHANGED, QUIET, frame, line_style, new_figure
+from .judgement import Evaluation, TestSeries, Verdict, evaluation
+from .sine_with_dwell_figures import MARKS
+from .trace import Trace, at, first_crossing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+TOUCH = 1e-9
+"""Overrun above which a cone is hit [m]."""
+
+
+@evaluation
+def evaluate_lane_change(judged: Evaluation, trace: Trace) -> None:
+    """Return speeds, largest overrun, sideslip and lateral acceleration, and whether it was clean."""
+    t, over, x = trace.time, trace["cone_overrun"], trace["position_x"]
+    track = lanes_of(trace.facts)
+    start = track[0].start if track else trace.facts.get("track_start")
+    instant = None
+    if isinstance(start, (int, float)):
+        front = trace.facts.get("cg_to_front_end", 0.0)
+        instant = first_crossing(t, x, float(start) - float(front), float(t[0]))
+    speed = None if instant is None else at(t, trace["velocity_x"], instant)
+    judged.add("entry", "speed at the first cones", speed, "m/s", "of the front end")
+    through = len(t) - 1
+    if track:
+        last = track[-1].end + float(trace.facts.get("cg_to_rear_end", 0.0))
+        passed = np.flatnonzero(x >= last)
+        through = int(passed[0]) if passed.size else -1
+    ends = float(trace["velocity_x"][through])
+    judged.add("exit", "speed behind the last cones", None if through < 0 else ends, "m/s", "of the rear end")
+    worst = int(np.argmax(over))
+    judged.add("overrun", "largest distance beyond the cones", float(over[worst]), "m")
+    if over[worst] > TOUCH:
+        place = x[worst] - (start if isinstance(start, (int, float)) else 0.0)
+        said = f"{over[worst]:.3f} m beyond the cones, {place:.1f} m from the first ones"
+        judged.rule("clean", False, said)
+    elif instant is None:
+        judged.rule("clean", None, "the car has not reached the first cones")
+    elif through < 0:
+        judged.rule("clean", None, "the record ends before the car has passed the last cones")
+    else:
+        judged.rule("clean", True, "no cone is touched")
+    if "sideslip" in trace:
+        judged.add("sideslip", "peak sideslip", float(np.abs(trace["sideslip"]).max()), "rad")
+    a_y = float(np.abs(trace["acceleration_y"]).max())
+    judged.add("acceleration", "largest lateral acceleration", a_y, "m/s2")
+    if "steering_wheel_angle" in trace:
+        hand = float(np.abs(trace["steering_wheel_angle"]).max())
+        judged.add("hand", "largest hand-wheel angle", hand, "rad")
+
+
+CLEAN = "clean"
+
+
+def highest_clean(
+    clean: Callable[[float], bool], *, first: float, step: float, resolution: float, least: float, most: float
+) -> tuple[float | None, float | None]:
+    """Return the highest value that was clean and the lowest above it that was not, None where there is none.
+
+    Args:
+        clean: asked once per value.
+        first, step: where to begin, and by what to go on.
+        resolution: by how much both may differ in the end.
+        least, most: bounds of the values.
+
+    >>> highest_clean(lambda v: v < 61.3, first=50, step=10, resolution=1, least=10, most=200)
+    (61.25, 61.875)
+    """
+    good = bad = None
+    value = min(max(first, least), most)
+    while good is None or bad is None:
+        if clean(value):
+            good, nearer = value, min(value + step, most)
+        else:
+            bad, nearer = value, max(value - step, least)
+        if nearer == value:
+            return good, bad
+        value = nearer
+    while bad - good > resolution:
+        value = 0.5 * (good + bad)
+        if clean(value):
+            good = value
+        else:
+            bad = value
+    return good, bad
+
+
+def judge_entry_speeds(runs: Sequence[Evaluation]) -> TestSeries:
+    """Return the highest clean entry speed of runs, with no run below it that is not clean."""
+    ordered = sorted((run for run in runs if run["entry"] is not None), key=lambda run: run["entry"] or 0.0)
+    clean = list(itertools.takewhile(is_clean, ordered))
+    highest = clean[-1]["entry"] if clean else None
+    touched = ordered[len(clean)]["entry"] if len(clean) < len(ordered) else None
+    said = "No run is clean."
+    if highest is not None:
+        above = "" if touched is None else f"; not clean at {3.6 * touched:.1f} km/h"
+        said = f"Highest clean entry speed: {3.6 * highest:.1f} km/h{above}."
+    return TestSeries(ordered, said, {"highest_clean_entry_speed": highest, "lowest_not_clean": touched})
+
+
+def is_clean(run: Evaluation) -> bool:
+    """Return whether a run was driven without touching a cone."""
+    ruling = run.rulings.get(CLEAN)
+    return ruling is not None and ruling.verdict is Verdict.PASSED
+
+
+EVERY = 5.0
+"""Between outlines of the car [m]."""
+AROUND = 12.0
+"""Shown before the first cones and behind the last ones [m]."""
+
+
+def draw_run(trace: Trace, judged: Evaluation) -> Figure:
+    """Return the figure of a run: the car between its cones, hand wheel, lateral acceleration, sideslip."""
+    track = lanes_of(trace.facts)
+    x = trace["position_x"]
+    start = track[0].start if track else 0.0
+    panels = [
+        (name, says, factor)
+        for name, says, factor in (
+            ("steering_wheel_angle", "Hand-wheel angle [°]", 180.0 / np.pi),
+            ("acceleration_y", "Lateral acceleration [m/s²]", 1.0),
+            ("sideslip", "Sideslip angle [°]", 180.0 / np.pi),
+            ("velocity_x", "Speed [km/h]", 3.6),
+        )
+        if name in trace
+    ]
+    heights = [1.5, *([0.8] * len(panels))]
+    with new_figure() as figure:
+        axes = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
+        _from_above(axes[0], trace, track, start)
+        for panel, (name, says, factor) in zip(axes[1:], panels, strict=True):
+            panel.plot(x - start, factor * trace[name], **line_style(0))
+            panel.set_title(says)
+            if name != "velocity_x":
+                panel.axhline(0.0, color="#444444", linewidth=0.7, zorder=1)
+        for panel in axes:
+            for lane in track:
+                panel.axvspan(lane.start - start, lane.end - start, color="#F1F1F1", zorder=0)
+        end = track[-1].end - start if track else float(x[-1]) - start
+        axes[0].set_xlim(-AROUND, min(end + AROUND, float(x.max()) - start))
+        axes[-1].set_xlabel("Distance from the first cones [m]")
+        entry = judged["entry"]
+        ruling = judged.rulings[CLEAN]
+        speed = "" if entry is None else f", {3.6 * entry:.1f} km/h at the first cones"
+        note = " · ".join([*filter(None, [trace.title, trace.name]), *judged.notes])
+        frame(
+            figure, 1.45 * sum(heights), [], f"Lane change{speed}: {ruling.verdict.value}, {ruling.why}", note
+        )
+    return figure
+
+
+def _from_above(axes: Axes, trace: Trace, track: list[Lane], start: float) -> None:
+    """Draw cones, the way of the centre of mass and outlines of the car."""
+    x, y = trace["position_x"] - start, trace["position_y"]
+    axes.plot(x, y, **line_style(0))
+    axes.set_title("From above [m]; the scale across is larger")
+    for lane in track:
+        places = np.linspace(lane.start, lane.end, 2 + round((lane.end - lane.start) / 4.0)) - start
+        for border in (lane.right, lane.left):
+            axes.plot(places, np.full_like(places, border), "^", color=CHANGED, markersize=3.5, zorder=4)
+    known = [trace.facts.get(name) for name in ("cg_to_front_end", "cg_to_rear_end", "vehicle_width")]
+    if "yaw_angle" not in trace or not all(isinstance(value, (int, float)) for value in known):
+        return
+    front, rear, width = (float(value) for value in known)  # type: ignore[arg-type]
+    body = np.array([[front, front, -rear, -rear, front], [0.5, -0.5, -0.5, 0.5, 0.5]])
+    body[1] *= width
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
+    for k in np.searchsorted(way, np.arange(0.0, way[-1], EVERY)):
+        c, s = np.cos(trace["yaw_angle"][k]), np.sin(trace["yaw_angle"][k])
+        axes.plot(
+            x[k] + c * body[0] - s * body[1], y[k] + s * body[0] + c * body[1],
+            color=QUIET, linewidth=0.7, zorder=2,
+        )  # fmt: skip
+    highest = max([lane.left for lane in track] + [float(y.max())])
+    lowest = min([lane.right for lane in track] + [float(y.min())])
+    axes.set_ylim(max(lowest, -12.0) - 0.8, min(highest, 12.0) + 0.8)
+
+
+def draw_series(series: TestSeries, note: str) -> Figure:
+    """Return the figure of a series: what is beyond the cones, and how hard the car is driven."""
+    panels: list[tuple[str, str, float]] = [
+        ("overrun", "Largest distance beyond the cones [m]", 1.0),
+        ("acceleration", "Largest lateral acceleration [m/s²]", 1.0),
+        ("sideslip", "Peak sideslip [°]", 180.0 / np.pi),
+        ("exit", "Speed behind the last cones [km/h]", 3.6),
+    ]
+    with new_figure() as figure:
+        grid = figure.subplots(2, 2, sharex=True, squeeze=False)
+        for axes, (key, says, factor) in zip(grid.flat, panels, strict=True):
+            for verdict, marker in ((Verdict.PASSED, "o"), (Verdict.FAILED, "X"), (Verdict.NOT_JUDGED, "s")):
+                runs = [run for run in series.runs if run.rulings[CLEAN].verdict is verdict]
+                points = [(3.6 * (run["entry"] or 0.0), run[key]) for run in runs]
+                shown = [(v, factor * value) for v, value in points if value is not None]
+                style: dict[str, Any] = {"color": MARKS[verdict], "markersize": 6.0, "linestyle": ""}
+                axes.plot([v for v, _ in shown], [value for _, value in shown], marker=marker, **style)
+            axes.set_title(says)
+            if (highest := series.found["highest_clean_entry_speed"]) is not None:
+                axes.axvline(3.6 * highest, color=CHANGED, linewidth=1.2)
+        grid[0, 0].set_yscale("symlog", linthresh=0.1, linscale=0.5)
+        grid[0, 0].set_ylim(-0.02, 2.0 * max([0.1, *(run["overrun"] or 0.0 for run in series.runs)]))
+        grid[0, 0].set_yticks([0.0, 0.1, 1.0, 10.0][: 3 if grid[0, 0].get_ylim()[1] < 10.0 else 4])
+        grid[0, 0].yaxis.set_major_formatter("{x:g}")
+        for axes in grid[1]:
+            axes.set_xlabel("Speed at the first cones [km/h]")
+        frame(figure, 4.6, [], series.summary, f"round: clean; cross: cones touched · {note}")
+    return figure

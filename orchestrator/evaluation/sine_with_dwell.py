@@ -1,0 +1,396 @@
+"""Sine with dwell, one run: from the filtered signals to both criteria of the regulation.
+
+1. Zero: all signals less their means over the 1.0 s before the steering rate stays above 75 deg/s for
+   200 ms (below 26.8 degrees of amplitude it never does: before it first exceeds 75 deg/s).
+2. BOS: from there on the angle reaches 5 degrees. COS: it is back at zero after the second half wave.
+3. Second peak: the first local peak of the yaw rate, of 5 % prominence, after the steering has changed sign;
+   at COS + 1.000 s at the latest, and at least a fifth of the largest yaw rate before.
+4. Stability: yaw rate over that peak, signed, at COS + 1.000 s at most 35 %, at COS + 1.750 s at most 20 %.
+   Without a second peak the car is unstable.
+5. Responsiveness, from 5 A of amplitude on: a_y integrated twice from BOS is at least 1.83 m at BOS + 1.07 s,
+   1.52 m for cars above 3500 kg.
+
+The ratio is signed, so a car that spins can pass it: a peak of the sideslip angle beyond 20 degrees is noted.
+
+Where the yaw rate does not follow the first half wave, or opposes it, nothing is judged.
+
+Source: UN Regulation No. 140 (2017), GTR 8, as adopted in GB/T 30677-2014; the numbers are the same in FMVSS
+126. Our readings: order of the filters (`filters`), prominence and bounds of the second peak, lateral
+displacement as the double integral (not the path, which differs by up to 0.36 m), ratios timed from COS.
+
+Sine with dwell, the whole series: which runs there must be, and what all of them come to.
+
+    1.5 A, 2 A, 2.5 A, ... up to the last run, of max(6.5 A, 270 degrees), or 300 degrees where 6.5 A is more;
+
+once left first and once right first. Steps of 0.5 A go on beyond 6.5 A where the last run is 270 degrees.
+The series passes if every run that it asks for is there and passes all that is asked of it.
+
+Source: UN Regulation No. 140, GTR 8.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+
+from ..figures.style import shown
+from ..metrics.measures import running_integral
+from .judgement import CriterionResult, Evaluation, NotJudged, TestSeries, Verdict, evaluation
+from .trace import Trace, at, first_crossing, likeness, opposed, prepared, refuse_opposed, running_mean
+
+RATE, LASTS, MEAN = math.radians(75.0), 0.2, 0.1
+"""Steering rate that begins the test [rad/s], for how long, and the width of its running mean [s]."""
+BEFORE = 1.0
+"""Length of the zeroing range [s]."""
+BEGUN = math.radians(5.0)
+"""Hand-wheel angle of BOS [rad]."""
+PROMINENCE = 0.05
+"""Of the second peak, over the largest yaw rate of that half wave; chosen: ripple of filters is less."""
+LEAST_PEAK = 0.2
+"""Of the second peak, over the largest yaw rate of the first half wave. Chosen: 96 runs of six cars with and
+without control, 45 to 270 degrees on mu 0.4 and 0.9, have 0.95 to 2.1; what is less is noise."""
+FOLLOWS = 0.5
+"""Likeness (see `signs`) of yaw rate and hand wheel in the first half wave, below which the yaw rate is not
+that of the car that was steered. Chosen: those runs have 0.90 to 0.98, noise has about 0."""
+RATIOS = ((1.0, 0.35), (1.75, 0.20))
+"""Time after COS [s], largest ratio of the yaw rate."""
+AT, FAR, FAR_HEAVY, HEAVY = 1.07, 1.83, 1.52, 3500.0
+"""Lateral displacement: time after BOS [s], least value [m], that of heavy cars, and their mass [kg]."""
+FROM = 5.0
+"""Multiple of A from which on responsiveness is judged."""
+DRY = 0.9
+"""Friction of the road that the regulation asks for."""
+SPEED, SLACK = 80.0 / 3.6, 2.0 / 3.6
+"""Speed at the beginning and how far it may be off [m/s]."""
+SPUN = math.radians(20.0)
+"""Sideslip that is remarkable though the ratios pass; chosen: beyond what a driver can hold."""
+SLIGHT = 1e-6
+"""Relative slack of an amplitude against a multiple of A, for rounding."""
+
+
+@dataclass(frozen=True)
+class DwellCourse:
+    """The zeroed signals of a run and the instants in them; what could not be found is None."""
+
+    time: np.ndarray
+    angle: np.ndarray  # of the hand wheel, the first half wave positive [rad]
+    yaw_rate: np.ndarray  # [rad/s], likewise
+    displacement: np.ndarray  # from BOS [m], likewise; zero before
+    zeroed: tuple[float, float]
+    begin: float  # BOS
+    end: float  # COS
+    peak: float | None  # instant of the second peak
+    side: float  # 1: left first
+    notes: list[str] = field(default_factory=list)
+
+
+def course_of(trace: Trace) -> DwellCourse:
+    """Return the course of a run as the regulation sees it.
+
+    Raises:
+        NotJudged: the record is too short, the steering no sine with dwell, COS not reached.
+        ResultsError: a signal is missing.
+    """
+    signals = prepared(trace, ("steering_wheel_angle", "yaw_rate", "acceleration_y"))
+    t, rate = signals["time"], trace.even.rate
+    notes: list[str] = []
+    start = _start(t, signals["steering_wheel_angle"], rate, notes)
+    if start - BEFORE < t[0] - 1e-9:
+        raise NotJudged(
+            f"the record begins {start - t[0]:.2f} s before the steering; {BEFORE:g} s are needed"
+        )
+    quiet = (t >= start - BEFORE) & (t <= start)
+    zeroed = {name: x - x[quiet].mean() for name, x in signals.items() if name != "time"}
+    angle = zeroed["steering_wheel_angle"]
+    side = _first_side(t, angle, start)
+    angle, r, a_y = side * angle, side * zeroed["yaw_rate"], side * zeroed["acceleration_y"]
+    begin = first_crossing(t, angle, BEGUN, start)
+    if begin is None:
+        raise NotJudged(f"the hand wheel does not reach {math.degrees(BEGUN):g} degrees")
+    reversed_ = first_crossing(t, -angle, 0.0, float(t[np.argmax(np.where(t >= begin, angle, -np.inf))]))
+    if reversed_ is None or not np.any((t > reversed_) & (angle < -BEGUN)):
+        raise NotJudged("there is no second half wave of steering")
+    end = first_crossing(t, angle, 0.0, float(t[np.argmin(np.where(t >= reversed_, angle, np.inf))]))
+    if end is None:
+        raise NotJudged("completion of steer is not reached: the hand wheel does not come back to zero")
+    displacement = _displacement(t, a_y, begin)
+    _check_answers(t, angle, r, displacement, begin, reversed_)
+    return DwellCourse(
+        t,
+        angle,
+        r,
+        displacement,
+        (start - BEFORE, start),
+        begin,
+        end,
+        _second_peak(t, r, begin, reversed_, end),
+        side,
+        notes,
+    )
+
+
+def _start(t: np.ndarray, angle: np.ndarray, rate: float, notes: list[str]) -> float:
+    """Return the end of the zeroing range [s]."""
+    turning = running_mean(np.gradient(angle, t), MEAN, rate)
+    first = np.flatnonzero(np.abs(turning) > RATE)
+    if not first.size:
+        raise NotJudged(f"the steering rate does not exceed {math.degrees(RATE):g} deg/s")
+    side = _first_side(t, angle - angle[0], float(t[0]))
+    lasting = max(1, round(LASTS * rate))  # samples
+    stays = np.convolve(side * turning > RATE, np.ones(lasting), "valid") >= lasting - 0.5
+    found = np.flatnonzero(stays)
+    if found.size:
+        return float(t[found[0]])
+    notes.append(
+        f"zeroed before the first instant above {math.degrees(RATE):g} deg/s: the first half wave does not "
+        f"stay above it for {1000 * LASTS:g} ms"
+    )
+    return float(t[first[0]])
+
+
+def _first_side(t: np.ndarray, angle: np.ndarray, start: float) -> float:
+    beyond = np.flatnonzero((np.abs(angle) >= BEGUN) & (t >= start))
+    if not beyond.size:
+        raise NotJudged(f"the hand wheel does not reach {math.degrees(BEGUN):g} degrees")
+    return math.copysign(1.0, float(angle[beyond[0]]))
+
+
+def _check_answers(
+    t: np.ndarray, angle: np.ndarray, r: np.ndarray, displacement: np.ndarray, begin: float, reversed_: float
+) -> None:
+    """Raise NotJudged if the car does not answer the first half wave, or to the other side."""
+    first = (t >= begin) & (t <= reversed_)
+    refuse_opposed(angle[first], r[first], "yaw rate")
+    found = likeness(angle[first], r[first])
+    if found < FOLLOWS:
+        raise NotJudged(
+            "the yaw rate does not follow the steering: their likeness in the first half wave is "
+            f"{found:.2f}, at least {FOLLOWS:g} is needed"
+        )
+    if at(t, displacement, min(begin + AT, float(t[-1]))) < 0.0:
+        raise opposed("lateral acceleration")
+
+
+def _second_peak(t: np.ndarray, r: np.ndarray, begin: float, reversed_: float, end: float) -> float | None:
+    """Return the instant of the second peak, None if there is none.
+
+    Raises:
+        NotJudged: the yaw rate hardly answers the reversal.
+    """
+    from scipy.signal import find_peaks
+
+    after, latest = t >= reversed_, end + RATIOS[0][0]
+    x, instants = -r[after], t[after]
+    before = float(r[(t >= begin) & (t <= reversed_)].max())
+    answered = float(x[instants <= latest].max(initial=0.0))
+    if answered < LEAST_PEAK * before:
+        raise NotJudged(
+            f"the yaw rate hardly answers the reversal: it reaches {math.degrees(answered):.2g} deg/s after "
+            f"{math.degrees(before):.2g} deg/s in the first half wave"
+        )
+    peaks, _ = find_peaks(x, prominence=PROMINENCE * float(x.max()), height=LEAST_PEAK * before)
+    found = instants[peaks]
+    return float(found[0]) if found.size and found[0] <= latest else None
+
+
+def _displacement(t: np.ndarray, a_y: np.ndarray, begin: float) -> np.ndarray:
+    """Return the double integral of a_y from BOS on, by the trapezoidal rule."""
+    late = t > begin
+    times = np.concatenate([[begin], t[late]])
+    a = np.concatenate([[at(t, a_y, begin)], a_y[late]])
+    found = np.zeros_like(t)
+    found[late] = running_integral(times, running_integral(times, a))[1:]
+    return found
+
+
+def percent(ratio: float) -> str:
+    """Return a ratio with one decimal in per cent, no -0.0."""
+    return f"{round(100 * ratio, 1) + 0.0:.1f} %"
+
+
+@evaluation
+def evaluate_dwell(judged: Evaluation, trace: Trace, angle: float | None = None) -> None:
+    """Return what a run comes to; without A [rad] in `angle` responsiveness is not judged."""
+    try:
+        course = course_of(trace)
+    except NotJudged as why:
+        for criterion in ("stability", "responsiveness"):
+            judged.rule(criterion, None, str(why))
+        return
+    judged.notes += course.notes
+    steered = np.abs(trace["steering_wheel_angle"] - _zero_of(trace, course))
+    amplitude = float(steered.max())
+    told = trace.facts.get("amplitude")
+    if isinstance(told, float) and abs(abs(told) - amplitude) < math.radians(0.5):
+        amplitude = abs(told)  # to the last digit, not to the nearest sample
+    judged.add("amplitude", "amplitude", course.side * amplitude, "rad", "hand wheel, positive: left first")
+    if angle:
+        judged.add("multiple", "amplitude over A", amplitude / angle, "1")
+    judged.add("begin", "beginning of steer", course.begin, "s", "5 degrees, filtered and zeroed")
+    judged.add("end", "completion of steer", course.end, "s", "zero, filtered and zeroed")
+    _stability(judged, course)
+    _responsiveness(judged, course, trace, angle, amplitude)
+    _beside(judged, course, trace)
+
+
+def _zero_of(trace: Trace, course: DwellCourse) -> float:
+    quiet = (trace.time >= course.zeroed[0]) & (trace.time <= course.zeroed[1])
+    return float(trace["steering_wheel_angle"][quiet].mean())
+
+
+def _stability(judged: Evaluation, course: DwellCourse) -> None:
+    t, r = course.time, course.yaw_rate
+    last = course.end + RATIOS[-1][0]
+    value = None if course.peak is None else at(t, r, course.peak)
+    judged.add("peak", "second peak of the yaw rate", None if value is None else course.side * value, "rad/s")
+    judged.add("peak_at", "instant of the second peak", course.peak, "s")
+    short = last > t[-1] + 1e-9
+    held, said = [], []
+    for late, most in RATIOS:
+        known = value is not None and course.end + late <= t[-1] + 1e-9
+        ratio = at(t, r, course.end + late) / value if known and value else None
+        name = f"yaw-rate ratio at COS + {late:.3f} s"
+        judged.add(f"ratio_{round(1000 * late)}", name, ratio, "%", "signed, over the second peak")
+        if ratio is not None:
+            held.append(ratio <= most)
+            said.append(f"{percent(ratio)} of at most {100 * most:g} % at COS + {late:g} s")
+    if short:
+        why = f"the record ends {t[-1] - course.end:.2f} s after completion of steer; "
+        judged.rule("stability", None, f"{why}{RATIOS[-1][0]:g} s are needed")
+    elif value is None:
+        judged.rule("stability", False, "the reversal produces no second peak of the yaw rate")
+    else:
+        judged.rule("stability", all(held), "; ".join(said))
+
+
+def _responsiveness(
+    judged: Evaluation, course: DwellCourse, trace: Trace, angle: float | None, amplitude: float
+) -> None:
+    instant = course.begin + AT
+    there = instant <= course.time[-1]
+    found = at(course.time, course.displacement, instant) if there else None
+    reading = "double integral of the filtered lateral acceleration of the centre of mass"
+    judged.add("displacement", f"lateral displacement at BOS + {AT:g} s", found, "m", reading)
+    criterion = "responsiveness"
+    if angle is None:
+        judged.rule(criterion, None, "A is not known: give runs of slowly increasing steer")
+    elif amplitude < FROM * angle * (1.0 - SLIGHT):
+        return  # not asked of this run
+    elif found is None:
+        judged.rule(criterion, None, f"the record ends before BOS + {AT:g} s")
+    elif trace.friction is not None and trace.friction < DRY * (1.0 - SLIGHT):
+        judged.rule(criterion, None, f"friction {trace.friction:g}; a dry road, {DRY:g}, is asked for")
+    else:
+        least = FAR_HEAVY if trace.mass is not None and trace.mass > HEAVY else FAR
+        judged.rule(criterion, found >= least, f"{found:.2f} m of at least {least:g} m")
+        if trace.mass is None:
+            judged.notes.append(f"mass not known: taken as at most {HEAVY:g} kg")
+
+
+def _beside(judged: Evaluation, course: DwellCourse, trace: Trace) -> None:
+    """Add what the regulation does not ask for but a reader needs."""
+    after = trace.time >= course.begin
+    if "sideslip" in trace:
+        peak = float(np.abs(trace["sideslip"][after]).max())
+        judged.add("sideslip", "peak sideslip", peak, "rad", "from BOS to the end of the record")
+        if peak > SPUN:
+            stable = judged.rulings["stability"].verdict.value
+            judged.notes.append(f"sideslip reaches {math.degrees(peak):.0f} degrees (stability: {stable})")
+    else:
+        judged.notes.append("sideslip was not recorded: a spin may pass the ratios unseen")
+    if "velocity_x" in trace:
+        speed = at(trace.time, trace["velocity_x"], course.begin)
+        judged.add("speed", "speed at BOS", speed, "m/s")
+        judged.add("speed_end", "speed at COS", at(trace.time, trace["velocity_x"], course.end), "m/s")
+        if abs(speed - SPEED) > SLACK:
+            why = f"{3.6 * speed:.1f} km/h at BOS; 80 +- 2 km/h are asked for"
+            for criterion in judged.rulings:
+                judged.rule(criterion, None, why)
+
+
+FIRST, STEP, LAST = 1.5, 0.5, 6.5
+"""Amplitudes over A: of the first run, from run to run, of the last."""
+LEAST, MOST = 270.0, 300.0
+"""Bounds of the last amplitude [deg]."""
+NEAR = math.radians(1.0)
+"""How far an amplitude may be from the one asked for [rad]; chosen: what steering robots keep."""
+SAME = math.radians(0.05)
+"""Amplitudes that differ by less are the same [rad]; chosen: below a tenth of a degree."""
+CRITERIA = ("stability", "responsiveness")
+
+
+def amplitudes(angle: float) -> list[float]:
+    """Return the amplitudes of one direction [rad], from A [rad].
+
+    >>> [round(math.degrees(x), 1) for x in amplitudes(math.radians(44.3))][-3:]
+    [243.6, 265.8, 287.9]
+    """
+    a = math.degrees(angle)
+    last = min(max(LAST * a, LEAST), MOST)
+    steps = int((last / a - FIRST) / STEP + 1e-9)
+    found = [(FIRST + STEP * k) * a for k in range(steps + 1)] if FIRST * a < last else []
+    if not found or last - found[-1] > 1e-6:
+        found.append(last)
+    return [math.radians(round(x, 6)) for x in found]
+
+
+def is_series(runs: Sequence[Evaluation]) -> bool:
+    """Return whether runs can be a series: several, no two of the same amplitude."""
+    found = sorted(_of(run) for run in runs if run["amplitude"] is not None)
+    return len(runs) > 1 and all(b - a > SAME for a, b in itertools.pairwise(found))
+
+
+def judge_series(runs: Sequence[Evaluation], angle: float) -> TestSeries:
+    """Return what all runs come to, in the order of their amplitudes; `angle`: A [rad]."""
+    ordered = sorted(runs, key=lambda run: (-math.copysign(1.0, _of(run)), abs(_of(run))))
+    missing = [
+        math.degrees(side * wanted)
+        for side in (1.0, -1.0)
+        for wanted in amplitudes(angle)
+        if not any(abs(_of(run) - side * wanted) <= NEAR for run in runs)
+    ]
+    rulings = {criterion: _ruling(criterion, ordered, missing) for criterion in CRITERIA}
+    passed = all(ruling.verdict is Verdict.PASSED for ruling in rulings.values())
+    verdict = Verdict.PASSED if passed else Verdict.FAILED
+    criteria = {name: asdict(ruling) for name, ruling in rulings.items()}
+    found = {"A": angle, "verdict": verdict, "criteria": criteria}
+    return TestSeries(ordered, f"A = {shown(angle, 'rad')}; the series has {verdict.value}.", found, rulings)
+
+
+def _ruling(criterion: str, runs: Sequence[Evaluation], missing: Sequence[float]) -> CriterionResult:
+    """Return the verdict of a criterion over all runs; amplitudes [deg] may be missing."""
+    asked = [run for run in runs if criterion in run.rulings]
+    failed = [run for run in asked if run.rulings[criterion].verdict is Verdict.FAILED]
+    if failed:
+        return CriterionResult(Verdict.FAILED, f"{len(failed)} of {len(asked)} runs fail, {_span(failed)}")
+    reasons = [one.why for run in asked if (one := run.rulings[criterion]).verdict is Verdict.NOT_JUDGED]
+    if reasons:
+        said = f"{len(reasons)} of {len(asked)} runs are not judged: {reasons[0]}"
+    elif missing:
+        lacking = ", ".join(f"{x:+.1f}" for x in missing)
+        said = f"{len(missing)} runs are missing, of {lacking} degrees"
+    elif not asked:
+        said = "no run is asked"
+    else:
+        return CriterionResult(Verdict.PASSED, f"all {len(asked)} runs pass")
+    return CriterionResult(Verdict.NOT_JUDGED, said)
+
+
+def _of(run: Evaluation) -> float:
+    """Return the amplitude of a run [rad], positive if left first; nothing known sorts last."""
+    value = run["amplitude"]
+    return math.nan if value is None else value
+
+
+def _span(runs: Sequence[Evaluation]) -> str:
+    """Return from which amplitude on runs fail, each direction for itself."""
+    words = []
+    for name, side in (("left first", 1.0), ("right first", -1.0)):
+        found = [math.degrees(abs(_of(run))) for run in runs if side * _of(run) > 0]
+        if found:
+            words.append(f"{name}: {len(found)}, the smallest of {min(found):.1f} degrees")
+    return "; ".join(words)

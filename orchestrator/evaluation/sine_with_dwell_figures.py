@@ -1,0 +1,182 @@
+"""Figures of sine with dwell: a run with its instants and ratios, and a series over the amplitude."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..figures.style import CHANGED, QUIET, frame, line_style, new_figure
+from .judgement import Evaluation, NotJudged, TestSeries, Verdict
+from .sine_with_dwell import AT, FAR, FAR_HEAVY, HEAVY, RATIOS, DwellCourse, course_of, percent
+from .trace import Trace, at
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MARKS = {Verdict.PASSED: "#009E73", Verdict.FAILED: "#D55E00", Verdict.NOT_JUDGED: QUIET}
+"""Colours of verdicts, of figures and of words in them."""
+RESPONSE = "responsiveness"
+
+
+def draw_run(trace: Trace, judged: Evaluation) -> Figure | None:
+    """Return the figure of a run: hand wheel, yaw rate with its ratios, displacement, sideslip.
+
+    None where nothing can be judged.
+    """
+    try:
+        course = course_of(trace)
+    except NotJudged:
+        return None
+    with new_figure() as figure:
+        names = ["hand wheel", "yaw rate", "displacement", *(["sideslip"] if "sideslip" in trace else [])]
+        heights = [1.0, 1.7, 1.0, 1.0][: len(names)]
+        panels = figure.subplots(len(names), 1, sharex=True, height_ratios=heights)
+        _hand_wheel(panels[0], course)
+        _yaw_rate(panels[1], course, judged)
+        _displaced(panels[2], course, judged, trace)
+        if len(names) > 3:
+            panels[3].plot(trace.time, np.degrees(course.side * trace["sideslip"]), **line_style(0))
+            panels[3].set_title("Sideslip angle [°]")
+        late = min(float(course.time[-1]), course.end + RATIOS[-1][0] + 0.35)
+        for axes in panels:
+            axes.set_xlim(course.zeroed[0] - 0.1, late)
+            for instant in (course.begin, course.end):
+                axes.axvline(instant, color="#444444", linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+            axes.axhline(0.0, color="#444444", linewidth=0.7, zorder=1)
+        panels[-1].set_xlabel("Time [s]")
+        side = "left" if course.side > 0 else "right"
+        title = f"Sine with dwell, {math.degrees(abs(judged['amplitude'] or 0)):.1f}°, {side} first"
+        said = f"{title}: {_verdicts(judged)}"
+        note = " · ".join(
+            [
+                *filter(None, [trace.title, trace.name]),
+                "first half wave positive, signals filtered and zeroed as UN R140 says",
+                *judged.notes,
+            ]
+        )
+        frame(figure, 2.0 * sum(heights), [], said, note)
+    return figure
+
+
+def _verdicts(judged: Evaluation) -> str:
+    return ", ".join(f"{name} {ruling.verdict.value}" for name, ruling in judged.rulings.items())
+
+
+def _label(axes: Axes, x: float, y: float, text: str, place: tuple[float, float], **more: Any) -> None:
+    axes.annotate(text, (x, y), place, textcoords="offset points", fontsize=8, annotation_clip=True, **more)
+
+
+def _hand_wheel(axes: Axes, course: DwellCourse) -> None:
+    axes.plot(course.time, np.degrees(course.angle), **line_style(0))
+    axes.axvspan(*course.zeroed, color="#EDEDED", zorder=0)
+    axes.set_title("Hand-wheel angle [°]")
+    middle = 0.5 * sum(course.zeroed)
+    top = float(np.degrees(course.angle).max())
+    axes.text(middle, 0.55 * top, "zeroed here", ha="center", fontsize=8, color=QUIET)
+    _label(axes, course.begin, top, f"BOS {course.begin:.3f} s", (-4, -8), ha="right")
+    _label(axes, course.end, top, f"COS {course.end:.3f} s", (4, -8))
+
+
+def _yaw_rate(axes: Axes, course: DwellCourse, judged: Evaluation) -> None:
+    axes.plot(course.time, np.degrees(course.yaw_rate), **line_style(0))
+    axes.set_title("Yaw rate [°/s]")
+    if course.peak is None:
+        axes.text(0.99, 0.06, "the reversal produces no peak", transform=axes.transAxes, ha="right",
+                  color=MARKS[Verdict.FAILED])  # fmt: skip
+        return
+    value = math.degrees(at(course.time, course.yaw_rate, course.peak))
+    axes.plot([course.peak], [value], "o", color="#111111", markersize=5, zorder=4)
+    _label(axes, course.peak, value, f"second peak {value:.1f} °/s", (8, -3))
+    low, high = axes.get_ylim()
+    axes.set_ylim(low - 0.12 * (high - low), high)
+    for late, most in RATIOS:
+        instant = course.end + late
+        ratio = judged[f"ratio_{round(1000 * late)}"]
+        axes.plot([instant - 0.22, instant], [most * value] * 2, color=CHANGED, linewidth=2.2, zorder=3)
+        below: dict[str, Any] = {"va": "top", "ha": "right"}
+        below["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.85}
+        _label(axes, instant, most * value, f"limit {100 * most:g} %", (-2, -3), color=CHANGED, **below)
+        axes.axvline(instant, color=QUIET, linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
+        if ratio is None:
+            continue
+        good = ratio <= most
+        colour = MARKS[Verdict.PASSED if good else Verdict.FAILED]
+        axes.plot([instant], [ratio * value], "D", color=colour, markersize=5.5, zorder=4)
+        text = f"{percent(ratio)} at\nCOS + {late:g} s"
+        axes.text(instant, 0.97, text, transform=axes.get_xaxis_transform(), fontsize=8, color=colour,
+                  ha="center", va="top", backgroundcolor="white")  # fmt: skip
+
+
+def _displaced(axes: Axes, course: DwellCourse, judged: Evaluation, trace: Trace) -> None:
+    shown = course.time <= course.end + 0.3
+    axes.plot(course.time[shown], course.displacement[shown], **line_style(0))
+    axes.set_title("Lateral displacement, double integral of the lateral acceleration [m]")
+    found, instant = judged["displacement"], course.begin + AT
+    if found is None:
+        return
+    ruling = judged.rulings.get(RESPONSE)
+    colour = MARKS[ruling.verdict] if ruling else QUIET
+    axes.axvline(instant, color=QUIET, linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
+    axes.plot([instant], [found], "D", color=colour, markersize=5.5, zorder=4)
+    asked = "" if ruling else ", not asked of this amplitude"
+    text = f"{found:.2f} m at BOS + {AT:g} s{asked}"
+    _label(axes, instant, found, text, (-7, 4), color=colour, ha="right")
+    if ruling and ruling.verdict is not Verdict.NOT_JUDGED:
+        least = FAR_HEAVY if trace.mass is not None and trace.mass > HEAVY else FAR
+        axes.plot([instant, instant + 0.35], [least] * 2, color=CHANGED, linewidth=2.2, zorder=3)
+        _label(axes, instant + 0.35, least, f"at least {least:g} m", (4, -3), color=CHANGED)
+
+
+def draw_series(series: TestSeries, note: str) -> Figure:
+    """Return the figure of a series: ratios and displacement over the amplitude, both directions."""
+    from matplotlib.lines import Line2D
+
+    panels: list[tuple[str, str, float, float | None]]
+    panels = [(f"ratio_{round(1000 * late)}", f"Yaw-rate ratio at COS + {late:g} s [%]", 100.0, 100 * most)
+              for late, most in RATIOS]  # fmt: skip
+    panels += [("displacement", f"Lateral displacement at BOS + {AT:g} s [m]", 1.0, None)]
+    if any(run["sideslip"] is not None for run in series.runs):
+        panels += [("sideslip", "Peak sideslip [°]", 180 / math.pi, None)]
+    with new_figure() as figure:
+        grid = figure.subplots(2, 2, sharex=True, squeeze=False)
+        for axes, (key, says, factor, limit) in zip(grid.flat, panels, strict=False):
+            for k, side in enumerate((1.0, -1.0)):
+                runs = [run for run in series.runs if side * (run["amplitude"] or 0.0) > 0]
+                x = [math.degrees(abs(run["amplitude"] or 0.0)) for run in runs]
+                y = [math.nan if run[key] is None else factor * (run[key] or 0.0) for run in runs]
+                marker = {"marker": "os"[k], "markersize": 6.5 - 2.5 * k}
+                axes.plot(x, y, **line_style(k), **marker)
+            axes.set_title(says)
+            if limit is not None:
+                axes.axhline(limit, color=CHANGED, linewidth=1.5)
+                _label(
+                    axes,
+                    axes.get_xlim()[1],
+                    limit,
+                    f"at most {limit:g} %",
+                    (-4, 3),
+                    color=CHANGED,
+                    ha="right",
+                )
+        asked = [run for run in series.runs if RESPONSE in run.rulings]
+        judged = [run for run in asked if run.rulings[RESPONSE].verdict is not Verdict.NOT_JUDGED]
+        if judged:
+            x = [math.degrees(abs(run["amplitude"] or 0.0)) for run in judged]
+            grid[1, 0].plot([min(x), max(x)], [FAR] * 2, color=CHANGED, linewidth=1.5)
+            _label(grid[1, 0], max(x), FAR, f"at least {FAR:g} m", (-4, 4), color=CHANGED, ha="right")
+        for axes in grid[1]:
+            axes.set_xlabel("Amplitude of the hand wheel [°]")
+        if len(panels) < 4:
+            grid[1, 1].set_axis_off()
+        handles = [
+            Line2D([], [], label=name, marker="os"[k], **line_style(k))
+            for k, name in enumerate(("left first", "right first"))
+        ]
+        said = "; ".join(f"{name} {one.verdict.value}: {one.why}" for name, one in series.rulings.items())
+        angle, verdict = math.degrees(series.found["A"]), series.found["verdict"].value
+        title = f"Sine with dwell, A = {angle:.1f}°: the series has {verdict}"
+        frame(figure, 5.0, handles, title, f"{said} · {note}")
+    return figure

@@ -1,0 +1,293 @@
+"""Understeer gradient: how much more a car has to be steered with a_y than by its geometry.
+
+    delta = L kappa + K_us a_y,        delta = delta_h / i_s,  kappa = r / v_x
+
+K_us is the slope of delta - L r / v_x over a_y; so it does not matter whether the speed was held and the hand
+wheel turned slowly, or the radius was held and the speed raised. Tyres lose stiffness with the square of
+a_y, so the gradient of the linear range is that at zero of
+
+    delta - L r / v_x = c_0 + K_us a_y + c_3 a_y^3                  fitted over 0.5 to 2 m/s2
+
+and beyond it a local one, a straight line over 1 m/s2.
+
+Source: after ISO 4138, Passenger cars - Steady-state circular driving behaviour - Open-loop test methods,
+from memory of the standard, which fits a curve and differentiates it; the cubic and its range are ours.
+
+Slowly increasing steer: the hand-wheel angle A at 0.3 g, from which sine with dwell follows.
+
+    A = mean |delta_h| at a_y = 0.3 g over all runs, each from a straight line through 0.1 to 0.375 g
+
+Each angle and the mean are rounded to 0.1 degrees. The regulation asks for three runs to the left and three
+to the right; where runs do not scatter one of each says the same.
+
+Source: UN Regulation No. 140 and GTR 8, "slowly increasing steer test": 80 +- 2 km/h, 13.5 deg/s, linear
+regression, 0.3 g. The window of the regression, 0.1 to 0.375 g, is NHTSA's (TP-126), from memory.
+
+Step steer: how quickly, how far and with how much overshoot a car answers a step of the hand wheel.
+
+    time zero        the hand wheel has reached half of its final angle
+    steady value     mean over the last second of the record
+    response time    from time zero until 90 % of the steady value is reached
+    peak time        from time zero to the largest value;  overshoot = largest value / steady value - 1
+    gain             steady value over final hand-wheel angle
+
+of yaw rate and lateral acceleration, and T_beta = peak time of the yaw rate times steady sideslip, in rad s.
+
+Source: after ISO 7401, Road vehicles - Lateral transient response test methods - Open-loop test methods; the
+definitions are from memory of the standard.
+
+Frequency response of yaw rate and lateral acceleration to the hand wheel, from a sweep.
+
+    H(f) = sum Y X* / sum |X|^2          over the lines of the spectra within 0.05 Hz of f
+
+X is the spectrum of the hand wheel, Y that of the answer; the record begins and ends at rest. Where the hand
+wheel has less than a hundredth of its largest power nothing is told.
+
+Source: after ISO 7401, Road vehicles - Lateral transient response test methods, from memory of the standard:
+gains and phases from 0.2 to 2 Hz. Ours: the width of the bands, and as bandwidth where the gain has fallen to
+70.7 % of that at 0.2 Hz.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from .judgement import Evaluation, NotJudged, evaluation
+from .trace import SLOWEST, Trace, at, first_crossing, opposed, prepared, refuse_opposed
+
+FIT_RANGE = (0.5, 2.0)
+"""Lateral acceleration that the cubic is fitted over [m/s2]."""
+LEVELS, HALF = (3.0, 4.0, 5.0, 6.0), 0.5
+"""Lateral accelerations of local gradients and half their windows [m/s2]."""
+FEWEST = 20
+"""Samples in a window."""
+UNIT = "rad.s2/m"
+
+
+@evaluation
+def evaluate_understeer(judged: Evaluation, trace: Trace) -> None:
+    """Return understeer gradients at the road wheels.
+
+    The run has to tell `steering_ratio` and the wheelbase, `cg_to_front_axle` and `cg_to_rear_axle`.
+    """
+    names = ("steering_wheel_angle", "yaw_rate", "velocity_x", "acceleration_y")
+    hand, r, v, a_y = (trace[name] for name in names)
+    ratio, front, rear = map(trace.told, ("steering_ratio", "cg_to_front_axle", "cg_to_rear_axle"))
+    side = math.copysign(1.0, float(a_y[np.argmax(np.abs(a_y))]))
+    a_y = side * a_y
+    extra = side * (hand / ratio - (front + rear) * r / np.maximum(v, 0.1))
+    last = int(np.argmax(a_y))  # what comes after is not the slow rise any more
+    a_y, extra = a_y[: last + 1], extra[: last + 1]
+    refuse_opposed(side * hand[: last + 1], a_y, "lateral acceleration")
+    refuse_opposed(hand[: last + 1], r[: last + 1], "yaw rate")
+    found = gradients(a_y, extra)
+    gradient = found.pop(0.0)
+    if gradient is None:
+        raise NotJudged(
+            f"lateral acceleration does not rise slowly through {FIT_RANGE[0]:g} to {FIT_RANGE[1]:g} m/s2"
+        )
+    reading = f"at zero of a cubic through {FIT_RANGE[0]:g} to {FIT_RANGE[1]:g} m/s2"
+    judged.add("gradient", "understeer gradient at the road wheels", gradient, UNIT, reading)
+    judged.add("gradient_hand", "understeer gradient at the hand wheel", gradient * ratio, UNIT, reading)
+    if gradient > 0:
+        speed = math.sqrt((front + rear) / gradient)
+        judged.add("characteristic_speed", "characteristic speed", speed, "m/s", "sqrt(L / K_us)")
+    reading = f"straight line over {2 * HALF:g} m/s2"
+    for level, local in found.items():
+        judged.add(f"gradient_{level:g}", f"understeer gradient at {level:g} m/s2", local, UNIT, reading)
+    judged.add("largest", "largest lateral acceleration", float(a_y.max()), "m/s2")
+
+
+def gradients(a_y: np.ndarray, extra: np.ndarray) -> dict[float, float | None]:
+    """Return lateral acceleration [m/s2] -> understeer gradient there [rad.s2/m], at 0 of the linear range.
+
+    Where there is too little to tell, it is None.
+
+    Args:
+        a_y: rising [m/s2].
+        extra: delta - L r / v_x [rad].
+    """
+
+    def slope(low: float, high: float, *powers: int) -> float | None:
+        inside = (a_y >= low) & (a_y <= high)
+        if a_y.max() < high or np.count_nonzero(inside) < FEWEST:
+            return None
+        terms = np.column_stack([a_y[inside] ** power for power in powers])
+        return float(np.linalg.lstsq(terms, extra[inside], rcond=None)[0][0])
+
+    local = {level: slope(level - HALF, level + HALF, 1, 0) for level in LEVELS}
+    return {0.0: slope(*FIT_RANGE, 1, 0, 3), **local}
+
+
+G = 9.80665
+"""Standard gravity [m/s2]."""
+SLOW_STEER_LEVEL, SLOW_STEER_WINDOW = 0.3 * G, (0.1 * G, 0.375 * G)
+"""Lateral acceleration of A, and the window of the regression [m/s2]."""
+
+
+@evaluation
+def evaluate_slow_steer(judged: Evaluation, trace: Trace) -> None:
+    """Return the angle at 0.3 g, `angle` [rad], and the line that it lies on."""
+    judged.add("angle", "hand-wheel angle at 0.3 g", None, "rad")
+    signals = prepared(trace, ("steering_wheel_angle", "acceleration_y"))
+    angle, acceleration = signals["steering_wheel_angle"], signals["acceleration_y"]
+    refuse_opposed(angle, acceleration, "lateral acceleration")
+    side = math.copysign(1.0, float(angle[np.argmax(np.abs(angle))]))
+    a_y, delta = side * acceleration, side * angle
+    beyond = np.flatnonzero(a_y > SLOW_STEER_WINDOW[1])
+    if not beyond.size:
+        raise NotJudged(
+            f"lateral acceleration reaches {a_y.max() / G:.3f} g, not {SLOW_STEER_WINDOW[1] / G:g} g"
+        )
+    end = int(beyond[0])
+    before = np.flatnonzero(a_y[:end] < SLOW_STEER_WINDOW[0])
+    begin = int(before[-1]) + 1 if before.size else 0
+    if end - begin < FEWEST:
+        raise NotJudged(
+            f"{end - begin} samples between {SLOW_STEER_WINDOW[0] / G:g} and {SLOW_STEER_WINDOW[1] / G:g} g"
+        )
+    slope, intercept = np.polyfit(a_y[begin:end], delta[begin:end], 1)
+    found = math.radians(round(math.degrees(intercept + slope * SLOW_STEER_LEVEL), 1))
+    reading = "straight line through 0.1 to 0.375 g, rounded to 0.1 degrees"
+    judged.add("angle", "hand-wheel angle at 0.3 g", side * found, "rad", reading)
+    judged.add("slope", "hand-wheel angle per lateral acceleration", slope, "rad.s2/m", "of that line")
+    spread = delta[begin:end] - (intercept + slope * a_y[begin:end])
+    judged.add("spread", "largest distance from the line", float(np.max(np.abs(spread))), "rad")
+    if "velocity_x" in trace:
+        speed = trace.even["velocity_x"][: end + 1]
+        judged.add("speed", "lowest speed up to 0.375 g", float(speed.min()), "m/s")
+
+
+def characteristic_angle(judged: Sequence[Evaluation]) -> float:
+    """Return A [rad]: the mean of |angle| over all runs, rounded to 0.1 degrees.
+
+    Raises:
+        NotJudged: a run has none, or there is none.
+    """
+    without = next((one for one in judged if one["angle"] is None), None)
+    if without or not judged:
+        why = "; ".join(without.notes) if without else "there is no run"
+        raise NotJudged(f"slowly increasing steer{f', {without.label}' if without else ''}: {why}")
+    mean = float(np.mean([abs(one["angle"] or 0.0) for one in judged]))
+    return math.radians(round(math.degrees(mean), 1))
+
+
+STEADY = 1.0
+"""Stretch at the end of the record over which steady values are means [s]."""
+STEP_LEVEL = 0.9
+"""Of the steady value, which ends the response time."""
+SETTLED = 0.02
+"""Range over the steady stretch, over its mean, above which nothing is steady; chosen."""
+STEP_RESPONSES = {"yaw_rate": ("yaw rate", "rad/s"), "acceleration_y": ("lateral acceleration", "m/s2")}
+_GAINS = {"yaw_rate": "1/s", "acceleration_y": "m/(s2.rad)"}
+
+
+@evaluation
+def evaluate_step(judged: Evaluation, trace: Trace) -> None:
+    """Return gains, response times, overshoots of a step steer."""
+    t = trace.time
+    hand = trace["steering_wheel_angle"]
+    if t.size < 3 or t[-1] - t[0] < 2.0 * STEADY:
+        raise NotJudged(f"the record is shorter than {2.0 * STEADY:g} s")
+    end = t >= t[-1] - STEADY
+    step = float(hand[end].mean()) - float(hand[0])
+    if abs(step) < math.radians(0.1):
+        raise NotJudged("the hand wheel is not turned")
+    side = math.copysign(1.0, step)
+    zero = first_crossing(t, side * (hand - hand[0]), 0.5 * abs(step), float(t[0]))
+    if zero is None or np.ptp(hand[end]) > SETTLED * abs(step):
+        raise NotJudged("the hand wheel is still turned at the end of the record")
+    for key, (name, _) in STEP_RESPONSES.items():
+        refuse_opposed(hand - hand[0], trace[key] - trace[key][0], name)
+    judged.add("step", "final hand-wheel angle", step, "rad")
+    judged.add("zero", "time zero", zero, "s", "half of the final hand-wheel angle")
+    if "velocity_x" in trace:
+        judged.add("speed", "speed at time zero", at(t, trace["velocity_x"], zero), "m/s")
+    for key, (name, unit) in STEP_RESPONSES.items():
+        x = side * (trace[key] - trace[key][0])
+        steady = float(x[end].mean())
+        judged.add(f"{key}_steady", f"steady {name}", side * steady, unit, f"mean over the last {STEADY:g} s")
+        judged.add(
+            f"{key}_gain", f"gain of the {name}", steady / abs(step), _GAINS[key], "over the hand wheel"
+        )
+        if np.ptp(x[end]) > SETTLED * abs(steady):
+            judged.notes.append(
+                f"the {name} is not steady at the end: {100 * np.ptp(x[end]) / abs(steady):.1f} %"
+            )
+        answered = first_crossing(t, x, STEP_LEVEL * steady, float(t[0])) if steady > 0 else None
+        judged.add(f"{key}_response", f"response time of the {name}", _since(answered, zero), "s", "to 90 %")
+        largest = int(np.argmax(x))
+        judged.add(f"{key}_peak", f"peak time of the {name}", float(t[largest]) - zero, "s")
+        over = float(x[largest]) / steady - 1.0 if steady > 0 else None
+        judged.add(f"{key}_overshoot", f"overshoot of the {name}", over, "%")
+    if "sideslip" in trace:
+        sideslip = float(trace["sideslip"][end].mean() - trace["sideslip"][0])
+        judged.add("sideslip_steady", "steady sideslip", sideslip, "rad")
+        peak = judged["yaw_rate_peak"]
+        judged.add("t_beta", "T_beta", None if peak is None else peak * abs(sideslip), "rad.s")
+
+
+def _since(instant: float | None, zero: float) -> float | None:
+    return None if instant is None else instant - zero
+
+
+FREQUENCIES = (0.2, 0.5, 1.0, 1.5, 2.0)
+"""At which gain and phase are told [Hz]."""
+GRID = np.arange(0.2, 3.001, 0.02)
+HALF_BAND = 0.05
+LEAST = 0.01
+"""Power of the hand wheel, over its largest, below which it says nothing of a frequency."""
+SWEEP_RESPONSES = {"yaw_rate": ("yaw rate", "1/s"), "acceleration_y": ("lateral acceleration", "m/(s2.rad)")}
+
+
+def response(trace: Trace, answer: str) -> np.ndarray:
+    """Return H at the frequencies of `GRID`, NaN where the hand wheel says nothing; shape (frequencies,).
+
+    Raises:
+        NotJudged: the record is too short or too coarse.
+        ResultsError: a signal is missing.
+    """
+    if trace.time.size < 2 or trace.time[-1] - trace.time[0] < 1.0 / HALF_BAND or trace.rate < SLOWEST:
+        raise NotJudged(f"needs a record of {1.0 / HALF_BAND:g} s at {SLOWEST:g} Hz")
+    even = trace.even
+    frequency = np.fft.rfftfreq(even.time.size, 1.0 / even.rate)
+    spectrum = [np.fft.rfft(even[name] - even[name][0]) for name in ("steering_wheel_angle", answer)]
+    bands = [np.abs(frequency - f) <= HALF_BAND for f in GRID]
+    power = np.array([np.mean(np.abs(spectrum[0][band]) ** 2) for band in bands])
+    cross = np.array([np.mean(spectrum[1][band] * np.conj(spectrum[0][band])) for band in bands])
+    known = power >= LEAST * max(float(power.max()), 1e-300)
+    return np.where(known, cross / np.where(known, power, 1.0), np.nan)
+
+
+@evaluation
+def evaluate_sweep(judged: Evaluation, trace: Trace) -> None:
+    """Return gains, phases, largest gain and bandwidth."""
+    responses = {key: response(trace, key) for key in SWEEP_RESPONSES}
+    for key, (name, _) in SWEEP_RESPONSES.items():
+        if responses[key][0].real < 0.0:  # more than a quarter of a period late at 0.2 Hz, or turned round
+            raise opposed(name)
+    for key, (name, unit) in SWEEP_RESPONSES.items():
+        found = responses[key]
+        gain, phase = np.abs(found), np.angle(found)
+        for f in FREQUENCIES:
+            k = int(np.argmin(np.abs(GRID - f)))
+            there = bool(np.isfinite(gain[k]))
+            judged.add(
+                f"{key}_gain_{f:g}", f"gain of the {name} at {f:g} Hz", gain[k] if there else None, unit
+            )
+            judged.add(f"{key}_phase_{f:g}", f"its phase at {f:g} Hz", phase[k] if there else None, "rad")
+        if not np.isfinite(gain[0]):
+            continue
+        most = int(np.nanargmax(gain))
+        judged.add(
+            f"{key}_peak", f"largest gain of the {name} over that at 0.2 Hz", gain[most] / gain[0], "1"
+        )
+        judged.add(f"{key}_peak_at", "its frequency", GRID[most], "Hz")
+        below = np.flatnonzero(gain[most:] < math.sqrt(0.5) * gain[0])
+        width = GRID[most + below[0]] if below.size else None
+        judged.add(
+            f"{key}_bandwidth", f"bandwidth of the {name}", width, "Hz", "70.7 % of the gain at 0.2 Hz"
+        )

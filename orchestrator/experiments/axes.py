@@ -1,0 +1,359 @@
+"""The schema of axes: what varies from run to run, the values it takes.
+
+The schema of regions: the values that a paper leaves open, how far each may lie from the chosen one.
+
+The points of a design: every combination, a list, or a Latin hypercube.
+
+What parts of an experiment's file change in the runs' scenarios.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, PlainValidator, model_validator
+
+from ..messages import short
+from ..plan import FACTS, FAULTS, OF_RUN, TYRES, Algorithm, Override, Value
+from ..scenario import overrides, yaml_lines
+from ..scenario.fault_schema import FaultSpec, by_place
+from ..scenario.quantities import parse_unit
+from ..scenario.scenario_schema import Scalar
+from ..scenario.validation import StrictModel, Time
+from .judged_schema import Number, Patterns, is_finite, text_of
+
+if TYPE_CHECKING:
+    from .schema import ExperimentSpec
+
+
+MOST = 100_000
+"""Runs of an experiment; chosen: more is a slip of the pen, and would be planned for an hour."""
+
+FILES = ("vehicle", TYRES, f"{TYRES}.front", f"{TYRES}.rear")
+"""Places that take names of files, relative to the experiment's."""
+
+AxisKind = Literal["setting", "fmu", "file", "variant"]
+
+
+def _places(value: object) -> list[str]:
+    places = [value] if isinstance(value, str) else value
+    if not isinstance(places, list) or not places or not all(isinstance(p, str) and p for p in places):
+        raise ValueError(
+            "must be unit.parameter, vehicle.parameter, inputs.pattern, a unit, vehicle or tyres "
+            f"(got {short(value)})"
+        )
+    return places
+
+
+def _levels(value: object) -> dict[Any, str]:
+    """Return the values of an axis, each with its words."""
+    if isinstance(value, dict) and value and all(isinstance(said, str) for said in value.values()):
+        return dict(value)
+    if not isinstance(value, list) or not all(_is_plain(v) for v in value):
+        raise ValueError("must be a list of values, or a mapping of values to words")
+    if not value:
+        raise ValueError("has no values")
+    if len({text_of(v) for v in value}) < len(value):
+        again = next(text_of(v) for i, v in enumerate(value) if text_of(v) in map(text_of, value[:i]))
+        raise ValueError(f"names {again} twice")
+    return {v: text_of(v) for v in value}
+
+
+def _is_plain(value: object) -> bool:
+    return isinstance(value, (str, bool)) or is_finite(value)
+
+
+TargetList = Annotated[list[str], PlainValidator(_places)]
+Levels = Annotated[dict[Any, str], PlainValidator(_levels)]
+
+
+class OverrideSpec(StrictModel):
+    """What is other than in the scenario file."""
+
+    swap: dict[str, str] = Field({}, description="Unit -> FMU, a name or a path")
+    set: dict[str, Scalar] = Field({}, description="unit.parameter -> value")
+    vehicle: str | None = Field(None, description="Vehicle file, relative to this file")
+    faults: list[FaultSpec] = Field([], description="In place of the scenario's at these places")
+    stop_time: Time | None = Field(None, description="In place of the scenario's")
+    step_size: Time | None = Field(None, description="In place of the scenario's")
+    algorithm: Algorithm | None = Field(None, description="In place of the scenario's")
+
+    @property
+    def places(self) -> list[str]:
+        """What is changed."""
+        own = [place for place in ("vehicle", *OF_RUN) if getattr(self, place, None) is not None]
+        return [*self.swap, *self.set, *(f"{FAULTS}.{one.on}" for one in self.faults), *own]
+
+
+class VariantSpec(OverrideSpec):
+    """Changes that belong together."""
+
+
+class AxisSpec(StrictModel):
+    """What is varied, and the values it takes: listed, or so many from one to another; or variants."""
+
+    vary: TargetList = Field(
+        [], description="unit.parameter, inputs.pattern, a unit (its FMU), vehicle or tyres (files)"
+    )
+    variants: dict[str, VariantSpec] = Field({}, description="Words -> changes that belong together")
+    values: Levels | None = Field(None, description="A list, or a mapping of values to words")
+    start: Number | None = Field(None, alias="from", description="The first of `count` values")
+    end: Number | None = Field(None, alias="to", description="The last")
+    count: int | None = Field(None, ge=2, le=MOST, description="How many; a Latin hypercube needs none")
+    spacing: Literal["linear", "log"] = Field("linear", description="Equal steps or equal factors")
+    unit: str | None = Field(None, description="Of the numbers; left out: the parameter's own")
+    says: str = Field("", description="What figures call it; default: the parameter in words")
+
+    @property
+    def kind(self) -> AxisKind:
+        """What the axis varies."""
+        if self.variants:
+            return "variant"
+        place = self.vary[0]
+        return "setting" if _is_setting(place) else "file" if place in FILES else "fmu"
+
+    @property
+    def places(self) -> list[str]:
+        """What the axis changes."""
+        return self.vary or list(dict.fromkeys(p for one in self.variants.values() for p in one.places))
+
+    @property
+    def length(self) -> int | None:
+        """How many values there are, None if the axis does not say."""
+        levels = self.variants or self.values
+        return self.count if levels is None else len(levels)
+
+    @property
+    def numeric(self) -> bool:
+        """Whether all values are numbers."""
+        if self.kind != "setting":
+            return False
+        return self.values is None or all(
+            isinstance(v, (int, float)) and not isinstance(v, bool) for v in self.values
+        )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> AxisSpec:
+        if bool(self.vary) == bool(self.variants):
+            raise ValueError("needs either vary or variants")
+        if self.variants:
+            given = (self.values, self.start, self.end, self.count, self.unit)
+            if any(one is not None for one in given):
+                raise ValueError("variants have no values, from, to, count or unit")
+            return self
+        if "inputs" in self.vary:
+            raise ValueError("vary: inputs needs a name, for example inputs.friction*")
+        if len(self.vary) > 1 and not all(map(_is_setting, self.vary)):
+            raise ValueError("vary: only several unit.parameter may share an axis")
+        ends = (self.start, self.end)
+        if self.values is not None and (ends != (None, None) or self.count is not None):
+            raise ValueError("give either values, or from, to and count")
+        if self.values is None:
+            if None in ends:
+                raise ValueError("needs values, or from, to and count")
+            if self.kind != "setting":
+                raise ValueError(f"{self.vary[0]} takes names: give values, not from and to")
+            self._check_ends()
+        elif self.kind != "setting" and not all(isinstance(value, str) for value in self.values):
+            raise ValueError(f"values: {self.vary[0]} takes names of files or FMUs")
+        if self.unit is not None:
+            if not self.numeric:
+                raise ValueError("unit: the values are no numbers")
+            parse_unit(self.unit)
+        elif self.values is not None and self.kind == "setting":
+            quantity = next((v for v in self.values if _is_quantity(v)), None)
+            if quantity is not None:
+                raise ValueError(f"values: {quantity!r}: give plain numbers, and their unit in `unit`")
+        return self
+
+    def _check_ends(self) -> None:
+        assert self.start is not None
+        assert self.end is not None
+        if not self.start < self.end:
+            raise ValueError(f"from must be below to (got {self.start:g} and {self.end:g})")
+        if self.spacing == "log" and self.start * self.end <= 0:
+            raise ValueError("from and to must both be above 0, or both below, where spacing is log")
+
+
+class DesignAxisSpec(AxisSpec):
+    """An axis of the points at which the runs of an experiment are made."""
+
+    runs: Patterns = Field(["*"], description="Which runs it changes; the others are the same all along it")
+    repeats: bool = Field(
+        False,
+        description="Whether its values, seeds say, make repeats of one and the same: every number is then "
+        "the mean over them, with its confidence interval; listed, with at least 2 of them",
+    )
+
+    @model_validator(mode="after")
+    def _repeated(self) -> DesignAxisSpec:
+        if self.repeats and len(self.values or ()) < 2:
+            raise ValueError("repeats: needs a list of two values or more")
+        return self
+
+
+def _is_setting(place: str) -> bool:
+    return place not in FILES and ("." in place or place in (*OF_RUN, *FACTS))
+
+
+def _is_quantity(value: object) -> bool:
+    return isinstance(value, str) and value[:1].isdigit() and not value.isidentifier() and " " in value
+
+
+LEVELS = 5
+"""Of an open value from one number to another. Chosen: enough for a straight line between two to do."""
+
+
+class OpenVariantSpec(VariantSpec):
+    """Changes that belong together; none: as chosen."""
+
+    scenario: str = Field(
+        "", description="In place of a run's own, whose name is `{scenario}`; relative to this file"
+    )
+
+
+class OpenValueSpec(AxisSpec):
+    """A value that is open, as an axis of which every run has a value of its own: the chosen one."""
+
+    variants: dict[str, OpenVariantSpec] = Field(  # type: ignore[assignment]
+        {}, description="Words -> changes that belong together"
+    )
+    times: bool = Field(False, description="Whether the values are factors on what each run has")
+    runs: Patterns = Field(["*"], description="Which runs it may touch; those that set it themselves keep it")
+    because: str = Field(description="Why this range: a source, or `chosen:` and why", min_length=1)
+
+    @model_validator(mode="after")
+    def _complete(self) -> OpenValueSpec:
+        if self.times and (not self.numeric or self.unit is not None):
+            raise ValueError("times: factors are plain numbers")
+        return self
+
+    @property
+    def stepped(self) -> OpenValueSpec:
+        """The same with so many levels along it."""
+        return (
+            self if self.values or self.variants else self.model_copy(update={"count": self.count or LEVELS})
+        )
+
+    @property
+    def continuous(self) -> OpenValueSpec:
+        """The same with every number of its range."""
+        return self.model_copy(update={"count": None})
+
+
+class RegionSpec(StrictModel):
+    """Where claims are judged beside the chosen point: along each open value, and over all together."""
+
+    points: int = Field(24, ge=10, le=10_000, description="Of a Latin hypercube over all open values")
+    seed: int = Field(1, ge=0, description="Of the Latin hypercube")
+    open_values: dict[str, OpenValueSpec] = Field(description="Name -> range", min_length=1)
+
+
+RUN = "run"
+"""What figures and tables along axes call the axis of named runs."""
+DesignPoint = tuple["Level", ...]
+"""One level per axis, in the order of the axes."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """A value of an axis as the file gives it, and what figures and tables call it."""
+
+    value: Value
+    words: str
+
+
+def levels_of(axis: AxisSpec) -> list[Level]:
+    """Return the levels of an axis that lists or counts them."""
+    if axis.variants:
+        return [Level(words, words) for words in axis.variants]
+    if axis.values is not None:
+        return [Level(value, words) for value, words in axis.values.items()]
+    assert axis.start is not None
+    assert axis.end is not None
+    assert axis.count is not None
+    return [_level(number) for number in _spaced(axis.start, axis.end, axis.count, axis.spacing)]
+
+
+def _spaced(start: float, end: float, count: int, spacing: str) -> list[float]:
+    """Return `count` numbers from start to end; 0.1, 0.2, 0.3 where equal steps are that exactly."""
+    if spacing == "log":
+        inner = [start * (end / start) ** (i / (count - 1)) for i in range(1, count - 1)]
+        return [float(start), *inner, float(end)]
+    first, last = Fraction(repr(start)), Fraction(repr(end))
+    return [float(first + (last - first) * i / (count - 1)) for i in range(count)]
+
+
+def _level(number: float) -> Level:
+    return Level(number, f"{number:.6g}")
+
+
+def points(spec: ExperimentSpec) -> list[DesignPoint]:
+    """Return the points of the axes, always in the same order; the last axis of a grid changes first."""
+    axes = list(spec.axes.values())
+    if spec.design == "latin_hypercube":
+        assert spec.points is not None
+        assert spec.seed is not None
+        return latin_hypercube(axes, spec.points, spec.seed)
+    levels = [levels_of(axis) for axis in axes]
+    return list(itertools.product(*levels) if spec.design == "grid" else zip(*levels, strict=True))
+
+
+def latin_hypercube(axes: Sequence[AxisSpec], runs: int, seed: int) -> list[DesignPoint]:
+    """Return `runs` points of which every axis has one in each of `runs` equal parts of its range.
+
+    An axis of listed values takes each of them equally often, as far as `runs` can be divided.
+    Source: McKay, Beckman, Conover, Technometrics 21 (1979) 239-245.
+    """
+    generator = np.random.Generator(np.random.PCG64(seed))
+    columns: list[list[Level]] = []
+    for axis in axes:
+        places = (generator.permutation(runs) + generator.random(runs)) / runs
+        columns.append([level_at(axis, float(place)) for place in places])
+    return list(zip(*columns, strict=True))
+
+
+def level_at(axis: AxisSpec, place: float) -> Level:
+    """Return the level at a place between 0 and 1."""
+    if axis.variants or axis.values is not None or axis.count is not None:
+        levels = levels_of(axis)
+        return levels[min(int(place * len(levels)), len(levels) - 1)]
+    assert axis.start is not None
+    assert axis.end is not None
+    if axis.spacing == "log":
+        size = math.exp((1 - place) * math.log(abs(axis.start)) + place * math.log(abs(axis.end)))
+        return _level(math.copysign(size, axis.start))
+    return _level((1 - place) * axis.start + place * axis.end)
+
+
+def changes_at(axis: AxisSpec, level: Level, folder: Path, origin: str = "sweep") -> list[Override]:
+    """Return what a level of an axis changes, of a file in a folder."""
+    if axis.kind == "file":
+        return [Override(axis.vary[0], str(folder / str(level.value)), origin)]
+    if axis.kind == "variant":
+        return changes_of_file(axis.variants[str(level.value)], folder, origin)
+    if axis.kind == "fmu":
+        return overrides.changes_of({axis.vary[0]: str(level.value)}, {}, folder, origin)
+    return [overrides.setting(place, _given(axis, level), origin) for place in axis.vary]
+
+
+def _given(axis: AxisSpec, level: Level) -> Value:
+    """Return a level with the unit that the axis counts in."""
+    if axis.unit:
+        return f"{text_of(level.value)} {axis.unit}"
+    return yaml_lines.scalar(level.value) if isinstance(level.value, str) else level.value
+
+
+def changes_of_file(given: OverrideSpec, folder: Path, origin: str) -> list[Override]:
+    """Return the changes that a part of a file in a folder gives."""
+    vehicle = [Override("vehicle", str(folder / given.vehicle), origin)] if given.vehicle else []
+    of_run = overrides.changes_of_run(given, origin)
+    faults = [Override(f"{FAULTS}.{place}", ones, origin) for place, ones in by_place(given.faults).items()]
+    return vehicle + of_run + overrides.changes_of(given.swap, given.set, folder, origin) + faults

@@ -1,0 +1,394 @@
+"""What all figures over axes share: which runs a panel holds, what axes and levels are called, their look.
+
+A metric as curves over an axis, or as a map over two.
+
+The colours of maps get lighter all the way, lines differ in colour, dash and marker: both survive
+grey print and every eye.
+
+How far an axis may go, over another: a line through the last values that hold, and a band up to the
+first that do not.
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import cycle
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from ..errors import ResultsError
+from ..figures.style import QUIET, line_style, literal, shown, shown_unit
+from ..metrics.measures import variable_of, words
+from ..metrics.run_metrics import MetricValue, metric
+from .axes import RUN, Level
+from .experiment import Case
+from .grids import cells
+from .judged_schema import si_number, text_of
+from .outcome import ExperimentResult, limits_of
+from .schema import FigureSpec
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+MARKERS = "os^Dv<>"
+FAILED: dict[str, Any] = {
+    "marker": "x",
+    "markersize": 6,
+    "linestyle": "",
+    "color": "#111111",
+    "label": "no number: failed, not made, or never",
+}
+"""A run that gives no number: a cross, never a gap that could pass for nothing."""
+GUIDE: dict[str, Any] = {"color": QUIET, "linewidth": 0.9, "linestyle": (0, (4, 2))}
+
+
+class Drawing:
+    """A figure over axes: `fill` draws a panel, `finish` what panels share; what has a label is explained."""
+
+    what = ""
+    """What is drawn, without its unit."""
+    upwards = ""
+    """What stands beside the panels on the left."""
+
+    def __init__(self, findings: ExperimentResult, spec: FigureSpec) -> None:
+        self.findings = findings
+        self.spec = spec
+        self.axes = findings.spec.axes
+        self.names = list(self.axes)
+        only = {axis: set(map(text_of, values)) for axis, values in spec.only.items()}
+        self.runs = [
+            run
+            for run in findings.experiment.first_cases
+            if all(text_of(self.at(run, axis).value) in values for axis, values in only.items())
+        ]
+
+    def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
+        """Draw the runs of a panel."""
+        raise NotImplementedError
+
+    def finish(self, figure: Figure, drawn: Sequence[Axes]) -> None:
+        """Set what all panels share."""
+
+    def panels(self) -> list[tuple[str, list[Case]]]:
+        """Return the heading and the runs of each panel."""
+        runs = self.findings.experiment.first_cases
+        if not self.spec.panel_axis:
+            return [("", runs)]
+        return [
+            (
+                self.name_of(self.spec.panel_axis, level),
+                [r for r in runs if self.at(r, self.spec.panel_axis) == level],
+            )
+            for level in self.levels(self.spec.panel_axis)
+        ]
+
+    def lines(self) -> Iterator[tuple[Level | None, dict[str, Any]]]:
+        """Yield the levels that have a line each, with its look; None for a single line."""
+        levels = self.levels(self.spec.lines) if self.spec.lines else []
+        for number, level in enumerate(levels):
+            yield level, {**style_of(number), "label": self.name_of(self.spec.lines, level)}
+        if not levels:
+            yield None, style_of(0)
+
+    def at(self, run: Case, axis: str) -> Level:
+        """Return where a run stands on an axis; "run" is that of its names."""
+        if axis == RUN:
+            return Level(run.run.name, run.run.label)
+        return run.point[self.names.index(axis)]
+
+    def levels(self, axis: str) -> list[Level]:
+        """Return the levels of an axis that runs have, in their order."""
+        return list(dict.fromkeys(self.at(run, axis) for run in self.runs))
+
+    def place(self, level: Level, axis: str) -> float:
+        """Return where a level is drawn: numbers as they are, names at 0, 1, 2."""
+        if self.numeric(axis):
+            return float(level.value)
+        return float(self.levels(axis).index(level))
+
+    def numeric(self, axis: str) -> bool:
+        """Return whether an axis is one of numbers."""
+        return axis != RUN and self.axes[axis].numeric
+
+    def label(self, axis: str) -> str:
+        """Return an axis in words, with its unit."""
+        if axis == RUN:
+            return "Run"
+        spec = self.axes[axis]
+        said = spec.says or (words(variable_of(spec.vary[0]).replace("*", "")) if spec.vary else axis)
+        unit = self.unit_of(axis)
+        return f"{said.strip()} in {unit}" if unit else said.strip()
+
+    def unit_of(self, axis: str) -> str:
+        """Return the unit that an axis counts in, as people write it."""
+        assert self.findings.planned is not None  # as of every experiment along axes
+        return self.findings.planned.axis_unit(axis).strip(" []").replace(".", "·")
+
+    def name_of(self, axis: str, level: Level) -> str:
+        """Return a level of an axis in words."""
+        if not self.numeric(axis):
+            return level.words
+        return f"{self.axes[axis].says or axis} {level.words} {self.unit_of(axis)}".strip()
+
+    def scale_x(self, axes: Axes) -> None:
+        """Set the scale and, for an axis of names, the ticks of x."""
+        if self.numeric(self.spec.x):
+            set_scale(axes, "x", self.axes[self.spec.x].spacing)
+        else:
+            name_ticks(axes, [level.words for level in self.levels(self.spec.x)])
+
+
+def set_scale(axes: Axes, which: Literal["x", "y"], scale: str) -> None:
+    """Set the scale of an axis; a logarithmic one has plain numbers, too."""
+    if scale == "log":
+        axes.set(**{f"{which}scale": "log"})  # type: ignore[arg-type]
+        getattr(axes, f"{which}axis").set_major_formatter("{x:g}")
+
+
+def name_ticks(axes: Axes, names: Sequence[str]) -> None:
+    """Make x an axis of names, at 0, 1, 2."""
+    axes.set_xticks(range(len(names)), [literal(name) for name in names])
+    axes.set_xlim(-0.5, len(names) - 0.5)
+
+
+def style_of(number: int) -> dict[str, Any]:
+    """Return colour, dash and marker of a line."""
+    return {**line_style(number), "marker": MARKERS[number % len(MARKERS)], "markersize": 4.5}
+
+
+COLOURS = "cividis"
+"""From dark to light for every eye (Nuñez, Anderton, Renslow, PLOS ONE 13 (2018) e0199239)."""
+
+
+class ValueDrawing(Drawing):
+    """What all drawings of numbers share: the unit in which they are shown, lines, a value to mark."""
+
+    def show_in(self, unit: str) -> None:
+        """Show numbers of a unit as people read them, that to mark, too."""
+        self.quantity = unit
+        self.unit, self.factor = shown_unit(unit)
+        self.measured = f"{self.what} in {self.unit}" if self.unit else self.what
+        marked = self.spec.mark
+        self.mark = None if marked is None else self.number(marked)
+        self.mark_text = "" if marked is None else shown(si_number(marked, unit), unit)
+
+    def number(self, given: float | str) -> float:
+        """Return a number of the file in the unit shown."""
+        return self.factor * si_number(given, self.quantity)
+
+    def shown(self, value: MetricValue | None) -> tuple[float, float]:
+        """Return a number and half the width of its confidence interval as shown; NaN: nothing to draw."""
+        if value is None or not math.isfinite(value.number):
+            return math.nan, 0.0
+        return self.factor * value.number, self.factor * value.half
+
+    def draw_line(
+        self, axes: Axes, line: Iterable[tuple[float, MetricValue | None]], style: dict[str, Any]
+    ) -> None:
+        """Draw a line through (x, value) with confidence, and a cross where there is no number."""
+        points = sorted((x, *self.shown(value)) for x, value in line)
+        axes.plot([x for x, *_ in points], [y for _, y, _ in points], **style)
+        for x, y, half in points:
+            if half:
+                axes.vlines(x, y - half, y + half, color=style["color"], linewidth=1.2)
+            if math.isnan(y):
+                axes.plot([x], [0.0], transform=axes.get_xaxis_transform(), clip_on=False, **FAILED)
+
+    def draw_mark(self, axes: Axes) -> None:
+        """Draw the value to mark, if there is one."""
+        if self.mark is not None:
+            axes.axhline(self.mark, label=self.mark_text, **GUIDE)
+
+
+class MetricDrawing(ValueDrawing):
+    """What curves and maps share: the metric and its range."""
+
+    def __init__(self, findings: ExperimentResult, spec: FigureSpec) -> None:
+        super().__init__(findings, spec)
+        chosen = findings.spec.metrics[spec.metric]
+        self.what = chosen.heading or metric(chosen.metric).title
+        self.show_in(findings.unit(spec.metric))
+        self.upwards = self.label(spec.y) if spec.y else self.measured
+        numbers = [self.shown(self.value(run))[0] for run in self.runs]
+        drawn = [x for x in numbers if not math.isnan(x) and (x > 0 or spec.scale != "log")]
+        if not drawn:
+            raise ResultsError("nothing to draw: no run gives this metric a number that can be drawn.")
+        self.low, self.high = min(drawn), max(drawn)
+        if spec.largest is not None:
+            self.high = self.number(spec.largest)
+            self.low = min(self.low, self.high)
+
+    def value(self, run: Case) -> MetricValue | None:
+        """Return the metric of a run."""
+        return self.findings.mean(run, self.spec.metric)
+
+
+class CurveDrawing(MetricDrawing):
+    """A line, or for a Latin hypercube points, for each level of `lines`."""
+
+    def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
+        for level, style in self.lines():
+            mine = [run for run in runs if level is None or self.at(run, self.spec.lines) == level]
+            if self.findings.spec.design == "latin_hypercube":
+                style["linestyle"] = ""
+            self.draw_line(
+                axes,
+                ((self.place(self.at(run, self.spec.x), self.spec.x), self.value(run)) for run in mine),
+                style,
+            )
+        self.draw_mark(axes)
+        self.scale_x(axes)
+
+    def finish(self, figure: Figure, drawn: Sequence[Axes]) -> None:
+        set_scale(drawn[0], "y", self.spec.scale)
+        if self.spec.largest is not None:
+            drawn[0].set_ylim(self.low if self.spec.scale == "log" else min(self.low, 0.0), self.high)
+        elif self.spec.scale == "linear" and self.low >= 0:
+            drawn[0].set_ylim(bottom=0.0)
+
+
+class GridLines(ValueDrawing):
+    """The columns of a grid as lines over its rows."""
+
+    def __init__(self, findings: ExperimentResult, spec: FigureSpec) -> None:
+        super().__init__(findings, spec)
+        grid = findings.spec.grids[spec.grid]
+        values = findings.values_of_grids
+        self.cells = [(cell, values.get(cell.key)) for cell in cells(grid) if cell.column]
+        units = {value.unit for _, value in self.cells if value}
+        if not units:
+            raise ResultsError("nothing to draw: no cell of the grid has a number.")
+        self.what = grid.title
+        self.show_in(min(units))
+        self.upwards = self.measured
+
+    def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
+        rows = list(dict.fromkeys(cell.row for cell, _ in self.cells))
+        columns = list(dict.fromkeys(cell.column for cell, _ in self.cells))
+        for number, column in enumerate(columns):
+            shift = 0.03 * (number - (len(columns) - 1) / 2)  # so that none hides another
+            mine = ((rows.index(c.row) + shift, value) for c, value in self.cells if c.column == column)
+            self.draw_line(axes, mine, {**style_of(number), "label": column})
+        self.draw_mark(axes)
+        name_ticks(axes, ["\n".join(textwrap.wrap(row, 14)) for row in rows])
+
+    def finish(self, figure: Figure, drawn: Sequence[Axes]) -> None:
+        set_scale(drawn[0], "y", self.spec.scale)
+
+
+class MapDrawing(MetricDrawing):
+    """A grid as coloured cells, other designs as coloured points."""
+
+    def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
+        x = [float(self.at(run, self.spec.x).value) for run in runs]
+        y = [float(self.at(run, self.spec.y).value) for run in runs]
+        values = [self.shown(self.value(run))[0] for run in runs]
+        if self.findings.spec.design == "grid":
+            self._cells(axes, x, y, values)
+        else:
+            axes.scatter(x, y, c=values, s=60, edgecolors="#444444", linewidths=0.4, **self._scale())
+        self.scale_x(axes)
+        set_scale(axes, "y", self.axes[self.spec.y].spacing)
+        for a, b, value in zip(x, y, values, strict=True):
+            if math.isnan(value):
+                axes.plot([a], [b], **FAILED)
+        axes.grid(False)
+
+    def _cells(self, axes: Axes, x: list[float], y: list[float], values: list[float]) -> None:
+        columns, rows = sorted(set(x)), sorted(set(y))
+        table = np.full((len(rows), len(columns)), math.nan)
+        for a, b, value in zip(x, y, values, strict=True):
+            table[rows.index(b), columns.index(a)] = value
+        right = edges(columns, log=self.axes[self.spec.x].spacing == "log")
+        up = edges(rows, log=self.axes[self.spec.y].spacing == "log")
+        axes.pcolormesh(right, up, table, edgecolors="face", linewidth=0.1, **self._scale())
+        if self.mark is not None:
+            ends = boundary(table > self.mark, right, up)
+            says = f"beyond this line more than {self.mark_text}"
+            for colour, width, label in (("white", 3.4, ""), ("#111111", 1.6, says)):
+                for line in ends:
+                    axes.plot(*line, color=colour, linewidth=width, solid_capstyle="round", label=label)
+
+    def _scale(self) -> dict[str, Any]:
+        from matplotlib.colors import LogNorm, Normalize
+
+        kind = LogNorm if self.spec.scale == "log" else Normalize
+        low = self.low if self.spec.scale == "log" else min(self.low, max(0.0, self.low))
+        return {"cmap": COLOURS, "norm": kind(low, self.high if self.high > low else low + 1.0)}
+
+    def finish(self, figure: Figure, drawn: Sequence[Axes]) -> None:
+        beyond = "max" if self.spec.largest is not None else "neither"
+        bar = figure.colorbar(drawn[0].collections[0], ax=list(drawn), pad=0.02, fraction=0.05, extend=beyond)
+        bar.set_label(literal(self.measured))
+
+
+def edges(values: Sequence[float], *, log: bool) -> np.ndarray:
+    """Return the edges of cells around sorted values: halfway between neighbours."""
+    centres = np.log(values) if log else np.array(values, dtype=float)
+    if len(centres) == 1:
+        found = np.array([centres[0] - 0.5, centres[0] + 0.5])
+    else:
+        middle = (centres[1:] + centres[:-1]) / 2
+        found = np.concatenate([[2 * centres[0] - middle[0]], middle, [2 * centres[-1] - middle[-1]]])
+    return np.exp(found) if log else found
+
+
+def boundary(
+    beyond: np.ndarray, right: np.ndarray, up: np.ndarray
+) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+    """Return the edges, ((x0, x1), (y0, y1)) each, between cells that are beyond and cells that are not."""
+    upright = [((right[j + 1],) * 2, (up[i], up[i + 1])) for i, j in np.argwhere(np.diff(beyond, axis=1))]
+    level = [((right[j], right[j + 1]), (up[i + 1],) * 2) for i, j in np.argwhere(np.diff(beyond, axis=0))]
+    return upright + level
+
+
+HATCHES = ("", "///", "...", "\\\\\\", "xxx")
+"""Of the bands, so that they differ in grey print."""
+END: dict[str, Any] = {"mfc": "white", "markersize": 8, "linestyle": ""}
+"""The mark of a line where all values tried hold, or none."""
+
+
+class LimitDrawing(Drawing):
+    """A limit over an axis."""
+
+    def __init__(self, findings: ExperimentResult, spec: FigureSpec) -> None:
+        super().__init__(findings, spec)
+        limit = findings.spec.limits[spec.limit]
+        self.what, self.upwards = limit.says, self.label(limit.of)
+        self._found = limits_of(findings, limit)
+        tried = [float(level.value) for level in self.levels(limit.of)]
+        self._smallest, self._largest = min(tried), max(tried)
+
+    def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
+        settings = [{axis: self.at(run, axis) for axis in self._found[0].others} for run in runs]
+        limits = [limit for limit in self._found if limit.others in settings]
+        ends = []
+        for (level, style), hatch in zip(self.lines(), cycle(HATCHES), strict=False):
+            mine = [one for one in limits if level is None or one.others[self.spec.lines] == level]
+            placed = {self.place(one.others[self.spec.x], self.spec.x): one for one in mine}
+            x = sorted(placed)
+            low = [self._smallest if (last := placed[at].largest) is None else last for at in x]
+            high = [self._largest if (first := placed[at].beyond) is None else first for at in x]
+            axes.fill_between(x, low, high, color=style["color"], alpha=0.16, linewidth=0.0, hatch=hatch)
+            axes.plot(x, low, **style)
+            for at, end in zip(x, low, strict=True):
+                if placed[at].beyond is None:
+                    ends.append((at, end, "^", style["color"], "all values tried hold"))
+                if placed[at].largest is None:
+                    ends.append((at, end, "v", style["color"], "none holds"))
+        axes.fill_between(
+            [], [], color=QUIET, alpha=0.25, linewidth=0.0, label="up to the first value that fails"
+        )
+        for at, end, marker, colour, says in sorted(ends, key=lambda end: end[2]):
+            axes.plot([at], [end], marker, color=colour, **END)
+            axes.plot([], [], marker, color=QUIET, label=says, **END)
+        self.scale_x(axes)
+
+    def finish(self, figure: Figure, drawn: Sequence[Axes]) -> None:
+        margin = 0.06 * (self._largest - self._smallest) or 1.0
+        drawn[0].set_ylim(self._smallest - margin, self._largest + margin)

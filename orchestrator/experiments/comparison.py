@@ -1,0 +1,360 @@
+"""One scenario with several FMUs for a unit, as an experiment of one named run per combination.
+
+How the result of a scenario depends on the communication step: error, observed order, cost.
+
+Each algorithm runs at h, h/2, h/4, ...; units with a step size of their own keep it. The error of
+a run is the largest difference from the finest run of the first algorithm, over the communication
+points of the coarsest run, relative to the signal's peak. The observed order at h is
+log2(|x_h - x_h/2| / |x_h/2 - x_h/4|) with the same norm: it needs no exact solution, and compares
+an algorithm only with itself.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import ResultsError, ScenarioError
+from ..figures.style import QUIET, frame, line_style, new_figure
+from ..labels import changed, with_changes
+from ..metrics.measures import words
+from ..metrics.run_metrics import MetricValue, metric
+from ..plan import Algorithm, Override
+from ..plan import Value as Plain
+from ..results.read import Results
+from ..scenario.load import load_scenario
+from ..scenario.overrides import is_path, swap_of
+from .experiment import LoadedExperiment, NamedRun
+from .judged_schema import text_of
+from .outcome import ExperimentResult
+from .record import TableColumn
+from .schema import ExperimentSpec
+from .tables import Cell, Table, marked, remarks
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+PANELS = (
+    "steer_angle",
+    "sideslip",
+    "sideslip_error",
+    "yaw_rate",
+    "acceleration_y",
+    "yaw_moment",
+    "path",
+)
+FIGURES = {"overview": PANELS, "wheel_torques": ("wheel_torque_*",)}
+"""Name of the file -> panels."""
+
+
+def comparison(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) -> LoadedExperiment:
+    """Return the experiment that compares a scenario's variants (see `variants`)."""
+    runs = variants(scenario, swaps, changes)
+    title = load_scenario(scenario, changes=changes).title or scenario.stem
+    exchanged = " and ".join(dict.fromkeys(text.partition("=")[0].strip() for text in swaps))
+    return of_runs(runs, f"{title} ({exchanged} exchanged)", scenario, changes, FIGURES)
+
+
+def of_runs(
+    runs: Sequence[NamedRun],
+    title: str,
+    path: Path,
+    changes: Sequence[Override],
+    figures: dict[str, tuple[str, ...]],
+) -> LoadedExperiment:
+    """Return an experiment of runs that no file lists; `changes`: of all; `figures`: name -> panels."""
+    given = {
+        "title": title,
+        "runs": [{"name": run.name, "scenario": run.scenario.name} for run in runs],
+        "figures": [
+            {"name": name, "title": name.replace("_", " ").capitalize(), "runs": ["*"], "panels": [*panels]}
+            for name, panels in figures.items()
+        ],
+    }
+    spec = ExperimentSpec.model_validate(given)
+    return LoadedExperiment(path, spec, {run.name: run for run in runs}, (), tuple(changes))
+
+
+def variants(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) -> list[NamedRun]:
+    """Return one run for every combination of the FMUs that `swaps` names.
+
+    Args:
+        scenario: the scenario file.
+        swaps: `unit=fmu,fmu,...`; a unit may be named more than once. An FMU may bring parameters,
+            `fmu:parameter=value:parameter=value`, so that one FMU can be compared with itself. If only
+            one FMU is named in all, the scenario as it stands is the other variant.
+        changes: for all.
+
+    Raises:
+        ScenarioError: the scenario or an option is wrong, or there is nothing to compare.
+    """
+    choices = _choices(swaps)
+    if all(len(names) == 1 for names in choices.values()):
+        swapped = [swap_of(unit, names[0], "--swap")[0] for unit, names in choices.items()]
+        own = load_scenario(scenario, changes=[*swapped, *changes]).replaced
+        for unit, names in choices.items():
+            fmu = str(scenario.absolute().parent / own[unit]) if is_path(own[unit]) else own[unit]
+            names[:0] = [fmu] if fmu not in names else []
+    named = [unit for unit, names in choices.items() if len(names) > 1]
+    if not named:
+        raise ScenarioError("nothing to compare: name several FMUs, for example --swap controller=a,b")
+    runs: list[NamedRun] = []
+    for combination in itertools.product(*choices.values()):
+        chosen = dict(zip(choices, combination, strict=True))
+        label = " + ".join(_label(chosen[unit], choices[unit]) for unit in named)
+        repeated = sum(run.label.partition(" (")[0] == label for run in runs)
+        label += f" ({repeated + 1})" if repeated else ""
+        name = re.sub(r"[^\w.+=-]+", "_", label.replace(" + ", "+")).strip("_")
+        if any(run.name == name for run in runs):
+            name = f"{name}_{len(runs) + 1}"
+        swapped_in = [one for unit, text in chosen.items() for one in swap_of(unit, text, "--swap")]
+        runs.append(NamedRun(name, label, label, scenario, tuple(swapped_in)))
+    return runs
+
+
+def _choices(swaps: Sequence[str]) -> dict[str, list[str]]:
+    """Return unit -> FMUs, each once, in the order of the options."""
+    choices: dict[str, list[str]] = {}
+    for text in swaps:
+        unit, equals, fmus = text.partition("=")
+        names = [fmus] if Path(fmus).is_file() else [name.strip() for name in fmus.split(",")]
+        if not (unit.strip() and equals and all(names)):
+            raise ScenarioError(f"--swap {text}: write --swap UNIT=FMU or --swap UNIT=FMU,FMU,...")
+        known = choices.get(unit.strip(), [])
+        choices[unit.strip()] = list(dict.fromkeys([*known, *names]))
+    return choices
+
+
+def _label(text: str, choices: Sequence[str]) -> str:
+    """Return what tells a choice from the others: its FMU, unless all have it, and what they do not share."""
+    fmu, *brought = swap_of("", text, "--swap")
+    others = [swap_of("", other, "--swap") for other in choices]
+    name = str(fmu.value)
+    shared = [one for one in brought if all(one in other for other in others)]
+    values = [f"{one.place[1:]}={text_of(one.value)}" for one in brought if one not in shared]
+    one_fmu = all(other[0] == fmu for other in others)
+    return " ".join([*([] if one_fmu and values else [Path(name).stem if is_path(name) else name]), *values])
+
+
+def comparison_table(findings: ExperimentResult) -> Table:
+    """Return a table with one row per metric and one column per run."""
+    results, runs = findings.results, findings.experiment.runs.values()
+    failed = [run.label for run in runs if run.name not in results]
+    shown = [run for run in runs if run.name in results]
+    words = changed(findings.experiment.by_options)
+    notes = [f"changed: {words}"] if words else []
+    notes += remarks((run.label, results[run.name]) for run in shown)
+    labels = [*(marked(run.label, results[run.name]) for run in shown), *failed]
+    table = Table(findings.spec.title, ["metric", "", *labels], notes=notes)
+    for key, spec in findings.spec.metrics.items():
+        cells: list[Cell] = [findings.values.get((run.name, key)) for run in shown]
+        chosen = metric(spec.metric)
+        table.rows.append([chosen.title, chosen.formula, *cells, *("failed" for _ in failed)])
+    table.notes += [f"{r.label}: {results[r.name].ended}" for r in shown if results[r.name].ended]
+    return table
+
+
+ROUNDING = 1e-13
+"""Relative difference that a different order of additions can make."""
+
+
+@dataclass(frozen=True)
+class ConvergenceRow:
+    """One run: its algorithm and step [s], and what it came to; None where it cannot be known."""
+
+    algorithm: str
+    step: float
+    error: float | None  # relative to the signal's peak
+    order: float | None
+    wall_time: float | None  # [s]
+    failed: str = ""
+    finest: bool = False  # the run that all others are compared with
+
+
+def refinements(
+    scenario: Path,
+    *,
+    halvings: int,
+    signal: str,
+    algorithms: Sequence[Algorithm],
+    changes: Sequence[Override] = (),
+) -> LoadedExperiment:
+    """Return the runs of a convergence study: all steps of the first algorithm, then the next.
+
+    Raises:
+        ScenarioError: the scenario or an option is wrong.
+    """
+    loaded = load_scenario(scenario, changes=changes)
+    if signal.count(".") != 1:
+        raise ScenarioError(f"--signal {signal}: write UNIT.VARIABLE, for example plant.yaw_rate")
+    runs = []
+    for algorithm in algorithms or [loaded.algorithm]:
+        for k in range(halvings + 1):
+            step: Fraction = loaded.step_size / 2**k
+            refined = (
+                Override("algorithm", algorithm, "converge"),
+                Override("step_size", float(step), "converge"),
+            )
+            name = f"{algorithm}/{_milliseconds(float(step)).replace(' ', '')}"
+            label = f"{algorithm}, {_milliseconds(float(step))}"
+            runs.append(NamedRun(name, label, label, scenario, refined))
+    title = with_changes(f"Convergence of {signal}, {scenario.stem}", changes)
+    return of_runs(runs, title, scenario, changes, {})
+
+
+def _milliseconds(step: float) -> str:
+    return f"{1000 * step:.10g} ms"
+
+
+def measure(findings: ExperimentResult, signal: str) -> list[ConvergenceRow]:
+    """Return a row for every run, computed from its results.
+
+    Raises:
+        ResultsError: the signal is zero throughout.
+    """
+    by_algorithm: dict[str, list[NamedRun]] = {}
+    for run in findings.experiment.runs.values():
+        by_algorithm.setdefault(str(_given(run, "algorithm")), []).append(run)
+    finest = next(iter(by_algorithm.values()))[-1]
+    failed = {case.run.name: findings.record(case).problems for case in findings.experiment.cases}
+    samples = {
+        run.name: _samples(findings.results.get(run.name), signal, "; ".join(failed[run.name]))
+        for run in findings.experiment.runs.values()
+    }
+    reference = samples[finest.name][0]
+    peak = math.nan if reference is None else float(np.max(np.abs(reference)))
+    if peak == 0:
+        raise ResultsError(f"{signal} is zero throughout: choose another --signal.")
+    rows = []
+    for algorithm, runs in by_algorithm.items():
+        coarse = [_common(samples[run.name][0], k) for k, run in enumerate(runs)]
+        target = _common(reference, len(runs) - 1)
+        steps = [_distance(a, b) for a, b in zip(coarse, [*coarse[1:], None], strict=True)]
+        for k, run in enumerate(runs):
+            after = steps[k + 1] if k + 1 < len(steps) else None
+            order = math.log2(first / after) if (first := steps[k]) and after else None
+            distance = None if run is finest else _distance(coarse[k], target)
+            _, wall_time, why = samples[run.name]
+            error = None if distance is None else distance / peak
+            step = float(_given(run, "step_size"))
+            rows.append(ConvergenceRow(algorithm, step, error, order, wall_time, why, run is finest))
+    return rows
+
+
+def _given(run: NamedRun, place: str) -> Plain:
+    """Return what a run gives at a place."""
+    return next(change.plain for change in reversed(run.changes) if change.place == place)
+
+
+def _samples(found: Results | None, signal: str, why: str) -> tuple[np.ndarray | None, float | None, str]:
+    """Return the signal, the wall time [s] and why there is neither."""
+    if found is None:
+        return None, None, why
+    if not np.issubdtype(found[signal].dtype, np.number):
+        return None, None, f"{signal} is no number"
+    return found[signal], found.record.wall_time, ""
+
+
+def _common(x: np.ndarray | None, k: int) -> np.ndarray | None:
+    """Return the samples of a run with step h / 2^k at the communication points of that with h."""
+    return None if x is None else x[:: 2**k]
+
+
+def _distance(a: np.ndarray | None, b: np.ndarray | None) -> float | None:
+    """Return the largest difference; 0 if it is no more than rounding."""
+    if a is None or b is None:
+        return None
+    distance = float(np.max(np.abs(a - b)))
+    return distance if distance > ROUNDING * float(np.max(np.abs(b))) else 0.0
+
+
+def convergence_table(rows: Sequence[ConvergenceRow], title: str) -> Table:
+    """Return the table of all runs."""
+    table = Table(title, ["algorithm", "step", "error", "observed order", "wall time"])
+    for row in rows:
+        error: Cell = None if row.error is None else MetricValue(row.error, "1")
+        if row.failed or row.finest:
+            error = f"failed: {row.failed}" if row.failed else "the finest"
+        order = MetricValue(row.order, "1") if row.order is not None else None
+        cost = MetricValue(row.wall_time, "s") if row.wall_time is not None else None
+        table.rows.append([row.algorithm, _milliseconds(row.step), error, order, cost])
+    return table
+
+
+def columns_of(rows: Sequence[ConvergenceRow]) -> list[TableColumn]:
+    """Return all runs as columns, in SI."""
+    numbers = (("step_size", "s", "step"), ("error", "1", "error"), ("order", "1", "order"),
+               ("wall_time", "s", "wall_time"))  # fmt: skip
+    return [
+        TableColumn("algorithm", "string", [row.algorithm for row in rows]),
+        *(
+            TableColumn(n, "float64", [getattr(row, part) for row in rows], {"unit": u})
+            for n, u, part in numbers
+        ),
+        TableColumn("failed", "string", [row.failed for row in rows]),
+    ]
+
+
+def convergence_figure(rows: Sequence[ConvergenceRow], signal: str, title: str, note: str) -> Figure:
+    """Return error over step and error over cost, both axes logarithmic, with slopes 1 and 2 to compare.
+
+    Raises:
+        ResultsError: no run has an error above zero.
+    """
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import LogLocator
+
+    drawn = [row for row in rows if row.error and row.wall_time]
+    if not drawn:
+        raise ResultsError("nothing to draw: no two runs differ.")
+    names = list(dict.fromkeys(row.algorithm for row in drawn))
+    styles = {
+        name: {**line_style(k), "marker": "os^"[k % 3], "markersize": 5} for k, name in enumerate(names)
+    }
+    with new_figure() as figure:
+        by_step, by_cost = figure.subplots(1, 2, sharey=True)
+        for name in names:
+            mine = [row for row in drawn if row.algorithm == name]
+            errors = [row.error for row in mine]
+            by_step.plot([1000 * row.step for row in mine], errors, **styles[name])
+            by_cost.plot([row.wall_time for row in mine], errors, **styles[name])
+        _slopes(by_step, drawn)
+        for axes, heading, below in (
+            (by_step, f"{words(signal)}: largest error, relative to its peak", "communication step in ms"),
+            (by_cost, "the same over the wall time of the run", "wall time in s"),
+        ):
+            axes.set(xscale="log", yscale="log", xlabel=below)
+            axes.set_title(heading)
+        steps = sorted({1000 * row.step for row in drawn})
+        by_step.set_xticks(steps, [f"{step:g}" for step in steps])
+        by_step.minorticks_off()
+        by_cost.xaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5, 7)))
+        by_cost.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        by_cost.xaxis.set_minor_formatter("")
+        handles = [Line2D([], [], label=name, **styles[name]) for name in names]
+        frame(figure, 3.6, handles, title, note)
+    return figure
+
+
+def _slopes(axes: Axes, rows: Sequence[ConvergenceRow]) -> None:
+    """Draw lines of order 1 and 2 above the data, from the coarsest step down."""
+    steps = [1000 * row.step for row in rows]
+    coarse, fine = max(steps), min(steps)
+    top = 3 * max(row.error or 0.0 for row in rows)
+    for order in (1, 2):
+        end, middle = (top * (step / coarse) ** order for step in (fine, math.sqrt(coarse * fine)))
+        axes.plot([coarse, fine], [top, end], color=QUIET, linewidth=0.8, linestyle=":")
+        axes.annotate(
+            f"order {order}", (math.sqrt(coarse * fine), middle), (-4, 3), ha="right",
+            textcoords="offset points", fontsize=7.5, color=QUIET,
+        )  # fmt: skip

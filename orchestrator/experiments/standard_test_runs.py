@@ -1,0 +1,131 @@
+"""The runs of standard tests that ask for many: each varies one job, of which all take the options.
+
+Results stay on disk, so a series that was stopped goes on where it was: what has been made already, of the
+same scenario, FMUs and program, is not made again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from ..errors import ScenarioError
+from ..evaluation.judgement import Evaluation, TestSeries
+from ..evaluation.lane_change import evaluate_lane_change, highest_clean, is_clean, judge_entry_speeds
+from ..evaluation.sine_with_dwell import amplitudes
+from ..evaluation.trace import Trace, trace_of
+from ..plan import Override
+from ..results.read import load_results
+from ..scenario.quantities import convert
+from .jobs import Job, PlanningCache, keyed, planned, ready
+
+AMPLITUDE = "driver.amplitude"
+"""What sine with dwell varies: the amplitude of the hand wheel [rad], positive to the left."""
+SIDES = (("left", 1.0), ("right", -1.0))
+SPEED = "speed"
+"""What lane changes vary: the speed of the scenario [m/s]."""
+KMH = 1.0 / 3.6
+STEP, RESOLUTION = 10.0 * KMH, 0.5 * KMH
+"""Steps to the first speeds, and difference of speeds that is left in the end [m/s]."""
+LEAST, MOST = 10.0 * KMH, 250.0 * KMH
+"""Speeds between which is sought [m/s]."""
+
+
+def slow_steer_jobs(base: Job, once: PlanningCache) -> list[Job]:
+    """Return the runs of slowly increasing steer, with the scenario's amplitude, to both sides.
+
+    Raises:
+        ScenarioError: they cannot start, or the driver has no amplitude.
+    """
+    given = _amplitude_of(base, once)
+    sides = [_varied(base, name, steered(side * given, "slowly increasing steer")) for name, side in SIDES]
+    return list(map(keyed, ready(sides, once=once)))
+
+
+def dwell_jobs(base: Job, angle: float, once: PlanningCache) -> list[Job]:
+    """Return the runs of sine with dwell for A [rad], left first and right first.
+
+    Raises:
+        ScenarioError: they cannot start.
+    """
+    jobs = [
+        _varied(
+            base, f"{name}_first/{math.degrees(amplitude):.2f}", steered(side * amplitude, "sine with dwell")
+        )
+        for name, side in SIDES
+        for amplitude in amplitudes(angle)
+    ]
+    return list(map(keyed, ready(jobs, once=once)))
+
+
+def steered(amplitude: float, origin: str) -> Override:
+    """Return what gives the driver an amplitude [rad]."""
+    return Override(AMPLITUDE, amplitude, origin)
+
+
+def entry_speeds(
+    base: Job, once: PlanningCache, make: Callable[[Job], bool]
+) -> tuple[list[Trace], TestSeries]:
+    """Make the runs that lead to the highest clean entry speed; return them and what they come to.
+
+    Args:
+        base: the run at the scenario's own speed, from which the series begins.
+        once: reads files and opens FMUs.
+        make: makes a run unless it has been made already; returns whether there are results of it.
+
+    Raises:
+        ScenarioError: they cannot start, or the scenario tells no speed.
+        ResultsError: a run has not recorded what it needs.
+    """
+    scenario, plan = planned(base, once)
+    first = 0.0 if scenario.speed is None else float(convert(str(scenario.speed), "m/s"))
+    if first <= 0.0:
+        raise ScenarioError(f"{base.scenario}: tells no speed above 0, from which the series could begin")
+    duration = float(plan.step * plan.n_steps)
+    driven: list[Trace] = []
+    judged: list[Evaluation] = []
+
+    def clean(speed: float) -> bool:
+        seconds = math.ceil(10.0 * duration * first / speed) / 10.0  # long enough for it
+        changes = Override(SPEED, speed, "entry speed"), Override("stop_time", seconds, "entry speed")
+        (job,) = map(keyed, ready([_varied(base, f"{speed / KMH:.2f}", *changes)], once=once))
+        if not make(job):
+            return False
+        driven.extend(traces([job]))
+        driven[-1] = replace(driven[-1], label=f"{job.label} km/h")
+        judged.append(evaluate_lane_change(driven[-1]))
+        return is_clean(judged[-1])
+
+    highest_clean(clean, first=first, step=STEP, resolution=RESOLUTION, least=LEAST, most=MOST)
+    return driven, judge_entry_speeds(judged)
+
+
+def traces(jobs: Sequence[Job]) -> list[Trace]:
+    """Return what runs have recorded, each called by its folder.
+
+    Raises:
+        ResultsError: a run has left none.
+    """
+    return [replace(trace_of(load_results(job.out)), label=job.label) for job in jobs]
+
+
+def _varied(base: Job, name: str, *changes: Override) -> Job:
+    """Return a run of a series, in a folder below that of all."""
+    label = f"{base.label}/{name}" if base.label else name
+    return replace(base, label=label, out=base.out / name, changes=(*base.changes, *changes))
+
+
+def _amplitude_of(job: Job, once: PlanningCache) -> float:
+    """Return the size of the amplitude that a job's driver is given [rad].
+
+    Raises:
+        ScenarioError: it has none.
+    """
+    _, plan = planned(job, once)
+    unit, _, name = AMPLITUDE.partition(".")
+    for one in plan.instances:
+        value = one.parameter(name) if one.name == unit else None
+        if isinstance(value, (int, float)) and value != 0:
+            return abs(float(value))
+    raise ScenarioError(f"{job.scenario}: {AMPLITUDE} is no amplitude of a hand wheel other than 0")

@@ -1,0 +1,334 @@
+"""The tables of an experiment as people read them: runs, grids, derived numbers, verdicts, limits.
+
+Tables of what standard tests come to: one run with every quantity, or a row per run.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ..evaluation.judgement import Evaluation, TestQuantity, TestSeries
+from ..figures.style import shown
+from ..labels import changed
+from ..metrics.run_metrics import MetricValue, metric
+from .axes import levels_of
+from .experiment import NamedRun
+from .grids import cells, grid_tables, side_by_side
+from .jobs import NOT_MADE
+from .judged_schema import Claim, GridSpec, MetricReference, MetricSpec, si_number
+from .judging import ClaimResult
+from .outcome import ExperimentResult, limit_table
+from .schema import TableSpec
+from .tables import Cell, Table, marked, remarks
+
+if TYPE_CHECKING:
+    from ..evaluation.standard_tests import StandardTest
+
+
+HOLDS, UNDECIDED, NOT_JUDGED = "holds", "undecided", "not judged"
+CARRIES = ("margin", "region", "nearest flip")
+"""Headings of how far a verdict carries; the last two over a region."""
+FAILS = {"claims": "does not reproduce", "checks": "does not hold"}
+
+
+def all_tables(findings: ExperimentResult) -> list[Table]:
+    """Return all tables of an experiment, in the order in which they are read."""
+    return [
+        *run_tables(findings),
+        *derived_tables(findings),
+        *claim_tables(findings),
+        *limit_tables(findings),
+    ]
+
+
+def limit_tables(findings: ExperimentResult) -> list[Table]:
+    """Return the tables of all limits, and the grids that say how far down they hold."""
+    tables = [limit_table(findings, name) for name in findings.spec.limits]
+    tables += [
+        one for grid in findings.spec.grids.values() if grid.holds for one in _grid_tables(findings, grid)
+    ]
+    if words := changed(findings.experiment.by_options):
+        for table in tables:
+            table.notes.append(f"changed: {words}")
+    return tables
+
+
+def _grid_tables(findings: ExperimentResult, grid: GridSpec) -> list[Table]:
+    """Return a grid with what is said of its cells, and what the paper prints."""
+    signs: dict[tuple[str, str], str] = {}
+    for one in findings.judgements if grid.holds else ():
+        about = {(c.run, c.derived or c.metric) for c in one.said.holds_if}
+        if len(about) == 1:
+            word = verdict(one)
+            (key,) = about
+            signs[key] = signs.get(key) or ("" if word == HOLDS else "✗" if word in FAILS.values() else "?")
+    return grid_tables(grid, findings.values_of_grids, signs)
+
+
+def derived_tables(findings: ExperimentResult, *, apart: bool = False) -> list[Table]:
+    """Return the grids, and a table of the derived numbers if there are any.
+
+    `apart`: what the paper prints for a grid is a table of its own.
+    """
+    spec, tables = findings.spec, []
+    for grid in spec.grids.values():
+        if not grid.holds:
+            found = _grid_tables(findings, grid)
+            tables += found if apart else [side_by_side(found)]
+    in_grids = {cell.metric for grid in spec.grids.values() if grid.derived for cell in cells(grid)}
+    if alone := {key: one for key, one in spec.derived.items() if key not in in_grids}:
+        rows: list[list[Cell]] = [[one.says, findings.derived.get(key)] for key, one in alone.items()]
+        headings = ["what", "value"]
+        if any(one.published is not None for one in alone.values()):
+            headings.append("the paper says")
+            for row, one in zip(rows, alone.values(), strict=True):
+                printed = one.published
+                row.append(None if printed is None else MetricValue(si_number(printed, one.unit), one.unit))
+        tables.append(Table("Computed from several runs", headings, [*rows]))
+    return tables
+
+
+def heading(spec: MetricSpec) -> str:
+    """Return the heading of a metric's column."""
+    if spec.heading:
+        return spec.heading
+    return f"{metric(spec.metric).formula}{spec.during()}"
+
+
+def verdict(judgement: ClaimResult) -> str:
+    """Return the verdict in plain words."""
+    if judgement.holds is None:
+        return NOT_JUDGED
+    if not judgement.sure or (judgement.region and not judgement.region.decided):
+        return UNDECIDED
+    return HOLDS if judgement.holds else FAILS[judgement.group]
+
+
+def margin_words(judgement: ClaimResult) -> str | None:
+    """Return the margin at the chosen point, `14 %`, negative where the claim does not hold; None: none."""
+    return None if judgement.margin is None else share(judgement.margin)
+
+
+def share(ratio: float) -> str:
+    """Return a margin in per cent, two digits of it: 1.6 %; beyond 100 % its size tells nothing more."""
+    if abs(ratio) > 1.0:
+        return "by far" if ratio > 0 else "missed by far"
+    return shown(ratio, "%", digits=2)
+
+
+def reach(findings: ExperimentResult) -> str:
+    """Return where claims have been judged, in words; "" if nothing is left open."""
+    if findings.spec.region is None or not findings.claims:
+        return ""
+    if not findings.regions:
+        return "at the chosen point only; the region of the open values has not been run"
+    alone = [replace(one, region=None) for one in findings.claims]
+    return f"over the region of the open values; at the chosen point alone {tally_words(counts_of(alone))}"
+
+
+def tally_words(counts: Mapping[str, int]) -> str:
+    """Return counts of verdicts in words: `holds: 13, undecided: 2`."""
+    return ", ".join(f"{word}: {count}" for word, count in counts.items())
+
+
+def region_words(judgement: ClaimResult) -> list[str]:
+    """Return how far a verdict carries: `holds in 71 % of 24 points`, `flips at amplitude 0.08 rad`."""
+    region = judgement.region
+    if region is None:
+        return []
+    flip = region.flip
+    return [
+        held_words(region.holding, len(region.points), region.without_result),
+        flip_words(flip.says, flip.words, flip.chosen) if flip else NO_FLIP,
+    ]
+
+
+NO_FLIP = "no flip along any open value"
+
+
+def held_words(holding: int, points: int, without_result: int = 0) -> str:
+    """Return at which part of the points a claim holds."""
+    failed = f", {without_result} without a result" if without_result else ""
+    return f"holds in {100 * holding / points:.0f} % of {points} points{failed}"
+
+
+def flip_words(says: str, level: str, chosen: str = "") -> str:
+    """Return where a verdict becomes another: what is varied, the level, and the one chosen if it is told."""
+    return f"flips at {says} {level}" + (f" (chosen: {chosen})" if chosen else "")
+
+
+def counts_of(judgements: Sequence[ClaimResult]) -> dict[str, int]:
+    """Return how many judgements have each verdict, those that occur."""
+    words = [verdict(one) for one in judgements]
+    every = (HOLDS, UNDECIDED, *FAILS.values(), NOT_JUDGED)
+    return {word: words.count(word) for word in every if word in words}
+
+
+def run_tables(findings: ExperimentResult) -> list[Table]:
+    """Return the tables of metrics: one row per run, beside it what the paper says of that run alone."""
+    return [_run_table(findings, table) for table in findings.spec.tables]
+
+
+def _run_table(findings: ExperimentResult, spec: TableSpec) -> Table:
+    study = findings.experiment
+    runs = study.matching(spec.runs)
+    alone = len(study.settings) == 1
+    said = {run.name: _said_of(findings, run, spec) if alone else [] for run in runs}
+    columns = [study.spec.metrics[key] for key in spec.metrics]
+    table = Table(spec.title, ["run", *map(heading, columns)])
+    formulas: dict[str, list[str]] = {}
+    for column in columns:
+        if column.heading:
+            formulas.setdefault(metric(column.metric).formula, []).append(column.heading)
+    table.notes = [f"{', '.join(named)}: {formula}" for formula, named in formulas.items()]
+    some = any(said.values())
+    carries = CARRIES if findings.regions else CARRIES[:1]
+    if some and not findings.regions and (only := reach(findings)):
+        table.notes.append(f"verdicts: {only}")
+    if some:  # beside the first metric, which the claims are about
+        table.headings[2:2] = ["the paper says", "verdict", *carries]
+    for run, setting in itertools.product(runs, study.settings):
+        row = ", ".join(filter(None, [run.row, *(level.words for level in setting)]))
+        if not findings.made(run, setting):
+            cells: list[Cell] = [NOT_MADE.status, *[None] * (len(table.headings) - 2)]
+        elif why := findings.failure(run, setting):
+            cells = ["failed", *[None] * (len(table.headings) - 2)]
+            table.notes.append(f"{row}: {why}")
+        else:
+            cells = [findings.at[setting].get((run.name, key)) for key in spec.metrics]
+            ended = (findings.record(case).ended for case in findings.cases_of(run, setting))
+            if early := next(filter(None, ended), None):
+                table.notes.append(f"{row}: {early}; what is of the whole run, or later, has no result")
+            if some:
+                cells[1:1] = _beside(said[run.name], len(carries))
+                table.notes += [f"{run.row}: {j.said.note}" for j in said[run.name] if j.said.note]
+        results = findings.results.get(run.name)
+        table.rows.append([marked(row, results) if results else row, *cells])
+        table.notes += remarks([(row, results)]) if results else []
+    return table
+
+
+def _beside(judged: Sequence[ClaimResult], carries: int) -> list[Cell]:
+    """Return what a paper says of a run, the verdicts, and how far they carry; of several one cell each."""
+    rows = [
+        [f"{one.said.short} ({one.said.source})", verdict(one), *_carries(one, carries)] for one in judged
+    ]
+    columns: Iterable[Sequence[str | None]] = zip(*rows, strict=True) if rows else [()] * (2 + carries)
+    return ["; ".join(filter(None, column)) or None for column in columns]
+
+
+def _said_of(findings: ExperimentResult, run: NamedRun, table: TableSpec) -> list[ClaimResult]:
+    """Return the claims with a short form that speak of the table's first metric of this run alone."""
+    return [
+        judgement
+        for judgement in findings.claims
+        if isinstance(judgement.said, Claim)
+        and judgement.said.short
+        and all(
+            (condition.run, condition.metric) == (run.name, table.metrics[0])
+            and not isinstance(condition.bound, MetricReference)
+            for condition in judgement.said.holds_if
+        )
+    ]
+
+
+def _carries(judgement: ClaimResult, columns: int) -> list[str | None]:
+    """Return the cells of `CARRIES`."""
+    how_far: list[str | None] = [*region_words(judgement)] or [None, None]
+    return [margin_words(judgement), *how_far][:columns]
+
+
+def line_table(judgement: ClaimResult) -> Table:
+    """Return a table of the open values that a claim depends on: margins along each, where it flips."""
+    assert judgement.region is not None
+    table = Table("", ["open value", "margin, from", "to", "flips at"])
+    for line in judgement.region.lines:
+        ends = line.margins
+        flip = line.flip.words if line.flip else None
+        table.rows.append([line.says, *map(share, ends or ()), *([] if ends else [None, None]), flip])
+    table.numbers = {1, 2}
+    if (spread := judgement.region.spread) is not None:
+        words = share(spread) if spread <= 1.0 else "more than 100 %"
+        table.notes = [f"spread of the margin over all of them: {words}"]
+    return table
+
+
+def region_table(findings: ExperimentResult) -> Table:
+    """Return a table of the open values of the region: what is chosen, their range, why it is that."""
+    region = findings.spec.region
+    assert region is not None
+    lines = {line.open_value: line for one in findings.regions.values() for line in one.lines}
+    rows: list[list[Cell]] = []
+    for name, one in region.open_values.items():
+        line, levels = lines.get(name), levels_of(one.stepped)
+        unit = one.unit or (line.unit if line and line.unit != "1" and not one.times else "")
+        ends = [levels[0].words, levels[-1].words] if one.start is not None else [one.words for one in levels]
+        words = " to ".join(ends) if one.start is not None else ", ".join(ends)
+        chosen = line.words(line.chosen.place) if line and line.chosen.place is not None else None
+        rows.append([
+            one.says or name, None if one.times else chosen,
+            f"{words} × as chosen" if one.times else f"{words} {unit}".rstrip(), one.because,
+        ])  # fmt: skip
+    title = f"Open values: {region.points} points over all together, and one at a time"
+    return Table(title, ["open value", "chosen", "range", "because"], [*rows])
+
+
+def claim_tables(findings: ExperimentResult) -> list[Table]:
+    """Return the paper's claims that stand beside no run, and the project's own checks."""
+    beside = {
+        id(judgement)
+        for table in findings.spec.tables
+        for run in findings.experiment.matching(table.runs)
+        for judgement in _said_of(findings, run, table)
+    }
+    tables = []
+    for title, judged in (
+        ("What the paper says beyond single runs", findings.claims),
+        ("What this project asks of it", findings.checks),
+    ):
+        table = Table(
+            title, ["claim", "measured", "verdict", *(CARRIES if findings.regions else CARRIES[:1])]
+        )
+        for one in judged:
+            if id(one) not in beside:
+                says = f"{one.said.says} ({one.said.source})" if one.said.source else one.said.says
+                note = f"\n{one.said.note}" if one.said.note else ""
+                carries = _carries(one, len(table.headings) - 3)
+                table.rows.append([f"{says}{note}", "\n".join(one.measured), verdict(one), *carries])
+        if not findings.regions and judged is findings.claims and (only := reach(findings)):
+            table.notes.append(f"verdicts: {only}")
+        tables += [table] if table.rows else []
+    return tables
+
+
+def _cell(quantity: TestQuantity | None) -> Cell:
+    if quantity is None or quantity.value is None:
+        return None
+    return MetricValue(quantity.value, quantity.unit)
+
+
+def run_table(judged: Evaluation, title: str) -> Table:
+    """Return a table of one run: a row per quantity and how the standard was read, its verdicts below."""
+    rows: list[Sequence[Cell]] = [[one.name, _cell(one), one.reading] for one in judged.quantities.values()]
+    notes = [f"{name}: {one}" for name, one in judged.rulings.items()]
+    return Table(f"{judged.label}: {title}", ["quantity", "value", "reading"], rows, notes + judged.notes)
+
+
+def runs_table(runs: Sequence[Evaluation], test: StandardTest, series: TestSeries | None) -> Table:
+    """Return a table of many runs, a row each, in the order given; the verdict of the series below."""
+    keys = [key for key in test.columns if any(key in run.quantities for run in runs)]
+    names = {key: run.quantities[key].name for run in reversed(runs) for key in keys if key in run.quantities}
+    criteria = list(dict.fromkeys(name for run in runs for name in run.rulings))
+    rows: list[Sequence[Cell]] = []
+    for run in runs:
+        words = [run.rulings[name].verdict.value if name in run.rulings else "-" for name in criteria]
+        rows.append([run.label, *(_cell(run.quantities.get(key)) for key in keys), *words])
+    notes = []
+    if series:
+        notes += [f"{name}: {one}" for name, one in series.rulings.items()]
+        notes.append(series.summary)
+    notes += [f"{run.label}: {'; '.join(run.notes)}" for run in runs if run.notes]
+    return Table(test.says, ["run", *(names[key] for key in keys), *criteria], rows, notes)

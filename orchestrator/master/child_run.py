@@ -1,0 +1,405 @@
+"""A run whose units are stepped in a process of their own, while the results are kept in this one.
+
+A unit that crashes, calls exit, hangs, or closes all files, does so to the other process: this one sees it
+end without the word that a run ends with, and still has every row. So no run of foreign code ends in
+silence, and Ctrl-C always works, whatever the FMU does with signals.
+
+Chosen over isolating every foreign FMU by default, which costs 30 to 70 us per unit and step, and over a
+hook that the C library calls at exit(), which neither _exit() nor a signal asks. This costs a fork, a few
+milliseconds per run, and nothing per step; while one process writes a block of rows the other fills the
+next. What it does not give is a wall between units: see `surroundings` for what they may change for each
+other, and `isolation` for the wall. It needs fork(), and is used on Linux alone.
+
+The process in which the units of a run are stepped, apart from the one that keeps the results.
+
+The other side is `apart`. Rows lie in memory that both share: two blocks, one of which is being filled
+while the other is being written. Beside them the pipe carries what is said a few times a second.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import itertools
+import json
+import math
+import mmap
+import os
+import signal
+import sys
+import threading
+import time
+import traceback
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import Interrupted, SimulationError, YawbenchError
+from ..messages import listed
+from ..plan import Plan, Value
+from ..results.recorder import BLOCK, RowBlock
+from .fmi import open_unit
+from .instance import CtypesInstance
+from .ipc import REPLY, LogRelay, PipeChannel, ProtocolError, rebuilt, told
+from .isolation import Isolation
+from .log import MASTER, WARNING, Log
+from .master import WORDS, EndRequested, Master
+from .process_state import StopFlag, flush_output, stop_requested_at
+from .run_loop import OpenInstance, RunLoop, RunProgress
+from .supervisor import ProcessLost, SupervisedProcess, die_with_parent
+
+ROWS, PROGRESS, ENDED, WHERE = 0x90, 0x91, 0x92, 0x93
+"""First bytes of records: rows are there, how far the run is, how it ended, in which unit it is."""
+TAKEN, FREE = b"\x01", b"\x02"
+"""What the other side says: rows have been written; terminate and free the units."""
+
+_SLOT = 256
+"""Bytes for what is recorded at a point and no Real, where it is looked for if the process dies."""
+
+
+class SharedProgress:
+    """The memory of both processes: the last communication point reached, and the rows so far."""
+
+    def __init__(self, width: int) -> None:
+        """Make it for rows of so many numbers."""
+        self._map = mmap.mmap(-1, 8 + 16 * BLOCK * width)
+        self._slots = mmap.mmap(-1, BLOCK * _SLOT)
+        self.completed = ctypes.c_int64.from_buffer(self._map)
+        self.completed.value = -1
+        self.blocks = np.frombuffer(self._map, float, offset=8).reshape(2, BLOCK, width)
+
+    def keep(self, at: int, others: list[Value]) -> None:
+        """Put what is no Real beside row `at` of the block being filled; nothing if it is too long."""
+        data = json.dumps(others).encode()
+        self._slots[at * _SLOT : (at + 1) * _SLOT] = (data if len(data) <= _SLOT else b"").ljust(_SLOT)
+
+    def kept(self, count: int) -> list[list[Value]]:
+        """Return what is no Real of the first rows of the block being filled, as far as it is there."""
+        slots = [self._slots[at * _SLOT : (at + 1) * _SLOT].strip() for at in range(count)]
+        return [json.loads(slot) for slot in itertools.takewhile(bool, slots)]
+
+
+class _Others(list):
+    """What is recorded and no Real, one list per row; also where it is found if the process dies."""
+
+    def __init__(self, shared: SharedProgress) -> None:
+        super().__init__()
+        self._shared = shared
+
+    def append(self, values: list[Value]) -> None:
+        self._shared.keep(len(self), values)
+        super().append(values)
+
+
+class _Rows:
+    """Where the run's rows go (see `course.Rows`): to the other side."""
+
+    def __init__(self, shared: SharedProgress, channel: PipeChannel) -> None:
+        self._channel = channel
+        self._blocks = [list(block) for block in shared.blocks]
+        self._given = 0  # blocks
+        self._first = 0
+        self.rows = self._blocks[0]
+        self.others: list[list[Value]] = _Others(shared)
+
+    def write(self, count: int) -> None:
+        """Give the first `count` of `rows` away, when those before have been written."""
+        if count <= 0:
+            return
+        if self._given and self._channel.hear() is None:
+            os._exit(1)
+        self._channel.send(ROWS, (self._first, count, self.others))
+        self._given += 1
+        self._first += count
+        self.others.clear()
+        self.rows = self._blocks[self._given % 2]
+
+
+def step_units(
+    plan: Plan,
+    opener: OpenInstance,
+    stop: StopFlag,
+    shared: SharedProgress,
+    channel: PipeChannel,
+    asking: int,
+) -> None:
+    """Make the run in this process, which has just been forked. Never returns.
+
+    Args:
+        asking: pipe through which the other side says that the run is to stop, and asks in which unit it is.
+    """
+    try:
+        die_with_parent()
+        os.setpgid(0, 0)  # what a unit sends to its group, and Ctrl-C on the terminal, is not for both
+        for descriptor in map(int, os.listdir("/proc/self/fd")):
+            if descriptor > 2 and descriptor not in (channel.reading, channel.writing, asking):
+                with contextlib.suppress(OSError):  # that of the folder that has just been listed
+                    os.close(descriptor)
+        _make(plan, opener, stop, shared, channel, asking)
+    except OSError:
+        os._exit(1)  # the other side is gone, or a unit has closed the pipe to it
+    except BaseException:
+        traceback.print_exc()
+        os._exit(1)
+    os._exit(0)
+
+
+def _make(
+    plan: Plan,
+    opener: OpenInstance,
+    stop: StopFlag,
+    shared: SharedProgress,
+    channel: PipeChannel,
+    asking: int,
+) -> None:
+    log = LogRelay(channel, timed=True)
+    rows = _Rows(shared, channel)
+
+    def progress(done: int, total: int) -> None:
+        channel.send(PROGRESS, (done, total))
+
+    course = RunLoop(plan, rows, log, stop, progress, shared.completed)
+    _tell_where(channel, asking, stop)
+    error = _go(course, opener)
+    log.finish()
+    ending = course.ended and (str(course.ended), course.ended.instance, course.ended.time)
+    channel.send(ENDED, (course.passes, ending, error))
+    while (said := channel.hear()) != FREE[0]:
+        if said is None:
+            return
+    course.end()
+    if isinstance(opener, Isolation):
+        opener.close()  # processes of units that the run has not come to
+    log.finish()
+    flush_output()
+    channel.send(REPLY, None)
+
+
+def _go(course: RunLoop, opener: OpenInstance) -> dict[str, Any] | None:
+    """Open, initialize, step; return what there is to tell if that fails."""
+    try:
+        course.go(opener)
+    except (YawbenchError, Interrupted) as error:
+        unit = getattr(error, "unit", None)
+        return {**told(error), "inputs": course.inputs_of(unit) if unit else {}}
+    except BaseException:
+        return {"kind": "", "problems": traceback.format_exc(), "inputs": {}}
+    return None
+
+
+def _tell_where(channel: PipeChannel, asking: int, stop: StopFlag) -> None:
+    """Answer, from a thread, in which unit the run is, and let it stop; also when an FMU calls exit()."""
+    stepping, process = threading.get_ident(), os.getpid()
+
+    def answer() -> None:
+        with contextlib.suppress(OSError):  # the other side is gone
+            while number := os.read(asking, 1):
+                stop.request(number[0])
+                channel.send(WHERE, _whereabouts(stepping))
+
+    threading.Thread(target=answer, daemon=True).start()
+
+    @ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.c_void_p)
+    def at_exit(status: int, _: int | None) -> None:
+        if os.getpid() == process:
+            with contextlib.suppress(OSError):
+                channel.send(WHERE, _whereabouts(stepping))
+        os._exit(status)
+
+    _kept.append(at_exit)
+    ctypes.CDLL(None).on_exit(at_exit, None)
+
+
+_kept: list[Any] = []
+
+
+def _whereabouts(thread: int) -> tuple[str, str] | None:
+    """Return the unit that a thread is in, and what is being done with it; None if it is in none."""
+    frame, found = sys._current_frames().get(thread), None
+    here = str(Path(__file__).parent)
+    while frame is not None:
+        if frame.f_code.co_filename.startswith(here):
+            local = frame.f_locals
+            if frame.f_code is Master.advance.__code__ and "call" in local:
+                operation = local["self"].operation_of(local["k"], local["call"])
+                return operation and (operation.instance, WORDS.get(operation.kind, operation.kind))
+            if isinstance(local.get("self"), CtypesInstance):
+                ending = frame.f_code.co_name == CtypesInstance.free.__name__
+                found = local["self"].name, "its end" if ending else "initialization"
+        frame = frame.f_back
+    return found
+
+
+KILL_AFTER = 3.0
+"""Time after a wish to stop at which the process is killed [s]; chosen: a step is over long before."""
+END_LIMIT = 10.0
+"""Time that units may take to be terminated and freed [s]; the results are written by then."""
+
+
+def can_be_apart() -> bool:
+    """Return whether a run can be stepped in a process of its own: signals are for the main thread."""
+    return sys.platform == "linux" and threading.current_thread() is threading.main_thread()
+
+
+class ChildRun(RunLoop, SupervisedProcess):
+    """The course of one run in another process."""
+
+    unasked = (ROWS, PROGRESS, WHERE)
+
+    def __init__(
+        self, plan: Plan, rows: RowBlock, log: Log, stop: StopFlag, progress: RunProgress | None
+    ) -> None:
+        super().__init__(plan, rows, log, stop, progress)
+        self._rows: RowBlock = rows
+        self._shared = SharedProgress(len(rows.rows[0]))
+        self._blocks = 0  # written
+        self._inputs: dict[str, Value] = {}
+        self._where: tuple[str, str] | None = None
+        self._process: int | None = None
+        self._status = 0
+        self._deadline = math.inf
+        self._suspects: list[str] = []  # units that may have ended the process
+        self._told_end = False
+        self._closed = False  # no more rows are written
+
+    def inputs_of(self, unit: str) -> dict[str, Value]:
+        """Return the inputs with which the unit that has failed was last stepped."""
+        return self._inputs
+
+    def go(self, opener: OpenInstance) -> None:
+        if opener is open_unit:
+            self._suspects = [u.name for u in self.plan.instances if u.fmu.compiled]
+        asked, self._asking = os.pipe()
+        try:
+            self._process = self._start(partial(self._forked, opener, asked))
+        finally:
+            os.close(asked)
+        try:
+            self.passes, ending, failed = self._hear(ENDED)
+        except ProcessLost as lost:
+            raise self._death(lost) from None
+        self._told_end = True
+        if ending is not None:
+            reason, unit, at = ending
+            self.ended = EndRequested(reason, instance=unit, time=at)
+        if failed is not None:
+            self._inputs = failed["inputs"]
+            raise rebuilt(failed) if failed["kind"] else RuntimeError(failed["problems"])
+
+    def _forked(self, opener: OpenInstance, asked: int, commands: int, answers: int) -> int:
+        flush_output()
+        process = os.fork()
+        if process == 0:
+            step_units(self.plan, opener, self._stop, self._shared, PipeChannel(commands, answers), asked)
+        return process
+
+    def _take(self, kind: int, content: Any) -> None:
+        match kind, content:
+            case _, [int() as first, int() as count, list() as others] if kind == ROWS:
+                if first != self.handed_over:
+                    raise ProtocolError(f"rows from {first}, not {self.handed_over}")
+                self._record(count, others)
+                self._blocks += 1
+                with contextlib.suppress(BrokenPipeError):
+                    self._channel.say(TAKEN)
+            case _, [int() as done, int() as total] if kind == PROGRESS:
+                if self._progress is not None:
+                    self._progress(done, total)
+            case _, [str() as unit, str() as what] if kind == WHERE:
+                self._where = unit, what
+            case _, None if kind == WHERE:
+                pass
+            case _:
+                raise ProtocolError(f"a record {kind}")
+
+    def _record(self, count: int, others: list[list[Value]]) -> None:
+        if self._closed:
+            self.handed_over += count
+            return
+        self._closed = True  # if this fails, what comes after it is no use
+        self._rows.lay(self._shared.blocks[self._blocks % 2])
+        self._rows.others[:] = others
+        self._hand_over(count)
+        self._closed = False
+
+    def flush(self) -> None:
+        """Write the rows that the process has left behind."""
+        count = self._shared.completed.value + 1 - self.handed_over
+        others = []
+        if len(self.plan.record) + 1 > len(self._rows.rows[0]):  # there are such as are no Reals
+            others = self._shared.kept(count) if count <= BLOCK else []
+            count = len(others)
+        self._record(min(count, BLOCK), others)
+        self._closed = True
+
+    def _check_time(self) -> None:
+        """Let the process stop when that is wished; kill it if it does not, or takes too long to end."""
+        now, asked = time.monotonic(), stop_requested_at()
+        if asked is not None:
+            self._ask()
+        if now > self._deadline or (asked is not None and now - asked > KILL_AFTER):
+            self.close()
+            raise ProcessLost("did not come back")
+
+    def _ask(self) -> None:
+        """Let the process stop, and tell in which unit it is."""
+        with contextlib.suppress(OSError):
+            os.write(self._asking, bytes([self._stop.number]))
+
+    def _has_ended(self, within: float) -> bool:
+        assert self._process is not None
+        end = time.monotonic() + within
+        while os.waitid(os.P_PID, self._process, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
+            if time.monotonic() >= end:
+                return False
+            time.sleep(0.001)
+        return True
+
+    def close(self) -> int:
+        if self._process is not None:
+            for kill in (os.killpg, os.kill):  # with what units have started
+                with contextlib.suppress(OSError):
+                    kill(self._process, signal.SIGKILL)
+            _, status = os.waitpid(self._process, 0)
+            self._process, self._status = None, os.waitstatus_to_exitcode(status)
+            self._channel.close()
+            os.close(self._asking)
+        return self._status
+
+    def _death(self, lost: ProcessLost) -> SimulationError | Interrupted:
+        """Return what ends the run when its process did."""
+        completed = self._shared.completed.value
+        unit, doing = self._where or (None, "step" if completed >= 0 else "initialization")
+        if unit is None and len(self._suspects) == 1:
+            unit = self._suspects[0]
+        period = next((u.period for u in self.plan.instances if u.name == unit), 1)
+        now = self.plan.time(max(0, completed + 1 - period if (completed + 1) % period == 0 else completed))
+        sentence = f"{doing} failed at t = {now:.9g} s: the process of the run {lost}"
+        if unit is not None:
+            sentence = f"{unit}: {sentence}"
+        elif self._suspects:
+            sentence += f"; --isolate tells in which unit (not in Python are {listed(self._suspects)})"
+        if self._stop.requested:
+            return self._stop.interrupted(f": {sentence}", unit=unit, time=now)
+        return SimulationError(sentence, instance=unit, time=now)
+
+    def end(self) -> None:
+        """Let the process terminate and free the units; what becomes of it costs the results nothing."""
+        if self._process is None:
+            return
+        self._closed, self._where = True, None
+        self._deadline = time.monotonic() + END_LIMIT
+        try:
+            if not self._told_end:
+                self._ask()
+                self._hear(ENDED)
+            self._where = None  # what was asked for the end belongs to the run
+            self._channel.say(FREE)
+            self._hear(REPLY)
+        except (ProcessLost, OSError) as lost:
+            unit = self._where[0] if self._where else ", ".join(self._suspects) or "the units"
+            text = f"when units were terminated and freed, the process of the run {lost}"
+            self.log.add(unit, WARNING, MASTER, text, self.plan.time(max(0, self._shared.completed.value)))
+        self.close()

@@ -1,0 +1,213 @@
+"""Instances of FMI 2.0 co-simulation.
+
+Instances of FMI 3.0 co-simulation, without event mode.
+
+The instance of a unit in this process, of the version of FMI that its FMU follows.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import math
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from fmpy import calloc, free
+from fmpy.fmi2 import (
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+    fmi2CoSimulation,
+    fmi2LastSuccessfulTime,
+    fmi2Terminated,
+)
+from fmpy.fmi3 import fmi3IntermediateUpdateCallback, fmi3LogMessageCallback
+
+from ..fmu.binary import INTEGERS
+from ..plan import Instance
+from .instance import CtypesInstance, ExperimentSetup, Status
+from .log import DISCARD, OK, WARNING, Log, listen, receive
+from .process_state import ProcessState
+
+
+class Fmi2Instance(CtypesInstance):
+    """An instance of an FMI 2.0 co-simulation FMU."""
+
+    prefix = "fmi2"
+    version = 2
+    real = "Real"
+    c_types = {
+        "Real": ctypes.c_double,
+        "Integer": ctypes.c_int,
+        "Boolean": ctypes.c_int,
+        "String": ctypes.c_char_p,
+    }
+
+    def _instantiate(self, unit: Instance) -> int | None:
+        callbacks = _callbacks()
+        callbacks.componentEnvironment = self._listener = listen(self._log, unit.name, callbacks)
+        instantiate = self._function("Instantiate")
+        instantiate.restype = ctypes.c_void_p
+        return instantiate(
+            unit.name.encode(),
+            fmi2CoSimulation,
+            unit.fmu.guid.encode(),
+            Path(unit.fmu.directory, "resources").absolute().as_uri().encode(),
+            ctypes.byref(callbacks),
+            False,
+            True,  # PythonFMU passes on no message at all without
+        )
+
+    def _stepping(self, time: ctypes.c_double, step: ctypes.c_double) -> Callable[[], Status]:
+        component = ctypes.c_void_p(self._component)
+        return functools.partial(self._function("DoStep"), component, time, step, ctypes.c_int(1))
+
+    def setup(self, experiment: ExperimentSetup) -> Status:
+        return self._announce("SetupExperiment", experiment)
+
+    def enter(self) -> Status:
+        return self._do("EnterInitializationMode")
+
+    def ended(self) -> float | None:
+        """Return how far the FMU has gone if it has answered Discard because it wants to end."""
+        if not self._has("GetBooleanStatus"):
+            return None
+        wants, last = ctypes.c_int(0), ctypes.c_double(math.nan)
+        if self._do("GetBooleanStatus", fmi2Terminated, ctypes.byref(wants)) != OK or not wants.value:
+            return None
+        if self._has("GetRealStatus"):
+            self._do("GetRealStatus", fmi2LastSuccessfulTime, ctypes.byref(last))
+        return last.value
+
+
+def _log_fmi2(environment, instance, status, category, text):
+    receive(environment, status, category, text)
+
+
+def _log_unformatted(environment, instance, status, category, text):
+    receive(environment, status, category, (text or b"").replace(b"%%", b"%"))
+
+
+try:
+    from fmpy.logging import addLoggerProxy
+
+    _logger_fmi2 = fmi2CallbackLoggerTYPE(_log_fmi2)
+except (ImportError, OSError):  # no native proxy for this platform: arguments stay unformatted
+    addLoggerProxy = None
+    _logger_fmi2 = fmi2CallbackLoggerTYPE(_log_unformatted)
+
+_allocate = fmi2CallbackAllocateMemoryTYPE(calloc)
+_free = fmi2CallbackFreeMemoryTYPE(free)
+
+
+def _callbacks() -> fmi2CallbackFunctions:
+    """Return callback functions for one instance.
+
+    FMI 2.0's log texts are printf formats with arguments that Python cannot read; fmpy's native proxy
+    formats them (at most 2047 bytes).
+    """
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = _logger_fmi2
+    callbacks.allocateMemory = _allocate
+    callbacks.freeMemory = _free
+    if addLoggerProxy is not None:
+        addLoggerProxy(ctypes.byref(callbacks))
+    return callbacks
+
+
+class Fmi3Instance(CtypesInstance):
+    """An instance of an FMI 3.0 co-simulation FMU."""
+
+    prefix = "fmi3"
+    version = 3
+    real = "Float64"
+    c_types = {
+        "Float32": ctypes.c_float,
+        "Float64": ctypes.c_double,
+        **{name: getattr(ctypes, f"c_{name.lower()}") for name in INTEGERS},
+        "Boolean": ctypes.c_bool,
+        "String": ctypes.c_char_p,
+    }
+
+    def _instantiate(self, unit: Instance) -> int | None:
+        self._listener = listen(self._log, unit.name)
+        self._experiment = ExperimentSetup(0.0, 0.0)
+        self._ended = ctypes.c_bool(False)
+        self._reached = ctypes.c_double(math.nan)
+        resources = str(Path(unit.fmu.directory, "resources").absolute()) + os.sep
+        no, yes = False, True
+        instantiate = self._function("InstantiateCoSimulation")
+        instantiate.restype = ctypes.c_void_p
+        return instantiate(
+            unit.name.encode(),
+            unit.fmu.guid.encode(),
+            resources.encode(),
+            no,  # visible
+            yes,  # logging
+            no,  # event mode
+            no,  # early return
+            None,
+            ctypes.c_size_t(0),
+            ctypes.c_void_p(self._listener),
+            _logger_fmi3,
+            fmi3IntermediateUpdateCallback(),
+        )
+
+    def _stepping(self, time: ctypes.c_double, step: ctypes.c_double) -> Callable[[], Status]:
+        component, yes = ctypes.c_void_p(self._component), ctypes.c_bool(True)
+        event, early, ended, reached = ctypes.c_bool(), ctypes.c_bool(), self._ended, self._reached
+        answers = [ctypes.byref(value) for value in (event, ended, early, reached)]
+        do_step = self._function("DoStep")
+        call = functools.partial(do_step, component, time, step, yes, *answers)
+
+        def go_on(status: Status) -> Status:
+            """Do what is left of a step from which the FMU has returned early, though it was told not to."""
+            end = time.value + step.value
+            while status <= WARNING and early.value and not ended.value and reached.value < end:
+                begin = reached.value
+                rest = do_step(component, ctypes.c_double(begin), ctypes.c_double(end - begin), yes, *answers)
+                status = max(status, rest)
+                if early.value and not reached.value > begin:
+                    return self._impossible(f"it returned early and stays at t = {begin:.9g} s")
+            return status
+
+        def take_step() -> Status:
+            status = call()
+            if early.value:
+                status = go_on(status)
+            return max(status, DISCARD) if ended.value else status
+
+        return take_step
+
+    def ended(self) -> float | None:
+        return self._reached.value if self._ended.value else None
+
+    def setup(self, experiment: ExperimentSetup) -> Status:
+        self._experiment = experiment
+        return OK
+
+    def enter(self) -> Status:
+        return self._announce("EnterInitializationMode", self._experiment)
+
+
+def _log_fmi3(environment, status, category, text):
+    receive(environment, status, category, text)
+
+
+_logger_fmi3 = fmi3LogMessageCallback(_log_fmi3)
+
+
+SLAVES: dict[int, type[CtypesInstance]] = {2: Fmi2Instance, 3: Fmi3Instance}
+"""Major version of FMI -> its instances."""
+
+
+def open_unit(unit: Instance, log: Log, corrupted: set[Path]) -> CtypesInstance:
+    """Return the instance of a unit; arguments and errors are those of `FmuSlave`."""
+    surroundings = ProcessState()
+    try:
+        return SLAVES[unit.fmu.fmi](unit, log, corrupted)
+    finally:
+        surroundings.restore(unit.name, log)

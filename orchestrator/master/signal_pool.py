@@ -1,0 +1,217 @@
+"""Where every value of a run lives: one array of outputs and one of inputs for all units.
+
+The pool holds, one after the other, the outputs of all units at their last step (`now`), the same
+at the step before (`before`), samples that slow units keep of fast sources (`kept`), the constants
+of undriven inputs, and the time. So whatever an input needs, and every row of the results, is one
+indexed read of one array. Units of period 1 come first: what they need at once is contiguous.
+Values that are no Reals live in a dictionary beside it; without such wires it costs nothing.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import SimulationError
+from ..plan import Instance, Plan, Value, Variable, Wire
+from .coupling import WireTiming
+from .fault_injection import FaultInjector, faulting
+from .instance import FmuInstance, StepCalls
+
+
+@dataclass
+class InstanceSlot:
+    """One unit with its place in memory."""
+
+    instance: Instance
+    slave: FmuInstance
+    position: int  # in the evaluation order
+    inputs: list[Variable]  # Real and driven, in declared order
+    wires: list[Wire | None]  # what drives them; None for a constant
+    outputs: list[Variable]  # Real and needed, in declared order
+    other_inputs: list[tuple[Variable, Wire | None]]  # not Real; None for a constant
+    other_outputs: list[Variable]
+    sources: np.ndarray = field(default_factory=lambda: np.empty(0, np.intp))  # pool index per input
+    kept: np.ndarray = field(default_factory=lambda: np.empty(0))  # pool view, one per input
+    kept_at: int = 0  # pool index of kept[0]
+    u: np.ndarray = field(default_factory=lambda: np.empty(0))  # its inputs
+    y: np.ndarray = field(default_factory=lambda: np.empty(0))  # its outputs in the pool
+    y_before: np.ndarray = field(default_factory=lambda: np.empty(0))
+    output_faults: FaultInjector | None = None
+    input_faults: FaultInjector | None = None
+    calls: StepCalls = field(init=False)
+
+    @functools.cached_property
+    def scale(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Gain and offset of each input, None if no wire converts.
+
+        Others have 1 and -0.0, which leave every number as it is, to the sign of zero.
+        """
+        if not any(wire and wire.converts for wire in self.wires):
+            return None
+        pairs = [(w.gain, w.offset) if w and w.converts else (1.0, -0.0) for w in self.wires]
+        gains, offsets = np.array(pairs).T.copy()
+        return gains, offsets
+
+    @property
+    def name(self) -> str:
+        return self.instance.name
+
+    @property
+    def driven(self) -> bool:
+        """True if a Real input may change during a run."""
+        return any(self.wires) or any(v.name in self.instance.series for v in self.inputs)
+
+    @property
+    def sampled(self) -> bool:
+        """True for a unit that samples: it has outputs and all of them are discrete."""
+        outputs = self.instance.fmu.of("output")
+        return bool(outputs) and all(v.discrete for v in outputs)
+
+    def direct(self, variable: Variable) -> bool:
+        """Whether an input is needed at the end of the step (see `coupling`)."""
+        if variable.discrete or self.sampled:
+            return True
+        outputs = self.instance.fmu.of("output")
+        return any(v.depends_on is None or variable.name in v.depends_on for v in outputs)
+
+
+class SignalPool:
+    """The arrays of a run and the stations of its units, in evaluation order."""
+
+    def __init__(self, plan: Plan, slaves: Mapping[str, FmuInstance]) -> None:
+        self.plan = plan
+        self.stations = _stations(plan, slaves)
+        self.of = {s.name: s for s in self.stations}
+        self.placed = sorted(self.stations, key=lambda s: s.instance.period > 1)
+        n_out = sum(len(s.outputs) for s in self.stations)
+        n_in = sum(len(s.inputs) for s in self.stations)
+        self.n_outputs = n_out
+        self.pool = np.zeros(2 * n_out + 2 * n_in + 1)
+        self.now = self.pool[:n_out]
+        self.inputs = np.full(n_in, np.nan)
+        self.index: dict[tuple[str, str], int] = {}  # of an output's last sample
+        self.others: dict[tuple[str, str], Value] = {}
+        self.time_at = len(self.pool) - 1
+        self.time = ctypes.c_double.from_buffer(self.pool.data, 8 * self.time_at)
+        self.time.value = plan.time(0)
+        self._place_outputs()
+        self._place_inputs(2 * n_out, 2 * n_out + n_in)
+        for s in self.stations if plan.faults else ():
+            s.output_faults = faulting(self, s, of_output=True)
+            s.input_faults = faulting(self, s, of_output=False)
+
+    def _place_outputs(self) -> None:
+        at = 0
+        for s in self.placed:
+            end = at + len(s.outputs)
+            s.y = self.pool[at:end]
+            s.y_before = self.pool[self.n_outputs + at : self.n_outputs + end]
+            self.index.update(((s.name, v.name), at + i) for i, v in enumerate(s.outputs))
+            at = end
+
+    def _place_inputs(self, kept_at: int, constants_at: int) -> None:
+        at = 0
+        for s in self.placed:
+            end = at + len(s.inputs)
+            s.u = self.inputs[at:end]
+            s.kept = self.pool[kept_at + at : kept_at + end]
+            s.kept_at = kept_at + at
+            sources = []
+            for i, (variable, wire) in enumerate(zip(s.inputs, s.wires, strict=True)):
+                if wire is None:
+                    self.pool[constants_at + at + i] = float(s.instance.constants[variable.name])
+                    sources.append(constants_at + at + i)
+                else:
+                    sources.append(self.index[wire.source, wire.output])
+            s.sources = np.array(sources, np.intp)
+            at = end
+
+    def taken(self, s: InstanceSlot) -> np.ndarray:
+        """Return what a unit's Real inputs get of the outputs at the start."""
+        values = self.pool[s.sources]
+        values = values if s.scale is None else values * s.scale[0] + s.scale[1]
+        if s.input_faults is not None:
+            s.input_faults.begin(values)
+        return values
+
+    def other(self, wire: Wire) -> Value:
+        """Return what a wire that is no Real gives its input.
+
+        Raises:
+            KeyError: its source has not been read yet.
+        """
+        value = self.others[wire.source, wire.output]
+        if not wire.converts:
+            return value
+        number = int(wire.gain * value + wire.offset)  # type: ignore[operator]
+        if not -(2**31) <= number < 2**31:
+            sentence = f"{wire.target}: {wire.input} would be {number}, more than an Integer holds"
+            raise SimulationError(sentence, instance=wire.target, time=self.time.value)
+        return number
+
+    def given_others(self, s: InstanceSlot) -> dict[str, Value]:
+        """Return what a unit's inputs that are no Reals get, as far as their sources have been read."""
+        values = {}
+        for variable, wire in s.other_inputs:
+            if wire is None:
+                constant = s.instance.constants[variable.name]
+                values[variable.name] = self.others.get((s.name, variable.name), constant)
+            elif (wire.source, wire.output) in self.others:
+                values[variable.name] = self.other(wire)
+        return values
+
+    def relation(self, target: InstanceSlot, variable: Variable, wire: Wire) -> WireTiming:
+        """Return what the weights of a wire depend on."""
+        source = self.of[wire.source]
+        return WireTiming(
+            source_period=source.instance.period,
+            target_period=target.instance.period,
+            earlier=source.position < target.position,
+            direct=target.direct(variable),
+            discrete=source.instance.fmu.variables[wire.output].discrete,
+        )
+
+    def start_history(self) -> None:
+        """Make all earlier samples equal to the present ones."""
+        self.pool[self.n_outputs : 2 * self.n_outputs] = self.now
+        for s in self.stations:
+            self.pool.take(s.sources, None, s.kept, "clip")
+
+
+def by_type(variables: Iterable[Variable]) -> Iterable[list[Variable]]:
+    """Return variables in groups that one call of an FMU can set or get."""
+    groups: dict[str, list[Variable]] = {}
+    for variable in variables:
+        groups.setdefault(variable.place.type, []).append(variable)
+    return groups.values()
+
+
+def _stations(plan: Plan, slaves: Mapping[str, FmuInstance]) -> list[InstanceSlot]:
+    driver = {(w.target, w.input): w for w in plan.wires}
+    needed = {(w.source, w.output) for w in plan.wires} | set(plan.record)
+    stations = []
+    for position, unit in enumerate(plan.instances):
+        driven = [
+            (v, driver.get((unit.name, v.name)))
+            for v in unit.fmu.of("input")
+            if (unit.name, v.name) in driver or v.name in unit.constants
+        ]
+        read = [v for v in unit.fmu.variables.values() if (unit.name, v.name) in needed]
+        stations.append(
+            InstanceSlot(
+                unit,
+                slaves[unit.name],
+                position,
+                [v for v, _ in driven if v.type == "Real"],
+                [wire for v, wire in driven if v.type == "Real"],
+                [v for v in read if v.type == "Real"],
+                [(v, w) for v, w in driven if v.type != "Real"],
+                [v for v in read if v.type != "Real"],
+            )
+        )
+    return stations

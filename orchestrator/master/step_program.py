@@ -1,0 +1,271 @@
+"""The calls of one communication step, put together before the run.
+
+A program is a flat list of calls without arguments, each of which returns an FMI status; the
+master walks it and stops at the first that is not OK. Which units take part, and with which
+weights, repeats after the least common multiple of the units' periods: one program per phase.
+
+Inputs that follow a time series: their values at the instants that the coupling asks for.
+
+A series is known at all times, so nothing has to be extrapolated: `jacobi` takes its value at the
+beginning of a unit's step, `gauss_seidel` at its end, `extrapolated` in the middle of the step for an
+input that enters an integration and at the end for any other (see `coupling`).
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Iterator
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from ..plan import InputSeries, Plan, ValueRef, Variable
+from .coupling import CouplingWeights, halves_ahead, weights
+from .fault_injection import FaultInjector
+from .instance import Status
+from .log import OK
+from .signal_pool import InstanceSlot, SignalPool, by_type
+
+BLOCK = 1024
+"""Steps for which values are made at a time; chosen: some kilobytes per input."""
+LATE = 1e-9
+"""Part of a communication step by which an instant may miss the time that a file gives for a value."""
+
+
+def feeding(memory: SignalPool, s: InstanceSlot) -> Callable[[], Status]:
+    """Return the call that brings the series of a unit up to date, once for each of its steps."""
+    real = [(i, v) for i, v in enumerate(s.inputs) if v.name in s.instance.series]
+    others = [(s.name, v.name) for v, _ in s.other_inputs if v.name in s.instance.series]
+    slots = s.sources[[i for i, _ in real]] if real else np.empty(0, np.intp)
+    named = [v for _, v in real] + [v for v, _ in s.other_inputs if v.name in s.instance.series]
+    columns = [_column(memory.plan, s, v, s.instance.series[v.name]) for v in named]
+    pool, kept, n_real = memory.pool, memory.others, len(real)
+
+    def fed() -> Status:
+        values = [next(column) for column in columns]
+        if n_real:
+            pool[slots] = values[:n_real]
+        if others:
+            kept.update(zip(others, values[n_real:], strict=True))
+        return OK
+
+    return fed
+
+
+def _column(plan: Plan, s: InstanceSlot, variable: Variable, series: InputSeries) -> Iterator:
+    """Yield the values of one input, step by step."""
+    period, first = s.instance.period, 0
+    ahead = halves_ahead(plan.algorithm, period, direct=s.direct(variable))
+    halves, start = plan.step / 2, float(plan.start)
+    while True:
+        k = np.arange(first, first + period * BLOCK, period)
+        times = start + (2 * k + ahead) * halves.numerator / halves.denominator
+        yield from series.at(times + LATE * float(plan.step) * series.held).tolist()
+        first += period * BLOCK
+
+
+KEPT = 1024
+"""Programs kept. Periods without a common factor have cycles longer than any run; then every program is
+needed once, and made anew. Chosen: more than the phases of any usual set of periods."""
+
+OperationKind = Literal["gather", "set", "step", "keep", "get", "fault"]
+
+
+class Operation(NamedTuple):
+    """One call on behalf of a unit ("" for all units at once)."""
+
+    instance: str
+    kind: OperationKind
+    call: Callable[[], Status | None]
+
+
+class StepProgram:
+    """The programs of all phases, made when they are first needed."""
+
+    def __init__(self, memory: SignalPool) -> None:
+        self._memory = memory
+        self.cycle = math.lcm(*(s.instance.period for s in memory.stations))
+        self._made: dict[int, list[Operation]] = {}
+        self._gathers: dict[tuple, list[Operation]] = {}
+        self._feeds = {
+            s.name: Operation(s.name, "gather", feeding(memory, s))
+            for s in memory.stations
+            if s.instance.series
+        }
+        self._of_outputs = {s.name: _acting(s, s.output_faults, s.y) for s in memory.stations}
+        self._of_inputs = {s.name: _acting(s, s.input_faults, s.u) for s in memory.stations}
+
+    def at(self, k: int) -> list[Operation]:
+        """Return what is to be done from communication point `k` - 1 to `k`."""
+        phase = k % self.cycle
+        if phase not in self._made:
+            _make_room(self._made)
+            jacobi = self._memory.plan.algorithm == "jacobi"
+            self._made[phase] = self._jacobi(phase) if jacobi else self._in_sequence(phase)
+        return self._made[phase]
+
+    def _jacobi(self, k: int) -> list[Operation]:
+        """All inputs are taken before anything moves; a slow unit's at the start of its period."""
+        m = self._memory
+        beginning = [s for s in m.placed if (k - 1) % s.instance.period == 0]
+        ending = [s for s in m.stations if k % s.instance.period == 0]
+        fast = [s for s in beginning if s.instance.period == 1 and s.inputs]
+        operations = [self._feeds[s.name] for s in beginning if s.instance.series]
+        if fast:
+            sources = np.concatenate([s.sources for s in fast])
+            operations.append(Operation("", "gather", _held(m, sources, m.inputs[: len(sources)])))
+        slow = [s for s in beginning if s.instance.period > 1 and s.inputs]
+        operations += [Operation(s.name, "gather", _held(m, s.sources, s.u)) for s in slow]
+        operations += [op for s in beginning for op in _converting(s)]
+        operations += [op for s in beginning for op in self._of_inputs[s.name]]
+        operations += [op for s in beginning for op in _setting(m, s)]
+        for s in ending:
+            operations += [Operation(s.name, "step", s.calls.step), *getting(m, s)]
+            operations += self._of_outputs[s.name]
+        return operations
+
+    def _in_sequence(self, k: int) -> list[Operation]:
+        """Units one after the other, each with the newest that there is; slow ones at their end."""
+        operations: list[Operation] = []
+        for s in self._memory.stations:
+            if k % s.instance.period == 0:
+                operations += [self._feeds[s.name]] if s.instance.series else []
+                operations += [*self._gathering(s, k), *self._of_inputs[s.name]]
+                operations += _setting(self._memory, s)
+                operations.append(Operation(s.name, "step", s.calls.step))
+                if self._memory.plan.algorithm == "extrapolated" and s.outputs:
+                    operations.append(Operation(s.name, "keep", copying(s.y, s.y_before)))
+                operations += [*getting(self._memory, s), *self._of_outputs[s.name]]
+        return operations
+
+    def _gathering(self, s: InstanceSlot, k: int) -> list[Operation]:
+        m = self._memory
+        if not s.driven:
+            return []
+        per_input = []
+        for variable, wire in zip(s.inputs, s.wires, strict=True):
+            if wire is None:
+                per_input.append(CouplingWeights())
+            else:
+                relation = m.relation(s, variable, wire)
+                # one cycle on, so that no sample before the start is looked at
+                per_input.append(weights(m.plan.algorithm, relation, k + 2 * self.cycle))
+        key = (s.name, *per_input)
+        if key not in self._gathers:
+            _make_room(self._gathers)
+            operations = [Operation(s.name, "gather", _gather(m, s, per_input)), *_converting(s)]
+            if any(w.kept for w in per_input):
+                operations.append(Operation(s.name, "keep", _held(m, s.sources, s.kept)))
+            self._gathers[key] = operations
+        return self._gathers[key]
+
+
+def _make_room(kept: dict[Any, list[Operation]]) -> None:
+    if len(kept) >= KEPT:
+        del kept[next(iter(kept))]  # the oldest, which is the last one to be needed again
+
+
+def _gather(m: SignalPool, s: InstanceSlot, per_input: list[CouplingWeights]) -> Callable[[], Status]:
+    """Return the call that brings a unit's inputs up to date."""
+    first, second, factors = [], [], []
+    for i, w in enumerate(per_input):
+        now = int(s.sources[i])
+        past = s.kept_at + i if w.kept else now + m.n_outputs
+        if w == CouplingWeights(0.0, 1.0):
+            first.append(past)
+            second.append(past)
+            factors.append((1.0, 0.0))
+        else:
+            first.append(now)
+            second.append(past if w.before or w.kept else now)
+            factors.append((w.now, w.before + w.kept))
+    if all(factor == (1.0, 0.0) for factor in factors):
+        return _held(m, np.array(first, np.intp), s.u)
+    return _blended(m, np.array([first, second], np.intp), np.array(factors).T.copy(), s.u)
+
+
+def _held(m: SignalPool, sources: np.ndarray, target: np.ndarray) -> Callable[[], Status]:
+    take = m.pool.take
+
+    def held() -> Status:
+        take(sources, None, target, "clip")
+        return OK
+
+    return held
+
+
+def _blended(
+    m: SignalPool, pairs: np.ndarray, factors: np.ndarray, target: np.ndarray
+) -> Callable[[], Status]:
+    take, multiply, add = m.pool.take, np.multiply, np.add
+    terms = np.empty(pairs.shape)
+    first, second = terms
+
+    def blended() -> Status:
+        take(pairs, None, terms, "clip")
+        multiply(terms, factors, terms)
+        add(first, second, target)
+        return OK
+
+    return blended
+
+
+def _converting(s: InstanceSlot) -> list[Operation]:
+    """Return what turns a unit's inputs, as they were gathered, into its units of measurement."""
+    if s.scale is None:
+        return []
+    (gains, offsets), values = s.scale, s.u
+    multiply, add = np.multiply, np.add
+
+    def converted() -> Status:
+        multiply(values, gains, values)
+        add(values, offsets, values)
+        return OK
+
+    return [Operation(s.name, "gather", converted)]
+
+
+def _acting(s: InstanceSlot, faults: FaultInjector | None, values: np.ndarray) -> list[Operation]:
+    """Return what disturbs a unit's outputs or inputs, the same in all programs; nothing without a fault."""
+    return [] if faults is None else [Operation(s.name, "fault", faults.acting(values))]
+
+
+def copying(source: np.ndarray, target: np.ndarray) -> Callable[[], None]:
+    """Return the call that copies one buffer into another."""
+    return functools.partial(target.data.__setitem__, slice(None), source.data)
+
+
+def _setting(m: SignalPool, s: InstanceSlot) -> list[Operation]:
+    operations = []
+    if s.driven:
+        operations.append(Operation(s.name, "set", s.calls.set))
+    moving = [v for v, wire in s.other_inputs if wire is not None or v.name in s.instance.series]
+    driven = {v.place[:2] for v in moving}  # of an array all elements
+    wires = {v.name: wire for v, wire in s.other_inputs}
+    for chosen in by_type(v for v, _ in s.other_inputs if v.place[:2] in driven):
+        places, ends = [v.place for v in chosen], [((s.name, v.name), wires[v.name]) for v in chosen]
+
+        def put(places: list[ValueRef] = places, ends: list = ends) -> Status:
+            values = [m.others[key] if wire is None else m.other(wire) for key, wire in ends]
+            return s.slave.put(places, values)
+
+        operations.append(Operation(s.name, "set", put))
+    return operations
+
+
+def getting(m: SignalPool, s: InstanceSlot) -> list[Operation]:
+    """Return what reads a unit's outputs."""
+    operations = []
+    if s.outputs:
+        operations.append(Operation(s.name, "get", s.calls.get))
+    for chosen in by_type(s.other_outputs):
+        places, keys = [v.place for v in chosen], [(s.name, v.name) for v in chosen]
+
+        def fetch(places: list[ValueRef] = places, keys: list = keys) -> Status:
+            status, values = s.slave.fetch(places)
+            m.others.update(zip(keys, values, strict=True))
+            return status
+
+        operations.append(Operation(s.name, "get", fetch))
+    return operations

@@ -1,0 +1,176 @@
+"""Results as Parquet: a column per variable, its measurement unit in the field's metadata.
+
+Results as ASAM MDF 4, the format of measurement tools: one channel group, units in its channels.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Callable, Iterator, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import ResultsError
+from ..labels import changes_in, with_changes
+from .columnar import ColumnRecorder
+from .csv_file import column_of, values_of
+from .formats import FILES, asammdf, plain
+
+UNIT = b"unit"
+"""Key of the measurement unit in a field's metadata."""
+
+
+class ParquetRecorder(ColumnRecorder):
+    """The results of one run as Parquet. The file can be read once the run has ended."""
+
+    file = FILES["parquet"]
+    CHUNK = 32_768  # rows of a row group; chosen: 2 MB of 64 columns in memory are soon compressed
+
+    def _begin(self) -> None:
+        super()._begin()
+        self._writer: Any = None
+        self._lost: ResultsError | None = None
+
+    def _pass_on(self) -> None:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        arrays = [column_of(array) for array in self._columns.arrays()]
+        self._columns.clear()
+        if self._writer is None:
+            names = ["time", *self.columns]
+            self._schema = pa.schema(
+                pa.field(name, array.type, metadata={UNIT: self.units.get(name) or ""})
+                for name, array in zip(names, arrays, strict=True)
+            )
+            sink = pa.PythonFile(_Sink(self._append), mode="w")
+            self._writer = pq.ParquetWriter(sink, self._schema, compression="zstd")
+        try:
+            self._writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
+        except ResultsError as error:
+            self._lost = error
+            raise
+
+    def _complete(self, run: dict[str, Any]) -> None:
+        if self._lost is not None:  # a file with a hole is no use
+            raise ResultsError(self._lost.problems)
+        if self._columns.rows or self._writer is None:
+            self._pass_on()
+        self._writer.close()
+
+
+class _Sink:
+    """What pyarrow writes into. It takes no notice of a file that accepts less than it is given."""
+
+    closed = False
+
+    def __init__(self, append: Callable[[bytes], None]) -> None:
+        self._append = append
+
+    def write(self, data: bytes) -> int:
+        self._append(data)
+        return len(data)
+
+    def flush(self) -> None:
+        """Nothing: the file has no buffer."""
+
+    def close(self) -> None:
+        """Nothing: the recorder closes its file."""
+
+
+class ParquetFile:
+    """A Parquet file of results (see `formats.Source`)."""
+
+    def __init__(self, path: Path, texts: Sequence[str] | None = None) -> None:
+        import pyarrow.parquet as pq
+
+        self._file = pq.ParquetFile(path)  # by itself, whatever the folder above is called
+        self.names = list(self._file.schema_arrow.names)
+
+    def blocks(self, columns: Sequence[str]) -> Iterator[list[np.ndarray]]:
+        """Yield some rows after the other of chosen columns."""
+        for batch in self._file.iter_batches(columns=list(columns)):
+            yield [plain(values_of(batch.column(name))) for name in columns]
+
+
+class MdfRecorder(ColumnRecorder):
+    """The results of one run as MDF 4. All rows are in memory until the run has ended."""
+
+    file = FILES["mf4"]
+
+    def _complete(self, run: dict[str, Any]) -> None:
+        package = asammdf()
+        time, *columns = self._columns.arrays()
+        signals = [
+            package.Signal(
+                _samples(array), time, name=name, unit=self.units.get(name) or "", encoding="utf-8"
+            )
+            for name, array in zip(self.columns, columns, strict=True)
+        ]
+        with package.MDF(version="4.10") as mdf:
+            if run.get("started"):
+                mdf.header.start_time = datetime.fromisoformat(run["started"])
+            mdf.append(
+                signals,
+                comment=with_changes(str(run.get("title") or ""), changes_in(run)),
+                common_timebase=True,
+            )
+            data = io.BytesIO()
+            mdf.save(data, compression=2)  # transposed before it is deflated: columns change slowly
+        self._append(data.getvalue())
+
+
+def _samples(array: np.ndarray) -> np.ndarray:
+    if array.dtype.kind == "O":
+        return np.array([str(value).encode() for value in array])
+    return array.astype(np.uint8) if array.dtype == bool else array
+
+
+class MdfFile:
+    """An MDF file of results, of one channel group (see `formats.Source`).
+
+    Raises:
+        ResultsError: asammdf is not installed.
+    """
+
+    ROWS = 200_000
+    """Read at a time; chosen: a column of them is no more than some megabytes."""
+
+    def __init__(self, path: Path, texts: Sequence[str] | None = None) -> None:
+        self._path = path
+        with self._open() as mdf:
+            (group,) = mdf.groups
+            master = mdf.masters_db.get(0)
+            self._places = {one.name: i for i, one in enumerate(group.channels) if i != master}
+            self.names = ["time", *(one.name for i, one in enumerate(group.channels) if i != master)]
+            self._rows = int(group.channel_group.cycles_nr)
+
+    @contextlib.contextmanager
+    def _open(self) -> Iterator[Any]:
+        try:
+            with asammdf().MDF(self._path) as mdf:
+                yield mdf
+        except (OSError, ValueError, ResultsError):
+            raise
+        except Exception as error:  # asammdf raises MdfException and whatever its parsing meets
+            raise ValueError(" ".join(str(error).split()) or type(error).__name__) from None
+
+    def blocks(self, columns: Sequence[str]) -> Iterator[list[np.ndarray]]:
+        """Yield some rows after the other of chosen columns."""
+        with self._open() as mdf:
+            for begin in range(0, self._rows, self.ROWS):
+                part: dict[str, Any] = {"record_offset": begin, "record_count": self.ROWS}
+                yield [
+                    plain(mdf.get_master(0, **part))
+                    if name == "time"
+                    else plain(_decoded(mdf.get(group=0, index=self._places[name], **part).samples))
+                    for name in columns
+                ]
+
+
+def _decoded(samples: np.ndarray) -> np.ndarray:
+    return np.char.decode(samples, "utf-8") if samples.dtype.kind == "S" else samples

@@ -1,1 +1,0 @@
-"""Files for somebody who brings an idea of their own."""

@@ -1,0 +1,129 @@
+"""Strict schemas of YAML files: every problem of a file as a sentence with its place and what is allowed."""
+
+from __future__ import annotations
+
+import types
+import typing
+from fractions import Fraction
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, PlainSerializer, PlainValidator, ValidationError
+
+from ..messages import closest, listed, short
+from .quantities import instant, seconds
+from .yaml_lines import Document, KeyPath
+
+Model = TypeVar("Model", bound=BaseModel)
+Instant = Annotated[Fraction, PlainValidator(instant), PlainSerializer(float)]
+Time = Annotated[Fraction, PlainValidator(seconds), PlainSerializer(float)]
+"""Above zero."""
+
+
+class StrictModel(BaseModel):
+    """A part of a file: no unknown keys, no silent conversions."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+KINDS: dict[str, tuple[str, type, str]] = {
+    "tuning": ("a tuning file", dict, "; it is for `yawbench tune`"),
+    "runs": ("a study file", list, "; it is for `yawbench study` and `report`"),
+    "axes": ("a sweep file", dict, "; it is for `yawbench sweep`"),
+    "conditions": ("a ranking file", dict, "; it is for `yawbench rank`"),
+    "entries": ("a file of entries", dict, "; a ranking names it under 'more_entries'"),
+    "units": ("a scenario", dict, "; it is for `yawbench run`"),
+    "parameters": ("a vehicle file", dict, "; a scenario names it under 'vehicle'"),
+}
+"""Key that tells a kind of file from the others -> the kind, what stands at the key, where it belongs."""
+
+
+def validate(model: type[Model], document: Document) -> Model | None:
+    """Return the validated content, or None with the problems noted in the document."""
+    if document.data is None:
+        return None
+    if another := _another_kind(model, document.data):
+        document.report((), another)
+        return None
+    try:
+        return model.model_validate(document.data)
+    except ValidationError as errors:
+        for error in errors.errors(include_url=False):
+            _report(model, document, _place(document.data, error["loc"]), error)
+    return None
+
+
+def _another_kind(model: type[BaseModel], data: Any) -> str | None:
+    """Return a sentence if a file is plainly of another kind than its place asks for."""
+    own = [key for key in KINDS if key in model.model_fields]
+    if not own or not isinstance(data, dict) or any(key in data for key in own):
+        return None
+    found = next((key for key, (_, form, _) in KINDS.items() if isinstance(data.get(key), form)), None)
+    wanted = listed((KINDS[key][0] for key in own), last="or")
+    return f"{KINDS[found][0]}, not {wanted}{KINDS[found][2]}" if found else None
+
+
+def _place(data: Any, location: KeyPath) -> KeyPath:
+    """Return where an error stands in the file, without what only the schema has there."""
+    key: KeyPath = ()
+    for i, part in enumerate(location):
+        in_list = isinstance(data, list) and isinstance(part, int)
+        if in_list or (isinstance(data, dict) and part in data):
+            data = data[part]
+        elif i < len(location) - 1 or part == "[key]" or not isinstance(data, dict):
+            continue
+        key = (*key, part)
+    return key
+
+
+def _report(model: type[BaseModel], document: Document, key: KeyPath, error: Any) -> None:
+    kind, given = error["type"], error["input"]
+    if kind == "missing":
+        document.report(key[:-1], f"{str(key[-1])!r} is missing")
+    elif kind == "extra_forbidden":
+        allowed = _keys(model, key[:-1])
+        likely = closest(str(key[-1]), allowed)
+        guess = f"did you mean {likely!r}? " if likely else ""
+        document.report(key, f"unknown key; {guess}allowed here: {listed(allowed)}")
+    elif kind == "literal_error":
+        document.report(key, f"must be {error['ctx']['expected']} (got {short(given)})")
+    elif kind == "value_error":
+        document.report(key, str(error["ctx"]["error"]))
+    elif kind in _MUST_BE:
+        document.report(key, f"must be {_MUST_BE[kind]} (got {short(given)})")
+    else:
+        document.report(key, f"{error['msg']} (got {short(given)})")
+
+
+_MUST_BE = {
+    "string_type": "text",
+    "string_too_short": "text",
+    "dict_type": "a mapping",
+    "model_type": "a mapping",
+    "list_type": "a list",
+    "too_short": "not empty",
+    "float_type": "a number",
+    "finite_number": "a finite number",
+    "bool_type": "true or false",
+}
+
+
+def _keys(model: type[BaseModel], key: KeyPath) -> list[str]:
+    """Return the keys allowed in the mapping at `key`."""
+    inner: Any = model
+    for part in key:
+        if isinstance(inner, type) and issubclass(inner, BaseModel):
+            named = {field.alias or name: field for name, field in inner.model_fields.items()}
+            inner = _plain(named[str(part)].annotation)
+        else:
+            inner = _plain(typing.get_args(inner)[-1])
+    return [field.alias or name for name, field in inner.model_fields.items()]
+
+
+def _plain(annotation: Any) -> Any:
+    """Return an annotation without `| None` and without what Annotated adds."""
+    if typing.get_origin(annotation) is typing.Annotated:
+        return _plain(typing.get_args(annotation)[0])
+    if typing.get_origin(annotation) in (types.UnionType, typing.Union):
+        arms = [arm for arm in typing.get_args(annotation) if arm is not types.NoneType]
+        return _plain(arms[-1])
+    return annotation

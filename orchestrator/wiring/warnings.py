@@ -1,0 +1,361 @@
+"""Remarks on values that are hardly meant: two for one matter, another car's, a slip of the pen.
+
+What the control side sees of the car: the truth, a measurement of it, or an estimate.
+
+Whoever computes with a signal sees it as its source's role says: an estimator gives estimates, a sensor
+measurements, and what comes from neither nor from the control side itself, from the plant, say, or the
+driver, is the truth, exact and at once, as no car has it.
+
+Remarks on cars that cannot be: a mass in grams, a wheelbase in mm, a yaw inertia that no mass has.
+
+Ranges are beside the quantities (`vocabulary.vehicle`). What an FMU begins with is not looked at: it is its
+author's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import product
+from typing import NamedTuple
+
+from vocabulary.vehicle import CAR, DYNAMIC_INDEX
+
+from ..messages import fold, listed
+from ..plan import DEFAULT, SENSING, Finding, Fmu, Instance, Value, Variable, Wire
+from ..scenario.load import LoadedScenario
+from ..scenario.quantities import meant_unit, number_and_unit
+from .context import FACTS
+from .parameters import STIFFNESSES, known_car
+
+CONTROL = ("reference", "controller", "allocator", "wheel_control", "monitor")
+"""Roles that decide what the car is to do."""
+TRUTH = "truth"
+
+
+def role_of(unit: str, fmu: Fmu) -> str:
+    """Return a unit's role as far as it counts here: its FMU's name begins with it, or it is its name."""
+    roles = (*SENSING, *CONTROL)
+    return next((role for role in roles if fmu.name.startswith(f"{role}_")), unit)
+
+
+def seen_as(wire: Wire, units: Iterable[Instance]) -> str:
+    """Return "truth", "late truth", "measurement" or "estimate".
+
+    "" for what the control side says itself, or does not see.
+    """
+    roles = {unit.name: role_of(unit.name, unit.fmu) for unit in units}
+    if roles[wire.target] not in (*CONTROL, "estimator") or roles[wire.source] in CONTROL:
+        return ""
+    truth = "late truth" if wire.output.endswith("_delayed") else TRUTH
+    return SENSING.get(roles[wire.source], truth)
+
+
+def exact(units: Sequence[Instance], wires: Iterable[Wire]) -> list[str]:
+    """Return a note on all that the control side sees exactly although there is a sensor.
+
+    Units that only watch, such as a reference for comparison, may see the truth: nothing that the car does
+    follows from them.
+    """
+    wires = list(wires)
+    if not any(role_of(unit.name, unit.fmu) == "sensor" for unit in units):
+        return []
+    steering = _steering(units, wires)
+    found: dict[tuple[str, str], list[str]] = {}
+    for wire in wires:
+        if wire.target in steering and seen_as(wire, units) == TRUTH:
+            found.setdefault((wire.target, wire.source), []).append(wire.input)
+    told = [f"{listed(fold(names))} of {to} (from {of})" for (to, of), names in found.items()]
+    return [f"exact, though there is a sensor: {'; '.join(told)}"] if told else []
+
+
+def _steering(units: Iterable[Instance], wires: Iterable[Wire]) -> set[str]:
+    """Return the units from which a way along wires leads to one that is not on the control side."""
+    inside = {unit.name for unit in units if role_of(unit.name, unit.fmu) in (*CONTROL, "estimator")}
+    found = {unit.name for unit in units} - inside
+    while more := {w.source for w in wires if w.target in found} - found:
+        found |= more
+    return found
+
+
+KIND = "no car"
+INERTIA = ("yaw_inertia", "mass", "cg_to_front_axle", "cg_to_rear_axle")
+"""What the dynamic index follows from."""
+
+
+class _Given(NamedTuple):
+    """A quantity of the car as it is given, in a place."""
+
+    place: str
+    name: str
+    value: float  # in SI
+    raw: object  # as written
+
+
+def remarks_on_car(scenario: LoadedScenario, units: Mapping[str, Instance]) -> list[Finding]:
+    """Return a remark for every quantity of the car that no car has, and for inertias that do not fit."""
+    of_file = remarks_on_values(scenario.vehicle_file.parameters)
+    told = {(one.name, one.value) for one in _of_file(scenario.vehicle_file.parameters)}
+    own = [one for one in _of_units(scenario, units) if (one.name, one.value) not in told]
+    return [*of_file, *filter(None, map(_beyond, own)), *_index(units)]
+
+
+def remarks_on_values(parameters: Mapping[str, Value]) -> list[Finding]:
+    """Return a remark for every value of a vehicle file that no car has."""
+    return [*filter(None, map(_beyond, _of_file(parameters)))]
+
+
+def _of_file(parameters: Mapping[str, Value]) -> Iterator[_Given]:
+    for name, raw in parameters.items():
+        if name in CAR:
+            try:
+                yield _Given(f"vehicle.{name}", name, known_car({name: raw}).values[name], raw)
+            except ValueError:  # in a unit that an FMU alone knows
+                continue
+
+
+def _of_units(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[_Given]:
+    """Yield what single units are given, by the scenario or by a change."""
+    for unit in units.values():
+        for name, value in unit.parameters.items():
+            origin = unit.origins.get(name, DEFAULT).kind
+            as_said = unit.fmu.variables[name].unit == CAR[name].unit if name in CAR else False
+            if as_said and origin not in ("default", "vehicle", "derived") and isinstance(value, float):
+                raw = scenario.units[unit.name].parameters.get(name, value)
+                yield _Given(f"{unit.name}.{name}", name, value, raw)
+
+
+def _beyond(one: _Given) -> Finding | None:
+    """Return a remark on a value outside its range, None if it is inside or has none."""
+    quantity = CAR[one.name]
+    if quantity.plausible is None:
+        return None
+    low, high = quantity.plausible
+    if low <= one.value <= high or one.value == 0.0:
+        return None
+    written = number_and_unit(one.raw) if isinstance(one.raw, str) else None
+    number, given = written or (f"{one.value:.10g}", quantity.unit)
+    likely = meant_unit(float(number), given, quantity.unit, lambda value: low <= value <= high)
+    unit = f" {quantity.unit}" if quantity.unit != "1" else ""
+    says = f"{one.place}: {one.value:.10g}{unit} is no car's, {low:g} to {high:g}{unit} is plausible" + (
+        f"; did you mean '{number} {likely}'?" if likely else ""
+    )
+    return Finding(KIND, one.place, one.value, None, says)
+
+
+def _index(units: Mapping[str, Instance]) -> Iterator[Finding]:
+    """Yield a remark on the first unit whose yaw inertia does not fit its mass and wheelbase.
+
+    Not where one of them is no car's by itself, or all are the FMU's own.
+    """
+    for unit in units.values():
+        values = {name: unit.parameter(name) for name in INERTIA if name in unit.fmu.variables}
+        numbers = [value for value in values.values() if isinstance(value, float)]
+        given = any(unit.origins.get(name, DEFAULT) != DEFAULT for name in INERTIA)
+        if not given or len(numbers) < len(INERTIA):
+            continue
+        told = (_Given("", name, number, number) for name, number in zip(INERTIA, numbers, strict=True))
+        if any(map(_beyond, told)):
+            continue
+        inertia, mass, front, rear = numbers
+        index = inertia / (mass * front * rear)
+        low, high = DYNAMIC_INDEX
+        if not low <= index <= high:
+            says = (
+                f"{unit.name}: the yaw inertia, {inertia:.6g} kg.m2, is {index:.3g} times mass times the "
+                f"distances of both axles from the centre of mass; that of cars is {low:g} to {high:g} times"
+            )
+            yield Finding(KIND, f"{unit.name}.yaw_inertia", inertia, None, says)
+            return
+
+
+OF_CAR = (*(name for name, one in CAR.items() if one.needed), *STIFFNESSES, "steering_ratio")
+"""Parameters that describe the car, whichever unit has to know them."""
+OF_FILES = ("default", "vehicle", "derived", "scenario", "file")
+"""Origins of values that no change has given."""
+SAME = 1e-9
+"""Relative difference of values that count as equal: rounding of a conversion."""
+RADIUS = 0.03
+"""Relative difference of a wheel's radius from that of its tyre. Chosen: the load changes it by 1 to 2 %."""
+SLIPS = (
+    ("m/s", 70.0, "km/h", 3.6),  # chosen: above the top speed of nearly all cars
+    ("rad", 4 * math.pi, "deg", 180 / math.pi),  # chosen: two turns of a hand wheel
+)
+"""Measurement unit, the largest plausible value in it, the unit that was perhaps meant, factor to it."""
+
+
+class GivenValue(NamedTuple):
+    """What a unit is told of something."""
+
+    instance: str
+    name: str
+    value: Value
+    origin: str  # its kind
+    variable: Variable
+
+
+def remarks(scenario: LoadedScenario, units: Mapping[str, Instance]) -> list[Finding]:
+    """Return remarks on the values that a scenario's units are given."""
+    return [
+        *_two_values(units),
+        *_other_cars(scenario, units),
+        *_slips(scenario, units),
+        *_of_tyres(scenario, units),
+        *remarks_on_car(scenario, units),
+        *_idle_units(scenario, units),
+    ]
+
+
+def _idle_units(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Finding]:
+    """Yield a remark for every unit that would take its first step after the end of the run."""
+    lasts = scenario.stop_time - scenario.start_time
+    for unit in units.values():
+        step = unit.period * scenario.step_size
+        if step > lasts:
+            says = (
+                f"{unit.name} never takes a step: its step_size, {float(step):g} s, is longer than the run, "
+                f"{float(lasts):g} s; it keeps what it gave at the start"
+            )
+            yield Finding("no step", f"{unit.name}.step_size", float(step), None, says)
+
+
+def _of_tyres(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Finding]:
+    """Yield a remark for what does not go with the tyre property files."""
+    tyres = [unit for unit in units.values() if "pcy1_front" in unit.parameters]
+    if not tyres or not scenario.tyre_files:
+        return
+    law = tyres[0].fmu.name.removeprefix("tyre_").removesuffix("_transient")
+    for one in _parameters(units.values()):
+        if one.name == "tyre" and "pcx1_front" in units[one.instance].parameters and one.value != law:
+            says = f"{one.instance}.tyre is {one.value}: it does not ask the law of {tyres[0].name}, {law}"
+            yield Finding("another tyre", place=f"{one.instance}.tyre", says=says)
+    radii = {str(f.path.name): f.rolling_radius for f in scenario.tyre_files.values() if f.rolling_radius}
+    told = [one for one in _parameters(units.values()) if one.name == "wheel_radius"]
+    for (file, radius), one in product(radii.items(), told):
+        if isinstance(one.value, float) and radius and abs(one.value / radius - 1.0) > RADIUS:
+            yield Finding(
+                "another radius",
+                place=f"{one.instance}.wheel_radius",
+                value=one.value,
+                says=f"{one.instance}.wheel_radius is {one.value:.4g} m, but the tyres of {file} roll on "
+                f"{radius:.4g} m at nominal load",
+            )
+
+
+def _two_values(units: Mapping[str, Instance]) -> Iterator[Finding]:
+    """Yield a remark for everything that two units are told differently.
+
+    Not if the scenario gives both values for their units, or both are the FMUs' own of what is no
+    property of the car: then they are meant. But a speed held that is not that of the start is always told.
+    """
+    in_facts = {name for fact in FACTS.values() for name in (*fact.inputs, *fact.parameters)}
+    groups: dict[str, list[GivenValue]] = {}
+    for one in _parameters(units.values()):
+        groups.setdefault(one.name, []).append(one)
+    for name, told in groups.items():
+        if name not in in_facts and _one_matter(name, told) and _differ(told):
+            vehicle = f"--set vehicle.{name}=VALUE gives it to all of them that have no value of their own"
+            yield _finding(name, told, vehicle)
+    for name, fact in FACTS.items():
+        told = [one for one in _parameters(units.values()) if fact.counts(units[one.instance], one.name)]
+        told += [one for one in _constants(units.values()) if one.name in fact.inputs]
+        meant = ({"scenario"}, {"default"}) if fact.inputs else ()  # a road may differ from wheel to wheel
+        if _differ(told) and {one.origin for one in told} not in meant:
+            yield _finding(name, told, f"--set {name}=VALUE gives all of them one value")
+
+
+def _one_matter(name: str, told: list[GivenValue]) -> bool:
+    """Return whether a parameter of several units is meant to have one value."""
+    origins = {one.origin for one in told}
+    measured_alike = len({one.variable.unit or "1" for one in told}) == 1
+    if len(told) < 2 or not measured_alike or origins == {"scenario"}:
+        return False
+    if origins == {"default"}:
+        return name in OF_CAR
+    return name in OF_CAR or "vehicle" in origins or not _differ(told, start=True)
+
+
+def _differ(told: list[GivenValue], *, start: bool = False) -> bool:
+    """Return whether numbers differ: the values, or those that the FMUs have themselves."""
+    values = [one.variable.start if start else one.value for one in told]
+    if any(isinstance(value, bool) or not isinstance(value, (int, float)) for value in values):
+        return False
+    numbers = [float(value) for value in values]  # type: ignore[arg-type]
+    return len(numbers) > 1 and max(numbers) - min(numbers) > SAME * max(map(abs, numbers))
+
+
+def _parameters(units: Iterable[Instance]) -> Iterator[GivenValue]:
+    for unit in units:
+        for variable in unit.fmu.of("parameter"):
+            value = unit.parameter(variable.name)
+            if value is not None:
+                origin = unit.origins.get(variable.name, DEFAULT).kind
+                yield GivenValue(unit.name, variable.name, value, origin, variable)
+
+
+def _constants(units: Iterable[Instance]) -> Iterator[GivenValue]:
+    for unit in units:
+        for name, value in unit.constants.items():
+            if name not in unit.series:
+                origin = unit.origins.get(name, DEFAULT).kind
+                yield GivenValue(unit.name, name, value, origin, unit.fmu.variables[name])
+
+
+def _finding(name: str, told: list[GivenValue], way_out: str) -> Finding:
+    alike: dict[tuple[float, str], list[GivenValue]] = {}
+    for one in told:
+        alike.setdefault((float(one.value), one.origin), []).append(one)  # type: ignore[arg-type]
+    parts = []
+    for (value, origin), some in alike.items():
+        names = fold([f"{one.instance}.{one.name}" for one in some])
+        parts.append(f"{listed(names)} {_measured(value, some[0].variable)} ({origin})")
+    by_change = (one for one in told if one.origin not in OF_FILES)
+    first = next(by_change, told[0])
+    says = f"{name} has two values: {', '.join(parts)}; {way_out}"
+    return Finding("two values", f"{first.instance}.{first.name}", float(first.value), None, says)  # type: ignore[arg-type]
+
+
+def _other_cars(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Finding]:
+    """Yield a remark if units have properties of the car by default beside a vehicle file.
+
+    A ratio of 1 is no car's: it says that angles are those of the road wheels.
+    """
+    found = [
+        one
+        for one in (_parameters(units.values()) if scenario.vehicle_file.parameters else ())
+        if one.name in OF_CAR and one.origin == "default" and one.value != 1
+    ]
+    if found:
+        told = [f"{one.instance}.{one.name} {_measured(one.value, one.variable)}" for one in found]
+        says = f"not in the vehicle file, so as the FMUs have it: {listed(told)}"
+        first = found[0]
+        yield Finding("default car", f"{first.instance}.{first.name}", float(first.value), None, says)
+
+
+def _slips(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Finding]:
+    """Yield a remark for every number that was probably meant in another unit."""
+    for one in _parameters(units.values()):
+        spec = scenario.units[one.instance].parameters.get(one.name)
+        raw = scenario.vehicle_file.parameters.get(one.name) if spec is None else spec
+        told = [getattr(scenario, name) for name, fact in FACTS.items() if one.name in fact.parameters]
+        with_unit = any(isinstance(given, str) for given in (raw, *told))
+        if one.origin == "default" or with_unit or not isinstance(one.value, float):
+            continue
+        for unit, largest, meant, factor in SLIPS:
+            if one.variable.unit == unit and abs(one.value) > largest:
+                says = (
+                    f"{one.instance}.{one.name}: {one.value:g} {unit} is {factor * one.value:.4g} {meant}; "
+                    f"did you mean '{one.value:g} {meant}'?"
+                )
+                yield Finding("slip", f"{one.instance}.{one.name}", one.value, None, says)
+    for one in _constants(units.values()):
+        if one.name in FACTS["friction"].inputs and isinstance(one.value, float) and one.value > 2.0:
+            place = f"{one.instance}.{one.name}"
+            says = f"{place}: a friction of {one.value:g} is no road's; did you mean '{one.value:g} %'?"
+            yield Finding("slip", place, one.value, None, says)
+            return
+
+
+def _measured(value: Value, variable: Variable) -> str:
+    unit = variable.unit or "1"
+    return f"{value:.6g}{f' {unit}' if unit != '1' else ''}" if not isinstance(value, str) else value

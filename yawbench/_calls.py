@@ -1,0 +1,62 @@
+"""Many runs: those of plain Python are made in this process, the others in processes of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from orchestrator.errors import YawbenchError
+from orchestrator.experiments.jobs import Job, Outcome
+from orchestrator.experiments.workers import execute
+from orchestrator.master.fmi import open_unit
+from orchestrator.master.log import Log
+from orchestrator.plan import Instance
+
+from ._controller import PythonComponent
+
+
+def opener_of(programs: Mapping[Path, PythonComponent]) -> Callable[[Instance, Log, set[Path]], Any]:
+    """Return what makes the instances of a run: of FMUs, and of programs by the paths that stand for them."""
+
+    def opener(unit: Instance, log: Log, corrupted: set[Path]) -> Any:
+        program = programs.get(unit.fmu.path)
+        return program.open(unit, log) if program else open_unit(unit, log, corrupted)
+
+    return opener
+
+
+def make_all(
+    jobs: Sequence[Job],
+    programs: Mapping[Path, PythonComponent],
+    *,
+    workers: int | None,
+    done: Callable[[Outcome], None],
+    run: Callable[..., Any],
+) -> list[Outcome]:
+    """Make all runs and return their outcomes in order; those of plain Python follow each other at the end.
+
+    Args:
+        jobs: what to run, planned.
+        programs: by the paths that stand for them.
+        workers, done, run: see `execute`; `run` also takes an `opener`.
+    """
+    here = [
+        any(one.fmu.path in programs for one in job.plan.instances) if job.plan else False for job in jobs
+    ]
+    apart = [job for job, plain in zip(jobs, here, strict=True) if not plain]
+    made = iter(execute(apart, workers=workers, done=done, run=run) if apart else ())
+    outcomes = []
+    for job, plain in zip(jobs, here, strict=True):
+        outcome = _made_here(job, run, programs) if plain else next(made)
+        outcomes.append(outcome)
+        if plain:
+            done(outcome)
+    return outcomes
+
+
+def _made_here(job: Job, run: Callable[..., Any], programs: Mapping[Path, PythonComponent]) -> Outcome:
+    try:
+        return Outcome(job, value=run(job, opener=opener_of(programs)))
+    except YawbenchError as error:
+        return Outcome(job, tuple(error.problems), error.exit_status)

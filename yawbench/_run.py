@@ -1,0 +1,238 @@
+"""The results of a run: arrays, metrics, figures, files."""
+
+from __future__ import annotations
+
+import functools
+import io
+import math
+from collections.abc import Iterator
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from orchestrator.errors import ResultsError, ScenarioError
+from orchestrator.evaluation.judgement import Evaluation
+from orchestrator.evaluation.standard_tests import TESTS
+from orchestrator.evaluation.trace import trace_of
+from orchestrator.messages import hint, short
+from orchestrator.metrics.plausibility import findings_in, remarks_of
+from orchestrator.metrics.run_metrics import STANDARD, MetricValue, evaluate, evaluate_all, metric, why_none
+from orchestrator.results.read import Results, load_results
+
+from . import arguments
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+def open(folder: str | Path) -> Run:
+    """Return the run whose results lie in a folder.
+
+        >>> yb.open("results/mine").title
+        'Sideslip tracking at 25 m/s, mu 0.65'
+
+    Raises:
+        ResultsError: they are missing or unreadable.
+    """
+    return Run(load_results(arguments.path(folder, "folder")))
+
+
+class Run:
+    """What one run has recorded.
+
+    >>> run = yb.load("fnn_sideslip/25mps").run()
+    >>> len(run), "plant.yaw_rate" in run, sorted(run)[:2]
+    (8001, True, ['allocator.force_request_fl', 'allocator.force_request_fr'])
+    >>> run["plant.yaw_rate"].shape
+    (8001,)
+    >>> print(run["yaw_rate"].max().round(3), run.time[-1])
+    0.19 8.0
+    >>> run.unit_of("plant.yaw_rate")
+    'rad/s'
+    """
+
+    def __init__(self, results: Results) -> None:
+        self.results = arguments.instance(results, "results", Results, "a run; yawbench.open reads folders")
+
+    @property
+    def time(self) -> np.ndarray:
+        """Communication points [s], shape (rows,)."""
+        return self.results.time
+
+    @property
+    def title(self) -> str:
+        """The scenario's title."""
+        return str(self.results.run.get("title") or "")
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """Everything needed to repeat the run: run.json."""
+        return self.results.run
+
+    @property
+    def remarks(self) -> list[str]:
+        """What is no failure but hardly meant, in sentences: on given values, then on the run's course.
+
+        >>> base.set({"speed": 300}).run().remarks[0]
+        "driver.target_speed: 300 m/s is 1080 km/h; did you mean '300 km/h'?"
+        """
+        return remarks_of(findings_in(self.record))
+
+    @property
+    def changes(self) -> list[dict[str, Any]]:
+        """What was other than in the scenario file, each with place, value and origin."""
+        return list(self.record.get("changes", ()))
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Return a column, shape (rows,): `unit.variable`, or the only variable of that name."""
+        return self.results.columns[self.results.column(arguments.text(name, "name of a column"))]
+
+    def __contains__(self, name: object) -> bool:
+        return arguments.is_a(name, str) and arguments.plain(name) in self.results.columns
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.results.columns)
+
+    def __len__(self) -> int:
+        return self.time.size
+
+    def unit_of(self, name: str) -> str:
+        """Return the measurement unit of a column, "" if it has none."""
+        return self.results.units[self.results.column(arguments.text(name, "name of a column"))]
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return all columns over time; `attrs["units"]` holds their units.
+
+        >>> frame = run.to_pandas()
+        >>> frame.index.name, frame["plant.sideslip"].size, frame.attrs["units"]["plant.sideslip"]
+        ('time', 8001, 'rad')
+        """
+        import pandas as pd
+
+        frame = pd.DataFrame(self.results.columns, index=pd.Index(self.time, name="time"))
+        frame.attrs = {"title": self.title, "units": dict(self.results.units)}
+        return frame
+
+    def metric(self, name: str, window: tuple[float, float] | None = None) -> float:
+        """Return a metric in SI units; ratios are plain numbers.
+
+            >>> round(run.metric("peak(sideslip)"), 4)
+            0.0198
+            >>> run.metric("peak(yaw_rate)", window=(0, 1)) < 1e-9  # before the driver steers
+            True
+
+        Args:
+            name: `measure(signal)`; the documentation lists all measures.
+            window: from when to when [s]; default: the whole run.
+
+        Raises:
+            ScenarioError: there is no such measure.
+            ResultsError: the run has not recorded what it needs, or does not last for the window.
+        """
+        chosen = metric(arguments.text(name, "name of a metric"))
+        window = None if window is None else arguments.span(window, "window")
+        value = evaluate(self.results, chosen, window)
+        if value is None:
+            why = why_none(self.results, chosen, window or chosen.window, self.time[-1])
+            raise ResultsError(why or f"{name}: this run gives no number")
+        return value.number
+
+    def metrics(self) -> dict[str, MetricValue]:
+        """Return the usual metrics that the run has the signals for: name -> number and unit.
+
+        >>> run.metrics()["peak(sideslip)"].unit
+        'rad'
+        """
+        return evaluate_all(self.results, STANDARD)
+
+    def evaluate(self, test: str, *, angle: float | None = None) -> Evaluation:
+        """Return what a standard test makes of the run: quantities in SI, verdicts with their reasons.
+
+            >>> run.evaluate("step-steer").notes  # a sine ends where it began
+            ['the hand wheel is not turned']
+
+        Args:
+            test: its name, as `yawbench evaluate` has it.
+            angle: the hand-wheel angle at 0.3 g [rad], which sine with dwell needs for responsiveness.
+
+        Raises:
+            ScenarioError: there is no such test, or the angle is none.
+            ResultsError: the run has not recorded what it needs.
+        """
+        test = arguments.text(test, "test")
+        if test not in TESTS:
+            raise ScenarioError(f"there is no test {test!r}{hint(test, TESTS, lead='known')}")
+        if angle is not None and not TESTS[test].needs_angle:
+            raise ScenarioError(f"{test} needs no angle: leave it away")
+        if angle is not None:
+            with arguments.as_scenario_errors():
+                given = arguments.number(angle, "angle")
+            if not 0.0 < given < 2.0 * math.pi:
+                raise ScenarioError(f"angle: must be a number between 0 and 2 pi rad (got {short(angle)})")
+        return TESTS[test].evaluate(trace_of(self.results, self.title), angle)
+
+    def plot(self, *panels: str, title: str | None = None) -> Figure:
+        """Return a figure, drawn as `yawbench plot` draws it.
+
+            >>> run.plot("sideslip", "yaw_rate(sideslip)", "path").savefig("run.svg")
+
+        Args:
+            panels: a signal, its error (`sideslip_error`), one over another (`yaw_rate(sideslip)`) or `path`;
+                default: all that the papers draw.
+            title: default: the run's.
+
+        Raises:
+            ScenarioError: the run has not recorded one of them.
+            ResultsError: it has recorded nothing that could be drawn.
+        """
+        from orchestrator.figures import panels as drawing
+        from orchestrator.figures.plots import OVERVIEW, draw
+
+        wanted = [arguments.text(one, f"panels[{k}]") for k, one in enumerate(panels)]
+        title = None if title is None else arguments.text(title, "title")
+        runs = [drawing.LabelledRun(self.title, self.results)]
+        drawing.check_panels(runs, wanted, option="panel ")
+        return shown_in_notebooks(draw(runs, wanted or OVERVIEW, title=title))
+
+    def save(self, folder: str | Path, *, format: str = "csv") -> Path:
+        """Write results and run.json, as `yawbench run` does, and return the folder.
+
+            >>> sorted(file.name for file in run.save("results/mine").iterdir())
+            ['results.csv', 'run.json']
+
+        Raises:
+            ResultsError: they cannot be written.
+        """
+        from orchestrator.results.columnar import write_results
+
+        place = arguments.path(folder, "folder")
+        write_results(self.results, place, format=arguments.text(format, "format"))
+        return place
+
+    def __repr__(self) -> str:
+        noted = "".join(f"; {text}" for text in self.remarks)
+        return f"<Run {self.title!r}: {len(self)} rows of {len(self.results.columns)} variables{noted}>"
+
+    def _repr_html_(self) -> str:
+        from orchestrator.figures.style import shown
+
+        changed = "".join(f"<br>{escape(str(c['place']))} = {escape(str(c['value']))}" for c in self.changes)
+        cells = [(metric(name).title, shown(x.number, x.unit)) for name, x in self.metrics().items()]
+        rows = "".join(f"<tr><td>{escape(title)}</td><td>{escape(value)}</td></tr>" for title, value in cells)
+        noted = "".join(f"<br>⚠ {escape(text)}" for text in self.remarks)
+        return f"<b>{escape(self.title)}</b>{changed}{noted}<table>{rows}</table>"
+
+
+def shown_in_notebooks(figure: Figure) -> Figure:
+    """Return the figure, which a notebook now shows as a picture, with or without pyplot."""
+    figure._repr_png_ = functools.partial(_png, figure)  # type: ignore[attr-defined]
+    return figure
+
+
+def _png(figure: Figure) -> bytes:
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png", dpi=110)
+    return picture.getvalue()

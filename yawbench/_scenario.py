@@ -1,0 +1,277 @@
+"""A scenario as a value: loaded, changed, run."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from orchestrator.errors import Problem, ScenarioError, SimulationError, YawbenchWarning
+from orchestrator.fmu.opener import Opener
+from orchestrator.master.log import Log
+from orchestrator.master.simulate import simulate_in_memory
+from orchestrator.messages import hint, short
+from orchestrator.metrics.plausibility import remarks_of
+from orchestrator.plan import FAULTS, TYRES, FaultList, Instance, Override, Plan, Value
+from orchestrator.scenario import catalogue, scenario_schema
+from orchestrator.scenario.load import load_scenario
+from orchestrator.scenario.overrides import setting, spelled
+from orchestrator.tyres.stand import cornering_stiffness
+from orchestrator.wiring.make_plan import make_plan
+
+from . import arguments
+from ._calls import opener_of
+from ._controller import PythonComponent
+from ._run import Run
+
+
+def load(source: str | Path) -> Scenario:
+    """Return the scenario of a name or a file.
+
+        >>> yb.load("fnn_sideslip/25mps").title
+        'Sideslip tracking at 25 m/s, mu 0.65'
+
+    Args:
+        source: a name in the nearest folder `scenarios` or in that of yawbench, or the path of a YAML
+            file or an SSP archive.
+
+    Raises:
+        ScenarioError: there is no such scenario, or something is wrong with it.
+    """
+    scenario = Scenario(catalogue.find(arguments.path(source, "source"), "a scenario").absolute())
+    scenario.loaded  # noqa: B018 - what is wrong is said now
+    return scenario
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A scenario and what is changed in it; made by `load`, never changed itself.
+
+        >>> base = yb.load("fnn_sideslip/25mps")
+        >>> run = base.swap(controller="controller_off").set({"plant.initial_speed": "80 km/h"}).run()
+        >>> [change["place"] for change in run.changes]
+        ['controller', 'plant.initial_speed']
+
+    Attributes:
+        path: the file.
+        changes: what is other than in the file.
+    """
+
+    path: Path
+    changes: tuple[Override, ...] = ()
+    programs: Mapping[Path, PythonComponent] = field(default_factory=dict, repr=False)
+    """Units in plain Python, by the path that stands for each."""
+
+    def __post_init__(self) -> None:
+        if not arguments.is_a(self.path, Path):
+            arguments.refuse("path", "a Path; yawbench.load takes names, too", self.path)
+        if not arguments.is_a(self.changes, tuple) or not all(
+            arguments.is_a(one, Override) for one in self.changes
+        ):
+            arguments.refuse("changes", "changes as `set`, `swap` and `fault` make them", self.changes)
+        if not arguments.is_a(self.programs, dict):
+            arguments.refuse("programs", "programs as `swap` makes them", self.programs)
+
+    def swap(self, **units: Any) -> Scenario:
+        """Return the scenario with other units.
+
+            >>> linear = base.swap(tyre="tyre_linear")
+            >>> follow = base.swap(controller=lambda yaw_rate_ref, yaw_rate: 2e4 * (yaw_rate_ref - yaw_rate))
+            >>> [one.run().metric("rms_error(yaw_rate)") < 0.1 for one in (linear, follow)]
+            [True, True]
+
+        Args:
+            units: unit of the scenario -> the name of an FMU, the path of one, or plain Python: a
+                function whose parameters are named as signals are (`t` is the time in s); an object with
+                `inputs`, `outputs` and `output(t, u)`, perhaps `advance(t, h, u)`, `start(t, u)` and
+                `step_size`; or a component class. Every run works with a copy of an object.
+
+        Raises:
+            ScenarioError: there is no such unit, or what is given cannot stand for one.
+        """
+        given = self.loaded.units
+        changes, programs = [*self._unswapped(units).changes], dict(self.programs)
+        for unit, wanted in units.items():
+            if unit not in given:
+                text = f"there is no unit {short(unit)}{hint(unit, given, lead='units')}"
+                raise ScenarioError([Problem(text, file=self.path)])
+            if arguments.names_file(wanted):
+                changes.append(Override(unit, fmu_of(wanted, unit), "swap"))
+                continue
+            role = _role(self.loaded.replaced.get(unit, given[unit].fmu), unit)
+            program = PythonComponent(wanted, unit=unit, role=role)
+            programs[program.path] = program
+            changes.append(Override(unit, str(program.path), "swap"))
+            if program.step_size is not None:
+                changes.append(Override(f"{unit}.step_size", program.step_size, "swap"))
+        return replace(self, changes=tuple(changes), programs=programs)
+
+    def _unswapped(self, units: Iterable[str]) -> Scenario:
+        """Return the scenario without earlier swaps of units, and the step sizes that came with them."""
+        places = {place for unit in units for place in (unit, f"{unit}.step_size")}
+        kept = (one for one in self.changes if one.origin != "swap" or one.place not in places)
+        return replace(self, changes=tuple(kept))
+
+    def set(self, values: Mapping[str, Value]) -> Scenario:
+        """Return the scenario with other values.
+
+            >>> changes = {"vehicle.mass": 1200, "plant.initial_speed": "80 km/h", "inputs.friction*": 0.3}
+            >>> print(base.set(changes).run()["plant.velocity_x"][0].round(2))
+            22.22
+
+        Args:
+            values: as `--set` takes them: `unit.parameter`, `vehicle.parameter`, `inputs.pattern`,
+                `unit.step_size`, `stop_time`, `step_size` or `algorithm` -> value, in SI or with its unit.
+
+        Raises:
+            ScenarioError: a place or value is wrong.
+        """
+        given = arguments.mapping(values, "values", "a mapping of places to values, {'stop_time': 2}")
+        with arguments.as_scenario_errors("set"):
+            plain = {place: _plain(place, value) for place, value in given.items()}
+        changed = [setting(place, value, "set") for place, value in plain.items()]
+        scenario = replace(self, changes=(*self.changes, *changed))
+        scenario.loaded  # noqa: B018 - what is wrong is said now
+        return scenario
+
+    def fault(
+        self,
+        place: str,
+        *,
+        kind: str,
+        value: float | str | None = None,
+        start: float | str | None = None,
+        until: float | str | None = None,
+        **told: float | str,
+    ) -> Scenario:
+        """Return the scenario with a fault; several at one place act one after the other.
+
+            >>> blind = base.fault("plant.sideslip", kind="freeze", start=1.5)
+            >>> blind = blind.fault("plant.sideslip -> controller", kind="bias", value="0.5 deg", until=3)
+            >>> [fault["fault"] for fault in blind.run().record["faults"]]
+            ['freeze from 1.5 s', 'bias 0.5 deg until 3 s']
+
+        Args:
+            place: `unit.output` for all who take it and the results, `unit.output -> unit` on the way to
+                one of them, `unit.input`; a `*` stands for several.
+            kind: bias, gain, drift, noise, freeze, value, dropout, outlier, delay, saturation, loss or stuck.
+            value: as the kind has it: in SI, or with its unit.
+            start, until: when it begins and ends [s]; default: with the run.
+            told: `share` of the messages, `every` how often they come [s], `seed` of what is random.
+
+        Raises:
+            ScenarioError: there is no such place or kind, or it takes something else.
+        """
+        place, kind = arguments.text(place, "place"), arguments.text(kind, "kind")
+        given = {"kind": kind, "value": value, **told, "from": start, "until": until}
+        with arguments.as_scenario_errors("fault"):
+            item = {name: arguments.scalar(x, name) for name, x in given.items() if x is not None}
+        at = f"{FAULTS}.{spelled(place)}"
+        earlier = next((c for c in self.changes if (c.place, c.origin) == (at, "fault")), None)
+        before = earlier.value if earlier and isinstance(earlier.value, FaultList) else ()
+        others = [change for change in self.changes if change is not earlier]
+        scenario = replace(self, changes=(*others, Override(at, FaultList((*before, item)), "fault")))
+        scenario.loaded  # noqa: B018 - what is wrong is said now
+        return scenario
+
+    @cached_property
+    def loaded(self) -> scenario_schema.LoadedScenario:
+        """The scenario as its schema has it, all changes applied; the file is read once."""
+        return load_scenario(self.path, changes=self.changes)
+
+    def plan(self) -> Plan:
+        """Return what a run does: units in order, wires, constants, time grid.
+
+        Raises:
+            YawbenchError: an FMU is missing, a component whose source has changed cannot be built, or
+                the units cannot be connected.
+        """
+        plan = make_plan(self.loaded, opener=Opener(**self._opening()), measure=cornering_stiffness)
+        notes = tuple(
+            f"{unit.name}: {unit.fmu.name} is plain Python of this process, no FMU"
+            for unit in plan.instances
+            if unit.fmu.path in self.programs
+        )
+        return replace(plan, notes=plan.notes + notes)
+
+    def _opening(self) -> dict[str, Any]:
+        """Return the options of an `Opener`: what is stale is built in silence, plain Python is there."""
+        opened = {path: program.fmu for path, program in self.programs.items()}
+        return {"build": True, "tell": lambda text: None, "opened": opened}
+
+    def run(self, *, progress: Callable[[int, int], None] | None = None) -> Run:
+        """Run the scenario in this process and return its results; nothing is written.
+
+        Remarks on the run, if any, are one `YawbenchWarning`.
+
+        Args:
+            progress: called a few times a second with the steps done and those in all.
+
+        Raises:
+            SimulationError: a unit failed; what Python code raised is its `__cause__`.
+        """
+        if progress is not None:
+            arguments.function(progress, "progress", "done", "total")
+        opened: list[Any] = []
+        make = opener_of(self.programs)
+
+        def opener(unit: Instance, log: Log, corrupted: set[Path]) -> Any:
+            opened.append(make(unit, log, corrupted))
+            return opened[-1]
+
+        plan = self.plan()
+        try:
+            run = Run(simulate_in_memory(plan, opener=opener, progress=progress))
+        except SimulationError as error:
+            warn(plan.title, remarks_of((*plan.findings, *error.findings)))
+            causes = [getattr(slave, "error", None) for slave in opened if slave.name == error.instance]
+            raise error from next(iter(causes), None)
+        warn(run.title, run.remarks)
+        return run
+
+    @property
+    def title(self) -> str:
+        """The scenario's title."""
+        return self.loaded.title
+
+    def _repr_html_(self) -> str:
+        plan = self.plan()
+        rows = "".join(
+            f"<tr><td>{escape(unit.name)}</td><td>{escape(unit.fmu.name)}</td>"
+            f"<td>{escape(unit.fmu.description)}</td></tr>"
+            for unit in plan.instances
+        )
+        changed = "".join(f"<br>{escape(str(change))}" for change in self.changes)
+        return f"<b>{escape(plan.title)}</b>{changed}<table>{rows}</table>"
+
+
+def warn(title: str, remarks: Iterable[str]) -> None:
+    """Give one warning of all remarks, if there are any, at the line that called our caller."""
+    if said := "; ".join(remarks):
+        warnings.warn(f"{title}: {said}", YawbenchWarning, stacklevel=3)
+
+
+def fmu_of(wanted: str | Path, name: str) -> str:
+    """Return the FMU that an argument names: a name as it is, a path as an absolute one."""
+    path = arguments.path(wanted, name)
+    if path.suffix == ".fmu":
+        return str(path.absolute())
+    return arguments.text(wanted, name) if isinstance(wanted, str) else str(path)
+
+
+def _plain(place: str, value: Any) -> Value:
+    """Return the value of a place as plain Python."""
+    of_file = place == "vehicle" or place.partition(".")[0] == TYRES
+    return str(arguments.path(value, place)) if of_file else arguments.scalar(value, place)
+
+
+def _role(fmu: str, unit: str) -> str:
+    """Return the role of a unit: its FMU's name begins with it, else the unit is called so."""
+    from components.fmi.roles import ROLES
+
+    names = [role.name for role in ROLES.values()]
+    return next((name for name in names if Path(fmu).stem.startswith(f"{name}_")), unit)
