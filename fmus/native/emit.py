@@ -31,8 +31,13 @@ def emit(program: Program, source: str, guid: str) -> str:
         lines += ["typedef struct {", *(members or ["    char nothing;"]), f"}} {name};", ""]
     widths = ", ".join(map(str, program.rings)) or "0"
     lines += [f"enum {{ N_LISTS = {len(program.rings)} }};", f"static const int WIDTHS[] = {{{widths}}};", ""]
+    made: dict[ir.Outlined, str] = {}
     for name, function in program.functions.items():
-        lines += _Function(program, function).lines(name)
+        for outlined in _outlined(function.body):
+            if outlined not in made:
+                made[outlined] = f"{outlined.name}_{len(made)}"
+                lines += _Function(program, ir.Function(outlined.body, ()), made).of_its_own(outlined)
+        lines += _Function(program, function, made).lines(name)
     return "\n".join([*lines, '#include "unit.h"', ""])
 
 
@@ -91,8 +96,8 @@ def _variables(variables: Sequence[Any], guid: str) -> list[str]:
 class _Function:
     """The text of one function."""
 
-    def __init__(self, program: Program, function: ir.Function) -> None:
-        self.program, self.function = program, function
+    def __init__(self, program: Program, function: ir.Function, names: dict[ir.Outlined, str]) -> None:
+        self.program, self.function, self.names = program, function, names
         self.tables: list[str] = []
 
     def lines(self, name: str) -> list[str]:
@@ -102,9 +107,30 @@ class _Function:
         made = [f"    const {self._store_type(place, x)} n{i} = {self._stored(place, x)};" for i, (place, x) in
                 enumerate(stores)]  # fmt: skip
         made += [f"    {self._place(place)} = n{i};" for i, (place, _) in enumerate(stores)]
-        used = dict.fromkeys(x for x in self._used(self.function.body, [x for _, x in stores]))
+        head = f"static int {name}(Problem *problem, {_SIGNATURES[name]})"
+        return self._whole(head, body, made, [x for _, x in stores], ())
+
+    def of_its_own(self, function: ir.Outlined) -> list[str]:
+        """Return the lines of a function that computes from numbers alone."""
+        body: list[str] = []
+        self._statements(function.body, body, 1)
+        given = "".join(f", {TYPES[x.type]} {x.name}" for x in function.parameters)
+        types = dict.fromkeys(TYPES[type] for type in map(ir.type_of, function.results))
+        out = "".join(f", {type} *{type}s" for type in types)
+        made, counts = [], dict.fromkeys(types, 0)
+        for x in function.results:
+            type = TYPES[ir.type_of(x)]
+            made.append(f"    {type}s[{counts[type]}] = {self._as(ir.type_of(x), x)};")
+            counts[type] += 1
+        head = f"static int {self.names[function]}(Problem *problem, const Variables *v, const Configured *c{given}{out})"
+        return self._whole(head, body, made, function.results, function.parameters)
+
+    def _whole(
+        self, head: str, body: list[str], made: list[str], results: Sequence[ir.Operand], given: Sequence[ir.Var]
+    ) -> list[str]:
+        used = dict.fromkeys(x for x in self._used(self.function.body, results))
         assigned = list(dict.fromkeys(_targets(self.function.body)))
-        own = set(assigned)
+        own = {*assigned, *given}
         reads = [
             f"    const {TYPES[x.type]} {x.name} = {self.program.reads[x]};"
             for x in used
@@ -114,8 +140,7 @@ class _Function:
             f"    {TYPES[type]} {', '.join(f'{x.name} = 0' for x in assigned if x.type == type)};"
             for type in dict.fromkeys(x.type for x in assigned)
         ]
-        texts = [f"    char text_{s.count.name}[24];" for s in _all(self.function.body) if isinstance(s, ir.Digits)]
-        head = f"static int {name}(Problem *problem, {_SIGNATURES[name]})"
+        texts = [f"    char text_{s.count.name}[24];" for s in ir.every(self.function.body) if isinstance(s, ir.Digits)]
         return [head, "{", *reads, *declared, *texts, *self.tables, *body, *made, "    return 0;", "}", ""]
 
     def _place(self, place: str) -> str:
@@ -134,7 +159,7 @@ class _Function:
         return self._as(self._type_at(place), value)
 
     def _used(self, body: Sequence[ir.Statement], more: Sequence[ir.Operand]) -> Iterator[ir.Var]:
-        for statement in _all(body):
+        for statement in ir.every(body):
             for x in _operands(statement):
                 if isinstance(x, ir.Var):
                     yield x
@@ -179,6 +204,8 @@ class _Function:
                 ]
             elif isinstance(s, ir.Drop):
                 lines.append(f"{pad}drop(&lists[{s.ring}], {int(s.every)});")
+            elif isinstance(s, ir.Invoke):
+                lines += self._invoke(s, pad)
             elif isinstance(s, ir.Digits):
                 lines.append(
                     f"{pad}{s.count.name} = write_integer(text_{s.count.name}, {self._real(s.value)});"
@@ -186,6 +213,21 @@ class _Function:
             elif isinstance(s, ir.Digit):
                 text = f"text_{s.digits.name}[(int){self._real(s.index)}]"
                 lines.append(f"{pad}{s.target.name} = (unsigned char){text};")
+
+    def _invoke(self, s: ir.Invoke, pad: str) -> list[str]:
+        given = "".join(f", {self._as(p.type, x)}" for p, x in zip(s.function.parameters, s.operands, strict=True))
+        types = [TYPES[ir.type_of(x)] for x in s.function.results]
+        used = dict.fromkeys(types)
+        out = "".join(f", {type}s" for type in used)
+        lines = [f"{pad}{{"]
+        lines += [f"{pad}    {type} {type}s[{types.count(type)}];" for type in used]
+        lines += [f"{pad}    if ({self.names[s.function]}(problem, v, c{given}{out})) {{", f"{pad}        return 1;"]
+        lines.append(f"{pad}    }}")
+        counts = dict.fromkeys(used, 0)
+        for target, type in zip(s.targets, types, strict=True):
+            lines.append(f"{pad}    {target.name} = {type}s[{counts[type]}];")
+            counts[type] += 1
+        return [*lines, f"{pad}}}"]
 
     def _raise(self, s: ir.Raise, pad: str) -> list[str]:
         where = f" ({s.where})" if s.where else ""
@@ -286,20 +328,20 @@ class _Function:
         return f"{call} + 0.0" if s.target.type == ir.INT else call
 
 
-def _all(body: Sequence[ir.Statement]) -> Iterator[ir.Statement]:
-    for s in body:
-        yield s
-        if isinstance(s, ir.If):
-            yield from _all(s.then)
-            yield from _all(s.orelse)
-        elif isinstance(s, ir.Loop):
-            yield from _all(s.body)
+def _outlined(body: Sequence[ir.Statement]) -> Iterator[ir.Outlined]:
+    """Yield the functions that statements call, each after those that it calls itself."""
+    for s in ir.every(body):
+        if isinstance(s, ir.Invoke):
+            yield from _outlined(s.function.body)
+            yield s.function
 
 
 def _targets(body: Sequence[ir.Statement]) -> Iterator[ir.Var]:
-    for s in _all(body):
+    for s in ir.every(body):
         if isinstance(s, (ir.Let, ir.Load, ir.Digit)):
             yield s.target
+        elif isinstance(s, ir.Invoke):
+            yield from s.targets
         elif isinstance(s, ir.Digits):
             yield s.count
 
@@ -309,6 +351,8 @@ def _operands(s: ir.Statement) -> Sequence[ir.Operand]:
         return s.operands
     if isinstance(s, ir.Load):
         return (*s.table, s.index)
+    if isinstance(s, ir.Invoke):
+        return s.operands
     if isinstance(s, ir.If):
         return (s.test,)
     if isinstance(s, ir.Leave):

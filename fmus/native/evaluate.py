@@ -36,6 +36,7 @@ from .values import (
     Unreachable,
     is_number,
     is_plain,
+    like,
     same,
 )
 
@@ -401,14 +402,10 @@ class Evaluation(Merging):
         first = value.items[0]
         if not all(alike(first, x) for x in value.items):
             raise Refused("an item of a table whose items are not alike")
+        if isinstance(first, tuple):
+            return like(first, [self._whole(self._of_picked(value, k)) for k in range(len(first))])
         shapes = [shape_of(x, self.read) for x in value.items]
         columns = zip(*[numbers_of(s, x, self.read, self) for s, x in zip(shapes, value.items)], strict=True)
-        if isinstance(first, tuple):
-            return type(first)(
-                *([self._whole(self._of_picked(value, k)) for k in range(len(first))],)
-                if not hasattr(first, "_fields")
-                else [self._whole(self._of_picked(value, k)) for k in range(len(first))]
-            )
         return build(shapes[0], iter([self._at(tuple(column), value.index) for column in columns]))
 
     def _whole(self, value: Any) -> Any:

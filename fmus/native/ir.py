@@ -6,7 +6,7 @@ before it and at the end of its body. Integers are kept as doubles, exact up to 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 REAL, INT, BOOL, WORD, WIDE = "real", "int", "bool", "word", "wide"
@@ -115,7 +115,26 @@ class Drop:
     every: bool = False
 
 
-Statement = Let | Load | Digits | Digit | If | Loop | Leave | Raise | Push | Drop
+@dataclass(frozen=True, eq=False)
+class Outlined:
+    """A function of its own: what it computes from numbers alone."""
+
+    name: str
+    parameters: tuple[Var, ...]
+    body: tuple[Statement, ...]
+    results: tuple[Operand, ...]
+
+
+@dataclass(frozen=True)
+class Invoke:
+    """targets = function(operands)."""
+
+    targets: tuple[Var, ...]
+    function: Outlined
+    operands: tuple[Operand, ...]
+
+
+Statement = Let | Load | Invoke | Digits | Digit | If | Loop | Leave | Raise | Push | Drop
 
 
 @dataclass(frozen=True)
@@ -129,6 +148,17 @@ class Function:
 
     body: Sequence[Statement]
     stores: Sequence[tuple[str, Operand]]
+
+
+def every(body: Sequence[Statement]) -> Iterator[Statement]:
+    """Yield statements and all that are within them."""
+    for s in body:
+        yield s
+        if isinstance(s, If):
+            yield from every(s.then)
+            yield from every(s.orelse)
+        elif isinstance(s, Loop):
+            yield from every(s.body)
 
 
 def type_of(value: Operand) -> str:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from . import ir
-from .calls import Calling
+from .outline import Library, Outlining
 from .evaluate import Promote
 from .read import Sources
 from .shapes import Growing, Memo, Shape, Widening, build, numbers_of, shape_of, types_of
@@ -119,7 +119,8 @@ class _Specialising:
 
     def _attempt(self) -> Program:
         program = Program(self.component.variables, reads=dict(self.reads))
-        fixed = set(self.fixed)
+        fixed = self.fixed
+        self.libraries = Library(), Library()
         me, machine = self._run("configure", {})
         configured = self._shape(me, fixed)
         program.functions["configure"] = ir.Function(
@@ -127,7 +128,7 @@ class _Specialising:
         )
         program.configured = list(types_of(configured))
         leaves = self._leaves(program, program.configured, "c")
-        fixed |= set(leaves)
+        fixed = self.all_fixed = fixed | set(leaves)
         me, started = self._run("start", self._attributes(configured, leaves), self.t, List(self.inputs))
         state = self._shape(me, fixed)
         at_start = me
@@ -176,9 +177,10 @@ class _Specialising:
         source = self.sources.of(getattr(self.component, method))
         return f"{source.file}:{source.node.lineno}"
 
-    def _run(self, method: str, attributes: dict[str, Any], *args: Any) -> tuple[Instance, Calling]:
+    def _run(self, method: str, attributes: dict[str, Any], *args: Any) -> tuple[Instance, Outlining]:
         me = Instance(self.component, {**attributes, "p": self.parameters})
-        machine = Calling(self.sources)
+        fixed = self.fixed if method == "configure" else self.all_fixed
+        machine = Outlining(self.sources, fixed, self.libraries[method == "configure"])
         machine.facts.domains |= self.domains
         machine.choosers |= set(self.domains)
         self.given = machine.call(machine.attribute(me, method), list(args), {})
@@ -190,7 +192,7 @@ class _Specialising:
         memo = Memo(fixed, self.growing)
         return shape_of(me, lambda box: box.slots, "self", memo)
 
-    def _numbers(self, shape: Shape, me: Instance, machine: Calling) -> list[ir.Operand]:
+    def _numbers(self, shape: Shape, me: Instance, machine: Outlining) -> list[ir.Operand]:
         return numbers_of(shape, me, lambda box: box.slots, machine)
 
     def _attributes(self, shape: Shape, leaves: list[ir.Var]) -> dict[str, Any]:
