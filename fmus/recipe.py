@@ -13,11 +13,12 @@ from typing import Any
 
 from components.fmi.roles import ROLES
 from orchestrator.errors import BuildError
+from orchestrator.fmu.native import REASON
 
 from .closure import Parts, Sources
 from .compiler import compile_launcher, compiler_tools
 from .evidence import Looks
-from .native.build import HEADERS, WORD, native, toolchain, tools
+from .native.build import HEADERS, native, toolchain, tools
 from .packing import LIBRARIES, pack
 from .presentation import PAGE, icon
 from .staging import entry_module, missing_signals, staged, variant
@@ -96,7 +97,7 @@ class PythonRecipe:
                 resources=stage.folder,
             )
         packed |= made.files
-        packed[WORD] = made.why_not.encode()
+        packed[REASON] = made.why_not.encode()
         return packed, (package, entry)
 
 

@@ -19,6 +19,7 @@ from typing import Any
 
 from orchestrator.cache import keep, recall
 from orchestrator.errors import BuildError
+from orchestrator.fmu.native import WANTED
 
 from ..compiler import compile_library, compiler_command, compiler_version
 from .emit import emit
@@ -30,8 +31,6 @@ HERE = Path(__file__).resolve().parent
 HEADERS = {file.name: file for file in (HERE / "arithmetic.h", HERE / "unit.h", HERE.parent / "fmi2.h")}
 NATIVE_LIBRARY = "native.so"
 """Name of the native library beside the launcher, which opens it by this name."""
-WORD = "extra/org.yawbench.native/native.txt"
-"""Path in the archive of why a unit runs as Python; empty if it is native."""
 FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-builtin", "-fno-math-errno", "-w", "-fPIC", "-shared",
          "-fvisibility=hidden")  # fmt: skip
 """Functions are those of libm, as in CPython: the compiler must neither know nor fuse them."""
@@ -40,8 +39,6 @@ TO_WINDOWS = "x86_64-w64-mingw32-gcc"
 WINDOWS = ("-static", "-Wl,--no-insert-timestamp", "-s")
 STORE = "native"
 """Of native libraries in the cache."""
-WANTED = "YAWBENCH_UNITS"
-"""Environment variable: `python` for units without native library."""
 
 
 @dataclass(frozen=True)

@@ -352,12 +352,10 @@ class Evaluation(Merging):
         if isinstance(index, ir.Var):
             if not isinstance(items, (tuple, list)) or not items:
                 raise Refused("an index that is known at run time only")
-            return self._at(tuple(items), self.within(index, len(items), "list index out of range"))
+            return self._at(tuple(items), self.within(index, len(items), _beyond(items)))
         if isinstance(items, (tuple, list)) and isinstance(index, int):
             if not -len(items) <= index < len(items):
-                what = "tuple" if isinstance(items, tuple) else "list"
-                self.fail("IndexError", f"{what} index out of range")
-                raise Unreachable
+                self.end("IndexError", _beyond(items))
         found = items[index]
         return List(found) if isinstance(owner, List) and isinstance(index, slice) else found
 
@@ -393,7 +391,7 @@ class Evaluation(Merging):
         if not isinstance(index, ir.Var):
             return self._at(tuple(row[index] for row in rows), owner.index)
         width = len(rows[0])
-        index = self.within(index, width, "list index out of range")
+        index = self.within(index, width, _beyond(rows[0]))
         place = self.binary("+", self.binary("*", owner.index, width), index)
         return self._at(tuple(x for row in rows for x in row), place)
 
@@ -584,6 +582,10 @@ class Evaluation(Merging):
             return self.branch(self._equal(a, items[k]), lambda: True, lambda: go(k + 1))  # type: ignore
 
         return go(0)
+
+
+def _beyond(items: Any) -> str:
+    return f"{'tuple' if isinstance(items, tuple) else 'list'} index out of range"
 
 
 def _type_name(value: Any) -> str:

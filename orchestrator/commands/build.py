@@ -56,6 +56,8 @@ def build(components: Components = None, out: Target = None, force: Force = Fals
     if report.warning:
         why = f"these FMUs load in Python only, they have no launcher: {report.warning}"
         print(f"warning: {why}", file=sys.stderr)
+    for name, why in report.in_python.items():
+        print(f"{name} runs in Python: {why}", file=sys.stderr)
     if report.current:
         total = len(report.built) + len(report.current)
         print(f"{len(report.current)} of {total} FMUs up to date", file=sys.stderr)

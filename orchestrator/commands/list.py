@@ -25,9 +25,13 @@ Place = Annotated[
     ),
 ]
 
+Units = Annotated[
+    bool, typer.Option("--units", help="List FMUs with how each of them runs: natively, or in Python and why.")
+]
+
 
 @takes("fmus")
-def list(wishes: Wishes, what: Wanted = None, place: Place = None) -> None:
+def list(wishes: Wishes, what: Wanted = None, place: Place = None, units: Units = False) -> None:
     """List runs, scenarios, FMUs, vehicles, signals or metrics.
 
     Runs are shown with when they began, their scenario, what was changed, how they ended, and the largest
@@ -38,6 +42,12 @@ def list(wishes: Wishes, what: Wanted = None, place: Place = None) -> None:
     from ..scenario import catalogue
     from .batch import print_tables
 
+    if units:
+        found, problems = listing.fmus_in(_folder_of_fmus(place or wishes.fmus))
+        table = listing.units_table(found)
+        table.notes += problems
+        print_tables([table])
+        return
     if what is None:
         tables = [listing.files_table(None, kinds) for kinds in (SCENARIOS, VEHICLES)]
         tables[-1].notes.append("'yawbench list' also lists runs, fmus, signals and metrics.")

@@ -14,6 +14,7 @@ from vocabulary.wheels import WHEELS
 
 from ..errors import ModelDescriptionError, ScenarioError
 from ..fmu.archive import open_fmu
+from ..fmu.native import runs_as
 from ..metrics.measures import catalogue as measures
 from ..metrics.run_metrics import STANDARD, Value, columns_of, metric
 from ..metrics.symbols import symbol
@@ -111,6 +112,13 @@ def fmus_table(fmus: Sequence[Fmu], problems: Sequence[str]) -> Table:
     for fmu in fmus:
         count = str(len(fmu.of("parameter")))
         table.rows.append([fmu.name, _one_line(fmu.description) or None, count, fmu.generation_tool or None])
+    return table
+
+
+def units_table(fmus: Sequence[Fmu]) -> Table:
+    """Return a table of how units run that were built here: natively, or in Python and why."""
+    table = Table("", ["unit", "runs as"])
+    table.rows += [[fmu.name, runs_as(fmu.path)] for fmu in fmus]
     return table
 
 

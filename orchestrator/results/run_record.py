@@ -11,6 +11,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from ..fmu.native import runs_as
 from ..plan import DEFAULT, Plan, Series, Unit, Wire
 from ..sources import OF_RESULTS, sources_hash
 
@@ -87,6 +88,7 @@ def _fmu(unit: Unit, plan: Plan) -> dict[str, Any]:
         "generation_tool": fmu.generation_tool,
         "fmi_version": f"{fmu.fmi}.0",
         "built": None if fmu.built is None else asdict(fmu.built),
+        "runs_as": runs_as(fmu.path),
         "step_size": float(unit.period * plan.step),
         "tolerance": unit.tolerance or fmu.tolerance,
         "parameters": dict(unit.parameters),
