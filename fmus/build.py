@@ -117,8 +117,8 @@ def build_all(
         report.warning = compile_launcher()[1]
     if components is None and out.is_dir():
         for fmu in sorted(out.glob("*.fmu")):
-            found = read_mark(fmu)
-            if fmu.stem not in known and found is not None and found.is_component:
+            mark = read_mark(fmu)
+            if fmu.stem not in known and mark is not None and mark.is_component:
                 fmu.unlink()
                 report.removed.append(fmu.stem)
                 tell(fmu.stem, "removed")
@@ -147,9 +147,7 @@ def _built(
             yield jobs[job], job.result()
 
 
-def _problems(
-    name: str, out: Path, root: Path, known: Mapping[str, Recipe] | None = None
-) -> list[str]:
+def _problems(name: str, out: Path, root: Path, known: Mapping[str, Recipe] | None = None) -> list[str]:
     recipe = (known or find_recipes(root))[name]
     try:
         bring_up_to_date(recipe, out / f"{recipe.name}.fmu", component_mark(recipe, root), force=True)

@@ -65,7 +65,14 @@ class PythonRecipe:
         libraries = [f"tool:{file}" for file in LIBRARIES]
         translator = [*sorted((HERE / "native").glob("*.py")), *HEADERS.values()]
         return self.sources.evidence[self.module] | Looks().evidence(
-            [*sorted(HERE.glob("*.[pch]*")), *icon(self.role), *translator, *libraries, *tools(), *compiler_tools()]
+            [
+                *sorted(HERE.glob("*.[pch]*")),
+                *icon(self.role),
+                *translator,
+                *libraries,
+                *tools(),
+                *compiler_tools(),
+            ]
         )
 
     def make(self) -> tuple[dict[str, bytes], tuple[str, ...]]:

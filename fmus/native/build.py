@@ -14,6 +14,7 @@ import shutil
 import sys
 import tempfile
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -61,8 +62,13 @@ def tools() -> list[str]:
 
 def toolchain() -> str:
     """Return a text that changes with whatever translates, compiles or checks."""
-    said = [platform.python_version(), *FLAGS, *LINUX, *WINDOWS, os.environ.get(WANTED, "")]
-    for command in (compiler_command(), [TO_WINDOWS]):
+    return _toolchain(tuple(compiler_command()), os.environ.get(WANTED, ""))
+
+
+@cache
+def _toolchain(compiler: tuple[str, ...], wanted: str) -> str:
+    said = [platform.python_version(), *FLAGS, *LINUX, *WINDOWS, wanted]
+    for command in (compiler, (TO_WINDOWS,)):
         said += command
         if shutil.which(command[0]):
             said.append(compiler_version(command))

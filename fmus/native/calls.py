@@ -200,9 +200,8 @@ class Calling(Execution):
             raise Refused(f"making a {cls.__name__}")
         made = Instance(cls)
         init = cls.__dict__.get("__init__") or cls.__init__  # type: ignore[misc]
-        if dataclasses.is_dataclass(cls) and init.__qualname__.split(".")[-1] == "__init__" and not (
-            self.sources.contains(init)
-        ):
+        own = isinstance(init, types.FunctionType) and self.sources.contains(init)
+        if dataclasses.is_dataclass(cls) and not own:
             self._fill(made, cls, args, named)
         elif isinstance(init, types.FunctionType):
             self.call(init, [made, *args], named)
@@ -507,10 +506,17 @@ class Calling(Execution):
         return self.function("dist", *[self.binary("-", a, b) for a, b in pairs])
 
     def _python_hypot(self, *values: Any) -> Any:
-        return self.function("hypot", *values) if any(isinstance(x, ir.Var) for x in values) else math.hypot(*values)
+        return (
+            self.function("hypot", *values)
+            if any(isinstance(x, ir.Var) for x in values)
+            else math.hypot(*values)
+        )
 
     def _python_prod(self, values: Any) -> Any:
-        return functools.reduce(lambda a, b: self.binary("*", a, b), self.items(values), 1)
+        product: ir.Operand = 1
+        for item in self.items(values):
+            product = self.binary("*", product, item)
+        return product
 
 
 __all__ = ["Calling", "Merging"]

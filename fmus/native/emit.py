@@ -12,13 +12,21 @@ from .specialise import Program
 TYPES = {ir.REAL: "double", ir.INT: "double", ir.BOOL: "int", ir.WORD: "uint64_t", ir.WIDE: "uint64_t"}
 _INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 _COMPARED = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
-_WORDS = {"add_word": "+", "mul_word": "*", "and_word": "&", "or_word": "|", "xor_word": "^", "right_word": ">>"}
+_WORDS = {
+    "add_word": "+",
+    "mul_word": "*",
+    "and_word": "&",
+    "or_word": "|",
+    "xor_word": "^",
+    "right_word": ">>",
+}
 _INLINE = {"fabs", "copysign", "sqrt"}  # exact, whoever computes them
 _SIGNATURES = {
     "configure": "const Variables *v, Configured *c",
     "start": "const Variables *v, const Configured *c, State *s, List *lists, double t",
     "advance": "const Variables *v, const Configured *c, State *s, List *lists, double t, double h",
-    "output": "const Variables *v, const Configured *c, const State *s, const List *lists, double *y, double t",
+    "output": "const Variables *v, const Configured *c, const State *s, const List *lists, double *y,"
+    " double t",
 }
 
 
@@ -57,7 +65,9 @@ def quoted(text: str) -> str:
     made = ""
     for byte in text.encode("utf-8", "backslashreplace"):
         char = chr(byte)
-        made += f"\\{char}" if char in '"\\' else char if 32 <= byte < 127 and char != "?" else f"\\{byte:03o}"
+        made += (
+            f"\\{char}" if char in '"\\' else char if 32 <= byte < 127 and char != "?" else f"\\{byte:03o}"
+        )
     return f'"{made}"'
 
 
@@ -65,9 +75,11 @@ def _variables(variables: Sequence[Any], guid: str) -> list[str]:
     kinds = {"Real": "double", "Integer": "int", "Boolean": "int", "String": "int"}
     members = [f"    {kinds[v.type]} {v.name};" for v in variables]
     lines = ["typedef struct {", *(members or ["    char nothing;"]), "} Variables;", ""]
-    for v in variables:
-        if v.type == "String":
-            lines.append(f"static const char *const CHOICES_{v.name}[] = {{{', '.join(map(quoted, v.choices))}}};")
+    lines += [
+        f"static const char *const CHOICES_{v.name}[] = {{{', '.join(map(quoted, v.choices))}}};"
+        for v in variables
+        if v.type == "String"
+    ]
     rows = []
     for v in variables:
         start = v.choices.index(v.start) if v.type == "String" else v.start or 0
@@ -104,8 +116,10 @@ class _Function:
         body: list[str] = []
         self._statements(self.function.body, body, 1)
         stores = [(place, x) for place, x in self.function.stores]
-        made = [f"    const {self._store_type(place, x)} n{i} = {self._stored(place, x)};" for i, (place, x) in
-                enumerate(stores)]  # fmt: skip
+        made = [
+            f"    const {self._store_type(place, x)} n{i} = {self._stored(place, x)};"
+            for i, (place, x) in enumerate(stores)
+        ]
         made += [f"    {self._place(place)} = n{i};" for i, (place, _) in enumerate(stores)]
         head = f"static int {name}(Problem *problem, {_SIGNATURES[name]})"
         return self._whole(head, body, made, [x for _, x in stores], ())
@@ -122,11 +136,17 @@ class _Function:
             type = TYPES[ir.type_of(x)]
             made.append(f"    {type}s[{counts[type]}] = {self._as(ir.type_of(x), x)};")
             counts[type] += 1
-        head = f"static int {self.names[function]}(Problem *problem, const Variables *v, const Configured *c{given}{out})"
+        always = "Problem *problem, const Variables *v, const Configured *c"
+        head = f"static int {self.names[function]}({always}{given}{out})"
         return self._whole(head, body, made, function.results, function.parameters)
 
     def _whole(
-        self, head: str, body: list[str], made: list[str], results: Sequence[ir.Operand], given: Sequence[ir.Var]
+        self,
+        head: str,
+        body: list[str],
+        made: list[str],
+        results: Sequence[ir.Operand],
+        given: Sequence[ir.Var],
     ) -> list[str]:
         used = dict.fromkeys(x for x in self._used(self.function.body, results))
         assigned = list(dict.fromkeys(_targets(self.function.body)))
@@ -140,7 +160,11 @@ class _Function:
             f"    {TYPES[type]} {', '.join(f'{x.name} = 0' for x in assigned if x.type == type)};"
             for type in dict.fromkeys(x.type for x in assigned)
         ]
-        texts = [f"    char text_{s.count.name}[24];" for s in ir.every(self.function.body) if isinstance(s, ir.Digits)]
+        texts = [
+            f"    char text_{s.count.name}[24];"
+            for s in ir.every(self.function.body)
+            if isinstance(s, ir.Digits)
+        ]
         return [head, "{", *reads, *declared, *texts, *self.tables, *body, *made, "    return 0;", "}", ""]
 
     def _place(self, place: str) -> str:
@@ -191,7 +215,9 @@ class _Function:
             elif isinstance(s, ir.Leave):
                 lines += [f"{pad}if ({self._bool(s.test)}) {{", f"{pad}    break;", f"{pad}}}"]
             elif isinstance(s, ir.Load):
-                lines.append(f"{pad}{s.target.name} = {self._table(s, lines, pad)}[(int){self._real(s.index)}];")
+                lines.append(
+                    f"{pad}{s.target.name} = {self._table(s, lines, pad)}[(int){self._real(s.index)}];"
+                )
             elif isinstance(s, ir.Raise):
                 lines += self._raise(s, pad)
             elif isinstance(s, ir.Push):
@@ -215,13 +241,18 @@ class _Function:
                 lines.append(f"{pad}{s.target.name} = (unsigned char){text};")
 
     def _invoke(self, s: ir.Invoke, pad: str) -> list[str]:
-        given = "".join(f", {self._as(p.type, x)}" for p, x in zip(s.function.parameters, s.operands, strict=True))
+        given = "".join(
+            f", {self._as(p.type, x)}" for p, x in zip(s.function.parameters, s.operands, strict=True)
+        )
         types = [TYPES[ir.type_of(x)] for x in s.function.results]
         used = dict.fromkeys(types)
         out = "".join(f", {type}s" for type in used)
         lines = [f"{pad}{{"]
         lines += [f"{pad}    {type} {type}s[{types.count(type)}];" for type in used]
-        lines += [f"{pad}    if ({self.names[s.function]}(problem, v, c{given}{out})) {{", f"{pad}        return 1;"]
+        lines += [
+            f"{pad}    if ({self.names[s.function]}(problem, v, c{given}{out})) {{",
+            f"{pad}        return 1;",
+        ]
         lines.append(f"{pad}    }}")
         counts = dict.fromkeys(used, 0)
         for target, type in zip(s.targets, types, strict=True):
@@ -278,7 +309,11 @@ class _Function:
         return x.name if x.type in (ir.WORD, ir.WIDE) else f"(uint64_t)(int64_t){x.name}"
 
     def _as(self, type: str, x: ir.Operand) -> str:
-        by: dict[str, Callable[[ir.Operand], str]] = {ir.BOOL: self._bool, ir.WORD: self._word, ir.WIDE: self._word}
+        by: dict[str, Callable[[ir.Operand], str]] = {
+            ir.BOOL: self._bool,
+            ir.WORD: self._word,
+            ir.WIDE: self._word,
+        }
         return by.get(type, self._real)(x)
 
     def _operation(self, s: ir.Let) -> str:

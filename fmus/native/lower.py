@@ -345,7 +345,7 @@ class Lowering:
     def total(self, items: list[ir.Operand], start: ir.Operand) -> ir.Operand:
         """Return sum(items, start), by the summation of the Python that builds."""
         if not any(isinstance(x, ir.Var) for x in (*items, start)):
-            return sum(items, start)
+            return sum(items, start)  # type: ignore[arg-type]
         if COMPENSATED and any(ir.type_of(x) == ir.REAL for x in (*items, start)):
             return self.let(ir.REAL, "compensated_sum", start, *items)
         result = start

@@ -307,7 +307,7 @@ class _Join:
         return target
 
     def _mapped(self, a: ir.Operand, b: ir.Operand) -> tuple[ir.Var, dict[int, int]] | None:
-        """Return a variable and what the two paths make of each of its values, if they are told apart by it."""
+        """Return a variable that tells the two paths apart, and the number for each of its values."""
         kind, *of = self.machine.facts.meanings.get(self.test, ("",))
         if kind != "is" or isinstance(a, ir.Var) or not isinstance(a, int):
             return None

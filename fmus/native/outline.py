@@ -1,4 +1,4 @@
-"""Functions of a component that compute from numbers alone, as functions in C: what is used often is made once.
+"""Functions of a component that compute from numbers alone, as functions in C, each made once.
 
 A call is followed apart, with its arguments' numbers as parameters; if it changes nothing and is long enough
 to be worth it, the call stays one. All others are evaluated in place.
@@ -14,8 +14,21 @@ from .calls import Calling
 from .evaluate import Call, Promote
 from .lower import Facts
 from .read import Sources
-from .shapes import Forms, Growing, Held, Items, Known, Leaf, Made, Memo, Shape, build, numbers_of, shape_of
-from .shapes import types_of
+from .shapes import (
+    Forms,
+    Growing,
+    Held,
+    Items,
+    Known,
+    Leaf,
+    Made,
+    Memo,
+    Shape,
+    build,
+    numbers_of,
+    shape_of,
+    types_of,
+)
 from .values import Box, Frame, Picked, Refused, is_plain
 
 SHORTEST = 40
@@ -69,7 +82,11 @@ class Outlining(Calling):
         return self._sizes[node]
 
     def _tried(
-        self, call: Call, node: ast.FunctionDef | ast.Lambda, given: Shape, chosen: dict[ir.Var, frozenset[int]]
+        self,
+        call: Call,
+        node: ast.FunctionDef | ast.Lambda,
+        given: Shape,
+        chosen: dict[ir.Var, frozenset[int]],
     ) -> tuple[ir.Outlined, Shape] | None:
         parameters = tuple(self.new(type) for type in types_of(given))
         copies: dict[int, Any] = {}
@@ -95,7 +112,11 @@ class Outlining(Calling):
         form, results, value = path.value
         if any(map(_is_of_list, ir.every(path.out))):
             return None  # lists of the state are no numbers
-        if sum(1 for _ in ir.every(path.out)) < SHORTEST or len(results) > MOST_RESULTS or _holds(value, set(map(id, boxes)), self):
+        if (
+            sum(1 for _ in ir.every(path.out)) < SHORTEST
+            or len(results) > MOST_RESULTS
+            or _holds(value, set(map(id, boxes)), self)
+        ):
             return None
         name = f"{getattr(node, 'name', 'lambda')}_{len(self.library.made)}"
         return ir.Outlined(name, parameters, tuple(path.out), results), form

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import inspect
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -32,7 +33,7 @@ class Source:
     cells: dict[str, Any]
 
 
-@lru_cache(maxsize=None)
+@cache
 def _functions(file: str, content: bytes) -> dict[tuple[int, str], list[Tree]]:
     found: dict[tuple[int, str], list[Tree]] = {}
     for node in ast.walk(ast.parse(content)):
@@ -79,8 +80,6 @@ class Sources:
             raise Refused(f"{function.__qualname__} is a generator", where)
         cells = {}
         for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
-            try:
+            with contextlib.suppress(ValueError):  # not filled yet
                 cells[name] = cell.cell_contents
-            except ValueError:
-                continue
         return Source(nodes[0], shown, function.__globals__, cells)

@@ -8,12 +8,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from . import ir
 from .merge import Merging, items_of
-from .values import ANY, UNSET, Bound, Box, Closure, Dict, Frame, Instance, List, Picked, Refused, Ring, Union
-from .values import is_number, keys_of, like, same
+from .values import (
+    ANY,
+    UNSET,
+    Bound,
+    Box,
+    Closure,
+    Dict,
+    Frame,
+    Instance,
+    List,
+    Picked,
+    Refused,
+    Ring,
+    Union,
+    is_number,
+    keys_of,
+    like,
+    same,
+)
 
 
 @dataclass(eq=False)
@@ -125,14 +143,15 @@ def shape_of(value: Any, slots: Place, path: str = "", memo: Memo | None = None)
             made.parent = shape_of(value.parent, slots, f"{path}.", memo)
         return made
     if isinstance(value, Closure):
-        return Made(
-            value.node,
-            lambda frame, c=value: Closure(c.node, frame, c.source, c.defaults, c.named_defaults),
-            shape_of(value.frame, slots, path, memo),
-        )
+        of = value.source, value.defaults, value.named_defaults
+
+        def closure(frame: Any, node: Any = value.node) -> Closure:
+            return Closure(node, frame, *of)
+
+        return Made(value.node, closure, shape_of(value.frame, slots, path, memo))
     if isinstance(value, Bound):
-        inner = shape_of(value.owner, slots, path, memo)
-        return Made(value.function, lambda owner, f=value.function: Bound(f, owner), inner)
+        owner = shape_of(value.owner, slots, path, memo)
+        return Made(value.function, partial(Bound, value.function), owner)
     if isinstance(value, Picked):
         raise Refused("an item of a table is kept")
     return Known(value)
@@ -140,7 +159,7 @@ def shape_of(value: Any, slots: Place, path: str = "", memo: Memo | None = None)
 
 def _kind(box: Box) -> tuple[Any, Callable[[], Box]]:
     if isinstance(box, Instance):
-        return box.cls, lambda cls=box.cls: Instance(cls)  # type: ignore[misc]
+        return box.cls, partial(Instance, box.cls)
     if isinstance(box, List):
         return ("list", len(box.slots)), lambda: List([])
     if isinstance(box, Dict):
@@ -201,7 +220,7 @@ class Widening:
         ours = list(a.alternatives) if isinstance(a, Forms) else [a]
         if not isinstance(a, Forms):
             self.grew = True
-        places = []
+        places: list[int] = []
         for shape in b.alternatives if isinstance(b, Forms) else [b]:
             i = _place(ours, shape, len(places))
             if i == len(ours):
@@ -338,7 +357,7 @@ def _collect(
     elif isinstance(shape, Forms):
         given = list(value.alternatives) if isinstance(value, Union) else [value]
         memo = Memo()
-        places = []
+        places: list[int] = []
         for x in given:
             form = shape_of(x, slots, "", memo)
             places.append(_place(shape.alternatives, form, len(places)))

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from . import ir
-from .outline import Library, Outlining
 from .evaluate import Promote
+from .outline import Library, Outlining
 from .read import Sources
 from .shapes import Growing, Memo, Shape, Widening, build, numbers_of, shape_of, types_of
-from .values import Instance, List, Refused, Union, is_number, same
+from .values import Instance, List, Refused, Union, is_number
 
 WIDEST = 40
 """Times a step is followed until the state has its form."""
@@ -80,11 +80,15 @@ class _Specialising:
         self.growing: dict[str, Growing] = {}
         self.reads: dict[ir.Var, str] = {}
         self.domains: dict[ir.Var, frozenset[int]] = {}
-        of = {c: [v for v in component.variables if v.causality == c] for c in ("input", "output", "parameter")}
+        of = {
+            c: [v for v in component.variables if v.causality == c] for c in ("input", "output", "parameter")
+        }
         self.inputs = [self._read(ir.REAL, f"u_{v.name}", f"v->{v.name}") for v in of["input"]]
         self.outputs = len(of["output"])
         self.t, self.h = self._read(ir.REAL, "t", "t"), self._read(ir.REAL, "h", "h")
-        self.parameters = Instance(component.Parameters, {v.name: self._parameter(v) for v in of["parameter"]})
+        self.parameters = Instance(
+            component.Parameters, {v.name: self._parameter(v) for v in of["parameter"]}
+        )
         self.parameters.fixed = True
         self.fixed = {x for x in self.reads if self.reads[x].startswith("v->") and x not in self.inputs}
 
@@ -109,7 +113,7 @@ class _Specialising:
         for _ in range(WIDEST):
             try:
                 return self._attempt()
-            except Promote as found:
+            except Promote as found:  # noqa: PERF203 - each attempt follows from the last
                 if found.path in self.growing:
                     raise Refused("a list whose length changes in ways that are not followed") from None
                 self.growing[found.path] = Growing(len(self.growing), found.item)
@@ -124,7 +128,7 @@ class _Specialising:
         me, machine = self._run("configure", {})
         configured = self._shape(me, fixed)
         program.functions["configure"] = ir.Function(
-            machine.out, list(zip(_places("c->c"), self._numbers(configured, me, machine)))
+            machine.out, _placed("c->c", self._numbers(configured, me, machine))
         )
         program.configured = list(types_of(configured))
         leaves = self._leaves(program, program.configured, "c")
@@ -145,11 +149,12 @@ class _Specialising:
         else:
             raise Refused("a state that takes ever new forms")
         program.functions["start"] = ir.Function(
-            started.out, list(zip(_places("s->s"), self._numbers(state, at_start, started)))
+            started.out, _placed("s->s", self._numbers(state, at_start, started))
         )
-        changes = zip(_places("s->s"), self._numbers(state, me, advanced), leaves)
+        changes = _placed("s->s", self._numbers(state, me, advanced))
         program.functions["advance"] = ir.Function(
-            advanced.out, [(place, x) for place, x, leaf in changes if x is not leaf]
+            advanced.out,
+            [change for change, leaf in zip(changes, leaves, strict=True) if change[1] is not leaf],
         )
         program.functions["output"] = self._output(state, leaves, fixed)
         program.rings = [len(list(types_of(g.item))) for g in self.growing.values()]
@@ -171,7 +176,7 @@ class _Specialising:
         values = machine.items(given)
         if len(values) != self.outputs or not all(map(is_number, values)):
             raise Refused("output() returns something other than all outputs", self._line_of("output"))
-        return ir.Function(machine.out, list(zip(_places("y"), map(machine.as_real, values))))
+        return ir.Function(machine.out, _placed("y", list(map(machine.as_real, values))))
 
     def _line_of(self, method: str) -> str:
         source = self.sources.of(getattr(self.component, method))
@@ -184,8 +189,6 @@ class _Specialising:
         machine.facts.domains |= self.domains
         machine.choosers |= set(self.domains)
         self.given = machine.call(machine.attribute(me, method), list(args), {})
-        if any(not same(before, after) for before, after in zip(args[:2], args[:2])):
-            raise Refused("the arguments of a method are changed")
         return me, machine
 
     def _shape(self, me: Instance, fixed: set[ir.Var]) -> Shape:
@@ -206,22 +209,6 @@ class _Specialising:
         return made
 
 
-def _places(prefix: str) -> _Places:
-    return _Places(prefix)
-
-
-class _Places:
-    """prefix0, prefix1, ... without end."""
-
-    def __init__(self, prefix: str) -> None:
-        self.prefix, self.count = prefix, 0
-
-    def __iter__(self) -> _Places:
-        return self
-
-    def __next__(self) -> str:
-        self.count += 1
-        return f"{self.prefix}{self.count - 1}"
-
-
-__all__: list[str] = ["Callable", "Program", "specialise"]
+def _placed(prefix: str, numbers: list[ir.Operand]) -> list[tuple[str, ir.Operand]]:
+    """Return numbers with their places: prefix0, prefix1, ..."""
+    return [(f"{prefix}{i}", x) for i, x in enumerate(numbers)]

@@ -297,9 +297,9 @@ class Execution(Evaluation):
         place = self.within(index, len(held), "list assignment index out of range")
         for k in range(len(held)):
             if is_number(value) and is_number(held[k]):
-                type = ir.joined(ir.type_of(value), ir.type_of(held[k]))
+                kind = ir.joined(ir.type_of(value), ir.type_of(held[k]))
                 there = self.compare("==", place, k)
-                self.write(owner, k, self.let(type, "select", there, value, held[k]))
+                self.write(owner, k, self.let(kind, "select", there, value, held[k]))
             else:
                 there = self.compare("==", place, k)
                 before = held[k]
@@ -338,7 +338,11 @@ class Execution(Evaluation):
             self.assign(node.target, items[k])
             self.block(node.body)
             on = self._goes_on(self.exit)
-            self.branch(on, lambda: (self.leave(ON), go(k + 1)), lambda: None)
+            self.branch(on, lambda: further(k + 1), lambda: None)
+
+        def further(k: int) -> None:
+            self.leave(ON)
+            go(k)
 
         go(0)
         self._after_loop(node)
@@ -354,7 +358,7 @@ class Execution(Evaluation):
         how = self.exit
         if node.orelse:
             over = self.compare("==", how, OVER)
-            self.branch(over, lambda: (self.leave(ON), self.block(node.orelse)), lambda: None)
+            self.branch(over, lambda: self._otherwise(node.orelse), lambda: None)
             how = self.exit
         if isinstance(how, ir.Var):
             returns = any(isinstance(x, ast.Return) for x in ast.walk(node))
@@ -364,6 +368,10 @@ class Execution(Evaluation):
             else:
                 how = ON
         self.leave(how if isinstance(how, ir.Var) or how == RETURN else ON)
+
+    def _otherwise(self, statements: Sequence[ast.stmt]) -> None:
+        self.leave(ON)
+        self.block(statements)
 
     def _for_bytes(self, node: ast.For, over: Bytes) -> None:
         if node.orelse or any(isinstance(x, (ast.Break, ast.Return)) for x in ast.walk(node)):
@@ -406,7 +414,12 @@ class Execution(Evaluation):
         body: Callable[[], None],
     ) -> None:
         since = now()
-        passing = {name for name in _stored(node) if not self._is_read_outside(node, name)}
+        held = self.frame.slots
+        passing = {
+            name
+            for name in _stored(node)
+            if held.get(name, UNSET) is UNSET and not self._is_read_outside(node, name)
+        }  # names of one pass, which no other looks at
         carried: dict[tuple[Box, Any], Shape] = {}
         for _ in range(WIDEST):
             heads: list[tuple[ir.Var, ir.Var]] = []
@@ -461,11 +474,10 @@ class Execution(Evaluation):
                 value = build(shape, iter(leaves))
                 starts[box, key] = value
                 self.write(box, key, value)
-            fresh = [n for n in passing if self.frame.slots.get(n, UNSET) is UNSET]
             self.branch(test(), body, lambda: self.leave(OVER))
             how = self.exit
             self.leave(ON)
-            for name in fresh:
+            for name in passing:
                 self.open(self.frame).pop(name, None)
             return how
 

@@ -26,7 +26,8 @@ Place = Annotated[
 ]
 
 Units = Annotated[
-    bool, typer.Option("--units", help="List FMUs with how each of them runs: natively, or in Python and why.")
+    bool,
+    typer.Option("--units", help="List FMUs with how each of them runs: natively, or in Python and why."),
 ]
 
 

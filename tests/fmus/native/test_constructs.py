@@ -89,7 +89,7 @@ def output(self, t, u):
     "a variable changed on a path that breaks out": """
 def output(self, t, u):
     x, found, passes = u[0], -1.0, 0
-    while abs(x) > 0.01:
+    while 0.01 < abs(x) < 1e6:
         passes += 1
         x *= 0.7
         if x < u[1]:
@@ -247,7 +247,7 @@ def output(self, t, u):
     "an exception of its own": """
 def configure(self):
     if self.p.gain > 2.2:
-        raise ValueError(f"gain must be at most {2.2:g} (got {self.p.gain!r}, {self.p.gain:.3g} of {self.p.count})")
+        raise ValueError(f"at most {2.2:g} (got {self.p.gain!r}, {self.p.gain:.3g} of {self.p.count})")
 def output(self, t, u):
     if u[0] > 0.95:
         raise ValueError(f"a is {u[0]}: 100 % too large")
@@ -257,8 +257,9 @@ def output(self, t, u):
 def output(self, t, u):
     a, b = u
     return (
-        math.hypot(a, b) + math.dist((a, b, 1.0), (b, 2.0, a)) + math.atan2(a, b) + math.tanh(a) + math.degrees(b)
-        + math.copysign(a, b) + math.floor(3.0 * a) + math.ceil(3.0 * b) + abs(a) ** 0.37 + a**3 + math.cosh(b),
+        math.hypot(a, b) + math.dist((a, b, 1.0), (b, 2.0, a)) + math.atan2(a, b) + math.tanh(a)
+        + math.degrees(b) + math.copysign(a, b) + math.floor(3.0 * a) + math.ceil(3.0 * b)
+        + abs(a) ** 0.37 + a**3 + math.cosh(b),
     )
 """,
     "extremes and order": """

@@ -54,7 +54,9 @@ REFUSED = {
 def test_what_is_not_understood_is_refused_where_it_is(what, tmp_path):
     body, text, line = REFUSED[what]
     written = source(body)
-    first = written[: written.index("def output" if body.startswith("def output") else "def start")].count("\n")
+    first = written[: written.index("def output" if body.startswith("def output") else "def start")].count(
+        "\n"
+    )
     with component_of(written, tmp_path) as (component, home), pytest.raises(Refused) as refused:
         specialise(component, home)
     assert text in refused.value.text
