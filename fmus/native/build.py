@@ -92,6 +92,7 @@ def native(component: type[Any], home: Path, *, source: str, guid: str, resource
     if sys.platform != "linux" or platform.machine() != "x86_64":
         return Native(why_not=f"native units are built on Linux on x86-64, this is {platform.system()}")
     try:
+        compiler_version(compiler_command())
         text = emit(specialise(component, home), source, guid)
         return _let_through(text, component, guid, resources)
     except Refused as refused:
