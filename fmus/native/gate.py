@@ -24,9 +24,11 @@ from ..usual_ranges import usual_range
 STEPS = 2000
 LENGTHS = (0.001, 0.005, 0.02)
 """Of steps [s]: those of plants, controllers and sensors."""
-FEW, FEWEST, IN_ALL = 100, 5, 6000
+FEW, FEWEST, IN_ALL = 100, 2, 3000
 """Steps with every other value of a parameter: at most, at least, and of all values together about."""
-LIMIT = 120
+MANY = 60
+"""Numbers among parameters from which each is moved once only."""
+LIMIT = 240
 """Processor time [s] that a unit has on its way: a wrong translation may go round for ever."""
 _LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 
@@ -313,6 +315,7 @@ def _restored(beside: _Beside, inputs: Iterator[list[float]], h: float, t: float
 
 def _choices(beside: _Beside, variables: Sequence[Any]) -> Iterator[tuple[str, Callable[[], None]]]:
     """Yield settings of parameters: every choice, every number moved, and values out of range."""
+    many = len(beside.of["parameter"]) > MANY
     for i in beside.of["parameter"]:
         v = variables[i]
         if v.type == "String":
@@ -322,8 +325,12 @@ def _choices(beside: _Beside, variables: Sequence[Any]) -> Iterator[tuple[str, C
         elif v.type == "Integer":
             values = [v.start + 1, max(v.start * 7, 12345), -1]
         else:
-            values = [v.start * 1.25 + 0.01, v.start * 0.6, 0.0, -1.0]
-            values += [x for x in (v.minimum, v.maximum) if x is not None and abs(x) < 1e30]
+            values = [v.start * 1.25 + 0.01]
+            if many:
+                values += [v.minimum - 1.0] if v.minimum is not None else []
+            else:
+                values += [v.start * 0.6, 0.0, -1.0]
+                values += [x for x in (v.minimum, v.maximum) if x is not None and abs(x) < 1e30]
         for value in values:
             yield f"{v.name} = {value!r}", lambda i=i, k=v.type, x=value: beside.call("set", k, [i], [x])  # type: ignore
     reals = [i for i in beside.of["parameter"] if variables[i].type == "Real"]
