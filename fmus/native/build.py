@@ -99,6 +99,8 @@ def native(component: type[Any], home: Path, *, source: str, guid: str, resource
         return Native(why_not=str(refused))
     except BuildError as error:
         return Native(why_not=error.problems[0])
+    except Exception as error:  # whatever it is, the unit itself works
+        return Native(why_not=f"not translated: {type(error).__name__}: {error}")
 
 
 def _let_through(text: str, component: type[Any], guid: str, resources: Path) -> Native:

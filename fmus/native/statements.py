@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from . import ir
-from .evaluate import BINARY, Evaluation
+from .evaluate import BINARY, Evaluation, Promote
 from .merge import items_of
 from .read import Sources
 from .shapes import Known, Memo, Shape, Widening, build, numbers_of, shape_of, types_of
@@ -106,6 +106,11 @@ class Execution(Evaluation):
                 self.at(node)
                 refused.where = self.where()
             raise
+        except (Promote, Unreachable):
+            raise
+        except Exception as error:  # something that nobody has thought of yet
+            self.at(node)
+            raise Refused(f"not translated: {type(error).__name__}: {error}", self.where()) from error
 
     def relevant(self, box: Box, one: Any, other: Any) -> tuple[Any, Any]:
         if box is not self.frame or not isinstance(one, dict) or self._has_closures():
@@ -227,8 +232,6 @@ class Execution(Evaluation):
 
     def promote(self, owner: List, item: Any = UNSET) -> None:
         """Give up following a list of the state item by item, now that its length changes."""
-        from .evaluate import Promote
-
         if owner.path is not None:
             example = item if item is not UNSET else owner.slots[0] if owner.slots else UNSET
             if example is UNSET:
