@@ -46,6 +46,19 @@ _OPERATORS = {
 }  # fmt: skip
 
 
+_PURE = (set, frozenset, str, repr, ord, chr, divmod, pow, format, float, int, bool, tuple, complex, range)
+
+
+def _is_pure(function: Any) -> bool:
+    """Return whether a function does nothing but compute, so that it may be called at build time."""
+    if any(function is pure for pure in _PURE):
+        return True
+    owner = getattr(function, "__self__", None)
+    if isinstance(owner, (str, bytes, int, float, tuple, range, frozenset, dict)):
+        return True
+    return getattr(function, "__module__", "") in ("math", "_operator", "_bisect", "itertools")
+
+
 class Repeated:
     """What `itertools.repeat` gives without end."""
 
@@ -314,7 +327,7 @@ class Calling(Execution):
             if function is known:
                 return self.operate(op, *args)
         plain = [tuple(self.items(x)) if isinstance(x, List) else x for x in args]
-        if all(map(self._is_constant, (*plain, *named.values()))):
+        if _is_pure(function) and all(map(self._is_constant, (*plain, *named.values()))):
             try:
                 return self.imported(function(*plain, **named))
             except Exception as error:
