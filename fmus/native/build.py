@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import platform
 import shutil
 import sys
@@ -20,7 +19,6 @@ from typing import Any
 
 from orchestrator.cache import keep, recall
 from orchestrator.errors import BuildError
-from orchestrator.fmu.native import WANTED
 
 from ..compiler import compile_library, compiler_command, compiler_version
 from .emit import emit
@@ -57,17 +55,17 @@ class Native:
 
 def tools() -> list[str]:
     """Return what decides what a native library is, beside sources (see `evidence`)."""
-    return [f"tool:{TO_WINDOWS}", f"env:{WANTED}"]
+    return [f"tool:{TO_WINDOWS}"]
 
 
 def toolchain() -> str:
     """Return a text that changes with whatever translates, compiles or checks."""
-    return _toolchain(tuple(compiler_command()), os.environ.get(WANTED, ""))
+    return _toolchain(tuple(compiler_command()))
 
 
 @cache
-def _toolchain(compiler: tuple[str, ...], wanted: str) -> str:
-    said = [platform.python_version(), *FLAGS, *LINUX, *WINDOWS, wanted]
+def _toolchain(compiler: tuple[str, ...]) -> str:
+    said = [platform.python_version(), *FLAGS, *LINUX, *WINDOWS]
     for command in (compiler, (TO_WINDOWS,)):
         said += command
         if shutil.which(command[0]):
@@ -87,8 +85,6 @@ def native(component: type[Any], home: Path, *, source: str, guid: str, resource
         guid: of the FMU.
         resources: folder that an instance is told of.
     """
-    if os.environ.get(WANTED) == "python":
-        return Native(why_not=f"{WANTED} asks for Python")
     if sys.platform != "linux" or platform.machine() != "x86_64":
         return Native(why_not=f"native units are built on Linux on x86-64, this is {platform.system()}")
     try:

@@ -11,7 +11,7 @@ from pathlib import Path
 REASON = "extra/org.yawbench.native/native.txt"
 """Path in an archive of why it has no native library; empty if it has one."""
 WANTED = "YAWBENCH_UNITS"
-"""Environment variable: `python` asks for units in Python, at build and at run time."""
+"""Environment variable: `python` asks for units in Python at run time."""
 NATIVE = "native"
 
 

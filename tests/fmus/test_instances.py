@@ -17,6 +17,12 @@ from tests.fmus.programs import python_libraries
 TESTS = Path(__file__).resolve().parent
 
 
+@pytest.fixture(autouse=True)
+def in_python(monkeypatch):
+    """Native units share no interpreter."""
+    monkeypatch.setenv("YAWBENCH_UNITS", "python")
+
+
 def run_apart(script: str, *arguments: str) -> dict:
     """Run a script in a Python of its own with the tests on its path; return what it prints as JSON."""
     command = [sys.executable, "-c", script, *arguments]
