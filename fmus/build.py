@@ -11,14 +11,17 @@ it has; who runs scenarios does not use it (see `upkeep`).
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from components.fmi.roles import ROLES
 from orchestrator.errors import BuildError
 from orchestrator.files import draft_of, remove_draft
+from orchestrator.fmu.native import NATIVE, runs_as
 
 from .c.c_recipe import CRecipe, find_c_components
 from .check import defects, reference_files
@@ -45,6 +48,7 @@ class Report:
     built: list[str] = field(default_factory=list)
     current: list[str] = field(default_factory=list)
     removed: list[str] = field(default_factory=list)
+    in_python: dict[str, str] = field(default_factory=dict)  # built without a native library -> why
     warning: str = ""  # why FMUs that were built have no launcher, if they have none
 
 
@@ -90,28 +94,66 @@ def build_all(
     problems: list[str] = []
     report = Report()
     tell = progress or (lambda name, what: None)
+    stale = []
     for name in chosen:
-        try:
-            mark = component_mark(known[name], root)
-            made = bring_up_to_date(known[name], out / f"{name}.fmu", mark, force)
-        except BuildError as error:  # noqa: PERF203 - all problems are collected
-            problems += error.problems
-            tell(name, "failed")
+        if not force and _is_current(known[name], out / f"{name}.fmu", root):
+            report.current.append(name)
+            tell(name, "current")
         else:
-            (report.built if made else report.current).append(name)
-            tell(name, "built" if made else "current")
+            stale.append(name)
+    for name, found in _built(stale, known, out, root):
+        problems += found
+        if not found:
+            report.built.append(name)
+        tell(name, "failed" if found else "built")
     if problems:
         raise BuildError(problems)
+    report.built.sort(key=chosen.index)
+    for name in report.built:
+        how = runs_as(out / f"{name}.fmu")
+        if how is not None and how != NATIVE:
+            report.in_python[name] = how.removeprefix("Python: ")
     if any(isinstance(known[name], PythonRecipe) for name in report.built):
         report.warning = compile_launcher()[1]
     if components is None and out.is_dir():
         for fmu in sorted(out.glob("*.fmu")):
-            found = read_mark(fmu)
-            if fmu.stem not in known and found is not None and found.is_component:
+            mark = read_mark(fmu)
+            if fmu.stem not in known and mark is not None and mark.is_component:
                 fmu.unlink()
                 report.removed.append(fmu.stem)
                 tell(fmu.stem, "removed")
     return report
+
+
+def _is_current(recipe: Recipe, target: Path, root: Path) -> bool:
+    try:
+        return read_mark(target) == replace(component_mark(recipe, root), key=recipe.key(), tool=TOOL)
+    except (BuildError, OSError):
+        return False
+
+
+def _built(
+    names: list[str], known: Mapping[str, Recipe], out: Path, root: Path
+) -> Iterator[tuple[str, list[str]]]:
+    """Build components, as many at a time as there are processors; yield each with what is wrong with it."""
+    if len(names) < 2:
+        for name in names:
+            yield name, _problems(name, out, root, known)
+        return
+    workers = min(len(names), os.cpu_count() or 1)
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        jobs = {pool.submit(_problems, name, out, root): name for name in names}
+        for job in as_completed(jobs):
+            yield jobs[job], job.result()
+
+
+def _problems(name: str, out: Path, root: Path, known: Mapping[str, Recipe] | None = None) -> list[str]:
+    recipe = (known or find_recipes(root))[name]
+    try:
+        bring_up_to_date(recipe, out / f"{recipe.name}.fmu", component_mark(recipe, root), force=True)
+    except BuildError as error:
+        return list(error.problems)
+    return []
 
 
 def component_mark(recipe: Recipe, root: Path = COMPONENTS) -> BuildStamp:

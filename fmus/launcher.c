@@ -1,4 +1,5 @@
-/* The FMU's binary on Linux: provides Python, then passes every call on to PythonFMU's library.
+/* The FMU's binary on Linux: opens the unit's native library if there is one beside it, and passes every call
+ * on to it. Otherwise it provides Python, and passes them on to PythonFMU's library.
  *
  * PythonFMU 0.7.0's own library has no link to libpython, so only a host that is itself a Python
  * could load it. This launcher lies in its place and opens it, from beside itself, at the first
@@ -25,10 +26,13 @@
 #define EXPORT __attribute__((visibility("default")))
 #define UNLIKELY(x) __builtin_expect(!!(x), 0)
 #define PYTHONFMU "libpythonfmu-export.so"
+#define NATIVE "native.so"
+#define WANTED "YAWBENCH_UNITS" /* "python" for the component itself */
 
-/* PythonFMU's library: loaded once, by whoever instantiates first. */
+/* PythonFMU's library, or the native one: loaded once, by whoever instantiates first. */
 static struct {
     void *handle;
+    bool native; /* it is no PythonFMU's, but the unit itself */
     fmi2InstantiateFn Instantiate;
     fmi2FreeInstanceFn FreeInstance;
 #define MEMBER(name, parameters) fmi2##name##Fn name;
@@ -44,6 +48,7 @@ typedef struct {
     fmi2CallbackFunctions own;
     char *name;
     char *resources;
+    char *guid;
     fmi2Boolean visible;
     bool error_logged; /* during the call in progress */
     bool failed;       /* an error has been logged since the last reset or restored state */
@@ -165,17 +170,17 @@ static void unload(void)
     library.handle = NULL;
 }
 
-static bool open_library(char *problem, size_t size)
+static bool open_library(const char *name, char *problem, size_t size)
 {
     char folder[PATH_MAX], file[PATH_MAX + sizeof PYTHONFMU + 1];
     if (!own_folder(folder)) {
         snprintf(problem, size, "the folder of the FMU's binary cannot be found");
         return false;
     }
-    snprintf(file, sizeof file, "%s/" PYTHONFMU, folder);
+    snprintf(file, sizeof file, "%s/%s", folder, name);
     void *handle = dlopen(file, RTLD_NOW | RTLD_LOCAL);
     if (handle == NULL) {
-        snprintf(problem, size, "PythonFMU's library cannot be opened: %s", dlerror());
+        snprintf(problem, size, "the library %s cannot be opened: %s", name, dlerror());
         return false;
     }
     const struct {
@@ -197,15 +202,27 @@ static bool open_library(char *problem, size_t size)
         memcpy(functions[i].slot, &symbol, sizeof symbol);
     }
     library.handle = handle;
+    library.native = strcmp(name, NATIVE) == 0;
     atexit(unload);
     return true;
+}
+
+/* True if the unit has a native library and nobody asks for Python. */
+static bool is_native(void)
+{
+    char folder[PATH_MAX];
+    const char *wanted = getenv(WANTED);
+    return (wanted == NULL || strcmp(wanted, "python") != 0) && own_folder(folder) &&
+           exists("%s/%s", folder, NATIVE);
 }
 
 static bool load(char *problem, size_t size)
 {
     pthread_mutex_lock(&loading);
     bool ready =
-        library.handle != NULL || (provide_python(&python, problem, size) && open_library(problem, size));
+        library.handle != NULL ||
+        (is_native() ? open_library(NATIVE, problem, size)
+                     : provide_python(&python, problem, size) && open_library(PYTHONFMU, problem, size));
     pthread_mutex_unlock(&loading);
     return ready;
 }
@@ -301,13 +318,14 @@ static void discard(Instance *in)
     free(in->states);
     free(in->name);
     free(in->resources);
+    free(in->guid);
     free(in);
 }
 
 /* PythonFMU's library always logs, so that no error passes unseen; `wanted` decides for the host. */
 static fmi2Component new_stock(Instance *in)
 {
-    return library.Instantiate(in->name, fmi2CoSimulation, "", in->resources, &in->own, in->visible,
+    return library.Instantiate(in->name, fmi2CoSimulation, in->guid, in->resources, &in->own, in->visible,
                                fmi2True);
 }
 
@@ -315,7 +333,6 @@ EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String 
                                      const fmi2CallbackFunctions *functions, fmi2Boolean visible,
                                      fmi2Boolean logging_on)
 {
-    (void)guid; /* not known here: the same launcher serves every FMU */
     char problem[2 * PATH_MAX];
     if (functions == NULL) {
         return NULL;
@@ -341,10 +358,13 @@ EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String 
     in->name = strdup(name);
     in->visible = visible;
     in->log_all = logging_on != fmi2False;
-    in->resources = find_resources(location, problem, sizeof problem);
-    if (in->resources == NULL) {
+    in->guid = strdup(guid == NULL ? "" : guid);
+    if (!library.native) { /* a native unit needs none */
+        in->resources = find_resources(location, problem, sizeof problem);
+    }
+    if (in->resources == NULL && !library.native) {
         tell(functions, name, problem);
-    } else if (in->name != NULL) {
+    } else if (in->name != NULL && in->guid != NULL) {
         in->stock = new_stock(in);
         in->error_logged = false;
     }
@@ -490,6 +510,9 @@ static bool forget(Instance *in, fmi2FMUstate state)
 
 static bool is_empty(fmi2FMUstate state)
 {
+    if (library.native) {
+        return state == NULL;
+    }
     int lock = python.PyGILState_Ensure();
     bool empty = python.PyDict_Size(state) <= 0;
     python.PyGILState_Release(lock);

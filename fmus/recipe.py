@@ -13,10 +13,12 @@ from typing import Any
 
 from components.fmi.roles import ROLES
 from orchestrator.errors import BuildError
+from orchestrator.fmu.native import REASON
 
 from .closure import Parts, Sources
 from .compiler import compile_launcher, compiler_tools
 from .evidence import SourceDigests
+from .native.build import HEADERS, native, toolchain, tools
 from .packing import LIBRARIES, pack
 from .presentation import PAGE, icon
 from .staging import entry_module, missing_signals, staged, variant
@@ -54,15 +56,23 @@ class PythonRecipe:
     def key(self) -> str:
         """Return a hash of all that decides what the FMU's bytes are."""
         parts = [self.name, ".".join(self.module), json.dumps(dict(self.defaults)), _builder(self.role)]
-        parts += [hashlib.sha256(compile_launcher()[0] or b"").hexdigest(), _hash(self._files)]
+        parts += [toolchain(), hashlib.sha256(compile_launcher()[0] or b"").hexdigest(), _hash(self._files)]
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
     def evidence(self) -> dict[str, str]:
         """Return what the key follows from, cheap to look at (see `evidence`)."""
         self._files  # noqa: B018 - found once, with its evidence
-        tools = [f"tool:{file}" for file in LIBRARIES]
+        libraries = [f"tool:{file}" for file in LIBRARIES]
+        translator = [*sorted((HERE / "native").glob("*.py")), *HEADERS.values()]
         return self.sources.evidence[self.module] | SourceDigests().evidence(
-            [*sorted(HERE.glob("*.[pch]*")), *icon(self.role), *tools, *compiler_tools()]
+            [
+                *sorted(HERE.glob("*.[pch]*")),
+                *icon(self.role),
+                *translator,
+                *libraries,
+                *tools(),
+                *compiler_tools(),
+            ]
         )
 
     def make(self) -> tuple[dict[str, bytes], tuple[str, ...]]:
@@ -81,11 +91,20 @@ class PythonRecipe:
             if problems:
                 raise BuildError(problems)
             description = stage.description(component)
-        resources = {f"{package}/{path}": text for path, text in files.items()}
-        resources[f"{entry}.py"] = entry_module(self.name, component)
-        resources["slavemodule.txt"] = entry
-        launcher, _ = compile_launcher()
-        packed = pack(resources, description, name=self.name, version=digest, launcher=launcher)
+            resources = {f"{package}/{path}": text for path, text in files.items()}
+            resources[f"{entry}.py"] = entry_module(self.name, component)
+            resources["slavemodule.txt"] = entry
+            launcher, _ = compile_launcher()
+            packed = pack(resources, description, name=self.name, version=digest, launcher=launcher)
+            made = native(
+                component,
+                stage.folder / package,
+                source="/".join(module) + ".py",
+                guid=description.get("guid", ""),
+                resources=stage.folder,
+            )
+        packed |= made.files
+        packed[REASON] = made.why_not.encode()
         return packed, (package, entry)
 
 

@@ -34,6 +34,7 @@ Experience, SAE 2000-01-1633; the relations are kinematics, all thresholds are c
 """
 
 from dataclasses import dataclass
+from math import inf
 
 from vocabulary.gravity import G
 from vocabulary.wheels import wheels
@@ -43,6 +44,8 @@ from ..fmi.component import Component
 from ..fmi.variables import like, output, parameter, signal
 
 GYRO, ACCELEROMETER, HAND_WHEEL, WHEEL = 1.0, 2.0, 3.0, 4.0
+SIGNALS = (GYRO, ACCELEROMETER, HAND_WHEEL)
+"""Of which the last three rates are made, in their order."""
 INPUTS = ("yaw_rate", "acceleration_y", "steer_angle", "wheel_speed_*", "friction")
 SEEN = (*INPUTS[:3], *wheels("wheel_speed_*"), "friction")
 """What is watched, of which any step may show a fault."""
@@ -126,35 +129,35 @@ class Redundancy(Component):
 
     def configure(self) -> None:
         p = self.p
-        uses = {
-            GYRO: p.uses_yaw_rate,
-            ACCELEROMETER: p.uses_acceleration,
-            HAND_WHEEL: p.uses_steer_angle,
-            WHEEL: p.uses_wheel_speeds,
-        }
-        self.needed = [fault for fault, used in uses.items() if used]
+        self.uses = (
+            (GYRO, p.uses_yaw_rate),
+            (ACCELEROMETER, p.uses_acceleration),
+            (HAND_WHEEL, p.uses_steer_angle),
+            (WHEEL, p.uses_wheel_speeds),
+        )
         self.understeer = 1.0 / p.characteristic_speed**2 if p.characteristic_speed else 0.0
 
     def start(self, t: float, u: list[float]) -> None:
         self.fault = 0.0
-        self.lost: set[float] = set()
+        self.lost = [False] * 3  # gyro, accelerometer, hand wheel
         self.share = 1.0
         self.implied = 0.0
         self.last = (u[0], u[1])
         self.since: list[tuple[float, tuple[float, float, float]] | None] = [None, None]
         self.contradicted = 0.0
         self.off = [0.0] * 4
-        self.rolling = [0, 1, 2, 3]
+        self.rolling = [True] * 4  # wheels that are believed
 
     def advance(self, t: float, h: float, u: list[float]) -> None:
         p = self.p
-        if self.fault in self.needed:
+        if any(used and self.fault == fault for fault, used in self.uses):
             self.share = max(0.0, self.share - h / p.fade_time)
             return
-        if len(self.rolling) < 2:
+        rolling = sum(self.rolling)
+        if rolling < 2:
             return
         r, a_y, delta, *wheels, mu, _ = u
-        median = self._median(wheels)
+        median = self._median(wheels, rolling)
         v = p.wheel_radius * median
         if v < SLOWEST:
             self.since, self.implied, self.contradicted, self.off = [None, None], 0.0, 0.0, [0.0] * 4
@@ -164,11 +167,15 @@ class Redundancy(Component):
         most = mu * G / v
         steered = min(max(v * delta / (length * (1.0 + self.understeer * v * v)), -most), most)
         rates = (r, a_y / v, steered)
-        if not self.lost & {GYRO, ACCELEROMETER}:
+        no_gyro, no_accelerometer, _ = self.lost
+        if not (no_gyro or no_accelerometer):
             self.implied += h * (rates[1] - r - self.implied / p.washout)
             self.contradicted = self._lasting(self.contradicted, h, self._hand_wheel_contradicts(rates))
-        for k in self.rolling if len(self.rolling) > 2 else ():
-            self.off[k] = self._lasting(self.off[k], h, abs(wheels[k] - median) > p.wheel_share * median)
+        if rolling > 2:
+            self.off = [
+                self._lasting(off, h, abs(w - median) > p.wheel_share * median) if rolls else off
+                for rolls, off, w in zip(self.rolling, self.off, wheels, strict=True)
+            ]
         jumps = abs(r - self.last[0]), abs(a_y - self.last[1]) / max(v, SLOW)
         found = self._judged(t + h, (r, a_y), rates, jumps)
         if found:
@@ -178,19 +185,21 @@ class Redundancy(Component):
     def output(self, t: float, u: list[float]) -> tuple[float, ...]:
         return self.share * u[-1], self.fault, self.implied
 
-    def _median(self, wheels: list[float]) -> float:
-        """Return the median speed [rad/s] of the wheels that are believed, two at least."""
-        ordered = sorted([wheels[k] for k in self.rolling])
-        return 0.5 * (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2])
+    def _median(self, wheels: list[float], count: int) -> float:
+        """Return the median speed [rad/s] of the wheels that are believed, `count` of them, two at least."""
+        ordered = sorted([w if rolls else inf for rolls, w in zip(self.rolling, wheels, strict=True)])
+        return 0.5 * (ordered[(count - 1) // 2] + ordered[count // 2])
 
     def _lose(self, found: float) -> None:
         """Believe a signal no more."""
         self.fault = found
         if found == WHEEL:
-            self.rolling = [k for k in self.rolling if self.off[k] <= self.p.lasting]
+            self.rolling = [
+                rolls and off <= self.p.lasting for rolls, off in zip(self.rolling, self.off, strict=True)
+            ]
             self.off = [0.0] * 4
             return
-        self.lost.add(found)
+        self.lost = [lost or found == name for lost, name in zip(self.lost, SIGNALS, strict=True)]
         self.implied = self.contradicted = 0.0
 
     @staticmethod
@@ -213,24 +222,26 @@ class Redundancy(Component):
     ) -> float:
         """Return the number of the first fault that is found, 0 if there is none."""
         p, lost = self.p, self.lost
-        witnesses = [j for j, name in enumerate((GYRO, ACCELEROMETER, HAND_WHEEL)) if name not in lost]
-        inertial = [(k, name) for k, name in ((0, GYRO), (1, ACCELEROMETER)) if name not in lost]
-        for k, name in inertial:
-            if jumps[k] > p.jump:
-                return name
-        for k, name in inertial:
+        for k in (0, 1):
+            if not lost[k] and jumps[k] > p.jump:
+                return SIGNALS[k]
+        for k in (0, 1):
+            if lost[k]:
+                continue
             if seen[k] != self.last[k]:
                 self.since[k] = None
                 continue
             since, then = self.since[k] or (t, rates)
             self.since[k] = since, then
-            others = [abs(rates[j] - then[j]) > p.moved for j in witnesses if j != k]
-            if others and all(others) and t - since >= p.still_time:
-                return name
+            others = [j for j in range(3) if j != k]
+            alone = all(lost[j] for j in others)
+            moved = all(lost[j] or abs(rates[j] - then[j]) > p.moved for j in others)
+            if moved and not alone and t - since >= p.still_time:
+                return SIGNALS[k]
         if abs(self.implied) > p.largest_sideslip:
             gyro, felt, steered = rates
-            at_gyro = HAND_WHEEL in lost or abs(gyro - steered) > abs(felt - steered)
+            at_gyro = lost[2] or abs(gyro - steered) > abs(felt - steered)
             return GYRO if at_gyro else ACCELEROMETER
-        if self.contradicted > p.lasting and HAND_WHEEL not in lost:
+        if self.contradicted > p.lasting and not lost[2]:
             return HAND_WHEEL
         return WHEEL if max(self.off) > p.lasting else 0.0

@@ -63,6 +63,8 @@ def build(components: Components = None, out: BuildFolder = None, force: Force =
     if report.warning:
         why = f"these FMUs load in Python only, they have no launcher: {report.warning}"
         say(f"warning: {why}")
+    for name, why in report.in_python.items():
+        say(f"{name} runs in Python: {why}")
     if report.current:
         total = len(report.built) + len(report.current)
         say(f"{len(report.current)} of {total} FMUs up to date")

@@ -25,8 +25,14 @@ ListedFolder = Annotated[
 ]
 
 
+Units = Annotated[
+    bool,
+    typer.Option("--units", help="List FMUs with how each of them runs: natively, or in Python and why."),
+]
+
+
 @takes("fmus")
-def list(wishes: RunOptions, what: Wanted = None, place: ListedFolder = None) -> None:
+def list(wishes: RunOptions, what: Wanted = None, place: ListedFolder = None, units: Units = False) -> None:
     """List runs, scenarios, FMUs, vehicles, signals or metrics.
 
     Runs are shown with when they began, their scenario, what was changed, how they ended, and the largest
@@ -40,11 +46,18 @@ def list(wishes: RunOptions, what: Wanted = None, place: ListedFolder = None) ->
         recorded_table,
         runs_table,
         signals_table,
+        units_table,
     )
     from ..results.read import found_runs
     from ..scenario import catalogue
     from .progress import print_tables
 
+    if units:
+        found, problems = fmus_in(_folder_of_fmus(place or wishes.fmus))
+        table = units_table(found)
+        table.notes += problems
+        print_tables([table])
+        return
     if what is None:
         tables = [files_table(None, kinds) for kinds in (SCENARIOS, VEHICLES)]
         tables[-1].notes.append("'yawbench list' also lists runs, fmus, signals and metrics.")

@@ -20,6 +20,7 @@ from vocabulary.wheels import WHEELS
 from ..errors import ModelDescriptionError, ScenarioError
 from ..figures.style import shown
 from ..fmu.archive import open_fmu
+from ..fmu.native import runs_as
 from ..labels import changed, changes_in, with_changes
 from ..messages import printable, star
 from ..metrics.measures import catalogue as measures
@@ -205,6 +206,13 @@ def fmus_table(fmus: Sequence[Fmu], problems: Sequence[str]) -> Table:
     for fmu in fmus:
         count = str(len(fmu.of("parameter")))
         table.rows.append([fmu.name, _one_line(fmu.description) or None, count, fmu.generation_tool or None])
+    return table
+
+
+def units_table(fmus: Sequence[Fmu]) -> Table:
+    """Return a table of how FMUs that were built here run: natively, or in Python and why."""
+    table = Table("", ["FMU", "runs as"])
+    table.rows += [[fmu.name, runs_as(fmu.path)] for fmu in fmus]
     return table
 
 

@@ -24,6 +24,7 @@ from .. import checksums
 from ..cache import OF_RESULTS, sources_hash
 from ..errors import ResultsError
 from ..files import read_bytes, reading, reason
+from ..fmu.native import runs_as
 from ..messages import short
 from ..plan import DEFAULT, InputSeries, Instance, Plan, Wire
 from .folder import FAILED, LARGEST, RUN_FILE, refuse_dead
@@ -58,6 +59,7 @@ class FmuRecord(_Part):
     generation_tool: str | None = None
     fmi_version: str = ""
     built: dict[str, Any] | None = None
+    runs_as: str | None = None  # see `fmu.native.runs_as`
     step_size: float | None = None
     tolerance: float | None = None
     parameters: dict[str, Any] = {}
@@ -243,6 +245,7 @@ def _fmu(unit: Instance, plan: Plan) -> dict[str, Any]:
         "generation_tool": fmu.generation_tool,
         "fmi_version": f"{fmu.fmi}.0",
         "built": None if fmu.built is None else asdict(fmu.built),
+        "runs_as": runs_as(fmu.path),
         "step_size": float(unit.period * plan.step),
         "tolerance": unit.tolerance or fmu.tolerance,
         "parameters": dict(unit.parameters),

@@ -35,7 +35,7 @@ def host_command(program: Path, folder: Path) -> list[str]:
 
 def run(command: list[str], empty: Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """Run in an empty folder with next to nothing in the environment."""
-    clean = {"PATH": "/usr/bin:/bin", **environment}
+    clean = {"PATH": "/usr/bin:/bin", "YAWBENCH_UNITS": "python", **environment}
     return subprocess.run(command, cwd=empty, env=clean, capture_output=True, text=True, check=False)
 
 

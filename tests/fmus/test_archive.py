@@ -122,10 +122,12 @@ def test_an_archive_holds_what_the_fmu_needs_and_nothing_else(archive):
     assert [name for name in names if not name.startswith(f"resources/{package}/")] == [
         "binaries/linux64/controller_off.so",
         "binaries/linux64/libpythonfmu-export.so",
+        "binaries/linux64/native.so",
         "binaries/win64/controller_off.dll",
         "documentation/index.html",
         *(f"{FOLDER}/{file}" for file in ("controller_off_in.csv", "controller_off_ref.csv")),
         *(f"{FOLDER}/{file}" for file in ("controller_off_ref.opt", "fmi-ls-manifest.xml")),
+        "extra/org.yawbench.native/native.txt",
         "model.png",
         "modelDescription.xml",
         f"resources/{module}.py",

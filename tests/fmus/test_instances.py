@@ -17,6 +17,12 @@ from tests.fmus.programs import python_libraries
 TESTS = Path(__file__).resolve().parent
 
 
+@pytest.fixture(autouse=True)
+def in_python(monkeypatch):
+    """Native units share no interpreter."""
+    monkeypatch.setenv("YAWBENCH_UNITS", "python")
+
+
 def run_apart(script: str, *arguments: str) -> dict:
     """Run a script in a Python of its own with the tests on its path; return what it prints as JSON."""
     command = [sys.executable, "-c", script, *arguments]
@@ -145,7 +151,7 @@ def test_different_fmus_share_one_interpreter_that_no_unloading_ends(load, unpac
     arguments = []
     for fmu in (first, second):
         arguments += [str(fmu.binary), (fmu.folder / "resources").as_uri()]
-    environment = {"PATH": os.environ["PATH"]}
+    environment = {"PATH": os.environ["PATH"], "YAWBENCH_UNITS": "python"}
     done = subprocess.run([program, *arguments], env=environment, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
 
@@ -160,7 +166,7 @@ def test_python_loaded_with_local_symbols_is_found_and_used(load, tmp_path, host
     for library in libraries:
         command = [program, library, str(fmu.binary), (fmu.folder / "resources").as_uri()]
         # No other Python may be opened: this variable would lead to an error.
-        environment = {"PATH": "/nowhere", "YAWBENCH_LIBPYTHON": "/nowhere"}
+        environment = {"PATH": "/nowhere", "YAWBENCH_LIBPYTHON": "/nowhere", "YAWBENCH_UNITS": "python"}
         if "/usr/lib" not in library:
             environment["PYTHONHOME"] = str(Path(library).parent.parent)
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)

@@ -1,0 +1,286 @@
+/* Arithmetic as CPython has it, lists that grow, and the texts of exceptions: what made units compute with. */
+#include <math.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#if defined __GNUC__
+#define MAYBE_UNUSED __attribute__((unused))
+#else
+#define MAYBE_UNUSED
+#endif
+
+enum { REAL, INTEGER, BOOLEAN, STRING };
+enum { INPUT, OUTPUT, PARAMETER };
+
+/* A variable as the component declares it; `place` is where Variables has it. */
+typedef struct {
+    const char *name;
+    int type, causality;
+    size_t place;
+    double start, min, max;
+    const char *const *choices;
+    int n_choices;
+} Declared;
+
+/* ---- operators ---- */
+
+MAYBE_UNUSED static double mod(double a, double b)
+{
+    double m = fmod(a, b);
+    if (m != 0.0) {
+        return (b < 0.0) != (m < 0.0) ? m + b : m;
+    }
+    return copysign(0.0, b);
+}
+
+MAYBE_UNUSED static double floordiv(double a, double b)
+{
+    double m = fmod(a, b), quotient = (a - m) / b;
+    if (m != 0.0 && (b < 0.0) != (m < 0.0)) {
+        quotient -= 1.0;
+    }
+    if (quotient != 0.0) {
+        double whole = floor(quotient);
+        return quotient - whole > 0.5 ? whole + 1.0 : whole;
+    }
+    return copysign(0.0, a / b);
+}
+
+MAYBE_UNUSED static int undefined_1(double found, double x)
+{
+    return (isnan(found) && !isnan(x)) || (isinf(found) && isfinite(x));
+}
+
+MAYBE_UNUSED static int undefined_2(double found, double x, double y)
+{
+    return isnan(found) && !isnan(x) && !isnan(y);
+}
+
+MAYBE_UNUSED static int complex_power(double a, double b)
+{
+    return a < 0.0 && isfinite(a) && isfinite(b) && b != floor(b);
+}
+
+/* math.hypot and math.dist: the root of a compensated sum of squares, corrected once. */
+MAYBE_UNUSED static double norm(int n, const double *given)
+{
+    double largest = 0.0, sum = 1.0, lost_1 = 0.0, lost_2 = 0.0, lost_3 = 0.0, old, x, t, high, low, root;
+    int exponent, not_a_number = 0;
+    for (int i = 0; i < n; i++) {
+        x = __builtin_fabs(given[i]);
+        not_a_number |= isnan(x);
+        largest = x > largest ? x : largest;
+    }
+    if (isinf(largest)) {
+        return largest;
+    }
+    if (not_a_number) {
+        return NAN;
+    }
+    if (largest == 0.0 || n <= 1) {
+        return largest;
+    }
+    frexp(largest, &exponent);
+    if (exponent <= -1023) { /* too small to be scaled: as subnormal numbers are */
+        double scaled = 0.0;
+        for (int i = 0; i < n; i++) {
+            x = __builtin_fabs(given[i]) / 2.2250738585072014e-308;
+            scaled += x * x;
+        }
+        return 2.2250738585072014e-308 * sqrt(scaled);
+    }
+    const double split = 134217729.0, scale = ldexp(1.0, -exponent);
+    for (int i = 0; i < n; i++) {
+        x = __builtin_fabs(given[i]) * scale;
+        t = x * split, high = t - (t - x), low = x - high;
+        x = high * high;
+        old = sum, sum += x, lost_1 += (old - sum) + x;
+        x = 2.0 * high * low;
+        old = sum, sum += x, lost_2 += (old - sum) + x;
+        lost_3 += low * low;
+    }
+    root = sqrt(sum - 1.0 + (lost_1 + lost_2 + lost_3));
+    x = root;
+    t = x * split, high = t - (t - x), low = x - high;
+    x = -high * high;
+    old = sum, sum += x, lost_1 += (old - sum) + x;
+    x = -2.0 * high * low;
+    old = sum, sum += x, lost_2 += (old - sum) + x;
+    x = -low * low;
+    old = sum, sum += x, lost_3 += (old - sum) + x;
+    x = sum - 1.0 + (lost_1 + lost_2 + lost_3);
+    return (root + x / (2.0 * root)) / scale;
+}
+
+/* sum() from CPython 3.12 on, after A. Neumaier. */
+MAYBE_UNUSED static double compensated_sum(int n, const double *x)
+{
+    double sum = x[0], lost = 0.0;
+    for (int i = 1; i < n; i++) {
+        double t = sum + x[i];
+        lost += __builtin_fabs(sum) >= __builtin_fabs(x[i]) ? (sum - t) + x[i] : (x[i] - t) + sum;
+        sum = t;
+    }
+    return lost != 0.0 && isfinite(lost) ? sum + lost : sum;
+}
+
+/* ---- lists that grow: a ring of items, each of some numbers ---- */
+
+typedef struct {
+    double *items;
+    size_t first, count, capacity;
+} List;
+
+MAYBE_UNUSED static const double *item(const List *list, int width, double index)
+{
+    size_t place = list->first + (size_t)index;
+    return list->items + (place < list->capacity ? place : place - list->capacity) * (size_t)width;
+}
+
+/* Append an item; false where there is no memory for it. */
+MAYBE_UNUSED static int push(List *list, int width, const double *numbers)
+{
+    size_t size = (size_t)width * sizeof *numbers;
+    if (list->count == list->capacity) {
+        size_t capacity = list->capacity > 0 ? 2 * list->capacity : 8;
+        double *items = malloc(capacity * size);
+        if (items == NULL) {
+            return 0;
+        }
+        for (size_t i = 0; i < list->count; i++) {
+            memcpy(items + i * (size_t)width, item(list, width, (double)i), size);
+        }
+        free(list->items);
+        *list = (List){items, 0, list->count, capacity};
+    }
+    size_t place = list->first + list->count++;
+    memcpy(list->items + (place < list->capacity ? place : place - list->capacity) * (size_t)width, numbers, size);
+    return 1;
+}
+
+MAYBE_UNUSED static void drop(List *list, int every)
+{
+    if (every) {
+        list->first = list->count = 0;
+    } else {
+        list->first = list->first + 1 < list->capacity ? list->first + 1 : 0;
+        list->count--;
+    }
+}
+
+/* ---- texts ---- */
+
+typedef struct {
+    const char *kind, *where;
+    char text[2048];
+    size_t length;
+} Problem;
+
+static void say(Problem *problem, const char *text)
+{
+    size_t room = sizeof problem->text - 1 - problem->length, length = strlen(text);
+    length = length < room ? length : room;
+    memcpy(problem->text + problem->length, text, length);
+    problem->length += length;
+    problem->text[problem->length] = '\0';
+}
+
+MAYBE_UNUSED static void begin_problem(Problem *problem, const char *kind, const char *where)
+{
+    problem->kind = kind, problem->where = where;
+    problem->length = 0, problem->text[0] = '\0';
+}
+
+/* Write a number in digits: exponents from `widest` on, and below -4, are written out; ".0" if `real`.
+ * Printf and strtod are used on each other's text alone: what a locale takes for the point does not matter. */
+static void write_digits(char *out, double x, int digits, int widest, int real)
+{
+    char text[40], *end = out, found[24];
+    int n = 0, exponent;
+    if (!isfinite(x)) {
+        strcpy(out, isnan(x) ? "nan" : x > 0.0 ? "inf" : "-inf");
+        return;
+    }
+    snprintf(text, sizeof text, "%.*e", digits - 1, x);
+    for (const char *c = text; *c != 'e'; c++) {
+        if (*c >= '0' && *c <= '9' && n < 20) {
+            found[n++] = *c;
+        }
+    }
+    exponent = atoi(strchr(text, 'e') + 1);
+    while (n > 1 && found[n - 1] == '0') {
+        n--;
+    }
+    if (signbit(x)) {
+        *end++ = '-';
+    }
+    if (exponent < -4 || exponent >= widest) {
+        *end++ = found[0];
+        if (n > 1) {
+            *end++ = '.';
+            memcpy(end, found + 1, (size_t)n - 1), end += n - 1;
+        }
+        sprintf(end, "e%c%02d", exponent < 0 ? '-' : '+', abs(exponent));
+        return;
+    }
+    if (exponent < 0) {
+        *end++ = '0', *end++ = '.';
+        for (int i = -1; i > exponent; i--) {
+            *end++ = '0';
+        }
+        memcpy(end, found, (size_t)n), end += n;
+    } else {
+        for (int i = 0; i <= exponent; i++) {
+            *end++ = i < n ? found[i] : '0';
+        }
+        if (n > exponent + 1) {
+            *end++ = '.';
+            memcpy(end, found + exponent + 1, (size_t)(n - exponent - 1)), end += n - exponent - 1;
+        } else if (real) {
+            *end++ = '.', *end++ = '0';
+        }
+    }
+    *end = '\0';
+}
+
+/* repr() of a float: the fewest digits that give it back. */
+static void write_repr(char *out, double x)
+{
+    char text[40];
+    int digits = 1;
+    for (; digits < 17; digits++) {
+        snprintf(text, sizeof text, "%.*e", digits - 1, x);
+        if (strtod(text, NULL) == x) {
+            break;
+        }
+    }
+    write_digits(out, x, digits, 16, 1);
+}
+
+/* A number in some digits, as :.6g has it; 0: as repr() has it. */
+MAYBE_UNUSED static void say_real(Problem *problem, double x, int digits)
+{
+    char text[64];
+    if (digits == 0) {
+        write_repr(text, x);
+    } else {
+        write_digits(text, x, digits, digits, 0);
+    }
+    say(problem, text);
+}
+
+MAYBE_UNUSED static int write_integer(char *out, double x)
+{
+    return sprintf(out, "%.0f", x);
+}
+
+MAYBE_UNUSED static void say_integer(Problem *problem, double x)
+{
+    char text[400];
+    snprintf(text, sizeof text, "%.0f", x);
+    say(problem, text);
+}

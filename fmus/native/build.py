@@ -1,0 +1,133 @@
+"""The native library of a component: translated, compiled, and let through the gate; or why there is none.
+
+What was compiled and let through is kept in the cache by the C text, the compiler and the Python beside which
+it was driven, so nothing is made twice.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import shutil
+import sys
+import tempfile
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from orchestrator.cache import keep, recall
+from orchestrator.errors import BuildError
+
+from ..compiler import compile_library, compiler_command, compiler_version
+from .emit import emit
+from .gate import differences
+from .specialise import specialise
+from .values import Refused
+
+HERE = Path(__file__).resolve().parent
+HEADERS = {file.name: file for file in (HERE / "arithmetic.h", HERE / "unit.h", HERE.parent / "fmi2.h")}
+NATIVE_LIBRARY = "native.so"
+"""Name of the native library beside the launcher, which opens it by this name."""
+FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-builtin", "-fno-math-errno", "-w", "-fPIC", "-shared",
+         "-fvisibility=hidden")  # fmt: skip
+"""Functions are those of libm, as in CPython: the compiler must neither know nor fuse them."""
+LINUX = ("-Wl,--build-id=none", "-Wl,-z,defs", "-s")
+TO_WINDOWS = "x86_64-w64-mingw32-gcc"
+WINDOWS = ("-static", "-Wl,--no-insert-timestamp", "-s")
+STORE = "native"
+"""Of native libraries in the cache."""
+
+
+@dataclass(frozen=True)
+class Native:
+    """The native libraries of a unit.
+
+    Attributes:
+        files: path in the archive -> content.
+        why_not: why there are none, "" if there are.
+    """
+
+    files: dict[str, bytes] = field(default_factory=dict)
+    why_not: str = ""
+
+
+def tools() -> list[str]:
+    """Return what decides what a native library is, beside sources (see `evidence`)."""
+    return [f"tool:{TO_WINDOWS}"]
+
+
+def toolchain() -> str:
+    """Return a text that changes with whatever translates, compiles or checks."""
+    return _toolchain(tuple(compiler_command()))
+
+
+@cache
+def _toolchain(compiler: tuple[str, ...]) -> str:
+    said = [platform.python_version(), *FLAGS, *LINUX, *WINDOWS]
+    for command in (compiler, (TO_WINDOWS,)):
+        said += command
+        if shutil.which(command[0]):
+            said.append(compiler_version(command))
+    files = sorted([*HERE.glob("*.py"), *HEADERS.values()])
+    said += [hashlib.sha256(file.read_bytes()).hexdigest() for file in files]
+    return "\0".join(said)
+
+
+def native(component: type[Any], home: Path, *, source: str, guid: str, resources: Path) -> Native:
+    """Return the native libraries of a component, or why there are none.
+
+    Args:
+        component: its class, imported.
+        home: folder of its package.
+        source: its file, as a comment names it.
+        guid: of the FMU.
+        resources: folder that an instance is told of.
+    """
+    if sys.platform != "linux" or platform.machine() != "x86_64":
+        return Native(why_not=f"native units are built on Linux on x86-64, this is {platform.system()}")
+    try:
+        compiler_version(compiler_command())
+        text = emit(specialise(component, home), source, guid)
+        return _let_through(text, component, guid, resources)
+    except Refused as refused:
+        return Native(why_not=str(refused))
+    except BuildError as error:
+        return Native(why_not=error.problems[0])
+    except Exception as error:  # whatever it is, the unit itself works
+        return Native(why_not=f"not translated: {type(error).__name__}: {error}")
+
+
+def _let_through(text: str, component: type[Any], guid: str, resources: Path) -> Native:
+    key = hashlib.sha256((text + toolchain()).encode()).hexdigest()[:32]
+    kept = recall(STORE, key)
+    if kept is not None:
+        length = int.from_bytes(kept[:8], "little")
+        said, rest = json.loads(kept[8 : 8 + length]), kept[8 + length :]
+        files = {}
+        for path, size in said["files"]:
+            files[path], rest = rest[:size], rest[size:]
+        return Native(files, said["why_not"])
+    made = _made(text, component, guid, resources)
+    header = {"files": [[path, len(data)] for path, data in made.files.items()], "why_not": made.why_not}
+    head = json.dumps(header).encode()
+    keep(STORE, key, len(head).to_bytes(8, "little") + head + b"".join(made.files.values()))
+    return made
+
+
+def _made(text: str, component: type[Any], guid: str, resources: Path) -> Native:
+    name = component.fmu_name
+    sources = {f"{name}.c": text.encode()} | {n: file.read_bytes() for n, file in HEADERS.items()}
+    compiled = compile_library(compiler_command(), sources, *LINUX, *FLAGS, f"{name}.c", "-lm")
+    files = {f"binaries/linux64/{NATIVE_LIBRARY}": compiled}
+    with tempfile.TemporaryDirectory(prefix="yawbench_") as folder:
+        library = Path(folder, f"{name}.so")
+        library.write_bytes(compiled)
+        found = differences(library, guid, component, resources)
+    if found:
+        return Native(why_not=f"the translation is not the same as Python: {found}")
+    if shutil.which(TO_WINDOWS):
+        made = compile_library([TO_WINDOWS], sources, *WINDOWS, *FLAGS, f"{name}.c", "-lm")
+        files[f"binaries/win64/{name}.dll"] = made
+    return Native(files)

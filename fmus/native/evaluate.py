@@ -1,0 +1,618 @@
+"""Expressions of a component, evaluated as far as they are known at build time."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import inspect
+import re
+import types
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NoReturn
+
+from . import ir
+from .lower import OPERATORS
+from .merge import Merging, alike
+from .read import Source, Sources
+from .shapes import Shape, build, numbers_of, shape_of, types_of
+from .values import (
+    UNSET,
+    Bound,
+    Box,
+    Bytes,
+    Closure,
+    Dict,
+    Failure,
+    Frame,
+    Instance,
+    List,
+    Picked,
+    Refused,
+    Ring,
+    Span,
+    Text,
+    Union,
+    Unreachable,
+    is_number,
+    is_plain,
+    like,
+    same,
+)
+
+BINARY = {
+    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%", ast.Pow: "**",
+    ast.BitAnd: "&", ast.BitOr: "|", ast.BitXor: "^", ast.RShift: ">>", ast.LShift: "<<",
+}  # fmt: skip
+COMPARED = {
+    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
+}  # fmt: skip
+DEEPEST = 60
+"""Calls within each other; chosen: more than components have, fewer than a recursion without end."""
+
+
+class Promote(Exception):
+    """A list of the state changes its length."""
+
+    def __init__(self, path: str, item: Shape) -> None:
+        super().__init__(path)
+        self.path, self.item = path, item
+
+
+@dataclass
+class Call:
+    """A function that is being evaluated."""
+
+    source: Source
+    frame: Frame
+    cls: type | None = None
+    line: int = 0
+
+
+class Evaluation(Merging):
+    """The evaluation of expressions; `statements` adds statements, `calls` what is called."""
+
+    def __init__(self, sources: Sources) -> None:
+        super().__init__()
+        self.sources = sources
+        self.calls: list[Call] = []
+
+    def where(self) -> str:
+        return f"{self.calls[-1].source.file}:{self.calls[-1].line}" if self.calls else ""
+
+    def at(self, node: ast.AST) -> None:
+        """Take note of the line that is being evaluated."""
+        self.calls[-1].line = node.lineno  # type: ignore[attr-defined]
+
+    def evaluate(self, node: ast.expr) -> Any:
+        """Return the value of an expression.
+
+        Raises:
+            Refused: with file and line.
+        """
+        method = getattr(self, f"_{type(node).__name__.lower()}", None)
+        self.at(node)
+        if method is None:
+            raise Refused(f"{type(node).__name__} is not translated: {ast.unparse(node)}", self.where())
+        try:
+            return self.narrowed(method(node))
+        except Refused as refused:
+            if not refused.where:
+                self.at(node)
+                refused.where = self.where()
+            raise
+
+    def end(self, kind: str, message: str) -> NoReturn:
+        """Raise on the path that is being followed, and follow it no further."""
+        self.fail(kind, message)
+        raise Unreachable
+
+    # ---- names and constants ----------------------------------------------------------------
+
+    def _constant(self, node: ast.Constant) -> Any:
+        return node.value
+
+    def _name(self, node: ast.Name) -> Any:
+        call = self.calls[-1]
+        frame: Frame | None = call.frame
+        while frame is not None:
+            found = self.read(frame).get(node.id, UNSET)
+            if found is not UNSET:
+                return self.present(found, "UnboundLocalError", node.id)
+            frame = frame.parent
+        for names in (call.source.cells, call.source.names, vars(builtins)):
+            if node.id in names:
+                return names[node.id]
+        raise Refused(f"{node.id} has no value here")
+
+    def present(self, value: Any, kind: str, name: str) -> Any:
+        """Return a value that is there, or raise as Python does where it is not."""
+        if not isinstance(value, Union) or not any(x is UNSET for x in value.alternatives):
+            return value
+        text = f"cannot access local variable '{name}' where it is not associated with a value"
+
+        def use(x: Any) -> Any:
+            if x is UNSET:
+                self.fail(kind, text if kind == "UnboundLocalError" else name)
+                raise Unreachable
+            return x
+
+        return self.by_form(value, use)
+
+    def _joinedstr(self, node: ast.JoinedStr) -> Any:
+        parts: list[ir.Part] = []
+        for piece in node.values:
+            if isinstance(piece, ast.Constant):
+                parts.append(str(piece.value))
+                continue
+            assert isinstance(piece, ast.FormattedValue)
+            spec = self.evaluate(piece.format_spec) if piece.format_spec else ""
+            parts += self._formatted(self.evaluate(piece.value), spec, piece.conversion == ord("r"))
+        return joined_text(parts)
+
+    def _formatted(self, value: Any, spec: str, as_repr: bool) -> list[ir.Part]:
+        if isinstance(value, Text):
+            return list(value.parts)
+        if isinstance(value, ir.Var):
+            if spec != "" and not re.fullmatch(r"(\.\d)?g", spec):
+                raise Refused(f"the format {spec!r}")
+            return [(value, spec or "r")]
+        if isinstance(value, (tuple, List)) and not is_plain(value):
+            items = self.read(value) if isinstance(value, List) else value
+            opening, closing = "[]" if isinstance(value, List) else "()"
+            parts: list[ir.Part] = [opening]
+            for i, item in enumerate(items):
+                parts += [", "] * bool(i) + self._formatted(item, "", True)
+            return [*parts, ",)" if closing == ")" and len(items) == 1 else closing]
+        if not is_plain(value):
+            raise Refused("a text of something unknown")
+        return [format(repr(value) if as_repr else value, spec)]
+
+    # ---- structures -------------------------------------------------------------------------
+
+    def values(self, nodes: Sequence[ast.expr]) -> list[Any]:
+        """Return the values of expressions, some of which may be starred."""
+        found: list[Any] = []
+        for node in nodes:
+            if isinstance(node, ast.Starred):
+                found += self.items(self.evaluate(node.value))
+            else:
+                found.append(self.evaluate(node))
+        return found
+
+    def _tuple(self, node: ast.Tuple) -> Any:
+        return tuple(self.values(node.elts))
+
+    def _list(self, node: ast.List) -> Any:
+        return List(self.values(node.elts))
+
+    def _dict(self, node: ast.Dict) -> Any:
+        made: dict[Any, Any] = {}
+        for key, value in zip(node.keys, node.values, strict=True):
+            if key is None:
+                inner = self.evaluate(value)
+                made |= self.read(inner) if isinstance(inner, Dict) else inner
+            else:
+                made[self._key(self.evaluate(key))] = self.evaluate(value)
+        return Dict(made)
+
+    @staticmethod
+    def _key(value: Any) -> Any:
+        if not is_plain(value):
+            raise Refused("a key that is known at run time only")
+        return value
+
+    def items(self, value: Any) -> list[Any]:
+        """Return the items of what can be gone through.
+
+        Raises:
+            Refused: how many there are is known at run time only.
+        """
+        value = self.narrowed(value)
+        if isinstance(value, List):
+            return list(self.read(value))
+        if isinstance(value, Dict):
+            return list(self.read(value))
+        if isinstance(value, Picked):
+            return [self.subscript(value, k) for k in range(len(value.items[0]))]
+        if isinstance(value, (ir.Var, Ring, Span, Union, Bytes, Text, Instance)):
+            raise Refused("how many items there are is known at run time only")
+        if isinstance(value, (tuple, list, str, bytes, range, dict, set, frozenset)):
+            return list(value)
+        if hasattr(value, "__iter__"):
+            return [self.imported(x) for x in value]
+        if value is None:
+            self.end("TypeError", "cannot unpack non-iterable NoneType object")
+        raise Refused(f"going through {type(value).__name__}")
+
+    def imported(self, value: Any) -> Any:
+        """Return what a function of Python gave, as the evaluation works with it."""
+        if isinstance(value, list):
+            return List([self.imported(x) for x in value])
+        if type(value) is tuple:
+            return tuple(self.imported(x) for x in value)
+        if type(value) is dict:
+            return Dict({k: self.imported(x) for k, x in value.items()})
+        return value
+
+    # ---- comprehensions ---------------------------------------------------------------------
+
+    def _comprehended(self, generators: list[ast.comprehension], make: Any) -> list[Any]:
+        call, found = self.calls[-1], []
+        inner = replace(call, frame=Frame({}, call.frame))
+
+        def go(k: int) -> None:
+            if k == len(generators):
+                found.append(make())
+                return
+            for item in self.items(self.evaluate(generators[k].iter)):
+                self.assign(generators[k].target, item)  # type: ignore[attr-defined]
+                for condition in generators[k].ifs:
+                    holds = self.facts.known(self.truth_of(self.evaluate(condition)))
+                    if holds is None:
+                        raise Refused("a filter that is known at run time only")
+                    if not holds:
+                        break
+                else:
+                    go(k + 1)
+
+        self.calls.append(inner)
+        try:
+            go(0)
+        finally:
+            self.calls.pop()
+        return found
+
+    def _listcomp(self, node: ast.ListComp) -> Any:
+        return List(self._comprehended(node.generators, lambda: self.evaluate(node.elt)))
+
+    def _generatorexp(self, node: ast.GeneratorExp) -> Any:
+        return tuple(self._comprehended(node.generators, lambda: self.evaluate(node.elt)))
+
+    def _setcomp(self, node: ast.SetComp) -> Any:
+        return frozenset(self._comprehended(node.generators, lambda: self._key(self.evaluate(node.elt))))
+
+    def _dictcomp(self, node: ast.DictComp) -> Any:
+        def make() -> tuple[Any, Any]:
+            return self._key(self.evaluate(node.key)), self.evaluate(node.value)
+
+        return Dict(dict(self._comprehended(node.generators, make)))
+
+    # ---- attributes and items ---------------------------------------------------------------
+
+    def _attribute(self, node: ast.Attribute) -> Any:
+        owner = self.evaluate(node.value)
+        self.at(node)
+        return self.by_form(owner, lambda x: self.attribute(x, node.attr))
+
+    def attribute(self, owner: Any, name: str) -> Any:
+        """Return an attribute."""
+        if isinstance(owner, Picked):
+            owner = self.loaded(owner)
+        if isinstance(owner, Instance):
+            held = self.read(owner)
+            if name in held and held[name] is not UNSET:
+                text = f"'{owner.cls.__name__}' object has no attribute '{name}'"
+                return self.present(held[name], "AttributeError", text)
+            if name == "__class__":
+                return owner.cls
+            return self._of_class(owner, owner.cls, name)
+        if isinstance(owner, (List, Ring, Dict, Text)):
+            return Bound(name, owner)
+        if owner is None:
+            self.end("AttributeError", f"'NoneType' object has no attribute '{name}'")
+        if isinstance(owner, tuple) and hasattr(owner, "_fields") and name not in owner._fields:
+            return self._of_class(owner, type(owner), name)
+        if isinstance(owner, (ir.Var, Box, Closure, Bound, Span, Bytes)):
+            raise Refused(f"the attribute {name} of a {type(owner).__name__}")
+        if isinstance(owner, type):
+            raw = inspect.getattr_static(owner, name, UNSET)
+            if isinstance(raw, classmethod):
+                return Bound(raw.__func__, owner)
+        return getattr(owner, name)
+
+    def _of_class(self, owner: Any, cls: type, name: str) -> Any:
+        raw = inspect.getattr_static(cls, name, UNSET)
+        if raw is UNSET:
+            raise Refused(f"{cls.__name__} has no attribute {name}")
+        if isinstance(raw, staticmethod):
+            return raw.__func__
+        if isinstance(raw, classmethod):
+            return Bound(raw.__func__, cls)
+        if isinstance(raw, property):
+            return self.call(raw.fget, [owner], {})  # type: ignore[attr-defined]
+        if isinstance(raw, types.FunctionType):
+            return Bound(raw, owner)
+        return raw if isinstance(owner, Instance) else getattr(owner, name)
+
+    def _subscript(self, node: ast.Subscript) -> Any:
+        owner, index = self.evaluate(node.value), self.evaluate(node.slice)
+        self.at(node)
+        return self.by_form(owner, lambda x: self.by_form(index, lambda i: self.subscript(x, i)))
+
+    def _slice(self, node: ast.Slice) -> Any:
+        ends = [None if x is None else self.evaluate(x) for x in (node.lower, node.upper, node.step)]
+        if any(isinstance(x, ir.Var) for x in ends):
+            raise Refused("a slice whose ends are known at run time only")
+        return slice(*ends)
+
+    def subscript(self, owner: Any, index: Any) -> Any:
+        """Return owner[index]."""
+        if owner is None:
+            self.end("TypeError", "'NoneType' object is not subscriptable")
+        if isinstance(owner, Ring):
+            return self.ring_item(owner, self.ring_index(owner, index, "list index out of range"))
+        if isinstance(owner, Dict):
+            return self.read(owner)[self._key(index)]
+        if isinstance(owner, Picked):
+            return self._of_picked(owner, index)
+        items = self.read(owner) if isinstance(owner, List) else owner
+        if isinstance(index, ir.Var):
+            index = self.settled(index, self.facts)
+        if isinstance(index, ir.Var):
+            if not isinstance(items, (tuple, list)) or not items:
+                raise Refused("an index that is known at run time only")
+            return self._at(tuple(items), self.within(index, len(items), _beyond(items)))
+        if (
+            isinstance(items, (tuple, list))
+            and isinstance(index, int)
+            and not -len(items) <= index < len(items)
+        ):
+            self.end("IndexError", _beyond(items))
+        found = items[index]
+        return List(found) if isinstance(owner, List) and isinstance(index, slice) else found
+
+    def within(self, index: ir.Operand, count: int, text: str) -> ir.Operand:
+        """Return an index known at run time as one from the beginning, raising where there is no item."""
+        from_end = self.compare("<", index, 0)
+        index = self.branch(from_end, lambda: self.binary("+", index, count), lambda: index)
+        self.require(self.compare(">=", index, 0), "IndexError", text)
+        self.require(self.compare("<", index, count), "IndexError", text)
+        return index
+
+    def _at(self, items: tuple[Any, ...], index: ir.Operand) -> Any:
+        if not isinstance(index, ir.Var):
+            return items[int(index)]
+        if all(is_number(x) for x in items):
+            try:
+                type = ir.type_of(items[0])
+                for item in items:
+                    type = ir.joined(type, ir.type_of(item))
+            except ValueError as error:
+                raise Refused(str(error)) from None
+            target = self.new(type)
+            self.out.append(ir.Load(target, items, index))
+            return target
+        if all(same(x, items[0]) for x in items):
+            return items[0]
+        return Picked(items, index)
+
+    def _of_picked(self, owner: Picked, index: Any) -> Any:
+        rows = [self.read(x) if isinstance(x, List) else x for x in owner.items]
+        if not all(isinstance(row, (tuple, list)) and len(row) == len(rows[0]) for row in rows):
+            raise Refused("an item of a table whose rows are not alike")
+        if not isinstance(index, ir.Var):
+            return self._at(tuple(row[index] for row in rows), owner.index)
+        width = len(rows[0])
+        index = self.within(index, width, _beyond(rows[0]))
+        place = self.binary("+", self.binary("*", owner.index, width), index)
+        return self._at(tuple(x for row in rows for x in row), place)
+
+    def loaded(self, value: Picked) -> Any:
+        """Return an item of a table with its numbers read."""
+        first = value.items[0]
+        if not all(alike(first, x) for x in value.items):
+            raise Refused("an item of a table whose items are not alike")
+        if isinstance(first, tuple):
+            return like(first, [self._whole(self._of_picked(value, k)) for k in range(len(first))])
+        shapes = [shape_of(x, self.read) for x in value.items]
+        pairs = zip(shapes, value.items, strict=True)
+        columns = zip(*[numbers_of(s, x, self.read, self) for s, x in pairs], strict=True)
+        return build(shapes[0], iter([self._at(tuple(column), value.index) for column in columns]))
+
+    def _whole(self, value: Any) -> Any:
+        return self.loaded(value) if isinstance(value, Picked) else value
+
+    # ---- lists of the state -----------------------------------------------------------------
+
+    def ring_length(self, ring: Ring) -> ir.Var:
+        """Return len(ring)."""
+        return self.let(ir.INT, "ring_length", ring.number)
+
+    def ring_index(self, ring: Ring, index: Any, text: str) -> ir.Operand:
+        """Return a place in a list of the state, from its beginning."""
+        length = self.ring_length(ring)
+        if not isinstance(index, ir.Var) and index < 0:
+            index = self.binary("+", length, index)
+            self.require(self.compare(">=", index, 0), "IndexError", text)
+            return index  # type: ignore[no-any-return]
+        if isinstance(index, ir.Var):
+            from_end = self.compare("<", index, 0)
+            place = index
+            index = self.branch(from_end, lambda: self.binary("+", length, place), lambda: place)
+            self.require(self.compare(">=", index, 0), "IndexError", text)
+        self.require(self.compare("<", index, length), "IndexError", text)
+        return index  # type: ignore[no-any-return]
+
+    def ring_item(self, ring: Ring, index: ir.Operand) -> Any:
+        """Return the item at a place that is there."""
+        types = list(types_of(ring.item))
+        read = [self.let(type, "ring_item", ring.number, k, index) for k, type in enumerate(types)]
+        return build(ring.item, iter(read))
+
+    # ---- operators --------------------------------------------------------------------------
+
+    def _binop(self, node: ast.BinOp) -> Any:
+        a, b = self.evaluate(node.left), self.evaluate(node.right)
+        self.at(node)
+        return self.operate(BINARY.get(type(node.op), "@"), a, b)
+
+    def operate(self, op: str, a: Any, b: Any) -> Any:
+        """Return a op b."""
+        if isinstance(a, Union) or isinstance(b, Union):
+            return self.by_form(a, lambda x: self.by_form(b, lambda y: self.operate(op, x, y)))
+        if is_number(a) and is_number(b):
+            return self.binary(op, a, b)
+        if isinstance(a, (List, list)) and op == "+" and isinstance(b, (List, list)):
+            return List([*self.items(a), *self.items(b)])
+        if isinstance(a, List) and op == "*" and isinstance(b, int):
+            return List(self.read(a) * b)
+        if isinstance(a, tuple) and isinstance(b, tuple) and op == "+":
+            return a + b
+        if isinstance(a, tuple) and isinstance(b, int) and op == "*":
+            return a * b
+        if (is_plain(a) and is_plain(b) and None not in (a, b)) or (
+            isinstance(a, frozenset) and isinstance(b, (set, frozenset))
+        ):
+            return OPERATORS[op](a, b)
+        if None in (a, b) and (is_number(a) or is_number(b)):
+            types = f"'{_type_name(a)}' and '{_type_name(b)}'"
+            self.end("TypeError", f"unsupported operand type(s) for {op}: {types}")
+        raise Refused(f"{op} of a {type(a).__name__} and a {type(b).__name__}")
+
+    def _unaryop(self, node: ast.UnaryOp) -> Any:
+        value = self.evaluate(node.operand)
+        self.at(node)
+        if isinstance(node.op, ast.Not):
+            return self.negation(self.truth_of(value))
+        if isinstance(node.op, ast.Invert):
+            raise Refused("~ is not translated")
+        negative = isinstance(node.op, ast.USub)
+        return self.by_form(value, lambda x: self.negative(x) if negative else self.binary("+", x, 0))
+
+    def truth_of(self, value: Any) -> ir.Operand:
+        """Return whether a value counts as true."""
+        if isinstance(value, Union):
+            return self.by_form(value, self.truth_of)  # type: ignore[no-any-return]
+        if is_number(value):
+            return self.truth(value)
+        if isinstance(value, Ring):
+            return self.compare("!=", self.ring_length(value), 0)
+        if isinstance(value, (List, Dict)):
+            return bool(self.read(value))
+        if isinstance(value, Picked):
+            return bool(len(value.items[0]))
+        return bool(value)
+
+    def _boolop(self, node: ast.BoolOp) -> Any:
+        conjunction = isinstance(node.op, ast.And)
+
+        def go(k: int) -> Any:
+            value = self.evaluate(node.values[k])
+            if k == len(node.values) - 1:
+                return value
+            test = self.truth_of(value)
+
+            def stay() -> Any:
+                return self.narrowed(value)
+
+            return self.branch(
+                test, *((lambda: go(k + 1), stay) if conjunction else (stay, lambda: go(k + 1)))
+            )
+
+        return go(0)
+
+    def _ifexp(self, node: ast.IfExp) -> Any:
+        test = self.truth_of(self.evaluate(node.test))
+        return self.branch(test, lambda: self.evaluate(node.body), lambda: self.evaluate(node.orelse))
+
+    def _namedexpr(self, node: ast.NamedExpr) -> Any:
+        value = self.evaluate(node.value)
+        self.assign(node.target, value)  # type: ignore[attr-defined]
+        return value
+
+    def _lambda(self, node: ast.Lambda) -> Any:
+        call = self.calls[-1]
+        return Closure(node, call.frame, call.source, tuple(self.values(node.args.defaults)))
+
+    def _compare(self, node: ast.Compare) -> Any:
+        def go(left: Any, k: int) -> Any:
+            right = self.evaluate(node.comparators[k])
+            self.at(node)
+            holds = self.compared(node.ops[k], left, right)
+            if k == len(node.ops) - 1:
+                return holds
+            return self.branch(self.truth_of(holds), lambda: go(right, k + 1), lambda: False)
+
+        return go(self.evaluate(node.left), 0)
+
+    def compared(self, op: ast.cmpop, a: Any, b: Any) -> ir.Operand:
+        """Return whether a comparison holds."""
+        if isinstance(a, Union) or isinstance(b, Union):
+            return self.by_form(a, lambda x: self.by_form(b, lambda y: self.compared(op, x, y)))  # type: ignore
+        if isinstance(op, (ast.In, ast.NotIn)):
+            found = self._contained(a, b)
+            return found if isinstance(op, ast.In) else self.negation(found)
+        if isinstance(op, (ast.Is, ast.IsNot)):
+            if isinstance(a, ir.Var) and isinstance(b, ir.Var):
+                raise Refused("whether two numbers are the same object")
+            return (a is b) == isinstance(op, ast.Is)
+        if is_number(a) and is_number(b):
+            return self.compare(COMPARED[type(op)], a, b)
+        if isinstance(op, (ast.Eq, ast.NotEq)):
+            equal = self._equal(a, b)
+            return equal if isinstance(op, ast.Eq) else self.negation(equal)
+        if None in (a, b) and (is_number(a) or is_number(b)):
+            types = f"'{_type_name(a)}' and '{_type_name(b)}'"
+            self.end("TypeError", f"'{COMPARED[type(op)]}' not supported between instances of {types}")
+        if is_plain(a) and is_plain(b):
+            return bool(OPERATORS[COMPARED[type(op)]](a, b))
+        raise Refused(f"comparing a {type(a).__name__} and a {type(b).__name__}")
+
+    def _equal(self, a: Any, b: Any) -> ir.Operand:
+        if isinstance(a, Union) or isinstance(b, Union):
+            return self.by_form(a, lambda x: self.by_form(b, lambda y: self._equal(x, y)))  # type: ignore
+        if is_number(a) and is_number(b):
+            return self.compare("==", a, b)
+        lists = isinstance(a, List), isinstance(b, List)
+        if all(lists) or (isinstance(a, tuple) and isinstance(b, tuple)):
+            one, other = self.items(a), self.items(b)
+            return len(one) == len(other) and self._all_equal(list(zip(one, other, strict=True)))
+        if isinstance(a, Box) or isinstance(b, Box):
+            return a is b
+        return not (isinstance(a, ir.Var) or isinstance(b, ir.Var)) and bool(a == b)
+
+    def _all_equal(self, pairs: list[tuple[Any, Any]]) -> ir.Operand:
+        if not pairs:
+            return True
+        return self.branch(  # type: ignore[no-any-return]
+            self._equal(*pairs[0]), lambda: self._all_equal(pairs[1:]), lambda: False
+        )
+
+    def _contained(self, a: Any, b: Any) -> ir.Operand:
+        if is_plain(a) and isinstance(b, (str, dict, set, frozenset, range)):
+            return a in b
+        items = self.items(b)
+
+        def go(k: int) -> ir.Operand:
+            if k == len(items):
+                return False
+            return self.branch(self._equal(a, items[k]), lambda: True, lambda: go(k + 1))  # type: ignore
+
+        return go(0)
+
+
+def _beyond(items: Any) -> str:
+    return f"{'tuple' if isinstance(items, tuple) else 'list'} index out of range"
+
+
+def _type_name(value: Any) -> str:
+    if isinstance(value, ir.Var):
+        return {ir.REAL: "float", ir.BOOL: "bool"}.get(value.type, "int")
+    return type(value).__name__
+
+
+def joined_text(parts: Sequence[ir.Part]) -> str | Text:
+    """Return parts as a text, known where all of them are."""
+    together: list[ir.Part] = []
+    for part in parts:
+        if isinstance(part, str) and together and isinstance(together[-1], str):
+            together[-1] += part
+        else:
+            together.append(part)
+    if all(isinstance(part, str) for part in together):
+        return "".join(part for part in together if isinstance(part, str))
+    return Text(tuple(together))
+
+
+__all__ = ["Call", "Evaluation", "Failure", "Promote", "joined_text"]

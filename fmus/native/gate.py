@@ -1,0 +1,390 @@
+"""The gate: a native unit beside its Python twin, through the same calls, to the last bit.
+
+Both are taken through 2,000 steps at each of three step lengths, with inputs in their usual ranges, a
+hundredth and three times of them; with every value of parameters that have choices, with parameters moved;
+through reset, a second start, states saved, restored and serialized; through parameters out of range and
+inputs that are no numbers. Values, statuses and sentences must be the same. NaN is NaN, whatever its sign.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import os
+import random
+import signal
+import struct
+from collections.abc import Callable, Iterator, Sequence
+from ctypes import CFUNCTYPE, byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from pathlib import Path
+from typing import Any
+
+from ..usual_ranges import usual_range
+
+STEPS = 2000
+LENGTHS = (0.001, 0.005, 0.02)
+"""Of steps [s]: those of plants, controllers and sensors."""
+FEW, FEWEST, IN_ALL = 100, 2, 3000
+"""Steps with every other value of a parameter: at most, at least, and of all values together about."""
+MANY = 60
+"""Numbers among parameters from which each is moved once only."""
+LIMIT = 240
+"""Processor time [s] that a unit has on its way: a wrong translation may go round for ever."""
+_LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
+
+
+class _Callbacks(ctypes.Structure):
+    _fields_ = (
+        ("logger", _LOGGER),
+        *((name, c_void_p) for name in ("allocate", "free", "finished", "environment")),
+    )
+
+
+class Difference(Exception):
+    """What native unit and twin do not have in common."""
+
+
+Answer = tuple[bool, list[str], bytes]
+"""Whether a call succeeded, what was logged, and the values that it gave."""
+
+
+class Native:
+    """A native unit, loaded from its library."""
+
+    def __init__(self, library: Path, guid: str) -> None:
+        self.library = ctypes.CDLL(str(library))
+        self.library.fmi2Instantiate.restype = c_void_p
+        self.said: list[str] = []
+        self._callbacks = _Callbacks(_LOGGER(self._log))
+        call = self.library.fmi2Instantiate
+        made = call(b"gate", c_int(1), guid.encode(), None, byref(self._callbacks), c_int(0), c_int(0))
+        if made is None:
+            raise Difference(f"the native unit does not start: {'; '.join(self.said)}")
+        self.instance = c_void_p(made)
+
+    def _log(self, environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
+        self.said.append(text.decode("utf-8", "replace").replace("%%", "%"))
+
+    def _answer(self, status: int, values: bytes = b"") -> Answer:
+        said, self.said = self.said, []
+        return status == 0, said, values
+
+    def reset(self) -> Answer:
+        return self._answer(self.library.fmi2Reset(self.instance))
+
+    def set(self, kind: str, refs: Sequence[int], values: Sequence[Any]) -> Answer:
+        type: Any = {"Real": c_double, "String": c_char_p}.get(kind, c_int)
+        given = [v.encode() if isinstance(v, str) else v for v in values]
+        call = getattr(self.library, f"fmi2Set{kind}")
+        n = len(refs)
+        return self._answer(call(self.instance, (c_uint * n)(*refs), c_size_t(n), (type * n)(*given)))
+
+    def get(self, refs: Sequence[int]) -> Answer:
+        n = len(refs)
+        values = (c_double * n)()
+        status = self.library.fmi2GetReal(self.instance, (c_uint * n)(*refs), c_size_t(n), values)
+        return self._answer(status, bytes(values))
+
+    def begin(self, t: float) -> Answer:
+        setup = self.library.fmi2SetupExperiment
+        status = setup(self.instance, c_int(0), c_double(0), c_double(t), c_int(0), c_double(0))
+        status |= self.library.fmi2EnterInitializationMode(self.instance)
+        return self._answer(status)
+
+    def end_initialization(self) -> Answer:
+        return self._answer(self.library.fmi2ExitInitializationMode(self.instance))
+
+    def step(self, t: float, h: float) -> Answer:
+        return self._answer(self.library.fmi2DoStep(self.instance, c_double(t), c_double(h), c_int(1)))
+
+    def save(self) -> bytes:
+        """Return the state in bytes, as a host may keep it."""
+        state, size = c_void_p(), c_size_t()
+        self.library.fmi2GetFMUstate(self.instance, byref(state))
+        self.library.fmi2SerializedFMUstateSize(self.instance, state, byref(size))
+        content = ctypes.create_string_buffer(size.value)
+        self.library.fmi2SerializeFMUstate(self.instance, state, content, size)
+        self.library.fmi2FreeFMUstate(self.instance, byref(state))
+        return content.raw
+
+    def restore(self, content: bytes) -> Answer:
+        state = c_void_p()
+        size = c_size_t(len(content))
+        status = self.library.fmi2DeSerializeFMUstate(self.instance, content, size, byref(state))
+        if status == 0:
+            status = self.library.fmi2SetFMUstate(self.instance, state)
+            self.library.fmi2FreeFMUstate(self.instance, byref(state))
+        return self._answer(status)
+
+
+class Twin:
+    """The component itself."""
+
+    def __init__(self, component: type[Any], resources: Path) -> None:
+        self.said: list[str] = []
+        said = self.said
+
+        def log(
+            unit: Any, text: str, status: int = 0, category: str | None = None, debug: object = None
+        ) -> None:
+            if category != "traceback":
+                said.append(text)
+
+        component.log = log
+        self._make = lambda: component(instance_name="gate", resources=str(resources))
+        self.unit = self._make()
+
+    def _answer(self, succeeded: Any = True, values: Sequence[float] = ()) -> Answer:
+        said = list(self.said)
+        self.said.clear()
+        return succeeded is not False and not said, said, struct.pack(f"{len(values)}d", *values)
+
+    def reset(self) -> Answer:
+        self.unit = self._make()
+        return self._answer()
+
+    def set(self, kind: str, refs: Sequence[int], values: Sequence[Any]) -> Answer:
+        getattr(self.unit, f"set_{kind.lower()}")(list(refs), list(values))
+        return self._answer()
+
+    def get(self, refs: Sequence[int]) -> Answer:
+        values = self.unit.get_real(list(refs))
+        return self._answer(values=values)
+
+    def begin(self, t: float) -> Answer:
+        self.unit.setup_experiment(t)
+        self.unit.enter_initialization_mode()
+        return self._answer()
+
+    def end_initialization(self) -> Answer:
+        self.unit.exit_initialization_mode()
+        return self._answer()
+
+    def step(self, t: float, h: float) -> Answer:
+        return self._answer(self.unit.do_step(t, h))
+
+    def save(self) -> bytes:
+        return self.unit._fmu_state_to_bytes(self.unit._get_fmu_state())  # type: ignore[no-any-return]
+
+    def restore(self, content: bytes) -> Answer:
+        self.unit._set_fmu_state(self.unit._fmu_state_from_bytes(content))
+        return self._answer()
+
+
+class _Beside:
+    """Both, called alike."""
+
+    def __init__(self, native: Native, twin: Twin, variables: Sequence[Any]) -> None:
+        self.native, self.twin, self.variables = native, twin, variables
+        self.of = {
+            c: [i for i, v in enumerate(variables) if v.causality == c]
+            for c in ("input", "output", "parameter")
+        }
+        self.told = ""
+
+    def call(self, what: str, *args: Any) -> bool:
+        """Call both and return whether they succeeded."""
+        one, other = getattr(self.native, what)(*args), getattr(self.twin, what)(*args)
+        if one[0] != other[0] or one[1] != other[1] or not _same(one[2], other[2]):
+            raise Difference(f"{self.told}{what}{_shown(args)}: {self._apart(one, other)}")
+        return one[0]  # type: ignore[no-any-return]
+
+    def _apart(self, one: Answer, other: Answer) -> str:
+        if one[0] != other[0]:
+            return f"native {'succeeds' if one[0] else 'fails'}, Python does not: {(one[1] or other[1])[:1]}"
+        if one[1] != other[1]:
+            return f"native says {one[1]}, Python {other[1]}"
+        for i, (a, b) in enumerate(zip(_numbers(one[2]), _numbers(other[2]), strict=True)):
+            if struct.pack("d", a) != struct.pack("d", b):
+                name = self.variables[self.of["output"][i]].name
+                return f"{name} is {a!r} natively, {b!r} in Python"
+        return "values differ"
+
+    def start(self, chosen: Callable[[], None], t: float, inputs: Sequence[float]) -> bool:
+        """Reset both, set parameters, and start."""
+        self.call("reset")
+        chosen()
+        if inputs:
+            self.call("set", "Real", self.of["input"], inputs)
+        return self.call("begin", t) and self.call("end_initialization") and self.outputs()
+
+    def outputs(self) -> bool:
+        return self.call("get", self.of["output"])
+
+    def steps(self, count: int, h: float, inputs: Iterator[list[float]], t: float) -> float:
+        """Take both through steps, until they fail; return the time."""
+        for k in range(count):
+            if self.of["input"]:
+                self.call("set", "Real", self.of["input"], next(inputs))
+            if not self.call("step", t, h):
+                break
+            t += h
+            self.outputs()
+            if k % 50 == 49:  # a step of another length, as a host makes for an event
+                self.call("step", t, 0.37 * h)
+                t += 0.37 * h
+        return t
+
+
+def _numbers(content: bytes) -> tuple[float, ...]:
+    return struct.unpack(f"{len(content) // 8}d", content)
+
+
+def _same(one: bytes, other: bytes) -> bool:
+    return one == other or all(
+        struct.pack("d", a) == struct.pack("d", b) or (math.isnan(a) and math.isnan(b))
+        for a, b in zip(_numbers(one), _numbers(other), strict=True)
+    )
+
+
+def _shown(args: Sequence[Any]) -> str:
+    text = ", ".join(f"{x:.9g}" if isinstance(x, float) else str(x) for x in args)
+    return f"({text[:80]}...)" if len(text) > 80 else f"({text})"
+
+
+def random_inputs(variables: Sequence[Any], seed: str) -> Iterator[list[float]]:
+    """Yield inputs without end: walks, jumps and stays in their usual ranges, smaller and larger ones."""
+    chance = random.Random(seed)
+    ranges = [usual_range(v.name) for v in variables if v.causality == "input"]
+    now = [0.5 * (low + high) for low, high in ranges]
+    scale, kind = 1.0, "walk"
+    while True:
+        if chance.random() < 0.01:
+            scale = chance.choice((0.01, 0.3, 1.0, 1.0, 1.0, 3.0))
+            kind = chance.choice(("walk", "walk", "jump", "stay", "rest"))
+        for i, (low, high) in enumerate(ranges):
+            middle, half = 0.5 * (low + high), 0.5 * (high - low) * scale
+            if kind == "walk":
+                moved = now[i] + half * chance.gauss(0.0, 0.05)
+                now[i] = min(max(moved, middle - half), middle + half)
+            elif kind == "jump" and chance.random() < 0.3:
+                now[i] = middle + half * chance.uniform(-1.0, 1.0)
+            elif kind == "rest":
+                now[i] = 0.0
+        yield list(now)
+
+
+def compare(library: Path, guid: str, component: type[Any], resources: Path, steps: int = STEPS) -> None:
+    """Take a native unit and its twin through everything.
+
+    Raises:
+        Difference: the first one that is found.
+    """
+    variables = component.variables
+    beside = _Beside(Native(library, guid), Twin(component, resources), variables)
+    inputs = random_inputs(variables, component.fmu_name)
+    first = [0.0 if v.start is None else float(v.start) for v in variables if v.causality == "input"]
+
+    def unchanged() -> None:
+        return None
+
+    for h in LENGTHS:
+        beside.told = f"steps of {h:g} s: "
+        if beside.start(unchanged, 0.0, first):
+            t = beside.steps(steps, h, inputs, 0.0)
+            _restored(beside, inputs, h, t)
+    settings = list(_choices(beside, variables))
+    few = max(FEWEST, min(FEW, IN_ALL // max(len(settings), 1)))
+    for told, choose in settings:
+        beside.told = f"{told}: "
+        if beside.start(choose, 0.25, next(inputs)):
+            beside.steps(few, random.Random(told).choice(LENGTHS), inputs, 0.25)
+    for i in beside.of["input"]:
+        for value in (math.nan, math.inf, -math.inf, 1e300, -0.0):
+            beside.told = f"{variables[i].name} = {value}: "
+            if beside.start(unchanged, 0.0, first):
+                t = beside.steps(3, 0.001, inputs, 0.0)
+                beside.call("set", "Real", [i], [value])
+                if beside.call("step", t, 0.001):
+                    beside.outputs()
+                    beside.call("step", t + 0.001, 0.001)
+                beside.call("step", t + 0.002, 0.0)
+
+
+def _restored(beside: _Beside, inputs: Iterator[list[float]], h: float, t: float) -> None:
+    """Save both, go on, restore, and go on from there; then start anew."""
+    kept = beside.native.save(), beside.twin.save()
+    beside.steps(FEW, h, inputs, t)
+    if not kept[1]:  # it cannot be pickled, with a function in it for instance
+        return
+    if beside.native.restore(kept[0])[0] != beside.twin.restore(kept[1])[0]:
+        raise Difference("a saved state is not restored")
+    beside.outputs()
+    beside.steps(FEW, h, inputs, t)
+
+
+def _choices(beside: _Beside, variables: Sequence[Any]) -> Iterator[tuple[str, Callable[[], None]]]:
+    """Yield settings of parameters: every choice, every number moved, and values out of range."""
+    many = len(beside.of["parameter"]) > MANY
+    for i in beside.of["parameter"]:
+        v = variables[i]
+        if v.type == "String":
+            values: list[Any] = [*v.choices, "none of them"]
+        elif v.type == "Boolean":
+            values = [True, False]
+        elif v.type == "Integer":
+            values = [v.start + 1, max(v.start * 7, 12345), -1]
+        else:
+            values = [v.start * 1.25 + 0.01]
+            if many:
+                values += [v.minimum - 1.0] if v.minimum is not None else []
+            else:
+                values += [v.start * 0.6, 0.0, -1.0]
+                values += [x for x in (v.minimum, v.maximum) if x is not None and abs(x) < 1e30]
+        for value in values:
+            yield f"{v.name} = {value!r}", lambda i=i, k=v.type, x=value: beside.call("set", k, [i], [x])  # type: ignore
+    reals = [i for i in beside.of["parameter"] if variables[i].type == "Real"]
+    others = [i for i in beside.of["parameter"] if variables[i].choices or variables[i].type == "Boolean"]
+    for k in range(20):
+
+        def choose(seed: int = k) -> None:
+            own = random.Random(seed)
+            if reals:
+                beside.call(
+                    "set", "Real", reals, [variables[i].start * own.uniform(0.8, 1.25) for i in reals]
+                )
+            for i in others:
+                v = variables[i]
+                beside.call("set", v.type, [i], [own.choice(v.choices or (True, False))])
+
+        yield f"all parameters moved, {k}", choose
+
+
+def differences(library: Path, guid: str, component: type[Any], resources: Path, limit: int = LIMIT) -> str:
+    """Return what tells a native unit from its twin, "" if nothing does, watched from another process.
+
+    Args:
+        library, guid: of the native unit.
+        component, resources: of its twin.
+        limit: processor time [s] that all may take.
+    """
+    import resource  # of POSIX alone, as os.fork is
+
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        text = "the comparison ends"
+        try:
+            os.close(reading)
+            resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
+            compare(library, guid, component, resources)
+            text = ""
+        except Difference as difference:
+            text = str(difference)
+        except BaseException as error:
+            text = f"{type(error).__name__}: {error}"
+        finally:
+            os.write(writing, b"." + text.encode()[:4000])
+            os._exit(0)
+    os.close(writing)
+    with open(reading, "rb") as answers:
+        content = answers.read()
+    _, status = os.waitpid(child, 0)
+    if content:
+        return content[1:].decode("utf-8", "replace")
+    if os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL):
+        return f"it is not done within {limit} s"
+    return f"it dies of signal {os.WTERMSIG(status)}"
+
+
+__all__ = ["Difference", "compare", "differences", "random_inputs"]

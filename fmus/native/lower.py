@@ -1,0 +1,358 @@
+"""Arithmetic of Python as operations of the intermediate form, with the exceptions that it can raise.
+
+Messages are those of the Python that builds. What is known of conditions on the path that is being followed
+(`Facts`) decides further ones.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from . import ir
+from .values import Refused, Unreachable
+
+MASK = 2**64 - 1
+OPERATORS: dict[str, Callable[[Any, Any], Any]] = {
+    "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "**": operator.pow,
+    "//": operator.floordiv, "%": operator.mod, "&": operator.and_, "|": operator.or_, "^": operator.xor,
+    ">>": operator.rshift, "<<": operator.lshift, "<": operator.lt, "<=": operator.le, ">": operator.gt,
+    ">=": operator.ge, "==": operator.eq, "!=": operator.ne,
+}  # fmt: skip
+_NAMES = {"+": "add", "-": "sub", "*": "mul", "&": "and", "|": "or", "^": "xor", ">>": "right"}
+_COMPARED = {"<": "lt", "<=": "le", ">": "gt", ">=": "ge", "==": "eq", "!=": "ne"}
+CAN_OVERFLOW = ("exp", "expm1", "sinh", "cosh")
+ALWAYS_DEFINED = ("atan", "atan2", "tanh", "fabs", "copysign", "floor", "ceil", "trunc")
+DOMAIN = ("sqrt", "sin", "cos", "tan", "asin", "acos", "log", "log1p", "log10", "fmod")
+FUNCTIONS = (*CAN_OVERFLOW, *ALWAYS_DEFINED, *DOMAIN)
+
+
+def complaint(call: Callable[[], Any]) -> tuple[str, str]:
+    """Return kind and message of the exception that a call raises."""
+    try:
+        call()
+    except Exception as error:
+        return type(error).__name__, str(error)
+    raise AssertionError("that raises nothing")
+
+
+class Facts:
+    """What is known of conditions on a path."""
+
+    def __init__(self) -> None:
+        self.truths: dict[ir.Var, bool] = {}
+        self.numbers: dict[ir.Var, int] = {}
+        self.others: dict[ir.Var, frozenset[int]] = {}  # what a variable is not
+        self.meanings: dict[ir.Var, tuple[Any, ...]] = {}
+        self.domains: dict[ir.Var, frozenset[int]] = {}  # all values that a variable can have
+
+    def copy(self) -> Facts:
+        """Return facts to which others can be added; what conditions mean is shared."""
+        more = Facts()
+        more.truths, more.numbers, more.others = dict(self.truths), dict(self.numbers), dict(self.others)
+        more.meanings, more.domains = self.meanings, self.domains
+        return more
+
+    def left(self, variable: ir.Var) -> frozenset[int] | None:
+        """Return the values that a variable can have on this path; None if they are not known."""
+        if variable in self.numbers:
+            return frozenset([self.numbers[variable]])
+        if variable not in self.domains:
+            return None
+        return self.domains[variable] - self.others.get(variable, frozenset())
+
+    def learn(self, condition: ir.Operand, holds: bool) -> None:
+        """Take note that a condition holds, or does not."""
+        if not isinstance(condition, ir.Var) or self.truths.get(condition) is holds:
+            return
+        self.truths[condition] = holds
+        kind, *of = self.meanings.get(condition, ("",))
+        if kind == "not":
+            self.learn(of[0], not holds)
+        elif kind == ("and" if holds else "or"):
+            self.learn(of[0], holds)
+            self.learn(of[1], holds)
+        elif kind == "is":
+            tag, number = of
+            if holds:
+                self.numbers[tag] = number
+            else:
+                self.others[tag] = self.others.get(tag, frozenset()) | {number}
+
+    def known(self, condition: ir.Operand) -> bool | None:
+        """Return whether a condition holds; None if that is not known."""
+        if not isinstance(condition, ir.Var):
+            return bool(condition)
+        if condition in self.truths:
+            return self.truths[condition]
+        kind, *of = self.meanings.get(condition, ("",))
+        if kind == "not":
+            found = self.known(of[0])
+            return None if found is None else not found
+        if kind in ("and", "or"):
+            both = self.known(of[0]), self.known(of[1])
+            decisive = kind == "or"
+            return decisive if decisive in both else None if None in both else not decisive
+        if kind == "is":
+            tag, number = of
+            if tag in self.numbers:
+                return self.numbers[tag] == number
+            if number in self.others.get(tag, ()):
+                return False
+            left = self.left(tag)
+            if left is not None and (number not in left or len(left) == 1):
+                return number in left
+        return None
+
+
+class Lowering:
+    """The statements so far, and the arithmetic that adds to them."""
+
+    def __init__(self) -> None:
+        self.out: list[ir.Statement] = []
+        self.facts = Facts()
+        self.choices: dict[ir.Var, tuple[ir.Operand, int, int]] = {}  # of constants: condition, then, else
+        self._count = 0
+
+    def where(self) -> str:
+        """Return file and line of what is being evaluated."""
+        raise NotImplementedError
+
+    def new(self, type: str) -> ir.Var:
+        """Return a new variable."""
+        self._count += 1
+        return ir.Var(f"{type[0]}{self._count}", type)
+
+    def let(self, type: str, op: str, *operands: ir.Operand) -> ir.Var:
+        """Return a new variable that has the value of an operation."""
+        target = self.new(type)
+        self.out.append(ir.Let(target, op, operands))
+        return target
+
+    def fail(self, kind: str, *message: ir.Part) -> None:
+        """Raise on the path that is being followed."""
+        self.out.append(ir.Raise(kind, message, self.where()))
+
+    def require(self, condition: ir.Operand, kind: str, message: str) -> None:
+        """Raise unless a condition holds.
+
+        Raises:
+            Unreachable: it is known not to hold.
+        """
+        known = self.facts.known(condition)
+        if known:
+            return
+        if known is False:
+            self.fail(kind, message)
+            raise Unreachable
+        failing = self.negation(condition)
+        assert isinstance(failing, ir.Var)
+        self.out.append(ir.If(failing, [ir.Raise(kind, (message,), self.where())]))
+        self.facts.learn(condition, True)
+
+    def settled(self, value: ir.Operand, facts: Facts) -> ir.Operand:
+        """Return the number that a variable is on a path, if that is known."""
+        if not isinstance(value, ir.Var):
+            return value
+        if value in self.choices:
+            condition, a, b = self.choices[value]
+            known = facts.known(condition)
+            if known is not None:
+                return value if value.type == ir.BOOL else a if known else b
+        left = facts.left(value)
+        return next(iter(left)) if left is not None and len(left) == 1 else value
+
+    # ---- conditions -------------------------------------------------------------------------
+
+    def truth(self, value: ir.Operand) -> ir.Operand:
+        """Return a number as a condition."""
+        if not isinstance(value, ir.Var):
+            return bool(value)
+        if value.type == ir.BOOL:
+            return value
+        if value in self.choices:
+            condition, a, b = self.choices[value]
+            if bool(a) == bool(b):
+                return bool(a)
+            return condition if a else self.negation(condition)
+        return self.let(ir.BOOL, "ne", value, 0)
+
+    def negation(self, condition: ir.Operand) -> ir.Operand:
+        """Return "not" of a condition."""
+        if not isinstance(condition, ir.Var):
+            return not condition
+        kind, *of = self.facts.meanings.get(condition, ("",))
+        if kind == "not":
+            return of[0]  # type: ignore[no-any-return]
+        found = self.let(ir.BOOL, "not", condition)
+        self.facts.meanings[found] = ("not", condition)
+        return found
+
+    def compare(self, op: str, a: ir.Operand, b: ir.Operand) -> ir.Operand:
+        """Return whether a comparison of two numbers holds."""
+        if not isinstance(a, ir.Var) and not isinstance(b, ir.Var):
+            return bool(OPERATORS[op](a, b))
+        if isinstance(a, ir.Var) and a in self.choices and not isinstance(b, ir.Var):
+            condition, one, other = self.choices[a]
+            first, second = bool(OPERATORS[op](one, b)), bool(OPERATORS[op](other, b))
+            if first == second:
+                return first
+            return condition if first else self.negation(condition)
+        a, b = self.settled(a, self.facts), self.settled(b, self.facts)
+        if not isinstance(a, ir.Var) and not isinstance(b, ir.Var):
+            return bool(OPERATORS[op](a, b))
+        found = self.let(ir.BOOL, _COMPARED[op], a, b)
+        if op == "==" and isinstance(a, ir.Var) and isinstance(b, int) and a.type == ir.INT:
+            self.facts.meanings[found] = ("is", a, int(b))
+        return found
+
+    # ---- arithmetic -------------------------------------------------------------------------
+
+    def binary(self, op: str, a: ir.Operand, b: ir.Operand) -> ir.Operand:
+        """Return a op b."""
+        if not isinstance(a, ir.Var) and not isinstance(b, ir.Var):
+            try:
+                result = OPERATORS[op](a, b)
+            except (ArithmeticError, ValueError) as error:
+                self.fail(type(error).__name__, str(error))
+                raise Unreachable from None
+            if isinstance(result, complex):
+                raise Refused("a complex number")
+            return result  # type: ignore[no-any-return]
+        types = {ir.type_of(a), ir.type_of(b)}
+        real = ir.REAL in types
+        if ir.WIDE in types and op not in ("+", "*", "&"):
+            raise Refused("an integer beyond 64 bits")
+        if not real and types & {ir.WORD, ir.WIDE} and op != "/":
+            return self._of_words(op, a, b)
+        if op in ("+", "-", "*"):
+            if real:
+                return self.let(ir.REAL, _NAMES[op], a, b)
+            return self.let(ir.INT, "mul_int" if op == "*" else _NAMES[op], a, b)
+        if op in ("/", "//", "%"):
+            if b == 0 or isinstance(b, ir.Var):
+                one = 1.0 if real else 1
+                self.require(self.compare("!=", b, 0), *complaint(lambda: OPERATORS[op](one, 0 * one)))
+            if op == "/":
+                return self.let(ir.REAL, "div", a, b)
+            name = "floordiv" if op == "//" else "mod"
+            return self.let(ir.REAL, name, a, b) if real else self.let(ir.INT, f"{name}_int", a, b)
+        if op == "**":
+            return self._power(a, b, real)
+        raise Refused(f"{op} of integers of less than 64 bits")
+
+    def _of_words(self, op: str, a: ir.Operand, b: ir.Operand) -> ir.Var:
+        wide = ir.WIDE in (ir.type_of(a), ir.type_of(b))
+        if op in ("+", "*"):
+            return self.let(ir.WIDE, f"{_NAMES[op]}_word", a, b)
+        if op == "&" and MASK in (a, b):
+            return self.let(ir.WORD, "word", b if a == MASK else a)
+        if op in ("&", "|", "^") and not wide:
+            return self.let(ir.WORD, f"{_NAMES[op]}_word", a, b)
+        if op == ">>" and not isinstance(b, ir.Var) and 0 <= b < 64 and not wide:
+            return self.let(ir.WORD, "right_word", a, b)
+        raise Refused(f"{op} of integers of 64 bits")
+
+    def _power(self, a: ir.Operand, b: ir.Operand, real: bool) -> ir.Var:
+        if not real and not (isinstance(b, int) and 0 <= b <= 8):
+            raise Refused("a power of integers whose exponent is not a small number")
+        if isinstance(b, ir.Var) or b < 0:
+            below = self.compare("<", b, 0)
+            zero = self.compare("==", a, 0)
+            bad = self.let(ir.BOOL, "both", below, zero)
+            self.require(self.negation(bad), *complaint(lambda: 0.0**-1.0))
+        if isinstance(b, ir.Var) or b != int(b):
+            bad = self.let(ir.BOOL, "complex_power", a, b)
+            self.require(self.negation(bad), "TypeError", "must be real number, not complex")
+        found = self.let(ir.REAL if real else ir.INT, "pow", a, b)
+        bad = self.let(ir.BOOL, "overflown", found, a, b)
+        self.require(self.negation(bad), *complaint(lambda: 1e200**2.0))
+        return found
+
+    def negative(self, a: ir.Operand) -> ir.Operand:
+        """Return -a."""
+        if not isinstance(a, ir.Var):
+            return -a
+        if a.type in (ir.WORD, ir.WIDE):
+            raise Refused("the negative of an integer of 64 bits")
+        return self.let(ir.REAL, "neg", a) if a.type == ir.REAL else self.let(ir.INT, "sub", 0, a)
+
+    def size(self, a: ir.Operand) -> ir.Operand:
+        """Return abs(a)."""
+        if not isinstance(a, ir.Var):
+            return abs(a)
+        if a.type in (ir.WORD, ir.WIDE):
+            return a
+        return self.let(ir.REAL if a.type == ir.REAL else ir.INT, "fabs", a)
+
+    def as_real(self, a: ir.Operand) -> ir.Operand:
+        """Return float(a)."""
+        if not isinstance(a, ir.Var):
+            return float(a)
+        return a if a.type == ir.REAL else self.let(ir.REAL, "real", a)
+
+    def whole(self, op: str, a: ir.Operand) -> ir.Operand:
+        """Return int(a) or round(a), for `op` "trunc" or "rint"; or what "floor" or "ceil" make of it."""
+        rounding: dict[str, Callable[[Any], int]]
+        rounding = {"trunc": int, "rint": round, "floor": math.floor, "ceil": math.ceil}
+        by = rounding[op]
+        if not isinstance(a, ir.Var):
+            try:
+                return by(a)
+            except (ArithmeticError, ValueError) as error:
+                self.fail(type(error).__name__, str(error))
+                raise Unreachable from None
+        if a.type != ir.REAL:
+            return a if a.type != ir.BOOL else self.let(ir.INT, "real", a)
+        bad = self.let(ir.BOOL, "isnan", a)
+        self.require(self.negation(bad), *complaint(lambda: by(math.nan)))
+        bad = self.let(ir.BOOL, "isinf", a)
+        self.require(self.negation(bad), *complaint(lambda: by(math.inf)))
+        return self.let(ir.INT, op, a)
+
+    def function(self, name: str, *operands: ir.Operand) -> ir.Operand:
+        """Return a function of `math` of numbers."""
+        if not any(isinstance(x, ir.Var) for x in operands):
+            try:
+                return getattr(math, name)(*operands)  # type: ignore[no-any-return]
+            except (ArithmeticError, ValueError) as error:
+                self.fail(type(error).__name__, str(error))
+                raise Unreachable from None
+        if name in ("floor", "ceil", "trunc"):
+            return self.whole(name, operands[0])
+        if name in ("isfinite", "isnan", "isinf"):
+            return self.let(ir.BOOL, name, *operands)
+        if name in ("degrees", "radians"):
+            by = 180.0 / math.pi if name == "degrees" else math.pi / 180.0
+            return self.let(ir.REAL, "mul", operands[0], by)
+        if name in ("hypot", "dist"):
+            return self.let(ir.REAL, "norm", *operands)
+        if name == "pow":
+            return self._power(self.as_real(operands[0]), self.as_real(operands[1]), True)
+        if name not in FUNCTIONS:
+            raise Refused(f"math.{name}")
+        found = self.let(ir.REAL, name, *operands)
+        if name in CAN_OVERFLOW:
+            bad = self.let(ir.BOOL, "overflown", found, operands[0])
+            self.require(self.negation(bad), *complaint(lambda: math.exp(1e3)))
+        elif name in DOMAIN:
+            bad = self.let(ir.BOOL, "undefined", found, *operands)
+            self.require(self.negation(bad), *complaint(lambda: math.sqrt(-1.0)))
+        return found
+
+    def total(self, items: list[ir.Operand], start: ir.Operand) -> ir.Operand:
+        """Return sum(items, start), by the summation of the Python that builds."""
+        if not any(isinstance(x, ir.Var) for x in (*items, start)):
+            return sum(items, start)  # type: ignore[arg-type]
+        if COMPENSATED and any(ir.type_of(x) == ir.REAL for x in (*items, start)):
+            return self.let(ir.REAL, "compensated_sum", start, *items)
+        result = start
+        for item in items:
+            result = self.binary("+", result, item)
+        return result
+
+
+COMPENSATED = sum([1.0, 1e100, 1.0, -1e100]) == 2.0
+"""Whether `sum` is compensated, as from CPython 3.12 on."""

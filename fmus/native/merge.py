@@ -1,0 +1,410 @@
+"""Two paths and where they join: what each has changed is taken back, and becomes one value per place.
+
+Numbers that differ are joined in a variable, tuples and objects of one kind item by item; values of
+different form become the alternatives of a union.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from . import ir
+from .lower import Facts, Lowering
+from .values import (
+    ANY,
+    UNSET,
+    Bound,
+    Box,
+    Closure,
+    Frame,
+    Instance,
+    List,
+    Picked,
+    Refused,
+    Ring,
+    Union,
+    Unreachable,
+    is_number,
+    keys_of,
+    like,
+    now,
+    same,
+)
+
+MOST_FORMS = 48
+"""Alternatives of a union; chosen: more than a component has, few enough to see that something grows."""
+
+
+@dataclass
+class Path:
+    """One of two paths: its statements, its value, and what boxes hold at its end."""
+
+    out: list[ir.Statement]
+    facts: Facts
+    value: Any
+    changed: dict[Box, Any]
+    dead: bool
+
+    def slots(self, box: Box) -> Any:
+        return self.changed.get(box, box.slots)
+
+
+def items_of(slots: Any, key: Any) -> Any:
+    """Return what slots hold at a key, or that there is nothing."""
+    return slots[key] if isinstance(slots, list) else slots.get(key, UNSET)
+
+
+def forms(value: Any) -> tuple[Any, ...]:
+    """Return the alternatives of a value."""
+    return value.alternatives if isinstance(value, Union) else (value,)
+
+
+def alike(a: Any, b: Any) -> bool:
+    """Return whether two values can be joined into one of the same form."""
+    if a is b or same(a, b):
+        return True
+    if is_number(a) and is_number(b):
+        return True
+    if isinstance(a, Picked) or isinstance(b, Picked):
+        return False
+    if isinstance(a, tuple) and isinstance(b, tuple):
+        return type(a) is type(b) and len(a) == len(b)
+    if isinstance(a, Box) and isinstance(b, Box) and type(a) is type(b):
+        if isinstance(a, List):
+            return len(a.slots) == len(b.slots)
+        if isinstance(a, Instance) and isinstance(b, Instance) and a.cls is not b.cls:
+            return False
+        return not isinstance(a, Ring) and set(a.slots) == set(b.slots)
+    if isinstance(a, Closure) and isinstance(b, Closure):
+        return a.node is b.node and same(a.defaults, b.defaults)
+    if isinstance(a, Union) or isinstance(b, Union):
+        return False
+    if isinstance(a, Bound) and isinstance(b, Bound):
+        return a.function is b.function and alike(a.owner, b.owner)
+    return False
+
+
+class Merging(Lowering):
+    """Branches, the journal of what is changed, and joins."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.choosers: set[ir.Var] = set()  # parameters that are one of some texts
+        self.maps: dict[ir.Var, tuple[ir.Var, dict[int, int]]] = {}  # variables that follow from another
+        self.journals: list[tuple[int, dict[Box, Any]]] = []  # since when, what boxes held before
+
+    # ---- boxes ------------------------------------------------------------------------------
+
+    def read(self, box: Box) -> Any:
+        """Return what a box holds."""
+        if box.merged is not None and box.merged.changed:
+            raise Refused("an object that has two names is changed")
+        return box.slots
+
+    def write(self, box: Box, key: Any, value: Any) -> None:
+        """Change what a box holds at a key."""
+        self.open(box)[key] = value
+
+    def open(self, box: Box) -> Any:
+        """Return what a box holds, to be changed."""
+        if box.merged is not None:
+            raise Refused("an object that has two names is changed")
+        box.changed = True
+        if self.journals:
+            since, journal = self.journals[-1]
+            if box.age < since and box not in journal:
+                journal[box] = box.slots
+                box.slots = box.slots.copy()
+        return box.slots
+
+    def followed(self, body: Callable[[], Any], facts: Facts) -> Path:
+        """Return what a body comes to, with all that it changes taken back."""
+        outer, known = self.out, self.facts
+        self.out, self.facts = [], facts
+        self.journals.append((now(), {}))
+        value, dead = None, False
+        try:
+            value = body()
+        except Unreachable:
+            dead = True
+        finally:
+            _, journal = self.journals.pop()
+            changed = {box: box.slots for box in journal}
+            for box, before in journal.items():
+                box.slots = before
+            path = Path(self.out, self.facts, value, changed, dead)
+            self.out, self.facts = outer, known
+        return path
+
+    def _adopt(self, path: Path) -> None:
+        for box, slots in path.changed.items():
+            self.open(box)
+            box.slots = slots
+
+    # ---- branches ---------------------------------------------------------------------------
+
+    def branch(self, test: ir.Operand, then: Callable[[], Any], orelse: Callable[[], Any]) -> Any:
+        """Return what `then` returns where a condition holds, `orelse` elsewhere."""
+        known = self.facts.known(test)
+        if known is not None:
+            return then() if known else orelse()
+        assert isinstance(test, ir.Var)
+        paths = []
+        for holds, body in ((True, then), (False, orelse)):
+            facts = self.facts.copy()
+            facts.learn(test, holds)
+            paths.append(self.followed(body, facts))
+        a, b = paths
+        if a.dead or b.dead:
+            live = b if a.dead else a
+            rest: list[ir.Statement] = []
+            if not live.dead:
+                live.out, rest = [], live.out  # what follows needs no arm of its own
+            self.out.append(ir.If(test, a.out, b.out))
+            if live.dead:
+                raise Unreachable
+            self.out += rest
+            self.facts = live.facts
+            self._adopt(live)
+            return live.value
+        join = _Join(self, test, a, b)
+        value = join.of(a.value, b.value)
+        changes = []
+        for box in dict.fromkeys((*a.changed, *b.changed)):
+            one, other = a.slots(box), b.slots(box)
+            if isinstance(one, list) and len(one) != len(other):
+                raise Refused("a list is made longer or shorter on one path only")
+            one, other = self.relevant(box, one, other)
+            keys = range(len(one)) if isinstance(one, list) else dict.fromkeys((*one, *other))
+            merged = {key: join.of(items_of(one, key), items_of(other, key)) for key in keys}
+            changes.append((box, list(merged.values()) if isinstance(one, list) else merged))
+        join.finish()
+        if a.out or b.out:
+            self.out.append(ir.If(test, a.out, b.out))
+        for box, slots in changes:
+            self.open(box)
+            box.slots = slots if isinstance(slots, list) else {k: v for k, v in slots.items()}
+        return value
+
+    def relevant(self, box: Box, one: Any, other: Any) -> tuple[Any, Any]:
+        """Return what a box holds on two paths, without what is of no more use on one of them."""
+        return one, other
+
+    def by_form(self, value: Any, use: Callable[[Any], Any]) -> Any:
+        """Return what `use` makes of the alternative that a value is."""
+        if not isinstance(value, Union):
+            return use(value)
+
+        def from_(possible: list[int]) -> Any:
+            k = possible[0]
+            if len(possible) == 1:
+                return self.by_form(value.alternatives[k], use)
+            test = self.compare("==", value.tag, k)
+            chosen = value.alternatives[k]
+            return self.branch(test, lambda: self.by_form(chosen, use), lambda: from_(possible[1:]))
+
+        return from_(self._possible(value, self.facts))
+
+    def narrowed(self, value: Any, facts: Facts | None = None) -> Any:
+        """Return the alternative that a value is, if that is known."""
+        if isinstance(value, Union):
+            left = self._possible(value, facts or self.facts)
+            if len(left) == 1:
+                return self.narrowed(value.alternatives[left[0]], facts)
+        return value
+
+    def _possible(self, value: Union, facts: Facts) -> list[int]:
+        tag = self.settled(value.tag, facts)
+        if not isinstance(tag, ir.Var):
+            return [int(tag)]
+        left = facts.left(tag)
+        if left is not None:
+            return sorted(left)
+        return [k for k in range(len(value.alternatives)) if k not in facts.others.get(tag, ())]
+
+
+def _values(x: ir.Operand, facts: Facts) -> frozenset[int] | None:
+    if not isinstance(x, ir.Var):
+        return frozenset([int(x)])
+    return facts.left(x)
+
+
+class _Join:
+    """The values of two paths, taken together."""
+
+    def __init__(self, machine: Merging, test: ir.Var, a: Path, b: Path) -> None:
+        self.machine, self.test, self.a, self.b = machine, test, a, b
+        self.boxes: dict[tuple[Box, Box], Box] = {}
+        self.numbers: dict[tuple[Any, Any], ir.Operand] = {}
+
+    def finish(self) -> None:
+        """Mark the objects that have become others."""
+        for (a, b), box in self.boxes.items():
+            a.merged = b.merged = box
+
+    def of(self, a: Any, b: Any) -> Any:
+        """Return what is `a` on one path, `b` on the other."""
+        a, b = self.machine.narrowed(a, self.a.facts), self.machine.narrowed(b, self.b.facts)
+        if a is b or same(a, b) or b is ANY:
+            return a
+        if a is ANY:
+            return b
+        if is_number(a) and is_number(b):
+            return self.number(a, b)
+        if isinstance(a, Picked):
+            a = self._loaded(a, self.a)
+        if isinstance(b, Picked):
+            b = self._loaded(b, self.b)
+        if not alike(a, b):
+            return self.union(a, b)
+        if isinstance(a, tuple):
+            return like(a, [self.of(x, y) for x, y in zip(a, b, strict=True)])
+        if isinstance(a, Box):
+            return self.box(a, b)
+        if isinstance(a, Closure):
+            frame = self.box(a.frame, b.frame)
+            return Closure(a.node, frame, a.source, a.defaults, a.named_defaults)
+        if isinstance(a, Bound):
+            return Bound(a.function, self.of(a.owner, b.owner))
+        raise Refused(f"a value that is {type(a).__name__} on both paths")
+
+    def _loaded(self, value: Picked, path: Path) -> Any:
+        outer, self.machine.out = self.machine.out, path.out
+        try:
+            return self.machine.loaded(value)  # type: ignore[attr-defined]
+        finally:
+            self.machine.out = outer
+
+    def number(self, a: ir.Operand, b: ir.Operand) -> ir.Operand:
+        a, b = self.machine.settled(a, self.a.facts), self.machine.settled(b, self.b.facts)
+        if same(a, b):
+            return a
+        key = (a if isinstance(a, ir.Var) else repr(a)), (b if isinstance(b, ir.Var) else repr(b))
+        if key in self.numbers:
+            return self.numbers[key]
+        mapped = self._mapped(a, b)
+        if mapped is not None and all(k == x for k, x in mapped[1].items()):
+            return mapped[0]
+        try:
+            target = self.machine.new(ir.joined(ir.type_of(a), ir.type_of(b)))
+        except ValueError as error:
+            raise Refused(str(error)) from None
+        self.a.out.append(ir.Let(target, "copy", (a,)))
+        self.b.out.append(ir.Let(target, "copy", (b,)))
+        if isinstance(a, int) and isinstance(b, int):
+            self.machine.choices[target] = (self.test, int(a), int(b))
+        if mapped is not None:
+            self.machine.maps[target] = mapped
+        if target.type == ir.INT:
+            left = _values(a, self.a.facts), _values(b, self.b.facts)
+            if left[0] is not None and left[1] is not None:
+                self.machine.facts.domains[target] = left[0] | left[1]
+        if target.type == ir.BOOL:
+            self._remember(target, a, b)
+        self.numbers[key] = target
+        return target
+
+    def _mapped(self, a: ir.Operand, b: ir.Operand) -> tuple[ir.Var, dict[int, int]] | None:
+        """Return a variable that tells the two paths apart, and the number for each of its values."""
+        kind, *of = self.machine.facts.meanings.get(self.test, ("",))
+        if kind != "is" or isinstance(a, ir.Var) or not isinstance(a, int):
+            return None
+        source, number = of
+        left = self.b.facts.left(source)
+        if left is None:
+            return None
+        if isinstance(b, ir.Var):
+            if b is source:
+                rest = {k: k for k in left}
+            elif b in self.machine.maps and self.machine.maps[b][0] is source:
+                rest = {k: x for k, x in self.machine.maps[b][1].items() if k in left}
+            else:
+                return None
+        elif isinstance(b, int):
+            rest = dict.fromkeys(left, int(b))
+        else:
+            return None
+        return source, {number: int(a), **rest}
+
+    def _remember(self, target: ir.Var, a: ir.Operand, b: ir.Operand) -> None:
+        meanings = self.machine.facts.meanings
+        if b is False or a is True:
+            first: Any = self.test
+            if b is False and a is True:
+                meanings[target] = ("and", first, True)
+            else:
+                meanings[target] = ("and", first, a) if b is False else ("or", first, b)
+        elif a is False or b is True:
+            against = ir.Var(f"not {self.test}", ir.BOOL)  # a meaning only, never computed
+            meanings[against] = ("not", self.test)
+            if a is False and b is True:
+                meanings[target] = ("not", self.test)
+            else:
+                meanings[target] = ("and", against, b) if a is False else ("or", against, a)
+
+    def box(self, a: Box, b: Box) -> Any:
+        if a is b:
+            return a
+        if (a, b) in self.boxes:
+            return self.boxes[a, b]
+        one, other = self.a.slots(a), self.b.slots(b)
+        if isinstance(a, Ring) or (isinstance(a, List) and len(one) != len(other)):
+            raise Refused("a list is made longer or shorter on one path only")
+        made: Box
+        if isinstance(a, Instance):
+            made = Instance(a.cls)
+        elif isinstance(a, List):
+            made = List(one)
+        elif isinstance(a, Frame) and isinstance(b, Frame):
+            parent = self.box(a.parent, b.parent) if a.parent and b.parent else None
+            made = Frame({}, parent)
+        else:
+            made = type(a)({})  # type: ignore[call-arg]
+        self.boxes[a, b] = made
+        keys = keys_of(made) if isinstance(made, List) else dict.fromkeys((*one, *other))
+        joined = {key: self.of(items_of(one, key), items_of(other, key)) for key in keys}
+        made.slots = list(joined.values()) if isinstance(made, List) else joined
+        return made
+
+    def _by_choice(self, a: Any, b: Any) -> Union | None:
+        """Return a union told by the parameter that tells the two paths apart, if one does."""
+        kind, *of = self.machine.facts.meanings.get(self.test, ("",))
+        if kind != "is" or of[0] not in self.machine.choosers:
+            return None
+        source, number = of
+        left = self.b.facts.left(source) or frozenset()
+        alternatives = [ANY] * (max(number, *left) + 1)
+        for k in left:
+            alternatives[k] = b.alternatives[k] if isinstance(b, Union) and b.tag is source else b
+        alternatives[number] = a
+        return Union(source, tuple(alternatives))
+
+    def union(self, a: Any, b: Any) -> Union:
+        chosen = self._by_choice(a, b)
+        if chosen is not None:
+            return chosen
+        alternatives = list(forms(a))
+        places: list[int] = []
+        for value in forms(b):
+            found = next((i for i, x in enumerate(alternatives) if alike(x, value)), None)
+            if found is None:
+                alternatives.append(value)
+                places.append(len(alternatives) - 1)
+            else:
+                alternatives[found] = self.of(alternatives[found], value)
+                places.append(found)
+        if len(alternatives) > MOST_FORMS:
+            raise Refused(f"a value of more than {MOST_FORMS} forms")
+        one: ir.Operand = a.tag if isinstance(a, Union) else 0
+        other: ir.Operand = places[0]
+        if isinstance(b, Union):
+            other = b.tag
+            if places != list(range(len(places))):
+                other = self.machine.new(ir.INT)
+                self.b.out.append(ir.Load(other, tuple(places), b.tag))
+        tag = self.number(one, other)
+        if not isinstance(tag, ir.Var):
+            raise Refused("two forms that cannot be told apart")
+        return Union(tag, tuple(alternatives))

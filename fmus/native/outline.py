@@ -1,0 +1,167 @@
+"""Functions of a component that compute from numbers alone, as functions in C, each made once.
+
+A call is followed apart, with its arguments' numbers as parameters; if it changes nothing and is long enough
+to be worth it, the call stays one. All others are evaluated in place.
+"""
+
+from __future__ import annotations
+
+import ast
+from typing import Any
+
+from . import ir
+from .calls import Calling
+from .evaluate import Call, Promote
+from .lower import Facts
+from .read import Sources
+from .shapes import (
+    Forms,
+    Growing,
+    Held,
+    Items,
+    Known,
+    Leaf,
+    Made,
+    Memo,
+    Shape,
+    build,
+    numbers_of,
+    shape_of,
+    types_of,
+)
+from .values import Box, Frame, Picked, Refused, is_plain
+
+SHORTEST = 40
+"""Statements from which a function stays one; chosen: a call with its arguments takes a dozen."""
+SMALLEST = 25
+"""Nodes of a syntax tree from which it is tried."""
+MOST_RESULTS = 40
+"""Numbers that a function returns at most."""
+
+
+class Library:
+    """The functions that have been made, for all evaluations that keep the same numbers fixed."""
+
+    def __init__(self) -> None:
+        self.made: dict[Any, tuple[ir.Outlined, Shape] | None] = {}
+        self.kept: list[Any] = []  # whose identity is part of a key
+
+
+class Outlining(Calling):
+    """Calls that become functions."""
+
+    def __init__(self, sources: Sources, fixed: set[ir.Var], library: Library) -> None:
+        super().__init__(sources)
+        self.fixed, self.library = fixed, library
+        self._sizes: dict[ast.AST, int] = {}
+
+    def _run(self, call: Call, node: ast.FunctionDef | ast.Lambda) -> Any:
+        if not self.calls or self._size(node) < SMALLEST:
+            return self.inside(call, node)
+        for name, value in call.frame.slots.items():
+            if isinstance(value, Picked):
+                call.frame.slots[name] = self.loaded(value)
+        chosen = {tag: left for tag in self.choosers if (left := self.facts.left(tag)) is not None}
+        given = shape_of(call.frame, self.read, "", Memo(self.fixed))
+        key = id(call.source), id(node), _key(given, {}), frozenset(chosen.items())
+        if key not in self.library.made:
+            self.library.kept.append((call.source, given))
+            self.library.made[key] = self._tried(call, node, given, chosen)
+        found = self.library.made[key]
+        if found is None:
+            return self.inside(call, node)
+        function, result = found
+        numbers = numbers_of(given, call.frame, self.read, self)
+        targets = tuple(self.new(type) for type in types_of(result))
+        self.out.append(ir.Invoke(targets, function, tuple(numbers)))
+        return build(result, iter(targets))
+
+    def _size(self, node: ast.AST) -> int:
+        if node not in self._sizes:
+            self._sizes[node] = sum(1 for _ in ast.walk(node))
+        return self._sizes[node]
+
+    def _tried(
+        self,
+        call: Call,
+        node: ast.FunctionDef | ast.Lambda,
+        given: Shape,
+        chosen: dict[ir.Var, frozenset[int]],
+    ) -> tuple[ir.Outlined, Shape] | None:
+        parameters = tuple(self.new(type) for type in types_of(given))
+        copies: dict[int, Any] = {}
+        frame = build(given, iter(parameters), copies)
+        assert isinstance(frame, Frame)
+        facts = Facts()
+        facts.meanings, facts.domains = self.facts.meanings, self.facts.domains
+        for tag, left in chosen.items():
+            facts.others[tag] = facts.domains[tag] - left
+
+        def run() -> Any:
+            value = self.inside(Call(call.source, frame), node)
+            form = shape_of(value, self.read, "", Memo(self.fixed))
+            return form, tuple(numbers_of(form, value, self.read, self)), value
+
+        try:
+            path = self.followed(run, facts)
+        except (Refused, Promote):
+            return None
+        boxes = [x for x in copies.values() if isinstance(x, Box)]
+        if path.dead or any(x is not frame for x in path.changed):
+            return None
+        form, results, value = path.value
+        if any(map(_is_of_list, ir.every(path.out))):
+            return None  # lists of the state are no numbers
+        if (
+            sum(1 for _ in ir.every(path.out)) < SHORTEST
+            or len(results) > MOST_RESULTS
+            or _holds(value, set(map(id, boxes)), self)
+        ):
+            return None
+        name = f"{getattr(node, 'name', 'lambda')}_{len(self.library.made)}"
+        return ir.Outlined(name, parameters, tuple(path.out), results), form
+
+
+def _is_of_list(statement: ir.Statement) -> bool:
+    if isinstance(statement, ir.Let):
+        return statement.op.startswith("ring_")
+    return isinstance(statement, (ir.Push, ir.Drop))
+
+
+def _holds(value: Any, boxes: set[int], machine: Calling) -> bool:
+    """Return whether a value is or holds one of the objects that a function was given."""
+    if isinstance(value, Box):
+        if id(value) in boxes:
+            return True
+        held = machine.read(value)
+        return any(_holds(x, boxes, machine) for x in (held if isinstance(held, list) else held.values()))
+    if isinstance(value, tuple):
+        return any(_holds(x, boxes, machine) for x in value)
+    if hasattr(value, "alternatives"):
+        return any(_holds(x, boxes, machine) for x in value.alternatives)
+    if hasattr(value, "frame"):
+        return _holds(value.frame, boxes, machine) or _holds(value.frame.parent, boxes, machine)
+    return hasattr(value, "owner") and _holds(value.owner, boxes, machine)
+
+
+def _key(shape: Shape, seen: dict[int, int]) -> Any:
+    """Return what tells a shape from others, the same for all that are alike throughout."""
+    if id(shape) in seen:
+        return "again", seen[id(shape)]
+    if isinstance(shape, Leaf):
+        return shape.type
+    if isinstance(shape, Known):
+        value = shape.value
+        return ("known", type(value), repr(value)) if is_plain(value) else ("known", id(value))
+    if isinstance(shape, Items):
+        return type(shape.sample), tuple(_key(x, seen) for x in shape.items)
+    if isinstance(shape, Held):
+        seen[id(shape)] = len(seen)
+        items = tuple((k, _key(x, seen)) for k, x in shape.items.items())
+        return shape.kind, items, shape.parent and _key(shape.parent, seen)
+    if isinstance(shape, Made):
+        return "made", id(shape.kind), _key(shape.inner, seen)
+    if isinstance(shape, Forms):
+        return "forms", _key(shape.tag, seen), tuple(_key(x, seen) for x in shape.alternatives)
+    assert isinstance(shape, Growing)
+    return "growing", shape.number

@@ -1,0 +1,85 @@
+"""The sources of a component: syntax tree, file and line of every function it uses."""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import inspect
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import FunctionType
+from typing import Any
+
+from .values import Refused
+
+Tree = ast.FunctionDef | ast.Lambda
+
+
+@dataclass(frozen=True)
+class Source:
+    """A function as it is written.
+
+    Attributes:
+        node: its syntax tree.
+        file: as sentences name it, from the folder of the package.
+        names: of the module.
+        cells: variables of the functions around it.
+    """
+
+    node: Tree
+    file: str
+    names: dict[str, Any]
+    cells: dict[str, Any]
+
+
+@cache
+def _functions(file: str, content: bytes) -> dict[tuple[int, str], list[Tree]]:
+    found: dict[tuple[int, str], list[Tree]] = {}
+    for node in ast.walk(ast.parse(content)):
+        if isinstance(node, ast.FunctionDef):
+            first = min([node.lineno, *(d.lineno for d in node.decorator_list)])
+            found.setdefault((first, node.name), []).append(node)
+        elif isinstance(node, ast.Lambda):
+            found.setdefault((node.lineno, "<lambda>"), []).append(node)
+    return found
+
+
+class Sources:
+    """The functions of one package, whose folder is `home`."""
+
+    def __init__(self, home: Path) -> None:
+        self.home = home.resolve()
+        self._known: dict[FunctionType, Source] = {}
+
+    def contains(self, function: FunctionType) -> bool:
+        """Return whether a function is of the package."""
+        return Path(function.__code__.co_filename).is_relative_to(self.home)
+
+    def of(self, function: FunctionType) -> Source:
+        """Return the source of a function.
+
+        Raises:
+            Refused: it has none, or is not the only one in its line.
+        """
+        if function not in self._known:
+            self._known[function] = self._found(function)
+        return self._known[function]
+
+    def _found(self, function: FunctionType) -> Source:
+        code = function.__code__
+        file = Path(code.co_filename)
+        shown = file.relative_to(self.home).as_posix() if self.contains(function) else file.name
+        where = f"{shown}:{code.co_firstlineno}"
+        if not file.is_file():
+            raise Refused(f"{function.__qualname__} has no source", where)
+        nodes = _functions(str(file), file.read_bytes()).get((code.co_firstlineno, code.co_name), [])
+        if len(nodes) != 1:
+            raise Refused(f"{function.__qualname__} cannot be told from others in its line", where)
+        if code.co_flags & (inspect.CO_GENERATOR | inspect.CO_COROUTINE):
+            raise Refused(f"{function.__qualname__} is a generator", where)
+        cells = {}
+        for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
+            with contextlib.suppress(ValueError):  # not filled yet
+                cells[name] = cell.cell_contents
+        return Source(nodes[0], shown, function.__globals__, cells)

@@ -1,0 +1,378 @@
+"""Forms of values that last: what a loop carries from one pass to the next, what a unit keeps between steps.
+
+A shape holds what is always the same and has leaves where numbers are; two values have a shape that is wide
+enough for both. A value becomes the list of its leaves' numbers, and is made of such a list again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from . import ir
+from .merge import Merging, items_of
+from .values import (
+    ANY,
+    UNSET,
+    Bound,
+    Box,
+    Closure,
+    Dict,
+    Frame,
+    Instance,
+    List,
+    Picked,
+    Refused,
+    Ring,
+    Union,
+    is_number,
+    keys_of,
+    like,
+    same,
+)
+
+
+@dataclass(eq=False)
+class Shape:
+    """A form; those below are its kinds."""
+
+
+@dataclass(eq=False)
+class Known(Shape):
+    """Always the same value, known at build time, or always the same object."""
+
+    value: Any
+
+
+@dataclass(eq=False)
+class Leaf(Shape):
+    """A number."""
+
+    type: str
+
+
+@dataclass(eq=False)
+class Items(Shape):
+    """A tuple like `sample`."""
+
+    sample: tuple[Any, ...]
+    items: list[Shape]
+
+
+@dataclass(eq=False)
+class Held(Shape):
+    """A box of one kind; `blank` makes an empty one."""
+
+    kind: Any
+    blank: Callable[[], Box]
+    items: dict[Any, Shape] = field(default_factory=dict)
+    parent: Shape | None = None
+    path: str = ""
+
+
+@dataclass(eq=False)
+class Made(Shape):
+    """A closure or bound method: `make` of what `inner` is."""
+
+    kind: Any
+    make: Callable[[Any], Any]
+    inner: Shape
+
+
+@dataclass(eq=False)
+class Forms(Shape):
+    """One of several shapes, told by a tag."""
+
+    tag: Shape
+    alternatives: list[Shape]
+
+
+@dataclass(eq=False)
+class Growing(Shape):
+    """A list of the state whose length changes."""
+
+    number: int
+    item: Shape
+
+
+Place = Callable[[Box], Any]
+"""Returns what a box holds, at the time in question."""
+
+
+class Memo(dict[Any, Shape]):
+    """Shapes of objects that have been met, and what is fixed.
+
+    Attributes:
+        fixed: variables that are the same in every call.
+        growing: path -> list whose length changes.
+    """
+
+    def __init__(self, fixed: Container[ir.Var] = (), growing: Mapping[str, Growing] | None = None) -> None:
+        super().__init__()
+        self.fixed, self.growing = fixed, growing or {}
+
+
+def shape_of(value: Any, slots: Place, path: str = "", memo: Memo | None = None) -> Shape:
+    """Return the shape of a value in which every unknown number is a leaf."""
+    memo = Memo() if memo is None else memo
+    if isinstance(value, ir.Var):
+        return Known(value) if value in memo.fixed else Leaf(value.type)
+    if isinstance(value, Union):
+        forms = [shape_of(x, slots, f"{path}|{i}", memo) for i, x in enumerate(value.alternatives)]
+        return Forms(Known(value.tag) if value.tag in memo.fixed else Leaf(ir.INT), forms)
+    if isinstance(value, tuple):
+        return Items(value, [shape_of(x, slots, f"{path}.{i}", memo) for i, x in enumerate(value)])
+    if isinstance(value, Ring):
+        return Growing(value.number, value.item)
+    if isinstance(value, Box):
+        if value.fixed:
+            return Known(value)
+        if value in memo:
+            return memo[value]
+        if path in memo.growing and isinstance(value, List):
+            return memo.growing[path]
+        kind, blank = _kind(value)
+        made = Held(kind, blank, path=path)
+        memo[value] = made
+        held = slots(value)
+        for key in range(len(held)) if isinstance(held, list) else list(held):
+            made.items[key] = shape_of(items_of(held, key), slots, f"{path}.{key}", memo)
+        if isinstance(value, Frame) and value.parent is not None:
+            made.parent = shape_of(value.parent, slots, f"{path}.", memo)
+        return made
+    if isinstance(value, Closure):
+        of = value.source, value.defaults, value.named_defaults
+
+        def closure(frame: Any, node: Any = value.node) -> Closure:
+            return Closure(node, frame, *of)
+
+        return Made(value.node, closure, shape_of(value.frame, slots, path, memo))
+    if isinstance(value, Bound):
+        owner = shape_of(value.owner, slots, path, memo)
+        return Made(value.function, partial(Bound, value.function), owner)
+    if isinstance(value, Picked):
+        raise Refused("an item of a table is kept")
+    return Known(value)
+
+
+def _kind(box: Box) -> tuple[Any, Callable[[], Box]]:
+    if isinstance(box, Instance):
+        return box.cls, partial(Instance, box.cls)
+    if isinstance(box, List):
+        return ("list", len(box.slots)), lambda: List([])
+    if isinstance(box, Dict):
+        return ("dict", tuple(box.slots)), lambda: Dict({})
+    return "frame", lambda: Frame({})
+
+
+class Widening:
+    """Shapes that are wide enough for two; remembers pairs, so that what is shared stays shared."""
+
+    def __init__(self) -> None:
+        self._pairs: dict[tuple[int, int], Shape] = {}
+        self._kept: list[Any] = []
+        self.grew = False
+
+    def of(self, a: Shape, b: Shape) -> Shape:
+        """Return a shape for all values of `a` and of `b`; `grew` tells whether it is another than `a`."""
+        if a is b or (isinstance(b, Known) and b.value is ANY):
+            return a
+        if isinstance(a, Known) and a.value is ANY:
+            self.grew = True
+            return b
+        key = id(a), id(b)
+        if key in self._pairs:
+            return self._pairs[key]
+        self._kept.append((a, b))
+        if isinstance(a, Known) and isinstance(b, Known) and same(a.value, b.value):
+            return a
+        types = _number_type(a), _number_type(b)
+        if types[0] and types[1]:
+            try:
+                type = ir.joined(types[0], types[1])
+            except ValueError as error:
+                raise Refused(str(error)) from None
+            if isinstance(a, Leaf) and a.type == type:
+                return a
+            self.grew = True
+            return Leaf(type)
+        if isinstance(a, Items) and isinstance(b, Items) and _alike(a, b):
+            items = [self.of(x, y) for x, y in zip(a.items, b.items, strict=True)]
+            return a if all(x is y for x, y in zip(items, a.items, strict=True)) else Items(a.sample, items)
+        if isinstance(a, Held) and isinstance(b, Held) and _alike(a, b):
+            made = Held(a.kind, a.blank, path=a.path)
+            self._pairs[key] = made
+            nothing = Known(UNSET)
+            for name in dict.fromkeys((*a.items, *b.items)):
+                made.items[name] = self.of(a.items.get(name, nothing), b.items.get(name, nothing))
+            if a.parent is not None and b.parent is not None:
+                made.parent = self.of(a.parent, b.parent)
+            return made
+        if isinstance(a, Made) and isinstance(b, Made) and _alike(a, b):
+            return Made(a.kind, a.make, self.of(a.inner, b.inner))
+        if isinstance(a, Growing) and isinstance(b, Growing) and a.number == b.number:
+            return a
+        return self._forms(a, b)
+
+    def _forms(self, a: Shape, b: Shape) -> Shape:
+        ours = list(a.alternatives) if isinstance(a, Forms) else [a]
+        if not isinstance(a, Forms):
+            self.grew = True
+        places: list[int] = []
+        for shape in b.alternatives if isinstance(b, Forms) else [b]:
+            i = _place(ours, shape, len(places))
+            if i == len(ours):
+                ours.append(shape)
+                self.grew = True
+            else:
+                ours[i] = self.of(ours[i], shape)
+            places.append(i)
+        tag: Shape = Leaf(ir.INT)
+        if isinstance(a, Forms) and isinstance(b, Forms) and places == list(range(len(ours))):
+            tag = self.of(a.tag, b.tag)
+        elif isinstance(a, Forms) and isinstance(a.tag, Known):
+            self.grew = True
+        return Forms(tag, ours)
+
+
+def _number_type(shape: Shape) -> str:
+    if isinstance(shape, Leaf):
+        return shape.type
+    return ir.type_of(shape.value) if isinstance(shape, Known) and is_number(shape.value) else ""
+
+
+def _alike(a: Shape, b: Shape) -> bool:
+    if _number_type(a) and _number_type(b):
+        return True
+    if isinstance(a, Known) and isinstance(b, Known):
+        return same(a.value, b.value)
+    if isinstance(a, Items) and isinstance(b, Items):
+        return type(a.sample) is type(b.sample) and len(a.items) == len(b.items)
+    if isinstance(a, Held) and isinstance(b, Held):
+        return bool(a.kind == b.kind)
+    if isinstance(a, Made) and isinstance(b, Made):
+        return a.kind is b.kind
+    if isinstance(a, Forms) and isinstance(b, Forms):
+        return len(a.alternatives) == len(b.alternatives)
+    if isinstance(a, Growing):
+        return isinstance(b, Growing) and a.number == b.number
+    return False
+
+
+def _place(shapes: list[Shape], form: Shape, wanted: int) -> int:
+    """Return which of some shapes is like a form, the wanted one if it is; their number if none is."""
+    if wanted < len(shapes) and _alike(shapes[wanted], form):
+        return wanted
+    return next((i for i, shape in enumerate(shapes) if _alike(shape, form)), len(shapes))
+
+
+def types_of(shape: Shape) -> Iterator[str]:
+    """Yield the types of a shape's leaves, in their order."""
+    yield from _types(shape, set())
+
+
+def _types(shape: Shape, seen: set[int]) -> Iterator[str]:
+    if isinstance(shape, Leaf):
+        yield shape.type
+    elif isinstance(shape, Items):
+        for item in shape.items:
+            yield from _types(item, seen)
+    elif isinstance(shape, Held) and id(shape) not in seen:
+        seen.add(id(shape))
+        for item in (*shape.items.values(), *((shape.parent,) if shape.parent else ())):
+            yield from _types(item, seen)
+    elif isinstance(shape, Made):
+        yield from _types(shape.inner, seen)
+    elif isinstance(shape, Forms):
+        yield from _types(shape.tag, seen)
+        for item in shape.alternatives:
+            yield from _types(item, seen)
+
+
+def build(shape: Shape, leaves: Iterator[Any], memo: dict[int, Any] | None = None) -> Any:
+    """Return the value of a shape whose leaves have these numbers."""
+    memo = {} if memo is None else memo
+    if isinstance(shape, Leaf):
+        return next(leaves)
+    if isinstance(shape, Known):
+        return shape.value
+    if isinstance(shape, Items):
+        return like(shape.sample, [build(item, leaves, memo) for item in shape.items])
+    if isinstance(shape, Growing):
+        return Ring(shape.number, shape.item)
+    if isinstance(shape, Made):
+        return shape.make(build(shape.inner, leaves, memo))
+    if isinstance(shape, Forms):
+        tag = build(shape.tag, leaves, memo)
+        return Union(tag, tuple(build(item, leaves, memo) for item in shape.alternatives))
+    assert isinstance(shape, Held)
+    if id(shape) not in memo:
+        made = memo[id(shape)] = shape.blank()
+        held = {key: build(item, leaves, memo) for key, item in shape.items.items()}
+        made.slots = list(held.values()) if isinstance(made, List) else held
+        if isinstance(made, List):
+            made.path = shape.path
+        if shape.parent is not None and isinstance(made, Frame):
+            made.parent = build(shape.parent, leaves, memo)
+    return memo[id(shape)]
+
+
+def numbers_of(shape: Shape, value: Any, slots: Place, machine: Merging) -> list[ir.Operand]:
+    """Return the numbers of a value at the leaves of a shape that is wide enough for it."""
+    found: list[ir.Operand] = []
+    _collect(shape, value, slots, machine, found, set())
+    return found
+
+
+def _collect(
+    shape: Shape, value: Any, slots: Place, machine: Merging, found: list[ir.Operand], seen: set[int]
+) -> None:
+    if value is ANY:
+        found += [0] * len(list(_types(shape, seen)))
+    elif isinstance(shape, Leaf):
+        found.append(value)
+    elif isinstance(shape, Items):
+        for item, x in zip(shape.items, value, strict=True):
+            _collect(item, x, slots, machine, found, seen)
+    elif isinstance(shape, Held):
+        if id(shape) in seen:
+            return
+        seen.add(id(shape))
+        held = slots(value)
+        for key, item in shape.items.items():
+            _collect(item, items_of(held, key), slots, machine, found, seen)
+        if shape.parent is not None:
+            _collect(shape.parent, value.parent, slots, machine, found, seen)
+    elif isinstance(shape, Growing):
+        if isinstance(value, List):
+            machine.out.append(ir.Drop(shape.number, every=True))
+            for item in slots(value):
+                numbers = numbers_of(shape.item, item, slots, machine)
+                machine.out.append(ir.Push(shape.number, tuple(numbers)))
+    elif isinstance(shape, Made):
+        inner = value.frame if isinstance(value, Closure) else value.owner
+        _collect(shape.inner, inner, slots, machine, found, seen)
+    elif isinstance(shape, Forms):
+        given = list(value.alternatives) if isinstance(value, Union) else [value]
+        memo = Memo()
+        places: list[int] = []
+        for x in given:
+            form = shape_of(x, slots, "", memo)
+            places.append(_place(shape.alternatives, form, len(places)))
+        tag: ir.Operand = places[0]
+        if isinstance(value, Union):
+            tag = value.tag
+            if places != list(range(len(places))):
+                tag = machine.new(ir.INT)
+                machine.out.append(ir.Load(tag, tuple(places), value.tag))
+        found += [tag] * isinstance(shape.tag, Leaf)
+        for i, mine in enumerate(shape.alternatives):
+            if i in places:
+                _collect(mine, given[places.index(i)], slots, machine, found, seen)
+            else:
+                found += [0] * len(list(_types(mine, seen)))
+
+
+__all__ = ["Forms", "Growing", "Held", "Known", "Leaf", "Shape", "Widening", "build", "keys_of", "numbers_of"]

@@ -1,0 +1,214 @@
+"""A component as four functions: what it does with its parameters, at the start, in a step, and its outputs.
+
+What stays on `self` is the unit's state. Its form is found by following the functions until it no longer
+widens: what is the same in every step is known, every other number has a place in the unit.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from . import ir
+from .evaluate import Promote
+from .outline import Library, Outlining
+from .read import Sources
+from .shapes import Growing, Memo, Shape, Widening, build, numbers_of, shape_of, types_of
+from .values import Instance, List, Refused, Union, is_number
+
+WIDEST = 40
+"""Times a step is followed until the state has its form."""
+STACK = 512 * 1024 * 1024
+"""Of the thread that translates [bytes]: calls within calls are followed by calls within calls."""
+
+
+@dataclass
+class Program:
+    """A component, specialised.
+
+    Attributes:
+        variables: its inputs, outputs and parameters, as it declares them.
+        functions: configure, start, advance, output.
+        reads: variable -> place it is read from.
+        configured, state: types of what it keeps of its parameters, and between steps.
+        rings: number of numbers per item, of each list whose length changes.
+    """
+
+    variables: Sequence[Any]
+    functions: dict[str, ir.Function] = field(default_factory=dict)
+    reads: dict[ir.Var, str] = field(default_factory=dict)
+    configured: list[str] = field(default_factory=list)
+    state: list[str] = field(default_factory=list)
+    rings: list[int] = field(default_factory=list)
+
+
+def specialise(component: type[Any], home: Path) -> Program:
+    """Return a component, whose package lies in the folder `home`, as a program.
+
+    Raises:
+        Refused: what cannot be translated, with file and line.
+    """
+    found: list[Any] = []
+
+    def run() -> None:
+        try:
+            found.append(_Specialising(component, Sources(home)).program())
+        except BaseException as error:
+            found.append(error)
+
+    size, deepest = threading.stack_size(STACK), sys.getrecursionlimit()
+    sys.setrecursionlimit(200_000)
+    try:
+        thread = threading.Thread(target=run)
+        thread.start()
+        thread.join()
+    finally:
+        threading.stack_size(size)
+        sys.setrecursionlimit(deepest)
+    if isinstance(found[0], BaseException):
+        raise found[0]
+    return found[0]  # type: ignore[no-any-return]
+
+
+class _Specialising:
+    def __init__(self, component: type[Any], sources: Sources) -> None:
+        self.component, self.sources = component, sources
+        self.growing: dict[str, Growing] = {}
+        self.reads: dict[ir.Var, str] = {}
+        self.domains: dict[ir.Var, frozenset[int]] = {}
+        of = {
+            c: [v for v in component.variables if v.causality == c] for c in ("input", "output", "parameter")
+        }
+        self.inputs = [self._read(ir.REAL, f"u_{v.name}", f"v->{v.name}") for v in of["input"]]
+        self.outputs = len(of["output"])
+        self.t, self.h = self._read(ir.REAL, "t", "t"), self._read(ir.REAL, "h", "h")
+        self.parameters = Instance(
+            component.Parameters, {v.name: self._parameter(v) for v in of["parameter"]}
+        )
+        self.parameters.fixed = True
+        self.fixed = {x for x in self.reads if self.reads[x].startswith("v->") and x not in self.inputs}
+
+    def _read(self, type: str, name: str, place: str) -> ir.Var:
+        made = ir.Var(name, type)
+        self.reads[made] = place
+        return made
+
+    def _parameter(self, v: Any) -> Any:
+        type = {"Real": ir.REAL, "Boolean": ir.BOOL}.get(v.type, ir.INT)
+        if v.type == "String":
+            if not v.choices:
+                raise Refused(f"the parameter {v.name} is a text without choices")
+            if len(v.choices) == 1:
+                return v.choices[0]
+            made = Union(self._read(ir.INT, f"p_{v.name}", f"v->{v.name}"), tuple(v.choices))
+            self.domains[made.tag] = frozenset(range(len(v.choices)))
+            return made
+        return self._read(type, f"p_{v.name}", f"v->{v.name}")
+
+    def program(self) -> Program:
+        for _ in range(WIDEST):
+            try:
+                return self._attempt()
+            except Promote as found:  # noqa: PERF203 - each attempt follows from the last
+                if found.path in self.growing:
+                    raise Refused("a list whose length changes in ways that are not followed") from None
+                self.growing[found.path] = Growing(len(self.growing), found.item)
+        raise Refused("too many lists whose length changes")
+
+    # ---- one attempt ------------------------------------------------------------------------
+
+    def _attempt(self) -> Program:
+        program = Program(self.component.variables, reads=dict(self.reads))
+        fixed = self.fixed
+        self.libraries = Library(), Library()
+        me, machine = self._run("configure", {})
+        configured = self._shape(me, fixed)
+        program.functions["configure"] = ir.Function(
+            machine.out, _placed("c->c", self._numbers(configured, me, machine))
+        )
+        program.configured = list(types_of(configured))
+        leaves = self._leaves(program, program.configured, "c")
+        fixed = self.all_fixed = fixed | set(leaves)
+        me, started = self._run("start", self._attributes(configured, leaves), self.t, List(self.inputs))
+        state = self._shape(me, fixed)
+        at_start = me
+        for _ in range(WIDEST):
+            program.state = list(types_of(state))
+            leaves = self._leaves(program, program.state, "s")
+            args = self.t, self.h, List(self.inputs)
+            me, advanced = self._run("advance", self._attributes(state, leaves), *args)
+            widening = Widening()
+            wide = widening.of(state, self._shape(me, fixed))
+            if not widening.grew:
+                break
+            state = wide
+        else:
+            raise Refused("a state that takes ever new forms")
+        program.functions["start"] = ir.Function(
+            started.out, _placed("s->s", self._numbers(state, at_start, started))
+        )
+        changes = _placed("s->s", self._numbers(state, me, advanced))
+        program.functions["advance"] = ir.Function(
+            advanced.out,
+            [change for change, leaf in zip(changes, leaves, strict=True) if change[1] is not leaf],
+        )
+        program.functions["output"] = self._output(state, leaves, fixed)
+        program.rings = [len(list(types_of(g.item))) for g in self.growing.values()]
+        for g in self.growing.values():
+            if ir.WORD in types_of(g.item):
+                raise Refused("a list of integers of 64 bits whose length changes")
+        return program
+
+    def _output(self, state: Shape, leaves: list[ir.Var], fixed: set[ir.Var]) -> ir.Function:
+        me, machine = self._run("output", self._attributes(state, leaves), self.t, List(self.inputs))
+        widening = Widening()
+        widening.of(state, self._shape(me, fixed))
+        after = self._numbers(state, me, machine)
+        if widening.grew or any(x is not leaf for x, leaf in zip(after, leaves, strict=True)):
+            raise Refused("output() changes what the unit keeps", self._line_of("output"))
+        given = self.given
+        if isinstance(given, Union) or not isinstance(given, (tuple, List)):
+            raise Refused("output() returns what has several forms", self._line_of("output"))
+        values = machine.items(given)
+        if len(values) != self.outputs or not all(map(is_number, values)):
+            raise Refused("output() returns something other than all outputs", self._line_of("output"))
+        return ir.Function(machine.out, _placed("y", list(map(machine.as_real, values))))
+
+    def _line_of(self, method: str) -> str:
+        source = self.sources.of(getattr(self.component, method))
+        return f"{source.file}:{source.node.lineno}"
+
+    def _run(self, method: str, attributes: dict[str, Any], *args: Any) -> tuple[Instance, Outlining]:
+        me = Instance(self.component, {**attributes, "p": self.parameters})
+        fixed = self.fixed if method == "configure" else self.all_fixed
+        machine = Outlining(self.sources, fixed, self.libraries[method == "configure"])
+        machine.facts.domains |= self.domains
+        machine.choosers |= set(self.domains)
+        self.given = machine.call(machine.attribute(me, method), list(args), {})
+        return me, machine
+
+    def _shape(self, me: Instance, fixed: set[ir.Var]) -> Shape:
+        memo = Memo(fixed, self.growing)
+        return shape_of(me, lambda box: box.slots, "self", memo)
+
+    def _numbers(self, shape: Shape, me: Instance, machine: Outlining) -> list[ir.Operand]:
+        return numbers_of(shape, me, lambda box: box.slots, machine)
+
+    def _attributes(self, shape: Shape, leaves: list[ir.Var]) -> dict[str, Any]:
+        made = build(shape, iter(leaves))
+        assert isinstance(made, Instance)
+        return dict(made.slots)
+
+    def _leaves(self, program: Program, types: list[str], kind: str) -> list[ir.Var]:
+        made = [ir.Var(f"{kind}_{i}", type) for i, type in enumerate(types)]
+        program.reads |= {x: f"{kind}->{kind}{i}" for i, x in enumerate(made)}
+        return made
+
+
+def _placed(prefix: str, numbers: list[ir.Operand]) -> list[tuple[str, ir.Operand]]:
+    """Return numbers with their places: prefix0, prefix1, ..."""
+    return [(f"{prefix}{i}", x) for i, x in enumerate(numbers)]

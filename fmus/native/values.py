@@ -1,0 +1,225 @@
+"""What the evaluation of a component works with, beside plain Python values.
+
+Numbers, strings, tuples, classes and functions that are known at build time are themselves. A number that is
+known at run time only is an `ir.Var`. Objects that can change are boxes, so that what one path changes can be
+taken back before the other is followed; a value that has several forms is a `Union` with a tag.
+"""
+
+from __future__ import annotations
+
+import ast
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from . import ir
+
+
+class Refused(Exception):
+    """What a component does cannot be translated; the text names it."""
+
+    def __init__(self, text: str, where: str = "") -> None:
+        super().__init__(text)
+        self.text, self.where = text, where
+
+    def __str__(self) -> str:
+        return f"{self.text} ({self.where})" if self.where else self.text
+
+
+class Unreachable(Exception):
+    """The path that is being followed has raised an exception."""
+
+
+class _Unset:
+    def __repr__(self) -> str:
+        return "nothing"
+
+
+UNSET = _Unset()
+"""A name or attribute without value."""
+
+
+class _Any:
+    def __repr__(self) -> str:
+        return "anything"
+
+
+ANY = _Any()
+"""A value that nobody looks at."""
+
+
+_numbers = itertools.count()
+
+
+class Box:
+    """An object that can change; the evaluation writes by its journal alone.
+
+    Attributes:
+        age: number in the order in which boxes are made.
+        fixed: it never changes.
+    """
+
+    def __init__(self) -> None:
+        self.age = next(_numbers)
+        self.fixed = False
+        self.slots: Any = {}
+        self.merged: Box | None = None  # what this and another became where two paths joined
+        self.changed = False
+
+
+class Frame(Box):
+    """The names of a call, with those of the function around it."""
+
+    def __init__(self, names: dict[str, Any], parent: Frame | None = None) -> None:
+        super().__init__()
+        self.slots = names
+        self.parent = parent
+
+
+class Instance(Box):
+    """An instance of a class of the component's package."""
+
+    def __init__(self, cls: type, attributes: dict[str, Any] | None = None) -> None:
+        super().__init__()
+        self.cls = cls
+        self.slots = attributes or {}
+
+
+class List(Box):
+    """A list whose length is known."""
+
+    def __init__(self, items: Sequence[Any]) -> None:
+        super().__init__()
+        self.slots = list(items)
+        self.path: str | None = None  # in the state, of a list that was there when the call began
+
+
+class Dict(Box):
+    """A dictionary with known keys."""
+
+    def __init__(self, items: dict[Any, Any]) -> None:
+        super().__init__()
+        self.slots = dict(items)
+
+
+class Ring(Box):
+    """A list of the state whose length is known at run time only.
+
+    Attributes:
+        number: of the list in the unit.
+        item: shape of its items.
+    """
+
+    def __init__(self, number: int, item: Any) -> None:
+        super().__init__()
+        self.number, self.item = number, item
+
+
+@dataclass(frozen=True, eq=False)
+class Union:
+    """A value of several forms: alternative `tag`."""
+
+    tag: ir.Var
+    alternatives: tuple[Any, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Picked:
+    """The item at an index, known at run time, of items that are alike."""
+
+    items: tuple[Any, ...]
+    index: ir.Var
+
+
+@dataclass(frozen=True, eq=False)
+class Closure:
+    """A function or lambda made while a component was being evaluated."""
+
+    node: ast.FunctionDef | ast.Lambda
+    frame: Frame
+    source: Any
+    defaults: tuple[Any, ...] = ()
+    named_defaults: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Bound:
+    """A method of an instance or of a list."""
+
+    function: Any
+    owner: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Text:
+    """A text with numbers in it that are known at run time only."""
+
+    parts: tuple[ir.Part, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Bytes:
+    """The bytes of a text."""
+
+    text: Text
+
+
+@dataclass(frozen=True, eq=False)
+class Span:
+    """What a loop of unknown length goes through: item(k) for k from `first` below `end`."""
+
+    first: ir.Operand
+    end: ir.Operand
+    item: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Failure:
+    """An exception that has been made."""
+
+    kind: type[BaseException]
+    message: Text
+
+
+def now() -> int:
+    """Return an age between those of the boxes that there are and of those to come."""
+    return next(_numbers)
+
+
+def is_number(value: Any) -> bool:
+    """Return whether a value is a number, known or not."""
+    return isinstance(value, (ir.Var, int, float))
+
+
+def is_plain(value: Any) -> bool:
+    """Return whether a value is known at build time and cannot change."""
+    if isinstance(value, tuple):
+        return all(map(is_plain, value))
+    return isinstance(value, (int, float, str, bytes, complex, type(None), range, frozenset))
+
+
+def same(one: Any, other: Any) -> bool:
+    """Return whether two values known at build time are the same, signs of zeros and types included."""
+    if one is other:
+        return True
+    if type(one) is not type(other) or isinstance(one, ir.Var | Box | Union | Closure | Bound):
+        return False
+    if isinstance(one, (int, float, str)):
+        return repr(one) == repr(other)
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(same, one, other))
+    try:
+        return bool(one == other)
+    except Exception:
+        return False
+
+
+def like(value: tuple[Any, ...], items: Sequence[Any]) -> tuple[Any, ...]:
+    """Return a tuple of the same class with other items."""
+    return type(value)(*items) if hasattr(value, "_fields") else tuple(items)
+
+
+def keys_of(box: Box) -> Iterator[Any]:
+    """Return the keys of all that a box holds."""
+    return iter(range(len(box.slots)) if isinstance(box, List) else list(box.slots))

@@ -1,0 +1,125 @@
+"""How an FMU carries its native library: one archive, Python beside it, either of them on request."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import zipfile
+
+import pytest
+
+from fmus.build import build_component
+from fmus.compiler import compiler_command
+from orchestrator.fmu.native import REASON, runs_as
+
+LAW = '''"""A law."""
+
+from dataclasses import dataclass
+
+from components.fmi.component import Component
+from components.fmi.variables import output, parameter
+
+
+@dataclass(frozen=True)
+class LawParameters:
+    """Of the law."""
+
+    gain: float = parameter(2000.0, "N.m.s/rad", "Gain", "chosen: a test", minimum=0.0)
+
+
+class Law(Component):
+    """Yaw moment in proportion to the yaw rate's error."""
+
+    Parameters = LawParameters
+    sampled = True
+    inputs = ("yaw_rate_ref", "yaw_rate")
+    outputs = (output("yaw_moment", "yaw_rate_ref", "yaw_rate"),)
+
+    def output(self, t, u):
+        return (BODY,)
+'''
+PROGRAM = """
+import json, sys
+import fmpy
+from fmpy import instantiate_fmu
+import tempfile
+archive = sys.argv[1]
+description = fmpy.read_model_description(archive)
+with tempfile.TemporaryDirectory() as folder:
+    fmpy.extract(archive, folder)
+    unit = instantiate_fmu(folder, description, "CoSimulation")
+    unit.setupExperiment(); unit.enterInitializationMode()
+    unit.setReal([0, 1], [0.3, 0.1]); unit.exitInitializationMode()
+    loaded = open("/proc/self/maps").read()
+    print(json.dumps([unit.getReal([2])[0], "native.so" in loaded, "libpythonfmu" in loaded]))
+    unit.freeInstance()
+"""
+
+
+@pytest.fixture(scope="module")
+def law(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("controllers")
+    file = folder / "controller_law.py"
+    file.write_text(LAW.replace("BODY", "self.p.gain * (u[0] - u[1])"))
+    return build_component(file, folder)
+
+
+def asked(archive, **environment):
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, str(archive)],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_the_archive_holds_the_native_library_beside_python(law):
+    names = zipfile.ZipFile(law).namelist()
+    assert {"binaries/linux64/native.so", "binaries/linux64/libpythonfmu-export.so"} <= set(names)
+    assert any(name.startswith("resources/yawbench_") for name in names)
+    assert runs_as(law) == "native"
+
+
+def test_the_launcher_opens_the_native_library_and_python_on_request(law, monkeypatch):
+    native, python = asked(law), asked(law, YAWBENCH_UNITS="python")
+    assert native[1:] == [True, False] and python[1:] == [False, True]
+    assert native[0] == python[0] == 2000.0 * (0.3 - 0.1)
+    monkeypatch.setenv("YAWBENCH_UNITS", "python")
+    assert runs_as(law) == "Python: YAWBENCH_UNITS asks for it"
+
+
+def test_what_is_not_translated_runs_in_python_and_says_why(tmp_path):
+    folder = tmp_path / "controllers"
+    folder.mkdir()
+    file = folder / "controller_law.py"
+    file.write_text(LAW.replace("BODY", "sum(x for x in u if x > 0.0)"))
+    made = build_component(file, folder)
+    line = file.read_text().splitlines().index("        return (sum(x for x in u if x > 0.0),)") + 1
+    why = f"a filter that is known at run time only (controllers/controller_law.py:{line})"
+    assert zipfile.ZipFile(made).read(REASON).decode() == why
+    assert runs_as(made) == f"Python: {why}"
+    assert asked(made)[1:] == [False, True]
+
+
+def test_the_native_library_needs_libm_and_libc_alone(law, tmp_path):
+    library = tmp_path / "native.so"
+    library.write_bytes(zipfile.ZipFile(law).read("binaries/linux64/native.so"))
+    said = subprocess.run(["ldd", str(library)], capture_output=True, text=True, check=True).stdout
+    needed = {line.split()[0].partition(".so")[0] for line in said.splitlines()}
+    assert needed <= {"linux-vdso", "libm", "libc", "/lib64/ld-linux-x86-64"}
+
+
+def test_without_compiler_a_unit_runs_in_python(tmp_path, monkeypatch):
+    monkeypatch.setenv("CC", "no-such-compiler")
+    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "cache"))
+    folder = tmp_path / "controllers"
+    folder.mkdir()
+    file = folder / "controller_law.py"
+    file.write_text(LAW.replace("BODY", "self.p.gain * (u[0] - u[1])"))
+    made = build_component(file, folder)
+    assert compiler_command() == ["no-such-compiler"]
+    assert runs_as(made) == "Python: there is no C compiler (no-such-compiler); CC can name one"

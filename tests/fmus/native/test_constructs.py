@@ -1,0 +1,384 @@
+"""Every construct of the language that units use, translated and driven beside Python to the last bit."""
+
+from __future__ import annotations
+
+import pytest
+
+from .small import compare, source
+
+CONSTRUCTS = {
+    "enumerate from one": """
+def output(self, t, u):
+    total = 0.0
+    for k, x in enumerate(u, start=1):
+        total += k * x
+    return (total,)
+""",
+    "del of an item": """
+def start(self, t, u):
+    self.queue = [(t, u[0])]
+def advance(self, t, h, u):
+    self.queue.append((t, u[0]))
+    while len(self.queue) > 1 and self.queue[0][0] < t - 5.0 * h:
+        del self.queue[0]
+def output(self, t, u):
+    return (self.queue[0][1] + len(self.queue),)
+""",
+    "a list that grows beyond any ring": """
+def start(self, t, u):
+    self.seen = []
+    self.total = 0.0
+def advance(self, t, h, u):
+    self.seen.append((u[0], u[1]))
+    self.total = 0.0
+    if u[0] > 0.9:
+        while self.seen:
+            a, b = self.seen.pop(0)
+            self.total += a * b
+def output(self, t, u):
+    return (self.total + len(self.seen),)
+""",
+    "a list of the state gone through in pairs": """
+def start(self, t, u):
+    self.seen = [(t, 0.0)]
+def advance(self, t, h, u):
+    self.seen.append((t, u[0]))
+    if len(self.seen) > 7:
+        self.seen.pop(0)
+def output(self, t, u):
+    area = 0.0
+    for (one, x), (other, _) in pairwise(self.seen):
+        if x > 0.95:
+            break
+        area += x * (other - one)
+    for time, x in self.seen:
+        if x > u[1]:
+            return (area + x,)
+    return (area + self.seen[-1][1],)
+""",
+    "a store into a list on one path": """
+def start(self, t, u):
+    self.items = [0.0, 1.0, 2.0]
+    self.same = self.items
+def advance(self, t, h, u):
+    if u[0] > 0.0:
+        self.items[1] = u[0]
+        if u[1] > 0.0:
+            self.same[2] += u[1]
+def output(self, t, u):
+    return (sum(self.items) + self.same[1],)
+""",
+    "a store at an index of the state": """
+def start(self, t, u):
+    self.items = [0.0] * 4
+    self.at = 0
+def advance(self, t, h, u):
+    self.items[self.at] = u[0]
+    self.at = (self.at + 1) % 4
+def output(self, t, u):
+    return (self.items[self.at - 1] - 0.5 * self.items[self.at],)
+""",
+    "an index out of range": """
+def start(self, t, u):
+    self.at = 0
+def advance(self, t, h, u):
+    self.at += 1
+def output(self, t, u):
+    return ((1.0, 2.0, 3.0, u[0], u[1])[self.at],)
+""",
+    "a variable changed on a path that breaks out": """
+def output(self, t, u):
+    x, found, passes = u[0], -1.0, 0
+    while 0.01 < abs(x) < 1e6:
+        passes += 1
+        x *= 0.7
+        if x < u[1]:
+            found = x
+            x = 100.0
+            break
+    return (x + found + passes,)
+""",
+    "a return within a loop": """
+def output(self, t, u):
+    return (self.halved(u[0]) + self.first(u),)
+def halved(self, x):
+    for k in range(40):
+        x *= 0.5
+        if abs(x) < 0.001:
+            return x + k
+    return -1.0
+def first(self, u):
+    for x in u:
+        if x > 0.3:
+            return x
+    return 7.0
+""",
+    "else of loops": """
+def output(self, t, u):
+    for x in u:
+        if x > 0.5:
+            break
+    else:
+        x = -3.0
+    k = 0
+    while k < 30:
+        k += 1
+        if k * u[0] > 9.0:
+            break
+    else:
+        k = 99
+    return (x + k,)
+""",
+    "continue": """
+def output(self, t, u):
+    total = 0.0
+    for k in range(30):
+        if k % 3 == 0 or u[0] * k > 8.0:
+            continue
+        total += u[1] / (k + 1)
+    for x in u:
+        if x < 0.0:
+            continue
+        total += x
+    return (total,)
+""",
+    "or and and as values": """
+def output(self, t, u):
+    a, b = u
+    return ((a or b) + 2.0 * (a and b) + ((a > 0.0 and b) or 3.0) + (0.0 or self.p.gain),)
+""",
+    "rounding": """
+def output(self, t, u):
+    x = round(u[0] * 3.0)
+    return (math.copysign(1.0, x) + x + int(u[1] * 5.0) + math.copysign(1.0, -round(0.3 * u[1])),)
+""",
+    "whole numbers": """
+def start(self, t, u):
+    self.n = self.p.count
+def advance(self, t, h, u):
+    self.n = (7 * self.n + 3) % 11 - self.n // 4
+def output(self, t, u):
+    return (self.n * math.copysign(1.0, 0 * -self.n) + self.n / 7 + u[0] // 0.3 + u[1] % -0.7,)
+""",
+    "loop variables that leak": """
+def output(self, t, u):
+    for k, x in enumerate((u[0], u[1], 3.0)):
+        pass
+    total = k + x
+    for n in range(25):
+        z = n * u[0]
+        if z > 6.0:
+            break
+    rows = [k * x for k in range(3)]
+    return (total + n + z + k + sum(rows),)
+""",
+    "sums": """
+def output(self, t, u):
+    a, b = u
+    return (sum([a, b, 1e-9, -a]) + sum((a * a, b, a), 0.1) + sum(x for x in (b, a)) + sum([]),)
+""",
+    "closures": """
+def configure(self):
+    gain = self.p.gain
+    def scaled(x, by=1.0):
+        return gain * x * by
+    self.law = scaled if self.p.on else (lambda x: x - gain)
+def output(self, t, u):
+    shift = u[1]
+    moved = lambda x: x + shift
+    shift = 2.0 * u[1]
+    def twice(f, x):
+        return f(f(x))
+    return (twice(moved, self.law(u[0])),)
+""",
+    "a choice of laws": """
+def configure(self):
+    laws = {"first": math.sin, "second": math.cos, "third": self.third}
+    self.law = laws[self.p.mode]
+    self.table = (1.0, 2.0) if self.p.mode == "first" else (3.0, 4.0, 5.0)
+@staticmethod
+def third(x):
+    return x * x
+def output(self, t, u):
+    return (self.law(u[0]) + len(self.table) + self.table[-1],)
+""",
+    "nothing or something": """
+def start(self, t, u):
+    self.last = None
+def advance(self, t, h, u):
+    if u[0] > 0.5:
+        self.last = None
+    elif self.last is None:
+        self.last = (t, u[0])
+def output(self, t, u):
+    since, x = self.last or (t, 9.0)
+    return (t - since + x,)
+""",
+    "integers of 64 bits": """
+def configure(self):
+    state = 0xCBF29CE484222325
+    for byte in f"{self.p.count}/noise".encode():
+        state = ((state ^ byte) * 0x100000001B3) & (2**64 - 1)
+    self.key = state
+def start(self, t, u):
+    self.n = 0
+def advance(self, t, h, u):
+    self.n += 1
+def output(self, t, u):
+    z = (self.key + (self.n + 1) * 0x9E3779B97F4A7C15) & (2**64 - 1)
+    z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & (2**64 - 1)
+    return (((z >> 12) + 0.5) * 2.0**-52,)
+""",
+    "exceptions of arithmetic": """
+def output(self, t, u):
+    a, b = u
+    if b > 0.9:
+        return (1.0 / (a - a),)
+    if b > 0.8:
+        return (math.sqrt(a - 2.0),)
+    if b > 0.7:
+        return (math.exp(1e4 * abs(a) + 800.0),)
+    if b > 0.6:
+        return (math.log(a - a),)
+    if b > 0.5:
+        return ((a - 2.0) ** 2 + (1e200 * a) ** 2,)
+    return (math.asin(2.0 * a),)
+""",
+    "an exception of its own": """
+def configure(self):
+    if self.p.gain > 2.2:
+        raise ValueError(f"at most {2.2:g} (got {self.p.gain!r}, {self.p.gain:.3g} of {self.p.count})")
+def output(self, t, u):
+    if u[0] > 0.95:
+        raise ValueError(f"a is {u[0]}: 100 % too large")
+    return (u[0],)
+""",
+    "functions of mathematics": """
+def output(self, t, u):
+    a, b = u
+    return (
+        math.hypot(a, b) + math.dist((a, b, 1.0), (b, 2.0, a)) + math.atan2(a, b) + math.tanh(a)
+        + math.degrees(b) + math.copysign(a, b) + math.floor(3.0 * a) + math.ceil(3.0 * b)
+        + abs(a) ** 0.37 + a**3 + math.cosh(b),
+    )
+""",
+    "extremes and order": """
+def output(self, t, u):
+    a, b = u
+    x, y, z = sorted([a, b, 0.1])
+    return (x + 2.0 * y + 4.0 * z + max(a, b, 0.0) * 8.0 + min([a, -b]) + max(map(abs, u)) + min(1, a),)
+""",
+    "chained comparisons": """
+def output(self, t, u):
+    a, b = u
+    return (1.0 * (-0.5 < a <= b < 0.9) + 2.0 * (a == a == a) + 4.0 * (not a < b) + 8.0 * (a != 0.0),)
+""",
+    "taking apart": """
+def start(self, t, u):
+    self.pair, self.rest = (u[0], u[1]), [1.0, 2.0, 3.0]
+def advance(self, t, h, u):
+    first, *others = self.rest
+    *self.rest, last = [*others, first + u[0], *self.pair][:4]
+    self.pair = last, self.pair[0]
+def output(self, t, u):
+    (a, b), [c, *_] = self.pair, self.rest
+    return (a + 2.0 * b + 4.0 * c,)
+""",
+    "zips, maps and chains": """
+def output(self, t, u):
+    rows = [[1.0, 2.0], [3.0, u[0]]]
+    columns = zip(*rows, strict=True)
+    products = [sum(map(mul, column, u)) for column in columns]
+    flat = [*chain.from_iterable(rows), *reversed(products), *map(mul, u, repeat(3.0))]
+    return (sum(x * k for k, x in enumerate(flat)) + bisect_right([-0.5, 0.0, 0.5], u[1]),)
+""",
+    "any and all": """
+def output(self, t, u):
+    return (1.0 * any(x > 0.5 for x in u) + 2.0 * all(x > -0.5 for x in u) + 4.0 * (u[0] in (0.0, u[1])),)
+""",
+    "an assignment in a condition": """
+def output(self, t, u):
+    if (x := u[0] - 0.2) > 0.0:
+        return (x,)
+    return (-2.0 * x if x else 5.0,)
+""",
+    "a step of many passes": """
+def start(self, t, u):
+    self.x, self.v = 1.0, 0.0
+def advance(self, t, h, u):
+    passes = max(1, math.ceil(h / 0.0007))
+    part = h / passes
+    for _ in range(passes):
+        self.v -= part * (50.0 * self.x - u[0])
+        self.x += part * self.v
+def output(self, t, u):
+    return (self.x,)
+""",
+}
+OBJECTS = '''class Lane(NamedTuple):
+    """A tuple with a property."""
+
+    left: float
+    right: float
+
+    @property
+    def middle(self):
+        return 0.5 * (self.left + self.right)
+
+
+class Base:
+    factor = 3.0
+
+    def __init__(self, x):
+        self.x = x
+
+    def value(self):
+        return self.factor * self.x
+
+
+class Filter(Base):
+    def __init__(self, x, *, tau=0.1):
+        super().__init__(x)
+        self.tau = tau
+
+    def see(self, x, h):
+        self.x += h / (self.tau + h) * (x - self.x)
+
+    def value(self):
+        return super().value() + 1.0
+
+    @classmethod
+    def fast(cls, x):
+        return cls(x, tau=0.001)
+'''
+WITH_OBJECTS = {
+    "objects and inheritance": """
+def start(self, t, u):
+    self.filters = [Filter(u[0]), Filter.fast(u[1])]
+    self.maybe = Filter(0.5) if self.p.on else None
+def advance(self, t, h, u):
+    for f, x in zip(self.filters, u, strict=True):
+        f.see(x, h)
+    if self.maybe is not None:
+        self.maybe.see(u[0], h)
+def output(self, t, u):
+    extra = self.maybe.value() if self.maybe else -1.0
+    return (self.filters[0].value() - self.filters[1].x + extra,)
+""",
+    "properties of tuples": """
+def output(self, t, u):
+    lane = Lane(u[0], u[1])
+    wider = lane._replace(left=lane.left + 1.0)
+    return (lane.middle + wider.middle * self.p.gain,)
+""",
+}
+
+
+@pytest.mark.parametrize("name", CONSTRUCTS)
+def test_a_construct_gives_the_same_bits(name, tmp_path):
+    compare(source(CONSTRUCTS[name]), tmp_path)
+
+
+@pytest.mark.parametrize("name", WITH_OBJECTS)
+def test_objects_give_the_same_bits(name, tmp_path):
+    compare(source(WITH_OBJECTS[name], OBJECTS), tmp_path)

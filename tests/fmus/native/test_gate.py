@@ -1,0 +1,62 @@
+"""What is not the same as Python, in a bit, a status or a sentence, does not get through the gate."""
+
+from __future__ import annotations
+
+import pytest
+
+from fmus.native import build
+from fmus.native.emit import emit
+from fmus.native.gate import differences
+from fmus.native.specialise import specialise
+
+from .small import compiled, component_of, source
+
+LAW = """
+def output(self, t, u):
+    if u[0] > 0.99:
+        raise ValueError("a is too large")
+    return (self.p.gain * u[0] + u[1],)
+"""
+BROKEN = {
+    "a bit": ("y[0] = n0;", "y[0] = nextafter(n0, 1e9);", "y is "),
+    "a sentence": ("a is too large", "a is too big", "native says"),
+    "a status": ("return 1;\n    }\n    ", "}\n    ", "Python does not"),
+    "an end": ("y[0] = n0;", "for (;;) {}", "it is not done within"),
+    "a life": ("y[0] = n0;", "abort();", "it dies of signal"),
+}
+
+
+def broken(text: str, what: str) -> str:
+    """Return C text in which the function of the outputs is wrong."""
+    before, after, _ = BROKEN[what]
+    head, _, rest = text.partition("static int output(")
+    if what == "a status":
+        before, after = "return 1;", "problem->kind = NULL;"
+    assert before in rest
+    return head + "static int output(" + rest.replace(before, after, 1)
+
+
+@pytest.mark.parametrize("what", BROKEN)
+def test_a_translation_that_is_wrong_is_found_out(what, tmp_path):
+    with component_of(source(LAW), tmp_path) as (component, home):
+        text = emit(specialise(component, home), "small.py", "{a}")
+        library = compiled(broken(text, what), tmp_path)
+        limit = 1 if what == "an end" else 60
+        found = differences(library, "{a}", component, home.parent, limit)
+    assert BROKEN[what][2] in found
+
+
+def test_a_translation_that_is_right_gets_through(tmp_path):
+    with component_of(source(LAW), tmp_path) as (component, home):
+        library = compiled(emit(specialise(component, home), "small.py", "{a}"), tmp_path)
+        assert differences(library, "{a}", component, home.parent) == ""
+
+
+def test_what_does_not_get_through_is_not_packed(tmp_path, monkeypatch):
+    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(build, "emit", lambda *args: broken(emit(*args), "a bit"))
+    with component_of(source(LAW), tmp_path) as (component, home):
+        made = build.native(component, home, source="small.py", guid="{a}", resources=home.parent)
+        again = build.native(component, home, source="small.py", guid="{a}", resources=home.parent)
+    assert made.files == {} and made == again
+    assert made.why_not.startswith("the translation is not the same as Python: steps of 0.001 s: ")

@@ -1,0 +1,63 @@
+"""What is not translated is refused in one sentence with file and line."""
+
+from __future__ import annotations
+
+import pytest
+
+from fmus.native.specialise import specialise
+from fmus.native.values import Refused
+
+from .small import component_of, source
+
+REFUSED = {
+    "try": (
+        "def output(self, t, u):\n    try:\n        return (u[0],)\n    finally:\n        pass",
+        "Try is not translated",
+        2,
+    ),
+    "a filter": (
+        "def output(self, t, u):\n    return (sum(x for x in u if x > 0.0),)",
+        "a filter that is known at run time only",
+        2,
+    ),
+    "a state that output changes": (
+        "def start(self, t, u):\n    self.n = 0.0\n"
+        "def output(self, t, u):\n    self.n += u[0]\n    return (self.n,)",
+        "output() changes what the unit keeps",
+        3,
+    ),
+    "a loop without end": (
+        "def output(self, t, u):\n    x = u[0]\n    while True:\n        x += 1.0\n    return (x,)",
+        "a loop without end",
+        3,
+    ),
+    "a slice": (
+        "def output(self, t, u):\n    return (sum(u[: self.p.count]),)",
+        "a slice whose ends are known at run time only",
+        2,
+    ),
+    "a function of another module": (
+        "def output(self, t, u):\n    return (math.gamma(u[0]),)",
+        "math.gamma",
+        2,
+    ),
+    "a generator": (
+        "def output(self, t, u):\n    return (sum(self.halves(u)),)\n"
+        "def halves(self, u):\n    for x in u:\n        yield 0.5 * x",
+        "halves is a generator",
+        3,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_is_not_understood_is_refused_where_it_is(what, tmp_path):
+    body, text, line = REFUSED[what]
+    written = source(body)
+    first = written[: written.index("def output" if body.startswith("def output") else "def start")].count(
+        "\n"
+    )
+    with component_of(written, tmp_path) as (component, home), pytest.raises(Refused) as refused:
+        specialise(component, home)
+    assert text in refused.value.text
+    assert refused.value.where == f"controllers/small.py:{first + line}"
