@@ -67,7 +67,7 @@ class FmuInstance(Protocol):
         """Return the calls of a step, which exchange floating-point values through the buffers."""
 
     def part(self, kind: str) -> str:
-        """Return the kind of call (set, step, get) that really failed when a call of `kind` did not return OK."""
+        """Return the kind of call (set, step, get) that failed when one of `kind` did not return OK."""
 
     def put(self, places: Sequence[ValueRef], values: Sequence[Value]) -> Status:
         """Set variables of one type; of an array, all elements."""
@@ -298,7 +298,7 @@ class CtypesInstance(FmuInstance, ABC):
 
 
 def _layout(places: Sequence[ValueRef]) -> tuple[Any, list[int], int]:
-    """Return the distinct value references, the index of each scalar in the call's values, and their number."""
+    """Return the distinct value references, each scalar's index among the values, and the number of values."""
     first: dict[int, int] = {}
     count = 0
     for place in places:

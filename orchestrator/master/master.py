@@ -1,4 +1,4 @@
-"""The fixed-step co-simulation master: initializes the instances of a plan and steps them through integer time.
+"""The fixed-step co-simulation master: initializes the instances of a plan and steps them in integer time.
 
 Per communication step it walks a flat list of calls (see `step_program`), checks once that the sum of all
 outputs is finite, and copies the recorded values into a row: a few microseconds on top of the instances'
@@ -43,7 +43,7 @@ class EndRequested(Exception):
 
 
 class Master:
-    """Steps the instances of one run. `completed` is the last communication point whose values are complete."""
+    """Steps the instances of one run. `completed` is the last communication point with all values."""
 
     def __init__(
         self,
@@ -110,7 +110,7 @@ class Master:
         Recorded values that are not Real are appended to `others`, one list per row.
 
         Raises:
-            SimulationError: an instance fails or a wire is not finite. The rows up to `completed` are complete.
+            SimulationError: an instance fails or a wire is not finite. Rows up to `completed` are complete.
             Interrupted: a stop was requested.
             EndRequested: an instance asked to end the run.
         """
@@ -178,7 +178,7 @@ class Master:
         return real | self.memory.given_others(s)
 
     def operation_of(self, k: int, call: Callable[[], Status | None]) -> Operation | None:
-        """Return the operation of the step to `k` that a call belongs to, None if it belongs to another step."""
+        """Return the operation of the step to `k` that a call belongs to, None if it is not part of it."""
         return next((op for op in self._operations[k % self.programs.cycle] if op.call is call), None)
 
     def _values_of_others(self) -> list[Value]:

@@ -32,7 +32,7 @@ OpenInstance = Callable[[Instance, Log, set[Path]], FmuInstance]
 
 
 class RecordedRows(Protocol):
-    """Buffer that a run fills: `rows` of Real values, one per communication point, `others` for other types."""
+    """Buffer that a run fills: `rows` of Reals, one per communication point, and `others` for other types."""
 
     rows: list[np.ndarray]
     others: list[list[Value]]

@@ -105,7 +105,7 @@ class StepProgram:
         return self._made[phase]
 
     def _jacobi(self, k: int) -> list[Operation]:
-        """Gather all inputs before any instance steps; those of a slow instance at the start of its period."""
+        """Gather all inputs before any instance steps, a slow instance's at the start of its period."""
         m = self._memory
         beginning = [s for s in m.placed if (k - 1) % s.instance.period == 0]
         ending = [s for s in m.stations if k % s.instance.period == 0]
@@ -148,7 +148,7 @@ class StepProgram:
                 per_input.append(CouplingWeights())
             else:
                 relation = m.relation(s, variable, wire)
-                # two cycles later, so that all samples lie after the start
+                # `k` is a phase; shifted so that no sample lies before the start
                 per_input.append(weights(m.plan.algorithm, relation, k + 2 * self.cycle))
         key = (s.name, *per_input)
         if key not in self._gathers:
@@ -213,7 +213,7 @@ def _blending(
 
 
 def _converting(s: InstanceSlot) -> list[Operation]:
-    """Return the operation that converts gathered inputs to the instance's units of measurement, if needed."""
+    """Return the operation, if needed, that converts inputs to the instance's units of measurement."""
     if s.scale is None:
         return []
     (gains, offsets), values = s.scale, s.u
@@ -228,7 +228,7 @@ def _converting(s: InstanceSlot) -> list[Operation]:
 
 
 def _acting(s: InstanceSlot, faults: FaultInjector | None, values: np.ndarray) -> list[Operation]:
-    """Return the operation that applies faults to outputs or inputs, shared by all programs; [] without faults."""
+    """Return the operation, if any, that applies faults to outputs or inputs; all programs share it."""
     return [] if faults is None else [Operation(s.name, "fault", faults.acting(values))]
 
 
