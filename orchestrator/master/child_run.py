@@ -130,9 +130,7 @@ def step_units(
     """
     try:
         die_with_parent()
-        os.setpgid(
-            0, 0
-        )  # so that signals to an FMU's group, and Ctrl-C on the terminal, reach one process only
+        os.setpgid(0, 0)  # signals to an FMU's group, and Ctrl-C, must not reach both
         for descriptor in map(int, os.listdir("/proc/self/fd")):
             if descriptor > 2 and descriptor not in (channel.reading, channel.writing, asking):
                 with contextlib.suppress(OSError):  # the descriptor used for listing the folder
@@ -190,7 +188,7 @@ def _go(course: RunLoop, opener: OpenInstance) -> dict[str, Any] | None:
 
 
 def _tell_where(channel: PipeChannel, asking: int, stop: StopFlag) -> None:
-    """Answer requests for the current instance from a thread and stop the run; also report exit() by an FMU."""
+    """Start a thread that reports the current instance and stops the run; also report exit() by an FMU."""
     stepping, process = threading.get_ident(), os.getpid()
 
     def answer() -> None:
@@ -216,7 +214,7 @@ _kept: list[Any] = []
 
 
 def _whereabouts(thread: int) -> tuple[str, str] | None:
-    """Return the unit that a thread is in, and what is being done with it; None if it is in none."""
+    """Return the instance whose code a thread is executing, and the operation; None outside all instances."""
     frame, found = sys._current_frames().get(thread), None
     here = str(Path(__file__).parent)
     while frame is not None:
@@ -233,18 +231,18 @@ def _whereabouts(thread: int) -> tuple[str, str] | None:
 
 
 KILL_AFTER = 3.0
-"""Time after a wish to stop at which the process is killed [s]; chosen: a step is over long before."""
+"""Time from a stop request until the child is killed [s]; chosen: far longer than a step."""
 END_LIMIT = 10.0
-"""Time that units may take to be terminated and freed [s]; the results are written by then."""
+"""Time allowed for terminating and freeing the instances [s]; the results are written by then."""
 
 
 def can_be_apart() -> bool:
-    """Return whether a run can be stepped in a process of its own: signals are for the main thread."""
+    """Return whether runs in a child process are supported here: Linux, and the main thread (for signals)."""
     return sys.platform == "linux" and threading.current_thread() is threading.main_thread()
 
 
 class ChildRun(RunLoop, SupervisedProcess):
-    """The course of one run in another process."""
+    """Runs a plan in a child process."""
 
     unasked = (ROWS, PROGRESS, WHERE)
 

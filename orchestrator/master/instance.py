@@ -298,7 +298,7 @@ class CtypesInstance(FmuInstance, ABC):
 
 
 def _layout(places: Sequence[ValueRef]) -> tuple[Any, list[int], int]:
-    """Return the distinct value references, each scalar's index among the values, and the number of values."""
+    """Return the distinct value references, each scalar's index among the values, and their number."""
     first: dict[int, int] = {}
     count = 0
     for place in places:

@@ -76,9 +76,7 @@ class ProcessState:
             yield "the mask of file permissions"
         if threading.current_thread() is threading.main_thread():
             for number in _HANDLED:
-                if (
-                    handler := signal.getsignal(number)
-                ) is not None:  # Python's handler, whatever C code has installed
+                if (handler := signal.getsignal(number)) is not None:  # Python's, whatever C has installed
                     signal.signal(number, handler)
 
 

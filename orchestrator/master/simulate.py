@@ -182,9 +182,7 @@ class Simulation:
 
     def _fail(self, error: BaseException) -> None:
         """Write the results so far, and the error that ended the run."""
-        with contextlib.suppress(
-            SimulationError
-        ):  # perhaps the disk is full; the rows that fit have been written
+        with contextlib.suppress(SimulationError):  # perhaps the disk is full; rows that fit are kept
             self.course.flush()
         problems = error.problems if isinstance(error, (YawbenchError, Interrupted)) else []
         if isinstance(error, SimulationError):
