@@ -1,26 +1,26 @@
-"""Adapters that run an SSP archive in one co-simulation master: this program's own, fmpy, libcosim or Ecos.
+"""Adapters that run an SSP archive in a co-simulation master: this program's own, fmpy, libcosim or Ecos.
 
 Each runs in a process of its own (`main`), so a crash costs only that master's result.
 
 **Own**: this program's master with the algorithm `jacobi`, timed as the others are.
 
-**fmpy**: its simulation of SSP archives (`fmpy.ssp.simulation.simulate_ssp`). It reads structure and FMUs from
-the archive but no parameter values, which are passed to it here; it cannot set texts. It exchanges nothing
-before the first step: every input is 0 in it, whatever the outputs are at the start. It steps all instances
-with one step, and labels the values after a step with the time at its beginning.
+**fmpy**: its simulation of SSP archives (`fmpy.ssp.simulation.simulate_ssp`). It reads structure and FMUs
+from the archive but no parameter values, which are passed to it here; it cannot set texts. It exchanges
+nothing before the first step: every input is 0 in it, whatever the outputs are at the start. It steps all
+instances with one step, and labels the values after a step with the time at its beginning.
 
 **libcosim**: the co-simulation core of the Open Simulation Platform, through libcosimpy. Its fixed-step
-algorithm steps all instances from the same exchanged values, so it is `jacobi`; an instance with a longer step
-is stepped once per multiple of the communication step, over its whole step. An observer has values only from
-the first step on. A connection that it cannot make returns -1, which its loader ignores; here the system comes
-from an archive whose wiring has been checked.
+algorithm steps all instances from the same exchanged values, so it is `jacobi`; an instance with a longer
+step is stepped once per multiple of the communication step, over its whole step. An observer has values only
+from the first step on. A connection that it cannot make returns -1, which its loader ignores; here the system
+comes from an archive whose wiring has been checked.
 
-**Ecos**: through ecospy. Its fixed-step algorithm steps all instances from the same exchanged values, so it is
-`jacobi`. It steps an instance with a longer step once per multiple of the communication step, but only over a
-single communication step (its `fixed_step_algorithm` passes the base step on), so that such an instance lags
-behind; systems for it get one step for all. It takes a parameter set of an archive by name, and accumulates
-its time in floating point, so steps are counted here. ecospy needs Intel's TBB and does not load it: the
-package `tbb` installs it next to the interpreter.
+**Ecos**: through ecospy. Its fixed-step algorithm steps all instances from the same exchanged values, so it
+is `jacobi`. It steps an instance with a longer step once per multiple of the communication step, but only
+over a single communication step (its `fixed_step_algorithm` passes the base step on), so such an instance
+advances too slowly; systems for it get one step for all. It takes a parameter set of an archive by name, and
+accumulates its time in floating point, so steps are counted here. ecospy needs Intel's TBB and does not load
+it: the package `tbb` installs it next to the interpreter.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 SSP has no elements for the communication step, the instances' own steps and the algorithm. They are written
 as annotations: the steps in those of the Open Simulation Platform, which libcosim understands, and of
-OMSimulator; everything else that `yawbench run` needs in one of our own. The latter also has the title, because
-the name of a structure is an identifier to other programs.
+OMSimulator; everything else that `yawbench run` needs in one of our own. The latter also has the title,
+because the name of a structure is an identifier to other programs.
 
 Only connected inputs have a connector. A constant is a parameter value with the name of its input: libcosim
 and Ecos read it that way, and fmpy gives an input connector without a connection the value of another one.
