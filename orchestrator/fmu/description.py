@@ -303,7 +303,7 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
 
 
 def _dangling(root: ElementTree.Element, fmi: int) -> str | None:
-    """Return an error for a reference to a missing variable, else None; fmpy takes index 0 for the last one."""
+    """Return an error for a reference to a missing variable, else None; fmpy takes index 0 for the last."""
     variables = root.findall("ModelVariables/*")
     if fmi == 2:
         known = {str(number) for number in range(1, len(variables) + 1)}

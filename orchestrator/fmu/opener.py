@@ -118,7 +118,7 @@ def find_folder(scenario: Path, *, opener: Opener) -> Path:
 
 
 def find_fmu(fmu: str, *, scenario: Path, fmus: Path, opener: Opener, build: bool = True) -> Path:
-    """Return the archive for `fmu`, a path relative to the scenario or a name in a folder; build it if needed.
+    """Return the archive for `fmu`, a path relative to the scenario or a name in a folder; may build it.
 
     Args:
         fmu: path or name, as given in the scenario or an option.
