@@ -180,7 +180,7 @@ def _go(course: RunLoop, opener: OpenInstance) -> dict[str, Any] | None:
     try:
         course.go(opener)
     except (YawbenchError, Interrupted) as error:
-        unit = getattr(error, "unit", None)
+        unit = getattr(error, "instance", None)
         return {**told(error), "inputs": course.inputs_of(unit) if unit else {}}
     except BaseException:
         return {"kind": "", "problems": traceback.format_exc(), "inputs": {}}

@@ -171,7 +171,7 @@ class PipeChannel:
 
 def told(error: YawbenchError | Interrupted) -> dict[str, Any]:
     """Return an error as JSON-ready data, for `rebuilt` in another process."""
-    where = {name: value for name, value in vars(error).items() if name in ("unit", "time", "number")}
+    where = {name: value for name, value in vars(error).items() if name in ("instance", "time", "number")}
     return {"kind": type(error).__name__, "problems": error.problems, "where": where}
 
 

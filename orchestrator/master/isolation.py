@@ -231,7 +231,7 @@ def opener_of(
         yield open_unit
         return
     if sys.platform == "win32":
-        raise SimulationError("--isolate needs Linux or macOS.", unit=None, time=0.0)
+        raise SimulationError("--isolate needs Linux or macOS.", instance=None, time=0.0)
     with Isolation(plan.instances, call_limit) as isolation:
         yield isolation
 

@@ -217,7 +217,7 @@ class Simulation:
     def _save(self, status: str, error: BaseException | None = None) -> None:
         """Write the record of the run and put the results in place."""
         self._saving = True
-        self._ended_by = getattr(error, "unit", None)
+        self._ended_by = getattr(error, "instance", None)
         ended: dict[str, Any] = {
             "wall_time": self.wall_time,
             "error": self._explained(error),
@@ -252,7 +252,7 @@ class Simulation:
     def _explained(self, error: BaseException | None) -> dict[str, Any] | None:
         if error is None:
             return None
-        unit = getattr(error, "unit", None)
+        unit = getattr(error, "instance", None)
         return {
             "message": str(error) or type(error).__name__,
             "unit": unit,
