@@ -1,1 +1,1 @@
-"""FMU archives: found, unpacked once, described, guarded against each other."""
+"""FMU archives: located, unpacked into a cache, described, and checked for what the master supports."""

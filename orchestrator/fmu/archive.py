@@ -1,12 +1,12 @@
-"""FMU archives, each unpacked once into the cache under a name that its content gives.
+"""FMU archives: read, and unpacked once each into the cache, under a name derived from the content.
 
-An entry holds, per archive, its files in `fmu/` and beside them `description.json`: the model
-description as this program needs it (parsing it anew costs 15 to 50 ms) and every file's hash. It
-appears under its name in one rename, complete, so processes that unpack the same archive at the
-same time cannot meet a half one. A file that was changed, cut off or deleted since is found by its
-hash, which costs a millisecond per FMU, and put back.
+A cache entry consists of the unpacked files in `fmu/` and `description.json`: the model description as this
+program needs it (parsing it again costs 15 to 50 ms) and every file's hash. It appears under its name
+complete, in one rename, so processes that unpack the same archive at the same time never meet half an entry.
+A file that was changed, truncated or deleted since is detected by its hash, which costs a millisecond per
+FMU, and restored.
 
-What the cache holds, seen from outside: kinds of entries, their sizes, whether they are whole.
+`kept_in` lists the entries of a cache folder: their kinds, sizes, and whether they are intact.
 """
 
 from __future__ import annotations
@@ -39,24 +39,24 @@ from . import description as fmu_description
 from .binary import binary_problem
 
 FORMAT = 6
-"""Of the cache's entries; part of their names, so versions of this program do not quarrel."""
+"""Format version of cache entries; part of their names, so versions of this program can share a cache."""
 
 _FILE_TIME = 946_684_800
-"""Of every unpacked file, 2000-01-01 [s]: what Python compiles of a module stays good when it is put back."""
+"""Time stamp of unpacked files, 2000-01-01 [s]: keeps Python's bytecode valid after a restore."""
 _DAMAGE = (
     zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, OSError, ValueError,
-    RuntimeError,  # encrypted, or packed by a method that is not known
+    RuntimeError,  # encrypted, or an unknown compression method
 )  # fmt: skip
 
 
 def open_fmu(path: Path | str, *, validate: bool = True) -> Fmu:
-    """Return the FMU `path`, unpacked in the cache.
+    """Open the FMU at `path`: unpack it into the cache, unless it is there, and describe it.
 
     Args:
-        validate: refuse a model description that is formally wrong, though it could be used.
+        validate: refuse an invalid model description even if it could be used.
 
     Raises:
-        ModelDescriptionError: missing, damaged, not supported, or no room to unpack it.
+        ModelDescriptionError: the FMU is missing, damaged or not supported, or cannot be unpacked.
     """
     path = Path(path).absolute()
     raw = read_archive(path)
@@ -88,7 +88,7 @@ def _no_room(path: Path, folder: Path, error: OSError) -> str:
 
 
 def read_archive(path: Path) -> bytes:
-    """Return an FMU's bytes; it may be in an archive itself, such as system.ssp/resources/plant.fmu.
+    """Return an FMU's bytes; it may be inside another archive, such as system.ssp/resources/plant.fmu.
 
     Raises:
         ModelDescriptionError: it cannot be read.
@@ -114,7 +114,7 @@ def read_archive(path: Path) -> bytes:
 
 
 def _read_member(path: Path) -> bytes:
-    """Return an FMU that is a member of an archive."""
+    """Return the bytes of an FMU that is a member of another archive."""
     outer = next(above for above in path.parents if os.path.isfile(above))
     member = path.relative_to(outer).as_posix()
     try:
@@ -136,13 +136,13 @@ def _load(entry: Path, path: Path) -> Fmu | None:
         fmu = fmu_description.from_record(record["fmu"], path=path, directory=entry / "fmu")
     except (ValueError, KeyError, TypeError, AttributeError):
         return None
-    with contextlib.suppress(OSError):  # a cache that others keep up is none to be tidied from here
+    with contextlib.suppress(OSError):  # a read-only cache is maintained by others
         os.utime(entry)
     return fmu
 
 
 def whole_entry(entry: Path) -> dict | None:
-    """Return the record of a cache entry all of whose files are as they were unpacked, else None."""
+    """Return the record of a cache entry, None if one of its files is missing or has changed."""
     try:
         record = json.loads((entry / "description.json").read_bytes())
         for name, digest in record["files"].items():
@@ -162,7 +162,7 @@ def _unpack(raw: bytes, entry: Path, path: Path) -> Fmu:
 
 
 def _files(raw: bytes, path: Path) -> dict[str, bytes]:
-    """Return the content of the archive's files by relative path, none of which leaves the folder."""
+    """Return relative path -> content of the archive's files; refuse paths that leave the folder."""
     contents = {}
     try:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
@@ -187,7 +187,7 @@ def _files(raw: bytes, path: Path) -> dict[str, bytes]:
 
 
 def _make_entry(files: dict[str, bytes], fmu: Fmu, entry: Path) -> None:
-    """Unpack beside the entry, then put it in its place, or what is damaged in its place."""
+    """Unpack into a scratch folder, then rename it to the entry, or repair a damaged entry from it."""
     entry.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     scratch = Path(tempfile.mkdtemp(prefix=".unpacking-", dir=entry.parent))
     try:
@@ -213,19 +213,19 @@ def _make_entry(files: dict[str, bytes], fmu: Fmu, entry: Path) -> None:
 
 
 def _repair(entry: Path, scratch: Path, files: Iterable[str]) -> None:
-    """Put every file back, one by one, so a process that uses the entry keeps what it has open."""
+    """Replace the files one by one, so that a process using the entry keeps its open files."""
     for name in (*(f"fmu/{name}" for name in files), "description.json"):
         target = entry / name
         if target.is_dir():
             shutil.rmtree(target)
         target.parent.mkdir(parents=True, exist_ok=True)
         os.replace(scratch / name, target)
-    for compiled in entry.rglob("__pycache__"):  # perhaps of a module as it was in between
+    for compiled in entry.rglob("__pycache__"):  # perhaps compiled from the damaged module
         shutil.rmtree(compiled, ignore_errors=True)
 
 
 def _prune(folder: Path) -> None:
-    """Delete entries and left-over scratch folders that nobody has used for long."""
+    """Delete entries and scratch folders not used for `KEEP_DAYS`."""
     oldest = time.time() - KEEP_DAYS * 86400.0
     for entry in folder.iterdir():
         ours = entry.name.startswith(".unpacking-") or re.fullmatch(r"[0-9a-f]{32}-\d+", entry.name)
@@ -238,21 +238,21 @@ def _prune(folder: Path) -> None:
 
 @dataclass(frozen=True)
 class CacheEntry:
-    """A file or folder of the cache."""
+    """An entry of the cache: a file or a folder, and a function that checks whether it is intact."""
 
     path: Path
     whole: Callable[[], bool]
 
     @property
     def size(self) -> int:
-        """Of all its files [B]."""
+        """Total size of its files [B]."""
         files = self.path.rglob("*") if self.path.is_dir() else [self.path]
         return sum(file.lstat().st_size for file in files if not file.is_dir())
 
 
 def kept_in(folder: Path) -> dict[str, list[CacheEntry]]:
-    """Return kind -> entries of a folder of the cache; nothing else that lies there is ours."""
-    found: dict[str, list[CacheEntry]] = {
+    """Return kind -> entries of a cache folder; other files there are not ours and left out."""
+    entries_by_kind: dict[str, list[CacheEntry]] = {
         "unpacked FMUs": [],
         "launchers": [_file(file) for file in folder.glob("launcher/*")],
         "keys of sources": [_file(file) for file in folder.glob("keys/*")],
@@ -262,10 +262,12 @@ def kept_in(folder: Path) -> dict[str, list[CacheEntry]]:
     for path in folder.iterdir():
         match = re.fullmatch(r"[0-9a-f]{32}-(\d+)", path.name)
         if match and int(match[1]) == FORMAT:
-            found["unpacked FMUs"].append(CacheEntry(path, partial(_entry_is_whole, path)))
+            entries_by_kind["unpacked FMUs"].append(CacheEntry(path, partial(_entry_is_whole, path)))
         elif match or path.name.startswith(".unpacking-"):
-            found["left over"].append(CacheEntry(path, lambda: True))  # of other versions, or ended half-way
-    return {kind: entries for kind, entries in found.items() if entries}
+            entries_by_kind["left over"].append(
+                CacheEntry(path, lambda: True)
+            )  # of other versions, or interrupted
+    return {kind: entries for kind, entries in entries_by_kind.items() if entries}
 
 
 def _file(file: Path) -> CacheEntry:
@@ -283,7 +285,7 @@ def _zip_is_whole(file: Path) -> bool:
 
 
 def remove(path: Path) -> None:
-    """Delete an entry, also while somebody uses it."""
+    """Delete an entry, even while it is in use."""
     if path.is_dir():
         shutil.rmtree(path, ignore_errors=True)
     else:

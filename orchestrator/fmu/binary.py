@@ -1,4 +1,4 @@
-"""The library in an FMU: where it has to be for this platform, which functions it has."""
+"""The shared library in an FMU: its path for this platform, and the FMI functions that it exports."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ CORE = {
     2: ("Instantiate", "SetupExperiment", *_ALWAYS),
     3: ("InstantiateCoSimulation", *_ALWAYS),
 }
-"""Major version of FMI -> functions without which nothing runs."""
+"""Major version of FMI -> functions that every run calls."""
 INTEGERS = tuple(f"{sign}Int{bits}" for bits in (8, 16, 32, 64) for sign in ("", "U"))
 TYPES = {
     2: ("Real", "Integer", "Boolean", "String"),
     3: ("Float32", "Float64", *INTEGERS, "Boolean", "String"),
 }
-"""Major version of FMI -> types in the names of the functions that set and get values."""
+"""Major version of FMI -> types as in the names of setters and getters."""
 _FILE_NAME = re.compile(r"[^/\\:\x00-\x1f\x7f]{1,200}")
 
 _ARCHITECTURES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
@@ -33,9 +33,9 @@ def integer_limits(kind: str) -> tuple[int, int]:
 
 
 def platform(fmi: int = 2) -> tuple[str, str]:
-    """Return a version of FMI's name of this platform and the suffix of its binaries."""
+    """Return the name of this platform in a version of FMI, and the suffix of its binaries."""
     names = {"win32": ("win", ".dll"), "cygwin": ("win", ".dll"), "darwin": ("darwin", ".dylib")}
-    system, suffix = names.get(sys.platform, ("linux", ".so"))  # as fmpy says, which takes long to import
+    system, suffix = names.get(sys.platform, ("linux", ".so"))  # as in fmpy, which is slow to import
     wide = sys.maxsize > 2**32
     if fmi == 2:
         return f"{system}{64 if wide else 32}", suffix
@@ -44,7 +44,7 @@ def platform(fmi: int = 2) -> tuple[str, str]:
 
 
 def binary_of(fmi: int, identifier: str) -> str:
-    """Return the path in an archive of the library for this platform."""
+    """Return the path, within the archive, of the library for this platform."""
     name, suffix = platform(fmi)
     return f"binaries/{name}/{identifier}{suffix}"
 
@@ -73,10 +73,10 @@ def binary_problem(fmu: Fmu) -> str | None:
 
 
 def lacking(library: bytes | None, fmi: int) -> tuple[str, ...]:
-    """Return the functions that a library does not have, of those that this program may call.
+    """Return the functions that this program may call and the library does not export.
 
-    Nothing of it is run: a function that has no name in the file cannot be found when it is loaded. A file
-    without any of the names gets its functions from another, so it has all or will be refused then.
+    The library is not loaded: a function whose name is not in the file cannot be found after loading. A file
+    with none of the names gets its functions from another library; it is checked when it is loaded.
     """
     access = [f"{verb}{kind}" for verb in ("Set", "Get") for kind in TYPES[fmi]]
     named = {name: f"fmi{fmi}{name}" for name in (*CORE[fmi], *access)}

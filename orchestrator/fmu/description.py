@@ -1,12 +1,10 @@
-"""An FMU's model description as `plan.Fmu`, read by fmpy, checked for what this master supports.
+"""Model descriptions: read by fmpy into `plan.Fmu`, and checked for what this master supports.
 
-The scalar variables of a model description, whichever version of FMI it is written in.
+`scalars` gives the variables as scalars whichever version of FMI describes them, arrays element by element.
 
-A guard against units that would silently run each other's code.
-
-All PythonFMU units of a process share one interpreter: of two modules with one name, the second is
-never loaded. Units made by `yawbench build` carry names that no other content has; units from
-elsewhere may not.
+`shadowed_modules` detects PythonFMU instances that would silently run each other's code: all of them in a
+process share one interpreter, and of two modules with the same name the second is never loaded. FMUs built by
+`yawbench build` have module names that are unique to their content; FMUs from other sources may not.
 """
 
 from __future__ import annotations
@@ -28,21 +26,21 @@ from ..plan import Fmu, UnitDefinition, Value, Variable
 from .binary import INTEGERS, binary_of, lacking
 
 _KINDS = {"Float32": "Real", "Float64": "Real"} | dict.fromkeys(INTEGERS, "Integer")
-"""Type of FMI 3.0 -> what it is to a scenario; others are called alike."""
+"""Type of FMI 3.0 -> type in a scenario, where the names differ."""
 _REFUSED = {
     "Binary": "is Binary, which is not supported",
     "Clock": "is a Clock, which is not supported",
 }
 MOST = 100_000
-"""Elements of an array, beyond which it is not supported. Chosen: more than any interface has."""
+"""Largest number of elements of an array; chosen: more than any interface has."""
 
 
 def scalars(description: Any, root: ElementTree.Element) -> tuple[dict[str, Variable], dict[str, str]]:
-    """Return the variables by name, arrays element by element, and why others cannot be used.
+    """Return the variables by name, arrays element by element, and the reasons why others cannot be used.
 
     Args:
-        description: fmpy's.
-        root: of the same model description.
+        description: the model description as fmpy reads it.
+        root: root element of the same model description.
     """
     variables: dict[str, Variable] = {}
     refused: dict[str, str] = {}
@@ -57,14 +55,14 @@ def scalars(description: Any, root: ElementTree.Element) -> tuple[dict[str, Vari
         declared = v.declaredType
         kind = _KINDS.get(v.type, v.type)
         unit = v.unit or (declared.unit if declared else None)
-        said = _said(element)
-        choices = tuple(said["choices"].split(", ")) if "choices" in said else ()
+        extra = _annotation(element)
+        choices = tuple(extra["choices"].split(", ")) if "choices" in extra else ()
         items = (
             {i.name: int(i.value) for i in declared.items} if v.type == "Enumeration" and declared else None
         )
         names = element_names(v.name, v.shape or ())
         starts = _starts(v, kind, element, len(names))
-        limits = element if modern else v  # fmpy does not read those of all types of FMI 3.0
+        limits = element if modern else v  # fmpy does not read the limits of all FMI 3.0 types
         for i, name in enumerate(names):
             variables.setdefault(
                 name,
@@ -82,8 +80,8 @@ def scalars(description: Any, root: ElementTree.Element) -> tuple[dict[str, Vari
                     depends_on=follows.get(id(v.alias or v)) if v.causality == "output" else None,
                     choices=choices or None,
                     items=items,
-                    optional=v.causality == "input" and "optional" in said,
-                    source=said.get("source", ""),
+                    optional=v.causality == "input" and "optional" in extra,
+                    source=extra.get("source", ""),
                     definition=definitions.get(unit),
                     encoding=("Int64" if kind == "Enumeration" else v.type) if modern else None,
                     element=i,
@@ -94,7 +92,7 @@ def scalars(description: Any, root: ElementTree.Element) -> tuple[dict[str, Vari
 
 
 def element_names(name: str, shape: tuple[int, ...]) -> list[str]:
-    """Return the names of an array's elements, row by row, counted from 1; a scalar's own name."""
+    """Return the names of an array's elements, row by row and counted from 1; for a scalar, its name."""
     if not shape:
         return [name]
     places = itertools.product(*(range(1, n + 1) for n in shape))
@@ -115,7 +113,7 @@ def _reason(v: Any) -> str | None:
 
 
 def _dependencies(description: Any) -> dict[int, tuple[str, ...] | None]:
-    """Return what each output follows: the names of inputs, None if it is not said."""
+    """Return id of an output -> names of the inputs that it depends on, None if not stated."""
 
     def names(known: Any) -> Iterator[str]:
         for v in known:
@@ -129,7 +127,7 @@ def _dependencies(description: Any) -> dict[int, tuple[str, ...] | None]:
 
 
 def _definitions(description: Any) -> dict[str | None, UnitDefinition]:
-    """Return what the description defines in base units, by the name of the unit."""
+    """Return name -> definition in SI base units, for the units of measurement that have one."""
     return {
         unit.name: UnitDefinition(
             (base.kg, base.m, base.s, base.A, base.K, base.mol, base.cd, base.rad), base.factor, base.offset
@@ -139,14 +137,14 @@ def _definitions(description: Any) -> dict[str | None, UnitDefinition]:
     }
 
 
-def _said(element: ElementTree.Element) -> dict[str, str]:
-    """Return what our own units say of a variable beyond the standard: optional, choices, source."""
-    said = element.find("Annotations/Tool[@name='yawbench']/variable")
-    return {} if said is None else said.attrib
+def _annotation(element: ElementTree.Element) -> dict[str, str]:
+    """Return yawbench's own annotation of a variable: optional, choices, source."""
+    annotation = element.find("Annotations/Tool[@name='yawbench']/variable")
+    return {} if annotation is None else annotation.attrib
 
 
 def _starts(v: Any, kind: str, element: ElementTree.Element, count: int) -> list[Value | None]:
-    """Return the start value of every element; one value stands for all."""
+    """Return the start value of every element; a single value applies to all."""
     texts: list[str | None]
     if not v.shape:
         texts = [v.start]
@@ -176,11 +174,11 @@ def _limit(v: Mapping[str, str] | Any, declared: Any, which: str) -> float | Non
 
 
 def shadowed_modules(fmus: Mapping[str, Fmu], *, isolated: bool = False) -> list[str]:
-    """Return a sentence for every unit that would run another unit's, or this program's, module.
+    """Return an error message for every instance that would run another instance's or this program's module.
 
     Args:
-        fmus: unit -> FMU.
-        isolated: each unit has a process of its own, and so no other's modules.
+        fmus: instance -> FMU.
+        isolated: each instance has a process of its own, and so its own modules.
     """
     problems = []
     seen: dict[str, tuple[str, str]] = {}
@@ -207,7 +205,7 @@ def shadowed_modules(fmus: Mapping[str, Fmu], *, isolated: bool = False) -> list
 
 
 def _loaded_from_elsewhere(module: str, content: str, directory: Path) -> bool:
-    """Return whether `module` is loaded, from other content than this unit's."""
+    """Return whether a different module with this name is already loaded in this process."""
     homes = [home for home in _homes(module) if not home.is_relative_to(directory)]
     return any(_content(home, module) != content for home in homes)
 
@@ -245,12 +243,12 @@ SUPPORTED = "supported are FMI 2.0 and 3.0 for co-simulation"
 
 
 def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
-    """Read the model description of the archive `raw` that holds `files`; `directory` is still to be set.
+    """Read the model description of the archive `raw` with the content `files`; the caller sets `directory`.
 
-    One that is formally wrong is read all the same, if it can be; what is wrong stands in `flaws`.
+    An invalid model description is read nevertheless if possible; its errors are listed in `flaws`.
 
     Raises:
-        ModelDescriptionError: none, malformed, unusable, or of a kind that is not supported.
+        ModelDescriptionError: it is missing, malformed, unusable, or of a kind that is not supported.
     """
     if "modelDescription.xml" not in files:
         raise ModelDescriptionError(f"{path}: no FMU: the archive holds no modelDescription.xml")
@@ -305,18 +303,18 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
 
 
 def _dangling(root: ElementTree.Element, fmi: int) -> str | None:
-    """Return which variable is meant that does not exist, None if all do; fmpy takes 0 for the last one."""
+    """Return an error for a reference to a missing variable, else None; fmpy takes index 0 for the last."""
     variables = root.findall("ModelVariables/*")
     if fmi == 2:
         known = {str(number) for number in range(1, len(variables) + 1)}
         what, own, among = "variable number", "index", f"there are {len(variables)}"
-        rates = [(one, "derivative") for one in root.iterfind("ModelVariables/ScalarVariable/Real")]
+        rates = [(e, "derivative") for e in root.iterfind("ModelVariables/ScalarVariable/Real")]
     else:
-        known = {one.get("valueReference", "") for one in variables}
+        known = {e.get("valueReference", "") for e in variables}
         what, own, among = "value reference", "valueReference", "no variable has it"
-        rates = [(one, "derivative") for one in variables]
+        rates = [(e, "derivative") for e in variables]
     unknowns = root.findall("ModelStructure//Unknown") if fmi == 2 else root.findall("ModelStructure/*")
-    places = [(one, key) for one in unknowns for key in (own, "dependencies")]
+    places = [(e, key) for e in unknowns for key in (own, "dependencies")]
     for element, key in (*places, *rates):
         for number in (element.get(key) or "").split():
             if number.isdecimal() and number.lstrip("0") not in known and number not in known:
@@ -325,7 +323,7 @@ def _dangling(root: ElementTree.Element, fmi: int) -> str | None:
 
 
 def _host_packages(root: ElementTree.Element) -> tuple[str, ...]:
-    """Return what one of our units needs of a Python beyond the standard library."""
+    """Return the packages beyond the standard library that an FMU of yawbench needs in its host."""
     needed = root.find("VendorAnnotations/Tool[@name='yawbench']/hostPackages")
     return () if needed is None else tuple(needed.get("names", "").split())
 
@@ -335,19 +333,19 @@ def _one_line(problem: object) -> str:
 
 
 def _tolerance(experiment: Any) -> float | None:
-    """Return the tolerance of a default experiment, None if it has none that makes sense."""
+    """Return the tolerance of a default experiment, None if it has no valid one."""
     text = experiment.tolerance if experiment else None
     value = None if text is None else float(text)
     return value if value is not None and 0.0 < value < math.inf else None
 
 
 def _parsed(xml: bytes, path: Path) -> ElementTree.Element:
-    """Return the root of the model description of an FMU of a kind that is supported."""
+    """Parse a model description; refuse versions and kinds of FMI that are not supported."""
     try:
         root = ElementTree.fromstring(xml)
     except ElementTree.ParseError as error:
         raise ModelDescriptionError(f"{path}: modelDescription.xml is not well-formed XML: {error}") from None
-    except (ValueError, LookupError) as error:  # of encodings that Python knows and the parser does not
+    except (ValueError, LookupError) as error:  # encodings that Python knows and the parser does not
         raise ModelDescriptionError(
             f"{path}: modelDescription.xml has an encoding that cannot be read ({_one_line(error)}); "
             "FMI asks for UTF-8"
@@ -365,9 +363,9 @@ def _parsed(xml: bytes, path: Path) -> ElementTree.Element:
 
 
 def _python_modules(files: Mapping[str, bytes]) -> dict[str, str]:
-    """Return the top-level modules that a PythonFMU unit brings along, each with a hash of its content.
+    """Return the top-level Python modules in a PythonFMU archive, each with a hash of its content.
 
-    PythonFMU's own package is left out: it is the same for all units or at least made to be.
+    PythonFMU's own package is left out: it is the same in all FMUs, or at least meant to be.
     """
     if "resources/slavemodule.txt" not in files:
         return {}
@@ -376,13 +374,13 @@ def _python_modules(files: Mapping[str, bytes]) -> dict[str, str]:
 
 
 def to_record(fmu: Fmu) -> dict[str, Any]:
-    """Return the description as JSON-ready data, without where archive and folder are."""
+    """Return the description as JSON-ready data, without the paths of archive and folder."""
     record = {key: value for key, value in asdict(fmu).items() if key not in ("name", "path", "directory")}
     return {**record, "variables": list(record["variables"].values())}
 
 
 def from_record(record: dict[str, Any], *, path: Path, directory: Path) -> Fmu:
-    """Return the description that `to_record` made, for the archive `path` unpacked in `directory`."""
+    """Return the description written by `to_record`, for the archive `path` unpacked in `directory`."""
     variables = {}
     for v in record["variables"]:
         for key in ("depends_on", "choices"):

@@ -1,4 +1,4 @@
-"""FMUs found and opened for plans: each once, brought up to date with its sources before if they are here."""
+"""Finds and opens the FMUs of plans, each once; FMUs of the project's own components are rebuilt if stale."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ def _say(text: str) -> None:
 
 
 class Opener:
-    """Opens the FMUs of one plan or many.
+    """Opens the FMUs of one or several plans.
 
     Args:
-        build: build what is stale, or missing and can be built. Only who starts runs does so, and
-            once for all of them; what each run finds stale then, its plan says.
+        build: build FMUs that are stale, or missing but buildable. Only the process that starts runs does
+            so, once for all of them; FMUs found stale later are listed in the plan.
         tell: called with a line for every FMU that is built.
-        opened: FMUs that need not be opened, by the path that stands for each.
+        opened: FMUs already opened, by their paths.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class Opener:
     ) -> None:
         self.build = build
         self._tell = tell
-        self._given = dict(opened or {})
+        self._preopened = dict(opened or {})
         self._opened: dict[tuple[Path, BuildInfo | None, bool], Fmu] = {}
         self._built: dict[Path, BuildInfo | None] = {}
 
@@ -61,20 +61,20 @@ class Opener:
         return FmuUpdater(lambda name: self._tell(f"{name}: built"))
 
     def bring(self, archive: Path, *, build: bool = True) -> Path:
-        """Return the archive to open in place of `archive`, built if need be; it may not exist.
+        """Return the archive to open for `archive`, building it if necessary; it may not exist.
 
         Raises:
-            BuildError: its sources cannot be made into an FMU.
+            BuildError: building fails.
         """
-        if archive in self._given:
+        if archive in self._preopened:
             return archive
         path, self._built[path] = self._upkeep.bring(archive, build=build and self.build)
         return path
 
     def open(self, archive: Path, *, validate: bool = True) -> Fmu:
-        """Return an FMU as `open_fmu` does, with what it was built from if it has been brought."""
-        if archive in self._given:
-            return self._given[archive]
+        """Open an FMU as `open_fmu` does, with its build info if `bring` has returned it; each only once."""
+        if archive in self._preopened:
+            return self._preopened[archive]
         built = self._built.get(archive)
         key = (archive, built, validate)
         if key not in self._opened:
@@ -89,20 +89,20 @@ class Opener:
         return self._opened[key]
 
     def names(self, folder: Path) -> list[str]:
-        """Return the names of the FMUs that a folder holds, or that can be built into it."""
-        held = {path.stem for path in folder.glob("*.fmu")}
+        """Return the names of the FMUs in a folder, including those that can be built into it."""
+        names = {path.stem for path in folder.glob("*.fmu")}
         if self.build and folder.resolve() == HOME:
             from fmus.build import find_recipes
 
-            held |= find_recipes().keys()
-        return sorted(held)
+            names |= find_recipes().keys()
+        return sorted(names)
 
 
 def find_folder(scenario: Path, *, opener: Opener) -> Path:
-    """Return the nearest folder `fmus` that holds FMUs, upward from a scenario file, then from here.
+    """Return the nearest folder `fmus` with FMUs, upwards from the scenario, then from the working directory.
 
     Raises:
-        ModelDescriptionError: there is none, and none may be built.
+        ModelDescriptionError: there is none, and building is not allowed.
     """
     above = scenario.absolute().parent
     here = Path.cwd()
@@ -118,18 +118,18 @@ def find_folder(scenario: Path, *, opener: Opener) -> Path:
 
 
 def find_fmu(fmu: str, *, scenario: Path, fmus: Path, opener: Opener, build: bool = True) -> Path:
-    """Return the archive that `fmu` means, built if need be: a path from the scenario, or a name in a folder.
+    """Return the archive for `fmu`, a path relative to the scenario or a name in a folder; may build it.
 
     Args:
-        fmu: as the scenario or an option gives it.
+        fmu: path or name, as given in the scenario or an option.
         scenario: the scenario file.
         fmus: the folder of FMUs.
         opener: brings archives up to date.
         build: whether it may build this one.
 
     Raises:
-        ModelDescriptionError: no such FMU; names those there are.
-        BuildError: its sources cannot be made into an FMU.
+        ModelDescriptionError: no such FMU; the message lists the existing ones.
+        BuildError: building fails.
     """
     if is_path(fmu):
         return opener.bring(Path(os.path.normpath(scenario.absolute().parent / fmu)), build=build)
@@ -147,7 +147,7 @@ def find_fmu(fmu: str, *, scenario: Path, fmus: Path, opener: Opener, build: boo
 
 
 def stale_fmus(fmus: Iterable[Fmu]) -> list[str]:
-    """Return a sentence for every FMU that is not made of its sources as they are."""
+    """Return a warning for every FMU that is out of date with its sources."""
     stale = {fmu.path: fmu.built.source for fmu in fmus if fmu.built is not None and not fmu.built.current}
     return [
         f"{path.name} is not made of {source or 'its sources'} as it is now; 'yawbench build' makes it anew"
@@ -156,7 +156,7 @@ def stale_fmus(fmus: Iterable[Fmu]) -> list[str]:
 
 
 def host_needs(fmus: Iterable[Fmu]) -> list[str]:
-    """Return a sentence for every FMU that needs more of a host's Python than the standard library."""
+    """Return a note for every FMU that needs packages beyond the standard library in its host's Python."""
     needs = {fmu.name: fmu.host_packages for fmu in fmus if fmu.host_packages}
     return [
         f"{name} needs {listed(packages)} in the Python of every host" for name, packages in needs.items()

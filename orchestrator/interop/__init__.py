@@ -1,1 +1,1 @@
-"""Other programs: systems in the form of SSP, and the same scenario run by other masters."""
+"""Interoperability: SSP export, and the same scenario run by other co-simulation masters."""

@@ -1,32 +1,26 @@
-"""What a master is asked to run, and what it gives back.
+"""Adapters that run an SSP archive in a co-simulation master: this program's own, fmpy, libcosim or Ecos.
 
-This program's master, run on an archive and measured as the others are.
+Each runs in a process of its own (`main`), so a crash costs only that master's result.
 
-fmpy's own simulation of SSP archives (`fmpy.ssp.simulation.simulate_ssp`).
+**Own**: this program's master with the algorithm `jacobi`, timed as the others are.
 
-It reads structure and FMUs from the archive but no parameter values, which are handed to it here;
-texts it cannot set. It exchanges nothing before the first step: every input is 0 in it, whatever
-the units' outputs are at the start. It steps all units with one step, and labels the values after
-a step with the time at its beginning.
+**fmpy**: its simulation of SSP archives (`fmpy.ssp.simulation.simulate_ssp`). It reads structure and FMUs
+from the archive but no parameter values, which are passed to it here; it cannot set texts. It exchanges
+nothing before the first step: every input is 0 in it, whatever the outputs are at the start. It steps all
+instances with one step, and labels the values after a step with the time at its beginning.
 
-libcosim, the co-simulation core of the Open Simulation Platform, through libcosimpy.
+**libcosim**: the co-simulation core of the Open Simulation Platform, through libcosimpy. Its fixed-step
+algorithm steps all instances from the same exchanged values, so it is `jacobi`; an instance with a longer
+step is stepped once per multiple of the communication step, over its whole step. An observer has values only
+from the first step on. A connection that it cannot make returns -1, which its loader ignores; here the system
+comes from an archive whose wiring has been checked.
 
-Its fixed-step algorithm steps all units from the same exchanged values, so it is `jacobi`; a unit
-with a step of its own is stepped once in so many communication steps, over its whole step. An
-observer has values only from the first step on. A connection that it cannot make is answered with
--1, which nobody looks at; here the system comes from an archive whose wiring has been checked.
-
-Ecos, through ecospy.
-
-Its fixed-step algorithm steps all units from the same exchanged values, so it is `jacobi`. Of a
-unit with a step of its own it calls one step in so many, but over a single communication step (its
-`fixed_step_algorithm` passes the base step on), so such a unit is half asleep; systems for it are
-given one step for all. It takes a parameter set of an archive by name, and accumulates its time
-in floating point, so steps are counted here.
-
-ecospy needs Intel's TBB and does not load it: the package `tbb` puts it beside the interpreter.
-
-One master in this process, by its name.
+**Ecos**: through ecospy. Its fixed-step algorithm steps all instances from the same exchanged values, so it
+is `jacobi`. It steps an instance with a longer step once per multiple of the communication step, but only
+over a single communication step (its `fixed_step_algorithm` passes the base step on), so such an instance
+advances too slowly; systems for it get one step for all. It takes a parameter set of an archive by name, and
+accumulates its time in floating point, so steps are counted here. ecospy needs Intel's TBB and does not load
+it: the package `tbb` installs it next to the interpreter.
 """
 
 from __future__ import annotations
@@ -59,12 +53,12 @@ from ..wiring.make_plan import make_plan
 
 @dataclass(frozen=True)
 class Request:
-    """An SSP archive to be run with a fixed communication step."""
+    """A run asked of a master: an SSP archive with a fixed communication step."""
 
     archive: str
     step: float  # communication step [s]
     n_steps: int
-    columns: list[tuple[str, str]]  # unit and output, of type Real
+    columns: list[tuple[str, str]]  # instance and output, of type Real
     core: int | None = None  # the only processor core the master may use
 
     def write(self, path: Path) -> None:
@@ -73,7 +67,7 @@ class Request:
 
     @classmethod
     def read(cls, path: Path) -> Request:
-        """Read what `write` has written."""
+        """Read a file written by `write`."""
         content = json.loads(path.read_text(encoding="utf-8"))
         content["columns"] = [tuple(column) for column in content["columns"]]
         return cls(**content)
@@ -81,13 +75,13 @@ class Request:
 
 @dataclass(frozen=True)
 class Recording:
-    """Values after 0, 1, ... n communication steps, and what a step took.
+    """Result of a master: the values after 0, 1, ... n communication steps, and the time per step.
 
-    `values` has a row per point and a column per requested one; NaN where a master has no value.
+    `values` has a row per communication point and a column per requested output; NaN: no value available.
     """
 
     values: np.ndarray
-    seconds: float  # in the master's own step, per communication step
+    seconds: float  # time spent in the master's own step, per communication step
 
     def write(self, path: Path) -> None:
         """Write the recording as .npz."""
@@ -95,19 +89,19 @@ class Recording:
 
     @classmethod
     def read(cls, path: Path) -> Recording:
-        """Read what `write` has written."""
+        """Read a file written by `write`."""
         with np.load(path) as content:
             return cls(content["values"], float(content["seconds"]))
 
 
 def run_own(request: Request) -> Recording:
-    """Run the archive here as `jacobi`.
+    """Run the archive in this program's master, with the algorithm `jacobi`.
 
     Raises:
         YawbenchError: the archive cannot be read, or the run fails.
     """
-    alike = Override("algorithm", "jacobi", "second-opinion")
-    plan = make_plan(load_scenario(Path(request.archive), changes=[alike]))
+    jacobi = Override("algorithm", "jacobi", "second-opinion")
+    plan = make_plan(load_scenario(Path(request.archive), changes=[jacobi]))
     log, slaves = Log(), dict[str, FmuInstance]()
     plan = replace(plan, record=tuple(request.columns))
     rows = np.zeros((request.n_steps + 1, 1 + len(request.columns)))
@@ -144,16 +138,16 @@ def run_fmpy_ssp(request: Request) -> Recording:
 
 
 def _parameters(archive: str) -> list[Any]:
-    """Return the values of the archive that fmpy can set, by unit.variable."""
+    """Return the values of the archive that fmpy can set, named `instance.variable`."""
     data = ssp_read.read(Path(archive)).data
-    given = dict(data["inputs"])
+    values = dict(data["inputs"])
     for unit, spec in data["units"].items():
-        given |= {f"{unit}.{name}": value for name, value in spec.get("parameters", {}).items()}
-    return [SimpleNamespace(name=name, value=v) for name, v in given.items() if not isinstance(v, str)]
+        values |= {f"{unit}.{name}": value for name, value in spec.get("parameters", {}).items()}
+    return [SimpleNamespace(name=name, value=v) for name, v in values.items() if not isinstance(v, str)]
 
 
 class _Stopwatch:
-    """Measures the steps of fmpy's loop: from its first to its last call of `do_step`."""
+    """Measures fmpy's loop, from its first to its last call of `do_step`."""
 
     seconds = 0.0
 
@@ -162,9 +156,9 @@ class _Stopwatch:
 
         step, begin = simulation.do_step, [0.0]
 
-        def timed(*given: Any) -> Any:
+        def timed(*arguments: Any) -> Any:
             begin[0] = begin[0] or time.perf_counter()
-            result = step(*given)
+            result = step(*arguments)
             self.seconds = time.perf_counter() - begin[0]
             return result
 
@@ -182,7 +176,7 @@ def run_libcosim(request: Request) -> Recording:
     """Run the archive in libcosim.
 
     Raises:
-        RuntimeError: it does not step.
+        RuntimeError: libcosim stops before the end.
     """
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
@@ -206,16 +200,16 @@ def run_libcosim(request: Request) -> Recording:
 
 
 def _readers(execution: Any, observer: Any, request: Request) -> list[tuple[list[int], Any]]:
-    """Return, per unit, the columns and a function that gives their values."""
+    """Return, per instance, its columns and a function that reads their values."""
     infos = execution.slave_infos()
     units = {infos[i].name.decode(): infos[i].index for i in range(execution.num_slaves())}
     readers = []
     for unit, index in units.items():
         references = {v.name.decode(): v.reference for v in execution.slave_variables(index)}
         where = [i for i, (u, _) in enumerate(request.columns) if u == unit]
-        wanted = [references[request.columns[i][1]] for i in where]
+        outputs = [references[request.columns[i][1]] for i in where]
         if where:
-            readers.append((where, partial(observer.last_real_values, index, wanted)))
+            readers.append((where, partial(observer.last_real_values, index, outputs)))
     return readers
 
 
@@ -226,7 +220,7 @@ def run_ecos(request: Request) -> Recording:
     """Run the archive in Ecos.
 
     Raises:
-        RuntimeError: it cannot initialize the system.
+        RuntimeError: Ecos cannot initialize the system.
     """
     _load_tbb()
     from ecospy.EcosSimulation import EcosSimulation
@@ -249,6 +243,7 @@ def run_ecos(request: Request) -> Recording:
 
 
 def _load_tbb() -> None:
+    """Load Intel's TBB, if installed next to the interpreter, for ecospy to find."""
     for folder in (Path(sys.prefix, "lib"), Path(sys.prefix, "Library", "bin")):
         for name in TBB:
             if (folder / name).exists():
@@ -260,7 +255,7 @@ MASTERS = {"own": run_own, "fmpy_ssp": run_fmpy_ssp, "libcosim": run_libcosim, "
 
 
 def main(name: str, request_file: str, recording_file: str) -> None:
-    """Run what the request says, write the recording; a reason why not goes to stderr."""
+    """Run a request in the named master and write its recording; errors go to stderr with exit status 1."""
     request = Request.read(Path(request_file))
     if request.core is not None and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {request.core})
@@ -269,4 +264,4 @@ def main(name: str, request_file: str, recording_file: str) -> None:
     except Exception as error:
         print(f"{type(error).__name__}: {error}", file=sys.stderr)
         sys.exit(1)
-    os._exit(0)  # some leave threads behind that never end
+    os._exit(0)  # some masters leave threads running that never end

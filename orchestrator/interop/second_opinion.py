@@ -1,12 +1,12 @@
-"""A scenario run by other masters, and how far their numbers are from those of ours.
+"""Second opinions: run a scenario in other co-simulation masters and compare the results with ours.
 
-Everything is exported as an SSP archive and every master runs it in a process of its own, so one
-that crashes or never ends costs a sentence. Samples are counted, not read off time labels: after k
-steps is after k steps, whatever a program calls that instant. What is compared is `jacobi`, the
-algorithm that they all have; a difference is relative to the signal's range in our run.
+Everything is exported as an SSP archive and every master runs it in a process of its own, so a crash or a
+hang costs only an error message. Samples are counted, not matched by time labels: after k steps is after k
+steps, whatever a program calls that time. The algorithm compared is `jacobi`, which all of them have; a
+difference is relative to the signal's range in our run.
 
-A master that cannot give a unit a step of its own gets the system with one step for all, and is
-compared with our run of that system.
+A master that cannot give an instance a step of its own gets the system with one step for all, and is compared
+with our run of that system.
 """
 
 from __future__ import annotations
@@ -27,23 +27,23 @@ from .masters import Recording, Request
 from .ssp_write import write_ssp
 
 AGREEMENT = 1e-9
-"""Difference, relative to a signal's range, below which two runs are the same run: rounding, and that
-one program counts time in nanoseconds and another adds steps up."""
+"""Difference, relative to a signal's range, up to which two runs agree: rounding, and the fact that one
+program counts time in nanoseconds and another accumulates steps."""
 ROUNDING = 1e-12
 """Range, relative to a signal's magnitude, up to which it counts as constant; chosen: thousands of
-roundings, far below what any signal here does."""
+roundings, far below the motion of any signal here."""
 LIMIT = 900.0
 """Time that a master may take [s]."""
 
 
 @dataclass(frozen=True)
 class OtherMaster:
-    """A program that runs SSP archives: its module, its package, what has to be known of it."""
+    """Another program that runs SSP archives: its key in `masters.MASTERS`, its package, its limitations."""
 
     title: str
     module: str
     package: str
-    one_step: bool  # cannot give a unit a step of its own
+    one_step: bool  # cannot give an instance a step of its own
     note: str = ""
 
 
@@ -69,14 +69,16 @@ MASTERS = (
 
 @dataclass(frozen=True)
 class SecondOpinion:
-    """What another master made of a system, beside what ours made of the same archive."""
+    """Comparison of another master's run with our run of the same archive."""
 
     master: OtherMaster
-    one_step: bool  # the system was given one step for all units
+    one_step: bool  # the system was run with one step for all instances
     problem: str = ""
-    differences: dict[str, float] = field(default_factory=dict)  # unit.variable -> largest, over range
+    differences: dict[str, float] = field(
+        default_factory=dict
+    )  # instance.variable -> largest, relative to its range
     seconds: dict[str, float] = field(default_factory=dict)  # per step: "theirs", "ours", "... on one core"
-    still: tuple[str, ...] = ()  # signals that keep their first value in our run, and so say little
+    still: tuple[str, ...] = ()  # constant signals in our run, which prove little
 
     @property
     def largest(self) -> float:
@@ -85,11 +87,12 @@ class SecondOpinion:
 
     @property
     def agrees(self) -> bool:
+        """Whether the run succeeded and all differences are within `AGREEMENT`."""
         return not self.problem and self.largest <= AGREEMENT
 
 
 def installed(master: OtherMaster) -> bool:
-    """Return whether the program's package is there."""
+    """Return whether the master's Python package is installed."""
     return importlib.util.find_spec(master.package) is not None
 
 
@@ -101,17 +104,17 @@ def second_opinion(
     pinned: bool = True,
     said: Callable[[str], None] = lambda text: None,
 ) -> list[SecondOpinion]:
-    """Run a plan in other masters and compare.
+    """Run a plan in other masters and compare the results with ours.
 
     Args:
-        plan: its algorithm does not matter, `jacobi` is compared.
+        plan: its algorithm is ignored: `jacobi` is compared.
         folder: for archives and recordings.
-        masters: which ones; those not installed get a sentence.
+        masters: to compare with; those not installed are reported as such.
         pinned: also measure every master on one processor core.
-        said: told what is being run.
+        said: called with the name of the master about to run.
 
     Raises:
-        WiringError: there is nothing to compare.
+        WiringError: no output of type Real is recorded, or the run does not begin at 0 s.
         ResultsError: the archive cannot be written.
         RuntimeError: our own run failed.
     """
@@ -126,16 +129,16 @@ def second_opinion(
     for master in masters:
         one_step = master.one_step and any(unit.period > 1 for unit in plan.instances)
         if not installed(master):
-            says = f"{master.package} is not installed: pip install 'yawbench[interop]'"
-            opinions.append(SecondOpinion(master, one_step, says))
+            problem = f"{master.package} is not installed: pip install 'yawbench[interop]'"
+            opinions.append(SecondOpinion(master, one_step, problem))
             continue
         if one_step not in ours:
             request = _request(plan, one_step, folder)
             said(f"yawbench{', one step for all units' if one_step else ''}")
-            made = _recordings("own", request, pinned, folder)
-            if isinstance(made, str):
-                raise RuntimeError(f"our own run of the archive has failed: {made}")
-            ours[one_step] = request, made
+            result = _recordings("own", request, pinned, folder)
+            if isinstance(result, str):
+                raise RuntimeError(f"our own run of the archive has failed: {result}")
+            ours[one_step] = request, result
         request, own = ours[one_step]
         said(master.title)
         theirs = _recordings(master.module, request, pinned, folder)
@@ -151,7 +154,7 @@ def second_opinion(
 
 
 def _request(plan: Plan, one_step: bool, folder: Path) -> Request:
-    """Write the archive; return what is to be run."""
+    """Write the archive; return the request to run it."""
     if one_step:
         plan = replace(plan, instances=tuple(replace(unit, period=1) for unit in plan.instances))
     path = folder / ("one_step.ssp" if one_step else "system.ssp")
@@ -160,13 +163,13 @@ def _request(plan: Plan, one_step: bool, folder: Path) -> Request:
 
 
 def _columns(plan: Plan) -> list[tuple[str, str]]:
-    """Return what is compared: every recorded output of type Real."""
+    """Return the outputs to compare: all recorded ones of type Real."""
     units = {unit.name: unit.fmu for unit in plan.instances}
     return [(u, name) for u, name in plan.record if units[u].variables[name].type == "Real"]
 
 
 def _recordings(module: str, request: Request, pinned: bool, folder: Path) -> dict[str, Recording] | str:
-    """Run one master, also on one core if asked; return a sentence if it has no result."""
+    """Run a master, if `pinned` also on one core; return an error message if it has no result."""
     variants = {"": request}
     if pinned and hasattr(os, "sched_getaffinity"):
         variants[" on one core"] = replace(request, core=max(os.sched_getaffinity(0)))
@@ -180,18 +183,18 @@ def _recordings(module: str, request: Request, pinned: bool, folder: Path) -> di
 
 
 def _run(module: str, request: Request, folder: Path) -> Recording | str:
-    """Run one master in a process of its own; return a sentence if it has no result."""
-    asked, answered = folder / "request.json", folder / "recording.npz"
-    request.write(asked)
-    answered.unlink(missing_ok=True)
-    command = python("orchestrator.interop.masters", module, asked, answered)
-    environment = os.environ | {"TMPDIR": str(folder)}  # Ecos leaves what it has unpacked
+    """Run a master in a process of its own; return an error message if it has no result."""
+    request_file, recording_file = folder / "request.json", folder / "recording.npz"
+    request.write(request_file)
+    recording_file.unlink(missing_ok=True)
+    command = python("orchestrator.interop.masters", module, request_file, recording_file)
+    environment = os.environ | {"TMPDIR": str(folder)}  # Ecos does not delete the files it unpacks
     try:
         done = subprocess.run(command, capture_output=True, timeout=LIMIT, env=environment, check=False)
     except subprocess.TimeoutExpired:
         return f"it did not end within {LIMIT:g} s"
-    if done.returncode == 0 and answered.exists():
-        return Recording.read(answered)
+    if done.returncode == 0 and recording_file.exists():
+        return Recording.read(recording_file)
     lines = done.stderr.decode(errors="replace").strip().splitlines()
     if done.returncode < 0:
         before = f"; before that it said: {' '.join(lines[-2:])}" if lines else ""
@@ -200,11 +203,11 @@ def _run(module: str, request: Request, folder: Path) -> Recording | str:
 
 
 def differences(request: Request, own: np.ndarray, other: np.ndarray) -> dict[str, float]:
-    """Return each signal's largest difference over its range in our run.
+    """Return each signal's largest difference, relative to its range in our run.
 
-    One that stays constant but for rounding (`ROUNDING`) has no range: over its magnitude, over 1 if
-    that is 0. The first row does not count where the other master has no value for it at all; any
-    other value that is not finite counts as infinite.
+    A signal that is constant up to rounding (`ROUNDING`) is scaled by its magnitude instead, or by 1 if that
+    is 0. The first row is left out if the other master has no values for it at all; any other value that is
+    not finite counts as an infinite difference.
     """
     first = int(np.all(np.isnan(other[0])))
     gap = np.abs(other[first:] - own[first:])
@@ -216,7 +219,7 @@ def differences(request: Request, own: np.ndarray, other: np.ndarray) -> dict[st
 
 
 def still_signals(request: Request, own: np.ndarray) -> tuple[str, ...]:
-    """Return the signals that stay constant but for rounding in our run."""
+    """Return the signals that are constant up to rounding in our run."""
     return tuple(
         f"{unit}.{name}"
         for (unit, name), moves in zip(request.columns, _moving(own), strict=True)

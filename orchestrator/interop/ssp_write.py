@@ -1,15 +1,16 @@
-"""A plan as an SSP archive that other programs, and this one, can run.
+"""SSP export: write a plan and its FMUs as an archive that other programs, and this one, can run.
 
-SSP has no place for the communication step, the units' own steps and the algorithm. They stand in
-annotations: the steps in those of the Open Simulation Platform, which libcosim understands, and of
-OMSimulator, all that `yawbench run` needs beyond them in one of our own. There too is the title, for
-the name of a structure is an identifier to other programs.
+SSP has no elements for the communication step, the instances' own steps and the algorithm. They are written
+as annotations: the steps in those of the Open Simulation Platform, which libcosim understands, and of
+OMSimulator; everything else that `yawbench run` needs in one of our own. The latter also has the title,
+because the name of a structure is an identifier to other programs.
 
-Only what is connected has a connector. A constant is a parameter value by the name of its input:
-that is how libcosim and Ecos take it, and fmpy gives an input connector without a connection the
-value of another one. Equal plans give equal bytes.
+Only connected inputs have a connector. A constant is a parameter value with the name of its input: libcosim
+and Ecos read it that way, and fmpy gives an input connector without a connection the value of another one.
+Equal plans give equal bytes.
 
-A plan as far as OMSimulator can run it: it reads no texts, no steps of units, no transformations.
+`for_omsimulator` reduces a plan to what OMSimulator can run: no texts, no steps of instances, no
+transformations.
 """
 
 from __future__ import annotations
@@ -57,19 +58,19 @@ _FILE_TIME = (1980, 1, 1, 0, 0, 0)
 
 
 Version = Literal["1.0", "2.0"]
-"""Of the standard. What is written here is the same in both but for the number."""
+"""Version of the SSP standard; the files written differ only in this number."""
 
 
 def write_ssp(plan: Plan, path: Path, standard: Version = "1.0", *, named: bool = False) -> None:
     """Write the plan and its FMUs into the archive `path`; `named`: as in `write_whole`.
 
     Raises:
-        ResultsError: it cannot be written, or not in XML.
-        ModelDescriptionError: an FMU is not there any more.
+        ResultsError: the archive cannot be written, or a text or value cannot be represented in it.
+        ModelDescriptionError: an FMU no longer exists.
     """
-    followed = [f"{unit.name}.{name}" for unit in plan.instances for name in unit.series]
-    if followed:
-        raise ResultsError(f"{path}: an archive has no place for the time series of {listed(fold(followed))}")
+    series = [f"{unit.name}.{name}" for unit in plan.instances for name in unit.series]
+    if series:
+        raise ResultsError(f"{path}: an archive has no place for the time series of {listed(fold(series))}")
     sources = _sources(plan)
     try:
         structure = system_structure(plan, standard)
@@ -99,7 +100,7 @@ def system_structure(plan: Plan, standard: Version = "1.0") -> _Element:
     """Return the system structure description of a plan.
 
     Raises:
-        ValueError: XML cannot hold what the plan holds.
+        ValueError: the plan has a text that XML cannot represent, or a step that no decimal equals.
     """
     root = etree.Element(f"{{{SSD}}}SystemStructureDescription", nsmap=NAMESPACES)
     root.set("version", standard)
@@ -136,9 +137,9 @@ def _identifier(title: str) -> str:
 
 
 def _add_step(system: _Element, plan: Plan) -> None:
-    """Write the communication step as OMSimulator wants it, without which it takes no system.
+    """Write the communication step for OMSimulator, which rejects systems without it.
 
-    Its master steps all units alike and does not look at the tolerances; it wants some.
+    Its master steps all instances alike; it ignores the tolerances but requires them.
     """
     annotations = SubElement(_annotation(system, OMS_ANNOTATION), f"{{{OMS}}}Annotations")
     master = SubElement(
@@ -150,7 +151,7 @@ def _add_step(system: _Element, plan: Plan) -> None:
 
 
 def _add_connection(above: _Element, wire: Wire) -> None:
-    """Write a wire; what it does to numbers is said in full, for programs that do not look at units too."""
+    """Write a wire, with its conversion as an explicit gain and offset for programs that ignore units."""
     connection = SubElement(
         above,
         f"{{{SSD}}}Connection",
@@ -166,13 +167,13 @@ def _add_connection(above: _Element, wire: Wire) -> None:
 
 
 def _in_order_of_scenario(plan: Plan) -> list[Instance]:
-    """Return the units as the scenario lists them: of equals, the first is evaluated first."""
-    given = list(plan.scenario.get("units", ()))
-    return sorted(plan.instances, key=lambda one: given.index(one.name) if one.name in given else len(given))
+    """Return the instances in the scenario's order, which decides between equals in the evaluation order."""
+    names = list(plan.scenario.get("units", ()))
+    return sorted(plan.instances, key=lambda i: names.index(i.name) if i.name in names else len(names))
 
 
 def _sources(plan: Plan) -> dict[str, str]:
-    """Return where in the archive each FMU is, by its hash; names without a character to be escaped."""
+    """Return hash -> path in the archive for each FMU; the paths have no characters that need escaping."""
     sources: dict[str, str] = {}
     for unit in plan.instances:
         stem = re.sub(r"[^A-Za-z0-9_-]", "_", unit.fmu.name)
@@ -251,7 +252,7 @@ def _text(variable: Variable, value: Value) -> str:
 
 
 def _spelled_units(plan: Plan) -> dict[str, Unit]:
-    """Return the units of measurement that appear in the plan, as far as all FMUs mean the same by them."""
+    """Return the units of measurement in the plan that all FMUs define alike."""
     meant: dict[str, set[Unit | None]] = {}
     for variable in (v for unit in plan.instances for v in unit.fmu.variables.values() if v.unit):
         meant.setdefault(str(variable.unit), set()).add(measure_of(variable.unit, variable.definition))
@@ -301,12 +302,12 @@ def _add_experiment(root: _Element, plan: Plan) -> None:
 
 
 def _recorded(plan: Plan) -> Iterable[str]:
-    """Return what the scenario says is recorded: nothing if that is all outputs."""
+    """Return the record list of the scenario, empty if it records all outputs."""
     return () if plan.scenario.get("record") is None else (f"{unit}.{name}" for unit, name in plan.record)
 
 
 def _annotation(above: _Element, kind: str) -> _Element:
-    """Return a new annotation, the element that its content goes into."""
+    """Add an annotation; return the element for its content."""
     group = above.find(f"{{{SSD}}}Annotations")
     if group is None:
         group = SubElement(above, f"{{{SSD}}}Annotations")
@@ -314,7 +315,7 @@ def _annotation(above: _Element, kind: str) -> _Element:
 
 
 def _decimal(seconds: Fraction) -> str:
-    """Return a time as the shortest decimal that is read back as the same fraction."""
+    """Return a time as the shortest decimal that equals the fraction exactly."""
     text = repr(float(seconds))
     if Fraction(text) != seconds:
         raise ValueError(f"a step of {text} s that has more digits is not the same in other programs")
@@ -322,14 +323,14 @@ def _decimal(seconds: Fraction) -> str:
 
 
 UNREAD = ("String", "Enumeration")
-"""Types of values that it does not read."""
+"""Types of values that OMSimulator does not read from an archive."""
 
 
 def for_omsimulator(plan: Plan) -> tuple[Plan, list[str]]:
-    """Return the plan without what OMSimulator refuses, and a remark for everything left out that matters.
+    """Return the plan reduced to what OMSimulator accepts, and a note for every relevant omission.
 
     Raises:
-        WiringError: a connection has a gain of its own, which it would pass over without a word.
+        WiringError: a connection has a gain or offset beyond unit conversion, which it would silently ignore.
     """
     fmus = {unit.name: unit.fmu.variables for unit in plan.instances}
 
@@ -350,7 +351,7 @@ def for_omsimulator(plan: Plan) -> tuple[Plan, list[str]]:
     slow = [unit.name for unit in plan.instances if unit.period > 1]
     if slow:
         notes.append(f"OMSimulator steps all units alike: the steps of {listed(slow)} are left out")
-    texts = [f"{one.name}.{name} = {text!r}" for one in plan.instances for name, text in _texts(one).items()]
+    texts = [f"{i.name}.{name} = {text!r}" for i in plan.instances for name, text in _texts(i).items()]
     if texts:
         notes.append(f"OMSimulator takes no texts from an archive; set there: {listed(texts)}")
     wires = tuple(replace(wire, gain=1.0, offset=0.0) for wire in plan.wires)
@@ -359,14 +360,15 @@ def for_omsimulator(plan: Plan) -> tuple[Plan, list[str]]:
 
 
 def _texts(unit: Instance) -> dict[str, Value]:
-    """Return the texts, and items of enumerations, that the FMU would not have by itself."""
-    given, variables = {**unit.parameters, **unit.constants}, unit.fmu.variables
-    return {k: v for k, v in given.items() if variables[k].type in UNREAD and v != variables[k].start}
+    """Return the texts and enumeration items that differ from the FMU's start values."""
+    values, variables = {**unit.parameters, **unit.constants}, unit.fmu.variables
+    return {k: v for k, v in values.items() if variables[k].type in UNREAD and v != variables[k].start}
 
 
 def _without_texts(unit: Instance) -> Instance:
+    """Return the instance without values that OMSimulator does not read, and with the step of all."""
     parameters, constants = (
-        {name: value for name, value in given.items() if unit.fmu.variables[name].type not in UNREAD}
-        for given in (unit.parameters, unit.constants)
+        {name: value for name, value in values.items() if unit.fmu.variables[name].type not in UNREAD}
+        for values in (unit.parameters, unit.constants)
     )
     return replace(unit, period=1, parameters=parameters, constants=constants)

@@ -1,1 +1,1 @@
-"""Stage three: the units of a plan stepped through integer time."""
+"""Co-simulation master: creates, initializes and steps the instances of a plan."""

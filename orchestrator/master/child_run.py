@@ -1,19 +1,17 @@
-"""A run whose units are stepped in a process of their own, while the results are kept in this one.
+"""Runs in a child process: the instances are stepped there, while this process keeps the results.
 
-A unit that crashes, calls exit, hangs, or closes all files, does so to the other process: this one sees it
-end without the word that a run ends with, and still has every row. So no run of foreign code ends in
-silence, and Ctrl-C always works, whatever the FMU does with signals.
+An FMU that crashes, calls exit, hangs or closes all files does so in the child: the parent sees the child end
+without its final record, and still has every row. So a run of third-party code never ends silently, and
+Ctrl-C always works, whatever the FMU does with signals.
 
-Chosen over isolating every foreign FMU by default, which costs 30 to 70 us per unit and step, and over a
-hook that the C library calls at exit(), which neither _exit() nor a signal asks. This costs a fork, a few
-milliseconds per run, and nothing per step; while one process writes a block of rows the other fills the
-next. What it does not give is a wall between units: see `surroundings` for what they may change for each
-other, and `isolation` for the wall. It needs fork(), and is used on Linux alone.
+Chosen over isolating every third-party FMU by default, which costs 30 to 70 us per instance and step, and
+over a hook that the C library calls at exit(), which neither _exit() nor a signal runs. This costs a fork, a
+few milliseconds per run, and nothing per step. It does not protect instances from each other: see
+`process_state` for what they may change for each other, and `isolation` for protection. It needs fork(), and
+is used on Linux only.
 
-The process in which the units of a run are stepped, apart from the one that keeps the results.
-
-The other side is `apart`. Rows lie in memory that both share: two blocks, one of which is being filled
-while the other is being written. Beside them the pipe carries what is said a few times a second.
+Rows lie in memory shared by both processes: two blocks, one being filled by the child while the other is
+being written by the parent. A pipe carries everything else, a few records per second.
 """
 
 from __future__ import annotations
@@ -51,19 +49,19 @@ from .run_loop import OpenInstance, RunLoop, RunProgress
 from .supervisor import ProcessLost, SupervisedProcess, die_with_parent
 
 ROWS, PROGRESS, ENDED, WHERE = 0x90, 0x91, 0x92, 0x93
-"""First bytes of records: rows are there, how far the run is, how it ended, in which unit it is."""
+"""First bytes of records from the child: a block of rows, progress, end of the run, current instance."""
 TAKEN, FREE = b"\x01", b"\x02"
-"""What the other side says: rows have been written; terminate and free the units."""
+"""Bytes from the parent: the rows have been written; terminate and free the instances."""
 
 _SLOT = 256
-"""Bytes for what is recorded at a point and no Real, where it is looked for if the process dies."""
+"""Bytes of shared memory per row for values that are not Real, so that they survive a crash of the child."""
 
 
 class SharedProgress:
-    """The memory of both processes: the last communication point reached, and the rows so far."""
+    """Memory shared by both processes: the last communication point reached, and two blocks of rows."""
 
     def __init__(self, width: int) -> None:
-        """Make it for rows of so many numbers."""
+        """Allocate it for rows of `width` numbers."""
         self._map = mmap.mmap(-1, 8 + 16 * BLOCK * width)
         self._slots = mmap.mmap(-1, BLOCK * _SLOT)
         self.completed = ctypes.c_int64.from_buffer(self._map)
@@ -71,18 +69,18 @@ class SharedProgress:
         self.blocks = np.frombuffer(self._map, float, offset=8).reshape(2, BLOCK, width)
 
     def keep(self, at: int, others: list[Value]) -> None:
-        """Put what is no Real beside row `at` of the block being filled; nothing if it is too long."""
+        """Store the non-Real values of row `at` of the block being filled, unless they are too long."""
         data = json.dumps(others).encode()
         self._slots[at * _SLOT : (at + 1) * _SLOT] = (data if len(data) <= _SLOT else b"").ljust(_SLOT)
 
     def kept(self, count: int) -> list[list[Value]]:
-        """Return what is no Real of the first rows of the block being filled, as far as it is there."""
+        """Return the non-Real values of the first rows of the block being filled, as far as stored."""
         slots = [self._slots[at * _SLOT : (at + 1) * _SLOT].strip() for at in range(count)]
         return [json.loads(slot) for slot in itertools.takewhile(bool, slots)]
 
 
 class _Others(list):
-    """What is recorded and no Real, one list per row; also where it is found if the process dies."""
+    """Non-Real values, one list per row, also stored in shared memory in case the process dies."""
 
     def __init__(self, shared: SharedProgress) -> None:
         super().__init__()
@@ -94,27 +92,27 @@ class _Others(list):
 
 
 class _Rows:
-    """Where the run's rows go (see `course.Rows`): to the other side."""
+    """The run's rows (see `run_loop.RecordedRows`), passed to the parent block by block."""
 
     def __init__(self, shared: SharedProgress, channel: PipeChannel) -> None:
         self._channel = channel
         self._blocks = [list(block) for block in shared.blocks]
-        self._given = 0  # blocks
+        self._sent = 0  # blocks
         self._first = 0
         self.rows = self._blocks[0]
         self.others: list[list[Value]] = _Others(shared)
 
     def write(self, count: int) -> None:
-        """Give the first `count` of `rows` away, when those before have been written."""
+        """Pass the first `count` rows on, once the block before has been written."""
         if count <= 0:
             return
-        if self._given and self._channel.hear() is None:
+        if self._sent and self._channel.hear() is None:
             os._exit(1)
         self._channel.send(ROWS, (self._first, count, self.others))
-        self._given += 1
+        self._sent += 1
         self._first += count
         self.others.clear()
-        self.rows = self._blocks[self._given % 2]
+        self.rows = self._blocks[self._sent % 2]
 
 
 def step_units(
@@ -128,18 +126,18 @@ def step_units(
     """Make the run in this process, which has just been forked. Never returns.
 
     Args:
-        asking: pipe through which the other side says that the run is to stop, and asks in which unit it is.
+        asking: pipe through which the parent requests a stop and asks for the current instance.
     """
     try:
         die_with_parent()
-        os.setpgid(0, 0)  # what a unit sends to its group, and Ctrl-C on the terminal, is not for both
+        os.setpgid(0, 0)  # signals to an FMU's group, and Ctrl-C, must not reach both
         for descriptor in map(int, os.listdir("/proc/self/fd")):
             if descriptor > 2 and descriptor not in (channel.reading, channel.writing, asking):
-                with contextlib.suppress(OSError):  # that of the folder that has just been listed
+                with contextlib.suppress(OSError):  # the descriptor used for listing the folder
                     os.close(descriptor)
         _make(plan, opener, stop, shared, channel, asking)
     except OSError:
-        os._exit(1)  # the other side is gone, or a unit has closed the pipe to it
+        os._exit(1)  # the parent is gone, or an FMU has closed the pipe to it
     except BaseException:
         traceback.print_exc()
         os._exit(1)
@@ -166,23 +164,23 @@ def _make(
     log.finish()
     ending = course.ended and (str(course.ended), course.ended.instance, course.ended.time)
     channel.send(ENDED, (course.passes, ending, error))
-    while (said := channel.hear()) != FREE[0]:
-        if said is None:
+    while (byte := channel.hear()) != FREE[0]:
+        if byte is None:
             return
     course.end()
     if isinstance(opener, Isolation):
-        opener.close()  # processes of units that the run has not come to
+        opener.close()  # processes of instances that were never opened
     log.finish()
     flush_output()
     channel.send(REPLY, None)
 
 
 def _go(course: RunLoop, opener: OpenInstance) -> dict[str, Any] | None:
-    """Open, initialize, step; return what there is to tell if that fails."""
+    """Open, initialize, step; return a description of the error if that fails."""
     try:
         course.go(opener)
     except (YawbenchError, Interrupted) as error:
-        unit = getattr(error, "unit", None)
+        unit = getattr(error, "instance", None)
         return {**told(error), "inputs": course.inputs_of(unit) if unit else {}}
     except BaseException:
         return {"kind": "", "problems": traceback.format_exc(), "inputs": {}}
@@ -190,11 +188,11 @@ def _go(course: RunLoop, opener: OpenInstance) -> dict[str, Any] | None:
 
 
 def _tell_where(channel: PipeChannel, asking: int, stop: StopFlag) -> None:
-    """Answer, from a thread, in which unit the run is, and let it stop; also when an FMU calls exit()."""
+    """Start a thread that reports the current instance and stops the run; also report exit() by an FMU."""
     stepping, process = threading.get_ident(), os.getpid()
 
     def answer() -> None:
-        with contextlib.suppress(OSError):  # the other side is gone
+        with contextlib.suppress(OSError):  # the parent is gone
             while number := os.read(asking, 1):
                 stop.request(number[0])
                 channel.send(WHERE, _whereabouts(stepping))
@@ -216,7 +214,7 @@ _kept: list[Any] = []
 
 
 def _whereabouts(thread: int) -> tuple[str, str] | None:
-    """Return the unit that a thread is in, and what is being done with it; None if it is in none."""
+    """Return the instance whose code a thread is executing, and the operation; None outside all instances."""
     frame, found = sys._current_frames().get(thread), None
     here = str(Path(__file__).parent)
     while frame is not None:
@@ -233,18 +231,18 @@ def _whereabouts(thread: int) -> tuple[str, str] | None:
 
 
 KILL_AFTER = 3.0
-"""Time after a wish to stop at which the process is killed [s]; chosen: a step is over long before."""
+"""Time from a stop request until the child is killed [s]; chosen: far longer than a step."""
 END_LIMIT = 10.0
-"""Time that units may take to be terminated and freed [s]; the results are written by then."""
+"""Time allowed for terminating and freeing the instances [s]; the results are written by then."""
 
 
 def can_be_apart() -> bool:
-    """Return whether a run can be stepped in a process of its own: signals are for the main thread."""
+    """Return whether runs in a child process are supported here: Linux, and the main thread (for signals)."""
     return sys.platform == "linux" and threading.current_thread() is threading.main_thread()
 
 
 class ChildRun(RunLoop, SupervisedProcess):
-    """The course of one run in another process."""
+    """Runs a plan in a child process."""
 
     unasked = (ROWS, PROGRESS, WHERE)
 
@@ -260,12 +258,12 @@ class ChildRun(RunLoop, SupervisedProcess):
         self._process: int | None = None
         self._status = 0
         self._deadline = math.inf
-        self._suspects: list[str] = []  # units that may have ended the process
+        self._suspects: list[str] = []  # instances that may have ended the process
         self._told_end = False
         self._closed = False  # no more rows are written
 
     def inputs_of(self, unit: str) -> dict[str, Value]:
-        """Return the inputs with which the unit that has failed was last stepped."""
+        """Return the inputs with which the failed instance was last stepped."""
         return self._inputs
 
     def go(self, opener: OpenInstance) -> None:
@@ -318,24 +316,24 @@ class ChildRun(RunLoop, SupervisedProcess):
         if self._closed:
             self.handed_over += count
             return
-        self._closed = True  # if this fails, what comes after it is no use
+        self._closed = True  # if this fails, later rows must not be written either
         self._rows.lay(self._shared.blocks[self._blocks % 2])
         self._rows.others[:] = others
         self._hand_over(count)
         self._closed = False
 
     def flush(self) -> None:
-        """Write the rows that the process has left behind."""
+        """Write the rows that the child has left in shared memory."""
         count = self._shared.completed.value + 1 - self.handed_over
         others = []
-        if len(self.plan.record) + 1 > len(self._rows.rows[0]):  # there are such as are no Reals
+        if len(self.plan.record) + 1 > len(self._rows.rows[0]):  # some columns are not Real
             others = self._shared.kept(count) if count <= BLOCK else []
             count = len(others)
         self._record(min(count, BLOCK), others)
         self._closed = True
 
     def _check_time(self) -> None:
-        """Let the process stop when that is wished; kill it if it does not, or takes too long to end."""
+        """Pass a stop request on to the child; kill it if it does not stop, or takes too long to end."""
         now, asked = time.monotonic(), stop_requested_at()
         if asked is not None:
             self._ask()
@@ -344,7 +342,7 @@ class ChildRun(RunLoop, SupervisedProcess):
             raise ProcessLost("did not come back")
 
     def _ask(self) -> None:
-        """Let the process stop, and tell in which unit it is."""
+        """Ask the child to stop and to report its current instance."""
         with contextlib.suppress(OSError):
             os.write(self._asking, bytes([self._stop.number]))
 
@@ -359,7 +357,7 @@ class ChildRun(RunLoop, SupervisedProcess):
 
     def close(self) -> int:
         if self._process is not None:
-            for kill in (os.killpg, os.kill):  # with what units have started
+            for kill in (os.killpg, os.kill):  # with the processes that FMUs have started
                 with contextlib.suppress(OSError):
                     kill(self._process, signal.SIGKILL)
             _, status = os.waitpid(self._process, 0)
@@ -369,7 +367,7 @@ class ChildRun(RunLoop, SupervisedProcess):
         return self._status
 
     def _death(self, lost: ProcessLost) -> SimulationError | Interrupted:
-        """Return what ends the run when its process did."""
+        """Return the exception for the death of the child process."""
         completed = self._shared.completed.value
         unit, doing = self._where or (None, "step" if completed >= 0 else "initialization")
         if unit is None and len(self._suspects) == 1:
@@ -386,7 +384,7 @@ class ChildRun(RunLoop, SupervisedProcess):
         return SimulationError(sentence, instance=unit, time=now)
 
     def end(self) -> None:
-        """Let the process terminate and free the units; what becomes of it costs the results nothing."""
+        """Let the child terminate and free the instances; a crash there is only a warning."""
         if self._process is None:
             return
         self._closed, self._where = True, None
@@ -395,7 +393,7 @@ class ChildRun(RunLoop, SupervisedProcess):
             if not self._told_end:
                 self._ask()
                 self._hear(ENDED)
-            self._where = None  # what was asked for the end belongs to the run
+            self._where = None  # an answer from before the end of the run
             self._channel.say(FREE)
             self._hear(REPLY)
         except (ProcessLost, OSError) as lost:

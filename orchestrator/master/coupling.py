@@ -1,24 +1,24 @@
-"""Which value a wire gives to its target: the three coupling algorithms.
+"""Coupling algorithms: how the value of a wire is estimated within a step.
 
-Every input is a weighted sum of at most two samples of its source, and the weights are known
-before the run. With time counted in communication steps, a unit of period M stepping from k - M
-to k sees a source of period N whose last known sample is at k0 and whose one before is at k0 - N:
+Every input is a weighted sum of at most two samples of its source, and the weights are known before the run.
+With time counted in communication steps, an instance of period M stepping from k - M to k sees a source of
+period N whose last known sample is at k0 and whose previous one is at k0 - N:
 
-    jacobi         y(k - M)                                     all units at once, nothing is newer
+    jacobi         y(k - M)                                     all instances at once, nothing is newer
     gauss_seidel   y(k0)
     extrapolated   y(k0) + (tau - k0) / N (y(k0) - y(k0 - N))   linear through two samples
 
-`extrapolated` takes tau = k - M/2, the middle of the step, for an input that enters an integration
-(no output depends on it directly), which makes the integral second-order accurate: for M = N = 1
-these are (y_n + y_n+1) / 2 if the source has already been stepped, 1.5 y_n - 0.5 y_n-1 if not. An
-input with direct feedthrough, and every input of a unit that samples, is taken at the end of the
-step, tau = k: y_n+1 or 2 y_n - y_n-1. A discrete source holds its value from one sample to the
-next, so of its last two samples the one in force at tau is taken: a plant integrates with the
-moment that the controller gave at the beginning of the step.
+`extrapolated` takes tau = k - M/2, the middle of the step, for an input that enters an integration (no output
+depends on it directly), which makes the integral second-order accurate: for M = N = 1 these are
+(y_n + y_n+1) / 2 if the source has already been stepped, 1.5 y_n - 0.5 y_n-1 if not. An input with direct
+feedthrough, and every input of a sampled instance, is taken at the end of the step, tau = k: y_n+1 or
+2 y_n - y_n-1. A discrete source holds its value from one sample to the next, so of its last two samples the
+one in force at tau is taken: a plant integrates with the moment that the controller gave at the beginning of
+the step.
 
-A slow unit (M > N) integrates over many samples of its source; it takes the straight line through
-the newest and the one that was newest at its own last step, which weighs neither by more than one.
-Before there are two samples, both are the initial value: held, for one step.
+A slow instance (M > N) integrates over many samples of its source; it takes the straight line through the
+newest sample and the one that was newest at its own last step, so that neither weight exceeds one. Before
+there are two samples, both are the initial value: held, for one step.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from ..plan import Algorithm
 
 @dataclass(frozen=True)
 class WireTiming:
-    """All that a wire's weights depend on. Periods in communication steps."""
+    """The properties of a wire that its weights depend on; periods in communication steps."""
 
     source_period: int
     target_period: int
@@ -41,7 +41,7 @@ class WireTiming:
 
 @dataclass(frozen=True)
 class CouplingWeights:
-    """Of the source's last sample, its sample before, and that of the target's last step."""
+    """Weights of the source's last sample, of the one before, and of the one at the target's last step."""
 
     now: float = 1.0
     before: float = 0.0
@@ -51,7 +51,7 @@ class CouplingWeights:
 def weights(algorithm: Algorithm, relation: WireTiming, k: int) -> CouplingWeights:
     """Return the weights of a wire for the step of its target that ends at `k`.
 
-    `k` is a communication point at which the target ends a step. They repeat after the least
+    `k` is a communication point at which the target ends a step. The weights repeat after the least
     common multiple of both periods.
     """
     if algorithm != "extrapolated":
@@ -70,7 +70,7 @@ def weights(algorithm: Algorithm, relation: WireTiming, k: int) -> CouplingWeigh
 
 
 def halves_ahead(algorithm: Algorithm, period: int, *, direct: bool) -> int:
-    """Return for when an input is taken, in halves of a communication step after its unit's step begins."""
+    """Return the time that an input is taken for, in half communication steps from the step's beginning."""
     held = {"jacobi": 0, "gauss_seidel": 2 * period}
     return held.get(algorithm, 2 * period if direct else period)
 

@@ -1,12 +1,12 @@
-"""Faults: what becomes of a unit's outputs once they are read, or of its inputs before they are set.
+"""Fault injection: disturb an instance's outputs after they are read, or its inputs before they are set.
 
-An output is faulty as of the instant that it is given for, so all who take it and the results get it so. An
-input is faulty as of the instant that it is taken for (see `coupling.halves_ahead`), after the coupling has
-made one value of several samples. At initialization both are so as of the start, however often values go
-round: a fault that is told the same instant again forgets what it saw of it before.
+An output is disturbed as of the time of its sample, so all receivers and the results get the same faulty
+value. An input is disturbed as of the time that it is taken for (see `coupling.halves_ahead`), after the
+coupling has combined several samples into one value. At initialization both are disturbed as of the start,
+however many passes it takes: calling a fault twice for the same time discards its first observation.
 
-Random numbers are counted, not drawn in turn: that of message n follows from the fault's stream and n alone,
-so neither the step nor the process, nor another fault, changes any.
+Random numbers are counter-based: that of message n depends on the fault's stream and n alone, so neither the
+step size nor the process nor another fault changes any of them.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ if TYPE_CHECKING:
     from .signal_pool import InstanceSlot, SignalPool
 
 BLOCK = 1024
-"""Random numbers made at a time; chosen: ten seconds of messages."""
+"""Random numbers generated at a time; chosen: ten seconds of messages."""
 LATE = 1e-9
-"""Part of a message by which an instant may miss its beginning."""
+"""Fraction of a message's period by which a time may fall short of its beginning."""
 
 Disturbance = Callable[[float, float], float]
-"""Returns what becomes of a value at a time [s]; called for every instant, in order."""
+"""Called with time [s] and value of every sample, in order; returns the disturbed value."""
 
 
 class FaultInjector:
-    """The faults of a unit's outputs or of its inputs.
+    """Applies the faults of an instance's outputs or of its inputs.
 
     Args:
-        plan: whose time it is.
-        period: of the unit, in communication steps.
-        at: index of a value, halves of a communication step from the beginning of a step to the instant that
-            the value is of, and what becomes of it.
+        plan: its start and step define the times.
+        period: of the instance, in communication steps.
+        at: per fault, the index of the value, the time that the value is for, in halves of a communication
+            step after the beginning of an instance's step, and the disturbance.
     """
 
     def __init__(self, plan: Plan, period: int, at: Sequence[tuple[int, int, Disturbance]]) -> None:
@@ -60,7 +60,7 @@ class FaultInjector:
             values[i] = disturb(self._start, float(values[i]))
 
     def acting(self, values: np.ndarray) -> Callable[[], Status]:
-        """Return the call that disturbs values, once for each step of the unit."""
+        """Return the call that disturbs `values`, to be made once per step of the instance."""
         at, scale, further, item = self._at, self._scale, self._further, values.item
         passed = 0
 
@@ -75,10 +75,10 @@ class FaultInjector:
 
 
 def faulting(memory: SignalPool, s: InstanceSlot, *, of_output: bool) -> FaultInjector | None:
-    """Return the faults of a unit's outputs, or of its inputs, None if it has none."""
+    """Return the injector for the faults of an instance's outputs or inputs, None if it has none."""
     plan, period = memory.plan, s.instance.period
     places = {v.name: (i, v) for i, v in enumerate(s.outputs if of_output else s.inputs)}
-    made = []
+    disturbances = []
     for fault in plan.faults:
         if (fault.instance, fault.of_output) != (s.name, of_output) or fault.variable not in places:
             continue
@@ -89,16 +89,15 @@ def faulting(memory: SignalPool, s: InstanceSlot, *, of_output: bool) -> FaultIn
             assert wire is not None
             ahead = halves_ahead(plan.algorithm, period, direct=s.direct(variable))
             held = memory.of[wire.source].instance.fmu.variables[wire.output].discrete
-        made.append((i, ahead, disturbance(fault, held=held)))
-    return FaultInjector(plan, period, made) if made else None
+        disturbances.append((i, ahead, disturbance(fault, held=held)))
+    return FaultInjector(plan, period, disturbances) if disturbances else None
 
 
 def disturbance(fault: Fault, *, held: bool) -> Disturbance:
-    """Return what becomes of a signal.
+    """Return the disturbance function of a fault.
 
     Args:
-        fault: of it.
-        held: the signal holds its value from one sample to the next, and is no line between them.
+        held: the signal holds its value between samples, so that delays do not interpolate.
     """
     begin, end, value = fault.begin, fault.end, fault.value
     stuck_at_once = fault.kind == "stuck" and value is not None
@@ -112,10 +111,10 @@ def disturbance(fault: Fault, *, held: bool) -> Disturbance:
     if fault.kind == "drift":
         return _drifting(begin, end, value)
     if fault.kind == "noise":
-        numbers = CountedNoise(fault, lambda made: made.standard_normal(BLOCK))
+        numbers = CountedNoise(fault, lambda generator: generator.standard_normal(BLOCK))
         return lambda t, x: x + value * numbers.at(t) if begin <= t < end else x
     if fault.kind == "outlier":
-        chances = CountedNoise(fault, lambda made: made.random(BLOCK))
+        chances = CountedNoise(fault, lambda generator: generator.random(BLOCK))
         share = fault.share
         return lambda t, x: x + value * _sign(chances.at(t), share) if begin <= t < end else x
     changed: Callable[[float], float] = {
@@ -166,21 +165,21 @@ def _late(begin: float, end: float, delay: float, *, held: bool) -> Disturbance:
         if samples and samples[-1][0] == t:
             samples.pop()
         samples.append((t, x))
-        wanted = t - delay
-        while len(samples) > 1 and samples[1][0] <= wanted + LATE * abs(delay):
+        past = t - delay
+        while len(samples) > 1 and samples[1][0] <= past + LATE * abs(delay):
             samples.popleft()
         if not begin <= t < end:
             return x
         (before, first), (after, second) = samples[0], samples[min(1, len(samples) - 1)]
-        if held or after == before or wanted <= before:
+        if held or after == before or past <= before:
             return first
-        return first + (second - first) * (wanted - before) / (after - before)
+        return first + (second - first) * (past - before) / (after - before)
 
     return disturb
 
 
 def _dropping(fault: Fault) -> Disturbance:
-    chances = CountedNoise(fault, lambda made: made.random(BLOCK))
+    chances = CountedNoise(fault, lambda generator: generator.random(BLOCK))
     begin, end, share = fault.begin, fault.end, fault.share
     first, kept = math.nan, math.nan
 
@@ -197,11 +196,11 @@ def _dropping(fault: Fault) -> Disturbance:
 
 
 class CountedNoise:
-    """Random numbers by their message, of which a fault has one every so often.
+    """Counter-based random numbers, one per message of a fault, whose messages are equally spaced in time.
 
     Args:
-        fault: its stream and the time between messages.
-        draw: `BLOCK` numbers.
+        fault: defines the random stream and the time between messages.
+        draw: returns the next `BLOCK` numbers of a generator.
     """
 
     def __init__(self, fault: Fault, draw: Callable[[np.random.Generator], np.ndarray]) -> None:
@@ -212,7 +211,7 @@ class CountedNoise:
         self._numbers: list[float] = []
 
     def at(self, t: float) -> float:
-        """Return the number of the message that is in force at a time [s]."""
+        """Return the random number of the message in force at a time [s]."""
         block, place = divmod(math.floor(t / self._every + LATE), BLOCK)
         if block != self._block:
             key = np.array([self._stream, block % 2**64], np.uint64)

@@ -1,8 +1,6 @@
-"""Instances of FMI 2.0 co-simulation.
+"""FMI 2.0 and 3.0 co-simulation instances, loaded into this process through ctypes.
 
-Instances of FMI 3.0 co-simulation, without event mode.
-
-The instance of a unit in this process, of the version of FMI that its FMU follows.
+FMI 3.0 is used without event mode and early return.
 """
 
 from __future__ import annotations
@@ -58,7 +56,7 @@ class Fmi2Instance(CtypesInstance):
             Path(unit.fmu.directory, "resources").absolute().as_uri().encode(),
             ctypes.byref(callbacks),
             False,
-            True,  # PythonFMU passes on no message at all without
+            True,  # logging on: otherwise PythonFMU passes on no messages at all
         )
 
     def _stepping(self, time: ctypes.c_double, step: ctypes.c_double) -> Callable[[], Status]:
@@ -72,7 +70,7 @@ class Fmi2Instance(CtypesInstance):
         return self._do("EnterInitializationMode")
 
     def ended(self) -> float | None:
-        """Return how far the FMU has gone if it has answered Discard because it wants to end."""
+        """Return the time reached [s] if Discard means that the FMU asks to end the run, else None."""
         if not self._has("GetBooleanStatus"):
             return None
         wants, last = ctypes.c_int(0), ctypes.c_double(math.nan)
@@ -104,9 +102,9 @@ _free = fmi2CallbackFreeMemoryTYPE(free)
 
 
 def _callbacks() -> fmi2CallbackFunctions:
-    """Return callback functions for one instance.
+    """Return the callback functions for one instance.
 
-    FMI 2.0's log texts are printf formats with arguments that Python cannot read; fmpy's native proxy
+    Log texts of FMI 2.0 are printf formats with arguments that Python cannot read; fmpy's native proxy
     formats them (at most 2047 bytes).
     """
     callbacks = fmi2CallbackFunctions()
@@ -164,7 +162,7 @@ class Fmi3Instance(CtypesInstance):
         call = functools.partial(do_step, component, time, step, yes, *answers)
 
         def go_on(status: Status) -> Status:
-            """Do what is left of a step from which the FMU has returned early, though it was told not to."""
+            """Complete a step from which the FMU returned early although it was not allowed to."""
             end = time.value + step.value
             while status <= WARNING and early.value and not ended.value and reached.value < end:
                 begin = reached.value
@@ -201,13 +199,13 @@ _logger_fmi3 = fmi3LogMessageCallback(_log_fmi3)
 
 
 SLAVES: dict[int, type[CtypesInstance]] = {2: Fmi2Instance, 3: Fmi3Instance}
-"""Major version of FMI -> its instances."""
+"""Major version of FMI -> class of its instances."""
 
 
 def open_unit(unit: Instance, log: Log, corrupted: set[Path]) -> CtypesInstance:
-    """Return the instance of a unit; arguments and errors are those of `FmuSlave`."""
-    surroundings = ProcessState()
+    """Return the running instance for a `plan.Instance`; arguments and errors as for `CtypesInstance`."""
+    state = ProcessState()
     try:
         return SLAVES[unit.fmu.fmi](unit, log, corrupted)
     finally:
-        surroundings.restore(unit.name, log)
+        state.restore(unit.name, log)

@@ -1,11 +1,11 @@
-"""Bringing all units to a common start.
+"""Initialization: bring all instances to a consistent start.
 
-Parameters are set once the experiment is set up, because some tools' FMUs reset the model there, and
-read back in initialization mode: one that did not take is an error. Units enter initialization mode
-in evaluation order, each with the outputs of those before it. Then values go round until no input
-changes by a single bit: closed loops (tyre forces, accelerations) settle that way. A loop that keeps
-flickering in its last digits is accepted after `PASSES` passes if nothing moves by more than
-`TOLERANCE` of its value; one that moves more is an error.
+Parameters are set after the experiment is set up, because some tools' FMUs reset the model there, and are
+read back in initialization mode: a parameter that did not take its value is an error. Instances enter
+initialization mode in evaluation order, each with the outputs of those before it. Then values are exchanged
+in passes until no input changes by a single bit, which settles closed loops (tyre forces, accelerations). A
+loop that keeps flickering in its last digits is accepted after `PASSES` passes if no value moves by more
+than `TOLERANCE` of itself; a loop that moves more is an error.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from .step_program import getting
 PASSES = 100
 TOLERANCE = 1e-9
 SINGLE = 1e-7
-"""Relative difference up to which a value that was read back is the one that was set; chosen: what an
-FMU that computes in single precision makes of it."""
+"""Relative difference up to which a value read back equals the value set; chosen: the rounding of an FMU
+that computes in single precision."""
 NAMED = 4
-"""Variables named in a sentence."""
+"""Variables named in a message."""
 
 StatusCheck = Callable[[str, str, Status], None]
-"""Called with a unit, what was done and the status after every call; raises if that is the end."""
+"""Called with instance, action and status after every FMI call; raises if the run cannot go on."""
 
 
 @dataclass
 class UnsettledWire:
-    """A wire whose value still changes."""
+    """A wire whose value changed in the last pass."""
 
     wire: str
     old: Value
@@ -46,6 +46,7 @@ class UnsettledWire:
 
     @property
     def large(self) -> bool:
+        """Whether the change exceeds `TOLERANCE`."""
         if not (isinstance(self.old, float) and isinstance(self.new, float)):
             return True
         return not abs(self.new - self.old) <= TOLERANCE * max(abs(self.old), abs(self.new))
@@ -57,11 +58,11 @@ class UnsettledWire:
 
 
 def initialize(memory: SignalPool, check: StatusCheck, log: Log) -> int:
-    """Initialize all units and return the number of passes it took.
+    """Initialize all instances and return the number of passes it took.
 
     Raises:
-        SimulationError: a parameter does not take, the loop of a wire does not settle; and whatever
-            `check` raises.
+        SimulationError: a parameter does not take its value or a loop does not settle; `check` may raise
+            others.
     """
     plan = memory.plan
     for station in memory.stations:
@@ -88,7 +89,7 @@ def initialize(memory: SignalPool, check: StatusCheck, log: Log) -> int:
 
 
 def _put(station: InstanceSlot, given: Mapping[str, Value], what: str, check: StatusCheck) -> None:
-    """Set variables; elements of an array that are not given keep their start values."""
+    """Set variables; the other elements of an array are set to their start values."""
     variables = station.instance.fmu.variables
     arrays = {variables[name].reference for name in given if variables[name].elements > 1}
     others = (v for v in variables.values() if v.reference in arrays) if arrays else ()
@@ -99,7 +100,7 @@ def _put(station: InstanceSlot, given: Mapping[str, Value], what: str, check: St
 
 
 def _known_inputs(memory: SignalPool, station: InstanceSlot) -> dict[str, Value]:
-    """Return constants and the outputs of earlier units; others keep the start value of the FMU."""
+    """Return the inputs known so far: constants and outputs of earlier instances."""
     known: dict[str, Value] = {}
     values = memory.taken(station).tolist()
     for variable, wire, value in zip(station.inputs, station.wires, values, strict=True):
@@ -109,28 +110,31 @@ def _known_inputs(memory: SignalPool, station: InstanceSlot) -> dict[str, Value]
 
 
 def _check_parameters(station: InstanceSlot, check: StatusCheck, log: Log) -> None:
-    """Read all parameters back; raise SimulationError if one does not have the value that was set.
+    """Read all parameters back and compare them with the values that were set.
 
-    It is a warning if the FMU does not tell: so it may be that all is well.
+    If the FMU cannot return a parameter, that is only a warning: its value may well be right.
+
+    Raises:
+        SimulationError: a parameter has another value.
     """
-    told: list[str] = []
+    differing: list[str] = []
     for chosen, status, lost in _read_back(station, station.instance.parameters, check, log):
         if status > WARNING:
             names = listed([v.name for v in chosen][:NAMED]) + (" and others" if len(chosen) > NAMED else "")
             text = f"whether {names} took the value that was set is not known: reading returned"
             log.add(station.name, WARNING, "", f"{text} {STATUS[status]}")
-        told += [f"{name} is {found}, not {asked}" for name, found, asked in lost]
-    if told:
-        more = f" and {len(told) - NAMED} more" if len(told) > NAMED else ""
-        what = "a parameter" if len(told) == 1 else "parameters"
+        differing += [f"{name} is {found}, not {asked}" for name, found, asked in lost]
+    if differing:
+        more = f" and {len(differing) - NAMED} more" if len(differing) > NAMED else ""
+        what = "a parameter" if len(differing) == 1 else "parameters"
         raise SimulationError(
-            f"{station.name}: {what} did not take the value that was set: {listed(told[:NAMED])}{more}",
+            f"{station.name}: {what} did not take the value that was set: {listed(differing[:NAMED])}{more}",
             instance=station.name, time=log.time.value,
         )  # fmt: skip
 
 
 def _check_constants(station: InstanceSlot, check: StatusCheck, log: Log) -> None:
-    """Read constant inputs back; warn of others, for an FMU may rightly take inputs only when it steps."""
+    """Read constant inputs back; a difference is a warning: an FMU may legally take inputs only in a step."""
     for _, _, lost in _read_back(station, station.instance.constants, check, log):
         for name, found, asked in lost:
             log.add(station.name, WARNING, "", f"the constant {name} reads back as {found}, not {asked}")
@@ -139,7 +143,7 @@ def _check_constants(station: InstanceSlot, check: StatusCheck, log: Log) -> Non
 def _read_back(
     station: InstanceSlot, given: Mapping[str, Value], check: StatusCheck, log: Log
 ) -> Iterator[tuple[list[Variable], Status, list[tuple[str, str, str]]]]:
-    """Yield variables of one type, the status of reading them, and which differ: name, found, asked."""
+    """Yield variables of one type, the status of reading them, and those that differ: name, read, set."""
     for chosen in by_type(station.instance.fmu.variables[name] for name in given):
         with log.deaf():
             raw, values = station.slave.fetch([v.place for v in chosen])
@@ -170,13 +174,14 @@ def _shown(variable: Variable, value: Value) -> str:
 
 
 def _comes_before(memory: SignalPool, wire: Wire | None, station: InstanceSlot) -> bool:
+    """Return whether an input is known before the instance is evaluated: a constant or an earlier output."""
     return wire is None or memory.of[wire.source].position < station.position
 
 
 def _renew(memory: SignalPool, s: InstanceSlot, check: StatusCheck) -> list[UnsettledWire]:
-    """Bring a unit's inputs and outputs up to date; return the wires that have changed.
+    """Update the inputs and outputs of an instance; return the wires that have changed.
 
-    A value that is not finite yet is not passed on: the loop may still heal it.
+    A value that is not finite is not passed on yet: later passes may make it finite.
     """
     new = memory.taken(s)
     new = np.where(np.isfinite(new) | np.isnan(s.u), new, s.u)
@@ -200,7 +205,7 @@ def _renew(memory: SignalPool, s: InstanceSlot, check: StatusCheck) -> list[Unse
 def _renew_others(
     memory: SignalPool, s: InstanceSlot, check: StatusCheck, moving: list[UnsettledWire]
 ) -> bool:
-    """Do the same for what is not Real; add to `moving` and return whether anything has changed."""
+    """Do the same for inputs that are not Real: extend `moving`, return whether an input has changed."""
     changed = set()
     given = memory.given_others(s)
     for variable, wire in s.other_inputs:
@@ -212,13 +217,14 @@ def _renew_others(
         if wire is not None:
             text = f"{wire.source}.{wire.output} -> {s.name}.{variable.name}"
             moving.append(UnsettledWire(text, "" if old is None else old, value))
-    if changed:  # of an array all elements
+    if changed:  # all elements of an array are set together
         names = [v.name for v, _ in s.other_inputs if v.place[:2] in changed]
         _put(s, {name: given[name] for name in names}, "setting inputs", check)
     return bool(changed)
 
 
 def _get(memory: SignalPool, s: InstanceSlot, check: StatusCheck) -> None:
+    """Read the outputs of an instance into the pool, with their faults."""
     for operation in getting(memory, s):
         check(s.name, "reading outputs", operation.call() or OK)
     if s.outputs and s.output_faults is not None:
@@ -226,6 +232,7 @@ def _get(memory: SignalPool, s: InstanceSlot, check: StatusCheck) -> None:
 
 
 def _unsettled(moving: list[UnsettledWire]) -> str:
+    """Return the message for wires that do not settle."""
     large = [str(movement) for movement in moving if movement.large]
     more = f" and {len(large) - 4} more" if len(large) > 4 else ""
     return (

@@ -1,14 +1,12 @@
-"""What the master needs of an FMU's instance, whichever version of FMI it follows.
+"""Interface of a running FMU instance, and its implementation on the FMU's C functions through ctypes.
 
-One FMU instance, loaded and stepped through ctypes.
+A step call is the raw C function with arguments converted to C objects once (0.26 us instead of 0.64 us
+with the types that fmpy declares, more with its logging wrappers), on buffers that belong to the master.
+Besides, fmpy refuses to load a library that lacks any function, even one that is never called.
 
-A call of a step is the raw C function with arguments that were made into C objects once (0.26 us instead
-of 0.64 us with the types that fmpy declares, more with its logging wrappers), on buffers that belong to
-the master. And fmpy loads no library that lacks a function, though nobody may call it.
-
-To FMI 3.0 an array is one variable, to a scenario so many scalars. Most exchanges of a step are of
-scalars of the precision and in the order of the master's buffer, and go straight through it; others are
-converted and rearranged on the way.
+In FMI 3.0 an array is one variable; in a scenario its elements are separate scalars. Most exchanges of a
+step are of scalars with the precision and in the order of the master's buffer, and use it directly; others
+are converted and rearranged on the way.
 """
 
 from __future__ import annotations
@@ -34,7 +32,7 @@ Status = int
 
 
 class StepCalls(NamedTuple):
-    """The calls of a communication step, each without arguments, returning an FMI status."""
+    """The calls of a communication step, each without arguments and returning an FMI status."""
 
     set: Callable[[], Status]
     step: Callable[[], Status]
@@ -42,18 +40,18 @@ class StepCalls(NamedTuple):
 
 
 class Buffers(NamedTuple):
-    """Where master and instance meet in a step: arrays of floating-point values, one item per place."""
+    """Arrays of floating-point values through which master and instance exchange, one item per `ValueRef`."""
 
     inputs: np.ndarray
     input_places: Sequence[ValueRef]
     outputs: np.ndarray
     output_places: Sequence[ValueRef]
-    time: ctypes.c_double  # at which the step begins [s], read at every call
-    step: ctypes.c_double  # its size [s], likewise
+    time: ctypes.c_double  # beginning of the step [s], read at every call
+    step: ctypes.c_double  # size of the step [s], read at every call
 
 
 class ExperimentSetup(NamedTuple):
-    """What an instance is told of the run before it is initialized."""
+    """Arguments of FMI's experiment setup, passed to an instance before initialization."""
 
     start: float  # [s]
     stop: float  # [s]
@@ -61,7 +59,7 @@ class ExperimentSetup(NamedTuple):
 
 
 class FmuInstance(Protocol):
-    """An instance of an FMU. Statuses are FMI's, never exceptions."""
+    """A running instance of an FMU. Failures are returned as FMI statuses, not raised."""
 
     name: str
 
@@ -69,16 +67,16 @@ class FmuInstance(Protocol):
         """Return the calls of a step, which exchange floating-point values through the buffers."""
 
     def part(self, kind: str) -> str:
-        """Return which kind of call (set, step, get) has failed when one of `kind` did not return OK."""
+        """Return the kind of call (set, step, get) that failed when one of `kind` did not return OK."""
 
     def put(self, places: Sequence[ValueRef], values: Sequence[Value]) -> Status:
-        """Set variables of one type; of an array all elements."""
+        """Set variables of one type; of an array, all elements."""
 
     def fetch(self, places: Sequence[ValueRef]) -> tuple[Status, list[Value]]:
-        """Return variables of one type."""
+        """Return the status and the values of variables of one type."""
 
     def setup(self, experiment: ExperimentSetup) -> Status:
-        """Tell the instance of the run."""
+        """Set up the experiment: start time, stop time, tolerance."""
 
     def enter(self) -> Status:
         """Enter initialization mode."""
@@ -87,38 +85,38 @@ class FmuInstance(Protocol):
         """Leave initialization mode."""
 
     def ended(self) -> float | None:
-        """Return the time [s] that an instance which wants to end has reached, None if it does not.
+        """Return the time [s] that an instance has reached if it asks to end the run, else None.
 
-        Asked after a step that was answered with Discard. Not a number: it does not say how far it is.
+        Called after a step that returned Discard. NaN: the FMU does not say how far it has got.
         """
 
     def note(self, status: Status) -> Status:
-        """Remember what a call has returned, which decides how the instance may be ended, and return it.
+        """Remember the status of a call, which decides how the instance may be ended, and return it.
 
-        The master says so of every call that counts. A number that is no status comes back as UNKNOWN.
+        The master reports every status that it acts on. A number that is not an FMI status becomes UNKNOWN.
         """
 
     def free(self) -> None:
-        """End the instance as its state allows. Once; further calls do nothing."""
+        """Terminate and free the instance as its state allows; further calls do nothing."""
 
 
 class CtypesInstance(FmuInstance, ABC):
-    """What instances of all versions of FMI share."""
+    """Base of the instances of all FMI versions."""
 
     prefix: ClassVar[str]
-    """Of the names of the functions."""
+    """Prefix of the names of the C functions."""
     version: ClassVar[int]
-    """Of FMI, the major one."""
+    """Major version of FMI."""
     real: ClassVar[str]
-    """The type in the names of the functions that exchange most values of a step."""
+    """Type, as in the function names, of the values exchanged directly with the master's buffer."""
     c_types: ClassVar[dict[str, Any]]
-    """Type in the names of the functions that set and get values -> C type."""
+    """Type as in the names of setters and getters -> C type."""
 
     def __init__(self, unit: Instance, log: Log, corrupted: set[Path]) -> None:
         """Load the library and instantiate.
 
         Args:
-            corrupted: shared by all instances of a run: the FMUs of which one has returned Fatal.
+            corrupted: folders of FMUs of which an instance has returned Fatal, shared by the whole run.
 
         Raises:
             ModelDescriptionError: the FMU has no loadable library for this platform.
@@ -141,8 +139,8 @@ class CtypesInstance(FmuInstance, ABC):
         self._component = self._instantiate(unit)
         if self._component is None:
             self.free()
-            said = log.errors(unit.name)
-            reason = said[0].text if said else "it gave no reason"
+            errors = log.errors(unit.name)
+            reason = errors[0].text if errors else "it gave no reason"
             if unit.fmu.needs_tool:
                 reason += f" (it says that it needs its tool: {unit.fmu.generation_tool or 'not named'})"
             raise SimulationError(
@@ -154,7 +152,7 @@ class CtypesInstance(FmuInstance, ABC):
         if not problem:
             file = (unit.fmu.directory / binary_of(self.version, unit.fmu.model_identifier)).absolute()
             try:
-                os.chdir(file.parent)  # where some look for other libraries
+                os.chdir(file.parent)  # some FMUs look for further libraries in the working directory
                 return ctypes.CDLL(str(file))
             except OSError as error:
                 problem = f"its library cannot be loaded: {error}"
@@ -164,7 +162,7 @@ class CtypesInstance(FmuInstance, ABC):
 
     @abstractmethod
     def _instantiate(self, unit: Instance) -> int | None:
-        """Return the instance; None if the FMU refuses."""
+        """Return the C pointer of the new instance, None if the FMU refuses."""
 
     def connect(self, buffers: Buffers) -> StepCalls:
         inputs, input_places, outputs, output_places, time, step = buffers
@@ -176,10 +174,10 @@ class CtypesInstance(FmuInstance, ABC):
 
     @abstractmethod
     def _stepping(self, time: ctypes.c_double, step: ctypes.c_double) -> Callable[[], Status]:
-        """Return the call of a step."""
+        """Return the call of the FMU's `DoStep`."""
 
     def _calls(self, verb: str, values: np.ndarray, places: Sequence[ValueRef]) -> Callable[[], Status]:
-        """Return the call that exchanges floating-point values, which may be of both precisions."""
+        """Return the call that sets or gets floating-point values of single or double precision."""
         calls = []
         for kind in dict.fromkeys(place.type for place in places):
             where = [i for i, place in enumerate(places) if place.type == kind]
@@ -191,7 +189,7 @@ class CtypesInstance(FmuInstance, ABC):
     def _staged(
         self, verb: str, values: np.ndarray, places: Sequence[ValueRef], where: list[int]
     ) -> Callable[[], Status]:
-        """Return the call for the values at some places of the buffer, all of one type."""
+        """Return the call for the values at the buffer's indices `where`, all of one type."""
         kind, (references, at, count) = places[0].type, _layout(places)
         if kind == self.real and at == where == list(range(len(values))) and count == len(values):
             straight = (ctypes.c_double * count).from_buffer(values.data)
@@ -212,7 +210,7 @@ class CtypesInstance(FmuInstance, ABC):
         return give if verb == "Set" else take
 
     def _call(self, name: str, references: Any, buffer: Any) -> Callable[[], Status]:
-        """Return the call of a function that sets or gets variables of one type."""
+        """Return the C setter or getter `name` with its arguments bound."""
         counts = [ctypes.c_size_t(len(references)), buffer]
         if self.version > 2:
             counts.append(ctypes.c_size_t(len(buffer)))
@@ -226,7 +224,7 @@ class CtypesInstance(FmuInstance, ABC):
         if not self._has(verb + kind):
             return self._impossible(f"the library lacks {self.prefix}{verb}{kind}"), [0] * len(places)
         buffer = (self.c_types[kind] * count)()
-        for i, value in zip(at, values, strict=False):  # none to get
+        for i, value in zip(at, values, strict=False):  # empty when getting
             buffer[i] = value
             if kind in INTEGERS and buffer[i] != value:
                 sentence = f"{value} does not fit into a variable of type {kind}"
@@ -241,17 +239,17 @@ class CtypesInstance(FmuInstance, ABC):
         return hasattr(self._library, self.prefix + name)
 
     def _function(self, name: str) -> Any:
-        """Return a C function, which takes C objects, and of Python's numbers only integers."""
+        """Return a C function; it takes C objects and, of Python's numbers, only integers."""
         function = self._library[self.prefix + name]
         function.restype = ctypes.c_int
         return function
 
     def _do(self, name: str, *arguments: Any) -> Status:
-        """Call a function of the instance."""
+        """Call a C function with the instance as its first argument."""
         return self._function(name)(ctypes.c_void_p(self._component), *arguments)
 
     def _announce(self, name: str, experiment: ExperimentSetup) -> Status:
-        """Call the function that is told of the run."""
+        """Call the C function that takes start time, stop time and tolerance."""
         start, stop, tolerance = experiment
         times = ctypes.c_double(start), 1, ctypes.c_double(stop)
         self._may_terminate = True
@@ -261,8 +259,8 @@ class CtypesInstance(FmuInstance, ABC):
         return kind
 
     def put(self, places: Sequence[ValueRef], values: Sequence[Value]) -> Status:
-        given = [v.encode() if isinstance(v, str) else v for v in values]  # C text is in bytes
-        return self._access("Set", places, given)[0]
+        encoded = [v.encode() if isinstance(v, str) else v for v in values]
+        return self._access("Set", places, encoded)[0]
 
     def fetch(self, places: Sequence[ValueRef]) -> tuple[Status, list[Value]]:
         status, values = self._access("Get", places, ())
@@ -300,7 +298,7 @@ class CtypesInstance(FmuInstance, ABC):
 
 
 def _layout(places: Sequence[ValueRef]) -> tuple[Any, list[int], int]:
-    """Return the references of the variables, the place of each scalar among all values, their number."""
+    """Return the distinct value references, each scalar's index among the values, and their number."""
     first: dict[int, int] = {}
     count = 0
     for place in places:
@@ -312,5 +310,5 @@ def _layout(places: Sequence[ValueRef]) -> tuple[Any, list[int], int]:
 
 
 def nothing_to_do() -> Status:
-    """Be a call of a step that is not needed."""
+    """No-op in place of a step call that is not needed."""
     return OK

@@ -1,14 +1,14 @@
-"""What the master and the process of an isolated unit say to each other, and the memory they share.
+"""Inter-process communication between the master and its child processes: pipes and shared memory.
 
-The Real values of a step, its time and its size lie in shared memory; two pipes carry single bytes:
-which of set, step and get are to be done, and how that ended. Such an exchange costs 7 us on one core
-and 50 us from core to core, most of it the two changes from one process to the other; a pair of pipes
-was the quickest of what tells the master at once that the other side has died. All else, and the
-messages that the FMU logs meanwhile, is a marked record of a few hundred bytes.
+The Real values of a step, its time and its size lie in shared memory; two pipes carry single bytes: which of
+set, step and get to do, and how that ended. Such an exchange costs 7 us on one core and 50 us from core to
+core, most of it the two context switches; a pair of pipes was the fastest of the mechanisms that report the
+death of the other side at once. Everything else, and the messages that the FMU logs meanwhile, is a tagged
+record of a few hundred bytes.
 
-An FMU can write into every file that its process has open, the pipe to the master among them. So what
-comes from there is JSON and checked, never unpickled; a byte that is no answer is told by the last answer and
-its number, which stand in the shared memory; and no record is waited for longer than a call may take.
+An FMU can write into any file that its process has open, including the pipe to the master. So records from
+there are JSON and checked, never unpickled; a stray byte is recognized by comparison with the last answer and
+its number in shared memory; and waiting for a record is limited by the time limit of a call.
 """
 
 from __future__ import annotations
@@ -32,42 +32,42 @@ from .log import KEPT, Log
 SET, STEP, GET = 1, 2, 4
 """Parts of an exchange, in this order; a sum of them asks for several."""
 ANSWER = 0x7F
-"""The largest byte that tells how an exchange ended (see `worker.Worker.exchange`)."""
+"""Largest byte that is the result of an exchange (see `isolation.InstanceServer.exchange`)."""
 REQUEST, LOG, REPLY, FAILED = 0x80, 0x81, 0x82, 0x83
-"""First bytes of records: what the master wants, what the FMU says, what the master gets, why it does not."""
+"""First bytes of records: the master's request, a log message, the reply, the reason of a failure."""
 LONGEST = 1 << 26
-"""Bytes of a record at most; chosen: no text that an FMU hands out is nearly as long."""
+"""Largest record [B]; chosen: far longer than any text of an FMU."""
 
 _HEAD = 4  # numbers before the inputs: time, step size, part being done, last answer
 _LENGTH = 4  # bytes
 
 
 class ProtocolError(Exception):
-    """What came out of a pipe is no record."""
+    """Data in a pipe are not a valid record."""
 
 
 class SharedBuffer:
-    """The shared memory of a unit: time and step size [s], part being done, last answer, inputs, outputs."""
+    """Shared memory of an instance: time and step size [s], current part, last answer, inputs, outputs."""
 
     def __init__(self, descriptor: int, inputs: int, outputs: int) -> None:
-        """Map the memory that `shared_memory` made, for so many values."""
+        """Map the file of `shared_memory` for the given numbers of inputs and outputs."""
         self._map = mmap.mmap(descriptor, size_of(inputs + outputs))
         self.time = ctypes.c_double.from_buffer(self._map, 0)
         self.step = ctypes.c_double.from_buffer(self._map, 8)
         self.part = ctypes.c_int64.from_buffer(self._map, 16)
         self.answer = ctypes.c_int64.from_buffer(self._map, 24)
-        """Number of the exchange times 256, and how it ended."""
+        """Number of the exchange times 256, plus its result."""
         self.inputs = np.frombuffer(self._map, float, inputs, 8 * _HEAD)
         self.outputs = np.frombuffer(self._map, float, outputs, 8 * (_HEAD + inputs))
 
 
 def size_of(values: int) -> int:
-    """Return the bytes of a board that holds so many inputs and outputs."""
+    """Return the size of a `SharedBuffer` with `values` inputs and outputs [B]."""
     return 8 * (_HEAD + values)
 
 
 def shared_memory(values: int) -> int:
-    """Return the descriptor of a file without a name, for a board of so many inputs and outputs."""
+    """Return the descriptor of an anonymous file for a `SharedBuffer` of `values` inputs and outputs."""
     if hasattr(os, "memfd_create"):
         descriptor = os.memfd_create("yawbench")
     else:
@@ -78,10 +78,10 @@ def shared_memory(values: int) -> int:
 
 
 class PipeChannel:
-    """One side's ends of the two pipes.
+    """One process's ends of the two pipes.
 
     Args:
-        wait: called before every read; returns when there is something, or raises.
+        wait: called before every read of a record; returns when data are available, or raises.
     """
 
     def __init__(self, reading: int, writing: int, wait: Callable[[], None] = lambda: None) -> None:
@@ -89,7 +89,7 @@ class PipeChannel:
         self.writing = writing
         self._wait = wait
         self._process = os.getpid()
-        self._alone = threading.Lock()  # an FMU may log from a thread of its own
+        self._alone = threading.Lock()  # an FMU may log from another thread
 
     def say(self, byte: bytes) -> None:
         """Write one byte."""
@@ -102,11 +102,11 @@ class PipeChannel:
         return byte[0] if byte else None
 
     def order(self, content: Any) -> None:
-        """Write a record to somebody who trusts this side."""
+        """Write a pickled record, for a process that trusts this one."""
         self._send(REQUEST, pickle.dumps(content))
 
     def ordered(self) -> Any:
-        """Return the record of `order` whose first byte has just been heard.
+        """Return the record written by `order`, whose first byte has just been read.
 
         Raises:
             EOFError: the other side is gone.
@@ -114,10 +114,10 @@ class PipeChannel:
         return pickle.loads(self._content())
 
     def send(self, kind: int, content: Any) -> None:
-        """Write a record of what JSON can hold.
+        """Write a record as JSON.
 
         Raises:
-            Garbled: there is too much of it, or JSON cannot hold it.
+            ProtocolError: it is too long, or not representable in JSON.
         """
         try:
             data = json.dumps(content).encode()
@@ -128,11 +128,11 @@ class PipeChannel:
         self._send(kind, data)
 
     def receive(self) -> Any:
-        """Return the record of `send` whose first byte has just been heard.
+        """Return the record written by `send`, whose first byte has just been read.
 
         Raises:
             EOFError: the other side is gone.
-            Garbled: it is no record; and whatever `wait` raises.
+            ProtocolError: the data are not a valid record. `wait` may raise others.
         """
         try:
             return json.loads(self._content())
@@ -141,7 +141,7 @@ class PipeChannel:
 
     def _send(self, kind: int, data: bytes) -> None:
         if os.getpid() != self._process:
-            os._exit(0)  # a copy that an FMU has made of this process
+            os._exit(0)  # a copy of this process forked by an FMU
         rest = memoryview(bytes([kind]) + len(data).to_bytes(_LENGTH, "little") + data)
         with self._alone:
             while rest:
@@ -170,29 +170,29 @@ class PipeChannel:
 
 
 def told(error: YawbenchError | Interrupted) -> dict[str, Any]:
-    """Return what there is to tell of an error to another process."""
-    where = {name: value for name, value in vars(error).items() if name in ("unit", "time", "number")}
+    """Return an error as JSON-ready data, for `rebuilt` in another process."""
+    where = {name: value for name, value in vars(error).items() if name in ("instance", "time", "number")}
     return {"kind": type(error).__name__, "problems": error.problems, "where": where}
 
 
 def rebuilt(told: dict[str, Any]) -> YawbenchError | Interrupted:
-    """Return the error that another process has told of."""
+    """Return the error that `told` has described in another process."""
     kinds = {kind.__name__: kind for kind in (*YawbenchError.__subclasses__(), Interrupted)}
     return kinds.get(told["kind"], YawbenchError)(told["problems"], **told["where"])
 
 
 class LogRelay(Log):
-    """Passes on what FMUs log at once, for one may be about to crash; a flood it only counts.
+    """Log that passes messages on at once, as the FMU may be about to crash; a flood is only counted.
 
     Args:
-        timed: it is known here what time the messages are of.
+        timed: the simulation time of the messages is known in this process.
     """
 
     def __init__(self, channel: PipeChannel, *, timed: bool) -> None:
         super().__init__()
         self._channel = channel
         self._timed = timed
-        self._untold = 0  # messages that were dropped
+        self._unreported = 0  # dropped messages not passed on yet
 
     def add(self, unit: str, status: int, category: str, text: str, time: float | None = None) -> None:
         kept = len(self.messages)
@@ -204,12 +204,12 @@ class LogRelay(Log):
 
     def drop(self, count: int) -> None:
         super().drop(count)
-        self._untold += count
-        if self._untold >= KEPT:
+        self._unreported += count
+        if self._unreported >= KEPT:
             self.finish()
 
     def finish(self) -> None:
-        """Pass on how many messages have been dropped since that was told last."""
-        if self._untold:
-            count, self._untold = self._untold, 0
+        """Pass on the number of messages dropped since the last call."""
+        if self._unreported:
+            count, self._unreported = self._unreported, 0
             self._channel.send(LOG, count)

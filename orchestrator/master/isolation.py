@@ -1,12 +1,12 @@
-"""Units in processes of their own: a crash or a call that never comes back ends a run, not the master.
+"""Isolated instances: each in a process of its own, so that a crash or a hang ends the run, not the master.
 
-To the master an isolated unit is a `Slave` like any other. Its numbers are those of the same unit in
-this process, for the process at the other end runs the same `unit.FmuSlave` on the same values. Setting
-inputs waits for the step and outputs come back with it, so a unit costs one exchange per step.
+To the master an isolated instance is an `FmuInstance` like any other. Its numbers are identical to those of
+the same instance in this process, because the process at the other end runs the same `CtypesInstance` on the
+same values. Setting inputs is deferred until the step, and outputs come back with it, so an instance costs
+one exchange per step.
 
-The process of an isolated unit: it does with the FMU what the master asks for, and nothing else.
-
-It ends when the master does, and with it all that the FMU has started (see `guardian`).
+`InstanceServer` is the other end: it does with the FMU what the master asks for, and nothing else. Its
+process ends when the master does, and with it everything that the FMU has started (see `supervisor`).
 """
 
 from __future__ import annotations
@@ -30,21 +30,21 @@ from .step_program import copying
 from .supervisor import InstanceProcess, ProcessLost, stand_guard
 
 CALL_LIMIT = 10.0
-"""Time that a call of an FMU may take [s]; chosen: ten thousand times what a step takes, and still
-within the patience of somebody who waits."""
+"""Time that a call of an FMU may take [s]; chosen: ten thousand times the length of a step, and still a
+tolerable wait."""
 
 _PARTS = {SET: ("set", "Set{}"), STEP: ("step", "DoStep"), GET: ("get", "Get{}")}
-"""Part of an exchange -> kind of the master's operation, and function of the FMU."""
+"""Part of an exchange -> kind of the master's operation and template of the FMI function's name."""
 
 
 class IsolatedInstance:
     """An instance of an FMU in a process of its own."""
 
     def __init__(self, unit: Instance, log: Log, process: InstanceProcess) -> None:
-        """Let the process load the library and instantiate.
+        """Have the process load the library and instantiate the FMU.
 
         Raises:
-            ModelDescriptionError, SimulationError: as `unit.FmuSlave`; also if the process dies of it.
+            ModelDescriptionError, SimulationError: as for `CtypesInstance`; also if the process dies.
         """
         self.name = unit.name
         self._log = log
@@ -59,7 +59,7 @@ class IsolatedInstance:
         except ProcessLost as lost:
             raise self._refused(f"{unit.name}: {lost.in_('its start')}") from None
         try:
-            # what the process needs of the FMU, which leaves out some hundred variables
+            # without the hundreds of variables, which the process does not need
             failed = process.ask("open", replace(unit, fmu=replace(unit.fmu, variables={}), series={}))
         except ProcessLost as lost:
             reason = lost.in_(f"{self._prefix}Instantiate or before")
@@ -161,7 +161,7 @@ class IsolatedInstance:
         return self._ask("", known(status), "note", status)
 
     def _ask(self, function: str, failed: Any, request: str, *arguments: Any) -> Any:
-        """Return the answer to a request, or `failed` if the process did not survive it."""
+        """Return the answer to a request, or `failed` if the process died."""
         if self._process is None:
             return failed
         self._part = ""
@@ -172,10 +172,10 @@ class IsolatedInstance:
             return failed
 
     def _lose(self, lost: ProcessLost, function: str) -> Status:
-        """Tell how the process was lost."""
+        """Log how the process was lost."""
         self._process = None
-        said = self._log.errors(self.name)
-        before = f"; before that it said: {' '.join(said[-1].text.split())}" if said else ""
+        errors = self._log.errors(self.name)
+        before = f"; before that it said: {' '.join(errors[-1].text.split())}" if errors else ""
         self._log.add(self.name, FATAL, PROCESS, lost.in_(function) + before)
         return FATAL
 
@@ -185,9 +185,9 @@ class IsolatedInstance:
             return
         try:
             process.ask("free")
-        except ProcessLost as lost:  # the results are not the worse for it
-            said = lost.in_(f"{self._prefix}Terminate or {self._prefix}FreeInstance")
-            self._log.add(self.name, WARNING, PROCESS, said)
+        except ProcessLost as lost:  # the results are not affected
+            text = lost.in_(f"{self._prefix}Terminate or {self._prefix}FreeInstance")
+            self._log.add(self.name, WARNING, PROCESS, text)
         else:
             process.close()
 
@@ -196,10 +196,10 @@ _BYTES = [bytes([parts]) for parts in range(SET + STEP + GET + 1)]
 
 
 class Isolation(contextlib.ExitStack):
-    """Opens units (see `simulate.Opener`) in processes of their own; all end with the `with` block."""
+    """A `run_loop.OpenInstance` that isolates instances; their processes end with the `with` block."""
 
     def __init__(self, units: Sequence[Instance], limit: float = CALL_LIMIT) -> None:
-        """Say which units there will be, for their processes to start at the same time.
+        """Remember the instances, so that their processes can start at the same time.
 
         Args:
             limit: time that a call of an FMU may take [s].
@@ -210,7 +210,7 @@ class Isolation(contextlib.ExitStack):
         self._processes: dict[str, InstanceProcess] = {}
 
     def __call__(self, unit: Instance, log: Log, corrupted: set[Path]) -> FmuInstance:
-        """Return the unit's instance. One that returns Fatal spoils no other: they share nothing."""
+        """Return a new isolated instance. Fatal from one does not affect the others: they share nothing."""
         if not self._processes:
             for each in self._units:
                 self._processes[each.name] = process = InstanceProcess(len(each.fmu.variables), self._limit)
@@ -222,36 +222,36 @@ class Isolation(contextlib.ExitStack):
 def opener_of(
     plan: Plan, call_limit: float | None
 ) -> Iterator[Callable[[Instance, Log, set[Path]], FmuInstance]]:
-    """Yield what opens the units of a plan: in this process, or isolated if calls have a limit [s].
+    """Yield a function that opens the instances of a plan: in this process, or isolated if `call_limit` [s].
 
     Raises:
-        SimulationError: this operating system has not what isolation needs.
+        SimulationError: isolation is not supported on this operating system.
     """
     if call_limit is None:
         yield open_unit
         return
     if sys.platform == "win32":
-        raise SimulationError("--isolate needs Linux or macOS.", unit=None, time=0.0)
+        raise SimulationError("--isolate needs Linux or macOS.", instance=None, time=0.0)
     with Isolation(plan.instances, call_limit) as isolation:
         yield isolation
 
 
 class InstanceServer:
-    """One FMU instance and the requests that concern it."""
+    """Serves the master's requests to one FMU instance."""
 
     def __init__(self, channel: PipeChannel, memory: int) -> None:
         self._channel = channel
         self._memory = memory
         self._log = LogRelay(channel, timed=False)
-        self._surroundings: ProcessState | None = ProcessState()  # until it is stepped
+        self._surroundings: ProcessState | None = ProcessState()  # until stepping begins
         self._slave: CtypesInstance
 
     def serve(self) -> None:
-        """Answer until there is no master any more, or in a copy that the FMU has made of this process."""
+        """Answer requests until the master is gone, or return in a copy forked by the FMU."""
         hear, say, answers = self._channel.hear, self._channel.say, [bytes([i]) for i in range(256)]
         process, count = os.getpid(), 0
-        while (asked := hear()) is not None:
-            parts = asked if asked <= SET | STEP | GET else 0
+        while (byte := hear()) is not None:
+            parts = byte if byte <= SET | STEP | GET else 0
             if parts:
                 answer, count = self.exchange(parts), count + 256
             else:
@@ -268,9 +268,9 @@ class InstanceServer:
                 self._channel.send(REPLY, reply)
 
     def exchange(self, parts: int) -> int:
-        """Do parts of a step in order; return the worst status, and 16 times the part it belongs to.
+        """Do parts of a step in order; return the worst status plus 16 times the part it belongs to.
 
-        Nothing is done after a status worse than Warning.
+        Stops after a status worse than Warning.
         """
         answer = OK
         for part, call in self._calls:
@@ -286,7 +286,7 @@ class InstanceServer:
         return answer
 
     def open(self, unit: Instance) -> dict[str, Any] | None:
-        """Instantiate the FMU; return what there is to tell if that fails."""
+        """Instantiate the FMU; return a description of the error if that fails."""
         try:
             self._slave = open_unit(unit, self._log, set())
         except YawbenchError as error:
@@ -307,14 +307,14 @@ class InstanceServer:
         return self._slave.exit()
 
     def free(self) -> None:
-        """End the instance, and what its library has still to print."""
+        """Free the instance and flush what its library has printed."""
         self._slave.free()
         self._log.finish()
         flush_output()
 
 
 def main(*descriptors: str) -> None:
-    """Serve the master at the other ends of two pipes, with memory that is shared with it."""
+    """Serve the master: descriptors of the pipes for reading and writing, and of the shared memory."""
     reading, writing, memory = map(int, descriptors)
     stand_guard(reading, (writing, memory))
     channel = PipeChannel(reading, writing)

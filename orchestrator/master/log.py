@@ -1,7 +1,7 @@
-"""What the units say through the FMI logger.
+"""Log of the messages that FMUs send through the FMI logger.
 
-There is one receiver for all instances of a process; the environment that an instance was given, a
-number, says whose message it is.
+There is one receiver for all instances of a process. The number passed to an instance as its component
+environment identifies whose message it is.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ OK, WARNING, DISCARD, ERROR, FATAL, PENDING, UNKNOWN = range(7)
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending", "a status that FMI does not have")
 
 WRITTEN = 100
-"""Warnings written into run.json; more are only counted."""
+"""Warnings written into run.json; further ones are only counted."""
 KEPT = 1000
-"""Messages kept per unit; a unit that goes on is only counted."""
+"""Messages kept per instance; further ones are only counted."""
 LONGEST = 10_000
-"""Characters kept of a message; chosen: a traceback has fewer."""
+"""Characters kept of a message; chosen: a traceback is shorter."""
 MASTER = "yawbench"
-"""Category of what the master has to say of a unit; always kept."""
+"""Category of the master's own messages about an instance; always kept."""
 PROCESS = "yawbench process"
-"""Category of the message that says how the process of an isolated unit ended; always kept."""
+"""Category of the message that says how the process of an isolated instance ended; always kept."""
 
-_TELLS_WHEN = re.compile(r"^[^:]* failed at t = [^:]* s: ")
+_HAS_TIME = re.compile(r"^[^:]* failed at t = [^:]* s: ")
 _CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
 def known(status: int) -> int:
-    """Return a status, UNKNOWN for a number that is none."""
+    """Return the status, or UNKNOWN for a number that is not an FMI status."""
     return status if OK <= status <= PENDING else UNKNOWN
 
 
 @dataclass(frozen=True)
 class Message:
-    """One message of a unit; `time` [s] is the communication point before it, if none is said."""
+    """A message of an instance; `time` [s] is the communication point before it, unless given explicitly."""
 
     instance: str
     time: float
@@ -50,7 +50,7 @@ class Message:
 
 
 class Log:
-    """All messages of a run with a status worse than OK, in the order in which they came."""
+    """The messages of a run with a status worse than OK, in order of arrival."""
 
     def __init__(self) -> None:
         self.messages: list[Message] = []
@@ -61,7 +61,7 @@ class Log:
 
     @contextlib.contextmanager
     def deaf(self) -> Iterator[None]:
-        """Hear nothing while the block runs: an FMU may be asked for what it need not tell."""
+        """Ignore FMU messages inside this block, because an optional read may legally fail."""
         self._deaf = True
         try:
             yield
@@ -69,10 +69,10 @@ class Log:
             self._deaf = False
 
     def add(self, unit: str, status: int, category: str, text: str, time: float | None = None) -> None:
-        """Keep a message; those with the status OK are of no interest.
+        """Add a message; those with the status OK are ignored.
 
         Args:
-            time: that it tells of [s]; default: the communication point before it.
+            time: simulation time that it is about [s]; default: the last communication point.
         """
         status = known(status)
         if status == OK or (self._deaf and category not in (MASTER, PROCESS)):
@@ -89,7 +89,7 @@ class Log:
         self.dropped += count
 
     def errors(self, unit: str) -> list[Message]:
-        """Return the unit's messages with a status worse than Warning, without tracebacks."""
+        """Return the messages of an instance with a status worse than Warning, without tracebacks."""
         return [
             m
             for m in self.messages
@@ -97,16 +97,16 @@ class Log:
         ]
 
     def tracebacks(self, unit: str) -> list[str]:
-        """Return the full Python tracebacks that the unit has logged."""
+        """Return the full Python tracebacks that an instance has logged."""
         return [m.text for m in self.messages if m.instance == unit and m.category == "traceback"]
 
     def warnings(self, ended_by: str | None = None) -> Iterable[Message]:
-        """Return what the units said while the run went on, after what the master had to say.
+        """Return the messages that did not end the run: the master's own first, then those of the FMUs.
 
-        That is warnings, and errors after which a unit went on as if there had been none.
+        These are warnings, and errors after which an instance continued regardless.
 
         Args:
-            ended_by: the unit whose errors ended the run, if one did: they are told elsewhere.
+            ended_by: the instance whose errors ended the run, if any; those are reported separately.
         """
         chosen = (
             m
@@ -116,7 +116,7 @@ class Log:
         return sorted(chosen, key=lambda m: m.category != MASTER)
 
     def record(self, ended_by: str | None = None) -> dict[str, Any]:
-        """Return what run.json says of the warnings (see `warnings`)."""
+        """Return the warnings as they appear in run.json (see `warnings`)."""
         warnings = list(self.warnings(ended_by))
         return {
             "warnings": [
@@ -128,7 +128,7 @@ class Log:
 
 
 def describe(unit: str, what: str, time: float, status: int, log: Log) -> str:
-    """Return one sentence: unit, what failed, when, and the reason.
+    """Return an error message: instance, what failed, when, and the reason.
 
     Args:
         what: "step", "initialization", "setting inputs", ...
@@ -136,21 +136,21 @@ def describe(unit: str, what: str, time: float, status: int, log: Log) -> str:
     """
     errors = _latest(unit, log)
     if status != OK and errors and errors[0].time < log.time.value:
-        errors = []  # the unit has gone on since
+        errors = []  # the instance has continued since then
     if status == PENDING and not errors:
         reason = "the FMU wants to compute asynchronously, which is not supported"
     elif not errors:
         reason = f"the FMU returned {STATUS[status]} and gave no reason"
     else:
-        ended = (m for m in errors if m.category == PROCESS)  # what the unit said before is told with it
+        ended = (m for m in errors if m.category == PROCESS)  # it already quotes the last error of the FMU
         reason = " ".join(next(ended, errors[0]).text.split())
-        if _TELLS_WHEN.match(reason):  # a component of this project: it knows where and when
+        if _HAS_TIME.match(reason):  # a component of this project, whose message already has place and time
             return f"{unit}: {reason.partition('; inputs: ')[0]}"
     return f"{unit}: {what} failed at t = {time:.9g} s: {reason}"
 
 
 def _latest(unit: str, log: Log) -> list[Message]:
-    """Return the errors that a unit has logged at the last instant at which it logged any."""
+    """Return the errors that an instance logged at the latest time at which it logged any."""
     errors = log.errors(unit)
     return [m for m in errors if m.time == errors[-1].time]
 
@@ -163,7 +163,7 @@ def listen(log: Log, unit: str, kept: Any = None) -> int:
     """Return the number under which `receive` passes messages on to `log`.
 
     Args:
-        kept: what has to stay in memory until the number is given to `unlisten`.
+        kept: object to be kept alive until `unlisten` is called with the number.
     """
     number = next(_numbers)
     _listeners[number] = (log, unit, kept)
@@ -176,16 +176,16 @@ def unlisten(number: int) -> None:
 
 
 def receive(number: int, status: int, category: bytes | None, text: bytes | None) -> None:
-    """Take a message of the instance that was given this number."""
+    """Log a message of the instance with this number (called from C)."""
     try:
         if number not in _listeners:
-            return  # a thread of an instance that is gone
+            return  # from a thread of an instance already freed
         log, unit, _ = _listeners[number]
         log.add(unit, status, _decoded(category), _decoded(text))
-    except Exception as error:  # must not reach the C code that called
+    except Exception as error:  # must not propagate into the calling C code
         print(f"yawbench: a log message was lost: {error}")
 
 
 def _decoded(text: bytes | None) -> str:
-    """Return a text of an FMU, without what would steer a terminal."""
+    """Decode a text of an FMU and remove control characters, which could act on a terminal."""
     return _CONTROLS.sub("", (text or b"").decode("utf-8", errors="replace"))

@@ -1,13 +1,12 @@
-"""The master: initializes the units of a plan and steps them through integer time.
+"""The fixed-step co-simulation master: initializes the instances of a plan and steps them in integer time.
 
-Per communication step it walks a flat program of calls (see `program`), looks once over all outputs
-for values that are not finite, and copies what is recorded into a row: a few microseconds beside
-the units' own work. Time is k p / q with whole numbers, correctly rounded, so it neither drifts nor
-misses the end.
+Per communication step it walks a flat list of calls (see `step_program`), checks once that the sum of all
+outputs is finite, and copies the recorded values into a row: a few microseconds on top of the instances'
+own work. Time is k p / q with whole numbers, correctly rounded, so it neither drifts nor misses the end.
 
-A value on a wire that is not finite ends the run, for every unit behind it computes with it. One
-that is only recorded is a warning: FMUs put out NaN for "not available", and infinity for a time
-that never comes.
+A value on a wire that is not finite ends the run, because every instance downstream computes with it. A
+recorded output that is not wired only gives a warning: FMUs use NaN for "not available" and infinity for a
+time that never comes.
 """
 
 from __future__ import annotations
@@ -31,11 +30,11 @@ from .signal_pool import SignalPool
 from .step_program import Operation, StepProgram
 
 ALMOST = 1e-6
-"""Part of a step by which an FMU may be short of its end; chosen: rounding of its own times."""
+"""Fraction of a step by which an FMU may stop short of its end; chosen: rounding of its own times."""
 
 
 class EndRequested(Exception):
-    """A unit wants the run to end, which is no failure: `instance`, at `time` [s]."""
+    """An instance asked to end the run, which is not a failure: `instance`, at `time` [s]."""
 
     def __init__(self, reason: str, *, instance: str, time: float) -> None:
         super().__init__(reason)
@@ -44,7 +43,7 @@ class EndRequested(Exception):
 
 
 class Master:
-    """One run of a plan. `completed` is the last communication point at which all values stand."""
+    """Steps the instances of one run. `completed` is the last communication point with all values."""
 
     def __init__(
         self,
@@ -55,11 +54,11 @@ class Master:
         reached: ctypes.c_int64 | None = None,
         copies: Copies | None = None,
     ) -> None:
-        """Connect the units.
+        """Connect the instances.
 
         Args:
-            reached: gets what `completed` is, for others to see.
-            copies: of this process, since before the units were opened.
+            reached: kept equal to `completed`, possibly in memory shared with another process.
+            copies: detects forks of this process; created before the FMUs were opened.
         """
         self.plan = plan
         self.log = log
@@ -77,26 +76,26 @@ class Master:
             into, of = [v.place for v in s.inputs], [v.place for v in s.outputs]
             s.calls = s.slave.connect(Buffers(s.u, into, s.y, of, self._clocks[period], size))
         self.programs = StepProgram(memory)
-        self._operations: dict[int, list[Operation]] = {}  # of the stretch being stepped, by phase
+        self._operations: dict[int, list[Operation]] = {}  # of the current `advance`, by phase
         real = [memory.index[key] for key in plan.record if key in memory.index]
         self._recorded = np.array([memory.time_at, *real], np.intp)
         self._recorded_others = [key for key in plan.record if key not in memory.index]
         self._wires = [w for w in plan.wires if (w.source, w.output) in memory.index]
         wired = {(w.source, w.output) for w in self._wires}
         self._spare = {key: at for key, at in memory.index.items() if key not in wired}
-        """Outputs that are recorded and on no wire, all of whose values have been finite so far."""
-        self._expected = np.arange(memory.n_outputs)  # to be finite
+        """Outputs that are recorded but not wired, and have been finite so far."""
+        self._expected = np.arange(memory.n_outputs)  # outputs checked to be finite
         self._ones = np.ones(memory.n_outputs)
         self._ending: EndRequested | None = None
-        self._points: Iterator[int] = iter(())  # left to be stepped to
+        self._points: Iterator[int] = iter(())  # communication points still to be reached
         self._surroundings = ProcessState()
         self._copies = copies or Copies()
 
     def initialize(self, row: np.ndarray, others: list[list[Value]]) -> None:
-        """Bring all units to the start, and record it like `advance`.
+        """Initialize all instances and record the start as `advance` does.
 
         Raises:
-            SimulationError: a unit fails or logs an error, a wire does not settle or is not finite.
+            SimulationError: an instance fails or logs an error, a wire does not settle or is not finite.
         """
         self.passes = initialize(self.memory, self._check_initialization, self.log)
         self._check_finite(0)
@@ -108,13 +107,12 @@ class Master:
     def advance(self, end: int, rows: Sequence[np.ndarray], others: list[list[Value]]) -> None:
         """Step to communication point `end`, filling one of `rows` per point.
 
-        What is recorded and no Real is appended to `others`, one list per row.
+        Recorded values that are not Real are appended to `others`, one list per row.
 
         Raises:
-            SimulationError: a unit fails or a wire is not finite. `completed` tells how many rows
-                are whole.
-            Interrupted: the stop flag was raised.
-            Ended: a unit wants no more.
+            SimulationError: an instance fails or a wire is not finite. Rows up to `completed` are complete.
+            Interrupted: a stop was requested.
+            EndRequested: an instance asked to end the run.
         """
         q = math.lcm(self.plan.step.denominator, self.plan.start.denominator)
         s, p = int(self.plan.start * q), int(self.plan.step * q)  # the k-th point is at (s + k p) / q
@@ -152,13 +150,13 @@ class Master:
             raise self._ending
 
     def check_surroundings(self, since: int) -> None:
-        """Make sure that no unit has changed for the others how they compute.
+        """Check that no FMU has changed the floating-point environment that all instances share.
 
         Args:
-            since: communication point at which that was so. What has been recorded since is given up.
+            since: communication point of the last successful check. Rows recorded after it are discarded.
 
         Raises:
-            SimulationError: one has.
+            SimulationError: an FMU has changed it.
         """
         if not self._surroundings.arithmetic_changed():
             return
@@ -174,20 +172,20 @@ class Master:
         )
 
     def inputs_of(self, unit: str) -> dict[str, Value]:
-        """Return the inputs with which a unit was last stepped."""
+        """Return the inputs with which an instance was last stepped."""
         s = self.memory.of[unit]
         real = {v.name: float(u) for v, u in zip(s.inputs, s.u, strict=True)}
         return real | self.memory.given_others(s)
 
     def operation_of(self, k: int, call: Callable[[], Status | None]) -> Operation | None:
-        """Return the operation of the step to `k` that a call belongs to; None: it is of another step."""
+        """Return the operation of the step to `k` that a call belongs to, None if it is not part of it."""
         return next((op for op in self._operations[k % self.programs.cycle] if op.call is call), None)
 
     def _values_of_others(self) -> list[Value]:
         return [self.memory.others[key] for key in self._recorded_others]
 
     def _check_initialization(self, unit: str, what: str, status: Status) -> None:
-        """Judge a call during initialization, where a logged error counts whatever the status is."""
+        """Check a call made during initialization, where a logged error counts whatever the status is."""
         self._copies.end()
         self._surroundings.restore(unit, self.log)
         status = self.memory.of[unit].slave.note(status)
@@ -200,7 +198,7 @@ class Master:
             raise self.stop.interrupted("during initialization", time=self.plan.time(0))
 
     def _answer(self, k: int, call: Callable[[], Status | None], status: Status) -> None:
-        """Judge a call of the step from `k` - 1 to `k` that did not return OK."""
+        """Handle a call of the step from `k` - 1 to `k` that did not return OK."""
         operation = self.operation_of(k, call)
         assert operation is not None
         station = self.memory.of[operation.instance]
@@ -209,7 +207,7 @@ class Master:
         if status == WARNING:
             self._note_warning(operation.instance, WORDS[kind])
             return
-        self._check_finite(k)  # a value that went wrong upstream explains this failure
+        self._check_finite(k)  # a non-finite value upstream is the better explanation
         time = self.plan.time(k - station.instance.period)
         if status == DISCARD and kind == "step" and (reached := station.slave.ended()) is not None:
             self._end(k, operation.instance, time if math.isnan(reached) else reached)
@@ -218,10 +216,10 @@ class Master:
         raise self._failure(sentence, operation.instance, time)
 
     def _end(self, k: int, unit: str, time: float) -> None:
-        """End the run because a unit wants to: now, or after this step if it has done all of it."""
+        """End the run at the request of an instance: now, or after this step if it completed the step."""
         now = self.log.time.value
-        said = [" ".join(m.text.split()) for m in self.log.messages if m.instance == unit and m.time >= now]
-        reason = f": {said[-1]}" if said else ", without a reason"
+        texts = [" ".join(m.text.split()) for m in self.log.messages if m.instance == unit and m.time >= now]
+        reason = f": {texts[-1]}" if texts else ", without a reason"
         ending = EndRequested(f"{unit} ended the run at t = {time:.9g} s{reason}", instance=unit, time=time)
         if time < self.plan.time(k) - ALMOST * float(self.plan.step):
             raise ending
@@ -229,21 +227,21 @@ class Master:
         deque(self._points, maxlen=0)
 
     def _failure(self, sentence: str, unit: str, time: float) -> SimulationError | Interrupted:
-        """Return what ends the run because of a unit."""
+        """Return the exception for a failed instance: an interruption if a stop was requested."""
         if self.stop.requested:
             return self.stop.interrupted(f": {sentence}", unit=unit, time=time)
         return SimulationError(sentence, instance=unit, time=time)
 
     def _note_warning(self, unit: str, what: str) -> None:
-        """Keep a Warning of a unit that has said nothing so far."""
+        """Log the status Warning of an instance that has not logged a message itself."""
         if not any(m.instance == unit and m.category != MASTER for m in self.log.warnings()):
             self.log.add(unit, WARNING, "", f"{what}: the FMU returned Warning and gave no reason")
 
     def _check_finite(self, k: int) -> None:
-        """Look for values that are not finite, which the sum of all outputs tells of.
+        """Find the non-finite values that made the sum of all outputs non-finite.
 
         Raises:
-            SimulationError: for the first wire, in evaluation order, that has such a value.
+            SimulationError: a wire has such a value; reported is the first in evaluation order.
         """
         memory = self.memory
         if np.isfinite(memory.now[self._expected]).all():

@@ -1,16 +1,14 @@
-"""What all code of a process shares, and a unit may therefore change for the others.
+"""Process-wide state that an FMU may corrupt for others, and signals that stop a run.
 
-Libraries that are compiled for speed let small numbers become zero for everybody from the moment they
-are loaded; others set a rounding mode or a locale (after which `strtod` reads "0,5") and leave it.
-Loading, instantiation and initialization are few calls: what they have changed is undone after each of
-them. In a step that would cost more than many units' own work, so between steps it is only looked, now and
-then, whether numbers are still computed as they were: if not, the run ends, for nobody knows since when.
-Units that are isolated share nothing.
+Libraries compiled for speed flush small numbers to zero for the whole process from the moment they are
+loaded; others set a rounding mode or a locale (after which `strtod` reads "0,5") and leave it. Loading,
+instantiation and initialization are few calls: what they have changed is restored after each of them. In a
+step that would cost more than the work of many instances, so between steps only the floating-point
+environment is checked, now and then: if it has changed, the run ends, because it is unknown since when.
+Isolated instances share nothing.
 
-Ctrl-C and SIGTERM as a wish that is looked at between steps.
-
-Python's own answer to Ctrl-C is an exception wherever the program happens to be, which inside an
-FMU would end in half a step or a dead process.
+Ctrl-C and SIGTERM set a flag that is checked between steps. Python's default for Ctrl-C is an exception at an
+arbitrary point, which inside an FMU would end in half a step or a dead process.
 """
 
 from __future__ import annotations
@@ -41,27 +39,28 @@ _HANDLED = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGPIPE") i
 
 
 class ProcessState:
-    """Those of this process, as they are when this is made."""
+    """Snapshot of the process-wide state: FPU mode, locale, working directory, umask, signal handlers."""
 
     def __init__(self) -> None:
         self._arithmetic = _arithmetic()
         self._locale = _c.setlocale(locale.LC_ALL, None)
         self._folder = os.getcwd()
         self._umask = _umask()
-        self._told: set[tuple[str, str]] = set()
+        self._reported: set[tuple[str, str]] = set()
 
     def arithmetic_changed(self) -> bool:
-        """Return whether numbers are rounded, flushed to zero or trapped in another way by now."""
+        """Return whether rounding, flush-to-zero or traps differ from the snapshot."""
         return _control(_arithmetic()) != _control(self._arithmetic)
 
     def restore(self, unit: str, log: Log) -> None:
-        """Undo what a unit has changed; the first time it does, that is a warning."""
-        for what in self._undone():
-            if (unit, what) not in self._told:
-                self._told.add((unit, what))
+        """Undo what an instance has changed; log a warning the first time."""
+        for what in self._restored():
+            if (unit, what) not in self._reported:
+                self._reported.add((unit, what))
                 log.add(unit, WARNING, MASTER, f"it changed {what}, which all units share; that was undone")
 
-    def _undone(self) -> Iterator[str]:
+    def _restored(self) -> Iterator[str]:
+        """Restore the snapshot; yield a description of each thing that had changed."""
         if self.arithmetic_changed():
             _c.fesetenv(self._arithmetic)
             yield "how numbers are rounded, flushed to zero or trapped"
@@ -77,20 +76,20 @@ class ProcessState:
             yield "the mask of file permissions"
         if threading.current_thread() is threading.main_thread():
             for number in _HANDLED:
-                if (handler := signal.getsignal(number)) is not None:  # Python's, whatever C has now
+                if (handler := signal.getsignal(number)) is not None:  # Python's, whatever C has installed
                     signal.signal(number, handler)
 
 
 class Copies:
-    """Ends the copies that a unit makes of this process with `fork` and lets return.
+    """Ends copies of this process that an FMU makes with `fork` and lets return from the call.
 
-    Each would go on with the run, and a unit that forks in every step would soon fill the machine. The
-    process is looked at once per step.
+    Each copy would go on with the run, and an FMU that forks in every step would soon fill the machine. The
+    process id is checked once per step.
     """
 
     def __init__(self) -> None:
         self.process = os.getpid()
-        self._made = mmap.mmap(-1, 1)  # shared with them
+        self._made = mmap.mmap(-1, 1)  # shared with the copies
 
     def end(self) -> None:
         """End this process if it is a copy."""
@@ -100,19 +99,19 @@ class Copies:
 
     @property
     def made(self) -> bool:
-        """Whether one has been ended."""
+        """Whether a copy has been made and ended."""
         return bool(self._made[0])
 
 
 def suspects(units: Sequence[Instance]) -> list[str]:
-    """Return the units that may have changed something: those that are compiled, or all if none is."""
+    """Return the instances that may have changed something: the compiled FMUs, or all if none is."""
     return [u.name for u in units if u.fmu.compiled] or [u.name for u in units]
 
 
 def flush_output() -> None:
-    """Write what Python and C have still to print."""
+    """Flush the standard output streams of Python and C."""
     for stream in filter(None, (sys.stdout, sys.stderr)):
-        with contextlib.suppress(OSError, ValueError):  # nobody reads it any more
+        with contextlib.suppress(OSError, ValueError):  # the reader has closed the pipe
             stream.flush()
     _c.fflush(None)
 
@@ -124,7 +123,7 @@ def _arithmetic() -> ctypes.Array[ctypes.c_char]:
 
 
 def _control(environment: ctypes.Array[ctypes.c_char]) -> tuple[int, ...]:
-    """Return what decides on results, without the flags that every operation may raise."""
+    """Return the part that affects results, without the flags that any operation may raise."""
     if platform.machine() in ("x86_64", "AMD64"):
         return struct.unpack_from("<H", environment)[0], struct.unpack_from("<I", environment, 28)[0] & ~0x3F
     if platform.machine() == "aarch64":
@@ -149,20 +148,20 @@ _requested_at: float | None = None
 
 
 class StopFlag:
-    """Whether the run is to end, and the signal that asks for it."""
+    """Whether the run should stop, and the signal that requested it."""
 
     def __init__(self) -> None:
         self.requested = False
         self.number: int = signal.SIGINT
 
     def request(self, number: int = signal.SIGINT) -> None:
-        """Let it end."""
+        """Ask the run to stop."""
         global _requested_at
         self.requested, self.number = True, number
         _requested_at = _requested_at or time.monotonic()
 
     def interrupted(self, how: str, *, unit: str | None = None, time: float | None = None) -> Interrupted:
-        """Return what to raise; `how` continues "the run was interrupted"."""
+        """Return the exception to raise; `how` continues the message "the run was interrupted"."""
         space = "" if how.startswith(":") else " "
         problem = f"the run was interrupted{space}{how}"
         return Interrupted(problem, instance=unit, time=time, number=self.number)
@@ -175,10 +174,10 @@ def stop_requested_at() -> float | None:
 
 @contextlib.contextmanager
 def terminable() -> Iterator[None]:
-    """Let SIGTERM end the block as Ctrl-C does, with an exception.
+    """Make SIGTERM end the block with an exception, as Ctrl-C does.
 
     Raises:
-        Interrupted: it came.
+        Interrupted: SIGTERM was received.
     """
 
     def handle(number: int, frame: FrameType | None) -> None:
@@ -196,12 +195,12 @@ def terminable() -> Iterator[None]:
 
 @contextlib.contextmanager
 def interrupts(flag: StopFlag, again: Callable[[], None]) -> Iterator[None]:
-    """Let SIGINT and SIGTERM raise `flag` while the block runs; `again` is called if they repeat.
+    """Make SIGINT and SIGTERM set `flag` while the block runs; `again` is called if they repeat.
 
     Outside the main thread, where Python allows no handlers, the block just runs.
 
     Raises:
-        Interrupted: one of them came too late for the block to end because of it.
+        Interrupted: a signal came too late to stop the block.
     """
 
     def handle(number: int, frame: FrameType | None) -> None:

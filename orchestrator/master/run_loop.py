@@ -1,6 +1,7 @@
-"""The course of a run: units opened, initialized, stepped, freed.
+"""The main loop of a run: open the FMUs, initialize them, step to the end, free them.
 
-How long the steps of one unit of a run take, by the processor time of the thread that makes them.
+`timing` wraps an instance to measure the processor time of its steps, by the clock of the thread that
+makes them.
 """
 
 from __future__ import annotations
@@ -24,32 +25,32 @@ from .master import EndRequested, Master
 from .process_state import Copies, StopFlag, suspects
 
 RunProgress = Callable[[int, int], None]
-"""Called a few times a second with the communication points done and those in all."""
+"""Called a few times a second with the number of communication points completed and their total."""
 
 OpenInstance = Callable[[Instance, Log, set[Path]], FmuInstance]
-"""Makes the instance of a unit (see `opening.open_unit`)."""
+"""Creates the running instance for a `plan.Instance` (see `fmi.open_unit`)."""
 
 
 class RecordedRows(Protocol):
-    """What a run fills: `rows` with Reals, one per communication point, `others` with what is none."""
+    """Buffer that a run fills: `rows` of Reals, one per communication point, and `others` for other types."""
 
     rows: list[np.ndarray]
     others: list[list[Value]]
 
     def write(self, count: int) -> None:
-        """Take over the first `count` of them; they are then free again."""
+        """Record the first `count` rows, which may then be overwritten."""
 
 
 REPORT_EVERY = 0.2
-"""Time between two reports of progress [s], while a single step does not take longer."""
+"""Time between two reports of progress [s], unless a single step takes longer."""
 
 
 class RunLoop:
-    """The course of one run in this process.
+    """Runs a plan in this process.
 
     Args:
-        rows: where rows go, a recorder's `rows` and `others`, before its `write` is called with their number.
-        reached: gets the last communication point at which all values stand, for others to see.
+        rows: buffer for the recorded values, usually the recorder itself.
+        reached: kept equal to the last complete communication point, possibly in shared memory.
     """
 
     def __init__(
@@ -63,9 +64,9 @@ class RunLoop:
     ) -> None:
         self.plan = plan
         self.passes = 0  # of initialization
-        self.handed_over = 0  # rows given away
+        self.handed_over = 0  # rows written
         self.writing = False
-        self.ended: EndRequested | None = None  # by a unit, before the plan's end
+        self.ended: EndRequested | None = None  # by an instance, before the stop time
         self._rows = rows
         self.log = log
         self._stop = stop
@@ -76,11 +77,11 @@ class RunLoop:
         self._copies = Copies()
 
     def inputs_of(self, unit: str) -> dict[str, Value]:
-        """Return the inputs with which a unit was last stepped."""
+        """Return the inputs with which an instance was last stepped."""
         return {} if self._master is None else self._master.inputs_of(unit)
 
     def go(self, opener: OpenInstance) -> None:
-        """Open, initialize, step."""
+        """Open the FMUs, initialize them and step to the end."""
         corrupted: set[Path] = set()
         for unit in self.plan.instances:
             for doubt in unit.fmu.doubts():
@@ -88,7 +89,7 @@ class RunLoop:
             self._slaves[unit.name] = opener(unit, self.log, corrupted)
             self._copies.end()
         self._master = Master(self.plan, self._slaves, self.log, self._stop, self._reached, self._copies)
-        with np.errstate(all="ignore"):  # what is not finite is found by looking, not by warning
+        with np.errstate(all="ignore"):  # non-finite values are found by `Master`, not by NumPy warnings
             self._master.initialize(self._rows.rows[0], self._rows.others)
             self.passes = self._master.passes
             try:
@@ -126,10 +127,10 @@ class RunLoop:
             self._progress(total, total)
 
     def _refuse_copies(self, completed: int) -> None:
-        """Make sure that no unit has copied this process.
+        """Check that no FMU has forked this process.
 
         Raises:
-            SimulationError: one has. It would do so in every step, and each copy remains until the run ends.
+            SimulationError: an FMU has. It would do so in every step, and each copy stays until the run ends.
         """
         if not self._copies.made:
             return
@@ -143,15 +144,15 @@ class RunLoop:
         )
 
     def flush(self) -> None:
-        """Hand over all whole rows."""
+        """Write all complete rows."""
         completed = -1 if self._master is None else self._master.completed
         self._hand_over(completed + 1 - self.handed_over)
 
     def _hand_over(self, count: int) -> None:
-        """Let the recorder write rows.
+        """Write rows to the recorder.
 
         Raises:
-            SimulationError: it cannot.
+            SimulationError: they cannot be written.
         """
         self.handed_over += count
         time = self.plan.time(max(0, self.handed_over - 1))
@@ -166,7 +167,7 @@ class RunLoop:
             self.writing = False
 
     def end(self) -> None:
-        """Terminate and free the units."""
+        """Terminate and free the instances."""
         for slave in reversed(self._slaves.values()):
             slave.free()
             self._copies.end()
@@ -174,7 +175,7 @@ class RunLoop:
 
 @dataclass
 class StepClock:
-    """What has been counted."""
+    """Accumulated time and number of the steps of an instance."""
 
     steps: int = 0
     total: int = 0  # [ns]
@@ -186,20 +187,20 @@ class StepClock:
 
 
 def timing(opener: OpenInstance, unit: str, clock: StepClock) -> OpenInstance:
-    """Return an opener whose instance of a unit is timed; the numbers of the run stay as they are."""
+    """Return an opener that times the instance named `unit`; the results of the run do not change."""
 
-    def opened(one: Instance, log: Log, corrupted: set[Path]) -> Any:
-        slave: Any = opener(one, log, corrupted)
-        if one.name == unit:
-            connect = slave.connect
-            slave.connect = lambda buffers: _timed(connect(buffers), clock)
-        return slave
+    def open_timed(planned: Instance, log: Log, corrupted: set[Path]) -> Any:
+        running: Any = opener(planned, log, corrupted)
+        if planned.name == unit:
+            connect = running.connect
+            running.connect = lambda buffers: _timed(connect(buffers), clock)
+        return running
 
-    return opened
+    return open_timed
 
 
 def _timed(calls: StepCalls, clock: StepClock) -> StepCalls:
-    """Return the calls of a step, timed."""
+    """Return the calls of a step, wrapped to be timed."""
     now = time.thread_time_ns
 
     def around(call: Callable[[], Status], steps: int = 0) -> Callable[[], Status]:

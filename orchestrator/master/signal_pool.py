@@ -1,10 +1,10 @@
-"""Where every value of a run lives: one array of outputs and one of inputs for all units.
+"""Signal pool: all values of a run, in one array of outputs and one of inputs for all instances.
 
-The pool holds, one after the other, the outputs of all units at their last step (`now`), the same
-at the step before (`before`), samples that slow units keep of fast sources (`kept`), the constants
-of undriven inputs, and the time. So whatever an input needs, and every row of the results, is one
-indexed read of one array. Units of period 1 come first: what they need at once is contiguous.
-Values that are no Reals live in a dictionary beside it; without such wires it costs nothing.
+The pool stores, one after the other, the outputs of all instances at their last step (`now`), the same at
+the step before (`before`), samples of fast sources kept for slow instances (`kept`), the constants of
+undriven inputs, and the time. So every value that an input needs, and every row of the results, is one
+indexed read of one array. Instances of period 1 come first: what they need at once is contiguous. Values
+that are not Real live in a separate dictionary, which costs nothing if there are no such wires.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from .instance import FmuInstance, StepCalls
 
 @dataclass
 class InstanceSlot:
-    """One unit with its place in memory."""
+    """An instance with its variables, its views of the pool, its faults and its step calls."""
 
     instance: Instance
     slave: FmuInstance
     position: int  # in the evaluation order
     inputs: list[Variable]  # Real and driven, in declared order
-    wires: list[Wire | None]  # what drives them; None for a constant
+    wires: list[Wire | None]  # that drive the inputs; None: a constant
     outputs: list[Variable]  # Real and needed, in declared order
-    other_inputs: list[tuple[Variable, Wire | None]]  # not Real; None for a constant
+    other_inputs: list[tuple[Variable, Wire | None]]  # not Real; None: a constant
     other_outputs: list[Variable]
     sources: np.ndarray = field(default_factory=lambda: np.empty(0, np.intp))  # pool index per input
     kept: np.ndarray = field(default_factory=lambda: np.empty(0))  # pool view, one per input
     kept_at: int = 0  # pool index of kept[0]
-    u: np.ndarray = field(default_factory=lambda: np.empty(0))  # its inputs
-    y: np.ndarray = field(default_factory=lambda: np.empty(0))  # its outputs in the pool
+    u: np.ndarray = field(default_factory=lambda: np.empty(0))  # view of the array of inputs
+    y: np.ndarray = field(default_factory=lambda: np.empty(0))  # view of the outputs in the pool
     y_before: np.ndarray = field(default_factory=lambda: np.empty(0))
     output_faults: FaultInjector | None = None
     input_faults: FaultInjector | None = None
@@ -49,7 +49,7 @@ class InstanceSlot:
     def scale(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Gain and offset of each input, None if no wire converts.
 
-        Others have 1 and -0.0, which leave every number as it is, to the sign of zero.
+        Inputs that are not converted have 1 and -0.0, which preserve every number, even the sign of zero.
         """
         if not any(wire and wire.converts for wire in self.wires):
             return None
@@ -63,17 +63,17 @@ class InstanceSlot:
 
     @property
     def driven(self) -> bool:
-        """True if a Real input may change during a run."""
+        """Whether any Real input may change during a run."""
         return any(self.wires) or any(v.name in self.instance.series for v in self.inputs)
 
     @property
     def sampled(self) -> bool:
-        """True for a unit that samples: it has outputs and all of them are discrete."""
+        """Whether it is a sampled system: it has outputs and all of them are discrete."""
         outputs = self.instance.fmu.of("output")
         return bool(outputs) and all(v.discrete for v in outputs)
 
     def direct(self, variable: Variable) -> bool:
-        """Whether an input is needed at the end of the step (see `coupling`)."""
+        """Return whether an input is needed at the end of the step (see `coupling`)."""
         if variable.discrete or self.sampled:
             return True
         outputs = self.instance.fmu.of("output")
@@ -81,11 +81,11 @@ class InstanceSlot:
 
 
 class SignalPool:
-    """The arrays of a run and the stations of its units, in evaluation order."""
+    """The arrays of a run and the slots of its instances, in evaluation order."""
 
     def __init__(self, plan: Plan, slaves: Mapping[str, FmuInstance]) -> None:
         self.plan = plan
-        self.stations = _stations(plan, slaves)
+        self.stations = _make_slots(plan, slaves)
         self.of = {s.name: s for s in self.stations}
         self.placed = sorted(self.stations, key=lambda s: s.instance.period > 1)
         n_out = sum(len(s.outputs) for s in self.stations)
@@ -94,7 +94,7 @@ class SignalPool:
         self.pool = np.zeros(2 * n_out + 2 * n_in + 1)
         self.now = self.pool[:n_out]
         self.inputs = np.full(n_in, np.nan)
-        self.index: dict[tuple[str, str], int] = {}  # of an output's last sample
+        self.index: dict[tuple[str, str], int] = {}  # (instance, output) -> index of its last sample
         self.others: dict[tuple[str, str], Value] = {}
         self.time_at = len(self.pool) - 1
         self.time = ctypes.c_double.from_buffer(self.pool.data, 8 * self.time_at)
@@ -132,7 +132,7 @@ class SignalPool:
             at = end
 
     def taken(self, s: InstanceSlot) -> np.ndarray:
-        """Return what a unit's Real inputs get of the outputs at the start."""
+        """Return the Real inputs of an instance, computed from the current outputs, at initialization."""
         values = self.pool[s.sources]
         values = values if s.scale is None else values * s.scale[0] + s.scale[1]
         if s.input_faults is not None:
@@ -140,10 +140,11 @@ class SignalPool:
         return values
 
     def other(self, wire: Wire) -> Value:
-        """Return what a wire that is no Real gives its input.
+        """Return the value of a wire that is not of type Real.
 
         Raises:
             KeyError: its source has not been read yet.
+            SimulationError: the converted number does not fit into an Integer.
         """
         value = self.others[wire.source, wire.output]
         if not wire.converts:
@@ -155,7 +156,7 @@ class SignalPool:
         return number
 
     def given_others(self, s: InstanceSlot) -> dict[str, Value]:
-        """Return what a unit's inputs that are no Reals get, as far as their sources have been read."""
+        """Return an instance's inputs that are not Real, as far as their sources have been read."""
         values = {}
         for variable, wire in s.other_inputs:
             if wire is None:
@@ -166,7 +167,7 @@ class SignalPool:
         return values
 
     def relation(self, target: InstanceSlot, variable: Variable, wire: Wire) -> WireTiming:
-        """Return what the weights of a wire depend on."""
+        """Return the properties of a wire that its weights depend on."""
         source = self.of[wire.source]
         return WireTiming(
             source_period=source.instance.period,
@@ -177,24 +178,25 @@ class SignalPool:
         )
 
     def start_history(self) -> None:
-        """Make all earlier samples equal to the present ones."""
+        """Set all earlier samples to the current ones."""
         self.pool[self.n_outputs : 2 * self.n_outputs] = self.now
         for s in self.stations:
             self.pool.take(s.sources, None, s.kept, "clip")
 
 
 def by_type(variables: Iterable[Variable]) -> Iterable[list[Variable]]:
-    """Return variables in groups that one call of an FMU can set or get."""
+    """Group variables by type, so that one FMI call can set or get each group."""
     groups: dict[str, list[Variable]] = {}
     for variable in variables:
         groups.setdefault(variable.place.type, []).append(variable)
     return groups.values()
 
 
-def _stations(plan: Plan, slaves: Mapping[str, FmuInstance]) -> list[InstanceSlot]:
+def _make_slots(plan: Plan, slaves: Mapping[str, FmuInstance]) -> list[InstanceSlot]:
+    """Return the slots, in evaluation order, without their arrays."""
     driver = {(w.target, w.input): w for w in plan.wires}
     needed = {(w.source, w.output) for w in plan.wires} | set(plan.record)
-    stations = []
+    slots = []
     for position, unit in enumerate(plan.instances):
         driven = [
             (v, driver.get((unit.name, v.name)))
@@ -202,7 +204,7 @@ def _stations(plan: Plan, slaves: Mapping[str, FmuInstance]) -> list[InstanceSlo
             if (unit.name, v.name) in driver or v.name in unit.constants
         ]
         read = [v for v in unit.fmu.variables.values() if (unit.name, v.name) in needed]
-        stations.append(
+        slots.append(
             InstanceSlot(
                 unit,
                 slaves[unit.name],
@@ -214,4 +216,4 @@ def _stations(plan: Plan, slaves: Mapping[str, FmuInstance]) -> list[InstanceSlo
                 [v for v in read if v.type != "Real"],
             )
         )
-    return stations
+    return slots

@@ -1,4 +1,4 @@
-"""One run, from a plan to results: what there is to write of it when it ends, however it ends."""
+"""Simulate a plan: make one run and write its results and its run record, however the run ends."""
 
 from __future__ import annotations
 
@@ -38,22 +38,22 @@ from .process_state import StopFlag, interrupts
 from .run_loop import OpenInstance, RunLoop, RunProgress
 
 IN_MEMORY = 16 * 10**9
-"""Bytes that the results of a run may take in memory. Chosen: what a desktop computer has."""
+"""Largest size of results kept in memory [B]; chosen: the memory of a desktop computer."""
 
 
 @dataclass(frozen=True)
 class RunInfo:
-    """What a completed run has to tell beside its results."""
+    """Summary of a completed run, in addition to its results."""
 
     folder: Path
     rows: int
     columns: int
-    id: str  # in run.json too: which run the results in a folder are of
+    id: str  # unique, also in run.json, to identify the run that a folder's results belong to
     wall_time: float  # of initialization and stepping [s]
     passes: int  # of initialization
     warnings: list[Message] = field(default_factory=list)
-    ended: str | None = None  # why a unit ended it before its stop time
-    findings: tuple[Finding, ...] = ()  # on the run's course
+    ended: str | None = None  # why an instance ended it before its stop time
+    findings: tuple[Finding, ...] = ()  # plausibility warnings
 
 
 def simulate(
@@ -68,26 +68,26 @@ def simulate(
     """Run a plan and write its results (`results.csv`) and `run.json` into the folder `out`.
 
     A run that fails or is interrupted (Ctrl-C, SIGTERM) writes what it has recorded, and why it
-    ended, before it raises. Results of an earlier run in `out` are replaced as a whole; a run that fails
-    leaves those of one that reached its end, and puts its own into `failed` beside them. A run that a unit
-    wants to end is complete, and says so. All is on the
-    disk before the units are terminated and freed.
+    ended, before it raises. Results of an earlier run in `out` are replaced as a whole, but a run that
+    fails keeps the results of an earlier completed run and writes its own into the subfolder `failed`.
+    A run that an instance asks to end counts as completed, and its record says so. Everything is on disk
+    before the instances are terminated and freed.
 
     Args:
         plan: made by `wiring.make_plan`.
         out: folder of the results; made if it does not exist.
-        progress: told how far the run is.
-        opener: makes the instances; tests put their own in.
+        progress: called with the number of communication points done and their total.
+        opener: creates the instances; tests pass their own.
         format: of the results, one of `results.formats.FILES`.
-        apart: step the units in a process of their own, where that is possible (see `apart`): whatever
-            becomes of it, the run ends with a sentence and the results so far.
+        apart: step the instances in a child process where that is possible (see `child_run`): even if it
+            crashes, the run ends with an error message and the results so far.
 
     Raises:
-        ScenarioError: there is no such format.
+        ScenarioError: `format` is unknown.
         ModelDescriptionError: an FMU has no library that this computer can load.
-        SimulationError: a unit failed, a wire was not finite or the results cannot be written any further.
+        SimulationError: an instance failed, a wire was not finite or writing the results failed.
         Interrupted: Ctrl-C or SIGTERM.
-        ResultsError: nothing can be written to `out`, or the format needs a package that is missing.
+        ResultsError: `out` is not writable, or the format needs a package that is missing.
     """
     recorder = recorder_of(format)(Path(out), *_columns(plan))
     run = Simulation(plan, recorder, progress, apart=apart and can_be_apart())
@@ -108,17 +108,17 @@ def simulate(
 def simulate_in_memory(
     plan: Plan, *, progress: RunProgress | None = None, opener: OpenInstance = open_unit
 ) -> Results:
-    """Run a plan and return its results; nothing is written.
+    """Run a plan and return its results without writing anything to disk.
 
     Raises:
-        ScenarioError: they would take more memory than `IN_MEMORY`.
-        ModelDescriptionError, SimulationError: as `simulate`.
+        ScenarioError: the results would take more memory than `IN_MEMORY`.
+        ModelDescriptionError, SimulationError: as for `simulate`.
     """
-    taken = 8 * (plan.n_steps + 1) * (len(plan.record) + 1)
-    if taken > IN_MEMORY:
-        size = f"{plan.n_steps:,} steps of {len(plan.record)} variables are {taken / 1e9:.3g} GB"
+    size = 8 * (plan.n_steps + 1) * (len(plan.record) + 1)
+    if size > IN_MEMORY:
+        what = f"{plan.n_steps:,} steps of {len(plan.record)} variables are {size / 1e9:.3g} GB"
         raise ScenarioError(
-            f"{size}, and {IN_MEMORY / 1e9:g} GB may be kept in memory: record less, or let 'yawbench run' "
+            f"{what}, and {IN_MEMORY / 1e9:g} GB may be kept in memory: record less, or let 'yawbench run' "
             "write them to a file"
         )
     recorder = MemoryRecorder(*_columns(plan))
@@ -128,7 +128,7 @@ def simulate_in_memory(
 
 
 def _columns(plan: Plan) -> tuple[list[str], list[bool], dict[str, str | None]]:
-    """Return the names of the recorded columns, which are Real, and their units."""
+    """Return the names of the recorded columns, whether each is Real, and the units of measurement."""
     units = {unit.name: unit for unit in plan.instances}
     recorded = {f"{unit}.{name}": units[unit].fmu.variables[name] for unit, name in plan.record}
     units_of = {"time": "s", **{column: variable.unit for column, variable in recorded.items()}}
@@ -136,10 +136,10 @@ def _columns(plan: Plan) -> tuple[list[str], list[bool], dict[str, str | None]]:
 
 
 class Simulation:
-    """One run of a plan into a recorder.
+    """Makes one run of a plan and records it.
 
     Args:
-        apart: step the units in a process of their own (see `apart`).
+        apart: step the instances in a child process (see `child_run`).
     """
 
     def __init__(
@@ -157,7 +157,7 @@ class Simulation:
         course = ChildRun if apart else RunLoop
         self.course: RunLoop = course(plan, recorder, self.log, self._stop, progress)
         self._saved = False
-        self._ended_by: str | None = None  # unit
+        self._ended_by: str | None = None  # instance
         self._started = datetime.now(timezone.utc)
         self._began = time.perf_counter()
         self._saving = False
@@ -167,7 +167,7 @@ class Simulation:
         return time.perf_counter() - self._began
 
     def make(self, opener: OpenInstance) -> None:
-        """Go from beginning to end; write what there is however it ends, before units are freed."""
+        """Make the run; write results and record however it ends, before the instances are freed."""
         with interrupts(self._stop, self._abandon):
             try:
                 self.recorder.announce(self._recorded(RUNNING))
@@ -181,8 +181,8 @@ class Simulation:
                 self._end()
 
     def _fail(self, error: BaseException) -> None:
-        """Write what there is and why there is no more."""
-        with contextlib.suppress(SimulationError):  # the disk may be why; what fits has been kept
+        """Write the results so far, and the error that ended the run."""
+        with contextlib.suppress(SimulationError):  # perhaps the disk is full; rows that fit are kept
             self.course.flush()
         problems = error.problems if isinstance(error, (YawbenchError, Interrupted)) else []
         if isinstance(error, SimulationError):
@@ -197,14 +197,14 @@ class Simulation:
                 problems.append(Problem(sentence, kind=KEPT))
 
     def _abandon(self) -> None:
-        """Leave at once: somebody insists, perhaps because a unit never comes back."""
+        """Exit at once after a second signal: an FMU may be hanging."""
         if self._saving or self.course.writing:
             return
-        if self._apart:  # units that are apart are not waited for long anyway
+        if self._apart:  # a child process is never waited for long
             return
         doing = "while its units were freed" if self._saved else "inside a unit"
         error = self._stop.interrupted(doing, time=self.log.time.value)
-        if self.recorder.place is None:  # the program is somebody else's
+        if self.recorder.place is None:  # results in memory: the caller's program must go on
             raise error
         try:
             if not self._saved:
@@ -217,7 +217,7 @@ class Simulation:
     def _save(self, status: str, error: BaseException | None = None) -> None:
         """Write the record of the run and put the results in place."""
         self._saving = True
-        self._ended_by = getattr(error, "unit", None)
+        self._ended_by = getattr(error, "instance", None)
         ended: dict[str, Any] = {
             "wall_time": self.wall_time,
             "error": self._explained(error),
@@ -235,7 +235,7 @@ class Simulation:
         self._saved, self._saving = True, False
 
     def _end(self) -> None:
-        """Terminate and free the units; add to the record, which is written by then, what they said."""
+        """Terminate and free the instances; add their last messages to the record already written."""
         try:
             self.course.end()
         finally:
@@ -252,7 +252,7 @@ class Simulation:
     def _explained(self, error: BaseException | None) -> dict[str, Any] | None:
         if error is None:
             return None
-        unit = getattr(error, "unit", None)
+        unit = getattr(error, "instance", None)
         return {
             "message": str(error) or type(error).__name__,
             "unit": unit,

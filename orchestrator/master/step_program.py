@@ -1,14 +1,13 @@
-"""The calls of one communication step, put together before the run.
+"""Step programs: the flat list of calls that make up one communication step, compiled before the run.
 
-A program is a flat list of calls without arguments, each of which returns an FMI status; the
-master walks it and stops at the first that is not OK. Which units take part, and with which
-weights, repeats after the least common multiple of the units' periods: one program per phase.
+Each call takes no arguments and returns an FMI status; the master walks the list and stops at the first
+that is not OK. Which instances take part, and with which coupling weights, repeats after the least common
+multiple of the instances' periods, so there is one program per phase of that cycle.
 
-Inputs that follow a time series: their values at the instants that the coupling asks for.
-
-A series is known at all times, so nothing has to be extrapolated: `jacobi` takes its value at the
-beginning of a unit's step, `gauss_seidel` at its end, `extrapolated` in the middle of the step for an
-input that enters an integration and at the end for any other (see `coupling`).
+Inputs that follow a time series are part of the program. A series is known at all times, so nothing has to
+be extrapolated: `jacobi` takes its value at the beginning of an instance's step, `gauss_seidel` at its end,
+`extrapolated` in the middle of the step for an input that enters an integration and at the end for any
+other (see `coupling`).
 """
 
 from __future__ import annotations
@@ -28,13 +27,13 @@ from .log import OK
 from .signal_pool import InstanceSlot, SignalPool, by_type
 
 BLOCK = 1024
-"""Steps for which values are made at a time; chosen: some kilobytes per input."""
+"""Steps for which series are sampled at a time; chosen: some kilobytes per input."""
 LATE = 1e-9
-"""Part of a communication step by which an instant may miss the time that a file gives for a value."""
+"""Fraction of a step by which a time may fall short of a time in the series file and still count as it."""
 
 
 def feeding(memory: SignalPool, s: InstanceSlot) -> Callable[[], Status]:
-    """Return the call that brings the series of a unit up to date, once for each of its steps."""
+    """Return the call that updates the series inputs of an instance, once for each of its steps."""
     real = [(i, v) for i, v in enumerate(s.inputs) if v.name in s.instance.series]
     others = [(s.name, v.name) for v, _ in s.other_inputs if v.name in s.instance.series]
     slots = s.sources[[i for i, _ in real]] if real else np.empty(0, np.intp)
@@ -42,7 +41,7 @@ def feeding(memory: SignalPool, s: InstanceSlot) -> Callable[[], Status]:
     columns = [_column(memory.plan, s, v, s.instance.series[v.name]) for v in named]
     pool, kept, n_real = memory.pool, memory.others, len(real)
 
-    def fed() -> Status:
+    def feed() -> Status:
         values = [next(column) for column in columns]
         if n_real:
             pool[slots] = values[:n_real]
@@ -50,11 +49,11 @@ def feeding(memory: SignalPool, s: InstanceSlot) -> Callable[[], Status]:
             kept.update(zip(others, values[n_real:], strict=True))
         return OK
 
-    return fed
+    return feed
 
 
 def _column(plan: Plan, s: InstanceSlot, variable: Variable, series: InputSeries) -> Iterator:
-    """Yield the values of one input, step by step."""
+    """Yield the values of a series input, step by step."""
     period, first = s.instance.period, 0
     ahead = halves_ahead(plan.algorithm, period, direct=s.direct(variable))
     halves, start = plan.step / 2, float(plan.start)
@@ -66,14 +65,14 @@ def _column(plan: Plan, s: InstanceSlot, variable: Variable, series: InputSeries
 
 
 KEPT = 1024
-"""Programs kept. Periods without a common factor have cycles longer than any run; then every program is
-needed once, and made anew. Chosen: more than the phases of any usual set of periods."""
+"""Programs cached. Periods without a common factor have cycles longer than any run; then every program is
+needed only once. Chosen: more than the phases of any usual set of periods."""
 
 OperationKind = Literal["gather", "set", "step", "keep", "get", "fault"]
 
 
 class Operation(NamedTuple):
-    """One call on behalf of a unit ("" for all units at once)."""
+    """One call on behalf of an instance ("" for all instances at once)."""
 
     instance: str
     kind: OperationKind
@@ -81,7 +80,7 @@ class Operation(NamedTuple):
 
 
 class StepProgram:
-    """The programs of all phases, made when they are first needed."""
+    """The step programs of all phases, each built when it is first needed."""
 
     def __init__(self, memory: SignalPool) -> None:
         self._memory = memory
@@ -97,7 +96,7 @@ class StepProgram:
         self._of_inputs = {s.name: _acting(s, s.input_faults, s.u) for s in memory.stations}
 
     def at(self, k: int) -> list[Operation]:
-        """Return what is to be done from communication point `k` - 1 to `k`."""
+        """Return the operations that lead from communication point `k` - 1 to `k`."""
         phase = k % self.cycle
         if phase not in self._made:
             _make_room(self._made)
@@ -106,7 +105,7 @@ class StepProgram:
         return self._made[phase]
 
     def _jacobi(self, k: int) -> list[Operation]:
-        """All inputs are taken before anything moves; a slow unit's at the start of its period."""
+        """Gather all inputs before any instance steps, a slow instance's at the start of its period."""
         m = self._memory
         beginning = [s for s in m.placed if (k - 1) % s.instance.period == 0]
         ending = [s for s in m.stations if k % s.instance.period == 0]
@@ -114,9 +113,9 @@ class StepProgram:
         operations = [self._feeds[s.name] for s in beginning if s.instance.series]
         if fast:
             sources = np.concatenate([s.sources for s in fast])
-            operations.append(Operation("", "gather", _held(m, sources, m.inputs[: len(sources)])))
+            operations.append(Operation("", "gather", _copying(m, sources, m.inputs[: len(sources)])))
         slow = [s for s in beginning if s.instance.period > 1 and s.inputs]
-        operations += [Operation(s.name, "gather", _held(m, s.sources, s.u)) for s in slow]
+        operations += [Operation(s.name, "gather", _copying(m, s.sources, s.u)) for s in slow]
         operations += [op for s in beginning for op in _converting(s)]
         operations += [op for s in beginning for op in self._of_inputs[s.name]]
         operations += [op for s in beginning for op in _setting(m, s)]
@@ -126,7 +125,7 @@ class StepProgram:
         return operations
 
     def _in_sequence(self, k: int) -> list[Operation]:
-        """Units one after the other, each with the newest that there is; slow ones at their end."""
+        """Step the instances in order, each with the newest values; slow ones at the end of their period."""
         operations: list[Operation] = []
         for s in self._memory.stations:
             if k % s.instance.period == 0:
@@ -149,25 +148,25 @@ class StepProgram:
                 per_input.append(CouplingWeights())
             else:
                 relation = m.relation(s, variable, wire)
-                # one cycle on, so that no sample before the start is looked at
+                # `k` is a phase; shifted so that no sample lies before the start
                 per_input.append(weights(m.plan.algorithm, relation, k + 2 * self.cycle))
         key = (s.name, *per_input)
         if key not in self._gathers:
             _make_room(self._gathers)
             operations = [Operation(s.name, "gather", _gather(m, s, per_input)), *_converting(s)]
             if any(w.kept for w in per_input):
-                operations.append(Operation(s.name, "keep", _held(m, s.sources, s.kept)))
+                operations.append(Operation(s.name, "keep", _copying(m, s.sources, s.kept)))
             self._gathers[key] = operations
         return self._gathers[key]
 
 
 def _make_room(kept: dict[Any, list[Operation]]) -> None:
     if len(kept) >= KEPT:
-        del kept[next(iter(kept))]  # the oldest, which is the last one to be needed again
+        del kept[next(iter(kept))]  # the oldest, which is needed again last
 
 
 def _gather(m: SignalPool, s: InstanceSlot, per_input: list[CouplingWeights]) -> Callable[[], Status]:
-    """Return the call that brings a unit's inputs up to date."""
+    """Return the call that computes an instance's inputs from weighted samples."""
     first, second, factors = [], [], []
     for i, w in enumerate(per_input):
         now = int(s.sources[i])
@@ -181,53 +180,55 @@ def _gather(m: SignalPool, s: InstanceSlot, per_input: list[CouplingWeights]) ->
             second.append(past if w.before or w.kept else now)
             factors.append((w.now, w.before + w.kept))
     if all(factor == (1.0, 0.0) for factor in factors):
-        return _held(m, np.array(first, np.intp), s.u)
-    return _blended(m, np.array([first, second], np.intp), np.array(factors).T.copy(), s.u)
+        return _copying(m, np.array(first, np.intp), s.u)
+    return _blending(m, np.array([first, second], np.intp), np.array(factors).T.copy(), s.u)
 
 
-def _held(m: SignalPool, sources: np.ndarray, target: np.ndarray) -> Callable[[], Status]:
+def _copying(m: SignalPool, sources: np.ndarray, target: np.ndarray) -> Callable[[], Status]:
+    """Return the call that copies values of the pool, by index, into a target."""
     take = m.pool.take
 
-    def held() -> Status:
+    def copy() -> Status:
         take(sources, None, target, "clip")
         return OK
 
-    return held
+    return copy
 
 
-def _blended(
+def _blending(
     m: SignalPool, pairs: np.ndarray, factors: np.ndarray, target: np.ndarray
 ) -> Callable[[], Status]:
+    """Return the call that writes weighted sums of two samples each into a target."""
     take, multiply, add = m.pool.take, np.multiply, np.add
     terms = np.empty(pairs.shape)
     first, second = terms
 
-    def blended() -> Status:
+    def blend() -> Status:
         take(pairs, None, terms, "clip")
         multiply(terms, factors, terms)
         add(first, second, target)
         return OK
 
-    return blended
+    return blend
 
 
 def _converting(s: InstanceSlot) -> list[Operation]:
-    """Return what turns a unit's inputs, as they were gathered, into its units of measurement."""
+    """Return the operation, if needed, that converts inputs to the instance's units of measurement."""
     if s.scale is None:
         return []
     (gains, offsets), values = s.scale, s.u
     multiply, add = np.multiply, np.add
 
-    def converted() -> Status:
+    def convert() -> Status:
         multiply(values, gains, values)
         add(values, offsets, values)
         return OK
 
-    return [Operation(s.name, "gather", converted)]
+    return [Operation(s.name, "gather", convert)]
 
 
 def _acting(s: InstanceSlot, faults: FaultInjector | None, values: np.ndarray) -> list[Operation]:
-    """Return what disturbs a unit's outputs or inputs, the same in all programs; nothing without a fault."""
+    """Return the operation, if any, that applies faults to outputs or inputs; all programs share it."""
     return [] if faults is None else [Operation(s.name, "fault", faults.acting(values))]
 
 
@@ -237,11 +238,12 @@ def copying(source: np.ndarray, target: np.ndarray) -> Callable[[], None]:
 
 
 def _setting(m: SignalPool, s: InstanceSlot) -> list[Operation]:
+    """Return the operations that set an instance's inputs."""
     operations = []
     if s.driven:
         operations.append(Operation(s.name, "set", s.calls.set))
     moving = [v for v, wire in s.other_inputs if wire is not None or v.name in s.instance.series]
-    driven = {v.place[:2] for v in moving}  # of an array all elements
+    driven = {v.place[:2] for v in moving}  # all elements of an array are set together
     wires = {v.name: wire for v, wire in s.other_inputs}
     for chosen in by_type(v for v, _ in s.other_inputs if v.place[:2] in driven):
         places, ends = [v.place for v in chosen], [((s.name, v.name), wires[v.name]) for v in chosen]
@@ -255,7 +257,7 @@ def _setting(m: SignalPool, s: InstanceSlot) -> list[Operation]:
 
 
 def getting(m: SignalPool, s: InstanceSlot) -> list[Operation]:
-    """Return what reads a unit's outputs."""
+    """Return the operations that read an instance's outputs."""
     operations = []
     if s.outputs:
         operations.append(Operation(s.name, "get", s.calls.get))

@@ -1,13 +1,13 @@
-"""Processes at the other ends of two pipes: listened to, watched, ended.
+"""Supervised child processes: connected by two pipes, watched, and ended with everything they started.
 
-One is that of an isolated unit, here; the other that in which the units of a run are stepped (see `apart`).
+`SupervisedProcess` is the parent's side, for isolated instances (`InstanceProcess`) and for child runs (see
+`child_run`).
 
-The process that stands between master and unit, so that nothing a unit has started outlives it.
-
-Every isolated unit has one, forked before the FMU is loaded, and costs an exchange nothing: it
-sleeps until the unit's process has ended or the master has (even by SIGKILL), then kills what is left.
-On Linux that is all descendants, daemons too: they become its children when their parents die.
-Elsewhere it is the unit's process group.
+A guardian process, forked before the FMU is loaded, stands between the master and each isolated instance so
+that nothing the FMU has started outlives it. It adds nothing to the cost of an exchange: it sleeps until the
+instance's process or the master has ended (even by SIGKILL), then kills what is left. On Linux these are all
+descendants, daemons too, which become its children when their parents die; elsewhere it is the process group
+of the instance.
 """
 
 from __future__ import annotations
@@ -32,23 +32,23 @@ from .log import Log
 from .process_state import stop_requested_at
 
 START_LIMIT = 60.0
-"""Time that a process may take to start [s]; chosen: Python is read from a slow disk in less."""
+"""Time that a process may take to start [s]; chosen: enough to load Python from a slow disk."""
 LOOK_EVERY = 100
-"""Time between two looks at the clock while an answer is waited for [ms]."""
+"""Interval between checks of the time limit while waiting for an answer [ms]."""
 STOP_GRACE = 1.0
-"""Time that a call may still take when the run is to stop [s]; chosen: as long as one likes to wait."""
+"""Time that a call may still take after a stop request [s]; chosen: a tolerable wait for the user."""
 CLOSING = 1.0
-"""Time in which a process that has closed its pipe is seen to end [s]."""
+"""Time allowed for a process to end after it has closed its pipe [s]."""
 GRACE = 5.0
-"""Time that the process of a unit may take to end when nobody is left to ask it [s]."""
+"""Time allowed for an instance's process to end after its pipes are closed [s]."""
 
 
 class ProcessLost(Exception):
-    """A process that gave no answer; it is gone, or has been ended because of that.
+    """A supervised process gave no answer: it has died, or was killed because of that.
 
     Args:
-        did: what it did, as "died of SIGSEGV".
-        late: it is the FMI function being called that did, or did not.
+        did: what happened to it, such as "died of SIGSEGV".
+        late: the cause is the FMI function being called, which did not return in time.
     """
 
     def __init__(self, did: str, *, late: bool = False) -> None:
@@ -56,21 +56,21 @@ class ProcessLost(Exception):
         self._late = late
 
     def in_(self, function: str) -> str:
-        """Return what the process of a unit did, with the FMI function being called ("" for none)."""
+        """Return the message for a loss during a call of an FMI function ("": between two calls)."""
         if self._late:
             return f"{function or 'its process'} {self}"
         return f"its process {self}" + (f" in {function}" if function else " between two calls")
 
 
 class SupervisedProcess(ABC):
-    """The hold on a process. All calls that wait for it raise `Lost` if no answer comes."""
+    """Parent's side of a child process. All calls that wait for it raise `ProcessLost` if no answer comes."""
 
     unasked: ClassVar[tuple[int, ...]]
-    """First bytes of the records that it may send at any time, beside what is logged in it."""
+    """First bytes of the records that it may send at any time, in addition to log messages."""
     log: Log
 
     def _start(self, start: Callable[[int, int], Any]) -> Any:
-        """Let `start` make it, given its ends of the pipes to read from and to write into."""
+        """Create the pipes and call `start` with the child's ends, for reading and for writing."""
         commands, writing = os.pipe()
         reading, answers = os.pipe()
         try:
@@ -84,22 +84,22 @@ class SupervisedProcess(ABC):
 
     @abstractmethod
     def _take(self, kind: int, content: Any) -> None:
-        """Take a record that came unasked; raise `Garbled` if it is none."""
+        """Handle an unsolicited record; raise `ProtocolError` if it is not valid."""
 
     @abstractmethod
     def _check_time(self) -> None:
-        """Raise `Lost` if it has had time enough."""
+        """Raise `ProcessLost` if the time limit has passed."""
 
     @abstractmethod
     def _has_ended(self, within: float) -> bool:
-        """Return whether it ends within a time [s]."""
+        """Wait up to a time [s] for the process to end; return whether it has."""
 
     @abstractmethod
     def close(self) -> int:
-        """End it and all that it has started, whatever they are doing; return its exit status. Once."""
+        """Kill the process and everything it started; return its exit status. Later calls do nothing."""
 
     def _hear(self, wanted: int) -> Any:
-        """Take what comes until it is the record, or the answer of one byte, that is wanted; return it."""
+        """Handle incoming records until the expected record or one-byte answer arrives; return it."""
         try:
             while True:
                 self._wait_for_more()
@@ -126,7 +126,7 @@ class SupervisedProcess(ABC):
             raise self.garbled(str(error)) from None
 
     def _keep(self, content: Any) -> None:
-        """Keep what a unit logs: a message, or how many more there were (see `exchange.Relay`)."""
+        """Log a message of an FMU, or the number of dropped messages (see `ipc.LogRelay`)."""
         match content:
             case int():
                 self.log.drop(content)
@@ -139,24 +139,24 @@ class SupervisedProcess(ABC):
         while not self._poll.poll(LOOK_EVERY):
             self._check_time()
             if self._has_ended(0.0) and not self._poll.poll(0):
-                raise EOFError  # something that a unit has started holds the pipe open
+                raise EOFError  # a process started by an FMU keeps the pipe open
 
     def garbled(self, what: str) -> ProcessLost:
-        """End it, for its answers can no longer be told from what else came; return what to raise."""
+        """Kill the process, whose output can no longer be parsed; return the exception to raise."""
         self.close()
         return ProcessLost(f"wrote into the pipe to the master what is no answer ({what})")
 
 
 class InstanceProcess(SupervisedProcess):
-    """The process of one isolated unit."""
+    """The process of one isolated instance."""
 
     unasked = (FAILED,)
 
     def __init__(self, values: int, limit: float) -> None:
-        """Start it, without waiting for it.
+        """Start the process without waiting for it.
 
         Args:
-            values: number of inputs and outputs for which there shall be room.
+            values: number of inputs and outputs to allocate shared memory for.
             limit: time that an answer may take [s].
         """
         self._limit = limit
@@ -166,26 +166,26 @@ class InstanceProcess(SupervisedProcess):
         self._popen = self._start(self._spawned)
 
     def _spawned(self, commands: int, answers: int) -> subprocess.Popen[bytes]:
-        theirs = (commands, answers, self.memory)
+        descriptors = (commands, answers, self.memory)
         return subprocess.Popen(
-            python("orchestrator.master.isolation", *theirs),
+            python("orchestrator.master.isolation", *descriptors),
             stdin=subprocess.DEVNULL,
-            pass_fds=theirs,
-            start_new_session=True,  # Ctrl-C on the terminal is for the master
+            pass_fds=descriptors,
+            start_new_session=True,  # Ctrl-C on the terminal is handled by the master alone
         )
 
     def wait_until_ready(self) -> None:
-        """Wait until it can be asked."""
+        """Wait until the process is ready for requests."""
         self._answer(START_LIMIT, REPLY)
 
     def ask(self, request: str, *arguments: Any) -> Any:
-        """Return the answer to a request (a method of `worker.Worker`)."""
-        with contextlib.suppress(BrokenPipeError):  # why is found where the answer should be
+        """Call a method of the process's `InstanceServer` or of its instance; return the result."""
+        with contextlib.suppress(BrokenPipeError):  # the cause is found when the answer is read
             self._channel.order((request, arguments))
         return self._answer(self._limit, REPLY)
 
     def exchange(self, parts: bytes) -> int:
-        """Let it do parts of a step; return how that ended (see `worker.Worker.exchange`)."""
+        """Have it do parts of a step; return the result (see `isolation.InstanceServer.exchange`)."""
         with contextlib.suppress(BrokenPipeError):
             self._channel.say(parts)
         return self._answer(self._limit, ANSWER)
@@ -217,7 +217,7 @@ class InstanceProcess(SupervisedProcess):
     def close(self) -> int:
         if not self._closed:
             self._closed = True
-            self._channel.close()  # its guardian wakes up
+            self._channel.close()  # wakes its guardian
             os.close(self.memory)
             if not self._has_ended(GRACE):
                 self._popen.kill()
@@ -227,15 +227,15 @@ class InstanceProcess(SupervisedProcess):
 
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36  # linux/prctl.h
 PATIENCE = 2.0
-"""Time for which what is left is killed [s]: something may start processes faster than they end."""
+"""Time spent on killing descendants [s]: a process may start new ones faster than they can be killed."""
 
 
 def stand_guard(reading: int, others: Iterable[int]) -> None:
-    """Fork; return in the child, which is to be the unit's process, and never in the guardian.
+    """Fork a guardian; return only in the child, which becomes the instance's process.
 
     Args:
-        reading: pipe from the master; when it has no writer any more, the master is gone.
-        others: descriptors that only the unit's process needs.
+        reading: pipe from the master; it closes when the master ends.
+        others: descriptors that only the instance's process needs.
     """
     _prctl(_PR_SET_CHILD_SUBREAPER, 1)
     waking, woken = os.pipe()
@@ -245,10 +245,10 @@ def stand_guard(reading: int, others: Iterable[int]) -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     guardian = os.getpid()
-    unit = os.fork()
-    if unit:
+    child = os.fork()
+    if child:
         try:
-            _watch(unit, reading, waking, others)
+            _watch(child, reading, waking, others)
         finally:
             os._exit(1)
     signal.set_wakeup_fd(-1)
@@ -257,29 +257,29 @@ def stand_guard(reading: int, others: Iterable[int]) -> None:
     for descriptor in (waking, woken):
         os.close(descriptor)
     for descriptor in (reading, *others):
-        os.set_inheritable(descriptor, False)  # by programs that the FMU starts
-    os.setsid()  # what it sends to its group is not for the guardian
+        os.set_inheritable(descriptor, False)  # not by programs that the FMU starts
+    os.setsid()  # signals to its group must not reach the guardian
     die_with_parent()
     if os.getppid() != guardian:
         os._exit(1)
 
 
-def _watch(unit: int, reading: int, waking: int, others: Iterable[int]) -> None:
-    """Wait for the unit's process or the master to end; kill what is left; end as the unit's did."""
+def _watch(process: int, reading: int, waking: int, others: Iterable[int]) -> None:
+    """Wait until the instance's process or the master ends; kill what is left; exit with the same status."""
     for descriptor in others:
         os.close(descriptor)
     events = select.poll()
-    events.register(reading, 0)  # nothing is asked for, so what comes is the end of the pipe
+    events.register(reading, 0)  # no events requested: only the end of the pipe is reported
     events.register(waking, select.POLLIN)
     ended: dict[int, int] = {}
-    while unit not in ended:
+    while process not in ended:
         ready = [descriptor for descriptor, _ in events.poll()]
         _reap(ended)
         if reading in ready:
             break
         os.read(waking, 512)
-    _kill_all(unit, ended)
-    code = os.waitstatus_to_exitcode(ended.get(unit, 0))
+    _kill_all(process, ended)
+    code = os.waitstatus_to_exitcode(ended.get(process, 0))
     if code >= 0:
         os._exit(code)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -289,12 +289,12 @@ def _watch(unit: int, reading: int, waking: int, others: Iterable[int]) -> None:
     os._exit(128 - code)
 
 
-def _kill_all(unit: int, ended: dict[int, int]) -> None:
-    """Kill the unit's process and all that it has started."""
+def _kill_all(process: int, ended: dict[int, int]) -> None:
+    """Kill the instance's process and everything it has started."""
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
         with contextlib.suppress(OSError):
-            os.killpg(unit, signal.SIGKILL)
+            os.killpg(process, signal.SIGKILL)
         for child in _children():
             with contextlib.suppress(OSError):
                 os.kill(child, signal.SIGKILL)
@@ -311,7 +311,7 @@ def _children() -> list[int]:
 
 
 def _reap(ended: dict[int, int]) -> bool:
-    """Note how children have ended that did; return whether there are more."""
+    """Collect the exit statuses of ended children; return whether children are left."""
     with contextlib.suppress(ChildProcessError):
         while (child := os.waitpid(-1, os.WNOHANG))[0]:
             ended.setdefault(*child)
@@ -320,7 +320,7 @@ def _reap(ended: dict[int, int]) -> bool:
 
 
 def die_with_parent() -> None:
-    """Let this process be killed when the one that has forked it ends (Linux)."""
+    """Have this process killed when its parent ends (Linux)."""
     _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
