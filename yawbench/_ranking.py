@@ -186,7 +186,7 @@ class Ranking:
 
     def __repr__(self) -> str:
         rows, columns = self.ranked.standings, self.ranked.ranking.conditions
-        return f"<Places of {len(rows)} controllers in {len(columns)} conditions>"
+        return f"<Ranking of {len(rows)} controllers in {len(columns)} conditions>"
 
     def _repr_html_(self) -> str:
         shown = self.table[["place", "title", "passed", "spun", "share", "margin", "sideslip"]]

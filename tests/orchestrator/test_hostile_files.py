@@ -65,7 +65,7 @@ def problems(text: str | bytes, **options: list[str]) -> list[str]:
         ('title: "\\e[31mred"', "a.yaml:3: title: holds the control character \\x1b"),
         ('title: "a \\u202e b"', "a.yaml:3: title: holds the control character \\u202e"),
         ('title: "\\ud800"', "a.yaml:3: title: holds the control character \\ud800"),
-        ('"\\e[2J": 1', "a.yaml:3: \x1b[2J: holds the control character \\x1b"),
+        ('"\\e[2J": 1', "a.yaml:3: \\x1b[2J: holds the control character \\x1b"),
         ("title: " + "[" * 45 + "]" * 45, "a.yaml:3: not valid YAML: more than 40 brackets in each other"),
         ("title: " + "[" * 5000, "a.yaml:3: not valid YAML: more than 40 brackets in each other"),
         (

@@ -99,7 +99,7 @@ class Bench:
         return self.experiment.run()
 
     @cached_property
-    def places(self) -> yb.Places:
+    def places(self) -> yb.Ranking:
         return yb.rank(against=["none"], conditions=["hard"], quick=True)
 
     def warm(self) -> None:
@@ -275,9 +275,9 @@ def _parameters() -> Iterator[Parameter]:
     yield of("rank.out", rank("out"), right={"None", *PATHS, *PRINTABLE},
              may=COLOURED)  # fmt: skip
     yield of("rank.workers", rank("workers"), right={"None", "three", "numpy uint8"})
-    yield of("Places.ranked", lambda x: yb.Places(x))
-    yield of("Places.place.name", lambda x: b.places.place(x), "entry")
-    yield of("Places.plot.kind", lambda x: b.places.plot(x), "kind", "picture")
+    yield of("Ranking.ranked", lambda x: yb.Ranking(x))
+    yield of("Ranking.place.name", lambda x: b.places.place(x), "entry")
+    yield of("Ranking.plot.kind", lambda x: b.places.plot(x), "kind", "picture")
     # Declarations.
     yield of("signal.name", lambda x: yb.signal(x), "signal")
     for name, right in (("unit", {"None"}), ("description", {"None"})):
