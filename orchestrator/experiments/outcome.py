@@ -247,7 +247,7 @@ def judge_results(
     for name, read in zip(experiment.runs, recorded, strict=True):
         found = (made[name].reason if name in made else "") or read
         if isinstance(found, str):
-            begun = name in made or any((out / name).glob(f"{RUN_FILE}*"))  # a run that died leaves a partial one
+            begun = name in made or any((out / name).glob(f"{RUN_FILE}*"))  # partial, if a run died
             records.append(MeasuredRun({}, (found,)) if begun else NOT_MADE)
         else:
             results[name] = found
