@@ -1,8 +1,8 @@
 """Schema of experiment files: studies, sweeps and tunings, with metrics, claims and figures.
 
-An experiment is a list of runs (a study, for example of a paper), or one scenario varied along axes (a sweep),
-or both. A run entry with `for` becomes one run per combination of its values; `{name}` in its texts is
-replaced by the value.
+An experiment is a list of runs (a study, for example of a paper), or one scenario varied along axes (a
+sweep), or both. A run entry with `for` becomes one run per combination of its values; `{name}` in its texts
+is replaced by the value.
 
     title: What a paper says
     runs:

@@ -206,7 +206,7 @@ def fmus_table(fmus: Sequence[Fmu], problems: Sequence[str]) -> Table:
 
 
 def signals_table(fmus: Sequence[Fmu]) -> Table:
-    """Return a table of the signals that FMUs exchange, with sources and users; the four wheels in one row."""
+    """Return a table of the signals that FMUs exchange, with sources and users; wheels share a row."""
     given: dict[str, list[str]] = {}
     taken: dict[str, list[str]] = {}
     about: dict[str, tuple[str, str]] = {}

@@ -1,4 +1,4 @@
-"""Tuning of control laws: one objective, one search algorithm and one budget for all, to make them comparable.
+"""Tuning of control laws by one objective, one search and one budget, so that they can be compared.
 
 An experiment file with the key `tuning` gives the ranges of every law's parameters. Trials are runs of that
 experiment like any other: planned before they start, executed in separate processes, added to the journal.
