@@ -96,7 +96,7 @@ def grid_tables(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[str
     ((_, columns),) = spec.columns.items()
     inside_all = [values.get(cell.key) for cell in cells(spec)]
     if spec.holds or spec.derived or any(value and value.half for value in inside_all):
-        return [_told_table(spec, values, verdicts)]
+        return [_display_table(spec, values, verdicts)]
     units = {value.unit for (_, key), value in values.items() if key == spec.metric}
     unit = "" if units <= {"1", "%"} else f" [{units.pop()}]"
     width, every = len(columns), cells(spec)
@@ -136,7 +136,7 @@ def side_by_side(tables: Sequence[Table]) -> Table:
     return Table(ours.title, headings, [*rows], theirs.notes, numbers)
 
 
-def _told_table(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[str, str], str]) -> Table:
+def _display_table(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[str, str], str]) -> Table:
     """Return a grid in display units, with confidence and, if it has `holds`, its last row."""
     ((_, rows),) = spec.rows.items()
     ((_, columns),) = spec.columns.items()

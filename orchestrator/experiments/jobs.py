@@ -199,9 +199,9 @@ def ready(
                 problems.setdefault(*place(problem))
         progress(number)
     if problems:
-        told = list(problems.values())
-        more = [f"and {len(told) - MANY} more problems"] if len(told) > MANY else []
-        raise ScenarioError(told[:MANY] + more)
+        messages = list(problems.values())
+        more = [f"and {len(messages) - MANY} more problems"] if len(messages) > MANY else []
+        raise ScenarioError(messages[:MANY] + more)
     return found
 
 

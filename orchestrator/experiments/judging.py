@@ -6,8 +6,8 @@ Everything that averages over repeats with different seeds takes its confidence 
                             t: quantile of Student's distribution with n - 1 degrees of freedom
 
 Repeats that differ only in their seed are independent. That their numbers are normally distributed is an
-assumption, harmless to a mean of ten unless there are outliers; such a mean says little, and its interval
-is wide.
+assumption, harmless to a mean of ten unless there are outliers; with outliers the mean says little, and its
+interval is wide.
 
 Source: Student (W. S. Gosset), The probable error of a mean, Biometrika 6 (1908) 1-25.
 """

@@ -181,12 +181,12 @@ def write_findings(findings: ExperimentResult, drawn: dict[str, str], out: Path)
         ResultsError: a file cannot be written.
     """
     write_table(findings, out)
-    _tell_of_changes(out / RECORD)
+    _warn_if_edited(out / RECORD)
     content = checksums.with_checksums(_record(findings, drawn))
     write_whole(out / RECORD, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def _tell_of_changes(file: Path) -> None:
+def _warn_if_edited(file: Path) -> None:
     """Warn if a record that is about to be overwritten was edited since it was written."""
     try:
         found = json.loads(read_bytes(file, largest=LARGEST))

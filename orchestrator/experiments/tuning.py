@@ -180,10 +180,10 @@ def tuning_table(experiment: LoadedExperiment, found: Sequence[TunedLaw]) -> Tab
             for trial in (one.trials[0], one.best)
         )
         units = {place: axis.unit for axis in tuning.laws[one.law].axes.values() for place in axis.vary}
-        told = [
+        settings = [
             f"{place}: {number:g} {units[place] or ''}".rstrip() for place, number in one.best.values.items()
         ]
-        table.rows.append([one.law, first, best, "\n".join(told)])
+        table.rows.append([one.law, first, best, "\n".join(settings)])
     return table
 
 
@@ -195,14 +195,14 @@ def entries_of(experiment: LoadedExperiment, found: Sequence[TunedLaw]) -> dict[
         if one.best.objective is None:
             continue  # all trials failed
         law = tuning.laws[one.law]
-        told = _changes(law, one.best.values).set
+        settings = _changes(law, one.best.values).set
         made = f"{experiment.identity}: {len(one.trials)} trials, seed {tuning.seed}"
         comes_to = f"{tuning.objective} {one.best.cost:.4g}, {one.trials[0].cost:.4g} amid the ranges"
         entries[re.sub(r"\W+", "_", f"{one.law.lower()}_tuned")] = {
             "title": f"{one.law}, tuned",
             "fmu": law.swap[tuning.entries],
             "gains": "tuned",
-            "parameters": {place.partition(".")[2]: value for place, value in told.items()},
+            "parameters": {place.partition(".")[2]: value for place, value in settings.items()},
             "source": f"{made}; {comes_to}",
         }
     return entries

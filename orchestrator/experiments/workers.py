@@ -254,8 +254,8 @@ def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:
     try:
         report: tuple[int, list[str], Any, bool] = (0, [], run(job), False)
     except (YawbenchError, Interrupted) as error:
-        told = isinstance(error, Interrupted)
-        report = (error.exit_status, [*error.problems] or [type(error).__name__], None, told)
+        interrupted = isinstance(error, Interrupted)
+        report = (error.exit_status, [*error.problems] or [type(error).__name__], None, interrupted)
     except BaseException as error:
         print(printable("".join(traceback.format_exception(error))), file=sys.stderr)
         report = (1, [f"{type(error).__name__}: {error}"], None, False)
