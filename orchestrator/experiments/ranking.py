@@ -1,4 +1,4 @@
-"""Rankings: their schema and loading, and the runs of controllers under conditions of sine with dwell.
+"""Ranking files: controllers compared under conditions of sine with dwell; schema, loading and runs.
 
     title: Where controllers stand
     step_size: 0.0025
@@ -20,7 +20,7 @@ A condition overrides its scenario like a run of a study. An entry swaps its FMU
 The runs are jobs as in every experiment: planned before the first one starts, executed in separate
 processes, added to the journal as they end, and not executed again by the same build. The steering angle A is
 determined once for each car, on a dry road without control, so all controllers drive the same amplitudes.
-Scores: `ranking_scores`.
+`ranking_scores` computes their scores.
 """
 
 from __future__ import annotations
