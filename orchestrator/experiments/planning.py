@@ -187,7 +187,7 @@ def _unit(axis: AxisSpec, plan: Plan) -> str | None:
     if (name or holder) in ("stop_time", "step_size"):
         return "s"
     if holder in FACTS:
-        return FACTS[holder].instance
+        return FACTS[holder].unit
     for unit in plan.instances:
         given = unit.constants if holder == "inputs" else unit.parameters
         if holder not in ("inputs", "vehicle", unit.name):

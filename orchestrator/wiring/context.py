@@ -33,7 +33,7 @@ from ..scenario.yaml_lines import PROBLEMS, Document, KeyPath
 class Fact:
     """What a fact reaches."""
 
-    instance: str
+    unit: str
     inputs: tuple[str, ...] = ()
     parameters: dict[str, str] = field(default_factory=dict)
     """Parameter -> the one of the same unit that turns it off if it is 0; "" if it always counts."""
