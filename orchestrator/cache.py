@@ -8,8 +8,8 @@ file is made again. If the user's folder cannot be written (a container, another
 is not plain ASCII, a temporary folder is used. The path must be plain because stock PythonFMU decodes
 only `%20` in the URI of its resources.
 
-Keys include a hash of this program's own code (`sources_hash`), because its version number does not
-change between releases.
+`sources_hash` identifies this program's own code, for keys and records: the version number does not change
+between releases.
 """
 
 from __future__ import annotations

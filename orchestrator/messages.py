@@ -1,4 +1,4 @@
-"""Building blocks of messages: lists, shortened and escaped text, "did you mean", folding of the four wheels."""
+"""Building blocks of messages: lists, shortened and escaped text, "did you mean", merging of four wheels."""
 
 from __future__ import annotations
 

@@ -271,7 +271,7 @@ def _text(value: Value, name: str = "") -> str:
 class Override:
     """A value that replaces one of the scenario file."""
 
-    place: str  # the target: "plant.mass", "inputs.friction*", "stop_time"; an instance or "vehicle": its file
+    place: str  # the target: "plant.mass", "inputs.friction*", "stop_time"; an instance (its FMU), "vehicle"
     value: Value | FaultList
     origin: str  # "--set", "--swap", "study", "sweep", ...
 

@@ -1,4 +1,4 @@
-"""What the scenario gives to inputs: constants and time series by the most specific pattern, then facts."""
+"""Constants and time series of inputs: the most specific pattern of the scenario wins, then facts."""
 
 from __future__ import annotations
 
@@ -12,37 +12,37 @@ from ..scenario.yaml_lines import KeyPath
 from .context import WiringContext, facts_of, matching
 from .parameters import origin, value_for
 
-Input = tuple[str, str]  # unit, variable
+Input = tuple[str, str]  # instance, variable
 
 
 FACT, INPUTS, CHANGED_FACT, CHANGED_INPUTS = range(4)
-"""What goes before what: a changed fact before what the file gives, not before other changes."""
+"""Levels of precedence, ascending: an overridden fact beats the file, but not other overrides."""
 
 
 @dataclass(frozen=True)
 class Constant:
-    """What the scenario gives to one input."""
+    """The constant or time series that the scenario gives to one input."""
 
     value: Value | InputSeries
     key: KeyPath
     origin: ValueOrigin
-    of_unit: bool  # the key names the unit, so it goes before equal names
-    exact: bool  # the key is no pattern
+    of_unit: bool  # the key names the instance, so it takes precedence over equal names
+    exact: bool  # the key is not a pattern
     level: int = INPUTS
 
     @property
     def rank(self) -> tuple[int, bool, bool]:
-        """By name before by `*`, then with the unit before without; all of `inputs` before facts."""
+        """Precedence: by level, then names before patterns, then keys with the instance before others."""
         return self.level, self.exact, self.of_unit
 
     @property
     def of_fact(self) -> bool:
-        """Whether a fact gives it, to those of many inputs that nothing drives."""
+        """Whether it comes from a fact, which applies only to inputs that nothing drives."""
         return self.level in (FACT, CHANGED_FACT)
 
 
 def constants(system: WiringContext) -> dict[Input, Constant]:
-    """Return what `inputs` and facts give to each input."""
+    """Return the constant of each input, from the scenario's `inputs` and facts."""
     scenario, fmus, inputs = system.scenario, system.fmus, system.inputs
     read = None
     if any(isinstance(raw, SeriesSpec) for raw in scenario.inputs.values()):
@@ -79,7 +79,7 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
             other = found.setdefault((unit, name), one)
             if other.rank < one.rank:
                 found[unit, name] = one
-            elif other.of_fact and of_unit:  # the changed fact stands where a constant of the unit did
+            elif other.of_fact and of_unit:  # the overridden fact replaces a constant of the instance
                 found[unit, name] = replace(other, of_unit=True)
             elif other.rank == one.rank and other is not one:
                 system.report(key, f"{unit}.{name} has another constant already, by inputs.{other.key[1]}")
@@ -87,7 +87,7 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
 
 
 def _of_facts(system: WiringContext) -> Iterator[tuple[Input, Constant]]:
-    """Yield what facts give to inputs."""
+    """Yield the constants of inputs that come from facts."""
     scenario, known = system.scenario, system.inputs
     for name, fact, raw, changed in facts_of(scenario):
         key: KeyPath = (name,)

@@ -1,18 +1,14 @@
-"""From a scenario to a plan: FMUs opened, parameters distributed, every input given its one source.
+"""Makes the plan of a scenario: opens FMUs, distributes parameters, connects inputs, selects what to record.
 
-An output feeds every input of the same name in other units. Before equal names go, in this order, a
-connection of the scenario and a constant whose key names the unit; a list of units under `connections`
-chooses among equal names. Any other constant is for inputs that nothing drives, one given by name
-before one given by a pattern. Whatever then has no source, or more than one, is an error: the start
-value that an FMU carries for an input is never used in silence.
+An output feeds every input of the same name in other instances. Two things take precedence over equal names,
+in this order: a connection of the scenario, and a constant whose key names the instance; a list of instances
+under `connections` chooses among equal names. Any other constant applies to inputs that nothing drives, one
+given by name before one given by a pattern. An input without a source, or with more than one, is an error:
+the start value of an input in its FMU is never used silently.
 
-Units of measurement fit if they have one dimension, and the wire converts; where an FMU declares none,
-nothing can be checked and a note says so. Types must be equal, and an enumeration's items must all be
-among those of the input it feeds, with the same numbers.
-
-Functions that an FMU's library lacks and a plan needs.
-
-What is recorded: the variables that the scenario's patterns mean.
+Units of measurement are compatible if they have the same dimension, and the wire converts; where an FMU
+declares no unit, nothing can be checked and a note says so. Types must be equal, and an enumeration's items
+must all be among those of the input it feeds, with the same numbers.
 """
 
 from __future__ import annotations
@@ -43,7 +39,7 @@ from .warnings import exact, remarks
 def missing_functions(
     units: Iterable[Instance], wires: Sequence[Wire], record: Sequence[tuple[str, str]]
 ) -> list[str]:
-    """Return a sentence for every function that is lacking; one that nothing asks for may be."""
+    """Return a message for every FMI function that the plan needs and an FMU's library does not export."""
     problems = []
     for unit in units:
         if not unit.fmu.lacking:
@@ -66,9 +62,9 @@ def missing_functions(
 
 
 def recorded(system: WiringContext) -> tuple[tuple[str, str], ...]:
-    """Return (unit, variable) of each column, in the order of the scenario's list or units.
+    """Return (instance, variable) of each recorded column, in the order of the scenario's `record`.
 
-    Without a list these are all outputs but text.
+    Without `record`, these are all outputs except text, in the order of the instances.
     """
     fmus, record = system.fmus, system.scenario.record
     if record is None:
@@ -106,9 +102,9 @@ def _matching(
 
 
 TYRE_FORCES = tuple(f"tyre_force_y_{wheel}" for wheel in WHEELS)
-"""Outputs by which tyres are known."""
+"""Outputs that identify an instance as tyres."""
 TyreMeasurement = Callable[[Instance, Mapping[str, float]], Mapping[str, float]]
-"""Returns the cornering stiffness [N/rad] of one tyre on some wheels: of a unit, by wheel -> load [N]."""
+"""Callback: (instance of tyres, wheel -> load [N]) -> wheel -> cornering stiffness of one tyre [N/rad]."""
 
 
 def make_plan(
@@ -122,17 +118,17 @@ def make_plan(
     """Open the scenario's FMUs and connect them.
 
     Args:
-        scenario: as loaded.
-        fmus: the folder that holds FMUs given by name; None: the nearest `fmus/` that holds any.
-        opener: of the FMUs; default: one that builds nothing.
-        isolated: each unit will have a process of its own (see `master.isolation`).
-        measure: tells the stiffness of tyres, for units that want that of axles which the vehicle file
-            does not give (see `tyres.axle_stiffness`).
+        scenario: the loaded scenario.
+        fmus: folder of the FMUs given by name; None: the nearest `fmus/` that contains any.
+        opener: opens the FMUs; default: an opener that builds nothing.
+        isolated: whether each instance will run in its own process (see `master.isolation`).
+        measure: measures the cornering stiffness of tyres, for instances that need it if the vehicle file
+            does not give it (see `tyres.stand.cornering_stiffness`).
 
     Raises:
-        ModelDescriptionError: FMUs that are missing, damaged or not supported.
-        BuildError: FMUs that are stale and cannot be built.
-        WiringError: everything that is wrong with parameters and connections.
+        ModelDescriptionError: FMUs are missing, damaged or not supported.
+        BuildError: FMUs are stale and cannot be built.
+        WiringError: with all problems of parameters and connections.
     """
     system = _open_all(scenario, fmus, opener or Opener())
     opened, notes = system.fmus, system.notes
@@ -190,7 +186,7 @@ def _take_from_tyres(
     distributed: Parameters,
     measure: TyreMeasurement | None,
 ) -> list[Problem]:
-    """Give units the cornering stiffnesses of axles that tyres at static loads have; return what is wrong."""
+    """Set missing cornering stiffnesses of axles to those of the tyres at static loads; return problems."""
     if not distributed.lacking:
         return []
     loads = [distributed.car.values[name] for name in STATIC_LOADS]
@@ -224,7 +220,7 @@ def _take_from_tyres(
 def _unit(
     system: WiringContext, name: str, parameters: dict[str, Value], inputs: Mapping[str, Value | InputSeries]
 ) -> Instance:
-    """Return a unit with the values of its parameters and of the inputs that no unit drives."""
+    """Return an instance with the values of its parameters and of the inputs without a wire."""
     spec, step, start = (
         system.scenario.units[name],
         system.scenario.step_size,
@@ -243,7 +239,7 @@ def _unit(
 
 
 def _misplaced(scenario: LoadedScenario) -> list[str]:
-    """Return a sentence for every swap by an FMU whose name begins with that of another unit."""
+    """Return a message for every swap to an FMU whose name begins with that of another instance."""
     found = []
     for change in scenario.changes:
         name = Path(str(change.value)).stem
@@ -254,7 +250,7 @@ def _misplaced(scenario: LoadedScenario) -> list[str]:
 
 
 def _open_all(scenario: LoadedScenario, fmus: Path | None, opener: Opener) -> WiringContext:
-    """Return a scenario with the FMU of each unit."""
+    """Open the FMU of each instance of a scenario."""
     document = scenario.document
     problems: dict[Problem, None] = {}
     folder = fmus or Path()
@@ -291,7 +287,7 @@ def _open_all(scenario: LoadedScenario, fmus: Path | None, opener: Opener) -> Wi
 
 
 def _check_instances(system: WiringContext) -> None:
-    """Report an FMU used by two units though it allows one instance per process."""
+    """Report FMUs with several instances that allow only one per process."""
     first: dict[str, str] = {}
     for name, fmu in system.fmus.items():
         other = first.setdefault(fmu.sha256, name)
@@ -304,7 +300,7 @@ def _check_instances(system: WiringContext) -> None:
 
 
 def _sorted(wires: Sequence[Wire], order: Sequence[str], fmus: Mapping[str, Fmu]) -> tuple[Wire, ...]:
-    """Return the wires by target in evaluation order, then by input as the FMU lists them."""
+    """Return the wires sorted by their target in evaluation order, then by input in the FMU's order."""
     place = {
         (unit, name): (i, j) for i, unit in enumerate(order) for j, name in enumerate(fmus[unit].variables)
     }
