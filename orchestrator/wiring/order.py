@@ -174,7 +174,7 @@ def _way_back(graph: Graph, start: Node) -> tuple[list[Node], int]:
 def _weights(
     following: Mapping[str, _Feedthrough], wires: Iterable[Wire], direct: Iterable[Wire]
 ) -> dict[Edge, int]:
-    """Return the cost of evaluating source after target: wires whose followers feed an instance, then wires."""
+    """Return the cost of evaluating source after target: first wires whose followers are used, then wires."""
     used = {(wire.source, wire.output) for wire in wires}
     weights: Counter[Edge] = Counter()
     for wire in direct:
