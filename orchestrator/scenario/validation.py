@@ -1,4 +1,4 @@
-"""Strict validation of YAML files with pydantic; every problem is a message with line, key and allowed values."""
+"""Strict validation of YAML files with pydantic; problems are messages with line, key and allowed values."""
 
 from __future__ import annotations
 
