@@ -174,9 +174,7 @@ class InputSeries:
 class ValueOrigin(NamedTuple):
     """Where the value of a parameter or constant comes from."""
 
-    kind: (
-        str  # "default" (of the FMU), "vehicle", "derived", "scenario", "file", or an override's: "--set"
-    )
+    kind: str  # "default" (of the FMU), "vehicle", "derived", "scenario", "file", or an override's: "--set"
     detail: str = ""  # the formula of a derived value, the name of a file
 
     def __str__(self) -> str:

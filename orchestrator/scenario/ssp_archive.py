@@ -83,10 +83,10 @@ class SspArchive:
         self._variables: dict[str, dict[str, SspVariable]] = {}
 
     def member(self, element: _Element) -> str:
-        """Return the member that the `source` of an element means.
+        """Return the name of the member that the `source` of an element refers to.
 
         Raises:
-            SspError: it is outside of the archive, or in an FMU.
+            SspError: the source is outside of the archive, or inside an FMU.
         """
         source = element.get("source", "")
         try:
@@ -103,10 +103,10 @@ class SspArchive:
         return member
 
     def xml(self, member: str, tag: str) -> _Element:
-        """Return the root of a description.
+        """Parse an XML member and return its root.
 
         Raises:
-            SspError: there is none, it is damaged, or its root is not a `tag`.
+            SspError: the member is missing or damaged, or its root is not a `tag`.
         """
         try:
             if self._archive.getinfo(member).file_size > LARGEST:
@@ -123,10 +123,10 @@ class SspArchive:
         return root
 
     def variables(self, member: str, component: _Element) -> dict[str, SspVariable]:
-        """Return the variables of an FMU; none if it cannot be read, as opening it will say.
+        """Return the variables of an FMU; none if it cannot be read, which is reported when it is opened.
 
         Raises:
-            SspError: the archive does not hold it.
+            SspError: the FMU is not in the archive.
         """
         if member not in self._variables:
             try:
