@@ -85,9 +85,9 @@ class Connector:
         self._notes = system.notes
         self._report = system.report
         self._having: dict[str, list[str]] = {}  # name of an output -> instances that have it
-        for unit, outputs in self._outputs.items():
+        for instance, outputs in self._outputs.items():
             for name in outputs:
-                self._having.setdefault(name, []).append(unit)
+                self._having.setdefault(name, []).append(instance)
         self._preferring: dict[str, list[tuple[list[str], KeyPath]]] = {}  # instance -> lists of sources
         self._preferred: dict[str, list[tuple[str, KeyPath]]] = {}  # instance -> preferred sources, in order
         self._refused: set[Input] = set()  # not to be driven by equal names (`from: null`)
@@ -106,36 +106,38 @@ class Connector:
             values[target] = constant.value
             self._system.origins[target[0]][target[1]] = constant.origin
         fed = wires.keys() | given.keys() | ambiguous
-        for unit, inputs in self._inputs.items():
+        for instance, inputs in self._inputs.items():
             for name, variable in inputs.items():
-                if (unit, name) in fed:
+                if (instance, name) in fed:
                     continue
-                if (variable.optional or self._explicit(unit)) and variable.start is not None:
-                    values[(unit, name)] = variable.start
-                    self._system.origins[unit][name] = DEFAULT
+                if (variable.optional or self._explicit(instance)) and variable.start is not None:
+                    values[(instance, name)] = variable.start
+                    self._system.origins[instance][name] = DEFAULT
                 else:
-                    self._report(("units", unit), self._undriven(unit, variable))
+                    self._report(("units", instance), self._undriven(instance, variable))
         fitted = [self._fitted(wire, key) for wire, key in wires.values()]
         self._note_units(wire for wire, key in wires.values() if self._scale(key) is None)
-        by_unit: dict[str, dict[str, Value | InputSeries]] = {unit: {} for unit in self._fmus}
-        for (unit, name), value in values.items():
-            by_unit[unit][name] = value
+        by_unit: dict[str, dict[str, Value | InputSeries]] = {instance: {} for instance in self._fmus}
+        for (instance, name), value in values.items():
+            by_unit[instance][name] = value
         return fitted, by_unit
 
     def _note_overruled(self, inputs: Set[Input]) -> None:
         """Note inputs with a constant that takes precedence over an output of the same name."""
         overruled: dict[Input, list[str]] = {}  # unit and source -> names
-        for unit, name in inputs:
-            sources = [] if self._explicit(unit) else self._sources(unit, name)[0]
+        for instance, name in inputs:
+            sources = [] if self._explicit(instance) else self._sources(instance, name)[0]
             for source in sources[:1]:
-                overruled.setdefault((unit, source), []).append(name)
-        for (unit, source), names in sorted(overruled.items()):
-            for name in fold([v for v in self._inputs[unit] if v in names]):
-                self._notes.append(f"{unit}.{name} has a value of its own: {source}.{name} does not drive it")
+                overruled.setdefault((instance, source), []).append(name)
+        for (instance, source), names in sorted(overruled.items()):
+            for name in fold([v for v in self._inputs[instance] if v in names]):
+                self._notes.append(
+                    f"{instance}.{name} has a value of its own: {source}.{name} does not drive it"
+                )
 
-    def _explicit(self, unit: str) -> bool:
+    def _explicit(self, instance: str) -> bool:
         """Return whether inputs of an instance are connected by the scenario's connections only."""
-        return self._scenario.explicit and unit not in self._scenario.replaced
+        return self._scenario.explicit and instance not in self._scenario.replaced
 
     def _by_connections(self) -> dict[Input, tuple[Wire, KeyPath]]:
         """Return the wires of the scenario's connections, each with the key of its connection."""
@@ -201,8 +203,8 @@ class Connector:
         """Store which sources instances prefer; report lists without any effect."""
         for end, names in (("from", sources), ("to", targets)):
             self._refuse_twice(names, (*key, end))
-        for unit in targets:
-            self._preferring.setdefault(unit, []).append((sources, key))
+        for instance in targets:
+            self._preferring.setdefault(instance, []).append((sources, key))
         ends = [(s, t) for s in sources for t in targets if s != t]
         if any(self._outputs[s].keys() & self._inputs[t].keys() for s, t in ends):
             return
@@ -214,7 +216,7 @@ class Connector:
 
     def _put_in_order(self) -> None:
         """Sort the preferred sources of each instance into an order that agrees with all of its lists."""
-        for unit, lists in self._preferring.items():
+        for instance, lists in self._preferring.items():
             keys: dict[str, KeyPath] = {}
             edges: dict[tuple[str, str], KeyPath] = {}
             for sources, key in lists:
@@ -227,52 +229,55 @@ class Connector:
             except CycleError as error:
                 order = list(keys)  # avoids further errors about this instance
                 circle = [f"{a} to {b} ({dotted(edges[a, b])})" for a, b in pairwise(error.args[1])]
-                self._report(lists[-1][1], f"{unit} cannot prefer {listed(circle)}")
-            self._preferred[unit] = [(source, keys[source]) for source in order]
+                self._report(lists[-1][1], f"{instance} cannot prefer {listed(circle)}")
+            self._preferred[instance] = [(source, keys[source]) for source in order]
 
-    def _no_such(self, key: KeyPath, unit: str, pattern: str, kind: str) -> None:
+    def _no_such(self, key: KeyPath, instance: str, pattern: str, kind: str) -> None:
         """Report a pattern without a match; only note it if the replaced FMU has a match."""
-        if self._system.had([unit], pattern, kind):
-            self._notes.append(f"{dotted(key[:2])} is left out: {unit} has no {kind} {pattern!r} any more")
+        if self._system.had([instance], pattern, kind):
+            self._notes.append(
+                f"{dotted(key[:2])} is left out: {instance} has no {kind} {pattern!r} any more"
+            )
             return
-        variable = self._fmus[unit].variables.get(pattern)
+        variable = self._fmus[instance].variables.get(pattern)
         if variable is not None:
-            self._report(key, f"{unit}.{pattern} is no {kind}: its causality is {variable.causality}")
+            self._report(key, f"{instance}.{pattern} is no {kind}: its causality is {variable.causality}")
             return
-        if pattern in self._fmus[unit].refused:
-            self._report(key, f"{unit}.{pattern} {self._fmus[unit].refused[pattern]}")
+        if pattern in self._fmus[instance].refused:
+            self._report(key, f"{instance}.{pattern} {self._fmus[instance].refused[pattern]}")
             return
-        names = fold([v.name for v in self._fmus[unit].of(kind)])
-        self._report(key, f"{unit} has no {kind} {pattern!r}{hint(pattern, names, lead='it has')}")
+        names = fold([v.name for v in self._fmus[instance].of(kind)])
+        self._report(key, f"{instance} has no {kind} {pattern!r}{hint(pattern, names, lead='it has')}")
 
     def _by_names(self, wires: dict[Input, tuple[Wire, KeyPath]], taken: Set[Input]) -> set[Input]:
         """Add wires between equal names, except to inputs `taken`; return inputs with several candidates."""
         ambiguous = set()
-        for unit, inputs in self._inputs.items():
-            if self._explicit(unit):
+        for instance, inputs in self._inputs.items():
+            if self._explicit(instance):
                 continue
             for name in inputs:
-                if (unit, name) in wires or (unit, name) in taken:
+                if (instance, name) in wires or (instance, name) in taken:
                     continue
-                sources, key = self._sources(unit, name)
+                sources, key = self._sources(instance, name)
                 if len(sources) == 1:
-                    wires[(unit, name)] = (Wire(sources[0], name, unit, name), key)
+                    wires[(instance, name)] = (Wire(sources[0], name, instance, name), key)
                 elif sources:
-                    ambiguous.add((unit, name))
+                    ambiguous.add((instance, name))
                     choices = listed(f"{source}.{name}" for source in sources)
                     self._report(
                         key,
-                        f"{unit}.{name} has more than one source: {choices}; name one under 'connections'",
+                        f"{instance}.{name} has more than one source: {choices}; "
+                        "name one under 'connections'",
                     )
         return ambiguous
 
-    def _sources(self, unit: str, name: str) -> tuple[list[str], KeyPath]:
+    def _sources(self, instance: str, name: str) -> tuple[list[str], KeyPath]:
         """Return the candidate instances for an input by its name, and the key responsible for them."""
-        having = [source for source in self._having.get(name, ()) if source != unit]
-        for preferred, key in self._preferred.get(unit, ()):
+        having = [source for source in self._having.get(name, ()) if source != instance]
+        for preferred, key in self._preferred.get(instance, ()):
             if preferred in having:
                 return [preferred], key
-        return having, ("units", unit)
+        return having, ("units", instance)
 
     def _given(
         self, given: Mapping[Input, Constant], wires: Mapping[Input, tuple[Wire, KeyPath]]
@@ -290,19 +295,19 @@ class Connector:
             self._report(constant.key, f"{driven}: a constant is for inputs that no unit drives{unless}")
         return {target: constant for target, constant in given.items() if target not in wires}
 
-    def _undriven(self, unit: str, variable: Variable) -> str:
+    def _undriven(self, instance: str, variable: Variable) -> str:
         """Return the message for an input without a source."""
         choices = [
             f"{source}.{name}"
             for source, names in self._fitting_outputs(variable).items()
-            if source != unit
+            if source != instance
             for name in names
             if alike(name, variable.name)
         ]
         connect = f"connect {listed(choices, last='or')}, or give" if 0 < len(choices) <= 8 else "give"
         measure = f" [{variable.unit}]" if variable.unit else ""
         return (
-            f"{unit}.{variable.name}{measure} has no source: no unit has an output of this name; "
+            f"{instance}.{variable.name}{measure} has no source: no unit has an output of this name; "
             f"{connect} a constant under 'inputs'"
         )
 
@@ -354,13 +359,17 @@ class Connector:
                 (wire.source, self._outputs[wire.source][wire.output]),
                 (wire.target, self._inputs[wire.target][wire.input]),
             )
-            lacking = [(unit, v.name) for unit, v in ends if v.type == "Real" and v.unit is None]
+            lacking = [(instance, v.name) for instance, v in ends if v.type == "Real" and v.unit is None]
             if len(lacking) == 1:
                 missing.setdefault(lacking[0][0], []).append(lacking[0][1])
-            odd.update({(unit, v.unit): None for unit, v in ends if v.unit and contradicts_its_name(v)})
-        for unit, names in missing.items():
+            odd.update(
+                {(instance, v.unit): None for instance, v in ends if v.unit and contradicts_its_name(v)}
+            )
+        for instance, names in missing.items():
             text = listed(fold(list(dict.fromkeys(names))))
-            self._notes.append(f"{unit} ({self._fmus[unit].name}) declares no unit for {text}: not checked")
-        for unit, measure in odd:
-            who = f"{unit} ({self._fmus[unit].name})"
+            self._notes.append(
+                f"{instance} ({self._fmus[instance].name}) declares no unit for {text}: not checked"
+            )
+        for instance, measure in odd:
+            who = f"{instance} ({self._fmus[instance].name})"
             self._notes.append(f"{who} defines {measure} otherwise than usual: taken as it defines it")

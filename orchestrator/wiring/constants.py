@@ -55,15 +55,17 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
         key: KeyPath = ("inputs", pattern)
         prefix, _, rest = pattern.partition(".")
         of_unit = prefix in fmus
-        units, name_pattern = ([prefix], rest) if of_unit else (list(fmus), pattern)
-        parts = {(u, name): part for u in units for part, name in matching(name_pattern, inputs[u]).items()}
-        if not parts and system.had(units, name_pattern, "input"):
+        instances, name_pattern = ([prefix], rest) if of_unit else (list(fmus), pattern)
+        parts = {
+            (u, name): part for u in instances for part, name in matching(name_pattern, inputs[u]).items()
+        }
+        if not parts and system.had(instances, name_pattern, "input"):
             system.notes.append(f"inputs.{pattern} is left out: no unit has such an input after the swap")
         elif not parts:
-            names = fold(list(dict.fromkeys(name for unit in units for name in inputs[unit])))
+            names = fold(list(dict.fromkeys(name for instance in instances for name in inputs[instance])))
             system.report(key, f"no input matches{hint(name_pattern, names, lead='there are')}")
-        for (unit, name), part in parts.items():
-            variable = inputs[unit][name]
+        for (instance, name), part in parts.items():
+            variable = inputs[instance][name]
             value: Value | InputSeries = 0
             try:
                 if isinstance(raw, SeriesSpec):
@@ -72,17 +74,19 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
                 else:
                     value = value_for(variable, raw)
             except ValueError as error:
-                system.report(key, f"{error}, for {unit}.{name}")
+                system.report(key, f"{error}, for {instance}.{name}")
             level = CHANGED_INPUTS if fact_changed and scenario.document.override(key) else INPUTS
             given_by = origin(scenario.document, key)
             one = Constant(value, key, given_by, of_unit, "*" not in pattern, level)
-            other = found.setdefault((unit, name), one)
+            other = found.setdefault((instance, name), one)
             if other.rank < one.rank:
-                found[unit, name] = one
+                found[instance, name] = one
             elif other.of_fact and of_unit:  # the overridden fact replaces a constant of the instance
-                found[unit, name] = replace(other, of_unit=True)
+                found[instance, name] = replace(other, of_unit=True)
             elif other.rank == one.rank and other is not one:
-                system.report(key, f"{unit}.{name} has another constant already, by inputs.{other.key[1]}")
+                system.report(
+                    key, f"{instance}.{name} has another constant already, by inputs.{other.key[1]}"
+                )
     return found
 
 
@@ -91,21 +95,23 @@ def _of_facts(system: WiringContext) -> Iterator[tuple[Input, Constant]]:
     scenario, known = system.scenario, system.inputs
     for name, fact, raw, changed in facts_of(scenario):
         key: KeyPath = (name,)
-        takers = [(unit, one) for unit, inputs in known.items() for one in fact.inputs if one in inputs]
+        takers = [
+            (instance, one) for instance, inputs in known.items() for one in fact.inputs if one in inputs
+        ]
         if fact.inputs and not takers:
             if not changed and any(system.had(known, one, "input") for one in fact.inputs):
                 system.notes.append(f"{name} is left out: no unit has such an input after the swap")
             else:
                 system.report(key, f"no unit has an input {name}")
         refused: dict[str, list[str]] = {}
-        for unit, one in takers:
+        for instance, one in takers:
             value = raw
             try:
-                value = value_for(known[unit][one], raw)
+                value = value_for(known[instance][one], raw)
             except ValueError as error:
-                refused.setdefault(str(error), []).append(f"{unit}.{one}")
+                refused.setdefault(str(error), []).append(f"{instance}.{one}")
             level = CHANGED_FACT if changed else FACT
-            yield (unit, one), Constant(value, key, origin(scenario.document, key), False, True, level)
+            yield (instance, one), Constant(value, key, origin(scenario.document, key), False, True, level)
         everywhere = [len(inputs) for inputs in refused.values()] == [len(takers)]
         for sentence, inputs in refused.items():
             for one in inputs:

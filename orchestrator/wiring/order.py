@@ -78,7 +78,7 @@ class _Feedthrough:
 
 def evaluate(fmus: Mapping[str, Fmu], wires: Sequence[Wire]) -> EvaluationOrder:
     """Find the evaluation order of the instances `fmus`, given in the order of the scenario."""
-    following = {unit: _Feedthrough(fmu) for unit, fmu in fmus.items()}
+    following = {instance: _Feedthrough(fmu) for instance, fmu in fmus.items()}
     direct = [wire for wire in wires if any(following[wire.target].outputs(wire.input))]
     weights = _weights(following, wires, direct)
     cycles = _cycles(list(fmus), weights)
@@ -122,7 +122,7 @@ def _loops(graph: Graph, most: int) -> list[str]:
             loop = error.args[1][::-1]  # the sorter has it against the direction of the wires
         shortest, effort = _shortest_loop(graph, effort)
         loop = shortest or loop
-        names = [f"{unit}.{name}" for unit, name in loop if name != UNDECLARED]
+        names = [f"{instance}.{name}" for instance, name in loop if name != UNDECLARED]
         if len(names) > LONGEST:
             names[LONGEST - 2 : -1] = [f"{len(names) - LONGEST + 1} more"]
         text = " -> ".join(names)
