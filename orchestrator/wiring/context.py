@@ -31,16 +31,16 @@ from ..scenario.yaml_lines import PROBLEMS, Document, KeyPath
 class Fact:
     """Which inputs and parameters a fact sets."""
 
-    instance: str
+    instance: str  # unit of measurement of the value
     inputs: tuple[str, ...] = ()
     parameters: dict[str, str] = field(default_factory=dict)
     """Parameter -> another of the same instance that disables it if 0; "" if it is always in use."""
 
-    def counts(self, unit: Instance, parameter: str) -> bool:
+    def counts(self, instance: Instance, parameter: str) -> bool:
         """Return whether the fact sets a parameter of an instance, and the parameter is in use."""
         if parameter not in self.parameters:
             return False
-        return unit.parameter(self.parameters[parameter]) != 0
+        return instance.parameter(self.parameters[parameter]) != 0
 
 
 FACTS = {
@@ -98,25 +98,25 @@ class WiringContext:
     @cached_property
     def origins(self) -> dict[str, dict[str, ValueOrigin]]:
         """Instance -> parameter or constant -> where its value comes from, as far as known yet."""
-        return {unit: {} for unit in self.fmus}
+        return {instance: {} for instance in self.fmus}
 
     @cached_property
     def inputs(self) -> ByUnit:
         """All inputs by instance and name."""
-        return {unit: {v.name: v for v in fmu.of("input")} for unit, fmu in self.fmus.items()}
+        return {instance: {v.name: v for v in fmu.of("input")} for instance, fmu in self.fmus.items()}
 
     @cached_property
     def outputs(self) -> ByUnit:
         """All outputs by instance and name."""
-        return {unit: {v.name: v for v in fmu.of("output")} for unit, fmu in self.fmus.items()}
+        return {instance: {v.name: v for v in fmu.of("output")} for instance, fmu in self.fmus.items()}
 
-    def before(self, units: Iterable[str] | None = None) -> Iterator[Fmu]:
+    def before(self, instances: Iterable[str] | None = None) -> Iterator[Fmu]:
         """Yield the existing FMUs that overrides have replaced, of some instances or of all."""
-        for unit in self.fmus if units is None else units:
-            if unit in self.scenario.replaced and (fmu := self.replaced(unit)) is not None:
+        for instance in self.fmus if instances is None else instances:
+            if instance in self.scenario.replaced and (fmu := self.replaced(instance)) is not None:
                 yield fmu
 
-    def had(self, units: Iterable[str], pattern: str, causality: str | None = None) -> bool:
+    def had(self, instances: Iterable[str], pattern: str, causality: str | None = None) -> bool:
         """Return whether a replaced FMU of one of the instances has such a variable.
 
         Args:
@@ -126,7 +126,7 @@ class WiringContext:
         """
         return any(
             match(pattern, variable.name) is not None and causality in (None, variable.causality)
-            for fmu in self.before(units)
+            for fmu in self.before(instances)
             for variable in fmu.variables.values()
         )
 

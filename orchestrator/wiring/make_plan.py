@@ -37,27 +37,33 @@ from .warnings import exact, remarks
 
 
 def missing_functions(
-    units: Iterable[Instance], wires: Sequence[Wire], record: Sequence[tuple[str, str]]
+    instances: Iterable[Instance], wires: Sequence[Wire], record: Sequence[tuple[str, str]]
 ) -> list[str]:
     """Return a message for every FMI function that the plan needs and an FMU's library does not export."""
     problems = []
-    for unit in units:
-        if not unit.fmu.lacking:
+    for instance in instances:
+        if not instance.fmu.lacking:
             continue
-        needed: dict[str, list[str]] = {f"fmi{unit.fmu.fmi}{name}": [] for name in CORE[unit.fmu.fmi]}
-        given = [*unit.parameters, *unit.constants, *(w.input for w in wires if w.target == unit.name)]
+        needed: dict[str, list[str]] = {f"fmi{instance.fmu.fmi}{name}": [] for name in CORE[instance.fmu.fmi]}
+        given = [
+            *instance.parameters,
+            *instance.constants,
+            *(w.input for w in wires if w.target == instance.name),
+        ]
         asked = [
-            *(w.output for w in wires if w.source == unit.name),
-            *(n for u, n in record if u == unit.name),
+            *(w.output for w in wires if w.source == instance.name),
+            *(n for u, n in record if u == instance.name),
         ]
         for verb, names in (("Set", given), ("Get", asked)):
             for name in dict.fromkeys(names):
-                kind = unit.fmu.variables[name].place.type
-                needed.setdefault(f"fmi{unit.fmu.fmi}{verb}{kind}", []).append(name)
+                kind = instance.fmu.variables[name].place.type
+                needed.setdefault(f"fmi{instance.fmu.fmi}{verb}{kind}", []).append(name)
         for function, names in needed.items():
-            if function in unit.fmu.lacking:
+            if function in instance.fmu.lacking:
                 purpose = f", which {listed(names)} needs" if names else ""
-                problems.append(f"{unit.name}: the library of {unit.fmu.name} lacks {function}{purpose}")
+                problems.append(
+                    f"{instance.name}: the library of {instance.fmu.name} lacks {function}{purpose}"
+                )
     return problems
 
 
@@ -68,20 +74,20 @@ def recorded(system: WiringContext) -> tuple[tuple[str, str], ...]:
     """
     fmus, record = system.fmus, system.scenario.record
     if record is None:
-        return tuple((unit, v.name) for unit, fmu in fmus.items() for v in _usual(fmu))
+        return tuple((instance, v.name) for instance, fmu in fmus.items() for v in _usual(fmu))
     chosen: dict[tuple[str, str], None] = {}
-    for i, (unit, pattern) in enumerate(record):
-        units = list(fmus) if unit == "*" else [unit]
-        found = _matching(units, fmus, pattern, _usual) or _matching(units, fmus, pattern, _all)
+    for i, (instance, pattern) in enumerate(record):
+        instances = list(fmus) if instance == "*" else [instance]
+        found = _matching(instances, fmus, pattern, _usual) or _matching(instances, fmus, pattern, _all)
         chosen.update(dict.fromkeys(found))
         if found:
             continue
-        if system.had(units, pattern):
-            system.notes.append(f"record[{i}] is left out: {unit} has no variable {pattern!r} any more")
+        if system.had(instances, pattern):
+            system.notes.append(f"record[{i}] is left out: {instance} has no variable {pattern!r} any more")
             continue
-        usual, every = ([v.name for u in units for v in of(fmus[u])] for of in (_usual, _all))
+        usual, every = ([v.name for u in instances for v in of(fmus[u])] for of in (_usual, _all))
         names = every if closest(pattern, usual) is None and closest(pattern, every) else usual
-        who = "no unit has a" if unit == "*" else f"{unit} has no"
+        who = "no unit has a" if instance == "*" else f"{instance} has no"
         more = hint(pattern, fold(list(dict.fromkeys(names))), lead="its outputs are")
         system.report(("record", i), f"{who} variable {pattern!r} to record{more}")
     return tuple(chosen)
@@ -96,9 +102,14 @@ def _all(fmu: Fmu) -> list[Variable]:
 
 
 def _matching(
-    units: Iterable[str], fmus: Mapping[str, Fmu], pattern: str, of: Callable[[Fmu], list[Variable]]
+    instances: Iterable[str], fmus: Mapping[str, Fmu], pattern: str, of: Callable[[Fmu], list[Variable]]
 ) -> list[tuple[str, str]]:
-    return [(unit, v.name) for unit in units for v in of(fmus[unit]) if match(pattern, v.name) is not None]
+    return [
+        (instance, v.name)
+        for instance in instances
+        for v in of(fmus[instance])
+        if match(pattern, v.name) is not None
+    ]
 
 
 TYRE_FORCES = tuple(f"tyre_force_y_{wheel}" for wheel in WHEELS)
@@ -148,11 +159,11 @@ def make_plan(
         "one of these units has to give an output that does not follow its input directly"
         for loop in evaluation.loops
     ]
-    units = {name: _unit(system, name, parameters[name], values[name]) for name in opened}
+    instances = {name: _instance(system, name, parameters[name], values[name]) for name in opened}
     if not problems and not of_all:  # all variables are known
-        of_all = missing_functions(units.values(), wires, record)
+        of_all = missing_functions(instances.values(), wires, record)
     if not problems and not of_all:
-        problems += _take_from_tyres(scenario, units, distributed, measure)
+        problems += _take_from_tyres(scenario, instances, distributed, measure)
     problems += [Problem(text, file=scenario.path) for text in of_all]
     if problems:
         raise WiringError([*_misplaced(scenario), *problems])
@@ -161,10 +172,10 @@ def make_plan(
         "so a wire against the evaluation order uses earlier values"
         for loop in evaluation.possible_loops[:1]
     ]
-    notes += exact(list(units.values()), wires)
-    findings = remarks(scenario, units)
+    notes += exact(list(instances.values()), wires)
+    findings = remarks(scenario, instances)
     return Plan(
-        instances=tuple(units[name] for name in evaluation.order),
+        instances=tuple(instances[name] for name in evaluation.order),
         wires=_sorted(wires, evaluation.order, opened),
         record=record,
         step=scenario.step_size,
@@ -182,7 +193,7 @@ def make_plan(
 
 def _take_from_tyres(
     scenario: LoadedScenario,
-    units: dict[str, Instance],
+    instances: dict[str, Instance],
     distributed: Parameters,
     measure: TyreMeasurement | None,
 ) -> list[Problem]:
@@ -190,7 +201,7 @@ def _take_from_tyres(
     if not distributed.lacking:
         return []
     loads = [distributed.car.values[name] for name in STATIC_LOADS]
-    tyres = [u for u in units.values() if {v.name for v in u.fmu.of("output")} >= {*TYRE_FORCES}]
+    tyres = [u for u in instances.values() if {v.name for v in u.fmu.of("output")} >= {*TYRE_FORCES}]
     try:
         if len(tyres) != 1 or measure is None:
             raise ValueError("there is no one unit for the tyres to take it from")
@@ -198,26 +209,26 @@ def _take_from_tyres(
     except (ValueError, YawbenchError) as error:
         return [
             scenario.document.problem(
-                ("units", unit),
+                ("units", instance),
                 f"the vehicle file does not give {listed(names)}, and the tyres do not tell: {error}",
             )
-            for unit, names in distributed.lacking.items()
+            for instance, names in distributed.lacking.items()
         ]
     stiffness = dict(zip(STIFFNESSES, (2.0 * found[wheel] for wheel in WHEELS[::2]), strict=True))
-    for unit, names in distributed.lacking.items():
+    for instance, names in distributed.lacking.items():
         formula = {
             name: ValueOrigin("derived", f"two of {tyres[0].fmu.name} at {load:.6g} N each")
             for name, load in zip(STIFFNESSES, loads, strict=True)
         }
-        units[unit] = replace(
-            units[unit],
-            parameters=units[unit].parameters | {name: stiffness[name] for name in names},
-            origins=units[unit].origins | {name: formula[name] for name in names},
+        instances[instance] = replace(
+            instances[instance],
+            parameters=instances[instance].parameters | {name: stiffness[name] for name in names},
+            origins=instances[instance].origins | {name: formula[name] for name in names},
         )
     return []
 
 
-def _unit(
+def _instance(
     system: WiringContext, name: str, parameters: dict[str, Value], inputs: Mapping[str, Value | InputSeries]
 ) -> Instance:
     """Return an instance with the values of its parameters and of the inputs without a wire."""
@@ -243,7 +254,7 @@ def _misplaced(scenario: LoadedScenario) -> list[str]:
     found = []
     for change in scenario.changes:
         name = Path(str(change.value)).stem
-        others = [unit for unit in scenario.units if name.startswith(f"{unit}_")]
+        others = [instance for instance in scenario.units if name.startswith(f"{instance}_")]
         if change.swaps and others and change.place not in others:
             found.append(f"{change}: by its name {name} is for the unit {others[0]!r}")
     return found
@@ -264,9 +275,9 @@ def _open_all(scenario: LoadedScenario, fmus: Path | None, opener: Opener) -> Wi
         path = find_fmu(fmu, scenario=scenario.path, fmus=folder, opener=opener, build=build)
         return opener.open(path, validate=validate)
 
-    def replaced(unit: str) -> Fmu | None:
+    def replaced(instance: str) -> Fmu | None:
         try:
-            return opened(scenario.replaced[unit], scenario.units[unit].validate_, build=False)
+            return opened(scenario.replaced[instance], scenario.units[instance].validate_, build=False)
         except ModelDescriptionError:
             return None
 
@@ -302,6 +313,8 @@ def _check_instances(system: WiringContext) -> None:
 def _sorted(wires: Sequence[Wire], order: Sequence[str], fmus: Mapping[str, Fmu]) -> tuple[Wire, ...]:
     """Return the wires sorted by their target in evaluation order, then by input in the FMU's order."""
     place = {
-        (unit, name): (i, j) for i, unit in enumerate(order) for j, name in enumerate(fmus[unit].variables)
+        (instance, name): (i, j)
+        for i, instance in enumerate(order)
+        for j, name in enumerate(fmus[instance].variables)
     }
     return tuple(sorted(wires, key=lambda wire: place[(wire.target, wire.input)]))
