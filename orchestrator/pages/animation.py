@@ -325,7 +325,10 @@ def data_of(runs: Sequence[tuple[str, Frames]]) -> dict[str, Any]:
 
 
 def _run(number: int, label: str, frames: Frames, end: float, before: Sequence[Frames]) -> dict[str, Any]:
-    """Return the data of one run; its ground only if none of `before` has the same. `end`: of the longest [s]."""
+    """Return the data of one run; its ground only if none of `before` has the same.
+
+    `end` [s] is that of the longest run.
+    """
     ground = () if frames.ground in [other.ground for other in before] else frames.ground
     last = frames.channels["time"][-1]
     early = [f"this run ends at {last:.2f} s"] if last < end - 1e-6 and not frames.failed else []
