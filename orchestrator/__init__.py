@@ -1,1 +1,1 @@
-"""The master and what stands around it; it never imports components."""
+"""Scenarios, FMUs, the co-simulation master, results, experiments and commands; never imports components."""

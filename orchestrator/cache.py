@@ -1,14 +1,15 @@
-"""What this program keeps because it is costly to make again: in the user's cache, or a temporary folder.
+"""On-disk cache of expensive intermediate files, in the user's cache folder or a temporary one.
 
     <32 digits>-<n>/    FMUs, unpacked (see `fmu.archive`)
     <store>/<key>       small files that begin with the hash of their content
 
-Nobody has to look after it. Nothing in it is believed unseen: a file that was cut off or changed is
-made anew. Where the user's folder cannot be written (a container, another user's home), or its path
-is not plain ASCII, a temporary folder serves. The path must be plain because stock PythonFMU decodes
-nothing but `%20` in the address of its resources.
+The cache cleans up after itself, and every file is verified before it is used: a truncated or changed
+file is made again. If the user's folder cannot be written (a container, another user's home), or its path
+is not plain ASCII, a temporary folder is used. The path must be plain because stock PythonFMU decodes
+only `%20` in the URI of its resources.
 
-A hash of this program's own code: its version tells releases apart, not what was changed since.
+`sources_hash` identifies this program's own code, for keys and records: the version number does not change
+between releases.
 """
 
 from __future__ import annotations
@@ -28,45 +29,45 @@ from .files import fcntl, write_whole
 
 _PLAIN_PATH = re.compile(r"[A-Za-z0-9_.~/\\: -]+")
 KEEP_DAYS = 60
-"""What has not been used, or kept anew, for so long is deleted when something else is kept."""
+"""Files that have not been written for this many days are deleted when another one is stored."""
 _DIGITS = 32
-"""Of the hash that a kept file begins with."""
+"""Length of the hash at the beginning of a cached file."""
 
 
 def cache_folders() -> Iterator[Path]:
-    """Yield the folders to keep things in, best first: YAWBENCH_CACHE or the user's cache, a temporary one.
+    """Yield the candidate cache folders, best first: YAWBENCH_CACHE or the user's cache, then temporary ones.
 
     Raises:
-        ModelDescriptionError: there is none.
+        ModelDescriptionError: there is no usable folder.
     """
-    wanted = _wanted()
+    folder = _user_folder()
     problems = []
     not_plain = (
-        f"{wanted}: FMUs cannot be unpacked here: the path holds more than ASCII letters, digits, "
+        f"{folder}: FMUs cannot be unpacked here: the path holds more than ASCII letters, digits, "
         "spaces and ._~-; name another folder in YAWBENCH_CACHE"
     )
-    found = wanted is not None and bool(_PLAIN_PATH.fullmatch(str(wanted)))
-    if wanted is not None and found:
-        yield wanted
+    usable = folder is not None and bool(_PLAIN_PATH.fullmatch(str(folder)))
+    if folder is not None and usable:
+        yield folder
     user = os.getuid() if hasattr(os, "getuid") else os.environ.get("USERNAME", "user").encode().hex()
     for base in dict.fromkeys((_temporary(), os.environ.get("PUBLIC", "/tmp"))):
         if _PLAIN_PATH.fullmatch(base):
             try:
                 yield _private(Path(base) / f"yawbench-{user}")
-                found = True
+                usable = True
             except OSError as error:
                 problems.append(f"{base}: FMUs cannot be unpacked here: {error.strerror}")
             except ModelDescriptionError as error:
                 problems += error.problems
-    if not found:
+    if not usable:
         raise ModelDescriptionError([*problems, not_plain][0])
 
 
 def cache_folder() -> Path:
-    """Return the best of `cache_folders` that can be written.
+    """Return the first of `cache_folders` that can be written.
 
     Raises:
-        ModelDescriptionError: there is none.
+        ModelDescriptionError: none can be written.
     """
     for folder in cache_folders():
         with contextlib.suppress(OSError):
@@ -77,14 +78,14 @@ def cache_folder() -> Path:
 
 
 _held: dict[Path, int] = {}
-"""Folders of the cache that this process uses, and the descriptors of its locks."""
+"""Cache folders that this process uses -> descriptors of its shared locks."""
 
 
 def hold(folder: Path) -> None:
-    """Keep a folder of the cache from being cleared until this process has ended; it is made if need be."""
+    """Protect a cache folder from being cleared while this process lives; create it if necessary."""
     if fcntl is None or folder in _held:
         return
-    with contextlib.suppress(OSError):  # what cannot be locked is not cleared either
+    with contextlib.suppress(OSError):  # a folder that cannot be locked is never cleared either
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         descriptor = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
         try:
@@ -97,7 +98,7 @@ def hold(folder: Path) -> None:
 
 @contextlib.contextmanager
 def alone_in(folder: Path) -> Iterator[bool]:
-    """Keep others from using a folder of the cache while the block runs; yield whether nobody does."""
+    """Lock a cache folder exclusively while the block runs; yield False if another process uses it."""
     if fcntl is None:
         yield True
         return
@@ -115,8 +116,8 @@ def alone_in(folder: Path) -> Iterator[bool]:
         os.close(descriptor)
 
 
-def _wanted() -> Path | None:
-    """Return the folder that the environment asks for, or the user's; None without a home."""
+def _user_folder() -> Path | None:
+    """Return the folder from YAWBENCH_CACHE, else the user's cache folder; None without a home directory."""
     from platformdirs import user_cache_path
 
     chosen = os.environ.get("YAWBENCH_CACHE")
@@ -137,7 +138,7 @@ def _temporary() -> str:
 
 
 def _private(folder: Path) -> Path:
-    """Make a folder that others could have made first; refuse it if they have."""
+    """Create a folder in a shared place; refuse it if another user has created it first."""
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     if hasattr(os, "getuid") and folder.lstat().st_uid != os.getuid():
         raise ModelDescriptionError(
@@ -148,7 +149,7 @@ def _private(folder: Path) -> Path:
 
 
 def recall(store: str, key: str) -> bytes | None:
-    """Return what was kept under `key`, None if nothing was or it is not whole."""
+    """Return the content stored under `key`, None if there is none or it is damaged."""
     with contextlib.suppress(ModelDescriptionError):
         for folder in cache_folders():
             with contextlib.suppress(OSError):
@@ -158,9 +159,9 @@ def recall(store: str, key: str) -> bytes | None:
 
 
 def keep(store: str, key: str, content: bytes) -> None:
-    """Keep `content` under `key` in place of what was kept there, in the first folder that takes it.
+    """Store `content` under `key`, replacing what was there, in the first folder that can be written.
 
-    Where none does, nothing is kept: whatever it is will be made again.
+    If none can, nothing is stored: the content will be computed again.
     """
     with contextlib.suppress(ModelDescriptionError):
         for folder in cache_folders():
@@ -179,10 +180,10 @@ def keep(store: str, key: str, content: bytes) -> None:
 
 
 def content_of(file: Path) -> bytes | None:
-    """Return what a kept file holds, None if it is not whole.
+    """Return the content of a cached file, None if it is damaged.
 
     Raises:
-        OSError: it cannot be read.
+        OSError: the file cannot be read.
     """
     whole = file.read_bytes()
     return whole[_DIGITS:] if whole[:_DIGITS] == _hash(whole[_DIGITS:]) else None
@@ -193,22 +194,22 @@ def _hash(content: bytes) -> bytes:
 
 
 OF_RESULTS = ("plan.py", "scenario", "fmu", "wiring", "master", "results", "tyres")
-"""Modules and stages that have a say in what a run records; units have hashes of their own."""
+"""Modules and packages that determine what a run records; FMUs are hashed separately."""
 OF_METRICS = (*OF_RESULTS, "metrics")
-"""And in the numbers made of it."""
+"""Those that determine the metrics of a run."""
 OF_TESTS = (*OF_METRICS, "evaluation")
-"""And in what a standard test makes of it."""
+"""Those that determine the evaluation of a standard test."""
 
 _HERE = Path(__file__).parent
 
 
 @cache
 def sources_hash(parts: tuple[str, ...]) -> str:
-    """Return the first twelve digits of the SHA-256 of the code of modules and folders."""
+    """Return the first twelve hexadecimal digits of the SHA-256 of the code of modules and packages."""
     digest = hashlib.sha256()
     for part in parts:
-        place = _HERE / part
-        for file in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
+        path = _HERE / part
+        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
             digest.update(f"{file.relative_to(_HERE).as_posix()}\0".encode())
             digest.update(file.read_bytes())
     return digest.hexdigest()[:12]

@@ -1,9 +1,7 @@
-"""Checksums inside a JSON record: whatever was changed since it was written is found, with its key.
+"""Checksums of JSON records, one per key, and of result files: they detect changes after writing.
 
-Every record and journal line that is read back carries them. They guard against editors, merges and disks,
-not against somebody who makes new ones on purpose.
-
-The checksum of a file of results.
+Every record and journal line that is read back carries them. They protect against editors, merges and
+faulty disks, not against deliberate forgery.
 """
 
 from __future__ import annotations
@@ -22,29 +20,29 @@ from .messages import listed, short
 
 KEY = "checksums"
 WHOLE = "*"
-"""Stands for all keys together, so that none is lost or added unseen."""
+"""Key of the checksum of the whole record, which detects added and removed keys."""
 DIGITS = 16
-"""Hexadecimal digits of a checksum. Chosen: one in 10^19 changes goes unseen."""
+"""Hexadecimal digits of a checksum. Chosen: one in 10^19 changes goes undetected."""
 NAMED = 5
-"""Keys named in a sentence. Chosen: what fits into a line or two."""
+"""Maximum number of keys named in a message. Chosen: they fit into a line or two."""
 
 
 def checksums_of(content: Mapping[str, Any]) -> dict[str, str]:
-    """Return the checksums of a record, one per key and one of the whole."""
+    """Return the checksums of a record: one per key, and one of the whole record."""
     parts = {key: _digest(value) for key, value in content.items()}
     return {WHOLE: _digest(dict(content)), **parts}
 
 
 def with_checksums(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a record with its checksums, in place of those that it may have."""
+    """Return a record with its checksums, replacing existing ones."""
     bare = {key: value for key, value in content.items() if key != KEY}
     return {**bare, KEY: checksums_of(bare)}
 
 
 def changed_since(content: Mapping[str, Any]) -> str:
-    """Return in words what was changed in a record since it was written, "" if nothing was.
+    """Describe what was changed in a record since it was written, "" if nothing was.
 
-    A record without checksums is taken as it is; see `has_checksums`.
+    A record without checksums counts as unchanged; see `has_checksums`.
     """
     if not has_checksums(content):
         return ""
@@ -52,31 +50,31 @@ def changed_since(content: Mapping[str, Any]) -> str:
 
 
 def what_changed(content: Mapping[str, Any], known: Any) -> str:
-    """Return in words what in a record does not fit its checksums, "" if all does."""
+    """Describe which keys of a record do not match its checksums, "" if all do."""
     if not isinstance(known, dict) or WHOLE not in known:
         return f"{KEY!r} was changed"
-    found = checksums_of(content)
+    actual = checksums_of(content)
     words = [
         f"{what} was {how}"
         for how, keys in (
-            ("changed", [key for key in found if key in known and known[key] != found[key]]),
-            ("added", [key for key in found if key not in known]),
-            ("removed", [key for key in known if key not in found]),
+            ("changed", [key for key in actual if key in known and known[key] != actual[key]]),
+            ("added", [key for key in actual if key not in known]),
+            ("removed", [key for key in known if key not in actual]),
         )
         if (what := _named([key for key in keys if key != WHOLE]))
     ]
-    if not words and known[WHOLE] != found[WHOLE]:
+    if not words and known[WHOLE] != actual[WHOLE]:
         words = [f"{KEY}.{WHOLE} was changed"]
     return ", ".join(words)
 
 
 def has_checksums(content: Mapping[str, Any]) -> bool:
-    """Return whether a record carries checksums: those of earlier versions do not."""
+    """Return whether a record carries checksums; records of earlier versions do not."""
     return KEY in content
 
 
 def warn(sentence: str) -> None:
-    """Tell the user what was found in a record; the process that a command began in does."""
+    """Warn the user about a record; only in the main process, so that workers do not repeat it."""
     if multiprocessing.parent_process() is None:
         warnings.warn(RecordWarning(sentence), stacklevel=3)
 
@@ -101,5 +99,5 @@ def checksum(path: Path) -> str:
 
 
 def shown(digest: Any) -> str:
-    """Return a SHA-256 as it stands in a run's record."""
+    """Return a SHA-256 as written in run records."""
     return f"sha256:{digest.hexdigest()}"

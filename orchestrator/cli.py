@@ -50,7 +50,7 @@ COMMANDS = {
 
 
 class _Commands(TyperGroup):
-    """All commands. What ends one of them from outside is told here, for typer tells SIGTERM as Ctrl-C."""
+    """The command group. It reports interruptions itself, because typer treats SIGTERM like Ctrl-C."""
 
     def make_context(self, *given: Any, **options: Any) -> Any:
         with _interruptible():
@@ -63,7 +63,7 @@ class _Commands(TyperGroup):
 
 @contextlib.contextmanager
 def _interruptible() -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM end the program with a word and an exit status that tells them apart."""
+    """Turn Ctrl-C and SIGTERM into a message and an exit status of their own (130, 143)."""
     try:
         yield
     except (Exception, KeyboardInterrupt) as error:
@@ -72,19 +72,19 @@ def _interruptible() -> Iterator[None]:
             raise
         interrupted = Interrupted.of(cause)
         _print_traceback(error)
-        _say(interrupted.problems)
+        _print_problems(interrupted.problems)
         raise SystemExit(interrupted.exit_status) from None
 
 
 def _interruption_in(error: BaseException | None) -> KeyboardInterrupt | None:
-    """Return what has interrupted the program; Python wraps it if it comes while a class is being made."""
+    """Return the KeyboardInterrupt behind an error; Python wraps it if it occurs during class creation."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error
 
 
 def _application(arguments: Sequence[str] = ()) -> typer.Typer:
-    """Return the program with the command that is called, or with all if none is, as for help."""
+    """Return the application with the called command only, which starts faster; without one, with all."""
     called = arguments[:1] if arguments and arguments[0] in COMMANDS else COMMANDS
     app = typer.Typer(
         name="yawbench",
@@ -100,8 +100,8 @@ def _application(arguments: Sequence[str] = ()) -> typer.Typer:
     return app
 
 
-def _tell_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(requested: bool) -> None:
+    if requested:
         from importlib.metadata import version
 
         typer.echo(f"yawbench {version('yawbench')}")
@@ -111,7 +111,7 @@ def _tell_version(wanted: bool) -> None:
 def _options(
     _: Annotated[
         bool,
-        typer.Option("--version", callback=_tell_version, is_eager=True, help="Print the version."),
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version."),
     ] = False,
 ) -> None:
     """A test bench for vehicle yaw-stability control made of FMI units."""
@@ -120,18 +120,17 @@ def _options(
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit with 0, 1 (the run failed) or 2 (the input is wrong).
 
-    If Ctrl-C or SIGTERM ends it, with 130 or 143.
-
-    Without arguments, this is the program: it takes them from its call, and leaves at once.
+    The exit status is 130 after Ctrl-C and 143 after SIGTERM. Without arguments, those of `sys.argv` are
+    used, and the process exits without shutting the interpreter down.
     """
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # of others; to look for them takes time
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # searching for plugins takes time
     _make_printable()
-    if not os.environ.get(TRACEBACK):  # what a library's objects complain of when they go is for nobody
+    if not os.environ.get(TRACEBACK):  # ignore errors raised in destructors of libraries
         sys.unraisablehook = lambda _: None
     with terminable():
         status = _status(sys.argv[1:] if arguments is None else arguments)
     if arguments is None and threading.active_count() == 1:
-        # To take the interpreter apart takes as long as a short command.
+        # Interpreter shutdown costs as much as a short command: skip it.
         atexit._run_exitfuncs()
         sys.stderr.flush()
         os._exit(status)
@@ -139,7 +138,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _status(arguments: Sequence[str]) -> int:
-    """Run a command, say what is wrong, and return the exit status."""
+    """Run a command, report its errors, and return the exit status."""
     try:
         os.getcwd()
     except OSError:
@@ -155,9 +154,9 @@ def _status(arguments: Sequence[str]) -> int:
             sys.stdout.flush()
     except YawbenchError as error:
         _print_traceback(error)
-        _say(error.problems)
+        _print_problems(error.problems)
         return error.exit_status
-    except BrokenPipeError:  # whoever read it has seen enough
+    except BrokenPipeError:  # the reader closed the pipe
         pass
     except OSError as error:  # a figure or table that cannot be written, most likely
         _print_traceback(error)
@@ -173,14 +172,14 @@ def _status(arguments: Sequence[str]) -> int:
 
 @contextlib.contextmanager
 def _warnings_as_notes() -> Iterator[None]:
-    """Say warnings of our own as every note is said; others stay as Python shows them."""
+    """Print this package's warnings as notes; leave other warnings to Python."""
     with warnings.catch_warnings():
         warnings.simplefilter("always", RecordWarning)
         before = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
             if issubclass(category, RecordWarning):
-                print(cut(printable(f"note: {message}"), SAID), file=sys.stderr, flush=True)
+                print(cut(printable(f"note: {message}"), LONGEST_MESSAGE), file=sys.stderr, flush=True)
             else:
                 before(message, category, *where, **more)
 
@@ -188,27 +187,27 @@ def _warnings_as_notes() -> Iterator[None]:
         yield
 
 
-SAID = 5000
-"""Characters of one sentence on the terminal. Chosen: twice the longest list of names."""
+LONGEST_MESSAGE = 5000
+"""Characters of a message on the terminal. Chosen: twice the longest list of names."""
 TRACEBACK = "YAWBENCH_TRACEBACK"
-"""Environment variable; if it is set, errors are shown with where in the program they come from."""
+"""Environment variable; if it is set, errors are printed with their tracebacks."""
 
 
-def _say(problems: Iterable[str]) -> None:
+def _print_problems(problems: Iterable[str]) -> None:
     for problem in problems:
-        print(cut(printable(problem), SAID), file=sys.stderr)
+        print(cut(printable(problem), LONGEST_MESSAGE), file=sys.stderr)
 
 
 def _print_traceback(error: BaseException) -> bool:
-    """Show where an error and what it was made of come from, if that is asked for; return whether."""
-    wanted = bool(os.environ.get(TRACEBACK))
-    if wanted:
+    """Print the traceback of an error and its causes if `TRACEBACK` is set; return whether it is."""
+    requested = bool(os.environ.get(TRACEBACK))
+    if requested:
         print(printable("".join(traceback.format_exception(error))), end="", file=sys.stderr)
-    return wanted
+    return requested
 
 
 def _own_error(error: Exception, shown: bool) -> str:
-    """Return the sentence for what should never happen: a mistake in this program, not in a file."""
+    """Return the message for an unexpected error: a bug in this program."""
     frame = traceback.extract_tb(error.__traceback__)[-1]
     what = printable(" ".join(f"{type(error).__name__}: {error}".split()))
     hint = "" if shown else f"; {TRACEBACK}=1 shows more"
@@ -219,7 +218,7 @@ def _own_error(error: Exception, shown: bool) -> str:
 
 
 def _make_printable() -> None:
-    """Let messages pass whatever the terminal can show, and be lost where nobody listens."""
+    """Escape characters that the terminal cannot encode, and replace closed streams by the null device."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:  # closed by the caller, as by `>&-`

@@ -1,17 +1,17 @@
-"""Everything that can go wrong, as one tree.
+"""Exceptions and warnings of this package, as one hierarchy.
 
     YawbenchError                 exit status
     ├── ScenarioError             2   the scenario file or a command-line override is wrong
     ├── ModelDescriptionError     2   an FMU is missing, corrupt or not supported
-    ├── WiringError               2   units cannot be connected as asked
+    ├── WiringError               2   instances cannot be connected as requested
     ├── ResultsError              2   recorded results are missing or unreadable
     ├── BuildError                1   a component cannot be made into an FMU
-    └── SimulationError           1   a run failed; knows unit and time
+    └── SimulationError           1   a run failed; has the instance and the time
 
-`Interrupted` (Ctrl-C, SIGTERM) is not part of it: it is a KeyboardInterrupt, so code that goes on after an
-error does not go on after Ctrl-C.
+`Interrupted` (Ctrl-C, SIGTERM) is a KeyboardInterrupt instead, so that code which continues after an error
+does not continue after Ctrl-C.
 
-All problems of one file are collected and raised once. Each is a sentence that says where, what,
+All problems of one file are collected and raised together. Each is a sentence that says where, what,
 and what is allowed.
 """
 
@@ -28,18 +28,18 @@ if TYPE_CHECKING:
     from .plan import Finding
 
 KEPT = "kept"
-"""Kind of the problem that names the results of a run that failed."""
+"""Kind of the problem that names the saved results of a failed run."""
 
 
 class Problem(str):
-    """What is wrong: a sentence that begins with its place, and knows that place.
+    """An error message that begins with its location, which its attributes give separately.
 
     Attributes:
-        text: the sentence without its place.
-        file: in which it is; None: in none.
-        line: of the file; None: in no line of it.
-        place: the value, such as "units.plant.fmu", or the change that gave it; "" if it is no value.
-        kind: KEPT, or "" of most.
+        text: the message without its location.
+        file: the file with the error, if any.
+        line: the line in the file, if any.
+        place: the key of the value, such as "units.plant.fmu", or the override that set it; "" if neither.
+        kind: KEPT, or "".
     """
 
     text: str
@@ -52,16 +52,16 @@ class Problem(str):
         cls, text: str, *, file: Path | None = None, line: int | None = None, place: str = "", kind: str = ""
     ) -> Problem:
         where = f"{file}:{line}" if file and line else f"{file or ''}"
-        text = printable(text)  # of users, FMUs and files: nothing of it may act on a terminal or a page
+        text = printable(text)  # from users, FMUs and files: must not contain control characters
         made = super().__new__(cls, printable(": ".join(filter(None, (where, place, text)))))
         made.text, made.file, made.line, made.place, made.kind = text, file, line, place, kind
         return made
 
 
 class YawbenchError(Exception):
-    """Base of all errors; `problems` are its sentences, each with its file and line if it has any.
+    """Base class of all errors; `problems` are its messages, each with file and line where known.
 
-    `file` and `line` are those of the first problem that has them, None where none has.
+    `file` and `line` are those of the first problem that has them, else None.
 
     >>> try:
     ...     yb.load("fnn_sideslip/26mps")
@@ -73,18 +73,18 @@ class YawbenchError(Exception):
     exit_status = 2
 
     def __init__(self, problems: str | Iterable[str]) -> None:
-        given = [problems] if isinstance(problems, str) else problems
-        self.problems = [one if isinstance(one, Problem) else Problem(one) for one in given]
-        placed = next((one for one in self.problems if one.file), None)
-        self.file = placed.file if placed else None
-        self.line = placed.line if placed else None
+        texts = [problems] if isinstance(problems, str) else problems
+        self.problems = [text if isinstance(text, Problem) else Problem(text) for text in texts]
+        located = next((problem for problem in self.problems if problem.file), None)
+        self.file = located.file if located else None
+        self.line = located.line if located else None
         super().__init__("\n".join(self.problems))
 
 
 class YawbenchWarning(UserWarning):
-    """Remarks on a run that is no failure but hardly meant: a car that spins, a friction of 65.
+    """A run succeeded but is probably not as intended: the car spins, a friction coefficient is 65.
 
-    `Scenario.run` and `Experiment.run` give one for each call. Filters of the module `warnings` make it an
+    `Scenario.run` and `Experiment.run` issue one per call. Filters of the module `warnings` turn it into an
     error or silence it.
 
     >>> import warnings
@@ -97,7 +97,7 @@ class YawbenchWarning(UserWarning):
 
 
 class ScenarioError(YawbenchError):
-    """The scenario file or a change of it is wrong.
+    """The scenario file or an override of it is wrong.
 
     >>> base.set({"stop_time": -1})
     Traceback (most recent call last):
@@ -115,7 +115,7 @@ class ModelDescriptionError(YawbenchError):
 
 
 class WiringError(YawbenchError):
-    """Units cannot be connected as asked.
+    """Instances cannot be connected as requested.
 
     >>> base.swap(controller=lambda roll_angle: -1e5 * roll_angle).run()
     Traceback (most recent call last):
@@ -133,7 +133,7 @@ class ResultsError(YawbenchError):
 
 
 class RecordWarning(UserWarning):
-    """What stands in a folder of results is not what was written there, or cannot be checked.
+    """A results folder was changed after it was written, or cannot be verified.
 
     >>> import warnings
     >>> warnings.simplefilter("error", yb.RecordWarning)  # to stop where a record carries no checksums
@@ -141,7 +141,7 @@ class RecordWarning(UserWarning):
 
 
 class BuildError(YawbenchError):
-    """A component cannot be made into an FMU; raised by a run whose FMUs have to be built first.
+    """An FMU cannot be built from its component; also raised by runs that have to build FMUs first.
 
     >>> try:
     ...     run = base.run()
@@ -170,11 +170,11 @@ class SimulationError(YawbenchError):
         super().__init__(problem)
         self.instance = instance
         self.time = time
-        self.findings: tuple[Finding, ...] = ()  # on the run's course until then
+        self.findings: tuple[Finding, ...] = ()  # about the run up to that time
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C or SIGTERM, which has ended a run of `instance` (None: between two calls) at `time` [s]."""
+    """Ctrl-C or SIGTERM stopped a run at `time` [s], during a call of `instance` (None: between calls)."""
 
     def __init__(
         self,
@@ -184,7 +184,7 @@ class Interrupted(KeyboardInterrupt):
         time: float | None = None,
         number: int = signal.SIGINT,
     ) -> None:
-        self.problems = [Problem(one) for one in ([problem] if isinstance(problem, str) else problem)]
+        self.problems = [Problem(text) for text in ([problem] if isinstance(problem, str) else problem)]
         self.instance = instance
         self.time = time
         self.number = number
@@ -192,10 +192,10 @@ class Interrupted(KeyboardInterrupt):
 
     @property
     def exit_status(self) -> int:
-        """As shells have it: 130 after Ctrl-C, 143 after SIGTERM."""
+        """Exit status by the convention of shells: 130 after Ctrl-C, 143 after SIGTERM."""
         return 128 + self.number
 
     @classmethod
     def of(cls, error: KeyboardInterrupt) -> Interrupted:
-        """Return the error itself, or one that stands for a plain KeyboardInterrupt."""
+        """Convert a KeyboardInterrupt to this type; return the error itself if it is of it already."""
         return error if isinstance(error, cls) else cls()

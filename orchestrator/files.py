@@ -1,13 +1,13 @@
-"""Users' files: opened without waiting, bounded in size, and every mistake in them a sentence.
+"""Safe reading and atomic writing of files.
 
-Every reader of a user's file (scenario, vehicle, study, sweep, SSP archive, FMU, results, time series)
-gets its bytes from `read_bytes` or `open_regular` and works inside `reading`. Mistakes that a reader
-foresees it reports itself, with the line; `reading` is for those that nobody foresaw.
+Reading never blocks, is bounded in size, and turns every error into one message. Every reader of a user's
+file (scenario, vehicle, study, sweep, SSP archive, FMU, results, time series) gets its bytes from
+`read_bytes` or `open_regular` and works inside `reading`. Readers report expected errors with their line;
+`reading` turns everything else into one message.
 
-Files written whole or not at all, and never through a link in a results folder.
-
-Results may come from somebody else, with links in place of the files and folders that are written there.
-The folder that the user names may itself be a link, or lie behind one. Below it no link is followed.
+Files are written completely or not at all, and never through a symbolic link in a results folder: results
+may come from other people, with links in place of files and folders. The folder that the user names may
+itself be a link, or be reached through one; below it, no link is followed.
 """
 
 from __future__ import annotations
@@ -31,30 +31,30 @@ R = TypeVar("R")
 TEXT = 1_000_000
 """Bytes of a YAML file. Chosen: fifty times the largest of ours; reading them takes five seconds."""
 PACKED = 1_000_000_000
-"""Bytes of an archive. Chosen: more than any FMU that we have met, and it is held in memory."""
+"""Bytes of an archive. Chosen: larger than all FMUs known to us, and it fits into memory."""
 UNPACKED = 1_000_000_000
-"""Bytes of all members of an archive. Chosen: likewise."""
+"""Bytes of all members of an archive, unpacked. Chosen: as `PACKED`."""
 MEMBERS = 50_000
 """Members of an archive. Chosen: ten times what a whole Python with numpy has."""
 DEPTH = 100
-"""Folders in each other in an archive. Chosen: ten times what a whole Python has; the standard library
-makes and deletes folders by recursion."""
+"""Nested folders in an archive. Chosen: ten times what a whole Python has; the standard library
+creates and deletes folders by recursion."""
 
 
 NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
-"""Flag that opens no symbolic link; Windows has none, there `refuse_link` alone must do."""
+"""Flag that refuses to open symbolic links; missing on Windows, where `refuse_link` alone has to do."""
 
 
 class TooLargeError(ValueError):
-    """What is in a file is more than is read, in a sentence that begins with "it" or a participle."""
+    """A file is too large to read; the message has the file as its subject ("it is larger than ...")."""
 
 
 def check_regular(path: Path) -> None:
-    """Make sure that a path names a regular file, so that no reader waits for a pipe or a device.
+    """Check that a path is a regular file, so that no reader blocks on a pipe or a device.
 
     Raises:
-        OSError: there is none, or a folder.
-        ValueError: it is something else, or no path can be called so.
+        OSError: the path does not exist, or is a folder.
+        ValueError: it is something else, or not a valid path.
     """
     mode = os.stat(path).st_mode
     if stat.S_ISDIR(mode):
@@ -64,25 +64,25 @@ def check_regular(path: Path) -> None:
 
 
 def refuse_link(path: Path) -> None:
-    """Make sure that a path does not name a symbolic link.
+    """Check that a path is not a symbolic link.
 
     Raises:
-        OSError: it does.
+        OSError: it is one.
     """
     if os.path.islink(path):
         raise OSError(errno.ELOOP, f"{path.name} is a symbolic link, which is not followed", str(path))
 
 
 def open_regular(path: Path, *, follow: bool = True) -> BinaryIO:
-    """Open a regular file for reading, without waiting for anything.
+    """Open a regular file for reading, without blocking.
 
     Args:
-        path: of the file.
-        follow: a symbolic link; False: refuse it.
+        path: the file.
+        follow: whether to follow a symbolic link; False: refuse it.
 
     Raises:
-        OSError: it cannot be opened.
-        ValueError: it is no regular file, or no path can be called so.
+        OSError: the file cannot be opened.
+        ValueError: it is not a regular file, or not a valid path.
     """
     check_regular(path)
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
@@ -90,7 +90,7 @@ def open_regular(path: Path, *, follow: bool = True) -> BinaryIO:
         refuse_link(path)
         flags |= NO_FOLLOW
     stream = open(os.open(path, flags), "rb")  # noqa: SIM115
-    if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):  # exchanged since
+    if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):  # replaced since the check
         stream.close()
         raise ValueError("it is a pipe, a socket or a device, not a file")
     return stream
@@ -100,27 +100,27 @@ def read_bytes(path: Path, *, largest: int, follow: bool = True) -> bytes:
     """Return the content of a regular file.
 
     Args:
-        path: of the file.
-        largest: size [bytes].
-        follow: a symbolic link; False: refuse it.
+        path: the file.
+        largest: maximum size [bytes].
+        follow: whether to follow a symbolic link; False: refuse it.
 
     Raises:
-        OSError: it cannot be opened or read.
-        ValueError: it is no regular file, or no path can be called so.
+        OSError: the file cannot be opened or read.
+        ValueError: it is not a regular file, or not a valid path.
         TooLargeError: it is larger than `largest`.
     """
     with open_regular(path, follow=follow) as stream:
         size = os.fstat(stream.fileno()).st_size
         if size > largest:
             raise TooLargeError(f"it is larger than {_in_words(largest)}")
-        return stream.read(size)  # room for as much is made, however little there is
+        return stream.read(size)  # allocates that much even for a short file, so not `largest`
 
 
 def check_archive(archive: zipfile.ZipFile) -> None:
-    """Make sure that an archive can be unpacked, by what its directory says: no more is ever read.
+    """Check the size of an archive by its directory; `zipfile` never reads more than that declares.
 
     Raises:
-        TooLargeError: a sentence.
+        TooLargeError: too many members, too many bytes, or too deeply nested folders.
     """
     members = archive.infolist()
     if len(members) > MEMBERS:
@@ -139,12 +139,12 @@ def _in_words(size: int) -> str:
 
 @contextlib.contextmanager
 def reading(what: str, path: Path | str, error: type[YawbenchError]) -> Iterator[None]:
-    """Turn what nobody foresaw while a user's file is read into one sentence; the cause stays chained.
+    """Convert unexpected exceptions while a user's file is read into one message, with the cause chained.
 
     Args:
-        what: the file is, or what else is read: "scenario file".
-        path: of the file, or what else says the place.
-        error: raised in place of the cause.
+        what: what is being read, for the message: "scenario file".
+        path: the file, or another description of the location.
+        error: type of the exception to raise.
     """
     try:
         yield
@@ -164,7 +164,7 @@ def reading(what: str, path: Path | str, error: type[YawbenchError]) -> Iterator
 def reads(
     what: str, error: type[YawbenchError]
 ) -> Callable[[Callable[Concatenate[Path | str, P], R]], Callable[Concatenate[Path | str, P], R]]:
-    """Return a decorator for a function that reads the file that is its first argument; see `reading`."""
+    """Decorate a function that reads the file given as its first argument; see `reading`."""
 
     def decorate(
         function: Callable[Concatenate[Path | str, P], R],
@@ -189,40 +189,40 @@ def reason(error: Exception) -> str:
 
 try:
     import fcntl
-except ImportError:  # Windows, where a file that somebody writes cannot be replaced anyway
+except ImportError:  # Windows, where an open file cannot be replaced anyway
     fcntl = None  # type: ignore[assignment]
 
 NEW = ".new"
-"""What the name of a file ends in for the moment in which it is being written."""
+"""Suffix of the temporary file while a file is written."""
 
 
 LOCK_FILE = ".yawbench-lock"
-"""Name of the file that its writer has locked in a folder of results."""
+"""Name of the file in a results folder that is locked by its writer."""
 
 
 def write_whole(path: Path, content: str | bytes, *, named: bool = False) -> None:
-    """Write a file so that at any moment there is what stood there before, or all of the new content.
+    """Write a file atomically: at any moment it has its old content or all of the new.
 
-    The folder is made if it does not exist. What a dead process has left under the temporary name is
-    overwritten. A link, pipe or device in the file's place is replaced, its target left alone.
+    The folder is created if necessary. A temporary file left by a dead process is overwritten. A link,
+    pipe or device at the path is replaced, its target unchanged.
 
     Args:
-        path: of the file.
-        content: of the file.
-        named: the user has named this very file: a link stays and its target is replaced, a pipe or a
+        path: the file.
+        content: its new content.
+        named: the user has named this very file: a link is kept and its target replaced, a pipe or a
             device is written to.
 
     Raises:
-        OSError: the file cannot be written; what stood there has not changed.
+        OSError: the file cannot be written; its old content is unchanged.
     """
-    # a path that is no UTF-8 comes as lone surrogates, which text shows as \\udcxx
+    # a path that is not UTF-8 has lone surrogates, which are written as \\udcxx
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     target = Path(os.path.realpath(path)) if named else path
     try:
         if not named:
             refuse_links_within(target.parent)
         target.parent.mkdir(parents=True, exist_ok=True)
-        if named and target.exists() and not target.is_file():  # a device or a pipe; a folder will say so
+        if named and target.exists() and not target.is_file():  # a device or a pipe; a folder raises
             target.write_bytes(data)
             return
         part = target.with_name(target.name + NEW)
@@ -245,10 +245,10 @@ def write_whole(path: Path, content: str | bytes, *, named: bool = False) -> Non
 
 
 def open_own(path: Path, flags: int, mode: int = 0o666) -> int:
-    """Open a file that only this program writes: a regular file, no link, with no other name.
+    """Open a file that only this program writes; refuse symbolic and hard links, pipes and devices.
 
     Raises:
-        OSError: it cannot be opened, or is something else.
+        OSError: the file cannot be opened, or is refused.
     """
     refuse_link(path)
     more = NO_FOLLOW | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
@@ -265,17 +265,17 @@ def open_own(path: Path, flags: int, mode: int = 0o666) -> int:
 
 
 def claim(path: Path, *, wait: bool = False) -> int:
-    """Open a file (see `open_own`), made if it does not exist, and lock it until its descriptor is closed.
+    """Open or create a file (see `open_own`), and lock it until its descriptor is closed.
 
-    The lock ends with the process, however that ends. On network drives that cannot lock it is none.
+    The lock ends with the process, however that ends. Network drives without locks are not locked.
 
     Args:
-        path: of the file.
-        wait: for the one who holds it.
+        path: the file.
+        wait: whether to wait if another process has locked it.
 
     Raises:
-        BlockingIOError: somebody else holds it, and nobody is to wait.
-        OSError: it cannot be opened.
+        BlockingIOError: another process has locked it, and `wait` is False.
+        OSError: the file cannot be opened.
     """
     while True:
         descriptor = open_own(path, os.O_RDWR | os.O_CREAT)
@@ -291,14 +291,14 @@ def claim(path: Path, *, wait: bool = False) -> int:
         with contextlib.suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(descriptor), os.lstat(path)):
                 return descriptor
-        os.close(descriptor)  # the one who held it has renamed or removed it
+        os.close(descriptor)  # the previous owner of the lock has renamed or removed the file: try again
 
 
 @contextlib.contextmanager
 def draft_of(file: Path, content: bytes) -> Iterator[Path]:
-    """Write `content` beside `file`, for whoever looks at it before it is put in its place.
+    """Write `content` to a temporary draft next to `file`, to be checked before it replaces the file.
 
-    Who else makes a draft of the same file waits. What a dead process has left is overwritten.
+    Other processes that draft the same file wait. A draft left by a dead process is overwritten.
     """
     path = _draft(file)
     descriptor = claim(path, wait=True)
@@ -318,7 +318,7 @@ def draft_of(file: Path, content: bytes) -> Iterator[Path]:
 
 
 def remove_draft(file: Path) -> None:
-    """Remove the draft of a file that a dead process has left."""
+    """Remove a draft of a file that a dead process has left."""
     path = _draft(file)
     if not path.is_file():
         return
@@ -333,9 +333,9 @@ def _draft(file: Path) -> Path:
 
 
 def lock_note(folder: Path) -> bytes | None:
-    """Return what the process that holds a folder has written into its lock file, None if nobody does.
+    """Return the content of a folder's lock file if a process has locked it, else None.
 
-    Nothing is changed, and no lock file made.
+    Changes nothing and creates no lock file.
     """
     try:
         descriptor = open_own(folder / LOCK_FILE, os.O_RDONLY)
@@ -346,7 +346,7 @@ def lock_note(folder: Path) -> bytes | None:
             if fcntl is not None:
                 fcntl.flock(stream.fileno(), fcntl.LOCK_SH | fcntl.LOCK_NB)
                 return None
-        except OSError:  # held, or on a network drive that cannot tell
+        except OSError:  # locked, or on a network drive without locks
             pass
         with contextlib.suppress(OSError):
             return stream.read(TEXT)
@@ -354,10 +354,10 @@ def lock_note(folder: Path) -> bytes | None:
 
 
 def refuse_links_within(folder: Path) -> None:
-    """Make sure that no link leads from a held folder to one below it, or out of it.
+    """Check that no folder on the path below a locked results folder is a symbolic link.
 
     Raises:
-        OSError: one of the folders below the outermost that a process holds is a link.
+        OSError: one of the folders below the outermost locked one is a link.
     """
     absolute = Path(os.path.abspath(folder))
     below: list[Path] = []

@@ -1,4 +1,4 @@
-"""What a run is called wherever it is drawn, printed or listed: its title with all that was changed."""
+"""Labels of runs in figures, tables and lists: the title with the overrides in words."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from typing import Any
 from .plan import Override, Plan
 
 OF_TIME = ("start_time", "stop_time", "step_size")
-"""Changes of the run that are times."""
+"""Overrides of the run whose values are times."""
 
 
 def changed(changes: Iterable[Override]) -> str:
-    """Return changes in words, `controller_off for controller, inputs.friction* = 0.3`; "" for none."""
+    """Return overrides in words, `controller_off for controller, inputs.friction* = 0.3`; "" for none."""
     return ", ".join(map(in_words, changes))
 
 
 def in_words(change: Override) -> str:
-    """Return a change in words."""
+    """Return an override in words."""
     value = change.value
     if change.faulty:
         return f"{change.faulty}: {value}"
@@ -38,53 +38,53 @@ def in_words(change: Override) -> str:
 
 def faults_of(plan: Plan) -> str:
     """Return the faults of a plan in words."""
-    return "; ".join(dict.fromkeys(f"{one.place}: {one.says}" for one in plan.faults))
+    return "; ".join(dict.fromkeys(f"{fault.place}: {fault.says}" for fault in plan.faults))
 
 
 def with_changes(title: str, changes: Iterable[Override]) -> str:
-    """Return a title in one line with what was changed behind it."""
+    """Return a title in one line, followed by the overrides."""
     words = changed(changes)
     return f"{title} (changed: {words})" if words and title else f"changed: {words}" if words else title
 
 
 def changes_in(run: Mapping[str, Any]) -> tuple[Override, ...]:
-    """Return what was changed for a run, by its record."""
-    given = run.get("changes")
+    """Return the overrides in a run record."""
+    items = run.get("changes")
     return tuple(
-        Override(str(one["place"]), one.get("value", ""), str(one.get("origin", "")))
-        for one in (given if isinstance(given, list) else ())
-        if isinstance(one, dict) and "place" in one
+        Override(str(item["place"]), item.get("value", ""), str(item.get("origin", "")))
+        for item in (items if isinstance(items, list) else ())
+        if isinstance(item, dict) and "place" in item
     )
 
 
 def changes_of_all(every: Sequence[Sequence[Override]]) -> tuple[Override, ...]:
-    """Return what was changed alike for all runs."""
+    """Return the overrides that all runs have in common."""
     first, *others = every or [()]
-    return tuple(one for one in first if all(_among(one, changes) for changes in others))
+    return tuple(change for change in first if all(_among(change, changes) for changes in others))
 
 
 def changed_each(labelled: Sequence[tuple[str, Sequence[Override]]]) -> str:
-    """Return what was changed for several runs (label, changes): for all, then for each by its label.
+    """Return the overrides of several runs (label, overrides) in words: common ones first, then by label.
 
-    A swap is not said again of a run that is called by its FMU.
+    A swap is left out where the label of the run names the FMU already.
     """
     common = changes_of_all([changes for _, changes in labelled])
     parts = [changed(common)]
     for label, changes in labelled:
-        own = [one for one in changes if not _among(one, common) and not _is_said(one, label)]
+        own = [change for change in changes if not _among(change, common) and not _in_label(change, label)]
         parts += [f"{label}: {changed(own)}"] if own else []
     return "; ".join(filter(None, parts))
 
 
-def _is_said(change: Override, label: str) -> bool:
+def _in_label(change: Override, label: str) -> bool:
     return change.swaps and fmu_of(change) == label.rpartition("/")[2]
 
 
 def fmu_of(swap: Override) -> str:
-    """Return the name of the FMU that a swap puts in."""
+    """Return the name of the FMU that a swap inserts."""
     name = str(swap.value)
     return Path(name).stem if name.lower().endswith(".fmu") else name
 
 
 def _among(change: Override, changes: Iterable[Override]) -> bool:
-    return any((one.place, one.value) == (change.place, change.value) for one in changes)
+    return any((other.place, other.value) == (change.place, change.value) for other in changes)

@@ -1,4 +1,4 @@
-"""What error messages say about a wrong name: the likely one, or all that are allowed."""
+"""Building blocks of messages: lists, shortened and escaped text, "did you mean", merging of four wheels."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import TypeVar
 from vocabulary.wheels import WHEELS
 
 _WHEEL_SUFFIX = re.compile(rf"_({'|'.join(WHEELS)})(?=_true\b|\b)")
-"""The wheel in a name, also in that of what a sensor measures (`wheel_speed_fl_true`)."""
+"""The wheel in a name, also in that of a sensor's true value (`wheel_speed_fl_true`)."""
 
 K = TypeVar("K")
 
 LISTED = 100
-"""Names in one sentence. Chosen: more than any of our FMUs has parameters."""
+"""Maximum number of names in a list. Chosen: more than any of our FMUs has parameters."""
 ALIKE = 500
-"""Names compared with a wrong one; of more, those that begin like it. Chosen: 20 ms."""
+"""Names compared with a wrong name; of more, those with the same beginning. Chosen: 20 ms."""
 
 
 def listed(items: Iterable[object], *, last: str = "and") -> str:
-    """Return 'a, b and c'; of very many the first ones, 'a, b, c and 900 more'."""
+    """Return 'a, b and c'; for long lists the first items, 'a, b, c and 900 more'."""
     words = [str(item) for item in items]
     if len(words) > LISTED:
         words[LISTED - 1 :] = [f"{len(words) - LISTED + 1} more"]
@@ -31,42 +31,42 @@ def listed(items: Iterable[object], *, last: str = "and") -> str:
 
 
 def short(value: object) -> str:
-    """Return a value as it stands in a message: in one line, cut if long, by its type if it has no text."""
+    """Return a value for use in a message: its repr in one line, shortened, or its type if repr fails."""
     if value is None:
         return "nothing"
     try:
         text = repr(value)
-    except Exception:  # a number of 5000 digits, or what an object of somebody else's makes of itself
+    except Exception:  # a number of 5000 digits, or a user's class with a faulty __repr__
         return f"an object of {type(value).__name__}"
     return cut(printable(" ".join(text.splitlines())), 60)
 
 
 def cut(text: str, longest: int = 200) -> str:
-    """Return a text, cut if it is longer than a message may be."""
+    """Return a text, truncated to `longest` characters."""
     return text if len(text) <= longest else text[: longest - 3] + "..."
 
 
 _UNPRINTABLE = re.compile(
-    "[\x00-\x08\x0b-\x1f\x7f-\x9f"  # control characters but tab and line feed
-    "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff"  # what turns the direction of text, or hides
-    "\ufffe\uffff"  # what XML does not allow
-    "\ud800-\udfff]"  # halves of characters
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f"  # control characters except tab and line feed
+    "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff"  # bidirectional controls, invisible characters
+    "\ufffe\uffff"  # not allowed in XML
+    "\ud800-\udfff]"  # lone surrogates
 )
 
 
 def unprintable(text: str) -> str | None:
-    """Return the first character of a text that would do something to a terminal or a page, written out."""
+    """Return the first unprintable character of a text as its escape sequence, None if there is none."""
     found = _UNPRINTABLE.search(text)
     return ascii(found[0])[1:-1] if found else None
 
 
 def printable(text: str) -> str:
-    """Return a text with such characters written out, as `\\x1b`."""
+    """Return a text with unprintable characters replaced by escape sequences, as `\\x1b`."""
     return _UNPRINTABLE.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
 def closest(name: str, valid: Iterable[str]) -> str | None:
-    """Return the valid name most like `name`, or None if none is like it."""
+    """Return the valid name most similar to `name`, or None if none is similar."""
     by_lower = {v.lower(): v for v in valid}
     if len(by_lower) > ALIKE:
         begins = name[:3].lower()
@@ -77,7 +77,7 @@ def closest(name: str, valid: Iterable[str]) -> str | None:
 
 
 def hint(name: str, valid: Iterable[str], *, lead: str) -> str:
-    """Return "; did you mean 'x'?", or if nothing is alike "; <lead>: a, b and c"."""
+    """Return "; did you mean 'x'?", or if no name is similar, "; <lead>: a, b and c"."""
     names = list(valid)
     likely = closest(name, names)
     if likely is not None:
@@ -91,7 +91,7 @@ def counted(number: int, noun: str) -> str:
 
 
 def fold(names: Sequence[str]) -> list[str]:
-    """Return the names with every complete group of four wheels folded to one with `*`."""
+    """Return the names with every complete group of four wheels replaced by one name with `*`."""
     present = set(names)
     folded: dict[str, None] = {}
     for name in names:
@@ -108,7 +108,7 @@ def star(text: str) -> str:
 
 
 def fold_sentences(items: Sequence[tuple[K, str]]) -> list[tuple[K, str]]:
-    """Return the sentences, each with its key, those that say the same of all four wheels once."""
+    """Return (key, sentence) pairs with sentences that are the same for all four wheels merged into one."""
     folded: dict[tuple[K, str], None] = {}
     alike: dict[tuple[K, str], set[str]] = {}
     for key, text in items:
@@ -120,7 +120,7 @@ def fold_sentences(items: Sequence[tuple[K, str]]) -> list[tuple[K, str]]:
 
 
 def fold_wires(pairs: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Return (output, input) pairs, those of the four wheels as one with `*`."""
+    """Return (output, input) pairs with those of the four wheels merged into one with `*`."""
     alike: dict[tuple[str, str], set[tuple[str, str]]] = {}
     for pair in pairs:
         alike.setdefault((star(pair[0]), star(pair[1])), set()).add(pair)

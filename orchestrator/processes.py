@@ -1,7 +1,7 @@
-"""Processes of Python that find the modules that this one does, and how they ended.
+"""Starting Python child processes safely.
 
-Processes of the standard library's multiprocessing that run neither the caller's script once more nor
-modules in the working folder.
+Children search for modules where this process does. Those of multiprocessing neither run the user's script
+again nor import modules from the working folder.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ _PROGRAM = (
 
 
 def python(module: str, *arguments: object) -> list[str]:
-    """Return the command that calls `main` of a module with arguments, all of them text."""
+    """Return the command line that calls `main` of a module with the arguments as strings."""
     return [sys.executable, "-c", _PROGRAM, module, "\n".join(sys.path), *map(str, arguments)]
 
 
 def how_it_ended(code: int) -> str:
-    """Return what a process did that has ended with this code, as `subprocess` gives it."""
+    """Describe how a process ended, by its return code as `subprocess` gives it."""
     if code >= 0:
         return f"ended itself with exit status {code}"
     try:
@@ -39,13 +39,13 @@ def how_it_ended(code: int) -> str:
 
 
 SAFE_PATH = "PYTHONSAFEPATH"
-"""Environment variable that keeps the working folder off a new Python's path; from Python 3.11 on."""
+"""Environment variable that keeps the working folder out of `sys.path`; from Python 3.11 on."""
 
 
 @contextlib.contextmanager
 def safe_path() -> Iterator[None]:
-    """Let processes that multiprocessing starts meanwhile leave the working folder alone."""
-    given = os.environ.get(SAFE_PATH)
+    """Keep the working folder out of `sys.path` of processes that multiprocessing starts in this block."""
+    before = os.environ.get(SAFE_PATH)
     os.environ[SAFE_PATH] = "1"
     start: Any = getattr(util, "spawnv_passfds", None)
     if sys.version_info < (3, 11) and start:
@@ -59,24 +59,24 @@ def safe_path() -> Iterator[None]:
     finally:
         if sys.version_info < (3, 11) and start:
             util.spawnv_passfds = start
-        if given is None:
+        if before is None:
             del os.environ[SAFE_PATH]
         else:
-            os.environ[SAFE_PATH] = given
+            os.environ[SAFE_PATH] = before
 
 
 def _off_path(command: Sequence[str]) -> list[str]:
-    """Return the command of a Python with a one-line program, which takes the working folder off its path."""
+    """Return a `python -c` command that first removes the working folder from `sys.path`."""
     at = command.index("-c") + 1
     return [*command[:at], f"import sys; del sys.path[0]; {command[at]}", *command[at + 1 :]]
 
 
 @contextlib.contextmanager
 def no_script() -> Iterator[None]:
-    """Let processes that multiprocessing starts meanwhile leave the program's script alone.
+    """Keep processes that multiprocessing starts in this block from running the main script again.
 
-    They would run it once more, which needs `if __name__ == "__main__":` there; what they do is
-    importable from elsewhere.
+    Users' scripts would otherwise need `if __name__ == "__main__":`; the functions that the processes call
+    can be imported without the script.
     """
     script = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
@@ -87,7 +87,7 @@ def no_script() -> Iterator[None]:
 
 
 class SafeSpawnProcess(context.SpawnProcess):
-    """A process that starts afresh."""
+    """A spawned process that neither runs the main script nor imports from the working folder."""
 
     @staticmethod
     def _Popen(process: BaseProcess) -> Any:
@@ -96,7 +96,7 @@ class SafeSpawnProcess(context.SpawnProcess):
 
 
 class SafeSpawnContext(context.SpawnContext):
-    """What starts such processes."""
+    """Multiprocessing context that starts `SafeSpawnProcess`es."""
 
     Process = SafeSpawnProcess
 
@@ -104,7 +104,7 @@ class SafeSpawnContext(context.SpawnContext):
 if hasattr(context, "ForkServerContext"):  # not on Windows
 
     class SafeForkServerProcess(context.ForkServerProcess):
-        """A process that a server starts, which has imported what it needs."""
+        """A process forked from a server that has already imported its modules, without the main script."""
 
         @staticmethod
         def _Popen(process: BaseProcess) -> Any:
@@ -112,6 +112,6 @@ if hasattr(context, "ForkServerContext"):  # not on Windows
                 return context.ForkServerProcess._Popen(process)  # type: ignore[attr-defined]
 
     class SafeForkServerContext(context.ForkServerContext):
-        """What starts such processes."""
+        """Multiprocessing context that starts `SafeForkServerProcess`es."""
 
         Process = SafeForkServerProcess

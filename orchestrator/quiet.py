@@ -1,7 +1,7 @@
-"""Keeps the server that starts processes, which imports this, quiet when its command is killed.
+"""Silences tracebacks in the fork server, which imports this module, when its parent is killed.
 
-The server, and a process that has just been started, would each show a traceback of the pipe that broke. Runs
-tell of their own errors (see `experiments.workers`).
+Otherwise the server, and a process that has just been started, would each print a traceback of a broken
+pipe. Runs report their own errors (see `experiments.workers`).
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""Many runs: those of plain Python are made in this process, the others in processes of their own."""
+"""Execution of many runs: those with plain Python in this process, the others in worker processes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ._controller import PythonComponent
 
 
 def opener_of(programs: Mapping[Path, PythonComponent]) -> Callable[[Instance, Log, set[Path]], Any]:
-    """Return what makes the instances of a run: of FMUs, and of programs by the paths that stand for them."""
+    """Return the factory of a run's instances: FMUs, and programs by the paths that stand for them."""
 
     def opener(unit: Instance, log: Log, corrupted: set[Path]) -> Any:
         program = programs.get(unit.fmu.path)

@@ -1,7 +1,7 @@
-"""Units in plain Python, run in the process of the run without an FMU.
+"""Components in plain Python, run in the process of the run without an FMU.
 
-A function, an object or a component class becomes a component, whose model description is the one
-that its FMU would have: wiring, master and results treat it as they treat an FMU.
+A function, an object or a component class becomes a component with the model description that its FMU would
+have, so that wiring, master and results treat it as they treat an FMU.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from . import arguments
 __all__ = ["PythonComponent", "output", "parameter", "signal"]
 
 HOME = Path("/python")
-"""Where the archive of a program would lie: a name for messages and records, nothing is there."""
+"""Folder in the made-up paths of Python components, used in messages and records; it does not exist."""
 
 
 class PythonComponent:
@@ -68,7 +68,7 @@ class PythonComponent:
             raise ScenarioError(f"{unit}: {error}") from None
         except (TypeError, ValueError) as error:
             raise ScenarioError(f"{unit}: {_name(given)}: {error}") from error
-        except Exception as error:  # whatever somebody else's code does when it is asked what it declares
+        except Exception as error:  # the user's code may raise anything while its declarations are read
             raise ScenarioError(f"{unit}: {_name(given)}: {arguments.said(error)}") from error
         name = self.component.fmu_name
         self.path = HOME / f"{name}.fmu"
@@ -77,7 +77,7 @@ class PythonComponent:
         self.fmu: Fmu = replace(described, sha256=digest, generation_tool="Python, no FMU")
 
     def open(self, unit: Instance, log: Log) -> PythonInstance:
-        """Return an instance for a unit of a run."""
+        """Return an instance of the component for a run."""
         return PythonInstance(unit, self._made(unit.name), log)
 
     def _made(self, unit: str) -> Component:
@@ -85,7 +85,7 @@ class PythonComponent:
 
 
 class PythonInstance:
-    """An instance of a program, as the master sees it (see `orchestrator.master.instance.Slave`)."""
+    """An instance of a program with the interface of `orchestrator.master.instance.FmuInstance`."""
 
     def __init__(self, unit: Instance, component: Component, log: Log) -> None:
         self.name = unit.name
@@ -94,7 +94,7 @@ class PythonInstance:
 
     @property
     def error(self) -> BaseException | None:
-        """What the program has raised, None if nothing."""
+        """The exception that the program has raised, None if there is none."""
         return getattr(self._component, "error", None)
 
     def connect(self, buffers: Buffers) -> StepCalls:
@@ -147,7 +147,7 @@ class PythonInstance:
         pass
 
     def _status(self, stepped: bool = True) -> Status:
-        """Hand over what the component has said; return how it is."""
+        """Pass on the component's messages; return its status."""
         queue = self._component.log_queue
         if queue:
             for message in queue:
@@ -159,7 +159,7 @@ class PythonInstance:
 
 
 def _archived(xml: bytes) -> bytes:
-    """Return an archive of a model description alone."""
+    """Return an FMU archive that contains only a model description."""
     archive = io.BytesIO()
     with zipfile.ZipFile(archive, "w") as members:
         members.writestr("modelDescription.xml", xml)
@@ -167,7 +167,7 @@ def _archived(xml: bytes) -> bytes:
 
 
 def _component(given: Any, role: str) -> type[Component]:
-    """Return the component class that a function, an object or a class stands for."""
+    """Return the component class made from a function, an object or a class."""
     if arguments.is_a(given, type):
         if issubclass(given, Component):
             return _reporting(given)
@@ -183,7 +183,7 @@ def _component(given: Any, role: str) -> type[Component]:
 
 
 def _of_function(function: Callable[..., Any], role: str) -> type[Component]:
-    """Return a component that calls a function of signals; its outputs are those that the role must show."""
+    """Return a component class that calls a function of signals; its outputs are those of the role."""
     known = {one.name: one.outputs for one in ROLES.values()}
     if role not in known:
         raise ScenarioError(
@@ -217,7 +217,7 @@ def _of_object(given: Any) -> type[Component]:
     def __init__(self: Any, **kwargs: Any) -> None:
         super(component, self).__init__(**kwargs)
         try:
-            self._given = copy.deepcopy(given)  # a run leaves nothing behind for the next
+            self._given = copy.deepcopy(given)  # so that a run does not affect the next one
         except Exception as error:
             raise ScenarioError(f"{_name(given)} cannot be copied for a run: {error}") from error
 
@@ -245,7 +245,7 @@ def _passing_on(method: str) -> Callable[..., Any]:
 def _class(
     given: Any, inputs: Sequence[Any], outputs: Sequence[Any], members: dict[str, Any]
 ) -> type[Component]:
-    """Return a component class; outputs that do not say what they follow follow all inputs."""
+    """Return a component class; outputs without declared dependencies depend on all inputs."""
     inputs, outputs = _signals(inputs, "inputs"), _signals(outputs, "outputs")
     names = [one if isinstance(one, str) else one.name for one in inputs]
     declared = tuple(output(one, *names) if isinstance(one, str) else one for one in outputs)
@@ -263,13 +263,13 @@ def _class(
 
 
 def _reporting(component: type[Component]) -> type[Component]:
-    """Return a component class that tells what its code raises, otherwise the same."""
+    """Return a subclass that keeps the exceptions of its code, otherwise unchanged."""
     same = {name: getattr(component, name) for name in ("__doc__", "__module__", "fmu_name")}
     return type(component.__name__, (component,), {**same, "_fail": _fail})
 
 
 def _signals(given: Any, name: str) -> tuple[str | VariableSpec, ...]:
-    """Return declared signals: names, or what `signal` and `output` make."""
+    """Return declared signals: names, or the results of `signal` and `output`."""
     wanted = "a tuple of names, ('yaw_rate',)"
     found = arguments.items(given, name, wanted)
     for k, one in enumerate(found):
@@ -279,7 +279,7 @@ def _signals(given: Any, name: str) -> tuple[str | VariableSpec, ...]:
 
 
 def _step_size(given: Any) -> float | None:
-    """Return the time between two samples that a program gives [s], None if it gives none."""
+    """Return the sampling time that a program declares [s], None if it declares none."""
     wanted = getattr(given, "step_size", None)
     if wanted is None:
         return None
@@ -290,10 +290,10 @@ def _step_size(given: Any) -> float | None:
 
 
 def _numbers(given: Any, outputs: Sequence[str]) -> tuple[float, ...]:
-    """Return what a program has returned as one number for each output.
+    """Return the values that a program has returned, one number for each output.
 
     Raises:
-        TypeError, ValueError: it is something else; names the output.
+        TypeError, ValueError: the value is something else; names the output.
     """
     if type(given) is float and len(outputs) == 1:
         return (given,)
@@ -316,7 +316,7 @@ def _numbers(given: Any, outputs: Sequence[str]) -> tuple[float, ...]:
 
 
 def _number(given: Any, output: str) -> float:
-    """Return one output; what is not finite is for the master to say."""
+    """Return one output as a number; the master checks that it is finite."""
     found = arguments.plain(given)
     if arguments.is_a(found, bool) or not arguments.is_a(found, int, float, Fraction):
         arguments.refuse(output, "a number", given)
@@ -327,9 +327,9 @@ def _number(given: Any, output: str) -> float:
 
 
 def _fail(self: Any, what: str, t: float) -> None:
-    """Remember the exception for whoever started the run, then do what every component does.
+    """Keep the exception for the caller of the run, then fail like any component.
 
-    What no error is (Ctrl-C, exit) is not for the run: it goes on to the caller.
+    Exceptions that are not errors (Ctrl-C, exit) pass through to the caller.
     """
     error = sys.exc_info()[1]
     if error is not None and not isinstance(error, Exception):
@@ -339,7 +339,7 @@ def _fail(self: Any, what: str, t: float) -> None:
 
 
 def _name(given: Any) -> str:
-    """Return what a program is called."""
+    """Return the name of a program."""
     if arguments.is_a(given, functools.partial):
         return _name(given.func)
     try:
@@ -352,10 +352,10 @@ def _name(given: Any) -> str:
 
 
 def _source(given: Any) -> bytes:
-    """Return the program's text where Python knows it: another text is another program."""
+    """Return the program's source text if Python knows it, to tell different programs apart."""
     try:
         return inspect.getsource(
             given if callable(given) and not hasattr(given, "output") else type(given)
         ).encode()
-    except Exception:  # there is none, or somebody else's code fails at being looked at
+    except Exception:  # there is no source, or inspecting the user's object fails
         return short(given).encode()

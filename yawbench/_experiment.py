@@ -1,4 +1,4 @@
-"""Many runs of a scenario: every combination of levels, one table, curves and maps."""
+"""Experiments from Python: every combination of levels as a run, one table, curves and maps."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 FAR = 1e100
-"""Where no scale of a figure ends. Chosen: drawing multiplies, and 1e308 would be infinite."""
+"""Bound on the scale of a figure. Chosen: drawing multiplies, and 1e308 would become infinite."""
 
 
 def experiment(
@@ -90,7 +90,7 @@ def experiment(
 
 
 def _checked(model: type[Model], given: dict[str, Any]) -> Model:
-    """Return what is given as its schema has it, with every problem of it as a sentence."""
+    """Validate data against a schema; all problems become sentences."""
     document = Document(Path(), given)
     made = validate(model, document)
     if made is None:
@@ -99,7 +99,7 @@ def _checked(model: type[Model], given: dict[str, Any]) -> Model:
 
 
 def _values(name: str, given: Iterable[Any]) -> dict[str, Any]:
-    """Return levels as an axis has them: numbers apart from the unit that they share."""
+    """Return levels as an axis stores them: numbers, and the unit that they share."""
     with arguments.as_scenario_errors():
         levels = [arguments.scalar(level, f"{name}[{k}]") for k, level in enumerate(given)]
     split = [number_and_unit(level) if isinstance(level, str) else None for level in levels]
@@ -291,7 +291,7 @@ def _axes_of(only: Any) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def _bar(title: str, total: int, *, shown: bool) -> Iterator[Callable[[Outcome], None]]:
-    """Show a bar that every outcome moves on, if that is asked for."""
+    """Show a progress bar that advances with every outcome, if `shown`."""
     if not shown:
         yield lambda outcome: None
         return

@@ -1,4 +1,4 @@
-"""A controller among others: its place, found by the ranking of the proving ground."""
+"""Ranking of a controller among others under the conditions of the proving ground."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def rank(
 
 
 def _entry(given: Any, name: str) -> tuple[dict[str, EntrySpec], dict[Path, PythonComponent]]:
-    """Return the entry of a controller by its name, and what it is in this process, by its path."""
+    """Return the entry of a controller by its name, and its Python component, if any, by its path."""
     if given is None:
         return {}, {}
     if arguments.names_file(given):

@@ -1,4 +1,4 @@
-"""The results of a run: arrays, metrics, figures, files."""
+"""The results of a run as arrays, metrics, figures and files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A scenario as a value: loaded, changed, run."""
+"""Scenarios as immutable values: loaded, changed, run."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ class Scenario:
         return replace(self, changes=tuple(changes), programs=programs)
 
     def _unswapped(self, units: Iterable[str]) -> Scenario:
-        """Return the scenario without earlier swaps of units, and the step sizes that came with them."""
+        """Return the scenario without earlier swaps of instances and the step sizes set by them."""
         places = {place for unit in units for place in (unit, f"{unit}.step_size")}
         kept = (one for one in self.changes if one.origin != "swap" or one.place not in places)
         return replace(self, changes=tuple(kept))
@@ -199,7 +199,7 @@ class Scenario:
         return replace(plan, notes=plan.notes + notes)
 
     def _opening(self) -> dict[str, Any]:
-        """Return the options of an `Opener`: what is stale is built in silence, plain Python is there."""
+        """Return the options of an `Opener`: build silently if out of date; the plain Python components."""
         opened = {path: program.fmu for path, program in self.programs.items()}
         return {"build": True, "tell": lambda text: None, "opened": opened}
 
@@ -250,13 +250,13 @@ class Scenario:
 
 
 def warn(title: str, remarks: Iterable[str]) -> None:
-    """Give one warning of all remarks, if there are any, at the line that called our caller."""
+    """Issue all remarks as one warning, if there are any, at the line that called our caller."""
     if said := "; ".join(remarks):
         warnings.warn(f"{title}: {said}", YawbenchWarning, stacklevel=3)
 
 
 def fmu_of(wanted: str | Path, name: str) -> str:
-    """Return the FMU that an argument names: a name as it is, a path as an absolute one."""
+    """Return the FMU that an argument names: a name unchanged, a path made absolute."""
     path = arguments.path(wanted, name)
     if path.suffix == ".fmu":
         return str(path.absolute())
@@ -264,13 +264,13 @@ def fmu_of(wanted: str | Path, name: str) -> str:
 
 
 def _plain(place: str, value: Any) -> Value:
-    """Return the value of a place as plain Python."""
+    """Return the value for a target as plain Python."""
     of_file = place == "vehicle" or place.partition(".")[0] == TYRES
     return str(arguments.path(value, place)) if of_file else arguments.scalar(value, place)
 
 
 def _role(fmu: str, unit: str) -> str:
-    """Return the role of a unit: its FMU's name begins with it, else the unit is called so."""
+    """Return the role of an instance: the prefix of its FMU's name, else its own name."""
     from components.fmi.roles import ROLES
 
     names = [role.name for role in ROLES.values()]

@@ -1,9 +1,9 @@
-"""Checks of what the library's functions are called with.
+"""Checks of the arguments of the library's functions.
 
-Public functions pass their arguments through here before they use them. A check returns the value as
-plain Python, or raises TypeError (it is of another kind) or ValueError (of the right kind, but not allowed)
-with a sentence that begins with the argument's name. Nothing that the value itself defines is trusted: its
-type decides, no text or bytes count as a number, and no iterator is read without end.
+Public functions check their arguments here before they use them. A check returns the value as plain Python,
+or raises TypeError (wrong kind) or ValueError (right kind, but not allowed) with a sentence that begins with
+the argument's name. Nothing that the value itself defines is trusted: only its type counts, text or bytes
+are never numbers, and no iterator is read without a limit.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from orchestrator.errors import Problem, ScenarioError
 from orchestrator.messages import listed, short, unprintable
 
 MOST = 100_000
-"""Items of one argument. Chosen: as many as an experiment may have runs."""
+"""Largest number of items of an argument. Chosen: the limit on runs of an experiment."""
 
 LONGEST = 1000
-"""Characters of a name or a title. Chosen: no sentence is as long."""
+"""Largest length of a name or a title. Chosen: longer than any sentence."""
 NAME = 255
-"""Bytes of a file's name that file systems allow."""
+"""Largest length of a file name [bytes] that file systems allow."""
 
 T = TypeVar("T")
 
@@ -129,12 +129,12 @@ def names_file(value: object) -> bool:
 
 
 def items(value: Any, name: str, wanted: str, *, ordered: bool = True) -> list[Any]:
-    """Return what an iterable gives, at most `MOST` items; text, bytes and mappings are none.
+    """Return the items of an iterable, at most `MOST`; text, bytes and mappings are refused.
 
     Args:
         value, name: the argument.
-        wanted: what it should have been, for messages.
-        ordered: whether a set, whose order is left to chance, is none, too.
+        wanted: description of valid arguments, for messages.
+        ordered: whether to refuse sets, too, as their order is arbitrary.
     """
     unfit: tuple[type, ...] = (str, bytes, bytearray, memoryview, Mapping)
     unfit += (set, frozenset) if ordered else ()
@@ -172,7 +172,7 @@ def mapping(value: Any, name: str, wanted: str) -> dict[str, Any]:
 
 
 def function(value: Any, name: str, *parameters: str) -> Callable[..., Any]:
-    """Return what can be called with so many values as it has parameters."""
+    """Return a callable that accepts as many arguments as there are `parameters`."""
     wanted = f"a function of {listed(parameters)}"
     if not callable(value) or is_a(value, type):
         refuse(name, wanted, value)
@@ -180,7 +180,7 @@ def function(value: Any, name: str, *parameters: str) -> Callable[..., Any]:
         inspect.signature(value).bind(*parameters)
     except TypeError:
         refuse(name, wanted, value)
-    except Exception:  # it does not tell, as those of C
+    except Exception:  # functions written in C may have no signature
         return cast(Callable[..., Any], value)
     return cast(Callable[..., Any], value)
 
@@ -200,7 +200,7 @@ def instance(value: Any, name: str, kind: type[T], made_by: str) -> T:
 
 @contextlib.contextmanager
 def as_scenario_errors(origin: str = "") -> Iterator[None]:
-    """Raise what is wrong with values of a scenario as its error, behind where they come from."""
+    """Turn errors about values of a scenario into ScenarioError, prefixed with their origin."""
     try:
         yield
     except (TypeError, ValueError) as error:
@@ -208,9 +208,9 @@ def as_scenario_errors(origin: str = "") -> Iterator[None]:
 
 
 def plain(value: Any) -> Any:
-    """Return a scalar of numpy, an array of no dimensions or an object of a subclass as plain Python.
+    """Return a NumPy scalar, a 0-d array or an instance of a subclass as plain Python.
 
-    Whatever is no number, text, True or False is given back as it is.
+    Other objects than numbers, text, True and False are returned unchanged.
     """
     if is_a(value, np.generic, np.ndarray) and value.shape == ():
         makes = {"b": bool, "i": int, "u": int, "f": float, "U": str}
@@ -224,12 +224,12 @@ def plain(value: Any) -> Any:
 
 
 def refuse(name: str, wanted: str, value: object) -> NoReturn:
-    """Raise TypeError for an argument that is of another kind than it must be."""
+    """Raise TypeError for an argument of the wrong kind."""
     raise TypeError(f"{name}: must be {wanted} (got {short(value)})")
 
 
 def is_a(value: object, *kinds: type) -> bool:
-    """Return whether a value is of one of some types, whatever it says itself of its class."""
+    """Return whether a value has one of the types, ignoring what it claims about its class."""
     return issubclass(type(value), kinds)
 
 
@@ -238,7 +238,7 @@ def _is_single(value: Any) -> bool:
 
 
 def said(error: BaseException) -> str:
-    """Return kind and text of an error that somebody else's code has raised."""
+    """Return type and text of an exception raised by a user's code."""
     try:
         return f"{type(error).__name__}: {error}"
     except Exception:

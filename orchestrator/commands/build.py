@@ -1,7 +1,4 @@
-"""`yawbench build`: make the components into FMUs.
-
-`yawbench cache`: what is kept to save time.
-"""
+"""`yawbench build` and `yawbench cache`: build FMUs from components; manage the cache."""
 
 from __future__ import annotations
 
@@ -71,7 +68,7 @@ def build(components: Components = None, out: BuildFolder = None, force: Force =
 
 
 def tell_of_build(name: str, what: str) -> None:
-    """Say what became of an FMU, unless nothing had to be done."""
+    """Report the result of building an FMU, unless it was up to date."""
     if what != "current":
         say(f"{name}: {what}")
 

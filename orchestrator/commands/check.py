@@ -1,4 +1,4 @@
-"""`yawbench check`: validate a scenario and show how its units are connected and ordered."""
+"""`yawbench check`: validate a scenario; show its instances, values and wires."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ All = Annotated[
 K = TypeVar("K")
 V = TypeVar("V")
 CAMBER = wheels("inclination_angle_*")
-"""What plants give by their roll camber."""
+"""Inclination angles, which plants output from their roll camber."""
 PIPE_WIDTH = 140
-"""Columns of what goes into a pipe or a file."""
+"""Line width of output to a pipe or a file."""
 
 
 @takes(*CHANGES, "fmus", "no_build", "no_validate")
@@ -49,7 +49,7 @@ def check(scenario: ScenarioFile, wishes: RunOptions, all_: All = False) -> None
 
 
 def show(plan: Plan, scenario: Path, *, defaults: bool = False) -> None:
-    """Print what the plan of a scenario file holds: for a terminal in its width, for a pipe in lines."""
+    """Print the plan of a scenario file, as wide as the terminal; in a pipe one line per row."""
     from rich.console import Console
 
     width = None if sys.stdout.isatty() else PIPE_WIDTH
@@ -124,7 +124,7 @@ def _unit_rows(plan: Plan) -> Iterable[Sequence[str]]:
 
 
 def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
-    """Return a row for every value with its origin, and how many defaults are left out that do not matter."""
+    """Return a row for every value with its origin, and the number of irrelevant defaults left out."""
     from ..messages import fold
 
     files = plan.scenario.get("tyre_files", {})
@@ -165,7 +165,7 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
 
 
 def _run_rows(plan: Plan) -> Iterable[Sequence[str]]:
-    """Yield the values that hold for the whole run."""
+    """Yield the rows of values that apply to the whole run."""
     given = {change.place: change.origin for change in plan.changes}
     run = {
         **({"start_time": f"{_number(plan.start)} s"} if plan.start else {}),
@@ -178,7 +178,7 @@ def _run_rows(plan: Plan) -> Iterable[Sequence[str]]:
 
 
 def _derived(plan: Plan) -> Iterable[Sequence[str]]:
-    """Return what was derived of the car, each with its formula."""
+    """Return the rows of derived vehicle values, each with its formula."""
     takers = _grouped(
         ((name, origin.detail), unit.name)
         for unit in plan.instances
@@ -189,7 +189,7 @@ def _derived(plan: Plan) -> Iterable[Sequence[str]]:
 
 
 def _beside_tyres(plan: Plan) -> Iterable[Sequence[str]]:
-    """Yield how far the axles' cornering stiffnesses given by hand are from those of the scenario's tyres."""
+    """Yield the deviation of stiffnesses stated for the axles from those of the scenario's tyres."""
     from ..errors import YawbenchError
     from ..tyres.stand import cornering_stiffness
     from ..wiring.make_plan import TYRE_FORCES
@@ -217,13 +217,13 @@ def _beside_tyres(plan: Plan) -> Iterable[Sequence[str]]:
 
 
 def _idle(plan: Plan) -> list[str]:
-    """Return what the vehicle file says that no unit takes."""
+    """Return the values of the vehicle file that no instance uses."""
     given = plan.scenario.get("vehicle_parameters", {})
     return [name for name in given if not any(unit.fmu.variables.get(name) for unit in plan.instances)]
 
 
 def _matters(unit: Instance, name: str) -> bool:
-    """Return whether a value is worth a line even if it is the FMU's own: the car, its speed, the road."""
+    """Return whether a default is worth showing: it concerns the car, its speed or the road."""
     from ..wiring.context import FACTS
     from ..wiring.warnings import OF_CAR
 
@@ -238,7 +238,7 @@ def _shown(value: Value | None, measure: str | None) -> str:
 
 
 def _wire_rows(plan: Plan) -> Iterable[tuple[str, str, str, str]]:
-    """Yield source, target, as what the control side sees the source, and the variables."""
+    """Yield source, target, the control side's view of the source (truth, measured, estimated), variables."""
     from ..messages import fold_wires, star
     from ..wiring.warnings import seen_as
 
@@ -265,13 +265,13 @@ def _fault_rows(plan: Plan) -> Iterable[Sequence[str]]:
 
 
 def _scaled(wire: Wire) -> str:
-    """Return what a wire does to numbers."""
+    """Return the conversion of a wire in words."""
     offset = f" {'-' if wire.offset < 0 else '+'} {abs(wire.offset):.6g}" if wire.offset else ""
     return f"x {wire.gain:.6g}{offset}"
 
 
 def _grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
-    """Return the values of each key, both in their order."""
+    """Group pairs by key, keeping the order of keys and values."""
     groups: dict[K, list[V]] = {}
     for key, value in pairs:
         groups.setdefault(key, []).append(value)
@@ -297,6 +297,6 @@ def _backward_rows(plan: Plan, direct: Iterable[Wire]) -> Iterable[Sequence[str]
 
 
 def _is_backward(wire: Wire, plan: Plan) -> bool:
-    """Return whether a wire leads to a unit that is evaluated before its source, or to the source itself."""
+    """Return whether a wire leads to its source itself or to an instance that is evaluated before it."""
     order = [unit.name for unit in plan.instances]
     return order.index(wire.source) >= order.index(wire.target)

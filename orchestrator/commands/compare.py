@@ -1,7 +1,4 @@
-"""`yawbench compare`: one scenario with several FMUs for a unit.
-
-`yawbench converge`: the same scenario at h, h/2, h/4, ...
-"""
+"""`yawbench compare` and `yawbench converge`: a scenario with different FMUs, or with smaller steps."""
 
 from __future__ import annotations
 

@@ -1,13 +1,4 @@
-"""The course of every command that makes the runs of an experiment: plan, make, judge, draw, write.
-
-`yawbench study`: run all that a study file names and judge its claims.
-
-`yawbench sweep`: one scenario over many conditions.
-
-`yawbench report`: one page that reproduces the papers.
-
-`yawbench tune`: the parameters of one or several laws, sought by one objective and one budget.
-"""
+"""`yawbench study`, `sweep`, `report` and `tune`: plan, run, judge and draw experiments; write pages."""
 
 from __future__ import annotations
 
@@ -34,17 +25,17 @@ if TYPE_CHECKING:
 def conduct(
     experiment: LoadedExperiment, folder: Path, wishes: RunOptions, each: Each, **of_jobs: Any
 ) -> ExperimentResult:
-    """Make the runs that have not been made already, judge them, draw the figures and write it all down.
+    """Make the runs that are missing, judge them, draw the figures and write all outputs.
 
     Args:
         experiment: as loaded.
-        folder: of its results.
-        wishes: of the user.
-        each: how to read the results of all runs, and how to draw all figures.
+        folder: its results folder.
+        wishes: the options of the command.
+        each: `map` used to read results and to draw figures.
         of_jobs: fields of all jobs in place of their defaults.
 
     Raises:
-        YawbenchError: a run cannot start; none has been.
+        YawbenchError: a run cannot start; none has been started.
         typer.Exit: Ctrl-C.
     """
     from ..errors import YawbenchError
@@ -70,7 +61,7 @@ def conduct(
                 )  # fmt: skip
         except YawbenchError:
             if not wishes.no_run or experiment.spec.axes:
-                raise  # else scenarios or FMUs are not here: results can be judged without them
+                raise  # scenarios or FMUs are missing, but existing results can be judged without them
         if planned:
             experiment = planned.experiment
             for note in stale_fmus(planned.fmus.values()):
@@ -92,7 +83,7 @@ def conduct(
         say(problem)
     if findings.not_made:
         say(f"{findings.not_made} of {counted(len(findings.records), 'run')} not made yet")
-    if experiment.spec.axes:  # others have been named as they failed
+    if experiment.spec.axes:  # without axes, failed runs have been reported one by one
         say_failed(findings.failed)
         if found := findings.remarkable():
             say(f"note: {found}")
@@ -106,7 +97,7 @@ def _over_region(
     wishes: RunOptions,
     once: PlanningCache,
 ) -> ExperimentResult:
-    """Return the findings with what becomes of their verdicts over the region; the journal knows its runs."""
+    """Return the findings with the verdicts over the region added; the journal has the runs already made."""
     from ..experiments.execution import left_to_do
     from ..experiments.journal import Journal
     from ..experiments.region import judge_region, plan_region
@@ -131,7 +122,7 @@ def _over_region(
 def chapter_of(
     findings: ExperimentResult, folder: Path, command: str, each: Each, *, shown_in: Path, **more: Any
 ) -> dict[str, Any]:
-    """Return the chapter of an experiment in a page that lies in a folder; `more`: facts of its own."""
+    """Return the chapter of an experiment for a page in `shown_in`; `more`: further template data."""
     from ..pages.report import chapter
     from ..results.folder import RUN_FILE
     from ..results.freshness import staleness
@@ -152,7 +143,7 @@ def chapter_of(
 
 
 def command_of(preset: str, path: Path, *, quick: bool = False, **options: Iterable[object] | None) -> str:
-    """Return the command line that makes an experiment again; `options`: name -> what it was given."""
+    """Return the command line that repeats an experiment; `options`: name -> values given."""
     import shlex
 
     flags = ["--quick"] if quick else []
@@ -161,7 +152,7 @@ def command_of(preset: str, path: Path, *, quick: bool = False, **options: Itera
 
 
 def write_page(chapters: Sequence[dict[str, Any]], folder: Path) -> None:
-    """Write the page of chapters into a folder and say where it is."""
+    """Write a page of chapters into a folder and print its path."""
     import os
 
     from ..files import write_whole
@@ -174,10 +165,10 @@ def write_page(chapters: Sequence[dict[str, Any]], folder: Path) -> None:
 
 
 def of_files(context: typer.Context, files: Sequence[Path], wishes: RunOptions) -> None:
-    """Conduct the experiments of files; tables of a single one go to the terminal, all to one page.
+    """Conduct the experiments of files; the tables of a single one are printed, all go to one page.
 
     Raises:
-        YawbenchError: a file or a run of it is wrong.
+        YawbenchError: a file or a run of it is invalid.
         typer.Exit: a run failed.
     """
     import os

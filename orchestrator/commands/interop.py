@@ -1,7 +1,4 @@
-"""`yawbench second-opinion`: the same scenario in masters that others wrote.
-
-`yawbench export-ssp`: a scenario as an archive that other programs can run.
-"""
+"""`yawbench second-opinion` and `yawbench export-ssp`: run a scenario in other masters; export it as SSP."""
 
 from __future__ import annotations
 
@@ -70,7 +67,7 @@ def second_opinion(
 
 
 def show(opinions: list[SecondOpinion]) -> None:
-    """Print the differences by signal, the times per step, and what has to be known."""
+    """Print the differences by signal, the times per step, and notes."""
     from ..experiments.tables import Table
     from ..messages import printable
 
@@ -97,7 +94,7 @@ def show(opinions: list[SecondOpinion]) -> None:
 
 
 def _show_still(one: SecondOpinion) -> None:
-    """Say of how many signals the comparison says little, since they do not change during the run."""
+    """Print how many signals are constant during the run, so that comparing them says little."""
     from ..messages import counted, fold, listed, printable
 
     if one.still:

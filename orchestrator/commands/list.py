@@ -1,4 +1,4 @@
-"""`yawbench list`: what there is to work with, and what has been made of it."""
+"""`yawbench list`: runs, scenarios, FMUs, vehicles, signals and metrics."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def list(wishes: RunOptions, what: Wanted = None, place: ListedFolder = None, un
 
 
 def _folder_of_fmus(given: Path | None) -> Path:
-    """Return the folder given, or the nearest one; where there is none, the project's FMUs are built."""
+    """Return the given or the nearest folder of FMUs; if there is none, build the project's FMUs."""
     from fmus.build import build_all
     from fmus.upkeep import place_of
 

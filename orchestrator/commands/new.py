@@ -1,9 +1,4 @@
-"""`yawbench new`: files to begin with, for somebody who brings an idea.
-
-What there is to begin with: a unit of any role, a car, a scenario, a study, a sweep, each ready to run.
-
-What a unit of one's own may be called.
-"""
+"""`yawbench new`: templates for a component of any role, a vehicle, a scenario, a study or a sweep."""
 
 from __future__ import annotations
 
@@ -26,12 +21,12 @@ from ..messages import listed
 
 
 def check_name(name: str, *, role: str, taken: Iterable[str]) -> None:
-    """Raise ScenarioError with one sentence if `name` cannot be that of a unit.
+    """Raise ScenarioError if `name` cannot be the name of a component.
 
     Args:
         name: of the file, without the role in front.
-        role: of the unit, such as "controller".
-        taken: names of the FMUs that there are.
+        role: of the component, such as "controller".
+        taken: names of existing FMUs.
     """
     if name.startswith(f"{role}_") and name != f"{role}_":
         raise ScenarioError(
@@ -52,7 +47,7 @@ def check_name(name: str, *, role: str, taken: Iterable[str]) -> None:
 
 
 def _plain(name: str, role: str) -> str:
-    """Return what a name could have meant: MyIdea-2 -> my_idea_2."""
+    """Return a valid name similar to the given one: MyIdea-2 -> my_idea_2."""
     words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name)
     return re.sub(r"[^a-z0-9]+", "_", words.lower()).strip("_").removeprefix(f"{role}_")
 
@@ -78,13 +73,13 @@ UNITS = {
     "plant": ("plant_seven_dof", ""),
     "tyre": ("tyre_dugoff", ""),
 }
-"""Unit -> FMU and what else a scenario says of it: paper A's run at 25 m/s."""
+"""Instance -> FMU and its other lines in a scenario: paper A's run at 25 m/s."""
 MORE = {"road": ("road_patchwork", "")}
-"""Units which that run does without."""
+"""Instances that this run does not have."""
 ROLES = ("controller", "driver", "reference", "tyre", "plant", "road")
-"""Units that can be begun with."""
+"""Roles that there are templates for."""
 KINDS = (*ROLES, "vehicle", "scenario", "study", "sweep")
-"""All that can be begun with."""
+"""All kinds of templates."""
 LAW = {"gain": 20000.0, "integral_gain": 50000.0, "limit": 5000.0}
 """Gains and limit of the controller [N.m.s/rad, N.m/rad, N.m]; chosen: they hold paper A's car."""
 VEHICLES = PurePosixPath("scenarios/vehicles")
@@ -92,19 +87,19 @@ VEHICLES = PurePosixPath("scenarios/vehicles")
 
 @dataclass(frozen=True)
 class NewFiles:
-    """Files to begin with, relative to the folder of the project, and which of them are what."""
+    """New files by their paths relative to the project folder, and the role of the important ones."""
 
     files: dict[PurePosixPath, str]
-    main: PurePosixPath  # what is run: a scenario, a study, a sweep
-    source: PurePosixPath | None = None  # of a unit: the Python file, or the folder of the C files
+    main: PurePosixPath  # the file to run: a scenario, a study, a sweep
+    source: PurePosixPath | None = None  # of a component: the Python file, or the folder of the C files
     test: PurePosixPath | None = None
 
 
 def begin(kind: str, name: str, language: Language = "python", *, in_checkout: bool) -> NewFiles:
-    """Return the files of a beginning.
+    """Return the files of a template.
 
-    In a checkout of yawbench a unit stands among its own, elsewhere in folders such as `controllers` and
-    `tests`. Scenarios always stand in `scenarios`.
+    In a checkout of yawbench a component goes to the project's own components, elsewhere to folders such as
+    `controllers` and `tests`. Scenarios always go to `scenarios`.
     """
     scenario = PurePosixPath("scenarios", name, "25mps.yaml")
     shipped = "../vehicles/in_wheel_motor_car.yaml" if in_checkout else ""
@@ -136,11 +131,11 @@ def _unit(
     scenario: PurePosixPath,
     facts: dict[str, Any],
 ) -> NewFiles:
-    """Return the source of a unit, its test and a scenario that uses it."""
+    """Return the source of a component, its test and a scenario that uses it."""
     home = PurePosixPath("components" if in_checkout else "", f"{role}s")
     source = home / (f"{name}.py" if language == "python" else name)
     test = PurePosixPath("tests/components" if in_checkout else "tests", f"test_{name}.py")
-    own = {"driver": ""}.get(role, (UNITS | MORE)[role][1])  # its parameters are its own
+    own = {"driver": ""}.get(role, (UNITS | MORE)[role][1])  # a new driver has parameters of its own
     facts |= {
         "role": role,
         "fmu": f"{role}_{name}",
@@ -173,7 +168,7 @@ def _rendered(templates: dict[PurePosixPath, str], facts: dict[str, Any]) -> dic
 
 
 def write_new(files: dict[PurePosixPath, str], folder: Path, *, also: Iterable[PurePosixPath] = ()) -> None:
-    """Write files below `folder`; none if one of them, or of the places `also`, exists.
+    """Write files below `folder`; none if one of them, or of the paths `also`, exists.
 
     Raises:
         ScenarioError: names what exists.
@@ -240,7 +235,7 @@ def new(kind: NewKindArgument, name: NewName, language: Written = "python", out:
 
 
 def _next(kind: str, name: str, begun: NewFiles, folder: Path, in_checkout: bool) -> list[list[str]]:
-    """Return the commands that build, test and run what has been written."""
+    """Return the commands that build, test and run the new files."""
     pass
 
     yawbench, python = _program("yawbench"), _program("python")
@@ -261,13 +256,13 @@ def _next(kind: str, name: str, begun: NewFiles, folder: Path, in_checkout: bool
 
 
 def _shown(path: Path) -> Path:
-    """Return a path as somebody would type it here."""
+    """Return a path relative to the working directory where possible."""
     relative = Path(os.path.relpath(path))
     return path.absolute() if relative.parts[:1] == ("..",) else relative
 
 
 def _program(name: str) -> str:
-    """Return how to call a program of this environment from here."""
+    """Return the command that calls a program of this environment from the working directory."""
     ours = Path(sys.executable).with_name(name)
     found = shutil.which(name)
     if not ours.exists() or (found is not None and os.path.samefile(found, ours)):

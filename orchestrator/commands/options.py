@@ -1,7 +1,4 @@
-"""Arguments and options that several subcommands share.
-
-The plan of the one scenario that a command is about, its FMUs up to date.
-"""
+"""Arguments and options shared by several subcommands, and the plan of a scenario with them applied."""
 
 from __future__ import annotations
 
@@ -19,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def named(kind: str, **told: Any) -> Any:
-    """Return an argument that is a file of a kind (see `scenario.catalogue`), or the name of one."""
+    """Return an argument for a file of a kind, or for its name (see `scenario.catalogue`)."""
 
     def find(given: Any) -> Any:
         from ..scenario import catalogue
@@ -48,10 +45,10 @@ ScenarioFile = Annotated[
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What a command is asked for by the options that it `takes`; the others stay as they are here.
+    """Options shared by the commands; those that a command does not declare with `takes` keep their defaults.
 
     Raises:
-        ScenarioError: two of them contradict each other, or one is not as it is to be written.
+        ScenarioError: two options contradict each other, or one is malformed.
     """
 
     swap: Annotated[
@@ -163,20 +160,20 @@ class RunOptions:
 
         if self.fresh and self.no_run:
             raise ScenarioError("--fresh and --no-run contradict each other")
-        if self.format_ != "csv":  # what reads and checks others takes time to load
+        if self.format_ != "csv":  # importing the other formats takes time
             from ..results.formats import check_format
 
             check_format(self.format_)
-        _ = self.limit, self.changes  # what is wrong with them is said before anything else
+        _ = self.limit, self.changes  # raises now if they are invalid
 
     @property
     def build(self) -> bool:
-        """Whether FMUs that are stale are built."""
+        """Whether FMUs that are out of date are built."""
         return not (self.no_build or self.no_run)
 
     @functools.cached_property
     def changes(self) -> tuple[Override, ...]:
-        """What is changed in all runs."""
+        """The overrides for all runs."""
         from ..scenario.overrides import read_changes
 
         return read_changes(self.swap or (), self.set_ or (), self.fault or ())
@@ -188,7 +185,7 @@ class RunOptions:
 
     @functools.cached_property
     def limit(self) -> float | None:
-        """How long a call of an FMU may take [s]; None if units are not isolated."""
+        """Time limit of an FMU call [s]; None if instances are not isolated."""
         from ..errors import ScenarioError
 
         given = self.call_limit
@@ -208,12 +205,12 @@ class RunOptions:
 
     @property
     def of_jobs(self) -> dict[str, Any]:
-        """Fields of jobs."""
+        """The fields of jobs that the options set."""
         return {"fmus": self.fmus, "call_limit": self.limit, "format": self.format_}
 
 
 def takes(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Let a command take options of `Wishes` behind its own, and hand them to it as `wishes`."""
+    """Add options of `RunOptions` after a command's own; it receives them as `wishes`."""
     shared = inspect.signature(RunOptions, eval_str=True).parameters
 
     def taking(command: Callable[..., None]) -> Callable[..., None]:
@@ -239,10 +236,10 @@ MAKING = ("out", "fmus", "no_build", "isolate", "call_limit")
 
 
 def plan_of_scenario(scenario: Path, wishes: RunOptions) -> Plan:
-    """Return the plan of a scenario with all that options change in it.
+    """Return the plan of a scenario with the overrides of the options, building its FMUs if necessary.
 
     Raises:
-        YawbenchError: the scenario, an option or an FMU is wrong, or a component cannot be built.
+        YawbenchError: the scenario, an option or an FMU is invalid, or a component cannot be built.
     """
     from ..fmu.opener import Opener
     from ..scenario.load import load_scenario

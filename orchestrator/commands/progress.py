@@ -1,4 +1,4 @@
-"""What the commands that make several runs share: progress, tables on the terminal."""
+"""Progress display, tables and folder locks of the commands that make several runs."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ if TYPE_CHECKING:
     from .options import RunOptions
 
 WIDTH = 140
-"""Of tables that go into a file or a pipe."""
+"""Width of tables written to a file or a pipe."""
 SHOWN = 10
 """Failed runs named on the terminal; all are in the table."""
 
 
 def say(text: str) -> None:
-    """Write a message for the user, apart from what the command gives out."""
+    """Print a message for the user on stderr, apart from the command's output."""
     print(printable(text), file=sys.stderr, flush=True)
 
 
 def hold(context: typer.Context, *folders: Path) -> None:
-    """Claim folders for this command until it has ended.
+    """Lock folders for this command until it ends.
 
     Raises:
-        ResultsError: another command is writing there, or nothing can be written.
+        ResultsError: another command is writing there, or a folder is not writable.
     """
     from ..results.lock import writing
 
@@ -47,10 +47,10 @@ def hold(context: typer.Context, *folders: Path) -> None:
 
 
 def pooled(context: typer.Context, wishes: RunOptions) -> Each:
-    """Return a `map` that spreads work over processes until this command has ended.
+    """Return a `map` that distributes work over processes until this command ends.
 
     Raises:
-        YawbenchError: this process may not open as many files as that takes.
+        YawbenchError: this process may not open as many files as that needs.
     """
     from ..experiments.workers import Pool
 
@@ -59,10 +59,10 @@ def pooled(context: typer.Context, wishes: RunOptions) -> Each:
 
 @contextlib.contextmanager
 def stoppable(folder: Path) -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM end the command with a word on what has been recorded.
+    """On Ctrl-C and SIGTERM, end the command with a message on what has been recorded.
 
     Raises:
-        Interrupted: with that word.
+        Interrupted: with that message.
     """
     try:
         yield
@@ -74,18 +74,18 @@ def stoppable(folder: Path) -> Iterator[None]:
 def make(
     title: str, jobs: Sequence[Job], wishes: RunOptions, journal: Journal | None = None
 ) -> list[Outcome]:
-    """Make those of some runs that are left, tell of them, and return what became of them.
+    """Make the runs that are not finished, report their progress, and return all outcomes.
 
     Args:
-        title: what they are.
+        title: description of the runs.
         jobs: with plans and keys.
-        wishes: of the user.
-        journal: knows what is finished, and notes what ends; without one the results on disk tell, and every
-            run has a line of its own.
+        wishes: the options of the command.
+        journal: has the finished runs and receives those that end; without one, finished runs are found on
+            disk, and every run is reported on a line of its own.
 
     Raises:
         KeyboardInterrupt: Ctrl-C.
-        YawbenchError: the journal cannot be written, or there is no such cluster.
+        YawbenchError: the journal cannot be written, or the cluster does not exist.
     """
     from ..experiments.execution import finish, left_to_do, runner_of
 
@@ -104,7 +104,7 @@ def make(
 
 
 def say_failed(failed: Mapping[str, str]) -> None:
-    """Say which runs failed; `failed`: words for each -> why."""
+    """Print which runs failed; `failed`: description of the run -> reason."""
     for words, why in list(failed.items())[:SHOWN]:
         say(f"{words} failed: {why}")
     if len(failed) > SHOWN:
@@ -115,13 +115,13 @@ def say_failed(failed: Mapping[str, str]) -> None:
 def reported(
     title: str, total: int, done: int = 0, *, each: bool = True
 ) -> Iterator[Callable[[Outcome], None]]:
-    """Tell of runs as they end: a bar on a terminal, elsewhere a line each or a line now and then.
+    """Report runs as they end: a bar on a terminal, elsewhere a line for each or for every tenth.
 
     Args:
         title: of the bar.
-        total: runs in all.
+        total: number of runs.
         done: how many of them are finished already.
-        each: whether to write a line for each run; else for every tenth of those that are left.
+        each: whether to write a line for each run; else for every tenth of the remaining ones.
     """
     width, count = len(str(total)), done
     with bar(title, total, done, quiet=each) as progress:
@@ -139,7 +139,7 @@ def reported(
 
 @contextlib.contextmanager
 def bar(title: str, total: int, done: int = 0, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
-    """Show progress and the time left: a bar on a terminal, elsewhere a line now and then, or none."""
+    """Show progress and the time left: a bar on a terminal, elsewhere a line now and then, or nothing."""
     if not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
         yield (lambda count: None) if quiet else _lines(total, done)
         return
@@ -157,14 +157,14 @@ def bar(title: str, total: int, done: int = 0, *, quiet: bool = False) -> Iterat
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("left"),
         TimeRemainingColumn(), TextColumn("so far"), TimeElapsedColumn(),
     )  # fmt: skip
-    # time left from the pace of the last runs; they differ less than their number
+    # estimate the time left from the pace of the latest runs
     with Progress(*columns, console=Console(stderr=True), transient=True, speed_estimate_period=120) as shown:
         task = shown.add_task(printable(title).replace("[", r"\["), total=total, completed=done)
         yield lambda count: shown.update(task, completed=count)
 
 
 def _lines(total: int, done: int) -> Callable[[int], None]:
-    """Return what writes a line for every tenth of the runs that are left."""
+    """Return a function that prints a line for every tenth of the remaining runs."""
     began, last = time.monotonic(), done
 
     def told(count: int) -> None:
@@ -179,7 +179,7 @@ def _lines(total: int, done: int) -> Callable[[int], None]:
 
 
 def save_figure(figure: Figure, wanted: Path | None, default: Path) -> None:
-    """Save a figure as `.svg` and `.png` and say where; what is wanted may have either ending, or none."""
+    """Save a figure as `.svg` and `.png` and print the paths; `wanted` may have either suffix, or none."""
     from ..figures.style import save
 
     stem = wanted or default
@@ -190,7 +190,7 @@ def save_figure(figure: Figure, wanted: Path | None, default: Path) -> None:
 
 
 def print_tables(tables: Iterable[Table]) -> None:
-    """Print tables on the standard output, as wide as the terminal."""
+    """Print tables to stdout, as wide as the terminal."""
     from rich.console import Console
 
     from ..experiments.tables import for_terminal

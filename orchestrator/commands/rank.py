@@ -1,4 +1,4 @@
-"""`yawbench rank`: controllers driven through conditions, and where each of them stands."""
+"""`yawbench rank`: drive controllers through conditions and rank them."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def rank(
 
 
 def _entry(given: str) -> tuple[str, EntrySpec]:
-    """Return the name and the entry of a controller from the command line."""
+    """Return the name and the entry of a controller given on the command line."""
     from ..errors import ScenarioError
     from ..experiments.ranking import UNIT, EntrySpec
     from ..plan import FaultList
@@ -118,7 +118,7 @@ def _entry(given: str) -> tuple[str, EntrySpec]:
 
 
 def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> None:
-    """Draw the pictures, write tables and page, and say where it is."""
+    """Draw the figures, write tables and page, and print where it is."""
     from ..errors import ResultsError
     from ..experiments.experiment import FIGURES
     from ..experiments.ranking_tables import (

@@ -1,12 +1,7 @@
-"""Recorded runs that a command is given as folders of results or as scenarios.
+"""`yawbench plot`, `animate`, `diff` and `salvage`: commands on recorded runs.
 
-`yawbench plot`: draw figures of recorded results, or of a scenario's run.
-
-`yawbench animate`: runs seen from above, as a page that needs no server.
-
-`yawbench diff`: what differs between two runs.
-
-`yawbench salvage`: keep what a run recorded whose process was killed.
+A run is given by its results folder, or by a scenario, which is run first if its results are missing or out
+of date.
 """
 
 from __future__ import annotations
@@ -32,10 +27,10 @@ Labels = Annotated[
 
 
 def recorded(sources: Sequence[Path], wishes: RunOptions) -> list[Path]:
-    """Return the folders of all results, after making the runs of scenarios that have none.
+    """Return the folders of all results, after running scenarios that have none.
 
     Raises:
-        ScenarioError: a scenario or an option is wrong.
+        ScenarioError: a scenario or an option is invalid.
     """
     from ..errors import ScenarioError
     from ..experiments.jobs import Job, PlanningCache, ready
@@ -67,7 +62,7 @@ def recorded(sources: Sequence[Path], wishes: RunOptions) -> list[Path]:
 
 
 def distinct(folders: Sequence[Path]) -> list[str]:
-    """Return the shortest ends of the paths that tell the folders apart."""
+    """Return the shortest suffixes of the paths that are different for all folders."""
     parts = [folder.absolute().parts for folder in folders]
     longest = max(len(p) for p in parts)
     for n in range(1, longest + 1):
@@ -78,10 +73,10 @@ def distinct(folders: Sequence[Path]) -> list[str]:
 
 
 def labels_of(folders: Sequence[Path], given: Sequence[str] | None) -> list[str]:
-    """Return what the legend calls each run: the labels given, or `distinct`.
+    """Return the label of each run in a legend: as given, or from `distinct`.
 
     Raises:
-        ScenarioError: there are not as many labels as folders.
+        ScenarioError: the numbers of labels and folders differ.
     """
     from ..errors import ScenarioError
     from ..messages import counted
@@ -93,7 +88,7 @@ def labels_of(folders: Sequence[Path], given: Sequence[str] | None) -> list[str]
 
 
 def folder_of_all(folders: Sequence[Path]) -> Path:
-    """Return where what shows all runs goes: the folder of the only one, or the one that holds them all."""
+    """Return the folder for figures of all runs: that of a single run, else their common parent."""
     if len(folders) == 1:
         return folders[0]
     return Path(os.path.commonpath([folder.absolute().parent for folder in folders]))

@@ -35,9 +35,9 @@ RunName = Annotated[
 ]
 
 SHOWN = 5
-"""Warnings shown; all are in run.json."""
+"""Number of warnings shown; all are in run.json."""
 BESIDE = 36
-"""Columns of a terminal that the title leaves to the bar and its numbers."""
+"""Columns of the terminal reserved for the bar and its numbers."""
 
 
 @takes(*CHANGES, *MAKING, "format_", "no_validate")
@@ -109,7 +109,7 @@ def _say_findings(findings: Iterable[Finding]) -> None:
 
 
 def _metric_names(given: Sequence[str]) -> list[str]:
-    """Return the metrics that `--metric` names, each once."""
+    """Return the metrics given by `--metric`, each once."""
     if not given:
         return []
     from ..metrics.run_metrics import STANDARD, metric
@@ -122,8 +122,8 @@ def _metric_names(given: Sequence[str]) -> list[str]:
 def _bar(title: str) -> Iterator[Callable[[int, int], None] | None]:
     """Show a progress bar on a terminal while the block runs, and nothing elsewhere.
 
-    It draws when it is told how far the run is. A bar with a thread of its own would take the
-    interpreter lock away from the units.
+    It redraws only when the run reports progress: a bar with a thread of its own would take the interpreter
+    lock away from the FMUs.
     """
     if not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
         yield None

@@ -1,7 +1,4 @@
-"""`yawbench drive`: all runs that a standard test asks for, made and evaluated.
-
-`yawbench evaluate`: what a standard test makes of recorded or measured runs.
-"""
+"""`yawbench drive` and `yawbench evaluate`: make and evaluate the runs of standard tests."""
 
 from __future__ import annotations
 
@@ -27,7 +24,7 @@ if TYPE_CHECKING:
 
 
 GROUND = "proving_ground"
-"""Folder of the scenarios of standard tests."""
+"""Folder of the standard tests' scenarios."""
 
 TestToDrive = Annotated[
     Literal["sine-with-dwell", "iso-3888-1", "iso-3888-2"], typer.Argument(help="The test.", metavar="TEST")
@@ -149,7 +146,7 @@ def _drive_dwell(
 
 
 def _drive_lane_change(base: Job, once: PlanningCache, wishes: RunOptions, *, figures: bool) -> int:
-    """Make and evaluate the runs to the highest clean entry speed; return the exit status."""
+    """Search the highest clean entry speed and evaluate its runs; return the exit status."""
     from ..evaluation.standard_tests import TESTS
     from ..experiments.standard_test_runs import entry_speeds
 
@@ -170,10 +167,10 @@ def _drive_lane_change(base: Job, once: PlanningCache, wishes: RunOptions, *, fi
 
 
 def _vehicle(given: str | None) -> tuple[Override, ...]:
-    """Return the change of the vehicle file.
+    """Return the override of the vehicle file.
 
     Raises:
-        ScenarioError: there is no such file.
+        ScenarioError: the file does not exist.
     """
     from ..plan import Override
     from ..scenario import catalogue
@@ -184,7 +181,7 @@ def _vehicle(given: str | None) -> tuple[Override, ...]:
 
 
 def _make(title: str, jobs: Sequence[Job], base: Job, wishes: RunOptions) -> int:
-    """Make the runs that are left; return the exit status, not 0 if one of them failed.
+    """Make the runs that are not finished; return the exit status, not 0 if one of them failed.
 
     Raises:
         typer.Exit: Ctrl-C.
@@ -269,21 +266,21 @@ def evaluate(
 
 @dataclass(frozen=True)
 class EvaluatedRuns:
-    """What the runs of a test come to, one by one and together."""
+    """The evaluations of the runs of a test, and of their series."""
 
     test: StandardTest
     traces: list[Trace]
     judged: list[Evaluation]
     series: TestSeries | None
     angle: float | None  # A [rad]
-    folder: Path  # of evaluation.json and of the figure of the series
+    folder: Path  # for evaluation.json and the figure of the series
 
     def conclude(self, *, each: bool, together: bool = False) -> None:
-        """Draw, write and print it.
+        """Draw, write and print the evaluations.
 
         Args:
             each: draw every run, too.
-            together: into the folder, not beside its results.
+            together: write figures into the folder instead of next to the results.
         """
         from ..experiments.verdict_tables import run_table, runs_table
         from ..files import write_whole
@@ -307,7 +304,7 @@ class EvaluatedRuns:
         say(f"{self.folder / FILE}{also}")
 
     def _draw(self, *, each: bool, together: bool) -> int:
-        """Draw runs, beside their results or together, and the series; return how many figures."""
+        """Draw the runs, next to their results or together, and the series; return the number of figures."""
         from ..figures.style import save
 
         stem = self.test.name.replace("-", "_")
@@ -348,10 +345,10 @@ def _runs(source: Path, mapping: MappingSpec | None) -> list[Path]:
 
 
 def angle_of(given: str | None) -> float | None:
-    """Return A [rad] as an option gives it, None if it does not.
+    """Return A [rad] as given by an option, None if it is not given.
 
     Raises:
-        ScenarioError: it is no such angle.
+        ScenarioError: the text is not such an angle.
     """
     from ..errors import ScenarioError
     from ..scenario.quantities import convert

@@ -1,7 +1,4 @@
-"""`yawbench vehicle`: what the car of a vehicle file is like.
-
-`yawbench tyre`: what a tyre property file or a tyre FMU is like.
-"""
+"""`yawbench vehicle` and `yawbench tyre`: handling figures of a car, characteristics of a tyre."""
 
 from __future__ import annotations
 
@@ -90,7 +87,7 @@ def vehicle(
 
 
 def _tables(cars: list[Handling]) -> list[Table]:
-    """Return the tables: a column for each plant."""
+    """Return the tables, with a column for each plant."""
     import math
 
     from ..evaluation.steering_tests import LEVELS, G

@@ -1,1 +1,1 @@
-"""What standard tests make of recorded or measured signals: quantities, verdicts, pictures."""
+"""Standard tests of vehicle dynamics: from recorded or measured signals to quantities and verdicts."""

@@ -1,16 +1,17 @@
-"""Straight-ahead braking on split friction, or over a jump of friction.
+"""Evaluation of straight-line braking, braking or lifting off in a turn, and side wind.
 
-From the brake's beginning on (the driver's force falls below zero; where that is not recorded, the
-deceleration exceeds 1 m/s2), until the car has stopped:
+**Straight-ahead braking** on split friction, or over a jump of friction. From the start of braking (the
+driver's force falls below zero; where that is not recorded, the deceleration exceeds 1 m/s2) until the car
+has stopped:
 
-    stopping distance      way of the centre of mass
-    mean deceleration      ((0.8 v_0)^2 - (0.1 v_0)^2) / (2 way in between)
+    stopping distance      distance travelled by the centre of mass
+    mean deceleration      ((0.8 v_0)^2 - (0.1 v_0)^2) / (2 distance in between)
     yaw                    largest yaw rate, within the first second and in all, and largest yaw angle
-    deviation              largest distance from the line along which the car went
+    deviation              largest distance from the line along which the car was travelling
     hand wheel             largest angle, and rate over 0.1 s
-    sideslip               largest above 10 km/h: below, it says nothing
+    sideslip               largest above 10 km/h: below that speed it is meaningless
 
-Where the road under the front wheels changes meanwhile, the friction jumps:
+If the friction under the front wheels jumps meanwhile:
 
     before, after          mean deceleration over the 0.5 s before it, and from 0.5 to 1 s after it
     adaptation             from the jump until nine tenths of that change, deceleration as mean over 0.1 s
@@ -18,33 +19,30 @@ Where the road under the front wheels changes meanwhile, the friction jumps:
 
 Source: after ISO 14512, Passenger cars - Straight-ahead braking on surfaces with split coefficient of
 friction - Open-loop test procedure, from memory of the standard; a driver who corrects makes it closed loop.
-The mean deceleration is that of UN Regulation No. 13-H. The numbers of the jump are ours: the regulation
+The mean deceleration is that of UN Regulation No. 13-H. The quantities of the jump are ours: the regulation
 asks that brakes of an anti-lock system adapt "within a reasonable time".
 
-Braking or lifting off in a turn: what becomes of a steady turn while the hand wheel is held.
-
-Steady state: means over the last 0.5 s before the action, with the radius R_0 = v_0 / r_0. 1 s after it:
+**Braking or lifting off in a turn**: how a steady turn continues while the hand wheel is held. Steady state:
+means over the last 0.5 s before the action, with the radius R_0 = v_0 / r_0. 1 s after it:
 
     yaw rate ratio     r / (v / R_0)     1: still the same circle, more: turns in, less: pushes out
     a_y ratio          a_y / (v^2 / R_0)
     deceleration       mean over that second
     sideslip           change against the steady state
 
-and the largest of the yaw rate ratio within that second.
+and the largest yaw rate ratio within that second.
 
 Source: after ISO 7975, Passenger cars - Braking in a turn - Open-loop test method, and ISO 9816 (power-off
 reactions), from memory of the standards.
 
-A gust of side wind while the hand wheel is held: how far the car is blown off its way.
-
-From the wind's beginning on, while the hand wheel is held, relative to the way the car went before (means
-over 0.5 s):
+**Side wind**: how far a gust pushes the car off its path while the hand wheel is held. From the start of the
+wind, relative to the direction of travel before it (means over 0.5 s):
 
     after 2 s        distance from that line, yaw angle
     within 2 s       largest yaw rate and lateral acceleration, their instants, largest sideslip
 
-Positive: to the left. The wind begins where the road unit tells a side force, in measurements the signal
-`wind_force_y` likewise.
+Positive: to the left. The wind starts where the road, or in measurements the signal `wind_force_y`, has a
+side force.
 
 Source: after ISO 12021, Road vehicles - Sensitivity to lateral wind - Open-loop test method using wind
 generator input, from memory of the standard: 100 km/h, a zone of wind of 25 m, the hand wheel held, evaluated
@@ -62,27 +60,27 @@ from .judgement import Evaluation, NotJudged, evaluation
 from .trace import Trace, at, first_crossing, refuse_opposed, running_mean
 
 BRAKED = 1.0
-"""Deceleration of the brake's beginning where the pedal is not recorded [m/s2]."""
+"""Deceleration at which braking starts, if the pedal is not recorded [m/s2]."""
 STOPPED = 0.1
 """Speed below which a car has stopped [m/s]; chosen."""
 UPPER, LOWER = 0.8, 0.1
-"""Speeds over v_0 between which the mean deceleration is taken: UN R13-H."""
+"""Fractions of v_0 between which the mean deceleration is computed: UN R13-H."""
 SLOW = 10.0 / 3.6
-"""Speed above which sideslip counts [m/s]; chosen."""
+"""Speed above which sideslip is evaluated [m/s]; chosen."""
 MEAN = 0.1
-"""Width of the mean for rates and decelerations [s]; chosen."""
+"""Width of the running mean of rates and decelerations [s]; chosen."""
 JUMP = 0.05
-"""Change of the friction of both front wheels that is a jump [1]; chosen."""
+"""Change of the friction at both front wheels that counts as a jump [1]; chosen."""
 BEFORE_BRAKING, LATE, LATER, ADAPTED = 0.5, 0.5, 1.0, 0.9
-"""Stretches before and after a jump [s], and the share of the change at which brakes have adapted."""
+"""Time spans before and after a jump [s], and the fraction of the change at which brakes have adapted."""
 
 
 @evaluation
 def evaluate_braking(judged: Evaluation, trace: Trace) -> None:
-    """Return stopping distance, decelerations, yaw, correction by the hand wheel; those of a jump."""
+    """Evaluate straight-line braking: distance, deceleration, yaw, steering correction, friction jump."""
     t, v_x, r = trace.time, trace["velocity_x"], trace["yaw_rate"]
     speed = np.hypot(v_x, trace["velocity_y"]) if "velocity_y" in trace else v_x
-    begin = _begin(trace)
+    begin = _braking_start(trace)
     way = running_integral(t, speed)
     way = way - at(t, way, begin)
     v_0 = at(t, speed, begin)
@@ -99,9 +97,9 @@ def evaluate_braking(judged: Evaluation, trace: Trace) -> None:
     during = (t >= begin) & (t <= end)
     first = during & (t <= begin + 1.0)
     turned = trace["yaw_angle"] if "yaw_angle" in trace else running_integral(t, r)
-    judged.add("yaw_rate_first", "largest yaw rate in the first second", _most(r, first), "rad/s")
-    judged.add("yaw_rate", "largest yaw rate", _most(r, during), "rad/s")
-    judged.add("yaw_angle", "largest yaw angle", _most(turned - at(t, turned, begin), during), "rad")
+    judged.add("yaw_rate_first", "largest yaw rate in the first second", _peak(r, first), "rad/s")
+    judged.add("yaw_rate", "largest yaw rate", _peak(r, during), "rad/s")
+    judged.add("yaw_angle", "largest yaw angle", _peak(turned - at(t, turned, begin), during), "rad")
     judged.add("deviation", "largest distance from the line", _deviation(trace, begin, during), "m")
     if "steering_wheel_angle" in trace:
         even = trace.even
@@ -109,16 +107,16 @@ def evaluate_braking(judged: Evaluation, trace: Trace) -> None:
         turning = running_mean(np.gradient(hand, even.time), MEAN, even.rate)
         within = (even.time >= begin) & (even.time <= end)
         correction = hand - at(even.time, hand, begin)
-        judged.add("hand", "largest correction of the hand wheel", _most(correction, within), "rad")
-        judged.add("hand_rate", "its largest rate", _most(turning, within), "rad/s", f"mean over {MEAN:g} s")
+        judged.add("hand", "largest correction of the hand wheel", _peak(correction, within), "rad")
+        judged.add("hand_rate", "its largest rate", _peak(turning, within), "rad/s", f"mean over {MEAN:g} s")
     if "sideslip" in trace:
         fast = during & (speed > SLOW)
-        judged.add("sideslip", "peak sideslip", _most(trace["sideslip"], fast), "rad", "above 10 km/h")
+        judged.add("sideslip", "peak sideslip", _peak(trace["sideslip"], fast), "rad", "above 10 km/h")
     _add_jump(judged, trace, begin, end)
 
 
-def _begin(trace: Trace) -> float:
-    """Return the instant at which the brake is pressed [s]."""
+def _braking_start(trace: Trace) -> float:
+    """Return the instant at which braking starts [s]."""
     t = trace.time
     if "drive_force" in trace:
         pressed = np.flatnonzero(trace["drive_force"] < 0.0)
@@ -133,7 +131,7 @@ def _begin(trace: Trace) -> float:
     raise NotJudged("the car is not braked")
 
 
-def _most(x: np.ndarray, where: np.ndarray) -> float | None:
+def _peak(x: np.ndarray, where: np.ndarray) -> float | None:
     return float(np.abs(x[where]).max()) if where.any() else None
 
 
@@ -143,12 +141,12 @@ def _mean_deceleration(
     instants = [first_crossing(t, -speed, -share * v_0, begin) for share in (UPPER, LOWER)]
     if None in instants:
         return None
-    one, other = (at(t, way, instant or 0.0) for instant in instants)
-    return v_0**2 * (UPPER**2 - LOWER**2) / (2.0 * (other - one))
+    upper, lower = (at(t, way, instant or 0.0) for instant in instants)
+    return v_0**2 * (UPPER**2 - LOWER**2) / (2.0 * (lower - upper))
 
 
 def _deviation(trace: Trace, begin: float, during: np.ndarray) -> float | None:
-    """Return the largest distance [m] from the line along which the car went when it was braked."""
+    """Return the largest distance [m] from the line along which the car travelled when braking started."""
     if not {"position_x", "position_y", "yaw_angle"} <= set(trace.signals):
         return None
     t = trace.time
@@ -156,11 +154,11 @@ def _deviation(trace: Trace, begin: float, during: np.ndarray) -> float | None:
     course = at(t, trace["yaw_angle"], begin)
     if "velocity_y" in trace:
         course += math.atan2(at(t, trace["velocity_y"], begin), at(t, trace["velocity_x"], begin))
-    return _most(y * math.cos(course) - x * math.sin(course), during)
+    return _peak(y * math.cos(course) - x * math.sin(course), during)
 
 
 def _add_jump(judged: Evaluation, trace: Trace, begin: float, end: float) -> None:
-    """Add what becomes of the car where the friction under both front wheels jumps, if it does."""
+    """Add the quantities of a jump of the friction under both front wheels, if there is one."""
     if not {"friction_fl", "friction_fr", "acceleration_x"} <= set(trace.signals):
         return
     t = trace.time
@@ -170,7 +168,7 @@ def _add_jump(judged: Evaluation, trace: Trace, begin: float, end: float) -> Non
     if not found.size:
         return
     jump = float(t[found[0]])
-    mu = [float(np.mean([one[k] for one in frictions])) for k in (found[0] - 1, found[0])]
+    mu = [float(np.mean([friction[k] for friction in frictions])) for k in (found[0] - 1, found[0])]
     judged.add("jump", "the friction jumps", jump, "s", f"from {mu[0]:.2f} to {mu[1]:.2f} in front")
     judged.add("jump_speed", "speed there", at(t, trace["velocity_x"], jump), "m/s")
     even = trace.even
@@ -191,18 +189,18 @@ def _add_jump(judged: Evaluation, trace: Trace, begin: float, end: float) -> Non
         adapted = None if instant is None else instant - jump
     judged.add("adaptation", "time of adaptation", adapted, "s", f"{100 * ADAPTED:g} % of the change")
     near = (t >= jump) & (t <= min(jump + 1.0, end))
-    judged.add("jump_yaw_rate", "largest yaw rate after it", _most(trace["yaw_rate"], near), "rad/s", "1 s")
+    judged.add("jump_yaw_rate", "largest yaw rate after it", _peak(trace["yaw_rate"], near), "rad/s", "1 s")
 
 
 BEFORE_ACTION, AFTER_ACTION = 0.5, 1.0
-"""Stretch of the steady state before the action, and instant after it [s]."""
+"""Length of the steady state before the action, and time after it that is evaluated [s]."""
 STEADY = 0.03
-"""Range of the yaw rate over that stretch, over its mean, beyond which it is no steady turn; chosen."""
+"""Largest range of the yaw rate in a steady turn, relative to its mean; chosen."""
 
 
 @evaluation
 def evaluate_turn(judged: Evaluation, trace: Trace, action: float | None = None) -> None:
-    """Return the ratios at 1 s after the action [s], by default that which the driver unit tells."""
+    """Evaluate braking or lifting off in a turn, 1 s after `action` [s]; default: as recorded."""
     t, v, r, a_y = trace.time, trace["velocity_x"], trace["yaw_rate"], trace["acceleration_y"]
     now = trace.told("action_time", "when the pedals change") if action is None else action
     before = (t >= now - BEFORE_ACTION) & (t <= now)
@@ -250,14 +248,14 @@ def evaluate_turn(judged: Evaluation, trace: Trace, action: float | None = None)
 
 
 AFTER_GUST, BEFORE_GUST = 2.0, 0.5
-"""Time over which is evaluated, and before the wind, of the means [s]."""
+"""Time evaluated after the start of the wind, and time before it for the means [s]."""
 HELD = math.radians(1.0)
-"""Range of the hand wheel beyond which it is not held [rad]; chosen: a loose grip."""
+"""Largest range of a hand wheel that counts as held [rad]; chosen: a loose grip."""
 
 
 @evaluation
 def evaluate_side_wind(judged: Evaluation, trace: Trace) -> None:
-    """Return what a gust does to a car within 2 s."""
+    """Evaluate the response of a car to a gust of side wind within 2 s."""
     t, wind = trace.time, trace["wind_force_y"]
     x, y, psi = trace["position_x"], trace["position_y"], trace["yaw_angle"]
     blown = np.flatnonzero(wind != 0.0)

@@ -1,6 +1,6 @@
-"""What a test comes to, in one run and in a series: quantities in their order, and verdicts.
+"""Results of standard tests: quantities and verdicts of a run and of a series of runs.
 
-A verdict is passed, failed or not judged, and says why. A quantity that does not exist stands there
+A verdict is passed, failed or not judged, and has a reason. A quantity that does not exist in a run is listed
 without a number, and a criterion that needs it is not judged, never passed.
 """
 
@@ -21,7 +21,7 @@ P = ParamSpec("P")
 
 
 class Verdict(str, Enum):
-    """What a criterion comes to."""
+    """The verdict on a criterion."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -30,17 +30,17 @@ class Verdict(str, Enum):
 
 @dataclass(frozen=True)
 class TestQuantity:
-    """A number of a run, in SI; `unit` "%" marks a ratio that is shown in per cent."""
+    """A quantity of a run, in SI; `unit` "%" marks a ratio that is shown in per cent."""
 
     name: str
-    value: float | None  # None: it does not exist in this run
+    value: float | None  # None: not defined for this run
     unit: str
-    reading: str = ""  # how the standard was read
+    reading: str = ""  # our reading of the standard
 
 
 @dataclass(frozen=True)
 class CriterionResult:
-    """The verdict of one criterion, and why."""
+    """The verdict on a criterion, and the reason."""
 
     verdict: Verdict
     why: str
@@ -50,16 +50,16 @@ class CriterionResult:
 
 
 class NotJudged(Exception):
-    """A run cannot be judged; the message says why."""
+    """Raised when a run cannot be judged; the message is the reason."""
 
 
 @dataclass
 class Evaluation:
-    """What one run comes to."""
+    """The evaluation of one run: its quantities and criteria."""
 
     label: str
     quantities: dict[str, TestQuantity] = field(default_factory=dict)  # key -> quantity
-    rulings: dict[str, CriterionResult] = field(default_factory=dict)  # criterion -> ruling
+    rulings: dict[str, CriterionResult] = field(default_factory=dict)  # by criterion
     notes: list[str] = field(default_factory=list)
 
     def add(self, key: str, name: str, value: float | None, unit: str, reading: str = "") -> None:
@@ -67,7 +67,7 @@ class Evaluation:
         self.quantities[key] = TestQuantity(name, None if value is None else float(value), unit, reading)
 
     def rule(self, criterion: str, holds: bool | None, why: str) -> None:
-        """Add the ruling of a criterion; `holds` None: it is not judged."""
+        """Add the verdict on a criterion; `holds` None: not judged."""
         verdict = Verdict.NOT_JUDGED if holds is None else Verdict.PASSED if holds else Verdict.FAILED
         self.rulings[criterion] = CriterionResult(verdict, why)
 
@@ -82,13 +82,13 @@ class Evaluation:
 
     @property
     def judges_nothing(self) -> bool:
-        """Whether no criterion is judged; of a test without criteria, whether no quantity has a value."""
+        """Whether no criterion is judged or, in a test without criteria, no quantity has a value."""
         if self.rulings:
             return all(one.verdict is Verdict.NOT_JUDGED for one in self.rulings.values())
         return all(one.value is None for one in self.quantities.values())
 
     def as_data(self) -> dict[str, Any]:
-        """Return it as plain data, for files: units are SI."""
+        """Return the evaluation as plain data for files, in SI units."""
         return {
             "label": self.label,
             "verdict": self.verdict,
@@ -101,9 +101,9 @@ class Evaluation:
 def evaluation(
     fill: Callable[Concatenate[Evaluation, Trace, P], None],
 ) -> Callable[Concatenate[Trace, P], Evaluation]:
-    """Make a function that fills in the judgement of a run return it; NotJudged becomes a note.
+    """Make a function that fills in an `Evaluation` create and return it; NotJudged becomes a note.
 
-    All of them raise ResultsError if the trace lacks a signal that the test needs.
+    All such functions raise ResultsError if the trace lacks a signal that the test needs.
     """
 
     @wraps(fill)
@@ -120,7 +120,7 @@ def evaluation(
 
 @dataclass
 class TestSeries:
-    """What all runs of a test come to together."""
+    """The evaluation of all runs of a test together."""
 
     runs: list[Evaluation]  # in their order
     summary: str  # in a sentence
@@ -129,7 +129,7 @@ class TestSeries:
 
 
 def overall(verdicts: Iterable[Verdict]) -> Verdict | None:
-    """Return the worst of all: failed, else not judged, else passed; None of none."""
+    """Return the worst verdict: failed, then not judged, then passed; None if there are none."""
     found = set(verdicts)
     for verdict in (Verdict.FAILED, Verdict.NOT_JUDGED, Verdict.PASSED):
         if verdict in found:

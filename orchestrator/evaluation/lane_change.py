@@ -1,20 +1,13 @@
-"""A double lane change between cones: was it clean, and how fast.
+"""Double lane change between cones (ISO 3888): evaluation of a run, highest clean entry speed, figures.
 
-Clean: no part of the body is beyond a row of cones, as the driver unit tells in `cone_overrun`, and all of
-it has passed the last ones. What scores is the highest speed at the first cones at which the track is
-driven clean (`lane_change_series`).
+A run is clean if no part of the body goes beyond a row of cones, which the driver reports as `cone_overrun`,
+and all of it has passed the last cones. The score is the highest speed at the first cones at which the track
+is driven clean. The search starts at the first speed and goes up in steps while runs are clean, else down
+until one is; then it halves the interval between the last two speeds until they differ by no more than the
+resolution. Anything else is not clean: a cone touched, a rollover, a record that ends too early.
 
-Source: ISO 3888-1 and ISO 3888-2, Passenger cars - Test track for a severe lane-change manoeuvre.
-
-The highest speed at which a track between cones is driven clean, over many runs.
-
-From the first speed on in steps, up while runs are clean, else down until one is; then the middle of the
-last two speeds, until they differ by no more than the resolution. Whatever is not clean counts as such: a
-cone touched, a car that rolls over, a record that ends too early.
-
-Source: ISO 3888-2 leaves the score to who drives; the highest clean entry speed is the common one.
-
-Figures of a lane change: a run seen from above between its cones, and a series over the entry speed.
+Source: ISO 3888-1 and ISO 3888-2, Passenger cars - Test track for a severe lane-change manoeuvre. ISO 3888-2
+leaves the score to the user; the highest clean entry speed is the common one.
 """
 
 from __future__ import annotations
@@ -38,12 +31,12 @@ if TYPE_CHECKING:
 
 
 TOUCH = 1e-9
-"""Overrun above which a cone is hit [m]."""
+"""Overrun above which a cone counts as hit [m]."""
 
 
 @evaluation
 def evaluate_lane_change(judged: Evaluation, trace: Trace) -> None:
-    """Return speeds, largest overrun, sideslip and lateral acceleration, and whether it was clean."""
+    """Evaluate a lane change: whether it is clean, speeds, overrun, sideslip and lateral acceleration."""
     t, over, x = trace.time, trace["cone_overrun"], trace["position_x"]
     track = lanes_of(trace.facts)
     start = track[0].start if track else trace.facts.get("track_start")
@@ -87,12 +80,14 @@ CLEAN = "clean"
 def highest_clean(
     clean: Callable[[float], bool], *, first: float, step: float, resolution: float, least: float, most: float
 ) -> tuple[float | None, float | None]:
-    """Return the highest value that was clean and the lowest above it that was not, None where there is none.
+    """Search the highest clean value; return it and the lowest value above it that is not clean.
+
+    None stands for a value that does not exist within the bounds.
 
     Args:
-        clean: asked once per value.
-        first, step: where to begin, and by what to go on.
-        resolution: by how much both may differ in the end.
+        clean: called once per value.
+        first, step: where the search starts, and its step.
+        resolution: largest difference between the two values at the end.
         least, most: bounds of the values.
 
     >>> highest_clean(lambda v: v < 61.3, first=50, step=10, resolution=1, least=10, most=200)
@@ -118,7 +113,7 @@ def highest_clean(
 
 
 def judge_entry_speeds(runs: Sequence[Evaluation]) -> TestSeries:
-    """Return the highest clean entry speed of runs, with no run below it that is not clean."""
+    """Return the highest clean entry speed: no run at a lower speed touched a cone."""
     ordered = sorted((run for run in runs if run["entry"] is not None), key=lambda run: run["entry"] or 0.0)
     clean = list(itertools.takewhile(is_clean, ordered))
     highest = clean[-1]["entry"] if clean else None
@@ -137,13 +132,13 @@ def is_clean(run: Evaluation) -> bool:
 
 
 EVERY = 5.0
-"""Between outlines of the car [m]."""
+"""Distance between the drawn outlines of the car [m]."""
 AROUND = 12.0
-"""Shown before the first cones and behind the last ones [m]."""
+"""Length of road drawn before the first cones and behind the last ones [m]."""
 
 
 def draw_run(trace: Trace, judged: Evaluation) -> Figure:
-    """Return the figure of a run: the car between its cones, hand wheel, lateral acceleration, sideslip."""
+    """Return the figure of a run: the car between the cones, hand wheel, lateral acceleration, sideslip."""
     track = lanes_of(trace.facts)
     x = trace["position_x"]
     start = track[0].start if track else 0.0
@@ -183,7 +178,7 @@ def draw_run(trace: Trace, judged: Evaluation) -> Figure:
 
 
 def _from_above(axes: Axes, trace: Trace, track: list[Lane], start: float) -> None:
-    """Draw cones, the way of the centre of mass and outlines of the car."""
+    """Draw the cones, the path of the centre of mass and outlines of the car."""
     x, y = trace["position_x"] - start, trace["position_y"]
     axes.plot(x, y, **line_style(0))
     axes.set_title("From above [m]; the scale across is larger")
@@ -210,7 +205,7 @@ def _from_above(axes: Axes, trace: Trace, track: list[Lane], start: float) -> No
 
 
 def draw_series(series: TestSeries, note: str) -> Figure:
-    """Return the figure of a series: what is beyond the cones, and how hard the car is driven."""
+    """Return the figure of a series over entry speed: overrun, and how hard the car is driven."""
     panels: list[tuple[str, str, float]] = [
         ("overrun", "Largest distance beyond the cones [m]", 1.0),
         ("acceleration", "Largest lateral acceleration [m/s²]", 1.0),

@@ -1,8 +1,10 @@
-"""Sine with dwell, one run: from the filtered signals to both criteria of the regulation.
+"""Sine with dwell (UN R140, GTR 8): evaluation of a run by both criteria, and of the series of runs.
 
-1. Zero: all signals less their means over the 1.0 s before the steering rate stays above 75 deg/s for
-   200 ms (below 26.8 degrees of amplitude it never does: before it first exceeds 75 deg/s).
-2. BOS: from there on the angle reaches 5 degrees. COS: it is back at zero after the second half wave.
+One run:
+
+1. Zero: subtract from all signals their means over the 1.0 s before the steering rate stays above 75 deg/s
+   for 200 ms (below 26.8 degrees of amplitude it never does: before it first exceeds 75 deg/s).
+2. BOS: the angle then reaches 5 degrees. COS: it is back at zero after the second half wave.
 3. Second peak: the first local peak of the yaw rate, of 5 % prominence, after the steering has changed sign;
    at COS + 1.000 s at the latest, and at least a fifth of the largest yaw rate before.
 4. Stability: yaw rate over that peak, signed, at COS + 1.000 s at most 35 %, at COS + 1.750 s at most 20 %.
@@ -11,21 +13,18 @@
    1.52 m for cars above 3500 kg.
 
 The ratio is signed, so a car that spins can pass it: a peak of the sideslip angle beyond 20 degrees is noted.
-
 Where the yaw rate does not follow the first half wave, or opposes it, nothing is judged.
 
-Source: UN Regulation No. 140 (2017), GTR 8, as adopted in GB/T 30677-2014; the numbers are the same in FMVSS
-126. Our readings: order of the filters (`filters`), prominence and bounds of the second peak, lateral
-displacement as the double integral (not the path, which differs by up to 0.36 m), ratios timed from COS.
-
-Sine with dwell, the whole series: which runs there must be, and what all of them come to.
+The series has runs at the amplitudes
 
     1.5 A, 2 A, 2.5 A, ... up to the last run, of max(6.5 A, 270 degrees), or 300 degrees where 6.5 A is more;
 
 once left first and once right first. Steps of 0.5 A go on beyond 6.5 A where the last run is 270 degrees.
-The series passes if every run that it asks for is there and passes all that is asked of it.
+The series passes if all these runs exist and pass every criterion that applies to them.
 
-Source: UN Regulation No. 140, GTR 8.
+Source: UN Regulation No. 140 (2017), GTR 8, as adopted in GB/T 30677-2014; the numbers are the same in FMVSS
+126. Our readings: order of the filters (see `trace`), prominence and bounds of the second peak, lateral
+displacement as the double integral (not the path, which differs by up to 0.36 m), ratios timed from COS.
 """
 
 from __future__ import annotations
@@ -43,38 +42,39 @@ from .judgement import CriterionResult, Evaluation, NotJudged, TestSeries, Verdi
 from .trace import Trace, at, first_crossing, likeness, opposed, prepared, refuse_opposed, running_mean
 
 RATE, LASTS, MEAN = math.radians(75.0), 0.2, 0.1
-"""Steering rate that begins the test [rad/s], for how long, and the width of its running mean [s]."""
+"""Steering rate that starts the test [rad/s], how long it must last, and width of its running mean [s]."""
 BEFORE = 1.0
 """Length of the zeroing range [s]."""
 BEGUN = math.radians(5.0)
 """Hand-wheel angle of BOS [rad]."""
 PROMINENCE = 0.05
-"""Of the second peak, over the largest yaw rate of that half wave; chosen: ripple of filters is less."""
+"""Prominence of the second peak relative to the largest yaw rate of that half wave; chosen: above the
+ripple of filters."""
 LEAST_PEAK = 0.2
-"""Of the second peak, over the largest yaw rate of the first half wave. Chosen: 96 runs of six cars with and
-without control, 45 to 270 degrees on mu 0.4 and 0.9, have 0.95 to 2.1; what is less is noise."""
+"""Height of the second peak relative to the largest yaw rate of the first half wave. Chosen: 96 runs of
+six cars with and without control, 45 to 270 degrees on mu 0.4 and 0.9, have 0.95 to 2.1; less is noise."""
 FOLLOWS = 0.5
-"""Likeness (see `signs`) of yaw rate and hand wheel in the first half wave, below which the yaw rate is not
+"""`likeness` of yaw rate and hand wheel in the first half wave, below which the yaw rate is not
 that of the car that was steered. Chosen: those runs have 0.90 to 0.98, noise has about 0."""
 RATIOS = ((1.0, 0.35), (1.75, 0.20))
-"""Time after COS [s], largest ratio of the yaw rate."""
+"""Time after COS [s], largest allowed ratio of the yaw rate."""
 AT, FAR, FAR_HEAVY, HEAVY = 1.07, 1.83, 1.52, 3500.0
-"""Lateral displacement: time after BOS [s], least value [m], that of heavy cars, and their mass [kg]."""
+"""Lateral displacement: time after BOS [s], least value [m], that for heavy cars, their mass [kg]."""
 FROM = 5.0
-"""Multiple of A from which on responsiveness is judged."""
+"""Multiple of A above which responsiveness is judged."""
 DRY = 0.9
-"""Friction of the road that the regulation asks for."""
+"""Friction of the road that the regulation requires."""
 SPEED, SLACK = 80.0 / 3.6, 2.0 / 3.6
-"""Speed at the beginning and how far it may be off [m/s]."""
+"""Speed at the start and its tolerance [m/s]."""
 SPUN = math.radians(20.0)
-"""Sideslip that is remarkable though the ratios pass; chosen: beyond what a driver can hold."""
+"""Sideslip that is noted even if the ratios pass [rad]; chosen: beyond what a driver can control."""
 SLIGHT = 1e-6
-"""Relative slack of an amplitude against a multiple of A, for rounding."""
+"""Relative tolerance when an amplitude is compared with a multiple of A, for rounding."""
 
 
 @dataclass(frozen=True)
 class DwellCourse:
-    """The zeroed signals of a run and the instants in them; what could not be found is None."""
+    """The zeroed signals of a run and its characteristic instants; None where one does not exist."""
 
     time: np.ndarray
     angle: np.ndarray  # of the hand wheel, the first half wave positive [rad]
@@ -89,10 +89,10 @@ class DwellCourse:
 
 
 def course_of(trace: Trace) -> DwellCourse:
-    """Return the course of a run as the regulation sees it.
+    """Return the zeroed signals and instants of a run, found as the regulation prescribes.
 
     Raises:
-        NotJudged: the record is too short, the steering no sine with dwell, COS not reached.
+        NotJudged: the record is too short, the steering is not a sine with dwell, COS is not reached.
         ResultsError: a signal is missing.
     """
     signals = prepared(trace, ("steering_wheel_angle", "yaw_rate", "acceleration_y"))
@@ -162,7 +162,7 @@ def _first_side(t: np.ndarray, angle: np.ndarray, start: float) -> float:
 def _check_answers(
     t: np.ndarray, angle: np.ndarray, r: np.ndarray, displacement: np.ndarray, begin: float, reversed_: float
 ) -> None:
-    """Raise NotJudged if the car does not answer the first half wave, or to the other side."""
+    """Raise NotJudged if the car does not respond to the first half wave, or responds to the wrong side."""
     first = (t >= begin) & (t <= reversed_)
     refuse_opposed(angle[first], r[first], "yaw rate")
     found = likeness(angle[first], r[first])
@@ -179,7 +179,7 @@ def _second_peak(t: np.ndarray, r: np.ndarray, begin: float, reversed_: float, e
     """Return the instant of the second peak, None if there is none.
 
     Raises:
-        NotJudged: the yaw rate hardly answers the reversal.
+        NotJudged: the yaw rate hardly responds to the steering reversal.
     """
     from scipy.signal import find_peaks
 
@@ -208,13 +208,13 @@ def _displacement(t: np.ndarray, a_y: np.ndarray, begin: float) -> np.ndarray:
 
 
 def percent(ratio: float) -> str:
-    """Return a ratio with one decimal in per cent, no -0.0."""
+    """Return a ratio in per cent with one decimal, never "-0.0 %"."""
     return f"{round(100 * ratio, 1) + 0.0:.1f} %"
 
 
 @evaluation
 def evaluate_dwell(judged: Evaluation, trace: Trace, angle: float | None = None) -> None:
-    """Return what a run comes to; without A [rad] in `angle` responsiveness is not judged."""
+    """Evaluate a run of sine with dwell; without A [rad] in `angle`, responsiveness is not judged."""
     try:
         course = course_of(trace)
     except NotJudged as why:
@@ -226,7 +226,7 @@ def evaluate_dwell(judged: Evaluation, trace: Trace, angle: float | None = None)
     amplitude = float(steered.max())
     told = trace.facts.get("amplitude")
     if isinstance(told, float) and abs(abs(told) - amplitude) < math.radians(0.5):
-        amplitude = abs(told)  # to the last digit, not to the nearest sample
+        amplitude = abs(told)  # exact, where the largest sample is not
     judged.add("amplitude", "amplitude", course.side * amplitude, "rad", "hand wheel, positive: left first")
     if angle:
         judged.add("multiple", "amplitude over A", amplitude / angle, "1")
@@ -234,7 +234,7 @@ def evaluate_dwell(judged: Evaluation, trace: Trace, angle: float | None = None)
     judged.add("end", "completion of steer", course.end, "s", "zero, filtered and zeroed")
     _stability(judged, course)
     _responsiveness(judged, course, trace, angle, amplitude)
-    _beside(judged, course, trace)
+    _add_notes(judged, course, trace)
 
 
 def _zero_of(trace: Trace, course: DwellCourse) -> float:
@@ -279,7 +279,7 @@ def _responsiveness(
     if angle is None:
         judged.rule(criterion, None, "A is not known: give runs of slowly increasing steer")
     elif amplitude < FROM * angle * (1.0 - SLIGHT):
-        return  # not asked of this run
+        return  # the criterion does not apply to this run
     elif found is None:
         judged.rule(criterion, None, f"the record ends before BOS + {AT:g} s")
     elif trace.friction is not None and trace.friction < DRY * (1.0 - SLIGHT):
@@ -291,8 +291,8 @@ def _responsiveness(
             judged.notes.append(f"mass not known: taken as at most {HEAVY:g} kg")
 
 
-def _beside(judged: Evaluation, course: DwellCourse, trace: Trace) -> None:
-    """Add what the regulation does not ask for but a reader needs."""
+def _add_notes(judged: Evaluation, course: DwellCourse, trace: Trace) -> None:
+    """Add quantities and notes beyond the regulation: sideslip and speeds."""
     after = trace.time >= course.begin
     if "sideslip" in trace:
         peak = float(np.abs(trace["sideslip"][after]).max())
@@ -313,11 +313,11 @@ def _beside(judged: Evaluation, course: DwellCourse, trace: Trace) -> None:
 
 
 FIRST, STEP, LAST = 1.5, 0.5, 6.5
-"""Amplitudes over A: of the first run, from run to run, of the last."""
+"""Amplitudes over A: first run, step, last run."""
 LEAST, MOST = 270.0, 300.0
 """Bounds of the last amplitude [deg]."""
 NEAR = math.radians(1.0)
-"""How far an amplitude may be from the one asked for [rad]; chosen: what steering robots keep."""
+"""Tolerance of an amplitude of the series [rad]; chosen: the accuracy of steering robots."""
 SAME = math.radians(0.05)
 """Amplitudes that differ by less are the same [rad]; chosen: below a tenth of a degree."""
 CRITERIA = ("stability", "responsiveness")
@@ -339,19 +339,19 @@ def amplitudes(angle: float) -> list[float]:
 
 
 def is_series(runs: Sequence[Evaluation]) -> bool:
-    """Return whether runs can be a series: several, no two of the same amplitude."""
-    found = sorted(_of(run) for run in runs if run["amplitude"] is not None)
+    """Return whether runs can form a series: more than one, all with different amplitudes."""
+    found = sorted(_amplitude(run) for run in runs if run["amplitude"] is not None)
     return len(runs) > 1 and all(b - a > SAME for a, b in itertools.pairwise(found))
 
 
 def judge_series(runs: Sequence[Evaluation], angle: float) -> TestSeries:
-    """Return what all runs come to, in the order of their amplitudes; `angle`: A [rad]."""
-    ordered = sorted(runs, key=lambda run: (-math.copysign(1.0, _of(run)), abs(_of(run))))
+    """Judge a series of runs, ordered by amplitude; `angle`: A [rad]."""
+    ordered = sorted(runs, key=lambda run: (-math.copysign(1.0, _amplitude(run)), abs(_amplitude(run))))
     missing = [
         math.degrees(side * wanted)
         for side in (1.0, -1.0)
         for wanted in amplitudes(angle)
-        if not any(abs(_of(run) - side * wanted) <= NEAR for run in runs)
+        if not any(abs(_amplitude(run) - side * wanted) <= NEAR for run in runs)
     ]
     rulings = {criterion: _ruling(criterion, ordered, missing) for criterion in CRITERIA}
     passed = all(ruling.verdict is Verdict.PASSED for ruling in rulings.values())
@@ -362,11 +362,13 @@ def judge_series(runs: Sequence[Evaluation], angle: float) -> TestSeries:
 
 
 def _ruling(criterion: str, runs: Sequence[Evaluation], missing: Sequence[float]) -> CriterionResult:
-    """Return the verdict of a criterion over all runs; amplitudes [deg] may be missing."""
+    """Return the verdict on a criterion over all runs; `missing`: amplitudes [deg] without a run."""
     asked = [run for run in runs if criterion in run.rulings]
     failed = [run for run in asked if run.rulings[criterion].verdict is Verdict.FAILED]
     if failed:
-        return CriterionResult(Verdict.FAILED, f"{len(failed)} of {len(asked)} runs fail, {_span(failed)}")
+        return CriterionResult(
+            Verdict.FAILED, f"{len(failed)} of {len(asked)} runs fail, {_failures(failed)}"
+        )
     reasons = [one.why for run in asked if (one := run.rulings[criterion]).verdict is Verdict.NOT_JUDGED]
     if reasons:
         said = f"{len(reasons)} of {len(asked)} runs are not judged: {reasons[0]}"
@@ -380,17 +382,17 @@ def _ruling(criterion: str, runs: Sequence[Evaluation], missing: Sequence[float]
     return CriterionResult(Verdict.NOT_JUDGED, said)
 
 
-def _of(run: Evaluation) -> float:
-    """Return the amplitude of a run [rad], positive if left first; nothing known sorts last."""
+def _amplitude(run: Evaluation) -> float:
+    """Return the amplitude of a run [rad], positive if left first; NaN if it is not known."""
     value = run["amplitude"]
     return math.nan if value is None else value
 
 
-def _span(runs: Sequence[Evaluation]) -> str:
-    """Return from which amplitude on runs fail, each direction for itself."""
+def _failures(runs: Sequence[Evaluation]) -> str:
+    """Return in words how many runs fail in each direction, and the smallest amplitude among them."""
     words = []
     for name, side in (("left first", 1.0), ("right first", -1.0)):
-        found = [math.degrees(abs(_of(run))) for run in runs if side * _of(run) > 0]
+        found = [math.degrees(abs(_amplitude(run))) for run in runs if side * _amplitude(run) > 0]
         if found:
             words.append(f"{name}: {len(found)}, the smallest of {min(found):.1f} degrees")
     return "; ".join(words)

@@ -1,4 +1,4 @@
-"""Figures of sine with dwell: a run with its instants and ratios, and a series over the amplitude."""
+"""Figures of sine with dwell: one run with its instants and ratios; a series over amplitude."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MARKS = {Verdict.PASSED: "#009E73", Verdict.FAILED: "#D55E00", Verdict.NOT_JUDGED: QUIET}
-"""Colours of verdicts, of figures and of words in them."""
+"""Colours of verdicts."""
 RESPONSE = "responsiveness"
 
 
 def draw_run(trace: Trace, judged: Evaluation) -> Figure | None:
     """Return the figure of a run: hand wheel, yaw rate with its ratios, displacement, sideslip.
 
-    None where nothing can be judged.
+    None if the run cannot be judged.
     """
     try:
         course = course_of(trace)
@@ -131,7 +131,7 @@ def _displaced(axes: Axes, course: DwellCourse, judged: Evaluation, trace: Trace
 
 
 def draw_series(series: TestSeries, note: str) -> Figure:
-    """Return the figure of a series: ratios and displacement over the amplitude, both directions."""
+    """Return the figure of a series: ratios and displacement over amplitude, in both directions."""
     from matplotlib.lines import Line2D
 
     panels: list[tuple[str, str, float, float | None]]

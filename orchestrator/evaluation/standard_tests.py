@@ -1,4 +1,4 @@
-"""The standard tests by their names: what evaluates a run, what draws it, what is shown of many."""
+"""The registry of standard tests: by name, the functions that evaluate and draw each of them."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class StandardTest:
-    """A test by its name. Modules, and numpy with them, are loaded when it is made use of."""
+    """A standard test. Its modules, and NumPy with them, are imported only when they are used."""
 
-    name: str  # as commands call it
+    name: str  # on the command line
     says: str
-    function: str  # module:function here that evaluates a run
-    columns: tuple[str, ...]  # keys of quantities that stand in a table of many runs
-    needs_angle: bool = False  # A is known to the function
-    drawing: str = ""  # module here with `draw_run` and `draw_series`
+    function: str  # "module:function" in this package that evaluates a run
+    columns: tuple[str, ...]  # keys of the quantities in tables of several runs
+    needs_angle: bool = False  # whether the function takes A
+    drawing: str = ""  # module in this package with `draw_run` and `draw_series`
 
     def evaluate(self, trace: Trace, angle: float | None = None) -> Evaluation:
-        """Return what a run comes to; `angle`: A [rad], where it is known and needed."""
+        """Return the evaluation of a run; `angle`: A [rad], if it is known and the test uses it."""
         judged: Evaluation = _named(self.function)(trace, *([angle] if self.needs_angle else []))
         return judged
 
@@ -35,7 +35,7 @@ class StandardTest:
         return figure
 
     def draw_series(self, series: TestSeries, note: str) -> Figure:
-        """Return the figure of what many runs come to; only of tests with a drawing."""
+        """Return the figure of a series; only for tests with a drawing module."""
         figure: Figure = _named(f"{self.drawing}:draw_series")(series, note)
         return figure
 
@@ -112,4 +112,4 @@ TESTS: dict[str, StandardTest] = {
         ),
     )
 }
-"""Name -> test, in the order in which they are driven."""
+"""Name -> test, in the order in which they are usually driven."""

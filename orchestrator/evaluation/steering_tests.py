@@ -1,29 +1,31 @@
-"""Understeer gradient: how much more a car has to be steered with a_y than by its geometry.
+"""Evaluation of steering tests: understeer gradient, slowly increasing steer, step steer, frequency response.
+
+**Understeer gradient**: how much more a car has to be steered with increasing a_y than its geometry requires.
 
     delta = L kappa + K_us a_y,        delta = delta_h / i_s,  kappa = r / v_x
 
 K_us is the slope of delta - L r / v_x over a_y; so it does not matter whether the speed was held and the hand
 wheel turned slowly, or the radius was held and the speed raised. Tyres lose stiffness with the square of
-a_y, so the gradient of the linear range is that at zero of
+a_y, so the gradient of the linear range is that at a_y = 0 of
 
     delta - L r / v_x = c_0 + K_us a_y + c_3 a_y^3                  fitted over 0.5 to 2 m/s2
 
-and beyond it a local one, a straight line over 1 m/s2.
+Above that range it is local, the slope of a straight line over 1 m/s2.
 
 Source: after ISO 4138, Passenger cars - Steady-state circular driving behaviour - Open-loop test methods,
 from memory of the standard, which fits a curve and differentiates it; the cubic and its range are ours.
 
-Slowly increasing steer: the hand-wheel angle A at 0.3 g, from which sine with dwell follows.
+**Slowly increasing steer**: the hand-wheel angle A at 0.3 g, which sets the amplitudes of sine with dwell.
 
     A = mean |delta_h| at a_y = 0.3 g over all runs, each from a straight line through 0.1 to 0.375 g
 
 Each angle and the mean are rounded to 0.1 degrees. The regulation asks for three runs to the left and three
-to the right; where runs do not scatter one of each says the same.
+to the right; where runs do not scatter, one to each side gives the same.
 
 Source: UN Regulation No. 140 and GTR 8, "slowly increasing steer test": 80 +- 2 km/h, 13.5 deg/s, linear
 regression, 0.3 g. The window of the regression, 0.1 to 0.375 g, is NHTSA's (TP-126), from memory.
 
-Step steer: how quickly, how far and with how much overshoot a car answers a step of the hand wheel.
+**Step steer**: how quickly, how far and with how much overshoot a car responds to a step of the hand wheel.
 
     time zero        the hand wheel has reached half of its final angle
     steady value     mean over the last second of the record
@@ -36,16 +38,16 @@ of yaw rate and lateral acceleration, and T_beta = peak time of the yaw rate tim
 Source: after ISO 7401, Road vehicles - Lateral transient response test methods - Open-loop test methods; the
 definitions are from memory of the standard.
 
-Frequency response of yaw rate and lateral acceleration to the hand wheel, from a sweep.
+**Frequency response** of yaw rate and lateral acceleration to the hand wheel, from a sweep.
 
     H(f) = sum Y X* / sum |X|^2          over the lines of the spectra within 0.05 Hz of f
 
-X is the spectrum of the hand wheel, Y that of the answer; the record begins and ends at rest. Where the hand
-wheel has less than a hundredth of its largest power nothing is told.
+X is the spectrum of the hand wheel, Y that of the response; the record begins and ends at rest. Frequencies
+at which the hand wheel has less than a hundredth of its largest power are left out.
 
 Source: after ISO 7401, Road vehicles - Lateral transient response test methods, from memory of the standard:
-gains and phases from 0.2 to 2 Hz. Ours: the width of the bands, and as bandwidth where the gain has fallen to
-70.7 % of that at 0.2 Hz.
+gains and phases from 0.2 to 2 Hz. Ours: the width of the bands, and the bandwidth, at which the gain has
+fallen to 70.7 % of that at 0.2 Hz.
 """
 
 from __future__ import annotations
@@ -59,19 +61,19 @@ from .judgement import Evaluation, NotJudged, evaluation
 from .trace import SLOWEST, Trace, at, first_crossing, opposed, prepared, refuse_opposed
 
 FIT_RANGE = (0.5, 2.0)
-"""Lateral acceleration that the cubic is fitted over [m/s2]."""
+"""Range of lateral acceleration of the cubic fit [m/s2]."""
 LEVELS, HALF = (3.0, 4.0, 5.0, 6.0), 0.5
-"""Lateral accelerations of local gradients and half their windows [m/s2]."""
+"""Lateral accelerations of the local gradients, and half the width of their windows [m/s2]."""
 FEWEST = 20
-"""Samples in a window."""
+"""Least number of samples in a window."""
 UNIT = "rad.s2/m"
 
 
 @evaluation
 def evaluate_understeer(judged: Evaluation, trace: Trace) -> None:
-    """Return understeer gradients at the road wheels.
+    """Evaluate understeer gradients at the road wheels.
 
-    The run has to tell `steering_ratio` and the wheelbase, `cg_to_front_axle` and `cg_to_rear_axle`.
+    The run must provide `steering_ratio` and, for the wheelbase, `cg_to_front_axle` and `cg_to_rear_axle`.
     """
     names = ("steering_wheel_angle", "yaw_rate", "velocity_x", "acceleration_y")
     hand, r, v, a_y = (trace[name] for name in names)
@@ -79,7 +81,7 @@ def evaluate_understeer(judged: Evaluation, trace: Trace) -> None:
     side = math.copysign(1.0, float(a_y[np.argmax(np.abs(a_y))]))
     a_y = side * a_y
     extra = side * (hand / ratio - (front + rear) * r / np.maximum(v, 0.1))
-    last = int(np.argmax(a_y))  # what comes after is not the slow rise any more
+    last = int(np.argmax(a_y))  # the slow rise ends here
     a_y, extra = a_y[: last + 1], extra[: last + 1]
     refuse_opposed(side * hand[: last + 1], a_y, "lateral acceleration")
     refuse_opposed(hand[: last + 1], r[: last + 1], "yaw rate")
@@ -102,12 +104,12 @@ def evaluate_understeer(judged: Evaluation, trace: Trace) -> None:
 
 
 def gradients(a_y: np.ndarray, extra: np.ndarray) -> dict[float, float | None]:
-    """Return lateral acceleration [m/s2] -> understeer gradient there [rad.s2/m], at 0 of the linear range.
+    """Return lateral acceleration [m/s2] -> understeer gradient there [rad.s2/m]; key 0: the linear range.
 
-    Where there is too little to tell, it is None.
+    The gradient is None where there are too few samples.
 
     Args:
-        a_y: rising [m/s2].
+        a_y: increasing [m/s2].
         extra: delta - L r / v_x [rad].
     """
 
@@ -130,7 +132,7 @@ SLOW_STEER_LEVEL, SLOW_STEER_WINDOW = 0.3 * G, (0.1 * G, 0.375 * G)
 
 @evaluation
 def evaluate_slow_steer(judged: Evaluation, trace: Trace) -> None:
-    """Return the angle at 0.3 g, `angle` [rad], and the line that it lies on."""
+    """Evaluate slowly increasing steer: the hand-wheel angle at 0.3 g, `angle` [rad], and the fitted line."""
     judged.add("angle", "hand-wheel angle at 0.3 g", None, "rad")
     signals = prepared(trace, ("steering_wheel_angle", "acceleration_y"))
     angle, acceleration = signals["steering_wheel_angle"], signals["acceleration_y"]
@@ -165,7 +167,7 @@ def characteristic_angle(judged: Sequence[Evaluation]) -> float:
     """Return A [rad]: the mean of |angle| over all runs, rounded to 0.1 degrees.
 
     Raises:
-        NotJudged: a run has none, or there is none.
+        NotJudged: a run has no angle, or there are no runs.
     """
     without = next((one for one in judged if one["angle"] is None), None)
     if without or not judged:
@@ -176,18 +178,18 @@ def characteristic_angle(judged: Sequence[Evaluation]) -> float:
 
 
 STEADY = 1.0
-"""Stretch at the end of the record over which steady values are means [s]."""
+"""Time at the end of the record over which steady values are averaged [s]."""
 STEP_LEVEL = 0.9
-"""Of the steady value, which ends the response time."""
+"""Fraction of the steady value at which the response time ends."""
 SETTLED = 0.02
-"""Range over the steady stretch, over its mean, above which nothing is steady; chosen."""
+"""Largest range of a steady signal, relative to its mean; chosen."""
 STEP_RESPONSES = {"yaw_rate": ("yaw rate", "rad/s"), "acceleration_y": ("lateral acceleration", "m/s2")}
 _GAINS = {"yaw_rate": "1/s", "acceleration_y": "m/(s2.rad)"}
 
 
 @evaluation
 def evaluate_step(judged: Evaluation, trace: Trace) -> None:
-    """Return gains, response times, overshoots of a step steer."""
+    """Evaluate a step steer: gains, response times, overshoots."""
     t = trace.time
     hand = trace["steering_wheel_angle"]
     if t.size < 3 or t[-1] - t[0] < 2.0 * STEADY:
@@ -235,16 +237,16 @@ def _since(instant: float | None, zero: float) -> float | None:
 
 
 FREQUENCIES = (0.2, 0.5, 1.0, 1.5, 2.0)
-"""At which gain and phase are told [Hz]."""
+"""Frequencies of the reported gains and phases [Hz]."""
 GRID = np.arange(0.2, 3.001, 0.02)
 HALF_BAND = 0.05
 LEAST = 0.01
-"""Power of the hand wheel, over its largest, below which it says nothing of a frequency."""
+"""Power of the hand wheel, relative to its largest, below which a frequency is left out."""
 SWEEP_RESPONSES = {"yaw_rate": ("yaw rate", "1/s"), "acceleration_y": ("lateral acceleration", "m/(s2.rad)")}
 
 
 def response(trace: Trace, answer: str) -> np.ndarray:
-    """Return H at the frequencies of `GRID`, NaN where the hand wheel says nothing; shape (frequencies,).
+    """Return H at the frequencies of `GRID`, NaN where the hand wheel has too little power; (n,).
 
     Raises:
         NotJudged: the record is too short or too coarse.
@@ -264,10 +266,12 @@ def response(trace: Trace, answer: str) -> np.ndarray:
 
 @evaluation
 def evaluate_sweep(judged: Evaluation, trace: Trace) -> None:
-    """Return gains, phases, largest gain and bandwidth."""
+    """Evaluate a frequency sweep: gains, phases, largest gain and bandwidth."""
     responses = {key: response(trace, key) for key in SWEEP_RESPONSES}
     for key, (name, _) in SWEEP_RESPONSES.items():
-        if responses[key][0].real < 0.0:  # more than a quarter of a period late at 0.2 Hz, or turned round
+        if (
+            responses[key][0].real < 0.0
+        ):  # lags by more than a quarter period at 0.2 Hz, or has the wrong sign
             raise opposed(name)
     for key, (name, unit) in SWEEP_RESPONSES.items():
         found = responses[key]

@@ -1,28 +1,25 @@
-"""Signals that a test is evaluated over, recorded or measured: by their names, in SI, over one time.
+"""Signals for standard tests: `Trace` of a run or a measurement, and its sampling, filtering and sign checks.
 
-A trace of a run here finds its signals by their names in the vocabulary. Of a measurement a mapping says
-which column is which:
+A `Trace` has signals by their names in the vocabulary, in SI, over one time axis. In results the signals are
+found by name. For a measurement, a mapping file assigns columns to signals:
 
-    time: {column: Zeit, unit: ms}            # the unit, if the file names none
+    time: {column: Zeit, unit: ms}            # the unit, if the file does not state it
     signals:
       steering_wheel_angle: {column: LRW, unit: deg, sign: -1}     # -1: positive to the right there
-      yaw_rate: Gierrate                      # the header names the unit: "Gierrate [deg/s]"
+      yaw_rate: Gierrate                      # the header states the unit: "Gierrate [deg/s]"
     mass: 1650 kg
 
-No unit is taken for granted: a column has one in the mapping, in its header, in a row of units below the
-header or in the file's own description, unless its signal is a plain number.
+No unit is assumed: a column has one in the mapping, in its header, in a row of units below the header or in
+the file's own description, unless its signal is a plain number.
 
-Signals prepared as regulations ask: even sampling, phaseless low pass, rates, instants in between.
-
-Low pass: a Butterworth filter of sixth order, forth and back, which has twelve poles and no phase (at the
-cut-off frequency the amplitude is halved). GTR 8 names "a 12-pole phaseless Butterworth filter"; that its
-twelve poles are those of both directions together is our reading. Unfiltered signals change a yaw-rate ratio
-of sine with dwell by up to 0.8 points, another order or cut-off by 0.1 points at most.
-
-Whether a car answers the steering to the side it is steered to.
+Signals are prepared as regulations require: even sampling, zero-phase low pass. The low pass is a Butterworth
+filter of sixth order, forward and backward, which has twelve poles and no phase (at the cut-off frequency the
+amplitude is halved). GTR 8 requires "a 12-pole phaseless Butterworth filter"; that its twelve poles are those
+of both directions together is our reading. Unfiltered signals change a yaw-rate ratio of sine with dwell by
+up to 0.8 points, another order or cut-off by 0.1 points at most.
 
 Measured columns often have signs other than those of ISO 8855. A yaw rate or a lateral acceleration that
-opposes the hand wheel is a mistake in the data, not a property of the car, and nothing can be judged by it.
+opposes the hand wheel is an error in the data, not a property of the car, and such runs are not judged.
 """
 
 from __future__ import annotations
@@ -56,17 +53,17 @@ from .judgement import NotJudged
 
 ORDER = 6
 CUT_OFF = {"steering_wheel_angle": 10.0, "yaw_rate": 6.0, "acceleration_y": 6.0}
-"""Of the low pass [Hz]: GTR 8."""
+"""Cut-off frequencies of the low pass [Hz]: GTR 8."""
 SHORTEST = 1.0
-"""Record without which there is nothing to filter [s]."""
+"""Least length of a record that can be filtered [s]."""
 SLOWEST = 50.0
-"""Sampling rate below which nothing is judged [Hz]. Chosen: 2.5 times what a low pass of 10 Hz must have."""
+"""Least sampling rate [Hz]. Chosen: 2.5 times what a low pass of 10 Hz needs."""
 UNEVEN = 1e-6
-"""Relative difference of steps up to which sampling is even; chosen: rounding of times in files."""
+"""Relative difference of time steps up to which sampling counts as even; chosen: rounding in files."""
 
 
 def even_grid(time: np.ndarray) -> np.ndarray:
-    """Return the times of even sampling, at the median step [s] where they are uneven; shape (rows,)."""
+    """Return evenly spaced times, at the median step [s] if the given ones are uneven; shape (rows,)."""
     steps = np.diff(time)
     step = float(np.median(steps))
     if np.all(np.abs(steps - step) <= UNEVEN * max(step, 1e-12) + 1e-9):
@@ -75,7 +72,7 @@ def even_grid(time: np.ndarray) -> np.ndarray:
 
 
 def resample(grid: np.ndarray, time: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return x at the times of a grid by monotone cubic interpolation; x itself if they are its own."""
+    """Return x interpolated to a grid by a monotone cubic; x itself if the grid is its own time."""
     if grid is time:
         return x
     from scipy.interpolate import PchipInterpolator
@@ -84,7 +81,7 @@ def resample(grid: np.ndarray, time: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def prepared(trace: Trace, names: Iterable[str]) -> dict[str, np.ndarray]:
-    """Return the signals of a trace behind their filters, and `time`.
+    """Return filtered signals of a trace by name, and their `time`.
 
     Raises:
         NotJudged: the record is too short or too coarse.
@@ -101,12 +98,12 @@ def prepared(trace: Trace, names: Iterable[str]) -> dict[str, np.ndarray]:
 
 
 def low_pass(x: np.ndarray, cut_off: float, rate: float) -> np.ndarray:
-    """Return x behind the phaseless Butterworth filter.
+    """Return x filtered by the zero-phase Butterworth low pass.
 
     Args:
-        x: shape (rows,), sampled evenly.
+        x: shape (rows,), evenly sampled.
         cut_off: frequency [Hz].
-        rate: of sampling [Hz].
+        rate: sampling rate [Hz].
     """
     from scipy.signal import butter, sosfiltfilt
 
@@ -116,7 +113,7 @@ def low_pass(x: np.ndarray, cut_off: float, rate: float) -> np.ndarray:
 
 
 def running_mean(x: np.ndarray, width: float, rate: float) -> np.ndarray:
-    """Return the centred mean over `width` [s]; at the ends over what there is of it."""
+    """Return the centred mean over `width` [s]; near the ends, over the samples that exist."""
     half = round(0.5 * width * rate)
     total = np.concatenate([[0.0], np.cumsum(x)])
     first = np.maximum(np.arange(len(x)) - half, 0)
@@ -125,9 +122,9 @@ def running_mean(x: np.ndarray, width: float, rate: float) -> np.ndarray:
 
 
 def first_crossing(time: np.ndarray, x: np.ndarray, level: float, after: float) -> float | None:
-    """Return the first instant [s] from `after` on at which x has risen to `level`; None if it never has.
+    """Return the first instant [s] from `after` on at which x has risen to `level`; None if it never does.
 
-    Between two samples x runs along a straight line.
+    x is interpolated linearly between samples.
     """
     reached = np.flatnonzero((x >= level) & (time >= after))
     if not reached.size:
@@ -140,30 +137,30 @@ def first_crossing(time: np.ndarray, x: np.ndarray, level: float, after: float) 
 
 
 def at(time: np.ndarray, x: np.ndarray, instant: float) -> float:
-    """Return x at an instant [s] on a straight line between two samples."""
+    """Return x at an instant [s], interpolated linearly."""
     return float(np.interp(instant, time, x))
 
 
 SPIKES = 0.01
-"""Share of the samples that may be beyond what cars reach; chosen: accelerometers have spikes."""
+"""Fraction of samples that may exceed what cars reach; chosen: accelerometers have spikes."""
 
 
 @dataclass(frozen=True)
 class Trace:
-    """What was recorded or measured in one run."""
+    """The signals of one run or measurement."""
 
     label: str
     time: np.ndarray  # shape (rows,) [s], increasing
-    signals: dict[str, np.ndarray]  # name in the vocabulary -> shape (rows,), in SI
+    signals: dict[str, np.ndarray]  # vocabulary name -> shape (rows,), in SI
     mass: float | None = None  # of the car [kg]
-    friction: float | None = None  # of the road, the lowest
+    friction: float | None = None  # lowest of the road
     facts: dict[str, Any] = field(default_factory=dict)  # other parameters of the run: name -> value
-    folder: Path | None = None  # where it lies
+    folder: Path | None = None  # of the results
     title: str = ""
 
     @property
     def name(self) -> str:
-        """What figures call it: the name of its folder, wherever that is, or its label."""
+        """The name used in figures: that of the folder, or the label."""
         return (self.folder.name if self.folder else "") or self.label
 
     def __contains__(self, name: object) -> bool:
@@ -173,7 +170,7 @@ class Trace:
         """Return a signal, shape (rows,).
 
         Raises:
-            ResultsError: it is not there.
+            ResultsError: the trace does not have it.
         """
         if name not in self.signals:
             have = ", ".join(self.signals) or "nothing"
@@ -181,10 +178,10 @@ class Trace:
         return self.signals[name]
 
     def told(self, name: str, meaning: str = "") -> float:
-        """Return a number that a run tells of its units.
+        """Return a numeric parameter of the recorded run.
 
         Raises:
-            NotJudged: it does not; `meaning` says what that would be.
+            NotJudged: the run has no such parameter; `meaning` explains it in the message.
         """
         value = self.facts.get(name)
         if not isinstance(value, (int, float)) or isinstance(value, bool):
@@ -193,19 +190,19 @@ class Trace:
 
     @cached_property
     def even(self) -> Trace:
-        """The same sampled evenly, itself if it is."""
+        """This trace sampled evenly; itself if it already is."""
         grid = even_grid(self.time)
         signals = {name: resample(grid, self.time, x) for name, x in self.signals.items()}
         return replace(self, time=grid, signals=signals)
 
     @property
     def rate(self) -> float:
-        """Sampling rate, the median [Hz]."""
+        """Median sampling rate [Hz]."""
         return 1.0 / float(np.median(np.diff(self.time)))
 
 
 def trace_of(results: Results, label: str = "") -> Trace:
-    """Return what a run has recorded of the vocabulary; mass and friction as its units were told."""
+    """Return the trace of recorded results; mass and friction come from the parameters of the instances."""
     signals = {}
     for name in SIGNALS:
         if "*" in name:
@@ -214,13 +211,15 @@ def trace_of(results: Results, label: str = "") -> Trace:
         if found:
             signals[name] = results.columns[found[0]] * si_of(results.units[found[0]])[1]
     own = Counter(column.partition(".")[2] for column in results)
-    for column, values in results.columns.items():  # what only one unit has, such as overruns of cones
+    for column, values in results.columns.items():  # signals of a single instance, such as overruns of cones
         name = column.partition(".")[2]
         if name not in signals and own[name] == 1 and np.issubdtype(values.dtype, np.number):
             signals[name] = values
     fmus = results.record.fmus
     told = {unit: {**fmu.defaults, **fmu.parameters} for unit, fmu in fmus.items()}
-    best = [unit for role in ("driver", "plant") for unit in results.units_of_role(role)]  # of test and car
+    best = [
+        unit for role in ("driver", "plant") for unit in results.units_of_role(role)
+    ]  # their parameters win over others of the same name
     facts = {name: value for unit in (*told, *best) for name, value in told.get(unit, {}).items()}
     masses = [told[unit]["mass"] for unit in results.units_of_role("plant") if "mass" in told.get(unit, {})]
     mass = masses[-1] if masses else None
@@ -237,7 +236,7 @@ def trace_of(results: Results, label: str = "") -> Trace:
 
 
 def _friction(results: Results, fmus: Mapping[str, FmuRecord], told: Mapping[str, Any]) -> float | None:
-    """Return the lowest friction that any wheel met: as recorded, else as roads or tyres were told."""
+    """Return the lowest friction at any wheel: as recorded, else from the parameters of road and tyres."""
     if columns := columns_of(results, "friction_*"):
         return float(min(results.columns[column].min() for column in columns))
     found = [told.get(unit, {}).get("base_friction") for unit in results.units_of_role("road")]
@@ -274,10 +273,10 @@ Kilograms = Annotated[float, BeforeValidator(_kilograms)]
 
 
 class ColumnSpec(StrictModel):
-    """Where a signal stands in a file."""
+    """The column of a measurement file that holds a signal."""
 
-    column: str = Field(min_length=1)  # its header, without the unit
-    unit: UnitText | None = None  # of its numbers; left out: as the header says
+    column: str = Field(min_length=1)  # header without the unit
+    unit: UnitText | None = None  # unit of its numbers; default: as the header says
     sign: Literal[1, -1] = 1  # -1: positive where ISO 8855 is negative
 
 
@@ -285,7 +284,7 @@ AnyColumn = Annotated[ColumnSpec, BeforeValidator(_column)]
 
 
 class MappingSpec(StrictModel):
-    """Which columns of a measurement are which signals."""
+    """The mapping from the columns of a measurement to signals."""
 
     time: AnyColumn = ColumnSpec(column="time")
     signals: dict[SignalText, AnyColumn] = Field(min_length=1)
@@ -295,10 +294,10 @@ class MappingSpec(StrictModel):
 
 @reads("mapping of signals", ScenarioError)
 def load_mapping(path: Path | str) -> MappingSpec:
-    """Read a mapping of signals.
+    """Read a mapping file.
 
     Raises:
-        ScenarioError: with everything that is wrong with it.
+        ScenarioError: it is invalid; lists all problems.
     """
     document = yaml_lines.read(Path(path), what="mapping of signals")
     spec = validate(MappingSpec, document)
@@ -308,10 +307,10 @@ def load_mapping(path: Path | str) -> MappingSpec:
 
 
 def load_trace(path: Path, mapping: MappingSpec | None, label: str = "") -> Trace:
-    """Return what a folder of results holds, or a file of measured columns: CSV, Parquet or ASAM MDF 4.
+    """Read the trace of a results folder, or of a measurement file: CSV, Parquet or ASAM MDF 4.
 
     Raises:
-        ResultsError: it cannot be read, lacks a column, a unit does not fit, or no mapping is given.
+        ResultsError: it cannot be read, lacks a column, a unit does not fit, or there is no mapping.
     """
     if os.path.isdir(path):
         return trace_of(load_results(path), label)
@@ -342,16 +341,16 @@ def _measured(file: SeriesFile, mapping: MappingSpec, label: str, title: str) ->
         values = numbers_in(column.values, unit, measure_of(wanted), wanted, f"column {spec.column!r}")
         _refuse_implausible(name, spec.column, column.values, values, unit)
         if not np.array_equal(times, clock):
-            values = np.interp(clock, times, values)  # channels of MDF have clocks of their own
+            values = np.interp(clock, times, values)  # channels of an MDF file may have different time axes
         signals[name] = spec.sign * values
     return Trace(label, clock, signals, mapping.mass, mapping.friction, title=title)
 
 
 def _unit_of(name: str, spec: ColumnSpec, of_file: str | None, wanted: str) -> str:
-    """Return the unit of the column of a signal, or of the time.
+    """Return the unit of a signal's column or of the time column.
 
     Raises:
-        ValueError: neither the mapping nor the file gives it; only plain numbers may go without.
+        ValueError: neither the mapping nor the file states it; only plain numbers may have none.
     """
     unit = spec.unit or of_file or (wanted if wanted == "1" else None)
     if unit is None:
@@ -364,14 +363,14 @@ def _unit_of(name: str, spec: ColumnSpec, of_file: str | None, wanted: str) -> s
 
 
 def _refuse_implausible(name: str, column: str, given: np.ndarray, values: np.ndarray, unit: str) -> None:
-    """Raise ValueError if a signal has values that no car reaches, with the unit that was probably meant.
+    """Raise ValueError if a signal has values that no car reaches; suggest the unit that was probably meant.
 
     Args:
-        name: of the signal.
-        column: its heading.
+        name: name of the signal.
+        column: heading of its column.
         given: the numbers of the column, in `unit`.
         values: the same in SI.
-        unit: of the column.
+        unit: unit of the column.
     """
     largest, wanted = SIGNALS[name].largest, SIGNALS[name].unit
     if largest is None or np.mean(np.abs(values) > largest) <= SPIKES:
@@ -385,25 +384,25 @@ def _refuse_implausible(name: str, column: str, given: np.ndarray, values: np.nd
 
 
 def likeness(hand: np.ndarray, answer: np.ndarray) -> float:
-    """Return the normalized product of two signals over the same samples, from -1 to 1; 0 if one is zero."""
+    """Return the normalized product of two sampled signals, from -1 to 1; 0 if one of them is zero."""
     size = float(np.sqrt(np.sum(hand**2) * np.sum(answer**2)))
     return float(np.sum(hand * answer)) / size if size else 0.0
 
 
 def refuse_opposed(hand: np.ndarray, answer: np.ndarray, name: str) -> None:
-    """Raise NotJudged if an answer is on the whole to the other side than the hand wheel.
+    """Raise NotJudged if a response is mostly to the opposite side of the hand wheel.
 
     Args:
         hand: hand-wheel angle over the samples in question; zero straight ahead.
-        answer: over the same samples.
-        name: of the answer, in words.
+        answer: the response over the same samples.
+        name: name of the response, in words.
     """
     if likeness(hand, answer) < 0.0:
         raise opposed(name)
 
 
 def opposed(name: str) -> NotJudged:
-    """Return the reason not to judge a run whose answer opposes the steering."""
+    """Return the exception for a run whose response opposes the steering."""
     return NotJudged(
         f"the {name} opposes the steering: both are positive to the left, so one of them has the wrong sign "
         "('sign: -1' in the mapping of measured columns turns it)"

@@ -1,1 +1,1 @@
-"""Several runs at once: comparisons, convergence, the study of a paper."""
+"""Experiments: studies, sweeps, tunings and rankings, expanded into runs, executed and judged."""

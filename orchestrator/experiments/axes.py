@@ -1,10 +1,7 @@
-"""The schema of axes: what varies from run to run, the values it takes.
+"""Axes of an experiment: their schema, the points of a design, and the overrides at each point.
 
-The schema of regions: the values that a paper leaves open, how far each may lie from the chosen one.
-
-The points of a design: every combination, a list, or a Latin hypercube.
-
-What parts of an experiment's file change in the runs' scenarios.
+A design is a full grid, a list or a Latin hypercube. A region has axes, too: the values that a paper
+leaves open, with the range over which claims are judged again.
 """
 
 from __future__ import annotations
@@ -34,10 +31,10 @@ if TYPE_CHECKING:
 
 
 MOST = 100_000
-"""Runs of an experiment; chosen: more is a slip of the pen, and would be planned for an hour."""
+"""Largest number of runs in an experiment; chosen: more is a typo, and would take an hour to plan."""
 
 FILES = ("vehicle", TYRES, f"{TYRES}.front", f"{TYRES}.rear")
-"""Places that take names of files, relative to the experiment's."""
+"""Override targets whose values are file names, relative to the experiment file."""
 
 AxisKind = Literal["setting", "fmu", "file", "variant"]
 
@@ -53,7 +50,7 @@ def _places(value: object) -> list[str]:
 
 
 def _levels(value: object) -> dict[Any, str]:
-    """Return the values of an axis, each with its words."""
+    """Return the values of an axis with their labels."""
     if isinstance(value, dict) and value and all(isinstance(said, str) for said in value.values()):
         return dict(value)
     if not isinstance(value, list) or not all(_is_plain(v) for v in value):
@@ -75,7 +72,7 @@ Levels = Annotated[dict[Any, str], PlainValidator(_levels)]
 
 
 class OverrideSpec(StrictModel):
-    """What is other than in the scenario file."""
+    """Overrides of a scenario."""
 
     swap: dict[str, str] = Field({}, description="Unit -> FMU, a name or a path")
     set: dict[str, Scalar] = Field({}, description="unit.parameter -> value")
@@ -87,17 +84,17 @@ class OverrideSpec(StrictModel):
 
     @property
     def places(self) -> list[str]:
-        """What is changed."""
+        """The targets of these overrides."""
         own = [place for place in ("vehicle", *OF_RUN) if getattr(self, place, None) is not None]
         return [*self.swap, *self.set, *(f"{FAULTS}.{one.on}" for one in self.faults), *own]
 
 
 class VariantSpec(OverrideSpec):
-    """Changes that belong together."""
+    """A named group of overrides."""
 
 
 class AxisSpec(StrictModel):
-    """What is varied, and the values it takes: listed, or so many from one to another; or variants."""
+    """An axis: targets with their values, listed or as a range; or variants that change several targets."""
 
     vary: TargetList = Field(
         [], description="unit.parameter, inputs.pattern, a unit (its FMU), vehicle or tyres (files)"
@@ -113,7 +110,7 @@ class AxisSpec(StrictModel):
 
     @property
     def kind(self) -> AxisKind:
-        """What the axis varies."""
+        """What the axis varies: a value, an FMU, a file or several targets at once."""
         if self.variants:
             return "variant"
         place = self.vary[0]
@@ -121,12 +118,12 @@ class AxisSpec(StrictModel):
 
     @property
     def places(self) -> list[str]:
-        """What the axis changes."""
+        """The targets that the axis overrides."""
         return self.vary or list(dict.fromkeys(p for one in self.variants.values() for p in one.places))
 
     @property
     def length(self) -> int | None:
-        """How many values there are, None if the axis does not say."""
+        """The number of values; None for a range without a count."""
         levels = self.variants or self.values
         return self.count if levels is None else len(levels)
 
@@ -183,7 +180,7 @@ class AxisSpec(StrictModel):
 
 
 class DesignAxisSpec(AxisSpec):
-    """An axis of the points at which the runs of an experiment are made."""
+    """An axis of an experiment's design."""
 
     runs: Patterns = Field(["*"], description="Which runs it changes; the others are the same all along it")
     repeats: bool = Field(
@@ -208,11 +205,11 @@ def _is_quantity(value: object) -> bool:
 
 
 LEVELS = 5
-"""Of an open value from one number to another. Chosen: enough for a straight line between two to do."""
+"""Levels of an open value given as a range. Chosen: enough to interpolate linearly between neighbours."""
 
 
 class OpenVariantSpec(VariantSpec):
-    """Changes that belong together; none: as chosen."""
+    """A named group of overrides; an empty one is the chosen point."""
 
     scenario: str = Field(
         "", description="In place of a run's own, whose name is `{scenario}`; relative to this file"
@@ -220,7 +217,7 @@ class OpenVariantSpec(VariantSpec):
 
 
 class OpenValueSpec(AxisSpec):
-    """A value that is open, as an axis of which every run has a value of its own: the chosen one."""
+    """A value that the paper leaves open: an axis on which every run already has its chosen value."""
 
     variants: dict[str, OpenVariantSpec] = Field(  # type: ignore[assignment]
         {}, description="Words -> changes that belong together"
@@ -237,19 +234,19 @@ class OpenValueSpec(AxisSpec):
 
     @property
     def stepped(self) -> OpenValueSpec:
-        """The same with so many levels along it."""
+        """The axis with discrete levels, for a scan along it."""
         return (
             self if self.values or self.variants else self.model_copy(update={"count": self.count or LEVELS})
         )
 
     @property
     def continuous(self) -> OpenValueSpec:
-        """The same with every number of its range."""
+        """The axis as a continuous range, for a Latin hypercube."""
         return self.model_copy(update={"count": None})
 
 
 class RegionSpec(StrictModel):
-    """Where claims are judged beside the chosen point: along each open value, and over all together."""
+    """Where claims are judged again: along each open value, and over all of them together."""
 
     points: int = Field(24, ge=10, le=10_000, description="Of a Latin hypercube over all open values")
     seed: int = Field(1, ge=0, description="Of the Latin hypercube")
@@ -257,21 +254,21 @@ class RegionSpec(StrictModel):
 
 
 RUN = "run"
-"""What figures and tables along axes call the axis of named runs."""
+"""Name of the axis of named runs in figures and tables."""
 DesignPoint = tuple["Level", ...]
 """One level per axis, in the order of the axes."""
 
 
 @dataclass(frozen=True)
 class Level:
-    """A value of an axis as the file gives it, and what figures and tables call it."""
+    """A value of an axis as written in the file, with its label in figures and tables."""
 
     value: Value
     words: str
 
 
 def levels_of(axis: AxisSpec) -> list[Level]:
-    """Return the levels of an axis that lists or counts them."""
+    """Return the levels of an axis with listed values, variants, or a counted range."""
     if axis.variants:
         return [Level(words, words) for words in axis.variants]
     if axis.values is not None:
@@ -283,7 +280,7 @@ def levels_of(axis: AxisSpec) -> list[Level]:
 
 
 def _spaced(start: float, end: float, count: int, spacing: str) -> list[float]:
-    """Return `count` numbers from start to end; 0.1, 0.2, 0.3 where equal steps are that exactly."""
+    """Return `count` numbers from start to end; exact fractions avoid 0.30000000000000004."""
     if spacing == "log":
         inner = [start * (end / start) ** (i / (count - 1)) for i in range(1, count - 1)]
         return [float(start), *inner, float(end)]
@@ -296,7 +293,7 @@ def _level(number: float) -> Level:
 
 
 def points(spec: ExperimentSpec) -> list[DesignPoint]:
-    """Return the points of the axes, always in the same order; the last axis of a grid changes first."""
+    """Return the points of a design in a fixed order; in a grid the last axis varies fastest."""
     axes = list(spec.axes.values())
     if spec.design == "latin_hypercube":
         assert spec.points is not None
@@ -307,9 +304,9 @@ def points(spec: ExperimentSpec) -> list[DesignPoint]:
 
 
 def latin_hypercube(axes: Sequence[AxisSpec], runs: int, seed: int) -> list[DesignPoint]:
-    """Return `runs` points of which every axis has one in each of `runs` equal parts of its range.
+    """Return a Latin hypercube: on every axis, each of `runs` equal parts of the range holds one point.
 
-    An axis of listed values takes each of them equally often, as far as `runs` can be divided.
+    An axis of listed values takes each of them equally often, up to the remainder of the division.
     Source: McKay, Beckman, Conover, Technometrics 21 (1979) 239-245.
     """
     generator = np.random.Generator(np.random.PCG64(seed))
@@ -321,7 +318,7 @@ def latin_hypercube(axes: Sequence[AxisSpec], runs: int, seed: int) -> list[Desi
 
 
 def level_at(axis: AxisSpec, place: float) -> Level:
-    """Return the level at a place between 0 and 1."""
+    """Return the level at a relative position, 0 to 1, along an axis."""
     if axis.variants or axis.values is not None or axis.count is not None:
         levels = levels_of(axis)
         return levels[min(int(place * len(levels)), len(levels) - 1)]
@@ -334,7 +331,7 @@ def level_at(axis: AxisSpec, place: float) -> Level:
 
 
 def changes_at(axis: AxisSpec, level: Level, folder: Path, origin: str = "sweep") -> list[Override]:
-    """Return what a level of an axis changes, of a file in a folder."""
+    """Return the overrides of one level of an axis; file names are relative to `folder`."""
     if axis.kind == "file":
         return [Override(axis.vary[0], str(folder / str(level.value)), origin)]
     if axis.kind == "variant":
@@ -345,14 +342,14 @@ def changes_at(axis: AxisSpec, level: Level, folder: Path, origin: str = "sweep"
 
 
 def _given(axis: AxisSpec, level: Level) -> Value:
-    """Return a level with the unit that the axis counts in."""
+    """Return the value of a level, with the axis's unit if it has one."""
     if axis.unit:
         return f"{text_of(level.value)} {axis.unit}"
     return yaml_lines.scalar(level.value) if isinstance(level.value, str) else level.value
 
 
 def changes_of_file(given: OverrideSpec, folder: Path, origin: str) -> list[Override]:
-    """Return the changes that a part of a file in a folder gives."""
+    """Return the overrides in one part of an experiment file; file names are relative to `folder`."""
     vehicle = [Override("vehicle", str(folder / given.vehicle), origin)] if given.vehicle else []
     of_run = overrides.changes_of_run(given, origin)
     faults = [Override(f"{FAULTS}.{place}", ones, origin) for place, ones in by_place(given.faults).items()]

@@ -1,12 +1,9 @@
-"""What all figures over axes share: which runs a panel holds, what axes and levels are called, their look.
+"""Figures over axes: metrics as curves or maps, grids as lines, limits as lines with a band.
 
-A metric as curves over an axis, or as a map over two.
-
-The colours of maps get lighter all the way, lines differ in colour, dash and marker: both survive
-grey print and every eye.
-
-How far an axis may go, over another: a line through the last values that hold, and a band up to the
-first that do not.
+`Drawing` has what they share: the runs of a panel, labels of axes and levels, line styles. Map colours
+increase in lightness, and lines differ in colour, dash and marker, so both survive grey print and
+colour blindness. A limit is drawn through the last values that hold; the band reaches to the first
+that do not.
 """
 
 from __future__ import annotations
@@ -43,17 +40,20 @@ FAILED: dict[str, Any] = {
     "color": "#111111",
     "label": "no number: failed, not made, or never",
 }
-"""A run that gives no number: a cross, never a gap that could pass for nothing."""
+"""Style of a run without a number: a cross, because a gap would be overlooked."""
 GUIDE: dict[str, Any] = {"color": QUIET, "linewidth": 0.9, "linestyle": (0, (4, 2))}
 
 
 class Drawing:
-    """A figure over axes: `fill` draws a panel, `finish` what panels share; what has a label is explained."""
+    """Base of figures over axes: `fill` draws a panel, `finish` sets what the panels share.
+
+    Artists with a label appear in the legend.
+    """
 
     what = ""
-    """What is drawn, without its unit."""
+    """Title of the drawn quantity, without its unit."""
     upwards = ""
-    """What stands beside the panels on the left."""
+    """Label of the y axes."""
 
     def __init__(self, findings: ExperimentResult, spec: FigureSpec) -> None:
         self.findings = findings
@@ -96,27 +96,27 @@ class Drawing:
             yield None, style_of(0)
 
     def at(self, run: Case, axis: str) -> Level:
-        """Return where a run stands on an axis; "run" is that of its names."""
+        """Return the level of a run on an axis; the axis "run" has the run names as levels."""
         if axis == RUN:
             return Level(run.run.name, run.run.label)
         return run.point[self.names.index(axis)]
 
     def levels(self, axis: str) -> list[Level]:
-        """Return the levels of an axis that runs have, in their order."""
+        """Return the levels of an axis that occur among the runs, in order."""
         return list(dict.fromkeys(self.at(run, axis) for run in self.runs))
 
     def place(self, level: Level, axis: str) -> float:
-        """Return where a level is drawn: numbers as they are, names at 0, 1, 2."""
+        """Return the coordinate of a level: its number, or for names 0, 1, 2, ..."""
         if self.numeric(axis):
             return float(level.value)
         return float(self.levels(axis).index(level))
 
     def numeric(self, axis: str) -> bool:
-        """Return whether an axis is one of numbers."""
+        """Return whether an axis is numeric."""
         return axis != RUN and self.axes[axis].numeric
 
     def label(self, axis: str) -> str:
-        """Return an axis in words, with its unit."""
+        """Return the label of an axis, with its unit."""
         if axis == RUN:
             return "Run"
         spec = self.axes[axis]
@@ -125,18 +125,18 @@ class Drawing:
         return f"{said.strip()} in {unit}" if unit else said.strip()
 
     def unit_of(self, axis: str) -> str:
-        """Return the unit that an axis counts in, as people write it."""
-        assert self.findings.planned is not None  # as of every experiment along axes
+        """Return the display unit of an axis."""
+        assert self.findings.planned is not None  # experiments with axes are always planned
         return self.findings.planned.axis_unit(axis).strip(" []").replace(".", "·")
 
     def name_of(self, axis: str, level: Level) -> str:
-        """Return a level of an axis in words."""
+        """Return the label of a level."""
         if not self.numeric(axis):
             return level.words
         return f"{self.axes[axis].says or axis} {level.words} {self.unit_of(axis)}".strip()
 
     def scale_x(self, axes: Axes) -> None:
-        """Set the scale and, for an axis of names, the ticks of x."""
+        """Set the scale of x, or for an axis of names its ticks."""
         if self.numeric(self.spec.x):
             set_scale(axes, "x", self.axes[self.spec.x].spacing)
         else:
@@ -144,14 +144,14 @@ class Drawing:
 
 
 def set_scale(axes: Axes, which: Literal["x", "y"], scale: str) -> None:
-    """Set the scale of an axis; a logarithmic one has plain numbers, too."""
+    """Set the scale of an axis; logarithmic axes get plain numbers instead of powers of ten."""
     if scale == "log":
         axes.set(**{f"{which}scale": "log"})  # type: ignore[arg-type]
         getattr(axes, f"{which}axis").set_major_formatter("{x:g}")
 
 
 def name_ticks(axes: Axes, names: Sequence[str]) -> None:
-    """Make x an axis of names, at 0, 1, 2."""
+    """Make x an axis of names, with ticks at 0, 1, 2, ..."""
     axes.set_xticks(range(len(names)), [literal(name) for name in names])
     axes.set_xlim(-0.5, len(names) - 0.5)
 
@@ -162,14 +162,14 @@ def style_of(number: int) -> dict[str, Any]:
 
 
 COLOURS = "cividis"
-"""From dark to light for every eye (Nuñez, Anderton, Renslow, PLOS ONE 13 (2018) e0199239)."""
+"""Safe for colour blindness (Nuñez, Anderton, Renslow, PLOS ONE 13 (2018) e0199239)."""
 
 
 class ValueDrawing(Drawing):
-    """What all drawings of numbers share: the unit in which they are shown, lines, a value to mark."""
+    """Base of drawings of numbers: display unit, lines with confidence intervals, a marked value."""
 
     def show_in(self, unit: str) -> None:
-        """Show numbers of a unit as people read them, that to mark, too."""
+        """Set the unit of the numbers, and with it the display unit and the marked value."""
         self.quantity = unit
         self.unit, self.factor = shown_unit(unit)
         self.measured = f"{self.what} in {self.unit}" if self.unit else self.what
@@ -178,11 +178,11 @@ class ValueDrawing(Drawing):
         self.mark_text = "" if marked is None else shown(si_number(marked, unit), unit)
 
     def number(self, given: float | str) -> float:
-        """Return a number of the file in the unit shown."""
+        """Convert a number of the experiment file to the display unit."""
         return self.factor * si_number(given, self.quantity)
 
     def shown(self, value: MetricValue | None) -> tuple[float, float]:
-        """Return a number and half the width of its confidence interval as shown; NaN: nothing to draw."""
+        """Return a number and its confidence half width in the display unit; NaN if missing."""
         if value is None or not math.isfinite(value.number):
             return math.nan, 0.0
         return self.factor * value.number, self.factor * value.half
@@ -190,7 +190,7 @@ class ValueDrawing(Drawing):
     def draw_line(
         self, axes: Axes, line: Iterable[tuple[float, MetricValue | None]], style: dict[str, Any]
     ) -> None:
-        """Draw a line through (x, value) with confidence, and a cross where there is no number."""
+        """Draw a line through (x, value) with confidence intervals, and a cross where a number is missing."""
         points = sorted((x, *self.shown(value)) for x, value in line)
         axes.plot([x for x, *_ in points], [y for _, y, _ in points], **style)
         for x, y, half in points:
@@ -200,13 +200,13 @@ class ValueDrawing(Drawing):
                 axes.plot([x], [0.0], transform=axes.get_xaxis_transform(), clip_on=False, **FAILED)
 
     def draw_mark(self, axes: Axes) -> None:
-        """Draw the value to mark, if there is one."""
+        """Draw the marked value, if there is one."""
         if self.mark is not None:
             axes.axhline(self.mark, label=self.mark_text, **GUIDE)
 
 
 class MetricDrawing(ValueDrawing):
-    """What curves and maps share: the metric and its range."""
+    """Base of curves and maps: the metric and its range."""
 
     def __init__(self, findings: ExperimentResult, spec: FigureSpec) -> None:
         super().__init__(findings, spec)
@@ -229,7 +229,7 @@ class MetricDrawing(ValueDrawing):
 
 
 class CurveDrawing(MetricDrawing):
-    """A line, or for a Latin hypercube points, for each level of `lines`."""
+    """A metric over an axis: a line, or for a Latin hypercube points, for each level of `lines`."""
 
     def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
         for level, style in self.lines():
@@ -271,7 +271,7 @@ class GridLines(ValueDrawing):
         rows = list(dict.fromkeys(cell.row for cell, _ in self.cells))
         columns = list(dict.fromkeys(cell.column for cell, _ in self.cells))
         for number, column in enumerate(columns):
-            shift = 0.03 * (number - (len(columns) - 1) / 2)  # so that none hides another
+            shift = 0.03 * (number - (len(columns) - 1) / 2)  # keep overlapping points visible
             mine = ((rows.index(c.row) + shift, value) for c, value in self.cells if c.column == column)
             self.draw_line(axes, mine, {**style_of(number), "label": column})
         self.draw_mark(axes)
@@ -282,7 +282,7 @@ class GridLines(ValueDrawing):
 
 
 class MapDrawing(MetricDrawing):
-    """A grid as coloured cells, other designs as coloured points."""
+    """A metric over two axes: coloured cells for a grid, coloured points for other designs."""
 
     def fill(self, axes: Axes, runs: Sequence[Case]) -> None:
         x = [float(self.at(run, self.spec.x).value) for run in runs]
@@ -341,20 +341,20 @@ def edges(values: Sequence[float], *, log: bool) -> np.ndarray:
 def boundary(
     beyond: np.ndarray, right: np.ndarray, up: np.ndarray
 ) -> list[tuple[tuple[float, float], tuple[float, float]]]:
-    """Return the edges, ((x0, x1), (y0, y1)) each, between cells that are beyond and cells that are not."""
+    """Return the edges ((x0, x1), (y0, y1)) between cells where `beyond` is true and others."""
     upright = [((right[j + 1],) * 2, (up[i], up[i + 1])) for i, j in np.argwhere(np.diff(beyond, axis=1))]
     level = [((right[j], right[j + 1]), (up[i + 1],) * 2) for i, j in np.argwhere(np.diff(beyond, axis=0))]
     return upright + level
 
 
 HATCHES = ("", "///", "...", "\\\\\\", "xxx")
-"""Of the bands, so that they differ in grey print."""
+"""Hatches of the bands, which tell them apart in grey print."""
 END: dict[str, Any] = {"mfc": "white", "markersize": 8, "linestyle": ""}
-"""The mark of a line where all values tried hold, or none."""
+"""Marker where all tried values hold, or none does."""
 
 
 class LimitDrawing(Drawing):
-    """A limit over an axis."""
+    """A limit over an axis, with a band up to the first value that fails."""
 
     def __init__(self, findings: ExperimentResult, spec: FigureSpec) -> None:
         super().__init__(findings, spec)

@@ -1,8 +1,8 @@
-"""Runs on a Dask cluster; needs the package distributed.
+"""Execution of runs on a Dask cluster; needs the package `distributed`.
 
-The workers need this program, in this version, and nothing else: plans travel with their tasks, the
-FMUs once to every worker, which unpacks them into its own cache. As on this machine every run has a
-process of its own, so a unit that crashes takes no worker with it.
+Workers only need the same version of this program: plans travel with their tasks, and every FMU is sent
+once to each worker, which unpacks it into its own cache. As with local runs, each run has its own
+process, so an FMU that crashes does not take the worker down.
 """
 
 from __future__ import annotations
@@ -32,25 +32,25 @@ from .jobs import Job, OnOutcome, Outcome
 from .workers import execute
 
 TIMEOUT = 10.0
-"""Time that a scheduler has to answer [s]."""
+"""Time limit for connecting to the scheduler [s]."""
 AHEAD = 4
-"""Runs handed to the cluster ahead of time, for each thread of its workers."""
+"""Runs submitted ahead of time per worker thread."""
 
 _LOCAL: dict[str, Path] = {}
-"""On a worker: hash of an FMU -> where it is unpacked."""
+"""On a worker: SHA-256 of an FMU -> the folder it is unpacked in."""
 
 
 def run_on_cluster(jobs: Sequence[Job], done: OnOutcome, *, scheduler: str) -> None:
-    """Make all runs on the workers of a Dask scheduler.
+    """Execute jobs on the workers of a Dask scheduler.
 
     Args:
-        jobs: what to run.
-        done: called with every outcome as it comes.
-        scheduler: its address, tcp://host:port.
+        jobs: the runs.
+        done: called with each outcome as it arrives.
+        scheduler: address, tcp://host:port.
 
     Raises:
-        ScenarioError: no scheduler answers, or its workers do not fit.
-        ResultsError: the cluster was lost on the way.
+        ScenarioError: no scheduler answers, or its workers are incompatible.
+        ResultsError: the connection to the cluster was lost.
         KeyboardInterrupt: Ctrl-C or SIGTERM.
     """
     fmus = {unit.fmu.sha256: unit.fmu for job in jobs if job.plan for unit in job.plan.instances}
@@ -83,7 +83,7 @@ def _submit_all(client: Any, jobs: Sequence[Job], done: OnOutcome, scheduler: st
 
 
 def _outcome(future: Any, job: Job, scheduler: str) -> Outcome:
-    """Return what a worker handed back, or why it handed back nothing."""
+    """Return the outcome that a worker reported, or the reason why it reported none."""
     if future.status == "cancelled" or future.status == "lost":
         raise ResultsError(f"{scheduler}: the cluster was lost; what it had finished is kept.")
     error = future.exception() if future.status == "error" else None
@@ -96,11 +96,11 @@ def _outcome(future: Any, job: Job, scheduler: str) -> Outcome:
 
 
 def _make(job: Job) -> Outcome:
-    """Make a run on a worker, in a process of its own."""
+    """Execute a run on a worker, in a separate process."""
     assert job.plan is not None
     here = replace(job, plan=_unpacked_here(job.plan))
     (outcome,) = execute([here], workers=1)
-    return replace(outcome, job=replace(job, plan=None))  # the plan is known where it came from
+    return replace(outcome, job=replace(job, plan=None))  # the caller has the plan: do not send it back
 
 
 def _unpacked_here(plan: Plan) -> Plan:
@@ -111,10 +111,10 @@ def _unpacked_here(plan: Plan) -> Plan:
 
 
 class _Archives(distributed.WorkerPlugin):
-    """A plugin of Dask's workers that unpacks FMUs before the first run starts.
+    """Dask worker plugin that unpacks the FMUs before the first run starts.
 
     Args:
-        archives: hash -> content.
+        archives: SHA-256 -> content of the FMU.
     """
 
     def __init__(self, archives: dict[str, bytes]) -> None:
@@ -123,7 +123,7 @@ class _Archives(distributed.WorkerPlugin):
         self.idempotent = False
 
     def setup(self, worker: Any) -> None:
-        """Called on every worker, those too that join later."""
+        """Unpack the FMUs; Dask calls this on every worker, including those that join later."""
         with tempfile.TemporaryDirectory() as folder:
             for digest, content in self.archives.items():
                 path = Path(folder, f"{digest}.fmu")
@@ -143,7 +143,7 @@ def _connected(address: str) -> Iterator[Any]:
         ) from None
     log = logging.getLogger("distributed.client")
     level = log.level
-    log.setLevel(logging.CRITICAL)  # it logs tracebacks when the scheduler is lost; the runs tell of that
+    log.setLevel(logging.CRITICAL)  # it logs tracebacks when the scheduler is lost, which we report
     try:
         with client:
             yield client
@@ -152,15 +152,15 @@ def _connected(address: str) -> Iterator[Any]:
 
 
 def _check_workers(client: Any, address: str) -> int:
-    """Return the number of threads of all workers, after making sure that they can do the work."""
+    """Check that all workers are compatible and return their number of threads."""
     threads = sum(client.nthreads().values())
     if not threads:
         raise ScenarioError(f"--scheduler {address}: this scheduler has no workers")
     here = ours()
     for worker, theirs in client.run(versions, on_error="return").items():
-        if isinstance(theirs, OSError):  # it is gone, or begins anew; runs go to the others
+        if isinstance(theirs, OSError):  # it has gone or is restarting; runs go to the others
             continue
-        if isinstance(theirs, Exception):  # whatever a worker without this program says
+        if isinstance(theirs, Exception):  # any error of a worker without this program
             text = " ".join(str(theirs).split())
             raise ScenarioError(
                 f"--scheduler {address}: its workers cannot run this program; "
@@ -184,4 +184,4 @@ def versions() -> dict[str, str]:
 
 
 ours = versions
-"""What the workers' versions are compared with."""
+"""The versions here, which those of the workers must match."""

@@ -1,12 +1,12 @@
-"""One scenario with several FMUs for a unit, as an experiment of one named run per combination.
+"""Experiments made of one scenario: comparisons of FMUs, and convergence over the communication step.
 
-How the result of a scenario depends on the communication step: error, observed order, cost.
+A comparison has one named run for every combination of the swapped FMUs.
 
-Each algorithm runs at h, h/2, h/4, ...; units with a step size of their own keep it. The error of
-a run is the largest difference from the finest run of the first algorithm, over the communication
-points of the coarsest run, relative to the signal's peak. The observed order at h is
-log2(|x_h - x_h/2| / |x_h/2 - x_h/4|) with the same norm: it needs no exact solution, and compares
-an algorithm only with itself.
+A convergence study runs each coupling algorithm at h, h/2, h/4, ...; instances with their own step size
+keep it. The error of a run is the largest difference from the finest run of the first algorithm, over
+the communication points of the coarsest run, relative to the signal's peak. The observed order at h is
+log2(|x_h - x_h/2| / |x_h/2 - x_h/4|) with the same norm: it needs no exact solution, and compares an
+algorithm only with itself.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ PANELS = (
     "path",
 )
 FIGURES = {"overview": PANELS, "wheel_torques": ("wheel_torque_*",)}
-"""Name of the file -> panels."""
+"""Figure name -> panels."""
 
 
 def comparison(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) -> LoadedExperiment:
@@ -72,7 +72,7 @@ def of_runs(
     changes: Sequence[Override],
     figures: dict[str, tuple[str, ...]],
 ) -> LoadedExperiment:
-    """Return an experiment of runs that no file lists; `changes`: of all; `figures`: name -> panels."""
+    """Build an experiment without a file; `changes`: overrides of all runs; `figures`: name -> panels."""
     given = {
         "title": title,
         "runs": [{"name": run.name, "scenario": run.scenario.name} for run in runs],
@@ -86,14 +86,14 @@ def of_runs(
 
 
 def variants(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) -> list[NamedRun]:
-    """Return one run for every combination of the FMUs that `swaps` names.
+    """Return one run for every combination of the FMUs in `swaps`.
 
     Args:
         scenario: the scenario file.
-        swaps: `unit=fmu,fmu,...`; a unit may be named more than once. An FMU may bring parameters,
-            `fmu:parameter=value:parameter=value`, so that one FMU can be compared with itself. If only
-            one FMU is named in all, the scenario as it stands is the other variant.
-        changes: for all.
+        swaps: `instance=fmu,fmu,...`; an instance may be named more than once. An FMU may bring
+            parameters, `fmu:parameter=value:parameter=value`, so that it can be compared with itself.
+            If every instance has a single FMU, the unchanged scenario is the other variant.
+        changes: overrides of all runs.
 
     Raises:
         ScenarioError: the scenario or an option is wrong, or there is nothing to compare.
@@ -123,7 +123,7 @@ def variants(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) 
 
 
 def _choices(swaps: Sequence[str]) -> dict[str, list[str]]:
-    """Return unit -> FMUs, each once, in the order of the options."""
+    """Return instance -> its FMUs, without repetition, in the order of the options."""
     choices: dict[str, list[str]] = {}
     for text in swaps:
         unit, equals, fmus = text.partition("=")
@@ -136,7 +136,7 @@ def _choices(swaps: Sequence[str]) -> dict[str, list[str]]:
 
 
 def _label(text: str, choices: Sequence[str]) -> str:
-    """Return what tells a choice from the others: its FMU, unless all have it, and what they do not share."""
+    """Return the label of a choice: its FMU, unless all share it, and the parameters that differ."""
     fmu, *brought = swap_of("", text, "--swap")
     others = [swap_of("", other, "--swap") for other in choices]
     name = str(fmu.value)
@@ -165,12 +165,12 @@ def comparison_table(findings: ExperimentResult) -> Table:
 
 
 ROUNDING = 1e-13
-"""Relative difference that a different order of additions can make."""
+"""Relative difference that a different order of summation can cause."""
 
 
 @dataclass(frozen=True)
 class ConvergenceRow:
-    """One run: its algorithm and step [s], and what it came to; None where it cannot be known."""
+    """One run of a convergence study: algorithm, step [s], error, order and cost; None where undefined."""
 
     algorithm: str
     step: float
@@ -178,7 +178,7 @@ class ConvergenceRow:
     order: float | None
     wall_time: float | None  # [s]
     failed: str = ""
-    finest: bool = False  # the run that all others are compared with
+    finest: bool = False  # the reference of all others
 
 
 def refinements(
@@ -217,7 +217,7 @@ def _milliseconds(step: float) -> str:
 
 
 def measure(findings: ExperimentResult, signal: str) -> list[ConvergenceRow]:
-    """Return a row for every run, computed from its results.
+    """Compute error, observed order and cost of every run from its results.
 
     Raises:
         ResultsError: the signal is zero throughout.
@@ -252,12 +252,12 @@ def measure(findings: ExperimentResult, signal: str) -> list[ConvergenceRow]:
 
 
 def _given(run: NamedRun, place: str) -> Plain:
-    """Return what a run gives at a place."""
+    """Return the value that a run's last override of a target sets."""
     return next(change.plain for change in reversed(run.changes) if change.place == place)
 
 
 def _samples(found: Results | None, signal: str, why: str) -> tuple[np.ndarray | None, float | None, str]:
-    """Return the signal, the wall time [s] and why there is neither."""
+    """Return the signal and the wall time [s], or None for both and the reason."""
     if found is None:
         return None, None, why
     if not np.issubdtype(found[signal].dtype, np.number):
@@ -266,12 +266,12 @@ def _samples(found: Results | None, signal: str, why: str) -> tuple[np.ndarray |
 
 
 def _common(x: np.ndarray | None, k: int) -> np.ndarray | None:
-    """Return the samples of a run with step h / 2^k at the communication points of that with h."""
+    """Return the samples of a run with step h / 2^k at the communication points of the run with h."""
     return None if x is None else x[:: 2**k]
 
 
 def _distance(a: np.ndarray | None, b: np.ndarray | None) -> float | None:
-    """Return the largest difference; 0 if it is no more than rounding."""
+    """Return the largest difference; 0 if it is within rounding."""
     if a is None or b is None:
         return None
     distance = float(np.max(np.abs(a - b)))
@@ -279,7 +279,7 @@ def _distance(a: np.ndarray | None, b: np.ndarray | None) -> float | None:
 
 
 def convergence_table(rows: Sequence[ConvergenceRow], title: str) -> Table:
-    """Return the table of all runs."""
+    """Return the table of a convergence study, one row per run."""
     table = Table(title, ["algorithm", "step", "error", "observed order", "wall time"])
     for row in rows:
         error: Cell = None if row.error is None else MetricValue(row.error, "1")
@@ -292,7 +292,7 @@ def convergence_table(rows: Sequence[ConvergenceRow], title: str) -> Table:
 
 
 def columns_of(rows: Sequence[ConvergenceRow]) -> list[TableColumn]:
-    """Return all runs as columns, in SI."""
+    """Return the rows as columns, in SI units."""
     numbers = (("step_size", "s", "step"), ("error", "1", "error"), ("order", "1", "order"),
                ("wall_time", "s", "wall_time"))  # fmt: skip
     return [
@@ -306,7 +306,7 @@ def columns_of(rows: Sequence[ConvergenceRow]) -> list[TableColumn]:
 
 
 def convergence_figure(rows: Sequence[ConvergenceRow], signal: str, title: str, note: str) -> Figure:
-    """Return error over step and error over cost, both axes logarithmic, with slopes 1 and 2 to compare.
+    """Draw error over step and error over cost, on logarithmic axes, with reference slopes 1 and 2.
 
     Raises:
         ResultsError: no run has an error above zero.

@@ -1,4 +1,4 @@
-"""The course of an experiment's runs: which are left to be made, made, and noted as they end."""
+"""Execution of an experiment's jobs: which are still to be run, by which runner, noted in the journal."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from .journal import Journal
 from .workers import execute
 
 Runner = Callable[[Sequence[Job], OnOutcome], object]
-"""Makes runs; see `runner_of`."""
+"""Executes jobs and reports each outcome; see `runner_of`."""
 
 
 def left_to_do(jobs: Sequence[Job], records: Mapping[str, MeasuredRun]) -> list[Job]:
-    """Return the runs that have not been made already, each key once, in their order.
+    """Return the jobs that are still to be run, without repetition, in their order.
 
-    Runs that are measured are those whose key is in `records`, and that have kept results if they are to;
-    of others the key stands in the results. The user is told of results that were changed.
+    A job with metrics is finished if its key is in `records` and, where results are kept, they can be
+    read; any other job is finished if the key in its results matches. Warns of results that were edited.
     """
     left: dict[tuple[str, Path], Job] = {}
     for job in jobs:
@@ -46,7 +46,7 @@ def left_to_do(jobs: Sequence[Job], records: Mapping[str, MeasuredRun]) -> list[
 
 
 def _other_unit(job: Job, record: MeasuredRun) -> str:
-    """Return which number of a run is in another unit than its plan gives it, "" if none is."""
+    """Describe a metric that was recorded in another unit than the plan's; "" if there is none."""
     assert job.plan is not None
     units = _units(job.plan, job.metrics)
     for key, value in record.values.items():
@@ -56,7 +56,7 @@ def _other_unit(job: Job, record: MeasuredRun) -> str:
 
 
 def _units(plan: Plan, metrics: MetricRequests) -> dict[str, str]:
-    """Return the unit of every metric of a run."""
+    """Return metric key -> unit."""
     results = results_to_be(plan)
     return {key: unit for key, name, _ in metrics if (unit := unit_in(results, metric(name))) is not None}
 
@@ -64,16 +64,16 @@ def _units(plan: Plan, metrics: MetricRequests) -> dict[str, str]:
 def finish(
     left: Sequence[Job], journal: Journal | None, *, runner: Runner, told: OnOutcome = lambda _: None
 ) -> list[Outcome]:
-    """Make runs, note each in the journal, if there is one, as it ends, and return what became of them.
+    """Execute jobs, add each to the journal (if any) as it ends, and return the outcomes.
 
     Raises:
-        KeyboardInterrupt: Ctrl-C; what is finished is in the journal.
-        ResultsError: the journal cannot be written, or a cluster was lost.
+        KeyboardInterrupt: Ctrl-C; finished runs are in the journal.
+        ResultsError: the journal cannot be written, or the cluster was lost.
     """
     outcomes: list[Outcome] = []
 
     def done(outcome: Outcome) -> None:
-        final = outcome.ok or (outcome.exit_status == 1 and not outcome.died)  # else it may go well next time
+        final = outcome.ok or (outcome.exit_status == 1 and not outcome.died)  # else try again
         if journal:
             journal.add(outcome.job.key, outcome.record, last=final)
         outcomes.append(outcome)
@@ -86,14 +86,14 @@ def finish(
 
 
 def runner_of(workers: int | None, scheduler: str | None) -> Runner:
-    """Return what makes runs: processes of this machine (see `execute`), or a Dask cluster.
+    """Return a runner: local worker processes (see `execute`), or a Dask cluster.
 
     Args:
-        workers: processes at a time; None: one per core.
-        scheduler: of the cluster.
+        workers: number of processes; None: one per core.
+        scheduler: address of the cluster's scheduler; None or "": run locally.
 
     Raises:
-        ScenarioError: the package that a cluster needs is missing.
+        ScenarioError: the package `distributed` is missing.
     """
     if not scheduler:
         return lambda jobs, told: execute(jobs, workers=workers, done=told)

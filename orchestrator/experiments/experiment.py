@@ -1,6 +1,6 @@
-"""Reading an experiment file: runs and axes expanded into cases, every problem reported in one go.
+"""Loading of experiment files: entries with `for` and axes expanded into runs and cases.
 
-Entries with `for`: the runs, claims, checks and derived numbers that each of them stands for.
+All problems of a file are reported at once.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ from .names_check import check_axes, check_names
 from .schema import ChoiceSpec, ExperimentSpec, RunSpec
 
 FIGURES = "figures"
-"""Folder of the figures, beside those of named runs."""
+"""Folder of the figures, next to the folders of named runs."""
 SENTENCES = ("says", "short", "source", "note")
-"""Fields of claims and derived numbers that are for people."""
+"""Fields of claims and derived numbers that are prose, where `{name}` becomes the label of a value."""
 MOST = 10_000
-"""Runs that are named. Chosen: a hundred times the largest of ours; all stand in one report."""
+"""Largest number of named runs. Chosen: a hundred times our largest study; one report shows them all."""
 LONGEST = 100
-"""Characters of a run's folder. Chosen: more do not fit into file names where a letter takes two bytes."""
+"""Characters of a folder name. Chosen: more do not fit into file names where a letter takes two bytes."""
 _FOLDER = re.compile(rf"[\w.+-]{{1,{LONGEST}}}")
 Texts = TypeVar("Texts", Claim, DerivedSpec)
 
 
 @dataclass(frozen=True)
 class NamedRun:
-    """One run of an experiment, wherever it stands on the axes."""
+    """A run of an experiment, before the axes multiply it into cases."""
 
     name: str  # "" if there is only one
     label: str
@@ -52,16 +52,16 @@ class NamedRun:
 
 @dataclass(frozen=True)
 class ForBinding:
-    """One of those that an entry stands for: what is in the place of its words in braces."""
+    """One combination of the values of an entry's `for`: what `{name}` becomes in its texts."""
 
     document: Document
     key: KeyPath  # of the entry
     values: dict[str, str]  # in names
     words: dict[str, str]  # in sentences
-    choices: list[ChoiceSpec]  # what the values of a run bring along
+    choices: list[ChoiceSpec]  # values that come with overrides
 
     def fill(self, text: str, *where: str, sentence: bool = False) -> str:
-        """Return a text of the entry, `where` it stands there, with what its words in braces stand for."""
+        """Return a text of the entry with its placeholders filled in; `where`: its key within the entry."""
         use = self.words if sentence else self.values
         for word in re.findall(r"\{([^{}]*)\}", text):
             if word not in use:
@@ -88,7 +88,7 @@ class ForBinding:
 def fillings(
     document: Document, key: KeyPath, for_each: Mapping[str, Mapping[str, Any]], what: str
 ) -> Iterator[ForBinding]:
-    """Yield every combination of a `for`; none of too many."""
+    """Yield every combination of a `for`; none, and a reported problem, if there are too many."""
     number = math.prod(map(len, for_each.values()))
     if number > MOST:
         document.report((*key, "for"), f"stands for {number} {what}; at most {MOST} are taken")
@@ -105,7 +105,7 @@ def fillings(
 
 
 def expanded(spec: ExperimentSpec, document: Document) -> ExperimentSpec:
-    """Return the file with one claim, check or derived number for each that an entry stands for."""
+    """Return the file with every claim, check and derived number expanded over its `for`."""
     derived: dict[str, DerivedSpec] = {}
     for name, number in spec.derived.items():
         key: KeyPath = ("derived", name)
@@ -124,7 +124,7 @@ def expanded(spec: ExperimentSpec, document: Document) -> ExperimentSpec:
 
 
 def named_runs(document: Document, i: int, entry: RunSpec) -> Iterator[NamedRun]:
-    """Yield the runs that the i-th entry stands for, none if it is wrong."""
+    """Yield the runs of the i-th entry, up to the first with an error, which is reported."""
     key: KeyPath = ("runs", i)
     folder, known = document.path.parent, len(document.problems)
     for one in fillings(document, key, entry.for_each, "runs"):
@@ -151,7 +151,7 @@ def named_runs(document: Document, i: int, entry: RunSpec) -> Iterator[NamedRun]
 
 
 def _check_folder(name: str, one: ForBinding) -> None:
-    """Report a name that cannot be that of a folder."""
+    """Report a run name that cannot be a folder name."""
     parts = name.split("/")
     if all(_FOLDER.fullmatch(part) and part.strip(".") for part in parts) and parts[0] != FIGURES:
         return
@@ -162,9 +162,9 @@ def _check_folder(name: str, one: ForBinding) -> None:
 
 
 RUNS = "runs"
-"""Folder of what runs along axes keep, beside those of named runs."""
+"""Folder of the results of runs along axes."""
 FEW = 3
-"""Repeats in haste. Chosen: fewer say nothing of chance."""
+"""Repeats of a quick look. Chosen: fewer give no useful confidence interval."""
 
 
 @dataclass(frozen=True)
@@ -178,38 +178,38 @@ class Case:
 
     @property
     def label(self) -> str:
-        """What messages call it."""
+        """The name of the case in messages."""
         return ", ".join([*filter(None, [self.run.name]), *(level.words for level in self.point)])
 
 
 @dataclass(frozen=True)
 class LoadedExperiment:
-    """An experiment that is right in itself."""
+    """A validated experiment file, expanded; its scenarios have not been read yet."""
 
     path: Path
     spec: ExperimentSpec
     runs: dict[str, NamedRun]
     for_all: tuple[Override, ...] = ()  # by the file's own `swap`, `set`, ...
-    by_options: tuple[Override, ...] = ()  # in all runs against the file
+    by_options: tuple[Override, ...] = ()  # of all runs, on the command line
 
     @property
     def changed(self) -> tuple[Override, ...]:
-        """What is changed in all runs."""
+        """The overrides of all runs."""
         return (*self.for_all, *self.by_options)
 
     @property
     def identity(self) -> str:
-        """What tells experiments apart: the name of the file and of its folder."""
+        """Identifies the experiment in its results folder: name of its file's folder and of the file."""
         return f"{self.path.absolute().parent.name}/{self.path.name}"
 
     @cached_property
     def points(self) -> list[DesignPoint]:
-        """All points of the axes; without axes one, of no levels."""
+        """All points of the design; without axes a single one without levels."""
         return points(self.spec)
 
     @cached_property
     def cases(self) -> list[Case]:
-        """All runs at all points, one run after the other."""
+        """All runs at all points, ordered by run."""
         pairs = itertools.product(self.runs.values(), self.points)
         return [
             Case(number, run, point, (*self.for_all, *run.changes, *self.by_options, *self._at(point, run)))
@@ -217,18 +217,18 @@ class LoadedExperiment:
         ]
 
     def setting(self, point: DesignPoint) -> DesignPoint:
-        """Return a point without the axes that make repeats of one and the same."""
+        """Return a point without the axes of repeats."""
         pairs = zip(self.spec.axes.values(), point, strict=True)
         return tuple(level for axis, level in pairs if not axis.repeats)
 
     @cached_property
     def settings(self) -> list[DesignPoint]:
-        """All points without the axes that make repeats of one and the same, each once."""
+        """All distinct points without the axes of repeats."""
         return list(dict.fromkeys(map(self.setting, self.points)))
 
     @property
     def short(self) -> LoadedExperiment:
-        """The same with the first few of its repeats."""
+        """The experiment with only the first few repeats."""
         axes = {
             name: axis.model_copy(update={"values": dict(itertools.islice((axis.values or {}).items(), FEW))})
             if axis.repeats
@@ -239,26 +239,26 @@ class LoadedExperiment:
 
     @cached_property
     def first_cases(self) -> list[Case]:
-        """All runs at all settings: of repeats the first."""
+        """All runs at all settings, only the first of their repeats."""
         found: dict[tuple[str, DesignPoint], Case] = {}
         for case in self.cases:
             found.setdefault((case.run.name, self.setting(case.point)), case)
         return list(found.values())
 
     def matching(self, patterns: Sequence[str]) -> list[NamedRun]:
-        """Return the runs that any of the patterns names, in the order of the patterns."""
+        """Return the runs whose names match any pattern, in the order of the patterns."""
         names = [name for pattern in patterns for name in self.runs if fnmatchcase(name, pattern)]
         return [self.runs[name] for name in dict.fromkeys(names)]
 
     def axis_of(self, place: str) -> tuple[str, str] | None:
-        """Return the axis and its place that a problem is about, by the change that it names; None: none."""
+        """Return the axis, and the target on it, whose override a problem names; None if it names none."""
         changes = itertools.chain.from_iterable(map(self._at, self.points))
         change = next((one for one in changes if str(one) == place), None)
         axes = self.spec.axes.items()
         return next(((n, change.place) for n, axis in axes if change and change.place in axis.places), None)
 
     def _at(self, point: DesignPoint, run: NamedRun | None = None) -> list[Override]:
-        """Return what a point changes, in a run if one is given."""
+        """Return the overrides at a point; with `run`, only those of axes that apply to it."""
         pairs = [
             (axis, level)
             for axis, level in zip(self.spec.axes.values(), point, strict=True)
@@ -269,14 +269,14 @@ class LoadedExperiment:
 
 @reads("experiment file", ScenarioError)
 def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> LoadedExperiment:
-    """Read a study or a sweep.
+    """Load an experiment file: a study, a sweep or a tuning.
 
     Args:
-        path: of the file.
-        changes: for all runs; the path of an FMU is relative to the working directory.
+        path: the file.
+        changes: overrides of all runs; paths of FMUs are relative to the working directory.
 
     Raises:
-        ScenarioError: with everything that is wrong with it.
+        ScenarioError: the file is invalid; lists all problems.
     """
     path = Path(path)
     document = yaml_lines.read(path, what="experiment file")

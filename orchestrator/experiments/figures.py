@@ -1,4 +1,4 @@
-"""Figures of an experiment: runs laid over each other, a metric or a limit over axes."""
+"""Figures of an experiment: overlaid runs, and metrics or limits over axes."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ PANELS_IN_A_ROW = 3
 
 
 def draw_all(findings: ExperimentResult, out: Path, each: Each = map) -> tuple[dict[str, str], list[str]]:
-    """Draw all figures as SVG and PNG into a folder below `out`; return name -> title, and problems.
+    """Draw all figures as SVG and PNG below `out`; return name -> title, and problems.
 
     Args:
-        findings: what is drawn.
-        out: the experiment's folder.
-        each: how to draw all figures.
+        findings: result of the experiment.
+        out: results folder of the experiment.
+        each: `map`, or a parallel equivalent.
     """
     wanted: list[tuple[Any, FigureSpec, str, Path]] = []
     light = findings.light()
@@ -55,12 +55,12 @@ def draw_all(findings: ExperimentResult, out: Path, each: Each = map) -> tuple[d
 
 
 def title_of(findings: ExperimentResult, spec: FigureSpec) -> str:
-    """Return what a figure is called."""
+    """Return the title of a figure."""
     return spec.title or f"{findings.spec.title}: {spec.name}"
 
 
 def runs_of(findings: ExperimentResult, spec: FigureSpec) -> list[LabelledRun]:
-    """Return the runs of an overlay that have results."""
+    """Return the runs of an overlay, without those that have no results."""
     named = findings.experiment.matching(spec.runs)
     return [
         LabelledRun(run.label, findings.results[run.name]) for run in named if run.name in findings.results
@@ -80,7 +80,7 @@ def _draw(wanted: tuple[Any, FigureSpec, str, Path]) -> str | None:
 
 
 def draw_over_axes(findings: ExperimentResult, spec: FigureSpec) -> Figure:
-    """Return a figure over axes.
+    """Draw a figure over axes.
 
     Raises:
         ResultsError: there is nothing to draw.
@@ -98,7 +98,7 @@ def draw_over_axes(findings: ExperimentResult, spec: FigureSpec) -> Figure:
         for k, (axes, (heading, runs)) in enumerate(zip(drawn, panels, strict=True)):
             drawing.fill(axes, runs)
             axes.set_title(literal(heading))
-            if k + columns >= len(drawn):  # none stands below
+            if k + columns >= len(drawn):  # the lowest panel of its column
                 axes.set_xlabel(literal(drawing.label(spec.x)) if spec.x else "")
                 axes.tick_params(labelbottom=True)
             if k % columns == 0:
@@ -110,7 +110,7 @@ def draw_over_axes(findings: ExperimentResult, spec: FigureSpec) -> Figure:
 
 
 def _legend(drawn: Sequence[Axes]) -> list[Artist]:
-    """Return one of each that has a label in any panel, runs without a number last."""
+    """Return one handle per label over all panels, with that of failed runs last."""
     found: dict[str, Artist] = {}
     for axes in drawn:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):

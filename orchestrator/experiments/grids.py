@@ -1,4 +1,4 @@
-"""A metric of many runs in rows and columns, beside what a paper prints for the same cells."""
+"""Grids: a metric of many runs in rows and columns, compared with the numbers a paper publishes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .tables import Cell, Table
 
 @dataclass(frozen=True)
 class GridCell:
-    """A run of a grid, where it stands, and what the paper prints for it (None: nothing)."""
+    """A cell of a grid: its run and metric, row and column, and the published number, if any."""
 
     run: str  # "" for a derived number
     metric: str  # or the key of a derived number
@@ -24,12 +24,12 @@ class GridCell:
 
     @property
     def key(self) -> tuple[str, str]:
-        """Where its value stands."""
+        """Key of the cell's value in a `MetricTable`."""
         return self.run, self.metric
 
 
 def cells(spec: GridSpec) -> list[GridCell]:
-    """Return the cells row by row, then the runs that stand outside the grid, with an empty column."""
+    """Return the cells row by row, then the runs outside the grid, whose column is empty."""
     ((row_key, rows),) = spec.rows.items()
     ((column_key, columns),) = spec.columns.items()
     found = []
@@ -44,11 +44,11 @@ def cells(spec: GridSpec) -> list[GridCell]:
 
 
 def ranked(spec: GridSpec, only: Mapping[str, Collection[str]] | None = None) -> list[GridCell]:
-    """Return the cells whose order is compared with the paper's: those that it prints.
+    """Return the cells whose order is compared with the paper's: those with a published number.
 
     Args:
         spec: the grid.
-        only: name of rows or columns -> those of their values that count; runs beside the grid then do not.
+        only: name of rows or columns -> values to include; excludes runs outside the grid.
     """
     among = [cell for cell in cells(spec) if cell.published is not None]
     if not only:
@@ -66,7 +66,7 @@ def correlation(
 
     Args:
         spec: the grid.
-        values: what the runs came to.
+        values: metrics of the runs.
         only: see `ranked`.
     """
     among = ranked(spec, only)
@@ -83,21 +83,20 @@ def correlation(
 
 
 def grid_tables(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[str, str], str]) -> list[Table]:
-    """Return the table of what is measured and that of what is published, in SI and three digits.
+    """Return the table of measured numbers and that of published ones, in SI units with three digits.
 
-    A grid that says how far down its columns `holds`, one of derived numbers, or one of means over repeats,
-    has its numbers as people read them.
+    A grid with `holds`, of derived numbers or of means over repeats has its numbers in display units.
 
     Args:
         spec: the grid.
-        values: what the runs came to, derived numbers as those of a run "".
-        verdicts: of what is said of single cells: "" if it holds, else a sign.
+        values: metrics of the runs; derived numbers under the run "".
+        verdicts: key of a cell -> verdict on claims about it: "" if they hold, else a sign.
     """
     ((_, rows),) = spec.rows.items()
     ((_, columns),) = spec.columns.items()
     inside_all = [values.get(cell.key) for cell in cells(spec)]
     if spec.holds or spec.derived or any(value and value.half for value in inside_all):
-        return [_told_table(spec, values, verdicts)]
+        return [_display_table(spec, values, verdicts)]
     units = {value.unit for (_, key), value in values.items() if key == spec.metric}
     unit = "" if units <= {"1", "%"} else f" [{units.pop()}]"
     width, every = len(columns), cells(spec)
@@ -127,7 +126,7 @@ def grid_tables(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[str
 
 
 def side_by_side(tables: Sequence[Table]) -> Table:
-    """Return what is measured and what the paper prints as one table."""
+    """Join the tables of measured and published numbers into one."""
     if len(tables) == 1:
         return tables[0]
     ours, theirs = tables
@@ -137,8 +136,8 @@ def side_by_side(tables: Sequence[Table]) -> Table:
     return Table(ours.title, headings, [*rows], theirs.notes, numbers)
 
 
-def _told_table(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[str, str], str]) -> Table:
-    """Return the table with units and confidence; if it is to say so, how far down each column holds."""
+def _display_table(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[str, str], str]) -> Table:
+    """Return a grid in display units, with confidence and, if it has `holds`, its last row."""
     ((_, rows),) = spec.rows.items()
     ((_, columns),) = spec.columns.items()
     every = cells(spec)
@@ -160,7 +159,7 @@ def _told_table(spec: GridSpec, values: MetricTable, verdicts: Mapping[tuple[str
 
 
 def _down_to(spec: GridSpec, column: str, verdicts: Mapping[tuple[str, str], str]) -> str:
-    """Return the last row of a column down to which all that is said of its cells holds."""
+    """Return the last row of a column down to which all claims about its cells hold."""
     last = ""
     for cell in (one for one in cells(spec) if one.column == column):
         if verdicts.get(cell.key):

@@ -1,4 +1,4 @@
-"""One run to be made: planned before the first of them starts, made in whatever process it is given to."""
+"""Jobs: runs planned in advance and executed by whichever process they are handed to."""
 
 from __future__ import annotations
 
@@ -24,48 +24,48 @@ if TYPE_CHECKING:
     from ..scenario.scenario_schema import LoadedScenario
 
 MANY = 10
-"""Problems shown; more are only counted."""
+"""Problems shown; the rest are only counted."""
 
 MetricRequests = tuple[tuple[str, str, tuple[float, float] | None], ...]
 """(key, metric, window) of each metric."""
 TestRequest = tuple[str, float | None]
-"""A standard test by its name, and A [rad] where it is known."""
+"""Name of a standard test, and its steering angle A [rad] if known."""
 STEP_TIME = "step_time"
-"""Key of the processor time of a step of the unit that is timed [s]."""
+"""Metric key of the mean processor time per step of the timed instance [s]."""
 MetricValues = dict[str, tuple[float, str] | None]
-"""Key of a metric -> its value and unit, None where the run gives none."""
+"""Metric key -> (value, unit); None where the run yields no value."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """One run to be made: a scenario, what is changed in it, and the folder its results go to."""
+    """A run to be executed: scenario, overrides, results folder, and what to measure."""
 
     label: str
     scenario: Path
     out: Path
     changes: tuple[Override, ...] = ()
     fmus: Path | None = None
-    record: tuple[str, ...] = ()  # unit.variable; default: what the scenario records
+    record: tuple[str, ...] = ()  # signals; default: those the scenario records
     format: str = "csv"  # of the results
-    call_limit: float | None = None  # of a call of an FMU [s], in a process per unit; None: units share one
-    metrics: MetricRequests = ()  # handed back when the run ends
-    test: TestRequest | None = None  # likewise its quantities and verdicts
-    timed: str = ""  # likewise the time that a step of this unit takes
+    call_limit: float | None = None  # of an FMU call [s], isolates the instances; None: not isolated
+    metrics: MetricRequests = ()  # computed when the run ends
+    test: TestRequest | None = None  # likewise, its quantities and verdicts
+    timed: str = ""  # likewise, the time per step of this instance
     keep: bool = True  # whether results are written
-    plan: Plan | None = None  # once it is made
+    plan: Plan | None = None  # None until planned
     key: str = ""  # see `keyed`
 
 
 @dataclass(frozen=True)
 class MeasuredRun:
-    """What became of a run: its metrics, or why there are none."""
+    """Metrics of a run, or the reason why there are none."""
 
     values: MetricValues
     problems: tuple[str, ...] = ()
-    findings: tuple[str, ...] = ()  # kinds of what was remarkable in its course
-    ended: str | None = None  # why a unit has ended it early
-    id: str | None = None  # of its results on disk, just made
-    made: bool = True  # False: there is no such run yet
+    findings: tuple[str, ...] = ()  # kinds of plausibility warnings about the run
+    ended: str | None = None  # why an instance ended it early
+    id: str | None = None  # id of its results on disk, if just written
+    made: bool = True  # False: the run has not been executed yet
 
     @property
     def ok(self) -> bool:
@@ -73,36 +73,36 @@ class MeasuredRun:
 
     @property
     def failed(self) -> bool:
-        """Whether it was made and gave no result."""
+        """Whether the run was executed without yielding a result."""
         return self.made and not self.ok
 
     @property
     def status(self) -> str:
-        """How the run ended, in one word or two."""
+        """One- or two-word status."""
         if not self.made:
             return NOT_MADE.reason or ""
         return ("ended early" if self.ended else "completed") if self.ok else "failed"
 
     @property
     def reason(self) -> str | None:
-        """Why it failed or ended early."""
+        """Why the run failed or ended early; None if neither."""
         return "; ".join(self.problems) or self.ended
 
 
 NOT_MADE = MeasuredRun({}, ("not made",), made=False)
-"""Of a run that has no results yet."""
+"""Record of a run that has not been executed yet."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a job: `problems` is empty if it ran to the end."""
+    """Outcome of a job; `problems` is empty if it succeeded."""
 
     job: Job
     problems: tuple[str, ...] = ()
     exit_status: int = 0
-    seconds: float = 0.0  # of the process, start to end
-    value: Any = None  # what the process returned, of `run_job` the record of the run
-    died: bool = False  # the process ended without a word, or because it was told to
+    seconds: float = 0.0  # wall time of the process
+    value: Any = None  # return value; of `run_job` a `MeasuredRun`
+    died: bool = False  # the process ended without a report, or was interrupted
 
     @property
     def ok(self) -> bool:
@@ -110,22 +110,22 @@ class Outcome:
 
     @property
     def reason(self) -> str:
-        """Why it failed, in one sentence."""
+        """Why the job failed, in one sentence."""
         return "; ".join(self.problems)
 
     @property
     def record(self) -> MeasuredRun:
-        """What became of the run, as its process says."""
+        """The record of the run, as its process reported it."""
         problems = tuple(text for text in self.problems if getattr(text, "kind", "") != KEPT)
         return MeasuredRun({}, problems) if problems else self.value
 
 
 OnOutcome = Callable[[Outcome], None]
-"""Told of every run that is finished, once for each job."""
+"""Callback, called once per finished job."""
 
 
 class PlanningCache:
-    """Files read and FMUs opened once for many plans; `options`: of the `Opener`."""
+    """Cache of parsed files and opened FMUs for making many plans; `options`: of the `Opener`."""
 
     def __init__(self, **options: Any) -> None:
         from ..fmu.opener import Opener
@@ -135,14 +135,14 @@ class PlanningCache:
         self.opener = Opener(**options)
 
     def read(self, path: Path, *, what: str) -> Document:
-        """Return what `yaml_lines.read` does, a copy each time."""
+        """Return a fresh copy of what `yaml_lines.read` returns."""
         if path not in self._documents:
             self._documents[path] = yaml_lines.read(path, what=what)
         return copy.deepcopy(self._documents[path])
 
 
 def planned(job: Job, once: PlanningCache | None = None) -> tuple[LoadedScenario, Plan]:
-    """Return a job's scenario with all that is changed in it, and its plan; `once` for many jobs.
+    """Return a job's scenario with its overrides applied, and its plan; `once`: cache for many jobs.
 
     Raises:
         YawbenchError: the scenario, an option or an FMU is wrong.
@@ -174,17 +174,18 @@ def ready(
     progress: Callable[[int], None] = lambda done: None,
     place: Callable[[str], tuple[Hashable, str]] = lambda problem: (problem, problem),
 ) -> list[Job]:
-    """Return the jobs with their plans, after making sure that every one can start.
+    """Plan all jobs, so that each of them is known to be able to start.
 
     Args:
-        jobs: what is to be run.
-        once: reads files and opens FMUs; one that builds what is stale of them does so first.
-        progress: told how many are planned.
-        place: what a problem is about, and its sentence; of several about one thing the first is told.
+        jobs: the runs.
+        once: cache of files and FMUs; builds stale FMUs first if its opener does.
+        progress: called with the number of jobs planned so far.
+        place: returns what a problem is about, and its message; only the first problem about a thing
+            is reported.
 
     Raises:
-        BuildError: FMUs that are stale and cannot be built.
-        ScenarioError: with everything that is wrong with any of them, each problem once.
+        BuildError: stale FMUs cannot be built.
+        ScenarioError: some jobs cannot start; lists each problem once.
     """
     once, found = once or PlanningCache(), []
     problems: dict[Hashable, str] = {}
@@ -198,14 +199,14 @@ def ready(
                 problems.setdefault(*place(problem))
         progress(number)
     if problems:
-        told = list(problems.values())
-        more = [f"and {len(told) - MANY} more problems"] if len(told) > MANY else []
-        raise ScenarioError(told[:MANY] + more)
+        messages = list(problems.values())
+        more = [f"and {len(messages) - MANY} more problems"] if len(messages) > MANY else []
+        raise ScenarioError(messages[:MANY] + more)
     return found
 
 
 def keyed(job: Job, metrics: MetricRequests = ()) -> Job:
-    """Return a job that hands back metrics, with its key: jobs of one key are one run."""
+    """Return a job with its metrics and key; jobs with equal keys are the same run."""
     assert job.plan is not None
     also: list[Any] | None = [metrics, sources_hash(OF_METRICS)] if metrics else None
     if job.test:
@@ -214,7 +215,7 @@ def keyed(job: Job, metrics: MetricRequests = ()) -> Job:
 
 
 def run_job(job: Job, opener: OpenInstance | None = None) -> MeasuredRun:
-    """Make one run in this process; `opener`: makes its instances, in place of what opens FMUs.
+    """Execute one run in this process; `opener` replaces the one that creates instances from FMUs.
 
     Raises:
         YawbenchError: the scenario is wrong or the run failed.
@@ -228,7 +229,7 @@ def run_job(job: Job, opener: OpenInstance | None = None) -> MeasuredRun:
         given = opener or own
         timed = timing(given, job.timed, clock) if job.timed and job.call_limit is None else given
         if job.keep:
-            apart = timed is own  # a clock counts in this process, and plain Python is at home there
+            apart = timed is own  # a step clock and instances in plain Python need this process
             run = simulate(plan, job.out, opener=timed, format=job.format, apart=apart).id
             if not (job.metrics or job.test):
                 return MeasuredRun({}, id=run)
@@ -242,11 +243,11 @@ def run_job(job: Job, opener: OpenInstance | None = None) -> MeasuredRun:
 
 
 def measured(results: Results, metrics: MetricRequests, test: TestRequest | None = None) -> MeasuredRun:
-    """Return what a run that has ended comes to; of a test quantities, and verdicts as 1, 0 or None."""
+    """Compute the metrics of a finished run; of a test its quantities, and its verdicts as 1, 0 or None."""
     values: MetricValues = {}
     for key, name, window in metrics:
         value = evaluate(results, metric(name), window)
-        short = results.ended and not window  # of a run that a unit has ended early it is another metric
+        short = results.ended and not window  # over a shorter time it is another metric
         values[key] = None if value is None or short else (value.number, value.unit)
     if test:
         values |= _judged(results, *test)
@@ -271,11 +272,11 @@ def _judged(results: Results, name: str, angle: float | None) -> MetricValues:
 
 
 def read_back(folder: Path, run: str | None = None) -> Results | str:
-    """Return the results of a run that reached its end, or a sentence that says why there are none.
+    """Return the results of a completed run, or a sentence that says why there are none.
 
     Args:
-        folder: of the results.
-        run: the id of the run that they must be of; None: whichever was the last.
+        folder: results folder.
+        run: expected id of the run; None: any.
     """
     try:
         results = load_results(folder)

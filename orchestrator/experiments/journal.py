@@ -1,8 +1,8 @@
-"""Which runs are finished that keep no results, and what they came to: a line per run, written as it ends.
+"""Journal of finished runs that keep no results: one JSON line per run, appended as it ends.
 
-The file is appended to, and each line is on the disk before the next run is counted. A line that a kill has
-cut off is dropped when the experiment goes on, and so, with a warning, is one whose checksums or types do
-not fit: its run is made again. The folder is held by its writer.
+Each line is synced to disk before the next run is counted. On resuming, a line truncated by a kill is
+dropped; a line with wrong checksums or types is dropped with a warning, and its run is executed again. The
+caller must have the folder locked.
 """
 
 from __future__ import annotations
@@ -22,27 +22,27 @@ from .jobs import MeasuredRun
 
 FILE = "runs.jsonl"
 FORMAT = 2
-"""Chosen: 1 had no checksums."""
+"""Version of the file format; 1 had no checksums."""
 NAMED = 10
-"""Damaged lines named one by one. Chosen: what a terminal shows at once."""
+"""Damaged lines reported one by one. Chosen: they fit on a terminal."""
 
 
 class _Line(BaseModel):
-    """A line, with checksums beside what the kinds of line hold."""
+    """Base of the lines; written with checksums of its fields."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
 
     def text(self) -> bytes:
-        """Return it as it is written; what is empty is left out."""
+        """Return the line as JSON with checksums, without fields at their defaults."""
         content = checksums.with_checksums(self.model_dump(exclude_defaults=True))
         return json.dumps(content, ensure_ascii=False).encode("utf-8", "backslashreplace") + b"\n"
 
     @classmethod
     def read(cls, line: bytes) -> Any:
-        """Return what a line holds.
+        """Parse a line.
 
         Raises:
-            ValueError: it is not what was written: a few words.
+            ValueError: the line was damaged or edited; says how.
         """
         content = _content(line)
         if not checksums.has_checksums(content):
@@ -57,14 +57,14 @@ class _Line(BaseModel):
 
 
 class _Head(_Line):
-    """The first line: whose runs these are."""
+    """The first line: the experiment that the runs belong to."""
 
     sweep: str
     format: int
 
 
 class _Entry(_Line):
-    """What became of the run of a key."""
+    """The record of a finished run."""
 
     key: str
     values: dict[str, Annotated[tuple[float, str], Field(strict=False)] | None]
@@ -74,20 +74,20 @@ class _Entry(_Line):
 
     @property
     def record(self) -> MeasuredRun:
-        """The same for the experiment."""
+        """The line as a `MeasuredRun`."""
         return MeasuredRun(self.values, self.problems, self.findings, self.ended)
 
 
 class Journal:
-    """The finished runs of the experiment whose results go to a folder.
+    """Finished runs of the experiment in a results folder.
 
     Args:
-        folder: made if it does not exist.
-        identity: of the experiment; a folder that holds another one is refused.
-        fresh: forget all runs that are finished, whichever experiment they are of.
+        folder: results folder, created if missing.
+        identity: of the experiment; a folder of another one is an error.
+        fresh: discard all finished runs, of whichever experiment.
 
     Raises:
-        ResultsError: the folder holds another one, or it cannot be written.
+        ResultsError: the folder belongs to another experiment, or cannot be written.
     """
 
     def __init__(self, folder: Path, identity: str, *, fresh: bool = False) -> None:
@@ -110,10 +110,10 @@ class Journal:
             raise
 
     def _take_over(self, lines: list[bytes], head: _Head) -> None:
-        """Read the lines of a journal; write it anew without those that are damaged.
+        """Read the lines of an existing journal, and rewrite it without damaged ones.
 
         Raises:
-            ResultsError: it is of another experiment, or no journal.
+            ResultsError: it belongs to another experiment, or is not a journal.
         """
         if not lines:
             self._append(head)
@@ -165,12 +165,12 @@ class Journal:
             self._file = _opened(self._path)
 
     def add(self, key: str, record: MeasuredRun, *, last: bool = True) -> None:
-        """Note that a run is finished.
+        """Add a finished run.
 
         Args:
-            key: of the run.
-            record: what became of it.
-            last: False if the run is to be made again when the experiment goes on; nothing is written then.
+            key: key of the run.
+            record: its metrics, or why there are none.
+            last: False if the run is to be executed again on resuming; then nothing is written.
 
         Raises:
             ResultsError: the journal cannot be written.
@@ -194,7 +194,7 @@ class Journal:
             raise ResultsError(f"{self._path}: cannot be written: {reason(error)}.") from None
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         os.close(self._file)
 
 
@@ -203,10 +203,10 @@ def _opened(path: Path) -> int:
 
 
 def _content(line: bytes) -> dict[str, Any]:
-    """Return the JSON of a line.
+    """Return the JSON object of a line.
 
     Raises:
-        ValueError: it is none.
+        ValueError: it is not a JSON object.
     """
     try:
         found = json.loads(line)
@@ -218,7 +218,7 @@ def _content(line: bytes) -> dict[str, Any]:
 
 
 def _is_earlier(line: bytes) -> bool:
-    """Return whether a first line is one of a journal without checksums."""
+    """Return whether this is the first line of a journal in the earlier format, without checksums."""
     try:
         content = _content(line)
     except ValueError:
@@ -227,6 +227,6 @@ def _is_earlier(line: bytes) -> bool:
 
 
 def _whole_lines(data: bytes) -> tuple[list[bytes], int]:
-    """Return the lines that have an end, and where the last of them ends."""
+    """Return the lines that end with a newline, and their total length in bytes."""
     whole = data.rfind(b"\n") + 1
     return data[:whole].split(b"\n")[:-1], whole

@@ -1,11 +1,10 @@
-"""The schema of what is computed of runs: metrics, grids, derived numbers, conditions on them.
+"""Schema of what an experiment computes and judges: metrics, grids, derived numbers, claims, limits.
 
-Numbers in files of experiments: plain ones in SI, or with their unit as text.
+Numbers in experiment files are plain ones in SI units, or text with a unit.
 
-Numbers that a study derives from several runs: expressions of their metrics, rank correlations.
-
-An expression knows numbers, the names that its `of` gives, + - * / and parentheses. Where a run is
-missing, or a divisor is zero, there is no number; never a wrong one.
+Derived numbers combine the metrics of several runs: arithmetic expressions, or rank correlations. An
+expression consists of numbers, the names under its `of`, + - * / and parentheses. It has no value where a
+run is missing or a divisor is zero.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from ..scenario.validation import StrictModel
 
 
 def text_of(value: object) -> str:
-    """Return a plain value as a YAML file would have it."""
+    """Return a scalar as text in YAML spelling."""
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
@@ -37,14 +36,14 @@ def is_finite(value: object) -> bool:
     """Return whether a value is a finite number."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return False
-    return abs(value) <= sys.float_info.max  # also of whole numbers that no float can hold
+    return abs(value) <= sys.float_info.max  # also right for integers too large for a float
 
 
 def si_number(given: float | str, unit: str) -> float:
-    """Return a number in SI, given as such or as text with its unit; `%` stands for a ratio.
+    """Return a number in SI units, from a plain number or text with a unit; `%` is a ratio.
 
     Raises:
-        ValueError: a sentence that says what the text should have been.
+        ValueError: the text is not a quantity of this unit; says what is expected.
     """
     return float(convert(given, "1" if unit == "%" else unit) if isinstance(given, str) else given)
 
@@ -68,11 +67,11 @@ def _quantity(value: object) -> float | str:
 
 Number = Annotated[float | int, PlainValidator(_number)]
 QuantityText = Annotated[float | int | str, PlainValidator(_quantity)]
-"""A number in SI, or text that begins with one and ends with its unit."""
+"""A number in SI units, or text with a number and its unit."""
 
 
 LONGEST = 400
-"""Characters of an expression. Chosen: eight times the longest of ours; deeper ones could not be computed."""
+"""Characters of an expression. Chosen: eight times our longest; bounds the depth of recursion."""
 
 _OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
@@ -83,16 +82,16 @@ _OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
 
 
 def parse(text: str) -> ast.expr:
-    """Return the expression that a text holds.
+    """Parse an arithmetic expression.
 
     Raises:
-        ValueError: it is none, or holds more than arithmetic.
+        ValueError: the text is not an expression, or contains more than arithmetic.
     """
     if len(text) > LONGEST:
         raise ValueError(f"{short(text)}: an expression has at most {LONGEST} characters")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError):  # by what is in it, by brackets
+    except (SyntaxError, ValueError, RecursionError, MemoryError):  # syntax, null bytes, nested brackets
         raise ValueError(f"{short(text)} is no expression, for example (a - b) / a") from None
     for node in _nodes(tree):
         plain = isinstance(node, ast.Constant) and type(node.value) in (int, float)
@@ -119,7 +118,7 @@ def calculate(text: str, values: Mapping[str, float]) -> float | None:
 
     Args:
         text: the expression.
-        values: of every name in it.
+        values: name -> value, of every name in it.
     """
 
     def value_of(node: ast.expr) -> float:
@@ -140,7 +139,7 @@ def calculate(text: str, values: Mapping[str, float]) -> float | None:
 
 
 def ranks(x: Sequence[float]) -> np.ndarray:
-    """Return the rank of every value, counted from 1; equal values share the mean of their ranks."""
+    """Return the ranks of values, from 1; ties get the mean of their ranks."""
     array = np.asarray(x, dtype=float)
     below = (array[:, None] > array[None, :]).sum(axis=1)
     equal = (array[:, None] == array[None, :]).sum(axis=1)
@@ -155,13 +154,13 @@ def rank_correlation(x: Sequence[float], y: Sequence[float]) -> float | None:
 
 
 CELLS = 10_000
-"""Of a grid. Chosen: a hundred times the largest of ours."""
+"""Largest number of cells in a grid. Chosen: a hundred times our largest."""
 OPERATORS = {"above": ">", "at_least": "≥", "below": "<", "at_most": "≤"}
-"""Key of a condition -> its sign."""
+"""Operator of a condition -> its symbol."""
 
 
 def alternatives(value: object) -> dict[str, str]:
-    """Return the values of one `for` key with their words."""
+    """Return the values of one `for` key with their labels."""
     if isinstance(value, list) and value and all(isinstance(v, (str, int, float)) for v in value):
         return {text_of(v): text_of(v) for v in value}
     if isinstance(value, dict) and value and all(isinstance(v, str) for v in value.values()):
@@ -189,18 +188,18 @@ Alternatives = Annotated[dict[str, str], PlainValidator(alternatives)]
 WindowField = Annotated[tuple[float, float], PlainValidator(_window)]
 MetricName = Annotated[str, AfterValidator(_metric_name)]
 Patterns = Annotated[list[str], Field(min_length=1)]
-"""Names of runs, with `*` and `?` for many."""
+"""Names of runs; `*` and `?` are wildcards."""
 
 
 class MetricSpec(StrictModel):
-    """A number per run."""
+    """A metric, computed of every run."""
 
     metric: MetricName = Field(description="measure(signal)")
     window: WindowField | None = Field(None, description="[from, to] in s; left out: the whole run")
     heading: str = Field("", description="Heading of its column; default: the formula")
 
     def during(self, lead: str = "") -> str:
-        """Return the window as the end of a phrase: ", 1 to 6 s", after a `lead` such as "from "."""
+        """Return the window to end a phrase with: ", 1 to 6 s", after a `lead` such as "from "."""
         return during(self.window or metric(self.metric).window, lead)
 
 
@@ -211,11 +210,11 @@ def _single(value: dict[str, dict[str, str]]) -> dict[str, dict[str, str]]:
 
 
 GridAxis = Annotated[dict[str, Alternatives], AfterValidator(_single)]
-"""The name that stands for a row's or a column's value, and its values."""
+"""Placeholder name of the rows or columns -> their values with labels."""
 
 
 class BesideSpec(StrictModel):
-    """A run that stands outside a grid."""
+    """A run outside a grid, shown with it."""
 
     run: str = Field(min_length=1)
     says: str = Field(description="What the run is", min_length=1)
@@ -223,7 +222,7 @@ class BesideSpec(StrictModel):
 
 
 class GridSpec(StrictModel):
-    """A metric of many runs in rows and columns, beside what a paper prints."""
+    """A metric of many runs in rows and columns, with the paper's numbers to compare."""
 
     title: str = Field(min_length=1)
     metric: str = ""
@@ -325,11 +324,11 @@ Bound = Annotated[
     | Annotated[MetricReference, Tag("reference")],
     Discriminator(lambda value: "reference" if isinstance(value, (dict, MetricReference)) else "number"),
 ]
-"""A number in SI, a number with its unit ('5 %'), or another run's metric."""
+"""A number in SI units, a number with its unit ('5 %'), or another run's metric."""
 
 
 class Condition(StrictModel):
-    """A comparison of a metric of a run, or of a derived number, with exactly one bound."""
+    """A comparison of a run's metric, or of a derived number, with exactly one bound."""
 
     run: str = Field("", description="Name of a run; with `*` every run that fits; left out: every run")
     metric: str = ""
@@ -349,12 +348,12 @@ class Condition(StrictModel):
 
     @property
     def operator(self) -> str:
-        """The one operator that is given."""
+        """The operator of the condition."""
         return next(name for name in OPERATORS if getattr(self, name) is not None)
 
     @property
     def bound(self) -> Any:
-        """What the metric is compared with."""
+        """The bound that the metric is compared with."""
         return getattr(self, self.operator)
 
     def __str__(self) -> str:
@@ -367,14 +366,14 @@ class Condition(StrictModel):
 
 
 class Assertion(StrictModel):
-    """What is said of runs, and the comparisons that decide whether it is so."""
+    """A statement about runs, and the conditions that decide whether it holds."""
 
     says: str = Field(description="In words", min_length=1)
     holds_if: list[Condition] = Field(description="All must be true", min_length=1)
 
 
 class Claim(Assertion):
-    """What somebody says, and the comparisons that decide whether it holds."""
+    """A claim of a paper or a check of our own, with the conditions that decide whether it holds."""
 
     for_each: dict[str, Alternatives] = Field(
         {}, alias="for", description="Key -> values; one claim per combination, {key} in its texts"
@@ -388,7 +387,7 @@ class Claim(Assertion):
     _number: int | None = PrivateAttr(None)
 
     def number(self, otherwise: int) -> int:
-        """Return where it stands in the file, for one of many of one entry; else `otherwise`."""
+        """Return the index of the file's entry that the claim was expanded from; else `otherwise`."""
         return otherwise if self._number is None else self._number
 
 

@@ -1,16 +1,13 @@
-"""Whether claims, checks and limits hold, judged by the metrics of runs.
+"""Verdicts on claims, checks and limits from the metrics of runs, with confidence intervals over repeats.
 
-Confidence in a mean over repeats: how far chance, such as the noise of a sensor, may have moved it.
-
-The one place that says how sure a mean over several runs is: axes that `repeats` a run, tables, verdicts and
-whatever else takes seeds.
+Everything that averages over repeats with different seeds takes its confidence from `interval`:
 
     mean ± t s / √n         s: standard deviation of the sample, n: repeats,
                             t: quantile of Student's distribution with n - 1 degrees of freedom
 
-Where repeats are alike in everything but their seed, their numbers are independent; that they are normally
-distributed is an assumption, harmless to a mean of ten unless single runs lie far off. Such a mean says
-little, and its interval is wide.
+Repeats that differ only in their seed are independent. That their numbers are normally distributed is an
+assumption, harmless to a mean of ten unless there are outliers; with outliers the mean says little, and its
+interval is wide.
 
 Source: Student (W. S. Gosset), The probable error of a mean, Biometrika 6 (1908) 1-25.
 """
@@ -32,7 +29,7 @@ from .judged_schema import Assertion, Condition, MetricReference, si_number
 from .margins import Gap, Region, margin
 
 MetricTable = Mapping[tuple[str, str], MetricValue]
-"""(run, key of the metric) -> value, of those that exist."""
+"""(run, metric key) -> value, where there is one."""
 
 _COMPARE = {
     "above": operator.gt,
@@ -45,18 +42,18 @@ _UPWARDS = ("above", "at_least")
 
 @dataclass(frozen=True)
 class ClaimResult:
-    """What was said, whether it holds (None: a run is missing), and what was measured in which runs."""
+    """Result of judging a claim: whether it holds (None: a run is missing), and what was measured."""
 
-    said: Any  # a claim, or what else has conditions
+    said: Any  # a claim, or anything else with conditions
     holds: bool | None
     measured: tuple[str, ...]
-    gaps: tuple[Gap | None, ...] = ()  # of every condition, of every run it names; None: no result
+    gaps: tuple[Gap | None, ...] = ()  # one per condition and run; None: no result
     region: Region | None = None
-    group: str = "claims"  # of a paper, or `checks`: our own
+    group: str = "claims"  # `claims` of a paper, or our own `checks`
 
     @property
     def sure(self) -> bool:
-        """Whether chance leaves the verdict as it is: no threshold that decides lies within confidence."""
+        """Whether the verdict is beyond chance: no deciding bound lies within the confidence interval."""
         gaps = [gap for gap in self.gaps if gap is not None]
         if self.holds is None or not any(gap.half for gap in gaps):
             return True
@@ -66,11 +63,11 @@ class ClaimResult:
 
     @property
     def margin(self) -> float | None:
-        """How far the claim is from the other verdict, as a share of its threshold (see `margins`)."""
+        """Distance of the claim from the opposite verdict, relative to its bound (see `margins`)."""
         return margin(self.gaps)
 
     def margin_from(self, chosen: ClaimResult) -> float | None:
-        """Return the margin of this judgement of what is judged at the chosen point, too."""
+        """Return the margin, with the scale of the result at the chosen point."""
         return margin(self.gaps, chosen.gaps)
 
 
@@ -80,16 +77,16 @@ def judge(
     runs: Mapping[str, str],
     derived: Mapping[str, MetricValue] | None = None,
 ) -> ClaimResult:
-    """Judge what is said by the values of metrics.
+    """Judge a claim, check or limit by the metrics of runs.
 
     Args:
-        said: its conditions must all be true, of every run that they name.
-        values: what the runs came to.
-        runs: name -> words for it, of all runs, those without values too.
-        derived: key -> number derived from several runs, of those that exist.
+        said: the claim; all its conditions must be true for every run they name.
+        values: metrics of the runs.
+        runs: name -> label of all runs, including those without values.
+        derived: key -> derived number, where there is one.
 
     Raises:
-        ScenarioError: a bound is given in a unit that its metric does not have.
+        ScenarioError: a bound has a unit that does not fit its metric.
     """
     found = [_compare(condition, values, runs, derived or {}) for condition in said.holds_if]
     verdicts = [holds for holds, _, _ in found]
@@ -101,7 +98,7 @@ def judge(
 def _compare(
     condition: Condition, values: MetricTable, runs: Mapping[str, str], derived: Mapping[str, MetricValue]
 ) -> tuple[bool | None, str, list[Gap | None]]:
-    """Return whether a condition is true of all runs it names, their values as text, and the gaps."""
+    """Return whether a condition is true for all runs it names, their values as text, and the gaps."""
     bound = condition.bound
     if condition.derived:
         named, measured = [""], [("", derived.get(condition.derived))]
@@ -131,7 +128,7 @@ def _compare(
         if value is None or limit is None
         else Gap(value.number, limit, condition.operator in _UPWARDS, value.half + off)
         for run, (_, value) in zip(named, measured, strict=True)
-        if (run, condition.metric) != itself  # which tells nothing
+        if (run, condition.metric) != itself  # the gap to itself tells nothing
     ]
     if missing or limit is None:
         return None, text, gaps
@@ -140,7 +137,7 @@ def _compare(
 
 
 def _range(known: Sequence[tuple[MetricValue, str]], missing: bool, digits: int) -> str:
-    """Return the value, or the smallest and the largest where they read differently, with their runs."""
+    """Return the value as text, or the smallest and largest with their runs where they read differently."""
     ends: dict[str, str] = {}
     for value, run in (*known[:1], *known[-1:]):
         ends.setdefault(shown(value.number, value.unit, digits=digits, half=value.half), run)
@@ -156,21 +153,20 @@ def _number(bound: float | str, unit: str) -> float:
 
 
 LEVEL = 0.95
-"""Share of such intervals that hold the true mean; chosen: what is usual."""
+"""Confidence level: share of intervals that contain the true mean; chosen: the usual one."""
 
 
 class ConfidenceInterval(NamedTuple):
-    """The mean over repeats, and half the width of its confidence interval, in the unit of the numbers."""
+    """A mean over repeats and the half width of its confidence interval, in the unit of the numbers."""
 
     mean: float
     half: float
 
 
 def interval(numbers: Sequence[float], level: float = LEVEL) -> ConfidenceInterval | None:
-    """Return the mean of the numbers of several repeats with its confidence interval.
+    """Return the mean over repeats with its confidence interval; None without numbers, or if one is NaN.
 
-    Equal numbers, and a single one, have no chance in them that could be seen: their interval has no width.
-    Nor have those of which one is infinite, as their mean is then. None for no numbers, or if one is none.
+    The interval has no width for a single number, for equal numbers, and where the mean is infinite.
     """
     if not numbers or any(map(math.isnan, numbers)):
         return None
@@ -186,7 +182,7 @@ def interval(numbers: Sequence[float], level: float = LEVEL) -> ConfidenceInterv
 
 @cache
 def _quantile(degrees: int, level: float) -> float:
-    """Return the quantile of Student's distribution that leaves out (1 - level) / 2 at each end."""
-    from scipy.special import stdtrit  # as scipy.stats.t does, which takes long to import
+    """Return the quantile of Student's distribution that leaves (1 - level) / 2 in each tail."""
+    from scipy.special import stdtrit  # what scipy.stats.t uses, without its slow import
 
     return float(stdtrit(degrees, 0.5 + level / 2))

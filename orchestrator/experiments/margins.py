@@ -1,10 +1,10 @@
-"""How far a verdict carries: margins, their spread over a region of open values, the nearest flip.
+"""Robustness of verdicts: margins, their spread over a region of open values, the nearest flip.
 
-A condition compares a number x with a threshold b. Its margin is how far x lies beyond b on the side on which
-the condition is true, as a share of |b|; negative on the other side. Where the threshold is another run's
-metric, b is what that comes to at the same point. Where b is 0, the margin is a share of |x| at the chosen
-point. The margin of a claim, all of whose conditions must be true, is the smallest of them all: it is
-positive where the claim holds, and goes through zero where the verdict flips.
+A condition compares a number x with a bound b. Its margin is how far x lies beyond b on the side where the
+condition is true, relative to |b|; it is negative on the other side. Where the bound is another run's metric,
+b is the value of that metric at the same point. Where b is 0, the margin is relative to |x| at the chosen
+point. The margin of a claim is the smallest of its conditions' margins, since all of them must be true: it is
+positive where the claim holds, and zero where the verdict flips.
 """
 
 from __future__ import annotations
@@ -15,37 +15,37 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 ONE_IN = 10
-"""A verdict is undecided if it is another at one in so many points of a region, or at more. Chosen: less is
-an exception that can be named."""
+"""A verdict is undecided if it differs at one in ten points of a region, or at more. Chosen: fewer are
+exceptions that can be named."""
 
 
 TIMES = "× as chosen"
-"""Unit of an open value that is a factor on what each run has, where that is not one number for all."""
+"""Unit of an open value that is a factor, where the runs have different chosen values."""
 
 
 @dataclass(frozen=True)
 class Gap:
-    """A number and the threshold that it is compared with, in one unit."""
+    """A number and the bound it is compared with, in the same unit."""
 
     number: float
     bound: float
-    upwards: bool  # whether the condition asks for more than the threshold
-    half: float = 0.0  # what both may be off by, as means over repeats
+    upwards: bool  # whether the condition asks for more than the bound
+    half: float = 0.0  # half width of their confidence, as means over repeats
 
     @property
     def beyond(self) -> float:
-        """How far the number lies beyond the threshold; negative where the condition is not true."""
+        """How far the number lies beyond the bound; negative where the condition is false."""
         if self.number == self.bound:
             return 0.0
         return self.number - self.bound if self.upwards else self.bound - self.number
 
 
 def margin(gaps: Sequence[Gap | None], chosen: Sequence[Gap | None] | None = None) -> float | None:
-    """Return the margin of all conditions together [1], see above; None where a number is missing.
+    """Return the smallest margin of all conditions [1], as defined above; None if a number is missing.
 
     Args:
-        gaps: of every condition, of every run it names.
-        chosen: the same at the chosen point; left out: this is the chosen point.
+        gaps: one per condition and run.
+        chosen: the same at the chosen point; None: `gaps` are at the chosen point.
     """
     shares = []
     for gap, at in zip(gaps, chosen or gaps, strict=True):
@@ -63,7 +63,7 @@ def margin(gaps: Sequence[Gap | None], chosen: Sequence[Gap | None] | None = Non
 
 @dataclass(frozen=True)
 class PointVerdict:
-    """The verdict and the margin at one point."""
+    """Verdict and margin at one point."""
 
     holds: bool | None
     margin: float | None
@@ -71,45 +71,45 @@ class PointVerdict:
 
 @dataclass(frozen=True)
 class LevelVerdict:
-    """A level of one open value, all others as chosen."""
+    """Verdict at a level of one open value, with all others as chosen."""
 
     words: str
-    place: float | None  # the number, in the unit of the line; None: it is none
+    place: float | None  # the number, in the unit of the scan; None: not numeric
     spot: PointVerdict
 
 
 @dataclass(frozen=True)
 class Flip:
-    """Where a verdict becomes another when one open value leaves its chosen value."""
+    """The level of one open value at which a verdict changes."""
 
     open_value: str
-    says: str  # what it is called
-    words: str  # the level at which the verdict is another, with its unit
-    place: float | None  # between two levels by the margins there (linearly); None: the values are no numbers
-    distance: float  # from the chosen value, as a share of the range
-    chosen: str = ""  # the chosen value with its unit; "" if there is none to tell
+    says: str  # label of the open value
+    words: str  # the level of the flip, with its unit
+    place: float | None  # interpolated linearly by margins; None: not numeric
+    distance: float  # from the chosen value, relative to the range
+    chosen: str = ""  # the chosen value with its unit; "" if the runs differ in it
 
 
 @dataclass(frozen=True)
 class OpenValueScan:
-    """One open value from end to end of its range."""
+    """Verdicts along one open value, from end to end of its range."""
 
     open_value: str
     says: str
-    unit: str  # of the numbers; "" if they have none
-    factor: float  # of a place to the number that is shown
+    unit: str  # unit of the numbers; "" if they have none
+    factor: float  # of a level's number to the displayed one
     chosen: LevelVerdict
     stops: tuple[LevelVerdict, ...]  # without the chosen one
 
     @property
     def margins(self) -> tuple[float, float] | None:
-        """The smallest and the largest margin along the line, the chosen point's too."""
+        """The smallest and the largest margin of the scan, including the chosen point."""
         every = [one.spot.margin for one in (self.chosen, *self.stops) if one.spot.margin is not None]
         return (min(every), max(every)) if every else None
 
     @property
     def flip(self) -> Flip | None:
-        """The flip that is nearest to the chosen value; levels without a result tell nothing."""
+        """The flip nearest to the chosen value; levels without a result are ignored."""
         known = [one for one in self.stops if one.spot.holds is not None]
         others = [one for one in known if one.spot.holds != self.chosen.spot.holds]
         if not others or self.chosen.spot.holds is None:
@@ -130,7 +130,7 @@ class OpenValueScan:
         return Flip(self.open_value, self.says, self.words(place), place, distance, chosen)
 
     def words(self, place: float) -> str:
-        """Return a place as people read it."""
+        """Return a number of the scan as text, in the display unit."""
         from ..figures.style import digits_of
 
         unit = f" {self.unit}" if self.unit not in ("", "1") else ""
@@ -138,7 +138,7 @@ class OpenValueScan:
 
 
 def _between(a: LevelVerdict, b: LevelVerdict) -> float:
-    """Return where the margin goes through zero between two stops, by a straight line."""
+    """Return where the margin is zero between two levels, by linear interpolation."""
     assert a.place is not None
     assert b.place is not None
     first, last = a.spot.margin, b.spot.margin
@@ -149,7 +149,7 @@ def _between(a: LevelVerdict, b: LevelVerdict) -> float:
 
 @dataclass(frozen=True)
 class Region:
-    """What becomes of a verdict when the open values are others than those chosen."""
+    """Verdicts on one claim over a region of open values."""
 
     chosen: PointVerdict
     points: tuple[PointVerdict, ...]  # of a Latin hypercube over all open values together
@@ -157,25 +157,25 @@ class Region:
 
     @property
     def holding(self) -> int:
-        """At how many points the claim holds."""
+        """The number of points at which the claim holds."""
         return sum(one.holds is True for one in self.points)
 
     @property
     def without_result(self) -> int:
-        """At how many points a run failed, so that there is no verdict; it counts as another."""
+        """The number of points without a verdict because a run failed; they count as changed verdicts."""
         return sum(one.holds is None for one in self.points)
 
     @property
     def agreeing(self) -> float:
-        """The share of the points whose verdict is that of the chosen point."""
+        """The share of points with the same verdict as the chosen point."""
         return sum(one.holds == self.chosen.holds for one in self.points) / len(self.points)
 
     @property
     def spread(self) -> float | None:
-        """How far the margin comes towards zero, or beyond, in the worst tenth of the points [1].
+        """How much the margin shrinks in the worst tenth of the points [1].
 
-        The distance from the margin at the chosen point to the best one of that tenth; infinite if there is
-        none because runs failed; 0 if even there it is larger than at the chosen point.
+        The distance from the margin at the chosen point to the best one of that tenth: infinite if runs
+        failed there, 0 if it is larger than at the chosen point.
         """
         if self.chosen.margin is None or self.chosen.holds is None:
             return None
@@ -186,20 +186,20 @@ class Region:
 
     @property
     def decided(self) -> bool:
-        """Whether the verdict is the chosen point's in more than nine tenths of the points.
+        """Whether more than nine tenths of the points have the verdict of the chosen point.
 
-        It is the same as to say that the margin is larger than its spread.
+        Equivalently: the margin exceeds its spread.
         """
         others = sum(one.holds != self.chosen.holds for one in self.points)
         return ONE_IN * others < len(self.points)
 
     @property
     def flip(self) -> Flip | None:
-        """The flip nearest to the chosen point, as a share of each range."""
+        """The flip nearest to the chosen point, by distance relative to each range."""
         flips = [flip for line in self.lines if (flip := line.flip)]
         return min(flips, key=lambda one: one.distance, default=None)
 
     @property
     def robust(self) -> bool:
-        """Whether nothing flips: not at any point, not along any line."""
+        """Whether the verdict flips neither at a point nor along any open value."""
         return self.agreeing == 1.0 and self.flip is None

@@ -1,4 +1,4 @@
-"""Whether all that a file of an experiment names is there: runs, metrics, axes, numbers, grids."""
+"""Checks that the runs, metrics, axes, numbers and grids an experiment file refers to exist."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from .experiment import LoadedExperiment
 
 COLUMNS = (RUN, "status", "reason", "findings", "key")
-"""Columns of the table beside the axes and the metrics."""
+"""Columns of the table besides axes and metrics."""
 
 
 def check_axes(spec: ExperimentSpec, document: Document) -> None:
-    """Report a place that two axes, or an axis and `set` or `swap`, would both give a value."""
+    """Report targets that two axes, or an axis and `set` or `swap`, override."""
     seen: dict[str, str] = dict.fromkeys(spec.places, "set and swap")
     for name, axis in spec.axes.items():
         for place in axis.places:
@@ -36,7 +36,7 @@ def check_axes(spec: ExperimentSpec, document: Document) -> None:
 
 
 def check_names(experiment: LoadedExperiment, document: Document) -> None:
-    """Report every name of a run, metric, axis or number that does not exist, or not there."""
+    """Report every reference to a run, metric, axis or number that does not exist."""
     spec, runs = experiment.spec, experiment.runs
     known: dict[str, tuple[Mapping[str, object], str]] = {
         "run": (runs, "runs"),
@@ -69,7 +69,7 @@ def check_names(experiment: LoadedExperiment, document: Document) -> None:
 
 
 def _names(spec: ExperimentSpec) -> Iterator[tuple[str, str, KeyPath]]:
-    """Yield (what, its name, where) of all that is named, but for patterns of runs."""
+    """Yield (kind, name, key) of all references except patterns of runs."""
     for i, table in enumerate(spec.tables):
         for k, name in enumerate(table.metrics):
             yield "metric", name, ("tables", i, "metrics", k)
@@ -106,7 +106,7 @@ def _names(spec: ExperimentSpec) -> Iterator[tuple[str, str, KeyPath]]:
 def _names_of_conditions(
     experiment: LoadedExperiment, document: Document
 ) -> Iterator[tuple[str, str, KeyPath]]:
-    """Yield the names in conditions likewise; report one that lacks its run."""
+    """Yield the references in conditions likewise; report conditions without a run."""
     for key, condition in experiment.spec.conditions():
         if condition.derived:
             yield "derived number", condition.derived, (*key, "derived")
@@ -123,7 +123,7 @@ def _names_of_conditions(
 
 
 def _patterns(spec: ExperimentSpec) -> Iterator[tuple[Sequence[str], KeyPath]]:
-    """Yield (patterns of runs, what has them)."""
+    """Yield (patterns of runs, key of the part that has them)."""
     for name, axis in spec.axes.items():
         yield axis.runs, ("axes", name)
     for i, table in enumerate(spec.tables):
@@ -137,7 +137,7 @@ def _patterns(spec: ExperimentSpec) -> Iterator[tuple[Sequence[str], KeyPath]]:
 
 
 def _check_correlations(spec: ExperimentSpec, document: Document) -> None:
-    """Report what a grid does not have that a rank correlation asks for."""
+    """Report rank correlations over rows, columns or published numbers that the grid lacks."""
     for name, number in spec.derived.items():
         grid = spec.grids.get(number.rank_correlation or "")
         if grid is None:
@@ -157,7 +157,7 @@ def _check_correlations(spec: ExperimentSpec, document: Document) -> None:
 
 
 def _check_limits(spec: ExperimentSpec, document: Document) -> None:
-    """Report a limit of an axis that can have none."""
+    """Report limits of axes that cannot have one."""
     for name, limit in spec.limits.items():
         if limit.of in spec.axes and not spec.axes[limit.of].numeric:
             document.report(("limits", name, "of"), f"the values of {limit.of!r} are no numbers")
@@ -168,7 +168,7 @@ def _check_limits(spec: ExperimentSpec, document: Document) -> None:
 
 
 def _check_levels(spec: ExperimentSpec, document: Document, i: int, figure: FigureSpec) -> None:
-    """Report values of an axis that are to be drawn and that it does not have."""
+    """Report values in a figure's `only` that the axis does not have."""
     for axis, chosen in figure.only.items():
         if axis not in spec.axes or (spec.design == "latin_hypercube" and spec.axes[axis].numeric):
             continue
@@ -179,7 +179,7 @@ def _check_levels(spec: ExperimentSpec, document: Document, i: int, figure: Figu
 
 
 def _check_places(spec: ExperimentSpec, document: Document, i: int, figure: FigureSpec) -> None:
-    """Report an axis of a grid that has no place in a figure, or two places."""
+    """Report axes of a grid that a figure does not show, or shows twice."""
     used = {*figure.axes.values()}
     for name, axis in figure.axes.items():
         if axis in spec.repeats:

@@ -1,7 +1,4 @@
-"""What an experiment comes to: metrics of every case, numbers derived from several, claims and checks.
-
-How far an axis may go until a condition fails: the largest value up to which all runs meet it.
-"""
+"""Result of an experiment: metrics of all cases, derived numbers, judged claims and checks, limits."""
 
 from __future__ import annotations
 
@@ -30,28 +27,28 @@ from .tables import Cell, Table
 
 K = TypeVar("K")
 Each = Callable[..., Iterable[Any]]
-"""`map`, or the `map` of an executor."""
+"""`map`, or a parallel equivalent such as `Pool.map`."""
 
 
 @dataclass(frozen=True)
 class ExperimentResult:
-    """What an experiment comes to."""
+    """Result of an experiment."""
 
     experiment: LoadedExperiment
     records: list[MeasuredRun]  # of all cases, in their order
-    results: dict[str, Results]  # of named runs that reached their end
-    planned: PlannedExperiment | None = None  # None: judged by what stands on disk alone
+    results: dict[str, Results]  # of completed named runs
+    planned: PlannedExperiment | None = None  # None: judged by the results on disk alone
     regions: Mapping[tuple[str, int], Region] = field(default_factory=dict)
-    """`claims` or `checks`, and a number -> what becomes of that verdict over the region."""
+    """(`claims` or `checks`, index) -> verdicts on it over the region."""
 
     @property
     def spec(self) -> ExperimentSpec:
-        """The file of the experiment."""
+        """Content of the experiment file."""
         return self.experiment.spec
 
     @property
     def failed(self) -> dict[str, str]:
-        """Words for each case that failed -> why."""
+        """Label of each failed case -> reason."""
         return {
             self.words(case): "; ".join(record.problems)
             for case, record in zip(self.experiment.cases, self.records, strict=True)
@@ -60,12 +57,12 @@ class ExperimentResult:
 
     @property
     def not_made(self) -> int:
-        """How many cases have not been run."""
+        """The number of cases that have not been executed."""
         return sum(not record.made for record in self.records)
 
     @property
     def fmus(self) -> list[tuple[str, str]]:
-        """Name and SHA-256 of the FMUs that the runs are made of, as planned, else as recorded; sorted."""
+        """Name and SHA-256 of the FMUs of all runs, from the plans or else from the run records; sorted."""
         if self.planned:
             return sorted((fmu.name, digest) for digest, fmu in self.planned.fmus.items())
         recorded = (fmu for one in self.results.values() for fmu in one.run.get("fmus", {}).values())
@@ -74,15 +71,15 @@ class ExperimentResult:
         )
 
     def words(self, case: Case) -> str:
-        """Return what a case is called in messages."""
+        """Return the name of a case in messages."""
         return self.planned.words(case) if self.planned and case.point else case.label
 
     def record(self, case: Case) -> MeasuredRun:
-        """Return what became of a case."""
+        """Return the record of a case."""
         return self.records[case.number]
 
     def value(self, case: Case, key: str) -> MetricValue | None:
-        """Return a metric of a case, None if it failed or gives none."""
+        """Return a metric of a case; None if the case failed or yields none."""
         found = self.record(case).values.get(key)
         return None if found is None else MetricValue(*found)
 
@@ -95,7 +92,7 @@ class ExperimentResult:
 
     @cached_property
     def at(self) -> dict[DesignPoint, dict[tuple[str, str], MetricValue]]:
-        """Setting -> (run, metric) -> value, of those that exist; over repeats the mean."""
+        """Setting -> (run, metric) -> value, where there is one; over repeats the mean."""
         return self._means(self._at_points)
 
     @cached_property
@@ -110,22 +107,22 @@ class ExperimentResult:
 
     @property
     def values(self) -> MetricTable:
-        """(run, metric) -> value, at the first setting of the axes, which is all there is without axes."""
+        """(run, metric) -> value, at the first setting of the axes: the only one without axes."""
         return next(iter(self.at.values()))
 
     @cached_property
     def derived_at(self) -> dict[DesignPoint, dict[str, MetricValue]]:
-        """Setting -> numbers derived from several runs, those that exist; over repeats the mean."""
+        """Setting -> key -> derived number, where there is one; over repeats the mean."""
         return self._means({point: derive(self.spec, values) for point, values in self._at_points.items()})
 
     def mean(self, case: Case, key: str) -> MetricValue | None:
-        """Return a metric of a case, over repeats of it the mean; None if one failed or gives none."""
+        """Return a metric of a case, averaged over its repeats; None if one of them failed or yields none."""
         return self.at[self.experiment.setting(case.point)].get((case.run.name, key))
 
     def _means(
         self, found: Mapping[DesignPoint, Mapping[K, MetricValue]]
     ) -> dict[DesignPoint, dict[K, MetricValue]]:
-        """Return setting -> what -> its mean over repeats, of what all of them have."""
+        """Return setting -> key -> mean over repeats, of the keys that all repeats have."""
         repeats: dict[DesignPoint, list[Mapping[K, MetricValue]]] = {}
         for point, values in found.items():
             repeats.setdefault(self.experiment.setting(point), []).append(values)
@@ -140,7 +137,7 @@ class ExperimentResult:
         return means
 
     def cases_of(self, run: NamedRun, setting: DesignPoint) -> list[Case]:
-        """Return a run at a setting: one case, or its repeats."""
+        """Return the cases of a run at a setting: a single one, or its repeats."""
         return self._cases[run.name, setting]
 
     @cached_property
@@ -151,32 +148,32 @@ class ExperimentResult:
         return found
 
     def failure(self, run: NamedRun, setting: DesignPoint) -> str:
-        """Return why a run at a setting failed, or the first of its repeats that did; "" for none."""
+        """Return why a run, or the first failed repeat of it, failed at a setting; "" if none did."""
         records = (self.record(case) for case in self.cases_of(run, setting))
         return next(("; ".join(record.problems) for record in records if record.failed), "")
 
     def made(self, run: NamedRun, setting: DesignPoint) -> bool:
-        """Return whether a run at a setting has been made, with all its repeats."""
+        """Return whether a run at a setting has been executed, with all its repeats."""
         return all(self.record(case).made for case in self.cases_of(run, setting))
 
     @property
     def derived(self) -> dict[str, MetricValue]:
-        """Numbers derived from several runs, as `values`."""
+        """Key -> derived number, at the first setting of the axes."""
         return next(iter(self.derived_at.values()))
 
     @property
     def values_of_grids(self) -> MetricTable:
-        """What cells of grids may show: metrics of runs, and derived numbers as those of a run ""."""
+        """Values for the cells of grids: metrics of runs, and derived numbers under the run ""."""
         return {**self.values, **{("", key): value for key, value in self.derived.items()}}
 
     @cached_property
     def claims(self) -> list[ClaimResult]:
-        """What the paper says, judged."""
+        """The judged claims of the paper."""
         return self._all_judged("claims", self.spec.claims)
 
     @cached_property
     def checks(self) -> list[ClaimResult]:
-        """What this project asks, judged."""
+        """Our own checks, judged."""
         return self._all_judged("checks", self.spec.checks)
 
     @property
@@ -191,7 +188,7 @@ class ExperimentResult:
         ]
 
     def judged(self, claim: Claim) -> ClaimResult:
-        """Return whether a claim holds; along axes, whether it does at every setting of them."""
+        """Judge a claim; with axes it must hold at every setting."""
         words = {run.name: run.row for run in self.experiment.runs.values()}
         every = [judge(claim, values, words, self.derived_at[at]) for at, values in self.at.items()]
         if len(every) == 1:
@@ -202,7 +199,7 @@ class ExperimentResult:
         return ClaimResult(claim, holds, (text,))
 
     def light(self) -> ExperimentResult:
-        """Return what figures over axes need, to be handed to other processes."""
+        """Return a reduced copy with what figures over axes need, cheap to send to other processes."""
         planned = self.planned and replace(self.planned, jobs=[], fmus={
             digest: replace(fmu, variables={}) for digest, fmu in self.planned.fmus.items()
         })  # fmt: skip
@@ -210,14 +207,14 @@ class ExperimentResult:
         return ExperimentResult(self.experiment, self.records, recorded, planned)
 
     def remarkable(self) -> str:
-        """Return in how many runs something was remarkable, `spin in 3 of 20 runs`; "" for none."""
+        """Summarise the plausibility warnings of all runs, `spin in 3 of 20 runs`; "" if there are none."""
         kinds = Counter(kind for record in self.records for kind in record.findings)
         total = counted(len(self.records) - self.not_made, "run")
         return ", ".join(f"{kind} in {count} of {total}" for kind, count in kinds.items())
 
 
 def judge_records(planned: PlannedExperiment, records: Mapping[str, MeasuredRun]) -> ExperimentResult:
-    """Return what an experiment along axes comes to; `records`: key -> what became of a run."""
+    """Return the result of an experiment with axes; `records`: job key -> record of the run."""
     found = [records.get(job.key, NOT_MADE) for job in planned.jobs]
     return ExperimentResult(planned.experiment, found, {}, planned)
 
@@ -230,17 +227,17 @@ def judge_results(
     planned: PlannedExperiment | None = None,
     each: Each = map,
 ) -> ExperimentResult:
-    """Read the results of all named runs below `out` and judge the experiment by them.
+    """Judge an experiment by the results of its named runs below `out`.
 
     Args:
         experiment: without axes.
-        out: its folder of results.
-        outcomes: of the runs that have just been made; they know best why one has no results.
-        planned: the experiment with its plans, where they can be made.
-        each: how to read the results of all runs.
+        out: its results folder.
+        outcomes: of the runs just executed; they know best why a run has no results.
+        planned: the experiment with its plans, if they are available.
+        each: `map`, or a parallel equivalent, to read results with.
 
     Raises:
-        ScenarioError: a claim's bound is in a unit that its metric does not have.
+        ScenarioError: a bound has a unit that does not fit its metric.
     """
     made = {outcome.job.label: outcome for outcome in outcomes}
     results: dict[str, Results] = {}
@@ -250,7 +247,7 @@ def judge_results(
     for name, read in zip(experiment.runs, recorded, strict=True):
         found = (made[name].reason if name in made else "") or read
         if isinstance(found, str):
-            begun = name in made or any((out / name).glob(f"{RUN_FILE}*"))  # a died run leaves a part of it
+            begun = name in made or any((out / name).glob(f"{RUN_FILE}*"))  # partial, if a run died
             records.append(MeasuredRun({}, (found,)) if begun else NOT_MADE)
         else:
             results[name] = found
@@ -259,7 +256,7 @@ def judge_results(
 
 
 def derive(spec: ExperimentSpec, values: MetricTable) -> dict[str, MetricValue]:
-    """Return the numbers derived from several runs, without those that lack one."""
+    """Compute the derived numbers, without those whose runs are missing."""
     found: dict[str, MetricValue] = {}
     for key, one in spec.derived.items():
         number = None
@@ -276,12 +273,12 @@ def derive(spec: ExperimentSpec, values: MetricTable) -> dict[str, MetricValue]:
 
 @dataclass(frozen=True)
 class Limit:
-    """Where an axis ends for one run and setting of the other axes, in the numbers of the file."""
+    """How far an axis may go for one run and setting of the other axes, in the unit of the file."""
 
-    others: dict[str, Level]  # axis -> its level; "run" -> the run, if runs have names
-    largest: float | None  # that holds with all below it; None: not even the smallest
-    beyond: float | None  # the next value, which does not hold; None: all hold
-    lacks: str = ""  # why the run beyond gives no metric: "failed", "not made"
+    others: dict[str, Level]  # axis -> level; "run" -> the run, if named
+    largest: float | None  # up to which all values hold; None: not even the first
+    beyond: float | None  # the next value, which fails; None: all hold
+    lacks: str = ""  # why the run beyond has no metric: "failed", "not made"
 
 
 def limits_of(findings: ExperimentResult, spec: LimitSpec) -> list[Limit]:
@@ -317,7 +314,7 @@ def _limit(
 
 
 def limit_table(findings: ExperimentResult, name: str) -> Table:
-    """Return a limit for all settings of the other axes, one row each."""
+    """Return the table of a limit, one row per run and setting of the other axes."""
     planned, spec = findings.planned, findings.spec.limits[name]
     assert planned is not None
     found = limits_of(findings, spec)

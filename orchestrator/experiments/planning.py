@@ -1,4 +1,4 @@
-"""All cases of an experiment planned before the first one starts."""
+"""Planning of an experiment: a job with a plan for every case, before the first one starts."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ from .judged_schema import MetricReference, MetricSpec, si_number
 
 @dataclass(frozen=True)
 class PlannedExperiment:
-    """An experiment whose cases can all start."""
+    """An experiment with a plan for every case."""
 
     experiment: LoadedExperiment
     jobs: list[Job]  # of the cases, in their order
-    units: dict[str, str]  # axis of numbers -> measurement unit in tables, an SI unit; "" if it has none
+    units: dict[str, str]  # numeric axis -> SI unit in tables; "" if it has none
     metric_units: dict[str, str]  # key of a metric -> its unit
-    fmus: dict[str, Fmu]  # hash -> FMU, of all that any run uses
+    fmus: dict[str, Fmu]  # SHA-256 -> FMU, of all runs
 
     def number(self, name: str, level: Level) -> float:
-        """Return the value of an axis of numbers in the unit of `units`."""
+        """Return a level of a numeric axis in the unit of `units`."""
         return number_of(self.experiment.spec.axes[name], level, self.units[name])
 
     def axis_unit(self, name: str) -> str:
-        """Return the unit of an axis as the file counts it, ` [km/h]`, or nothing."""
+        """Return the unit of an axis in the file as a suffix, ` [km/h]`, or ""."""
         unit = self.experiment.spec.axes[name].unit or self.units.get(name, "")
         return f" [{unit}]" if unit not in ("", "1") else ""
 
     def words(self, case: Case) -> str:
-        """Return what a case is called: `friction 0.3, speed 25 m/s, no control`."""
+        """Return the label of a case: `friction 0.3, speed 25 m/s, no control`."""
         parts = [case.run.row] if case.run.row else []
         for (name, axis), level in zip(self.experiment.spec.axes.items(), case.point, strict=True):
             unit = self.axis_unit(name).replace("[", "").replace("]", "")
@@ -50,24 +50,24 @@ class PlannedExperiment:
 
 
 def number_of(axis: AxisSpec, level: Level, unit: str) -> float:
-    """Return a level of an axis of numbers in a unit, an SI unit."""
+    """Return a level of a numeric axis in an SI unit."""
     if axis.unit is None:
         return float(level.value)
     return float(quantities.convert(f"{level.value!r} {axis.unit}", unit))
 
 
 def metrics_of(experiment: LoadedExperiment) -> MetricRequests:
-    """Return the metrics of an experiment as jobs have them."""
+    """Return the metrics of an experiment as requests for its jobs."""
     return tuple((key, spec.metric, spec.window) for key, spec in experiment.spec.metrics.items())
 
 
 def jobs_of(experiment: LoadedExperiment, out: Path, *, keep: bool = True, **of_jobs: Any) -> list[Job]:
-    """Return a job for every case; runs along axes hand back metrics, named runs keep their results.
+    """Return a job for every case, not planned yet.
 
     Args:
         experiment: as loaded.
-        out: its folder of results.
-        keep: whether runs along axes keep their results, too.
+        out: its results folder.
+        keep: whether runs along axes keep their results; named runs always do.
         of_jobs: other fields of all jobs.
     """
     axes = bool(experiment.spec.axes)
@@ -88,22 +88,22 @@ def plan_experiment(
     progress: Callable[[int], None] = lambda done: None,
     **of_jobs: Any,
 ) -> PlannedExperiment:
-    """Plan all cases (see `ready`); without metrics the experiment gets the standard ones that runs record.
+    """Plan all cases (see `ready`); an experiment without metrics gets the standard ones it can compute.
 
     Args:
         experiment: as loaded.
-        out: its folder of results.
-        once: reads files and opens FMUs.
-        progress: told how many cases are planned.
+        out: its results folder.
+        once: cache of files and FMUs.
+        progress: called with the number of cases planned so far.
         of_jobs: see `jobs_of`.
 
     Raises:
-        BuildError: FMUs that are stale and cannot be built.
-        ScenarioError: with everything that is wrong with any run, each problem once.
+        BuildError: stale FMUs cannot be built.
+        ScenarioError: some runs cannot start; lists each problem once.
     """
 
     def place(problem: str) -> tuple[Hashable, str]:
-        """Tell a problem of an axis once, not once per value of it, with its place in the file."""
+        """Report a problem of an axis once instead of once per value, with its key in the file."""
         axis = experiment.axis_of(getattr(problem, "place", ""))
         return (axis, f"{experiment.path}: axes.{axis[0]}: {problem}") if axis else (problem, problem)
 
@@ -128,10 +128,10 @@ def plan_experiment(
 
 
 def _metric_units(experiment: LoadedExperiment, made_up: list[Results]) -> dict[str, str]:
-    """Return the unit of every metric; `made_up`: results without rows.
+    """Return metric key -> unit; `made_up`: results without rows.
 
     Raises:
-        ScenarioError: no run records a metric's signals, or a bound is in a unit that it does not have.
+        ScenarioError: no run records a metric's signals, or a bound has a unit that does not fit.
     """
     units: dict[str, str] = {}
     problems = []
@@ -154,7 +154,7 @@ def _metric_units(experiment: LoadedExperiment, made_up: list[Results]) -> dict[
 
 
 def _bounds(experiment: LoadedExperiment, units: dict[str, str]) -> Iterable[tuple[str, str, float | str]]:
-    """Yield (place, unit, bound) of all bounds in the file whose unit is known."""
+    """Yield (key in the file, unit, bound) of all bounds whose unit is known."""
     spec = experiment.spec
     for key, condition in spec.conditions():
         derived = spec.derived.get(condition.derived)
@@ -168,10 +168,10 @@ def _bounds(experiment: LoadedExperiment, units: dict[str, str]) -> Iterable[tup
 
 
 def _units(experiment: LoadedExperiment, every: list[Plan]) -> dict[str, str]:
-    """Return the measurement unit of every axis of numbers.
+    """Return numeric axis -> unit.
 
     Raises:
-        ScenarioError: the unit that the file names does not fit; a run would have said so before.
+        ScenarioError: the unit in the file does not fit.
     """
     plans = {tuple(unit.fmu.sha256 for unit in plan.instances): plan for plan in every}.values()
     return {
@@ -182,12 +182,12 @@ def _units(experiment: LoadedExperiment, every: list[Plan]) -> dict[str, str]:
 
 
 def _unit(axis: AxisSpec, plan: Plan) -> str | None:
-    """Return the measurement unit of what an axis varies, if the plan has it."""
+    """Return the unit of an axis's target, or None if the plan does not have the target."""
     holder, _, name = axis.vary[0].partition(".")
     if (name or holder) in ("stop_time", "step_size"):
         return "s"
     if holder in FACTS:
-        return FACTS[holder].instance
+        return FACTS[holder].unit
     for unit in plan.instances:
         given = unit.constants if holder == "inputs" else unit.parameters
         if holder not in ("inputs", "vehicle", unit.name):

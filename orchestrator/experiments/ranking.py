@@ -1,4 +1,4 @@
-"""The schema of a ranking: controllers and conditions as data, and the cars that the conditions are of.
+"""Ranking files: controllers compared under conditions of sine with dwell; schema, loading and runs.
 
     title: Where controllers stand
     step_size: 0.0025
@@ -14,14 +14,13 @@
       pid: {title: PID, fmu: controller_pid, source: paper C}
     more_entries: [tuned.yaml]         # files of entries alone
 
-A condition changes a scenario as an entry of a study does. An entry puts its FMU in the place of the unit
-`controller` and gives it parameters, the same in all conditions.
+A condition overrides its scenario like a run of a study. An entry swaps its FMU in for the instance
+`controller` and sets its parameters, the same in all conditions.
 
-A ranking: which controllers drive through which conditions of sine with dwell, as jobs.
-
-Every run is one of the engine of all experiments: planned before the first starts, made in a process of its
-own, noted in the journal as it ends, not made again by the same build. A is found once for each car, on a dry
-road without control, so all controllers drive the same amplitudes. What the runs come to: `standings`.
+The runs are jobs as in every experiment: planned before the first one starts, executed in separate
+processes, added to the journal as they end, and not executed again by the same build. The steering angle A is
+determined once for each car, on a dry road without control, so all controllers drive the same amplitudes.
+`ranking_scores` computes their scores.
 """
 
 from __future__ import annotations
@@ -52,19 +51,19 @@ from .jobs import Job, MeasuredRun, MetricRequests, PlanningCache, keyed, ready
 from .standard_test_runs import AMPLITUDE, SIDES, slow_steer_jobs, steered
 
 UNIT = "controller"
-"""The unit whose place all entries take."""
+"""The instance that all entries swap."""
 NAME = r"^[\w.+-]+$"
 
 
 class CarSpec(OverrideSpec):
-    """A car, and how its characteristic angle A is found."""
+    """A car, with the scenario that determines its characteristic angle A."""
 
     title: str = Field(min_length=1, description="Its words")
     slow_steer: str = Field(min_length=1, description="Scenario of slowly increasing steer, for A")
 
 
 class ConditionSpec(OverrideSpec):
-    """What all controllers are put into: a car, a scenario of sine with dwell, what is changed in it."""
+    """A condition for all controllers: a car, a scenario of sine with dwell, and overrides."""
 
     title: str = Field(min_length=1, description="Its words")
     short: str = Field("", description="Words for the head of a column; default: all of them")
@@ -79,7 +78,7 @@ class ConditionSpec(OverrideSpec):
 
     @property
     def heading(self) -> str:
-        """Its words at the head of a column."""
+        """Heading of the condition's column."""
         return (self.short or self.title) + (" *" if self.seen else "")
 
     @field_validator("repeats")
@@ -91,7 +90,7 @@ class ConditionSpec(OverrideSpec):
 
 
 class EntrySpec(StrictModel):
-    """A controller."""
+    """A controller to be ranked."""
 
     title: str = Field(min_length=1, description="What tables call it")
     fmu: str = Field(min_length=1, description="Name of its FMU, or a path relative to the file")
@@ -101,19 +100,19 @@ class EntrySpec(StrictModel):
 
 
 class EntriesSpec(StrictModel):
-    """A file of entries alone: written by hand, or by `yawbench tune`, with checksums then."""
+    """A file of entries only: written by hand, or with checksums by `yawbench tune`."""
 
     entries: dict[str, EntrySpec] = Field(min_length=1, description="Name -> controller")
     checksums: dict[str, str] = Field({}, description="Of entries that `yawbench tune` has written")
 
     @property
     def content(self) -> dict[str, Any]:
-        """What checksums are of: the entries as they stand."""
+        """The entries as plain data, which the checksums are of."""
         return {name: one.model_dump(exclude_defaults=True) for name, one in self.entries.items()}
 
     @property
     def edited(self) -> str:
-        """What is not as `yawbench tune` has written it, in words, "" if all is."""
+        """Describes what was edited since `yawbench tune` wrote the file; "" if nothing was."""
         if self.checksums:
             words = checksums.what_changed(self.content, self.checksums)
             return f"{words} since `yawbench tune` wrote it" if words else ""
@@ -123,7 +122,7 @@ class EntriesSpec(StrictModel):
 
 
 class RankingSpec(StrictModel):
-    """A file of a ranking."""
+    """A ranking file."""
 
     title: str = Field(min_length=1)
     source: str = Field("", description="Of the test that everything is judged by")
@@ -150,43 +149,43 @@ class RankingSpec(StrictModel):
 
 
 RUNS = "runs"
-"""Folder of the results that are kept: of every cell's last amplitude."""
+"""Folder of the kept results: those of every cell's last amplitude."""
 SERIES, SLOW = "sine-with-dwell", "slowly-increasing-steer"
 METRICS: MetricRequests = (
     ("effort", "effort(yaw_moment)", None),
     ("chatter", "total_variation_rate(yaw_moment)", None),
 )
-"""What is measured beside what the test gives, and the intervention."""
+"""Metrics besides those of the test and the intervention."""
 INTERVENTION = "effort(wheel_torque_*)"
-"""Measured from the beginning of steer on: until the driver lets go of the accelerator, torque is his."""
+"""Measured from the beginning of steer: before it, wheel torque comes from the driver's accelerator."""
 STEERING_BEGINS = "start_time"
-"""Parameter of the driver [s]."""
+"""Parameter of the driver: beginning of steer [s]."""
 RECORDED = (
     "steering_wheel_angle", "yaw_rate", "sideslip", "acceleration_y", "velocity_x", "yaw_moment",
     "wheel_torque", "torque_request",
 )  # fmt: skip
-"""Beginnings of the names of what runs record; the rest would only take room."""
+"""Prefixes of the recorded signals; the others would only take space."""
 
 
 @dataclass(frozen=True)
 class LoadedRanking:
-    """A ranking as its file has it, and which part of it is wanted."""
+    """A loaded ranking file, and the selected part of its conditions."""
 
     path: Path
     spec: RankingSpec
-    entries: dict[str, tuple[EntrySpec, Path]]  # name -> controller, and the folder its path is relative to
-    quick: bool = False  # the last amplitudes of few conditions
-    chosen: tuple[str, ...] = ()  # conditions; none: all
-    edited: tuple[str, ...] = ()  # what is not as `yawbench tune` has written it
+    entries: dict[str, tuple[EntrySpec, Path]]  # name -> controller, base folder of its path
+    quick: bool = False  # only the last amplitude, and only quick conditions
+    chosen: tuple[str, ...] = ()  # selected conditions; empty: all
+    edited: tuple[str, ...] = ()  # files edited since `yawbench tune` wrote them
 
     @property
     def identity(self) -> str:
-        """What tells rankings apart: the name of the file and of its folder."""
+        """Identifies the ranking in its results folder: name of its file's folder and of the file."""
         return f"{self.path.absolute().parent.name}/{self.path.name}"
 
     @cached_property
     def conditions(self) -> dict[str, ConditionSpec]:
-        """Those that are driven."""
+        """The selected conditions."""
         return {
             name: one
             for name, one in self.spec.conditions.items()
@@ -195,11 +194,11 @@ class LoadedRanking:
 
     @cached_property
     def cars(self) -> list[str]:
-        """Names of the cars that they are of."""
+        """Names of the cars of the selected conditions."""
         return list(dict.fromkeys(one.car for one in self.conditions.values()))
 
     def changes(self, *parts: OverrideSpec, stop: bool = True) -> tuple[Override, ...]:
-        """Return the changes of the ranking itself and of parts of its file; the last of a place counts."""
+        """Return the overrides of the ranking and of parts of its file; the last one of a target counts."""
         own = [
             Override(name, float(value), "ranking")
             for name, value in (("step_size", self.spec.step_size), ("stop_time", self.spec.stop_time))
@@ -208,13 +207,13 @@ class LoadedRanking:
         return (*own, *(one for part in parts for one in changes_of_file(part, self.path.parent, "ranking")))
 
     def changes_of_entry(self, name: str) -> list[Override]:
-        """Return the changes that put an entry into a scenario."""
+        """Return the overrides that put an entry's controller into a scenario."""
         spec, folder = self.entries[name]
         given = {f"{UNIT}.{parameter}": value for parameter, value in spec.parameters.items()}
         return overrides.changes_of({UNIT: spec.fmu}, given, folder, "ranking")
 
     def changes_of_condition(self, name: str) -> tuple[Override, ...]:
-        """Return the changes that a condition makes in its scenario."""
+        """Return the overrides that a condition makes in its scenario."""
         condition = self.spec.conditions[name]
         return self.changes(self.spec.cars[condition.car], condition)
 
@@ -227,16 +226,16 @@ def load_ranking(
     quick: bool = False,
     chosen: Sequence[str] = (),
 ) -> LoadedRanking:
-    """Read a ranking.
+    """Load a ranking file.
 
     Args:
-        path: of the file.
-        more: entries from elsewhere; paths of their FMUs are relative to the working directory.
-        quick: drive only the last amplitude of the conditions that are for this.
-        chosen: conditions to drive in place of all.
+        path: the file.
+        more: further entries; paths of their FMUs are relative to the working directory.
+        quick: drive only the last amplitude of the conditions marked `quick`.
+        chosen: conditions to drive; empty: all.
 
     Raises:
-        ScenarioError: with everything that is wrong with it.
+        ScenarioError: the file is invalid; lists all problems.
     """
     path = Path(path)
     document = yaml_lines.read(path, what="ranking file")
@@ -271,7 +270,7 @@ def load_ranking(
 
 
 def jobs_for_angles(ranking: LoadedRanking, base: Job, once: PlanningCache) -> dict[str, list[Job]]:
-    """Return car -> the runs of slowly increasing steer that A follows from; `base`: as in `plan_drives`.
+    """Return car -> runs of slowly increasing steer, which determine A; `base`: as in `plan_drives`.
 
     Raises:
         ScenarioError: they cannot start.
@@ -288,10 +287,10 @@ def jobs_for_angles(ranking: LoadedRanking, base: Job, once: PlanningCache) -> d
 
 
 def angle_of(records: Sequence[MeasuredRun], car: str) -> float:
-    """Return A of a car [rad] from its runs of slowly increasing steer.
+    """Return the angle A of a car [rad] from its runs of slowly increasing steer.
 
     Raises:
-        ResultsError: there is none.
+        ResultsError: the runs do not yield it.
     """
     judged = []
     for record in records:
@@ -308,24 +307,24 @@ def angle_of(records: Sequence[MeasuredRun], car: str) -> float:
 
 @dataclass(frozen=True)
 class RankingRun:
-    """One run of a cell."""
+    """One run of a ranking: an entry under a condition at one amplitude."""
 
     entry: str
     condition: str
     amplitude: float  # [rad], positive: left first
     angle: float  # A of the car [rad]
     repeat: Value | None = None
-    last: bool = False  # the amplitude that the regulation ends with
-    job: Job | None = None  # once it is planned
+    last: bool = False  # whether this is the regulation's last amplitude
+    job: Job | None = None  # None until planned
 
     @property
     def key(self) -> str:
-        """Key of the run; "" of one that is not planned."""
+        """Key of the run's job; "" if not planned."""
         return self.job.key if self.job else ""
 
     @property
     def multiple(self) -> float:
-        """The amplitude over A."""
+        """The amplitude as a multiple of A."""
         return abs(self.amplitude) / self.angle
 
 
@@ -353,10 +352,10 @@ def plan_drives(
     once: PlanningCache,
     progress: Callable[[int], None] = lambda done: None,
 ) -> list[RankingRun]:
-    """Return runs with their jobs; `base` holds what all jobs share, and the folder of all results.
+    """Return the runs with planned jobs; `base`: common fields of all jobs, with the results folder.
 
     Raises:
-        ScenarioError: with everything that is wrong with any of them, each problem once.
+        ScenarioError: some runs cannot start; lists each problem once.
     """
     jobs = []
     for drive in drives:

@@ -1,13 +1,12 @@
-"""Where controllers of a ranking stand: runs judged, cells of a controller in a condition, places.
+"""Scores of a ranking: judged runs, controllers under conditions, and the order of the controllers.
 
 A run passes if the regulation's criteria are met and the sideslip stays below 20 degrees, beyond which a car
 turns round though its yaw-rate ratio may meet them. A condition is passed if all of its runs pass.
 
-Places: the more conditions a controller passes the better; of equally many, the larger its share of runs that
-pass, in the mean over conditions; then the smaller its peak sideslip, in the mean over conditions. Who lacks
-a run has no place.
+Controllers are ranked by the number of conditions passed; ties by the share of runs that pass, then by the
+peak sideslip, both averaged over conditions. A controller with missing runs is not ranked.
 
-The course of a ranking: A of every car, then all runs that are left, then where everybody stands.
+`drive_ranking` executes a ranking: first the runs for the angle A of every car, then all runs still missing.
 """
 
 from __future__ import annotations
@@ -29,17 +28,17 @@ from .judging import ConfidenceInterval, interval
 from .ranking import EntrySpec, LoadedRanking, RankingRun, angle_of, drives_of, jobs_for_angles, plan_drives
 
 UNHELD = 1.0
-"""Ratio of a car whose reversal produces no second peak of the yaw rate: it goes on turning as before."""
+"""Yaw-rate ratio without a second peak after the reversal: the car keeps turning as before."""
 WORST = -100.0
-"""Stability margin that stands for all that are worse, in points; chosen: such a car is lost."""
+"""Lower bound of the stability margin, in percentage points; chosen: such a car is lost."""
 
 
 @dataclass(frozen=True)
 class RankedRun:
-    """One run and what it came to; None: it has not been made."""
+    """A run with its record, which is None if the run is missing."""
 
     drive: RankingRun
-    dry: bool  # responsiveness counts
+    dry: bool  # whether responsiveness counts
     record: MeasuredRun | None
 
     def __getitem__(self, key: str) -> float | None:
@@ -59,18 +58,18 @@ class RankedRun:
 
     @property
     def spun(self) -> bool:
-        """Whether the sideslip goes beyond what a driver could hold."""
+        """Whether the sideslip exceeds what a driver could control."""
         slip = self["sideslip"]
         return slip is not None and slip > SPUN
 
     @property
     def passed(self) -> bool:
-        """Whether the run counts."""
+        """Whether the criteria are met without spinning."""
         return self.met and not self.spun
 
     @property
     def margin(self) -> float | None:
-        """Points of per cent that both ratios stay below their limits by; None of a run not made."""
+        """Percentage points by which both ratios stay below their limits; None if the run is missing."""
         if self.record is None:
             return None
         ratios = ((self[f"ratio_{round(1000 * late)}"], most) for late, most in RATIOS)
@@ -79,13 +78,13 @@ class RankedRun:
 
     @property
     def speed_lost(self) -> float | None:
-        """From beginning to completion of steer [m/s]."""
+        """Loss of speed from beginning to completion of steer [m/s]."""
         first, last = self["speed"], self["speed_end"]
         return None if first is None or last is None else first - last
 
     @property
     def verdict(self) -> str:
-        """In a word or two."""
+        """One-word verdict; of a failed run with the reason."""
         if self.record is None:
             return "missing"
         if not self.record.ok:
@@ -95,7 +94,7 @@ class RankedRun:
 
 @dataclass(frozen=True)
 class RankingCell:
-    """A controller in a condition."""
+    """A controller under a condition: all its runs."""
 
     entry: str
     condition: str
@@ -103,12 +102,12 @@ class RankingCell:
 
     @property
     def missing(self) -> int:
-        """Runs that have not been made."""
+        """The number of missing runs."""
         return sum(one.record is None for one in self.runs)
 
     @property
     def passed(self) -> bool:
-        """Whether all runs are."""
+        """Whether all runs passed."""
         return all(one.passed for one in self.runs)
 
     @property
@@ -120,11 +119,11 @@ class RankingCell:
 
     @property
     def share(self) -> float:
-        """Share of the runs that pass."""
+        """Share of the runs that passed."""
         return sum(one.passed for one in self.runs) / len(self.runs)
 
     def _over_repeats(self, number: Callable[[list[RankedRun]], float]) -> ConfidenceInterval | None:
-        """Return the mean over repeats of a number of their runs."""
+        """Average over repeats a number computed from the runs of each."""
         if self.missing:
             return None
         repeats = dict.fromkeys(one.drive.repeat for one in self.runs)
@@ -132,7 +131,7 @@ class RankingCell:
 
     @cached_property
     def margin(self) -> ConfidenceInterval | None:
-        """Least stability margin of all runs, in points; over repeats the mean."""
+        """Smallest stability margin of all runs, in percentage points; over repeats the mean."""
         return self._over_repeats(lambda runs: min(_known(runs, "margin", WORST)))
 
     @cached_property
@@ -142,12 +141,12 @@ class RankingCell:
 
     @cached_property
     def displacement(self) -> float | None:
-        """Least displacement of the runs that responsiveness is asked of [m]."""
+        """Smallest displacement of the runs at amplitudes where responsiveness counts [m]."""
         asked = [one for one in self.runs if one.drive.multiple >= FROM * (1.0 - SLIGHT)]
         return min((x for one in asked if (x := one["displacement"]) is not None), default=None)
 
     def number(self, key: str) -> float | None:
-        """Return the margin, the sideslip, or the mean of another number over all runs that have it."""
+        """Return the margin, the sideslip, or the mean of another metric over all runs that have it."""
         if key in ("margin", "sideslip"):
             over: ConfidenceInterval | None = getattr(self, key)
             return over.mean if over else None
@@ -156,48 +155,48 @@ class RankingCell:
 
 
 def _known(runs: Sequence[RankedRun], key: str, lost: float) -> Iterator[float]:
-    """Yield a number of all runs; `lost` stands for that of one that failed."""
+    """Yield a number of all runs; `lost` replaces a missing one."""
     return (lost if (x := one[key]) is None else x for one in runs)
 
 
 @dataclass(frozen=True)
 class EntryScore:
-    """What an entry comes to over all conditions."""
+    """Score of an entry over all conditions."""
 
     entry: str
     spec: EntrySpec
     cells: dict[str, RankingCell]  # condition -> cell
-    place: int | None = None  # None: it lacks runs
+    place: int | None = None  # None: not ranked, as runs are missing
 
     @property
     def missing(self) -> int:
-        """Cells that lack runs."""
+        """The number of conditions with missing runs."""
         return sum(cell.state == "missing" for cell in self.cells.values())
 
     def count(self, state: str) -> int:
-        """Return the number of conditions of a state."""
+        """Return the number of conditions with a state."""
         return sum(cell.state == state for cell in self.cells.values())
 
     @property
     def share(self) -> float:
-        """Share of runs that pass, in the mean over conditions."""
+        """Share of runs that passed, averaged over conditions."""
         return sum(cell.share for cell in self.cells.values()) / len(self.cells)
 
     def mean(self, key: str) -> float | None:
-        """Return the mean over conditions of a number of cells; None if one lacks it."""
+        """Return the mean of a number over conditions; None if a condition lacks it."""
         found = [cell.number(key) for cell in self.cells.values()]
         known = [x for x in found if x is not None]
         return sum(known) / len(known) if known and len(known) == len(found) else None
 
     @property
     def step_time(self) -> float | None:
-        """Processor time of a step of the controller [s]: the middle of all cells'."""
+        """Processor time of a step of the controller [s]: the median over conditions."""
         found = sorted(x for cell in self.cells.values() if (x := cell.number(STEP_TIME)) is not None)
         return found[len(found) // 2] if found else None
 
     @property
     def order(self) -> tuple[float, float, float]:
-        """What places go by, the least first."""
+        """Sort key of the ranking, best first."""
         slip = self.mean("sideslip")
         return (-self.count("passed"), -round(self.share, 9), math.inf if slip is None else round(slip, 9))
 
@@ -205,12 +204,12 @@ class EntryScore:
 def standings(
     ranking: LoadedRanking, drives: Sequence[RankingRun], records: Mapping[str, MeasuredRun]
 ) -> list[EntryScore]:
-    """Return what all entries come to, the first place first, those without a place last.
+    """Return the scores of all entries, best first, those that are not ranked last.
 
     Args:
         ranking: with the conditions that count.
         drives: all runs.
-        records: key -> what became of a run.
+        records: job key -> record of the run.
     """
     runs: dict[tuple[str, str], list[RankedRun]] = {}
     for drive in drives:
@@ -225,14 +224,14 @@ def standings(
 
 
 class Digits(NamedTuple):
-    """Significant digits with which numbers that decide places read differently."""
+    """Significant digits at which numbers that decide the order can be told apart."""
 
     share: int
     sideslip: int
 
 
 def deciding_digits(ranked: Sequence[EntryScore]) -> Digits:
-    """Return the digits for shares and mean peak sideslips; `ranked`: in the order of their places."""
+    """Return the digits for shares and mean peak sideslips; `ranked`: best first."""
     share, slip = [], []
     for one, next_ in pairwise(one for one in ranked if one.place):
         if one.order[0] != next_.order[0]:
@@ -245,7 +244,7 @@ def deciding_digits(ranked: Sequence[EntryScore]) -> Digits:
 
 
 def placed(every: Sequence[EntryScore]) -> list[EntryScore]:
-    """Return standings in their order, with places; equal ones share a place."""
+    """Return the scores in order, with places; equal ones share a place."""
     whole = sorted((one for one in every if not one.missing), key=lambda one: one.order)
     found: list[EntryScore] = []
     for number, one in enumerate(whole, start=1):
@@ -255,14 +254,14 @@ def placed(every: Sequence[EntryScore]) -> list[EntryScore]:
 
 
 RunJobs = Callable[[str, Sequence[Job]], object]
-"""Makes those of some runs that are left, under a title, and notes them in the journal."""
+"""Executes the jobs still missing, under a title, and adds them to the journal."""
 Planning = Callable[[int], AbstractContextManager[Callable[[int], None]]]
-"""Shows how many of so many runs are planned."""
+"""Progress display of planning a total number of runs."""
 
 
 @dataclass(frozen=True)
 class RankingResult:
-    """What a ranking comes to."""
+    """Result of a ranking."""
 
     ranking: LoadedRanking
     angles: dict[str, float]  # car -> A [rad]
@@ -280,19 +279,19 @@ def drive_ranking(
     only: Collection[str] = (),
     planning: Planning = lambda total: nullcontext(lambda done: None),
 ) -> RankingResult:
-    """Make the runs that are left and return where everybody stands.
+    """Execute the missing runs of a ranking and return its scores.
 
     Args:
         ranking: as loaded.
-        base: what all jobs share; results go to its folder.
-        journal: of finished runs.
-        once: reads files and opens FMUs.
-        make: makes runs.
-        only: entries whose runs are made; none: of all. The others stand with what is there.
-        planning: shows how many of so many runs are planned.
+        base: common fields of all jobs; results go to its folder.
+        journal: finished runs.
+        once: cache of files and FMUs.
+        make: executes runs.
+        only: entries whose runs are executed; empty: all. The others are scored by the runs in the journal.
+        planning: displays the progress of planning.
 
     Raises:
-        YawbenchError: a run cannot start, or A cannot be found.
+        YawbenchError: a run cannot start, or A cannot be determined.
     """
     slow = jobs_for_angles(ranking, base, once)
     make("A, the angle at 0.3 g", [job for jobs in slow.values() for job in jobs])

@@ -1,7 +1,4 @@
-"""Tables of a ranking: controllers, cells and runs, for people and for programs.
-
-Pictures of a ranking: who passes which condition, stability over intervention, single runs.
-"""
+"""Tables and figures of a ranking: controllers, conditions and runs; stability over intervention."""
 
 from __future__ import annotations
 
@@ -32,16 +29,16 @@ if TYPE_CHECKING:
 
 
 COLOURS = {"passed": "#BFE5D8", "spun": "#F7E3A1", "failed": "#F6CDB4", "missing": "#FFFFFF"}
-"""Of cells; words and signs tell them apart without."""
+"""Colours of cells, which their text also tells apart."""
 RUN = "sine_with_dwell"
-"""Name of the figure of a run."""
+"""File name of a run's figure."""
 TUNED = {"authors": ("o", "#0072B2"), "tuned": ("D", "#D55E00")}
 ROW = 0.235
-"""Height of a row of the matrix [inches]."""
+"""Height of a row of the matrix [inch]."""
 
 
 def sign_of(cell: RankingCell) -> str:
-    """Return what stands in the cell of a controller in a condition: a sign, or how many of its runs pass."""
+    """Return the text of a cell: a check mark, a dash, or how many of its runs passed."""
     if cell.state == "missing":
         return "–"
     if cell.state == "passed":
@@ -51,12 +48,12 @@ def sign_of(cell: RankingCell) -> str:
 
 
 def place_words(one: EntryScore) -> str:
-    """Return a place, `–` of an entry that lacks runs."""
+    """Return the place of an entry as text, `–` if it is not ranked."""
     return str(one.place) if one.place else "–"
 
 
 def draw_matrix(ranked: RankingResult, note: str) -> Figure:
-    """Return the picture of who passes which condition, a row per controller, the first place at the top."""
+    """Draw which controller passes which condition: a row per controller, best at the top."""
     from matplotlib.patches import Patch, Rectangle
 
     rows = ranked.standings
@@ -94,9 +91,9 @@ def draw_matrix(ranked: RankingResult, note: str) -> Figure:
 
 
 def draw_pareto(ranked: RankingResult, note: str) -> Figure:
-    """Return stability over intervention, a point per controller; those that none betters are joined.
+    """Draw stability over intervention: a point per controller, the Pareto front as a line.
 
-    Who asks for no moment at all is told of below: a car without control is far from all others.
+    Controllers that never act are listed in the note, since they lie far from all others.
 
     Raises:
         ResultsError: there is no controller to draw.
@@ -140,9 +137,9 @@ def draw_pareto(ranked: RankingResult, note: str) -> Figure:
 
 
 def draw_run(folder: Path, angle: float, again: bool = False) -> None:
-    """Draw a run of sine with dwell beside its results, unless that has been done; `angle`: A [rad].
+    """Draw a run of sine with dwell into its results folder, unless it exists; `angle`: A [rad].
 
-    A run that has left no results is passed over.
+    A run without results is skipped.
     """
     if not again and (folder / f"{RUN}.svg").is_file():
         return
@@ -156,7 +153,7 @@ def draw_run(folder: Path, angle: float, again: bool = False) -> None:
 
 
 def degrees(amplitude: float) -> str:
-    """Return an amplitude in whole and tenths of degrees."""
+    """Return an amplitude in degrees, to a tenth."""
     return f"{math.degrees(abs(amplitude)):.1f}°"
 
 
@@ -169,11 +166,11 @@ UNITS = {
     "margin": "points", "sideslip": "rad", "speed_lost": "m/s", "intervention": "N.m.s", "effort": "N.m.s",
     "chatter": "N.m/s",
 }  # fmt: skip
-"""Numbers of a cell, that are means over conditions for a controller -> unit."""
+"""Numbers of a cell -> unit; controllers have their means over conditions."""
 
 
 def words_of(number: float | None, unit: str) -> Words:
-    """Return a number as tables show it; nothing for nothing."""
+    """Return a number as a table cell; None if missing."""
     if number is None:
         return None
     if unit == "points":
@@ -182,14 +179,14 @@ def words_of(number: float | None, unit: str) -> Words:
 
 
 def spread(one: ConfidenceInterval | None, words: Callable[[float], str]) -> str | None:
-    """Return a mean over repeats with the half width of its confidence interval, if it has one."""
+    """Return a mean over repeats with the half width of its confidence interval, if any."""
     if one is None:
         return None
     return f"{words(one.mean)} ± {words(one.half)}" if one.half else words(one.mean)
 
 
 def row_of(one: EntryScore, digits: Digits) -> dict[str, Words]:
-    """Return the row of a controller: heading -> cell; `digits`: of what decides places."""
+    """Return the row of a controller: heading -> cell; `digits`: of the numbers that decide places."""
     slip = one.mean("sideslip")
     means = {
         key.replace("_", " "): words_of(one.mean(key), unit) for key, unit in UNITS.items() if key != "effort"
@@ -214,7 +211,7 @@ def row_of(one: EntryScore, digits: Digits) -> dict[str, Words]:
 
 
 def table_of(ranked: RankingResult, *left_out: str) -> Table:
-    """Return the table of controllers, the first place first; `left_out`: headings."""
+    """Return the table of controllers, best first; `left_out`: headings to omit."""
     digits = deciding_digits(ranked.standings)
     rows = [row_of(one, digits) for one in ranked.standings]
     kept = [heading for heading in rows[0] if heading not in left_out]
@@ -264,7 +261,7 @@ def _numbers(name: str, unit: str, values: Iterable[float | None]) -> TableColum
 
 
 def columns_of_entries(ranked: RankingResult) -> list[TableColumn]:
-    """Return a row per controller, numbers in SI."""
+    """Return columns with a row per controller, in SI units."""
     rows = ranked.standings
     return [
         _text("entry", (one.entry for one in rows)),
@@ -282,7 +279,7 @@ def columns_of_entries(ranked: RankingResult) -> list[TableColumn]:
 
 
 def columns_of_cells(ranked: RankingResult) -> list[TableColumn]:
-    """Return a row per controller and condition, numbers in SI."""
+    """Return columns with a row per controller and condition, in SI units."""
     cells = [cell for one in ranked.standings for cell in one.cells.values()]
     numbers = []
     for key, unit in {**UNITS, STEP_TIME: "s"}.items():
@@ -304,7 +301,7 @@ def columns_of_cells(ranked: RankingResult) -> list[TableColumn]:
 
 
 def columns_of_runs(ranked: RankingResult) -> list[TableColumn]:
-    """Return a row per run, numbers in SI."""
+    """Return columns with a row per run, in SI units."""
     runs = [run for one in ranked.standings for cell in one.cells.values() for run in cell.runs]
     units = {
         "ratio_1000": "1", "ratio_1750": "1", "displacement": "m", "sideslip": "rad", "speed": "m/s",

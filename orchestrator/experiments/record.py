@@ -1,6 +1,6 @@
-"""What an experiment leaves on disk beside its runs and its page: the table, and all it comes to as JSON.
+"""Files of an experiment's result: its table as CSV and Parquet, its verdicts, its record as JSON.
 
-The table of an experiment: one row per case, in the order of the design; equal runs, equal bytes.
+The table has one row per case, in the order of the design; equal runs give equal bytes.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ VERDICTS = "verdicts.csv"
 
 @dataclass(frozen=True)
 class TableColumn:
-    """A column of the table; numbers are in SI, with their unit in `about`."""
+    """A column of a table for programs; numbers are in SI units, named in `about`."""
 
     name: str
     kind: Literal["int64", "float64", "string"]
@@ -46,7 +46,7 @@ class TableColumn:
 
 
 def columns_of(findings: ExperimentResult) -> list[TableColumn]:
-    """Return run, axes, how each case ended, what was remarkable, metrics, key."""
+    """Return the columns of the table: run, axes, status, reason, warnings, metrics, key."""
     cases, spec, planned = findings.experiment.cases, findings.spec, findings.planned
     records = findings.records
     if spec.runs:
@@ -81,7 +81,7 @@ def columns_of(findings: ExperimentResult) -> list[TableColumn]:
 
 
 def verdict_columns(findings: ExperimentResult) -> list[TableColumn]:
-    """Return what was said, its verdict, margin and region: a row per claim and check."""
+    """Return columns with verdict, margin and region, a row per claim and check."""
     every = findings.judgements
     regions = [one.region for one in every]
     flips = [region and region.flip for region in regions]
@@ -102,7 +102,7 @@ def verdict_columns(findings: ExperimentResult) -> list[TableColumn]:
 
 
 def to_pandas(columns: Sequence[TableColumn]) -> pd.DataFrame:
-    """Return the table; `attrs["units"]` holds the units of its numbers."""
+    """Return columns as a data frame; `attrs["units"]` has the units of its numbers."""
     import pandas as pd
 
     frame = pd.DataFrame({one.name: pd.Series(one.values, dtype=_dtype(one)) for one in columns})
@@ -115,10 +115,10 @@ def _dtype(column: TableColumn) -> str:
 
 
 def write_table(findings: ExperimentResult, out: Path) -> None:
-    """Write the table into a folder, as CSV and as Parquet with units in the fields' metadata.
+    """Write table and verdicts as CSV, and the table as Parquet with units in the fields' metadata.
 
     Raises:
-        ResultsError: it cannot be written.
+        ResultsError: a file cannot be written.
     """
     columns = columns_of(findings)
     contents: dict[str, str | bytes] = {TABLE[0]: to_csv(columns), TABLE[1]: _parquet(findings, columns)}
@@ -132,7 +132,7 @@ def write_table(findings: ExperimentResult, out: Path) -> None:
 
 
 def to_csv(columns: Sequence[TableColumn]) -> str:
-    """Return columns as CSV, their units in the headings."""
+    """Return columns as CSV, with units in the headings."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(f"{c.name} [{c.about['unit']}]" if "unit" in c.about else c.name for c in columns)
@@ -141,7 +141,7 @@ def to_csv(columns: Sequence[TableColumn]) -> str:
 
 
 def _plain(row: Sequence[Any]) -> list[str]:
-    """Return numbers with all their digits, nothing for nothing."""
+    """Return a row as text: numbers with all digits, "" for None."""
     return [
         "" if x is None else repr(x) if isinstance(x, float) and math.isfinite(x) else str(x) for x in row
     ]
@@ -160,12 +160,12 @@ def _parquet(findings: ExperimentResult, columns: Sequence[TableColumn]) -> byte
 
 
 def _encodable(value: Any) -> Any:
-    """Return a value, of a text with halves of characters written out, as `write_whole` does."""
+    """Return a value; in text, lone surrogates are escaped, as by `write_whole`."""
     return value.encode("utf-8", "backslashreplace").decode() if isinstance(value, str) else value
 
 
 def _description(findings: ExperimentResult) -> str:
-    """Return what the experiment was, as JSON: the file's content, the FMUs with their hashes."""
+    """Describe the experiment as JSON: the content of its file, its FMUs with their SHA-256."""
     content = findings.spec.model_dump(by_alias=True, exclude_defaults=True)
     about = {"experiment": content, "fmus": dict(findings.fmus)}
     return json.dumps(about, ensure_ascii=False, default=str)
@@ -175,19 +175,19 @@ RECORD = "experiment.json"
 
 
 def write_findings(findings: ExperimentResult, drawn: dict[str, str], out: Path) -> None:
-    """Write table and record into a folder; `drawn`: name -> title of the figures in it.
+    """Write tables and record into a folder; `drawn`: name -> title of its figures.
 
     Raises:
-        ResultsError: they cannot be written.
+        ResultsError: a file cannot be written.
     """
     write_table(findings, out)
-    _tell_of_changes(out / RECORD)
+    _warn_if_edited(out / RECORD)
     content = checksums.with_checksums(_record(findings, drawn))
     write_whole(out / RECORD, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def _tell_of_changes(file: Path) -> None:
-    """Warn that a record was changed since it was written: it is about to be written anew from the runs."""
+def _warn_if_edited(file: Path) -> None:
+    """Warn if a record that is about to be overwritten was edited since it was written."""
     try:
         found = json.loads(read_bytes(file, largest=LARGEST))
         words = checksums.changed_since(found) if isinstance(found, dict) else "it is no record"
@@ -201,7 +201,7 @@ def _tell_of_changes(file: Path) -> None:
 
 def _record(findings: ExperimentResult, drawn: dict[str, str]) -> dict[str, Any]:
     spec, settings = findings.spec, findings.experiment.settings
-    alone = not spec.axes or (len(settings) == 1 and bool(spec.runs))  # else the table has them
+    alone = not spec.axes or (len(settings) == 1 and bool(spec.runs))  # else see the table
     return {
         "title": spec.title,
         "source": spec.source,
@@ -286,7 +286,7 @@ def _judgement(one: ClaimResult) -> dict[str, Any]:
 
 
 def _region(region: Region) -> dict[str, Any]:
-    """Return how far a verdict carries; numbers of open values in SI, or as factors."""
+    """Return the verdicts over a region; numbers of open values are in SI units, or factors."""
     flip = region.flip
     return {
         "points": len(region.points),

@@ -1,6 +1,6 @@
-"""Claims judged over a region of open values: which runs that takes, and what it comes to.
+"""Regions: claims judged again over the values that a paper leaves open, and the runs this needs.
 
-The runs are measured and not kept; a run at the chosen point is the named one itself, and is not made again.
+The runs keep no results. At the chosen point the named runs themselves are used.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ from .outcome import ExperimentResult, derive
 from .planning import PlannedExperiment, metrics_of, number_of
 
 ORIGIN = "region"
-"""Of changes that open values make."""
+"""Origin of overrides that open values make."""
 
 RegionPoint = tuple[tuple[str, Level], ...]
-"""Open value -> its level, of those that are not as chosen."""
+"""Pairs of open value and level; the open values not listed are as chosen."""
 RegionCell = tuple[str, RegionPoint]
-"""A run, and the open values that change it."""
+"""A named run, and the open values that change it."""
 RegionKey = tuple[str, int]
-"""Of what is judged: `claims` or `checks`, and its number."""
+"""(`claims` or `checks`, index) of what is judged."""
 
 
 def found_at(plan: Plan, place: str) -> tuple[Given, str] | None:
-    """Return what a run has at a place as changes name it, and its unit; None: it has no such place."""
+    """Return the value and unit that an override target has in a plan; None if it has no such target."""
     holder, _, name = place.partition(".")
     units = {unit.name: unit for unit in plan.instances}
     if not name and holder in units:
@@ -65,7 +65,7 @@ def found_at(plan: Plan, place: str) -> tuple[Given, str] | None:
 
 
 def _names(holder: str, name: str, unit: Instance, variable: Variable) -> bool:
-    """Return whether a place, `holder.name`, is a variable of a unit."""
+    """Return whether the target `holder.name` addresses a variable of an instance."""
     if holder in FACTS:
         fact = FACTS[holder]
         return fact.counts(unit, variable.name) or (
@@ -81,10 +81,10 @@ def _names(holder: str, name: str, unit: Instance, variable: Variable) -> bool:
 
 
 class RegionRuns:
-    """What open values make of the runs of an experiment.
+    """The runs of an experiment at the points of its region.
 
     Args:
-        planned: the experiment, without axes, with a plan for every run.
+        planned: an experiment without axes, with a plan for every run.
     """
 
     def __init__(self, planned: PlannedExperiment) -> None:
@@ -98,10 +98,10 @@ class RegionRuns:
 
     @cached_property
     def touched(self) -> dict[str, list[str]]:
-        """Open value -> the runs it touches.
+        """Open value -> the runs it applies to.
 
         Raises:
-            ScenarioError: it touches none.
+            ScenarioError: it applies to none.
         """
         found = {
             name: [run for run in self.experiment.runs if self._touches(one, run)]
@@ -113,7 +113,7 @@ class RegionRuns:
         return found
 
     def own_value(self, run: str, place: str) -> Given | None:
-        """Return what a run has at a place."""
+        """Return the value that a target has in a run; None if the run has no such target."""
         found = found_at(self.plans[run], place)
         return None if found is None else found[0]
 
@@ -140,19 +140,19 @@ class RegionRuns:
         return self._has(run, one.vary, one.times)
 
     def _has(self, run: NamedRun, places: Iterable[str], times: bool) -> bool:
-        """Return whether a run has all places, and leaves them open."""
+        """Return whether a run has all targets without overriding them itself."""
         own = {change.place for change in (*run.changes, *self.experiment.by_options)}
         return all(
             self.own_value(run.name, place) is not None and (times or place not in own) for place in places
         )
 
     def _scenario(self, variant: OpenVariantSpec, run: NamedRun) -> Path:
-        """Return the scenario that a run has at a level."""
+        """Return the scenario of a run at a variant."""
         named = variant.scenario.replace("{scenario}", run.scenario.stem)
         return self.experiment.path.parent / named if named else run.scenario
 
     def changes(self, name: str, place: RegionPoint) -> tuple[Path, list[Override]]:
-        """Return the scenario that a run has at a point, and what is changed in it besides."""
+        """Return the scenario of a run at a point, and the further overrides there."""
         run, changes = self.experiment.runs[name], []
         scenario = run.scenario
         for key, level in place:
@@ -168,14 +168,14 @@ class RegionRuns:
         return scenario, changes
 
     def cell(self, name: str, place: RegionPoint) -> RegionCell:
-        """Return a run at a point, by what changes it there."""
+        """Return a run at a point, with only those open values that change it there."""
         if (name, place) not in self._cells:
             other = (one for one in place if name in self.touched[one[0]] and self._is_other(name, one))
             self._cells[name, place] = (name, tuple(other))
         return self._cells[name, place]
 
     def _is_other(self, name: str, at: tuple[str, Level]) -> bool:
-        """Return whether a level is another than the one that a run has."""
+        """Return whether a level differs from the one chosen in a run."""
         key, level = at
         one = self.open_values[key]
         scenario, changes = self.changes(name, (at,))
@@ -186,27 +186,27 @@ class RegionRuns:
         return not math.isclose(self.number(key, level), self.chosen_number(key, [name]), rel_tol=1e-9)
 
     def number(self, key: str, level: Level) -> float:
-        """Return a level of an open value of numbers: in SI, or as a factor."""
+        """Return a level of a numeric open value: in SI units, or as a factor."""
         one = self.open_values[key]
         return float(level.value) if one.times else number_of(one, level, self.unit(key))
 
     def unit(self, key: str) -> str:
-        """Return the unit that the numbers of an open value have in the runs that it touches."""
+        """Return the unit of an open value in the runs that it applies to."""
         place = self.open_values[key].vary[0]
         found = (found_at(self.plans[name], place) for name in self.touched[key])
         return next((one[1] for one in found if one and one[1]), "")
 
     def own(self, key: str, names: Iterable[str]) -> set[float]:
-        """Return the numbers that runs have where an open value of numbers varies."""
+        """Return the distinct numbers chosen in runs for a numeric open value."""
         place = self.open_values[key].vary[0]
         found = [self.own_value(name, place) for name in names if name in self.touched[key]]
         return {float(value) for value in found if value is not None}
 
     def chosen_number(self, key: str, names: Iterable[str]) -> float:
-        """Return the number chosen in runs: in SI, or 1 as a factor.
+        """Return the number chosen in runs, in SI units; 1 for a factor.
 
         Raises:
-            ScenarioError: it is not the same in all of them.
+            ScenarioError: the runs differ in it.
         """
         if self.open_values[key].times:
             return 1.0
@@ -222,24 +222,24 @@ class RegionRuns:
 
 @dataclass(frozen=True)
 class RegionQuestion:
-    """A claim or check, the runs it speaks of, and where it is to be judged."""
+    """A claim or check, its runs, and the points at which to judge it."""
 
     claim: Claim
     runs: tuple[str, ...]
     points: list[RegionPoint]  # of the Latin hypercube
-    lines: dict[str, list[Level]]  # open value that it depends on -> its levels
+    lines: dict[str, list[Level]]  # open value it depends on -> levels
 
 
 @dataclass(frozen=True)
 class RegionPlan:
-    """All runs of a region, ready to start."""
+    """All planned runs of a region."""
 
     runs: RegionRuns
     asked: dict[RegionKey, RegionQuestion]
     jobs: dict[RegionCell, Job]
 
     def cells(self, asked: RegionQuestion) -> Iterator[RegionCell]:
-        """Yield every run at every point that a claim is judged at."""
+        """Yield every run of a claim at every point it is judged at."""
         along = (((key, level),) for key, levels in asked.lines.items() for level in levels)
         for place in itertools.chain(asked.points, along):
             yield from (self.runs.cell(run, place) for run in asked.runs)
@@ -252,16 +252,16 @@ def plan_region(
     once: PlanningCache,
     progress: Callable[[int], None] = lambda done: None,
 ) -> RegionPlan:
-    """Plan the runs that judge all claims over the region; checks are judged where these suffice.
+    """Plan the runs for judging all claims over the region; checks only reuse these runs.
 
     Args:
-        planned: the experiment; its file has a region.
-        folder: of the experiment's results.
-        once: as `ready` takes it.
-        progress: told how many runs are planned.
+        planned: the experiment, whose file has a region.
+        folder: results folder of the experiment.
+        once: cache of files and FMUs.
+        progress: called with the number of runs planned so far.
 
     Raises:
-        ScenarioError: an open value touches no run, or a level of it is none that a run can take.
+        ScenarioError: an open value applies to no run, or a run cannot take one of its levels.
     """
     runs = RegionRuns(planned)
     spec = runs.experiment.spec
@@ -285,7 +285,7 @@ def plan_region(
         jobs.append(replace(job, out=folder / RUNS, keep=False))
 
     def where(problem: str) -> tuple[str, str]:
-        """Tell a problem of an open value once, with its place in the file."""
+        """Report a problem of an open value once, with its key in the file."""
         place = getattr(problem, "place", "").removeprefix(f"{ORIGIN} ").partition("=")[0]
         key = next((key for key, one in runs.open_values.items() if place in one.places), None)
         at = f"{runs.experiment.path}: region.open_values.{key}: "
@@ -316,7 +316,7 @@ def _asked(runs: RegionRuns, claim: Claim, hypercube: list[tuple[Level, ...]]) -
 
 
 def runs_of(experiment: LoadedExperiment, claim: Claim) -> tuple[str, ...]:
-    """Return the names of all runs that decide on a claim."""
+    """Return the names of all runs that a claim depends on."""
     spec, found = experiment.spec, dict[str, None]()
     for condition in claim.holds_if:
         if condition.derived:
@@ -335,12 +335,12 @@ def runs_of(experiment: LoadedExperiment, claim: Claim) -> tuple[str, ...]:
 def judge_region(
     plan: RegionPlan, findings: ExperimentResult, records: Mapping[str, MeasuredRun]
 ) -> dict[RegionKey, Region]:
-    """Return what becomes of every verdict over the region.
+    """Judge all claims and checks over the region.
 
     Args:
         plan: of the region.
-        findings: what stands at the chosen point.
-        records: key of a run -> what became of it.
+        findings: the result at the chosen point.
+        records: job key -> record of the run.
     """
     chosen = {"claims": findings.claims, "checks": findings.checks}
     return {
@@ -385,7 +385,7 @@ def _judged(
         stops = []
         for level in levels:
             place = ((key, level),)
-            if any(runs.cell(name, place)[1] for name in asked.runs):  # else it is the chosen level
+            if any(runs.cell(name, place)[1] for name in asked.runs):  # otherwise this is the chosen level
                 number = runs.number(key, level) if one.numeric else None
                 stops.append(LevelVerdict(level.words, number, spot(place)))
         unit, factor = _shown(runs, key, asked.runs) if one.numeric else ("", 1.0)
@@ -399,10 +399,9 @@ def _judged(
 
 
 def _shown(runs: RegionRuns, key: str, names: Iterable[str]) -> tuple[str, float]:
-    """Return the unit in which an open value is shown, and the factor of its numbers to that.
+    """Return the display unit of an open value, and the factor that converts its numbers to it.
 
-    Factors become numbers where all runs that they are judged by have one in common; else they are
-    "times what was chosen".
+    Factors are shown as numbers if all runs have the same chosen value, else as multiples of it.
     """
     one = runs.open_values[key]
     unit = runs.unit(key)

@@ -1,14 +1,14 @@
-"""The schema of experiment files: runs, axes, metrics, judgements, figures; every key, strictly.
+"""Schema of experiment files: studies, sweeps and tunings, with metrics, claims and figures.
 
-An experiment is a list of runs (a study: a paper's, say), or one scenario whose conditions vary along axes
-(a sweep), or both. A run entry with `for` stands for one run per combination; `{name}` in its texts is then
-the value.
+An experiment is a list of runs (a study, for example of a paper), or one scenario varied along axes (a
+sweep), or both. A run entry with `for` becomes one run per combination of its values; `{name}` in its texts
+is replaced by the value.
 
     title: What a paper says
     runs:
       - for: {speed: [15, 25], controller: {off: no control, fnn: neural network}}
         name: "{speed}mps/{controller}"
-        label: "{controller}"              # in legends and tables the words: "no control"
+        label: "{controller}"              # legends and tables show the words: "no control"
         row: "{speed} m/s, {controller}"
         scenario: "{speed}mps.yaml"        # relative to this file
         swap: {controller: "controller_{controller}"}
@@ -23,8 +23,8 @@ the value.
     figures:
       - {name: overlay, runs: ["15mps/*"], panels: [sideslip, path]}
 
-Grids put one metric of many runs into rows and columns, beside what the paper prints; `derived` are
-numbers computed from several runs, which claims may speak of (`{derived: gain, at_least: 50 %}`).
+Grids show one metric of many runs in rows and columns, next to the paper's numbers; `derived` are
+numbers computed from several runs, which claims may refer to (`{derived: gain, at_least: 50 %}`).
 
     grids:
       shares:
@@ -41,11 +41,11 @@ numbers computed from several runs, which claims may speak of (`{derived: gain, 
         expression: (frozen - learning) / frozen
         of: {frozen: {run: frozen, metric: error}, learning: {run: learning, metric: error}}
         unit: "%"
-        published: 30 %                    # what the paper prints, in SI or with a unit
+        published: 30 %                    # by the paper, in SI units or with a unit
 
-A value of a run's `for` may bring changes along, faults among them, and claims, checks and derived numbers
-may have a `for` of their own. A grid of derived numbers with `holds` tells how far down its rows what is
-said of each column's cells holds.
+A value of a run's `for` may come with overrides, including faults; claims, checks and derived numbers may
+have a `for`, too. A grid of derived numbers with `holds` shows down to which row the claims about each
+column's cells hold.
 
     runs:
       - for:
@@ -59,8 +59,8 @@ said of each column's cells holds.
         for: {fault: {frozen: gyro frozen}}
         holds_if: [{run: "{fault}", metric: sideslip, at_most: 5 deg}]
 
-A verdict at one point may flip beside it. A region names the values that the paper leaves open, each with a
-range; the claims are judged along each of them, and at the points of a Latin hypercube over all together.
+A verdict at one point may flip nearby. A region names the values that the paper leaves open, each with a
+range; claims are judged again along each of them, and at the points of a Latin hypercube over all together.
 
     region:
       points: 24
@@ -71,18 +71,18 @@ range; the claims are judged along each of them, and at the points of a Latin hy
         tyre: {vary: tyre, values: [tyre_dugoff, tyre_magic_formula], because: "the paper names neither"}
         actuators: {variants: {none: {}, slow: {scenario: "{scenario}_slow.yaml"}}, because: "none is named"}
 
-An open value touches the runs that have it and do not set it themselves; with `times` it is a factor on
-what each run has. A variant may put another scenario in place of a run's. A claim depends on all open values
-that touch its runs, or on those that its `open_values` lists. Checks are judged over the region if the runs
-of claims are all they need. Margin, share, flip and "undecided" are defined in `docs/regions.md`.
+An open value applies to the runs that have its target and do not override it themselves; with `times` it is a
+factor on each run's value. A variant may replace a run's scenario. A claim depends on all open values that
+apply to its runs, or on those listed in its `open_values`. Checks are judged over the region if the runs for
+the claims suffice. Margin, share, flip and "undecided" are defined in `docs/regions.md`.
 
-Along axes, a limit is how far one of them may go; curves and maps show a metric over one or two.
+With axes, a limit is how far one of them may go; curves and maps show a metric over one or two of them.
 
     title: How fast may the car enter the manoeuvre?
     scenario: 25mps.yaml
     set: {driver.amplitude: 0.05}          # for all runs; swap, stop_time, ... likewise
     design: grid                           # every combination; list: first with first, second with
-    axes:                                  #   second; latin_hypercube: so many `points` by `seed`
+    axes:                                  #   second; latin_hypercube: needs `points`, `seed`
       friction: {vary: inputs.friction*, from: 0.1, to: 1.0, count: 10}
       speed: {vary: plant.initial_speed, from: 36, to: 144, count: 10, unit: km/h, says: Entry speed}
       control: {vary: controller, values: {controller_off: no control, controller_fnn: neural network}}
@@ -94,31 +94,31 @@ Along axes, a limit is how far one of them may go; curves and maps show a metric
     figures:
       - {name: stable, kind: limit, limit: stable, x: friction, lines: control, panels: car}
 
-What an axis varies is written as on the command line: `unit.parameter`, `vehicle.parameter` and
-`inputs.pattern` take values, as do `stop_time`, `step_size` and `algorithm`; a unit alone takes FMUs
-(`fmu:parameter=value` brings parameters along), `vehicle` takes vehicle files, `tyres` (`tyres.front`,
-`tyres.rear`) tyre property files. Several places may share an axis. In place of `vary` and `values`,
-`variants` change several things at once:
+Targets are written as on the command line: `instance.parameter`, `vehicle.parameter` and `inputs.pattern`
+take values, as do `stop_time`, `step_size` and `algorithm`; an instance alone takes FMUs
+(`fmu:parameter=value` also sets parameters), `vehicle` takes vehicle files, `tyres` (`tyres.front`,
+`tyres.rear`) tyre property files. Several targets may share an axis. Instead of `vary` and `values`,
+`variants` override several targets at once:
 
     control:
       variants:
         no control: {swap: {controller: controller_off}}
         with slip control: {swap: {wheel_control: wheel_control_slip}, set: {driver.amplitude: 0.04}}
 
-An axis of seeds `repeats` its runs: every number is then the mean over it, with its confidence interval
-(`confidence`), and a verdict whose threshold lies inside is undecided. `runs` names those that it changes.
+An axis of seeds with `repeats` gives every number as the mean over it, with a confidence interval
+(`judging.interval`); a verdict whose bound lies inside is undecided. `runs` names the runs it applies to.
 
     axes:
       seed: {vary: sensor.seed, values: [1, 2, 3, 4, 5], runs: ["*/noisy"], repeats: true}
 
-Tuning seeks values in ranges, for several laws by one objective and one budget; `yawbench tune` does it.
+A tuning searches ranges of parameters for several laws, by one objective and one budget: `yawbench tune`.
 
     tuning:
-      objective: cost                      # a derived number; the least is the best
+      objective: cost                      # a derived number, to be minimized
       population: 8                        # trials of a generation
       generations: 8
       seed: 1
-      runs: ["*/tuned"]                    # those that the laws drive; left out: all
+      runs: ["*/tuned"]                    # those with the laws; default: all
       laws:
         PD:
           swap: {controller: controller_pid}
@@ -154,13 +154,13 @@ from .judged_schema import (
 
 
 class ChoiceSpec(OverrideSpec):
-    """A value of a `for` of runs, with what it changes."""
+    """A value of a run's `for`, with its overrides."""
 
     says: str = Field("", description="What texts call it; default: the value")
 
 
 def _choices(value: object) -> Any:
-    """Return the values of a `for` of runs, those in short with the words alone."""
+    """Normalize the values of a run's `for`: a label alone becomes `{says: label}`."""
     if isinstance(value, dict) and any(isinstance(one, dict) for one in value.values()):
         return {str(k): {"says": one} if isinstance(one, str) else one for k, one in value.items()}
     return {k: {"says": words} for k, words in alternatives(value).items()}
@@ -170,7 +170,7 @@ Choices = Annotated[dict[str, ChoiceSpec], BeforeValidator(_choices)]
 
 
 class RunSpec(OverrideSpec):
-    """One run, or with `for` one per combination."""
+    """A run, or with `for` one run per combination of its values."""
 
     name: str = Field(description="Name of the run and of its folder, e.g. 25mps/fnn", min_length=1)
     scenario: str = Field(description="Scenario file, relative to this file", min_length=1)
@@ -182,7 +182,7 @@ class RunSpec(OverrideSpec):
 
 
 class LawSpec(OverrideSpec):
-    """What is tuned of a law, and what is changed for it."""
+    """A law to be tuned: its ranges and its overrides."""
 
     axes: dict[str, AxisSpec] = Field(description="Name -> what is sought, from and to", min_length=1)
 
@@ -195,7 +195,7 @@ class LawSpec(OverrideSpec):
 
 
 class TuningSpec(StrictModel):
-    """A search for the values that make an objective least, by one budget for all laws."""
+    """A search for parameters that minimize an objective, with the same budget for all laws."""
 
     objective: str = Field(description="Key of `derived`; the least is the best")
     population: int = Field(description="Trials of a generation", ge=5)
@@ -227,7 +227,7 @@ class TableSpec(StrictModel):
 
 
 class FigureSpec(StrictModel):
-    """A figure: several runs laid over each other, or a metric or a limit over one or two axes."""
+    """A figure: overlaid runs, a metric or a limit over one or two axes, or a grid."""
 
     name: str = Field(description="Name of its files", pattern=r"^[\w.+-]+$")
     title: str = ""
@@ -251,12 +251,12 @@ class FigureSpec(StrictModel):
 
     @property
     def panel_axis(self) -> str:
-        """The axis with a panel per value, "" if there is none."""
+        """The axis with one panel per value; "" if there is none."""
         return self.panels if isinstance(self.panels, str) else ""
 
     @property
     def axes(self) -> dict[str, str]:
-        """Key -> axis, of those that are given."""
+        """Key -> axis, of the axes used."""
         given = {"x": self.x, "y": self.y, "lines": self.lines, "panels": self.panel_axis}
         return {key: axis for key, axis in given.items() if axis}
 
@@ -292,13 +292,13 @@ class FigureSpec(StrictModel):
 
 
 def _list_of_runs(value: object) -> Any:
-    if isinstance(value, int):  # as Latin hypercubes had it
+    if isinstance(value, int):  # former syntax of Latin hypercubes
         raise ValueError(f"is a list of runs; a latin_hypercube has points: {value}")
     return value
 
 
 class ExperimentSpec(OverrideSpec):
-    """A file of an experiment."""
+    """An experiment file."""
 
     title: str = Field(min_length=1)
     source: str = Field(
@@ -348,13 +348,13 @@ class ExperimentSpec(OverrideSpec):
         return self
 
     def said(self) -> Iterator[tuple[str, int, Claim]]:
-        """Yield every claim and check, with its place in the file."""
+        """Yield every claim and check as (group, index in the file, claim)."""
         for group, said in (("claims", self.claims), ("checks", self.checks)):
             for i, one in enumerate(said):
                 yield group, one.number(i), one
 
     def conditions(self) -> Iterator[tuple[KeyPath, Condition]]:
-        """Yield every condition of claims, checks and limits, with its place in the file."""
+        """Yield every condition of claims, checks and limits, with its key in the file."""
         judged: list[tuple[str, str | int, Assertion]] = [*self.said()]
         judged += [("limits", name, limit) for name, limit in self.limits.items()]
         for group, which, one in judged:
@@ -363,11 +363,11 @@ class ExperimentSpec(OverrideSpec):
 
     @property
     def repeats(self) -> list[str]:
-        """The axes that make repeats of one and the same."""
+        """The axes with `repeats`."""
         return [name for name, axis in self.axes.items() if axis.repeats]
 
     def number_of_points(self) -> int:
-        """Return how many points the design has."""
+        """Return the number of points of the design."""
         if self.design == "latin_hypercube":
             return self.points or 0
         lengths = [axis.length or 0 for axis in self.axes.values()]

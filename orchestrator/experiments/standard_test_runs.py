@@ -1,7 +1,7 @@
-"""The runs of standard tests that ask for many: each varies one job, of which all take the options.
+"""The series of runs that standard tests consist of: variations of one base job.
 
-Results stay on disk, so a series that was stopped goes on where it was: what has been made already, of the
-same scenario, FMUs and program, is not made again.
+Results stay on disk, so an interrupted series resumes: runs of the same scenario, FMUs and program are not
+executed again.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from ..scenario.quantities import convert
 from .jobs import Job, PlanningCache, keyed, planned, ready
 
 AMPLITUDE = "driver.amplitude"
-"""What sine with dwell varies: the amplitude of the hand wheel [rad], positive to the left."""
+"""Target that sine with dwell varies: amplitude of the hand-wheel angle [rad], positive to the left."""
 SIDES = (("left", 1.0), ("right", -1.0))
 SPEED = "speed"
-"""What lane changes vary: the speed of the scenario [m/s]."""
+"""Target that lane changes vary: speed of the scenario [m/s]."""
 KMH = 1.0 / 3.6
 STEP, RESOLUTION = 10.0 * KMH, 0.5 * KMH
-"""Steps to the first speeds, and difference of speeds that is left in the end [m/s]."""
+"""Step of the coarse search for the entry speed, and its final resolution [m/s]."""
 LEAST, MOST = 10.0 * KMH, 250.0 * KMH
-"""Speeds between which is sought [m/s]."""
+"""Bounds of the search for the entry speed [m/s]."""
 
 
 def slow_steer_jobs(base: Job, once: PlanningCache) -> list[Job]:
-    """Return the runs of slowly increasing steer, with the scenario's amplitude, to both sides.
+    """Return jobs of slowly increasing steer to both sides, with the scenario's amplitude.
 
     Raises:
         ScenarioError: they cannot start, or the driver has no amplitude.
@@ -44,7 +44,7 @@ def slow_steer_jobs(base: Job, once: PlanningCache) -> list[Job]:
 
 
 def dwell_jobs(base: Job, angle: float, once: PlanningCache) -> list[Job]:
-    """Return the runs of sine with dwell for A [rad], left first and right first.
+    """Return jobs of sine with dwell for the angle A [rad], left first and right first.
 
     Raises:
         ScenarioError: they cannot start.
@@ -60,23 +60,23 @@ def dwell_jobs(base: Job, angle: float, once: PlanningCache) -> list[Job]:
 
 
 def steered(amplitude: float, origin: str) -> Override:
-    """Return what gives the driver an amplitude [rad]."""
+    """Return the override that sets the driver's amplitude [rad]."""
     return Override(AMPLITUDE, amplitude, origin)
 
 
 def entry_speeds(
     base: Job, once: PlanningCache, make: Callable[[Job], bool]
 ) -> tuple[list[Trace], TestSeries]:
-    """Make the runs that lead to the highest clean entry speed; return them and what they come to.
+    """Search for the highest clean entry speed; return the runs made and the series' verdict.
 
     Args:
-        base: the run at the scenario's own speed, from which the series begins.
-        once: reads files and opens FMUs.
-        make: makes a run unless it has been made already; returns whether there are results of it.
+        base: the job at the scenario's own speed, where the search starts.
+        once: cache of files and FMUs.
+        make: executes a run unless its results exist; returns whether there are results.
 
     Raises:
-        ScenarioError: they cannot start, or the scenario tells no speed.
-        ResultsError: a run has not recorded what it needs.
+        ScenarioError: a run cannot start, or the scenario has no speed.
+        ResultsError: a run did not record a signal that the test needs.
     """
     scenario, plan = planned(base, once)
     first = 0.0 if scenario.speed is None else float(convert(str(scenario.speed), "m/s"))
@@ -87,7 +87,7 @@ def entry_speeds(
     judged: list[Evaluation] = []
 
     def clean(speed: float) -> bool:
-        seconds = math.ceil(10.0 * duration * first / speed) / 10.0  # long enough for it
+        seconds = math.ceil(10.0 * duration * first / speed) / 10.0  # long enough for the same distance
         changes = Override(SPEED, speed, "entry speed"), Override("stop_time", seconds, "entry speed")
         (job,) = map(keyed, ready([_varied(base, f"{speed / KMH:.2f}", *changes)], once=once))
         if not make(job):
@@ -102,25 +102,25 @@ def entry_speeds(
 
 
 def traces(jobs: Sequence[Job]) -> list[Trace]:
-    """Return what runs have recorded, each called by its folder.
+    """Return the recorded signals of runs, labelled by their jobs.
 
     Raises:
-        ResultsError: a run has left none.
+        ResultsError: a run has no results.
     """
     return [replace(trace_of(load_results(job.out)), label=job.label) for job in jobs]
 
 
 def _varied(base: Job, name: str, *changes: Override) -> Job:
-    """Return a run of a series, in a folder below that of all."""
+    """Return a job of a series, with overrides and a subfolder."""
     label = f"{base.label}/{name}" if base.label else name
     return replace(base, label=label, out=base.out / name, changes=(*base.changes, *changes))
 
 
 def _amplitude_of(job: Job, once: PlanningCache) -> float:
-    """Return the size of the amplitude that a job's driver is given [rad].
+    """Return the absolute amplitude of a job's driver [rad].
 
     Raises:
-        ScenarioError: it has none.
+        ScenarioError: the driver has none.
     """
     _, plan = planned(job, once)
     unit, _, name = AMPLITUDE.partition(".")

@@ -1,7 +1,4 @@
-"""Tables for people, on the terminal or in a page, from one description.
-
-Tables of what there is: runs below a folder, scenarios, vehicles, FMUs, signals, metrics.
-"""
+"""Tables for people, on the terminal or in a page; and the listings of runs, files, FMUs and signals."""
 
 from __future__ import annotations
 
@@ -38,30 +35,30 @@ if TYPE_CHECKING:
 
 
 MARK = "†"
-"""Behind the name of a run whose course had something remarkable."""
+"""Mark after the name of a run with plausibility warnings."""
 MIN_HEADING = 12
-"""Characters of a heading over numbers before it is broken at a space."""
+"""Characters after which a heading over numbers is wrapped."""
 
 Cell = str | MetricValue | None
-"""Words, a number with its unit, or nothing."""
+"""A table cell: text, a number with its unit, or None if empty."""
 
 
 @dataclass
 class Table:
-    """Headings, rows of cells, and what has to be said below them."""
+    """A table: headings, rows of cells, and notes below."""
 
     title: str
     headings: list[str]
     rows: list[Sequence[Cell]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-    numbers: set[int] = field(default_factory=set)  # columns of numbers that stand as text
+    numbers: set[int] = field(default_factory=set)  # columns of numbers formatted as text
 
     def text(self) -> list[list[str]]:
-        """Return the cells of all rows as people read them."""
+        """Return the cells of all rows as text."""
         return [[_shown(cell) for cell in row] for row in self.rows]
 
     def is_number(self, column: int) -> bool:
-        """Return whether a column holds numbers, and so is set flush right."""
+        """Return whether a column has numbers, and so is aligned right."""
         return column in self.numbers or any(isinstance(row[column], MetricValue) for row in self.rows)
 
 
@@ -82,7 +79,7 @@ def for_terminal(table: Table) -> rich.console.Group:
     rows = table.text()
     for i, heading in enumerate(table.headings):
         number = table.is_number(i)
-        if number:  # a long heading is no reason for a broad column
+        if number:  # keep long headings from widening the column
             widest = max(MIN_HEADING, *(len(row[i]) for row in rows))
             heading = "\n".join(textwrap.wrap(heading, widest, break_long_words=False)) or heading
         side: Literal["left", "right"] = "right" if number else "left"
@@ -94,12 +91,12 @@ def for_terminal(table: Table) -> rich.console.Group:
 
 
 def marked(label: str, results: Results) -> str:
-    """Return what a table calls a run, with a mark if something in its course was remarkable."""
+    """Return the label of a run, with a mark if it has plausibility warnings."""
     return f"{label} {MARK}" if _remarkable(results) else label
 
 
 def remarks(runs: Iterable[tuple[str, Results]]) -> list[str]:
-    """Return a note for each run (label, results) with a mark."""
+    """Return a note for each marked run of (label, results)."""
     return [f"{MARK} {label}: {says}" for label, results in runs if (says := _remarkable(results))]
 
 
@@ -109,7 +106,7 @@ def _remarkable(results: Results) -> str:
 
 
 def metrics_of_run(results: Results, names: Sequence[str]) -> Table:
-    """Return a table of the metrics of one run, one row each; those it has no signals for are left out."""
+    """Return a table of a run's metrics, one row each, without those whose signals it lacks."""
     values = evaluate_all(results, names)
     rows: list[Sequence[Cell]] = [
         [metric(name).title, metric(name).formula, value] for name, value in values.items()
@@ -121,11 +118,11 @@ def metrics_of_run(results: Results, names: Sequence[str]) -> Table:
 
 
 PEAKS = ("sideslip", "yaw_rate", "acceleration_y")
-"""Signals whose largest values tell in a list how a run has ended."""
+"""Signals whose peaks summarise a run in a list."""
 
 
 def runs_table(runs: Sequence[FoundRun]) -> Table:
-    """Return a table of runs: when, of what, what was changed, how they ended, a few metrics."""
+    """Return a table of runs: start, scenario, overrides, status, a few peaks."""
     peaks = [metric(f"peak({signal})") for signal in PEAKS]
     headings = ["run", "begun", "scenario", "changed", "status", *(one.formula for one in peaks)]
     table = Table("", headings)
@@ -142,7 +139,7 @@ def runs_table(runs: Sequence[FoundRun]) -> Table:
 
 
 def _local(started: Any) -> str | None:
-    """Return a moment as people here write it."""
+    """Return an ISO timestamp in local time; None if it is invalid."""
     try:
         return datetime.fromisoformat(str(started)).astimezone().strftime("%Y-%m-%d %H:%M")
     except ValueError:
@@ -150,7 +147,7 @@ def _local(started: Any) -> str | None:
 
 
 def _peak(record: dict[str, Any], signal: str) -> MetricValue | None:
-    """Return the largest absolute value of a signal, by the record alone."""
+    """Return the peak of a signal from the run record, without reading the results."""
     units = {name: unit or "" for name, unit in (record.get("units") or {}).items()}
     columns = {name: np.empty(0) for name in units if name != "time"}
     found = columns_of(Results(Path(), np.empty(0), columns, units, record), signal)
@@ -162,12 +159,12 @@ def _peak(record: dict[str, Any], signal: str) -> MetricValue | None:
 
 
 def files_table(folder: Path | None, kinds: Sequence[str]) -> Table:
-    """Return a table of YAML files of some kinds (`strict.KINDS`) and SSP archives.
+    """Return a table of YAML files of some kinds (`validation.KINDS`) and SSP archives.
 
-    Those below a folder by their paths; without one, those that commands take by name.
+    Files below a folder are listed by path; without a folder, the catalogue's by name.
 
     Raises:
-        ScenarioError: there is no such folder, or no such file in it.
+        ScenarioError: the folder does not exist, or has no such files.
     """
     if folder is not None and not folder.is_dir():
         raise ScenarioError(f"{folder}: there is no such folder")
@@ -189,7 +186,7 @@ def files_table(folder: Path | None, kinds: Sequence[str]) -> Table:
 
 
 def fmus_in(folder: Path) -> tuple[list[Fmu], list[str]]:
-    """Return the FMUs in a folder, and what is wrong with those that cannot be used."""
+    """Return the FMUs in a folder, and the problems of those that cannot be used."""
     found: list[Fmu] = []
     problems: list[str] = []
     for path in sorted(folder.glob("*.fmu")):
@@ -217,7 +214,7 @@ def units_table(fmus: Sequence[Fmu]) -> Table:
 
 
 def signals_table(fmus: Sequence[Fmu]) -> Table:
-    """Return a table of the signals that FMUs exchange: who gives and who takes them, wheels as one."""
+    """Return a table of the signals that FMUs exchange, with sources and users; wheels share a row."""
     given: dict[str, list[str]] = {}
     taken: dict[str, list[str]] = {}
     about: dict[str, tuple[str, str]] = {}
@@ -257,7 +254,7 @@ def metrics_table() -> Table:
 
 
 def _some(names: Sequence[str] | dict[str, None]) -> str | None:
-    """Return names, the first of many."""
+    """Return names as a list in words, the first two of more than three."""
     listed = list(names)
     more = f" and {len(listed) - 2} more" if len(listed) > 3 else ""
     return ", ".join(listed[:2] if more else listed) + more or None

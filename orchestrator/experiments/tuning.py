@@ -1,13 +1,13 @@
-"""Tuning: laws whose parameters are sought by one objective, one search and one budget, so that they compare.
+"""Tuning of control laws by one objective, one search and one budget, so that they can be compared.
 
-A file of an experiment with a key `tuning` names, law by law, the ranges of what is sought. Whatever is tried
-is a run of that experiment like any other: planned before it starts, made in a process of its own, noted in
-the journal. Of a search that was stopped only what is left is run when it is begun again.
+An experiment file with the key `tuning` gives the ranges of every law's parameters. Trials are runs of that
+experiment like any other: planned before they start, executed in separate processes, added to the journal.
+A search that was interrupted resumes with the missing runs.
 
 The search is scipy's differential evolution, strategy best/1/bin: R. Storn, K. Price, Differential Evolution
 - a simple and efficient heuristic for global optimization over continuous spaces, J. Global Optimization
-11 (1997) 341-359. It is given a first generation (the middle of all ranges, and a Latin hypercube),
-generations to come, and a seed; nothing ends it early.
+11 (1997) 341-359. It gets a first generation (the middle of all ranges, and a Latin hypercube), the
+number of generations, and a seed; nothing ends it early.
 """
 
 from __future__ import annotations
@@ -35,48 +35,48 @@ if TYPE_CHECKING:
     from .schema import LawSpec, TuningSpec
 
 DIGITS = 3
-"""Of every value that is tried, so that a file can hold what is found; chosen: gains matter to a per cent."""
+"""Significant digits of tried values, so that files can state them; chosen: gains matter to a per cent."""
 TRIAL = "trial"
-"""The axis of what is tried."""
+"""Name of the axis of trials."""
 ENTRIES = "entries.yaml"
-"""What is found as entries of a ranking, in the folder of the results."""
+"""File in the results folder with the tuned laws as entries of a ranking."""
 
 JudgeExperiment = Callable[[LoadedExperiment], ExperimentResult]
-"""Makes those runs of an experiment that are left, and returns what it comes to."""
+"""Executes the missing runs of an experiment and returns its result."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """Values of what is sought, and what they come to; None if a run failed or gives no number."""
+    """Tried parameter values and their objective; None if a run failed or yields no number."""
 
     generation: int  # from 1
-    values: dict[str, float]  # place -> value, in the unit of its range
+    values: dict[str, float]  # target -> value, in the unit of its range
     objective: float | None
 
     @property
     def cost(self) -> float:
-        """The objective; infinite if there is none."""
+        """The objective; infinite if it is None."""
         return math.inf if self.objective is None else self.objective
 
 
 @dataclass(frozen=True)
 class TunedLaw:
-    """A law and all that was tried of it, in order; the first has the middle of all ranges."""
+    """A law with all its trials, in order; the first is the middle of all ranges."""
 
     law: str
     trials: list[Trial]
 
     @property
     def best(self) -> Trial:
-        """The trial with the least objective, the first of equal ones."""
+        """The first trial with the smallest objective."""
         return min(self.trials, key=lambda trial: trial.cost)
 
 
 def tuning_of(experiment: LoadedExperiment) -> TuningSpec:
-    """Return what an experiment asks to be tuned.
+    """Return the `tuning` of an experiment.
 
     Raises:
-        ScenarioError: it asks for nothing.
+        ScenarioError: the experiment has none.
     """
     if experiment.spec.tuning is None:
         raise ScenarioError(f"{experiment.path}: has no 'tuning'; it is for `yawbench study` or `sweep`")
@@ -84,11 +84,11 @@ def tuning_of(experiment: LoadedExperiment) -> TuningSpec:
 
 
 def search(experiment: LoadedExperiment, judged: JudgeExperiment) -> list[TunedLaw]:
-    """Return what the search of every law has tried.
+    """Search the parameters of every law and return all trials.
 
     Args:
         experiment: with `tuning`.
-        judged: makes runs and judges them.
+        judged: executes runs and judges them.
 
     Raises:
         ScenarioError: a run cannot start.
@@ -124,13 +124,13 @@ def search(experiment: LoadedExperiment, judged: JudgeExperiment) -> list[TunedL
 
 
 def best_of(experiment: LoadedExperiment, found: Sequence[TunedLaw]) -> LoadedExperiment:
-    """Return the runs of what was best of every law."""
+    """Return the experiment with the best trial of every law."""
     laws = tuning_of(experiment).laws
     return _trials(experiment, {one.law: _changes(laws[one.law], one.best.values) for one in found})
 
 
 def _fixed(experiment: LoadedExperiment, judged: JudgeExperiment) -> MetricTable:
-    """Return the metrics of the runs that no law drives."""
+    """Return the metrics of the runs without a tuned law."""
     left = _trials(experiment, {"as they stand": VariantSpec.model_validate({})}, driven=False)
     return judged(left).values if left.runs else {}
 
@@ -138,7 +138,7 @@ def _fixed(experiment: LoadedExperiment, judged: JudgeExperiment) -> MetricTable
 def _trials(
     experiment: LoadedExperiment, tried: dict[str, VariantSpec], *, driven: bool = True
 ) -> LoadedExperiment:
-    """Return an experiment of the runs that laws drive, or of the others, at each trial: its only axis."""
+    """Return an experiment of the runs with laws, or of the others, whose only axis are the trials."""
     drives = experiment.matching(tuning_of(experiment).runs)
     runs = {name: run for name, run in experiment.runs.items() if (run in drives) == driven}
     axes = {TRIAL: DesignAxisSpec.model_validate({"variants": tried})}
@@ -147,7 +147,7 @@ def _trials(
 
 
 def _values(law: LawSpec, places: Sequence[float]) -> dict[str, float]:
-    """Return what is tried at a point of the unit cube: place -> value."""
+    """Return target -> value at a point of the unit cube."""
     values = {}
     for axis, place in zip(law.axes.values(), places, strict=True):
         number = float(f"{level_at(axis, float(place)).value:.{DIGITS}g}")
@@ -156,7 +156,7 @@ def _values(law: LawSpec, places: Sequence[float]) -> dict[str, float]:
 
 
 def _changes(law: LawSpec, values: dict[str, float]) -> VariantSpec:
-    """Return a law's own changes with the values that are tried."""
+    """Return a law's overrides together with tried values."""
     units = {place: axis.unit for axis in law.axes.values() for place in axis.vary}
     tried = {place: f"{x!r} {unit}" if (unit := units[place]) else x for place, x in values.items()}
     own = {name: getattr(law, name) for name in OverrideSpec.model_fields}
@@ -169,7 +169,7 @@ def _objective(experiment: LoadedExperiment, values: MetricTable) -> float | Non
 
 
 def tuning_table(experiment: LoadedExperiment, found: Sequence[TunedLaw]) -> Table:
-    """Return the table of laws: the objective amid the ranges, the least, and where it was found."""
+    """Return the table of laws: objective in the middle of the ranges, smallest objective, its values."""
     tuning = tuning_of(experiment)
     spec = experiment.spec.derived[tuning.objective]
     budget = f"{tuning.population} x {tuning.generations} trials each, seed {tuning.seed}"
@@ -180,36 +180,36 @@ def tuning_table(experiment: LoadedExperiment, found: Sequence[TunedLaw]) -> Tab
             for trial in (one.trials[0], one.best)
         )
         units = {place: axis.unit for axis in tuning.laws[one.law].axes.values() for place in axis.vary}
-        told = [
+        settings = [
             f"{place}: {number:g} {units[place] or ''}".rstrip() for place, number in one.best.values.items()
         ]
-        table.rows.append([one.law, first, best, "\n".join(told)])
+        table.rows.append([one.law, first, best, "\n".join(settings)])
     return table
 
 
 def entries_of(experiment: LoadedExperiment, found: Sequence[TunedLaw]) -> dict[str, dict[str, Any]]:
-    """Return what is found as entries of a ranking: name -> title, FMU, parameters, where they are from."""
+    """Return the best trials as entries of a ranking: name -> title, FMU, parameters, source."""
     tuning = tuning_of(experiment)
     entries = {}
     for one in found:
         if one.best.objective is None:
-            continue  # nothing was found
+            continue  # all trials failed
         law = tuning.laws[one.law]
-        told = _changes(law, one.best.values).set
+        settings = _changes(law, one.best.values).set
         made = f"{experiment.identity}: {len(one.trials)} trials, seed {tuning.seed}"
         comes_to = f"{tuning.objective} {one.best.cost:.4g}, {one.trials[0].cost:.4g} amid the ranges"
         entries[re.sub(r"\W+", "_", f"{one.law.lower()}_tuned")] = {
             "title": f"{one.law}, tuned",
             "fmu": law.swap[tuning.entries],
             "gains": "tuned",
-            "parameters": {place.partition(".")[2]: value for place, value in told.items()},
+            "parameters": {place.partition(".")[2]: value for place, value in settings.items()},
             "source": f"{made}; {comes_to}",
         }
     return entries
 
 
 def entries_text(entries: dict[str, dict[str, Any]], command: str) -> str:
-    """Return the file of entries that a command found."""
+    """Return tuned entries as the text of a YAML file with checksums."""
     from io import StringIO
 
     from ruamel.yaml import YAML
@@ -224,7 +224,7 @@ def entries_text(entries: dict[str, dict[str, Any]], command: str) -> str:
 
 
 def columns_of(found: Sequence[TunedLaw]) -> list[TableColumn]:
-    """Return all trials as columns: law, generation, objective, and every place that any law varies."""
+    """Return all trials as columns: law, generation, objective, and every varied target."""
     rows = [(one.law, trial) for one in found for trial in one.trials]
     places = dict.fromkeys(place for _, trial in rows for place in trial.values)
     return [
@@ -236,7 +236,7 @@ def columns_of(found: Sequence[TunedLaw]) -> list[TableColumn]:
 
 
 def history_figure(experiment: LoadedExperiment, found: Sequence[TunedLaw], note: str) -> Figure:
-    """Return the least objective so far over the number of trials, a line per law."""
+    """Draw the smallest objective so far over the number of trials, a line per law."""
     from matplotlib.lines import Line2D
 
     from ..figures.style import frame, line_style, new_figure, shown_unit

@@ -1,6 +1,6 @@
-"""The tables of an experiment as people read them: runs, grids, derived numbers, verdicts, limits.
+"""Tables of results for people: an experiment's runs, grids, derived numbers, verdicts and limits.
 
-Tables of what standard tests come to: one run with every quantity, or a row per run.
+Also the tables of standard tests: all quantities of one run, or a row per run.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 
 HOLDS, UNDECIDED, NOT_JUDGED = "holds", "undecided", "not judged"
 CARRIES = ("margin", "region", "nearest flip")
-"""Headings of how far a verdict carries; the last two over a region."""
+"""Headings about the robustness of a verdict; the last two need a region."""
 FAILS = {"claims": "does not reproduce", "checks": "does not hold"}
 
 
 def all_tables(findings: ExperimentResult) -> list[Table]:
-    """Return all tables of an experiment, in the order in which they are read."""
+    """Return all tables of an experiment, in reading order."""
     return [
         *run_tables(findings),
         *derived_tables(findings),
@@ -45,7 +45,7 @@ def all_tables(findings: ExperimentResult) -> list[Table]:
 
 
 def limit_tables(findings: ExperimentResult) -> list[Table]:
-    """Return the tables of all limits, and the grids that say how far down they hold."""
+    """Return the tables of all limits, and the grids with `holds`."""
     tables = [limit_table(findings, name) for name in findings.spec.limits]
     tables += [
         one for grid in findings.spec.grids.values() if grid.holds for one in _grid_tables(findings, grid)
@@ -57,7 +57,7 @@ def limit_tables(findings: ExperimentResult) -> list[Table]:
 
 
 def _grid_tables(findings: ExperimentResult, grid: GridSpec) -> list[Table]:
-    """Return a grid with what is said of its cells, and what the paper prints."""
+    """Return the tables of a grid: measured numbers with signs of verdicts, and published numbers."""
     signs: dict[tuple[str, str], str] = {}
     for one in findings.judgements if grid.holds else ():
         about = {(c.run, c.derived or c.metric) for c in one.said.holds_if}
@@ -69,9 +69,9 @@ def _grid_tables(findings: ExperimentResult, grid: GridSpec) -> list[Table]:
 
 
 def derived_tables(findings: ExperimentResult, *, apart: bool = False) -> list[Table]:
-    """Return the grids, and a table of the derived numbers if there are any.
+    """Return the tables of grids, and of the derived numbers outside them.
 
-    `apart`: what the paper prints for a grid is a table of its own.
+    `apart`: put the published numbers of a grid into a separate table.
     """
     spec, tables = findings.spec, []
     for grid in spec.grids.values():
@@ -99,7 +99,7 @@ def heading(spec: MetricSpec) -> str:
 
 
 def verdict(judgement: ClaimResult) -> str:
-    """Return the verdict in plain words."""
+    """Return the verdict as text."""
     if judgement.holds is None:
         return NOT_JUDGED
     if not judgement.sure or (judgement.region and not judgement.region.decided):
@@ -108,19 +108,19 @@ def verdict(judgement: ClaimResult) -> str:
 
 
 def margin_words(judgement: ClaimResult) -> str | None:
-    """Return the margin at the chosen point, `14 %`, negative where the claim does not hold; None: none."""
+    """Return the margin at the chosen point, `14 %`, negative where the claim fails; None if missing."""
     return None if judgement.margin is None else share(judgement.margin)
 
 
 def share(ratio: float) -> str:
-    """Return a margin in per cent, two digits of it: 1.6 %; beyond 100 % its size tells nothing more."""
+    """Return a margin in per cent with two digits, 1.6 %; beyond 100 % its size no longer matters."""
     if abs(ratio) > 1.0:
         return "by far" if ratio > 0 else "missed by far"
     return shown(ratio, "%", digits=2)
 
 
 def reach(findings: ExperimentResult) -> str:
-    """Return where claims have been judged, in words; "" if nothing is left open."""
+    """Describe where claims were judged; "" without a region."""
     if findings.spec.region is None or not findings.claims:
         return ""
     if not findings.regions:
@@ -130,12 +130,12 @@ def reach(findings: ExperimentResult) -> str:
 
 
 def tally_words(counts: Mapping[str, int]) -> str:
-    """Return counts of verdicts in words: `holds: 13, undecided: 2`."""
+    """Return counts of verdicts as text: `holds: 13, undecided: 2`."""
     return ", ".join(f"{word}: {count}" for word, count in counts.items())
 
 
 def region_words(judgement: ClaimResult) -> list[str]:
-    """Return how far a verdict carries: `holds in 71 % of 24 points`, `flips at amplitude 0.08 rad`."""
+    """Describe the robustness of a verdict: `holds in 71 % of 24 points`, `flips at amplitude 0.08 rad`."""
     region = judgement.region
     if region is None:
         return []
@@ -150,25 +150,25 @@ NO_FLIP = "no flip along any open value"
 
 
 def held_words(holding: int, points: int, without_result: int = 0) -> str:
-    """Return at which part of the points a claim holds."""
+    """Describe the share of points at which a claim holds."""
     failed = f", {without_result} without a result" if without_result else ""
     return f"holds in {100 * holding / points:.0f} % of {points} points{failed}"
 
 
 def flip_words(says: str, level: str, chosen: str = "") -> str:
-    """Return where a verdict becomes another: what is varied, the level, and the one chosen if it is told."""
+    """Describe a flip: the open value, the level, and the chosen level if known."""
     return f"flips at {says} {level}" + (f" (chosen: {chosen})" if chosen else "")
 
 
 def counts_of(judgements: Sequence[ClaimResult]) -> dict[str, int]:
-    """Return how many judgements have each verdict, those that occur."""
+    """Return verdict -> number of judgements, of the verdicts that occur."""
     words = [verdict(one) for one in judgements]
     every = (HOLDS, UNDECIDED, *FAILS.values(), NOT_JUDGED)
     return {word: words.count(word) for word in every if word in words}
 
 
 def run_tables(findings: ExperimentResult) -> list[Table]:
-    """Return the tables of metrics: one row per run, beside it what the paper says of that run alone."""
+    """Return the tables of metrics: one row per run, with the paper's claims about that run alone."""
     return [_run_table(findings, table) for table in findings.spec.tables]
 
 
@@ -188,7 +188,7 @@ def _run_table(findings: ExperimentResult, spec: TableSpec) -> Table:
     carries = CARRIES if findings.regions else CARRIES[:1]
     if some and not findings.regions and (only := reach(findings)):
         table.notes.append(f"verdicts: {only}")
-    if some:  # beside the first metric, which the claims are about
+    if some:  # next to the first metric, which the claims are about
         table.headings[2:2] = ["the paper says", "verdict", *carries]
     for run, setting in itertools.product(runs, study.settings):
         row = ", ".join(filter(None, [run.row, *(level.words for level in setting)]))
@@ -212,7 +212,7 @@ def _run_table(findings: ExperimentResult, spec: TableSpec) -> Table:
 
 
 def _beside(judged: Sequence[ClaimResult], carries: int) -> list[Cell]:
-    """Return what a paper says of a run, the verdicts, and how far they carry; of several one cell each."""
+    """Return the cells of a run's claims: claim, verdict, robustness; several claims share the cells."""
     rows = [
         [f"{one.said.short} ({one.said.source})", verdict(one), *_carries(one, carries)] for one in judged
     ]
@@ -221,7 +221,7 @@ def _beside(judged: Sequence[ClaimResult], carries: int) -> list[Cell]:
 
 
 def _said_of(findings: ExperimentResult, run: NamedRun, table: TableSpec) -> list[ClaimResult]:
-    """Return the claims with a short form that speak of the table's first metric of this run alone."""
+    """Return the claims with a `short` text that are only about the table's first metric of this run."""
     return [
         judgement
         for judgement in findings.claims
@@ -242,7 +242,7 @@ def _carries(judgement: ClaimResult, columns: int) -> list[str | None]:
 
 
 def line_table(judgement: ClaimResult) -> Table:
-    """Return a table of the open values that a claim depends on: margins along each, where it flips."""
+    """Return a table of the open values that a claim depends on: range of margins, flips."""
     assert judgement.region is not None
     table = Table("", ["open value", "margin, from", "to", "flips at"])
     for line in judgement.region.lines:
@@ -257,7 +257,7 @@ def line_table(judgement: ClaimResult) -> Table:
 
 
 def region_table(findings: ExperimentResult) -> Table:
-    """Return a table of the open values of the region: what is chosen, their range, why it is that."""
+    """Return a table of a region's open values: chosen value, range, reason for the range."""
     region = findings.spec.region
     assert region is not None
     lines = {line.open_value: line for one in findings.regions.values() for line in one.lines}
@@ -277,7 +277,7 @@ def region_table(findings: ExperimentResult) -> Table:
 
 
 def claim_tables(findings: ExperimentResult) -> list[Table]:
-    """Return the paper's claims that stand beside no run, and the project's own checks."""
+    """Return the tables of claims that are not in a table of runs, and of our own checks."""
     beside = {
         id(judgement)
         for table in findings.spec.tables
@@ -311,14 +311,14 @@ def _cell(quantity: TestQuantity | None) -> Cell:
 
 
 def run_table(judged: Evaluation, title: str) -> Table:
-    """Return a table of one run: a row per quantity and how the standard was read, its verdicts below."""
+    """Return the table of a standard test's run: a row per quantity with its reading, verdicts as notes."""
     rows: list[Sequence[Cell]] = [[one.name, _cell(one), one.reading] for one in judged.quantities.values()]
     notes = [f"{name}: {one}" for name, one in judged.rulings.items()]
     return Table(f"{judged.label}: {title}", ["quantity", "value", "reading"], rows, notes + judged.notes)
 
 
 def runs_table(runs: Sequence[Evaluation], test: StandardTest, series: TestSeries | None) -> Table:
-    """Return a table of many runs, a row each, in the order given; the verdict of the series below."""
+    """Return the table of a standard test's runs, in the given order, with the series' verdict as notes."""
     keys = [key for key in test.columns if any(key in run.quantities for run in runs)]
     names = {key: run.quantities[key].name for run in reversed(runs) for key in keys if key in run.quantities}
     criteria = list(dict.fromkeys(name for run in runs for name in run.rulings))

@@ -1,9 +1,8 @@
-"""Runs in processes of their own, so that one that crashes takes no other with it.
+"""Worker processes: one per run, so that a crash does not affect other runs; and a pool for harmless work.
 
-Processes that read results and draw figures: work that cannot fail as FMUs can.
-
-They are asked and answer through pipes alone. The queues of `concurrent.futures` need semaphores, which
-outlive a command that is killed, and of which Python then complains on the terminal.
+`execute` starts a fresh process for every run. `Pool` reuses processes that read results and draw figures,
+which cannot crash as FMUs can. It communicates through pipes only: the queues of `concurrent.futures` need
+semaphores, which leak if the command is killed, and Python then complains about them on the terminal.
 """
 
 from __future__ import annotations
@@ -34,18 +33,18 @@ from ..processes import SAFE_PATH, SafeSpawnContext, no_script, safe_path
 from .jobs import Job, Outcome, run_job
 
 GRACE = 5.0
-"""Time that a process has to end, and a run to write what it has recorded [s]."""
+"""Time for a process to end, and for a run to write what it has recorded [s]."""
 LONGEST_FOLDER = 60
-"""Bytes of a folder's path that leave room for the names of sockets in it; chosen: they need 36."""
+"""Longest path of a folder for sockets [bytes]; chosen: their names need 36."""
 SHORT_FOLDER = "/tmp"
-"""Where they go if the folder for temporary files has a longer path."""
+"""Folder for sockets if the path of the temporary folder is too long."""
 LOOK_EVERY = 0.2
-"""Time between two looks whether to stop [s]."""
+"""Interval of checks for Ctrl-C and SIGTERM [s]."""
 FILES, FILES_EACH = 32, 4
-"""Files that have to be allowed open at a time, and as many for each process besides. Chosen: 32 do for two
-processes; each takes a pipe for its report and one that tells of its end."""
+"""Required limit of open files: a base, and more per process. Chosen: 32 suffice for two processes; each
+needs a pipe for its report and one that signals its end."""
 TRIES = 2
-"""Times that a run is begun whose process dies; chosen: a kill from outside strikes seldom twice."""
+"""Attempts at a run whose process dies; chosen: a kill from outside rarely happens twice."""
 NEEDED = (
     "orchestrator.quiet",
     "orchestrator.wiring.make_plan",
@@ -57,13 +56,13 @@ NEEDED = (
     "matplotlib.mathtext",
     "pyarrow.csv",
 )
-"""What runs need: modules that take long to import, after one that keeps the server quiet."""
+"""Modules to preload because they are slow to import; the first one keeps the server quiet."""
 FOR_TESTS = ("scipy.signal", "orchestrator.evaluation.sine_with_dwell")
-"""Likewise, where runs are judged by a standard test."""
+"""Further modules to preload if runs are judged by a standard test."""
 
 
 def default_workers() -> int:
-    """Return the number of processor cores this process may use."""
+    """Return the number of processor cores that this process may use."""
     affinity = getattr(os, "sched_getaffinity", None)
     return len(affinity(0)) if affinity else os.cpu_count() or 1
 
@@ -75,24 +74,24 @@ def execute(
     done: Callable[[Outcome], None] = lambda outcome: None,
     run: Callable[[Job], Any] = run_job,
 ) -> list[Outcome]:
-    """Run all jobs, so many at a time, each in a fresh process; return their outcomes in order.
+    """Execute all jobs, each in a fresh process, and return their outcomes in order.
 
-    A run whose process died is made again when the others are through: perhaps the process was killed, and
-    the run is not to blame.
+    A run whose process died is executed again after the others, since the process may have been killed
+    from outside.
 
-    Ctrl-C is looked at between two runs' ends, never while a process is being started, which would
-    leave one that nobody knows.
+    Ctrl-C is only handled between the ends of runs, never while a process is being started, which would
+    leave an orphan.
 
     Args:
-        jobs: what to run.
-        workers: processes at a time; default: one per core.
-        done: called with every outcome as it comes, one for each job.
-        run: what a process does with its job; importable by name. What it returns becomes the
+        jobs: the runs.
+        workers: number of processes; None: one per core.
+        done: called with each outcome as it arrives, once per job.
+        run: function that a process calls with its job, importable by name. Its return value becomes the
             outcome's value.
 
     Raises:
-        Interrupted: Ctrl-C or SIGTERM, when all runs have ended.
-        YawbenchError: this process may not open as many files as that takes.
+        Interrupted: Ctrl-C or SIGTERM, after all processes have ended.
+        YawbenchError: the limit of open files is too low.
     """
     limit = max(1, workers or default_workers())
     context = context_of(limit, FOR_TESTS if any(job.test for job in jobs) else ())
@@ -125,7 +124,7 @@ def execute(
 
 
 def context_of(workers: int, needed: Sequence[str] = ()) -> Any:
-    """Return how processes start: from a server that has imported once what each needs, or afresh."""
+    """Return a multiprocessing context: a fork server with preloaded modules if possible, else spawn."""
     _require_files(FILES + FILES_EACH * max(workers, default_workers()))
     if "forkserver" not in multiprocessing.get_all_start_methods() or not _has_place_for_sockets():
         return SafeSpawnContext()
@@ -146,7 +145,7 @@ def context_of(workers: int, needed: Sequence[str] = ()) -> Any:
 
 
 def _forget_server() -> None:
-    """Let a copy of this process that somebody forks start a server of its own; it cannot wait for ours."""
+    """In a forked copy of this process, forget the fork server: only its parent can wait for it."""
     server: Any = forkserver._forkserver  # type: ignore[attr-defined]
     alive = server._forkserver_alive_fd
     if alive is not None:
@@ -159,10 +158,10 @@ if hasattr(os, "register_at_fork"):
 
 
 def _require_files(needed: int) -> None:
-    """Make sure that this process may open so many files, since the server of processes cannot say it."""
+    """Check the limit of open files here, since the fork server cannot report it."""
     try:
         import resource
-    except ImportError:  # Windows, which has no such limit
+    except ImportError:  # Windows has no such limit
         return
     allowed, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     if allowed != resource.RLIM_INFINITY and allowed < needed:
@@ -173,9 +172,9 @@ def _require_files(needed: int) -> None:
 
 
 def _has_place_for_sockets() -> bool:
-    """Give multiprocessing a folder whose path is short enough for sockets, if one can be written.
+    """Make multiprocessing create its folder where paths of sockets are short enough; False if it cannot.
 
-    It makes its own where `tempfile` says, and asks only once; a socket's path has 108 bytes.
+    It creates the folder once, where `tempfile` points to; a socket's path has at most 108 bytes.
     """
     usual = tempfile.tempdir
     try:
@@ -191,11 +190,11 @@ def _has_place_for_sockets() -> bool:
 
 @dataclass
 class _Running:
-    """A job's process, the pipe it reports through, and when it began."""
+    """A running job: its process, the pipe it reports through, and its start time."""
 
     number: int
     job: Job
-    tries: int  # this one and those left
+    tries: int  # attempts left, including this one
     process: Any
     pipe: Connection
     began: float = field(default_factory=time.monotonic)
@@ -209,7 +208,7 @@ class _Running:
         return cls(number, job, tries, process, ours)
 
     def outcome(self) -> Outcome:
-        """Return what the process reported, or how it died if it did not."""
+        """Return the outcome that the process reported, or how it died."""
         try:
             status, problems, value, died = self.pipe.recv()
             self.end()
@@ -221,16 +220,17 @@ class _Running:
         return Outcome(self.job, tuple(problems), status, seconds, value, died)
 
     def end(self) -> None:
-        """Wait for the process to end; kill one that does not, because a unit never comes back."""
+        """Wait for the process to end; kill it if it does not, as when an FMU hangs."""
         self.process.join(timeout=GRACE)
         self.process.kill()
         self.process.join()
 
 
 def start(process: Any) -> None:
-    """Start a process, from a daemonic one as well.
+    """Start a process, even from a daemonic one.
 
-    Daemonic processes may have no children because they could leave orphans; ours end with their caller.
+    multiprocessing forbids daemonic processes to have children, which could be orphaned; ours end with
+    their caller.
     """
     settings = multiprocessing.current_process()._config  # type: ignore[attr-defined]
     with _starting:
@@ -246,7 +246,7 @@ _starting = threading.Lock()  # workers of a cluster start runs from several thr
 
 
 def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:
-    """Do one job in a process of its own and report how it ended."""
+    """Main function of a job's process: execute the job and report its outcome."""
     end_with_caller()
     os.environ.pop(SAFE_PATH, None)  # what an FMU starts may need its own folder
     if hasattr(os, "setpgrp"):
@@ -254,8 +254,8 @@ def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:
     try:
         report: tuple[int, list[str], Any, bool] = (0, [], run(job), False)
     except (YawbenchError, Interrupted) as error:
-        told = isinstance(error, Interrupted)
-        report = (error.exit_status, [*error.problems] or [type(error).__name__], None, told)
+        interrupted = isinstance(error, Interrupted)
+        report = (error.exit_status, [*error.problems] or [type(error).__name__], None, interrupted)
     except BaseException as error:
         print(printable("".join(traceback.format_exception(error))), file=sys.stderr)
         report = (1, [f"{type(error).__name__}: {error}"], None, False)
@@ -265,9 +265,9 @@ def _work(job: Job, run: Callable[[Job], Any], pipe: Connection) -> None:
 
 
 def end_with_caller() -> None:
-    """Let this process get SIGTERM when the caller has ended, however it did (Linux).
+    """Make this process receive SIGTERM when its caller has ended, however it ended (Linux only).
 
-    The pipe that tells of it asks for the signal; a thread that waits for it could not be forked.
+    The sentinel pipe sends the signal itself (F_SETSIG); a thread waiting on it would not survive a fork.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C on the terminal is for the caller
     caller = multiprocessing.parent_process()
@@ -290,17 +290,17 @@ def _death(code: int | None) -> str:
 
 
 POOL_GRACE = 5.0
-"""Time that a process has to end [s]; chosen: it only has to see that its pipe is closed."""
+"""Time for a process to end [s]; chosen: it only has to notice that its pipe is closed."""
 
 
 class Pool(contextlib.AbstractContextManager["Pool"]):
-    """So many processes at most, started as they are needed; all end with the `with` block.
+    """Pool of processes, started on demand; all end with the `with` block.
 
     Args:
-        workers: how many; None: one per core.
+        workers: largest number of processes; None: one per core.
 
     Raises:
-        YawbenchError: this process may not open as many files as that takes.
+        YawbenchError: the limit of open files is too low.
     """
 
     def __init__(self, workers: int | None = None) -> None:
@@ -309,10 +309,10 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
         self._processes: dict[Connection, Any] = {}
 
     def map(self, function: Callable[..., Any], *arguments: Iterable[Any]) -> list[Any]:
-        """Return what `function` gives for each set of arguments, in their order.
+        """Apply `function` to each set of arguments and return the results in order.
 
         Raises:
-            Exception: what the first call to fail has raised.
+            Exception: raised by the first call that fails.
             YawbenchError: a process was killed.
         """
         waiting = deque(enumerate(zip(*arguments, strict=False)))
@@ -327,12 +327,12 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
                     assert isinstance(pipe, Connection)
                     results[busy.pop(pipe)] = _answer(pipe)
         except BaseException:
-            self._end(kill=True)  # others still have to answer
+            self._end(kill=True)  # do not wait for other calls
             raise
         return [results[number] for number in range(len(results))]
 
     def _idle(self, busy: dict[Connection, int]) -> Connection | None:
-        """Return the pipe to a process that has nothing to do, None if there can be no more of them."""
+        """Return the pipe to an idle process, started if need be; None if all are busy."""
         for pipe in self._processes:
             if pipe not in busy:
                 return pipe
@@ -375,7 +375,7 @@ def _answer(pipe: Connection) -> Any:
 
 
 def _serve(pipe: Connection) -> None:
-    """Do what is asked until nobody asks any more."""
+    """Main function of a pool's process: execute calls until the pipe is closed."""
     end_with_caller()
     with contextlib.suppress(EOFError, OSError):
         while True:
@@ -388,7 +388,7 @@ def _serve(pipe: Connection) -> None:
 
 
 def _portable(error: Exception) -> Exception:
-    """Return an exception, or if it cannot be handed to another process, one that tells of it."""
+    """Return an exception, or if it cannot be pickled, a RuntimeError with its traceback."""
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:

@@ -1,1 +1,1 @@
-"""Figures of runs, drawn as the papers draw them."""
+"""Matplotlib figures of runs, in the style of the papers."""

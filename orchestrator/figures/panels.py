@@ -1,11 +1,9 @@
-"""The panels of figures: what one pair of axes shows, of one run or of several laid over each other.
+"""Panels of figures: what one pair of axes shows, of one run or of several overlaid.
 
-A panel is named by what it shows: a signal (over its reference, where the run recorded one),
+The name of a panel says what it shows: a signal (over its reference, where the run recorded one),
 `<signal>_error`, `path`, one signal over another (`yaw_rate(sideslip)`), or a signal of four wheels
-(`wheel_torque_*`: one panel with four lines for one run, four panels for several). A panel whose
-signals no run has does not exist.
-
-When runs were faulty, as spans behind the lines of panels over time.
+(`wheel_torque_*`: one panel with four lines for one run, four panels for several). Panels whose signals no
+run has are omitted. Times in which faults act are coloured spans behind the lines.
 """
 
 from __future__ import annotations
@@ -43,15 +41,15 @@ if TYPE_CHECKING:
 
 
 FAULTY = "#F7DDC8"
-"""The colour of a span; pale enough for all lines and the grid."""
+"""Colour of fault spans; pale enough for all lines and the grid."""
 SPAN: dict[str, Any] = {"color": FAULTY, "linewidth": 8.0, "linestyle": "-", "solid_capstyle": "butt"}
-"""How a legend shows it."""
+"""Line style of a fault span in a legend."""
 NAMED = 4
-"""Faults that a legend names; of more it says how many there are. Chosen: a legend is no table."""
+"""Number of faults listed in a legend; if there are more, it gives their number. Chosen: fits a legend."""
 
 
 class FaultSpan(NamedTuple):
-    """A fault of a run: from when until when [s], and what it is."""
+    """The start and end [s] of a fault, and its description."""
 
     begin: float
     end: float
@@ -59,7 +57,7 @@ class FaultSpan(NamedTuple):
 
 
 def spans_of(runs: Sequence[LabelledRun]) -> list[FaultSpan]:
-    """Return the faults of runs, each once; that not all have is said with the label."""
+    """Return the faults of runs, each once; a fault that not all runs have names its run."""
     found: dict[FaultSpan, list[str]] = {}
     for label, results in runs:
         for fault in results.record.faults if results.time.size else ():
@@ -79,7 +77,7 @@ def spans_of(runs: Sequence[LabelledRun]) -> list[FaultSpan]:
 
 
 def mark(axes: Axes, spans: Sequence[FaultSpan]) -> None:
-    """Draw spans behind all lines of axes over time; the limits stay."""
+    """Draw spans behind all lines of axes over time, without changing the limits."""
     limits = axes.get_xlim()
     for begin, end in dict.fromkeys((span.begin, span.end) for span in spans):
         axes.axvspan(begin, end, facecolor=FAULTY, edgecolor="none", zorder=0)
@@ -87,31 +85,31 @@ def mark(axes: Axes, spans: Sequence[FaultSpan]) -> None:
 
 
 def in_legend(spans: Sequence[FaultSpan]) -> list[str]:
-    """Return what a legend says of spans, none if there are none."""
+    """Return the legend entries of spans."""
     if len(spans) > NAMED:
         return [f"{len(spans)} faults"]
     return [span.says for span in spans]
 
 
 POINTS = 1500
-"""Buckets a line is thinned to; each keeps its smallest and its largest value."""
+"""Number of buckets a line is thinned to; each keeps its smallest and its largest value."""
 
 OFF_SCALE = 8.0
-"""A line that exceeds what must be seen by this factor may leave the axes if no more lines do than stay."""
+"""A line that exceeds the visible peak by this factor may leave the axes, if at most half the lines do."""
 
 PATH_ROOM = (ROW - 0.75) / (WIDTH - 1.0)
-"""Height over width of a path's axes in a figure."""
+"""Height over width of the axes of a path."""
 
 SEEN_ERROR = 0.02
-"""An error, relative to the reference's peak, that need not be magnified further."""
+"""Error, relative to the reference's peak, below which axes are not magnified further."""
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes: its name, whether it takes a whole row, and how it is filled.
+    """One pair of axes: its name, whether it takes a whole row, and the function that draws it.
 
-    Panels of one `scale` get the same limits. A panel that is not over time keeps its label below,
-    and is `rows` rows high.
+    Panels with the same `scale` get the same limits. A panel that is not over time keeps its axis label;
+    it is `rows` rows high.
     """
 
     name: str
@@ -123,9 +121,9 @@ class Panel:
 
 
 def panels_of(runs: Sequence[LabelledRun], name: str, *, whole: bool = False) -> list[Panel]:
-    """Return the panels that a name stands for: none if no run has the signals, four for wheels.
+    """Return the panels that a name selects: none if no run has the signals, four for wheels.
 
-    `whole`: no run leaves the axes, however far it goes.
+    `whole`: axes include all lines, however far they go.
     """
     if name == "path":
         drawn = [run for run in runs if _path_columns(run)]
@@ -151,7 +149,7 @@ def panels_of(runs: Sequence[LabelledRun], name: str, *, whole: bool = False) ->
 
 
 def shown_by(runs: Sequence[LabelledRun], names: Sequence[str], *, whole: bool = False) -> list[Panel]:
-    """Return all panels that the names stand for, in order (see `panels_of`)."""
+    """Return the panels that the names select, in order (see `panels_of`)."""
     panels = [panel for name in names for panel in panels_of(runs, name, whole=whole)]
     spans = spans_of(runs)
     if not spans:
@@ -168,15 +166,15 @@ def _marked(draw: Callable[[Axes], None], spans: Sequence[FaultSpan]) -> Callabl
 
 
 def check_panels(runs: Sequence[LabelledRun], names: Sequence[str], *, option: str = "--panel ") -> None:
-    """Make sure that every name stands for a panel of at least one run.
+    """Check that every name selects a panel of at least one run.
 
     Args:
-        runs: what there is to draw.
+        runs: the runs to draw.
         names: of panels.
-        option: what messages put before a name.
+        option: text before a name in messages.
 
     Raises:
-        ScenarioError: with a sentence for each name that does not.
+        ScenarioError: with a sentence for each name that selects nothing.
     """
     recorded = fold(list(dict.fromkeys(variable_of(column) for run in runs for column in run.results)))
     errors = [f"{name}_error" for name in recorded if panels_of(runs, f"{name}_error")]
@@ -191,7 +189,7 @@ def check_panels(runs: Sequence[LabelledRun], names: Sequence[str], *, option: s
 
 
 def _draw_signal(axes: Axes, runs: Sequence[LabelledRun], name: str, whole: bool) -> None:
-    """Draw a signal of all runs over its reference, and limit the axes to what can be read."""
+    """Draw a signal of all runs over its reference, with readable limits."""
     lines = []
     for number, run in enumerate(runs):
         columns = columns_of(run.results, name)
@@ -219,9 +217,9 @@ def _draw_signal(axes: Axes, runs: Sequence[LabelledRun], name: str, whole: bool
 
 
 def _limit(axes: Axes, scale: float, lines: list[tuple[str, float]], unit: str) -> None:
-    """Keep the axes readable when a lost car would squash all other lines; say who leaves them.
+    """Limit the axes where a diverging run would squash all other lines; note which lines leave them.
 
-    `scale` is a peak that must be seen, `lines` the label and the peak of every line, in SI.
+    `scale` is a peak that must be visible, `lines` the label and the peak of every line, in SI.
     """
     text, factor = shown_unit(unit)
     lost = [line for line in lines if line[1] > OFF_SCALE * scale]
@@ -273,10 +271,10 @@ def _path_columns(run: LabelledRun) -> tuple[str, str] | None:
 
 
 def draw_path(axes: Axes, runs: Sequence[LabelledRun], *, room: float = PATH_ROOM) -> None:
-    """Draw the paths seen from above; the lateral axis is stretched as far as the shape needs it.
+    """Draw the paths seen from above; the lateral axis is stretched as far as needed to show their shape.
 
     Args:
-        axes: what to draw into.
+        axes: the axes to draw into.
         runs: those that recorded a position are drawn.
         room: height of the axes over their width.
     """
@@ -305,14 +303,14 @@ def _stretch(length: float, breadth: float, *, room: float) -> int:
 
 def _line(axes: Axes, t: np.ndarray, x: np.ndarray, unit: str, style: dict[str, Any]) -> None:
     t, x = thinned(t, x * shown_unit(unit)[1])
-    if unit == "rad":  # an angle that passes half a turn comes back from the other side
+    if unit == "rad":  # interrupt the line where an angle wraps around
         turned = np.flatnonzero(np.abs(np.diff(x)) > 180.0) + 1
         t, x = np.insert(t, turned, t[turned]), np.insert(x, turned, np.nan)
     axes.plot(t, x, **style)
 
 
 def thinned(t: np.ndarray, x: np.ndarray, buckets: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
-    """Return the samples that draw the same line: the smallest and the largest of each bucket."""
+    """Return the samples that draw the same line: the smallest and largest of each bucket."""
     if x.size <= 2 * buckets + 2:
         return t, x
     edges = np.linspace(0, x.size, buckets + 1).astype(int)
@@ -324,7 +322,7 @@ def thinned(t: np.ndarray, x: np.ndarray, buckets: int = POINTS) -> tuple[np.nda
 
 
 def _finish(axes: Axes, signal: str, unit: str, more: str = "") -> None:
-    """Write the heading of a panel over time: what it shows, its symbol, its unit, and perhaps more."""
+    """Set the title of a panel over time: the signal, its symbol, its unit, and optional text."""
     text = shown_unit(unit)[0]
     formula = in_formula(signal)
     heading = literal(words(signal)) + (more or f" {formula}".rstrip())
@@ -348,7 +346,7 @@ def _span(arrays: list[np.ndarray]) -> float:
 
 
 def _alike(references: list[np.ndarray]) -> list[list[int]]:
-    """Return groups of references for which one wide line can stand: they lie within its width."""
+    """Group references that lie within the width of one wide line, so that one line represents them."""
     allowed = 0.05 * max((_peak(r) for r in references), default=0.0)
     groups: list[list[int]] = []
     for i, one in enumerate(references):

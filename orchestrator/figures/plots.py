@@ -1,8 +1,8 @@
-"""Figures of one run or of several laid over each other, drawn as the papers draw them.
+"""Figures of one run or of several overlaid, in the style of the papers.
 
-A figure is a list of panels, named by what they show (see `panels`). A panel whose signal no run has
-is left out. Angles are in degrees, speeds in km/h. Title and legend stand above the panels, so the
-legend covers no data; the line at the bottom says where the figure comes from.
+A figure is a list of panels, named by what they show (see `panels`). A panel whose signal no run has is
+omitted. Angles are in degrees, speeds in km/h. Title and legend are above the panels, so that the legend
+covers no data; the line at the bottom gives the provenance.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ def draw(
     changed: str | None = None,
     note: str | None = None,
 ) -> Figure:
-    """Return a figure of the panels with all runs laid over each other.
+    """Return a figure of the panels with all runs overlaid.
 
     Args:
         runs: the first is drawn first; the legend keeps the order.
-        panels: names of panels, in order; those that no run has the signals for are left out.
+        panels: names of panels, in order; those that no run has the signals for are omitted.
         title: default: the scenario's title.
-        changed: what was changed, to stand below the title; default: what the runs' records say. With a
-            title that was made for these runs it stands in the note.
+        changed: overrides, shown below the title; default: as recorded in the runs. With a title that was
+            made for these runs they are shown in the note.
         note: the line of provenance at the bottom; default: made from the runs' records.
 
     Raises:
@@ -76,7 +76,7 @@ def draw(
                 panel.draw(axes)
                 below = rows[i + 1] if i + 1 < len(rows) else []
                 if panel.over_time and below and below[0].over_time:
-                    axes.set_xlabel("")  # the same time axis stands below
+                    axes.set_xlabel("")  # the panel below has the same time axis
         said = changes_of(runs) if changed is None else changed
         foot = provenance(runs) if note is None else note
         if title is not None and changed is None and said:
@@ -88,7 +88,7 @@ def draw(
 
 
 def nothing_recorded(run: LabelledRun) -> str:
-    """Return a sentence on a run that has ended before there was anything to draw."""
+    """Return the message on a run that ended before it recorded anything."""
     error = run.results.record.error
     why = f": {' '.join(error.message.split())}" if error and error.message else ""
     return f"{run.results.folder}: nothing to draw, this run ended at its start{why}."
@@ -105,12 +105,12 @@ def _rows(panels: Sequence[Panel]) -> list[list[Panel]]:
 
 
 def _pair(left: Panel, right: Panel) -> bool:
-    """Return whether two panels may stand side by side."""
+    """Return whether two panels may be placed side by side."""
     return not left.wide and not right.wide and left.over_time == right.over_time
 
 
 def legend_of(runs: Sequence[LabelledRun], drawn: Iterable[Axes]) -> list[tuple[str, dict[str, Any]]]:
-    """Return label and look of what a legend explains: the runs if there are several, pale lines, spans."""
+    """Return labels and line styles of a legend: runs if there are several, reference lines, fault spans."""
     styles = [(run.label, line_style(k)) for k, run in enumerate(runs) if len(runs) > 1]
     if says := reference_words(line for axes in drawn for line in axes.get_lines()):
         styles.append((says, REFERENCE))
@@ -118,18 +118,18 @@ def legend_of(runs: Sequence[LabelledRun], drawn: Iterable[Axes]) -> list[tuple[
 
 
 def title_of(runs: Sequence[LabelledRun]) -> str:
-    """Return the title of the runs' scenario, or a general one where they differ."""
+    """Return the title of the runs' scenario, or a general one if they have different ones."""
     titles = {run.results.record.title or "" for run in runs}
     return (titles.pop() if len(titles) == 1 else "") or "Comparison of runs"
 
 
 def changes_of(runs: Sequence[LabelledRun]) -> str:
-    """Return what was changed for the runs against their scenarios, in words."""
+    """Return the overrides of the runs' scenarios, in words."""
     return changed_each([(run.label, changes_in(run.results.run)) for run in runs])
 
 
 def provenance(runs: Sequence[LabelledRun]) -> str:
-    """Return where the figure comes from: version, source, algorithm, step, FMUs with their hashes."""
+    """Return the provenance of a figure: version, source, algorithm, step, FMUs with their hashes."""
     records = [run.results.record for run in runs]
     sources = dict.fromkeys(str(record.scenario.get("source") or "") for record in records)
     parts = [f"yawbench {records[0].versions.get('yawbench', '')}".strip(), *filter(None, sources)]

@@ -1,7 +1,7 @@
-"""One signal over another: phase portraits, written `yaw_rate(sideslip)` for yaw rate over sideslip.
+"""Phase portraits: one signal over another, written `yaw_rate(sideslip)` for yaw rate over sideslip.
 
 Every run is a curve with a dot at its end, over the curve of the references where both signals have
-one. A curve that leaves the others far behind leaves the axes, and a note says how far it goes.
+one. A curve that goes much further than the others may leave the axes; a note then says how far it goes.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 POINTS = 4000
-"""Samples a curve is thinned to."""
+"""Number of samples a curve is thinned to."""
 FAR = 4.0
-"""A curve that goes so many times as far as another one may leave the axes."""
+"""A curve that goes this many times as far as another may leave the axes."""
 MARGIN = 1.2
-"""Room around the curves that stay."""
+"""Limits of the axes over the extent of the curves within them."""
 
 
 @dataclass(frozen=True)
 class PortraitCurve:
-    """A run's y over x, both as shown, and its references if it has both."""
+    """A run's y over x in displayed units, and its references if it has both."""
 
     number: int
     label: str
@@ -68,7 +68,7 @@ def _shown(results: Results, column: str) -> np.ndarray:
 
 
 def spread_rows(results: Results, most: int) -> np.ndarray:
-    """Return about so many rows, the same way apart, and the last."""
+    """Return about `most` evenly spaced row indices, the last row included."""
     size = results.time.size
     return np.append(np.arange(0, size - 1, max(1, size // most)), size - 1)
 
@@ -111,7 +111,7 @@ def _limit(
     references: Sequence[tuple[np.ndarray, np.ndarray]],
     units: list[str],
 ) -> None:
-    """Keep the axes to what is near; say how far the others go."""
+    """Limit the axes to the nearby curves; note how far the others go."""
     reach = [np.array([np.max(np.abs(curve.x)), np.max(np.abs(curve.y))]) for curve in curves]
     nearest = np.min(reach, axis=0)
     for x, y in references:

@@ -1,6 +1,7 @@
-"""The look of all figures: colours that differ for every eye and in grey print, fonts, files.
+"""The style of all figures, and the display of signals and numbers.
 
-Signals and numbers as people read them: formulas, degrees, km/h, per cent, few digits.
+Colours can be told apart by colour-blind readers and in grey print. Numbers are shown in degrees, km/h and
+per cent, with few digits; signals by their symbols.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ LINES: tuple[dict[str, Any], ...] = (
 """One style per run: Okabe and Ito's colours, and a dash pattern that survives grey print."""
 
 REFERENCE: dict[str, Any] = {"color": "#B8B8B8", "linestyle": "-", "linewidth": 5.0, "solid_capstyle": "butt"}
-"""A wide pale line below the others: a run that follows its reference runs in its middle."""
+"""Line style of references: wide and pale, so that a run that follows its reference is visible on it."""
 
 RC: Any = {
     "font.family": "DejaVu Sans",
@@ -68,24 +69,24 @@ RC: Any = {
 WIDTH, ROW = 10.0, 2.25
 """Width of a figure and height of a row of panels [inches]."""
 QUIET = "#666666"
-"""The colour of what may be overlooked: provenance, guides."""
+"""Colour of secondary text and lines: provenance, guides."""
 CHANGED = "#A33B00"
-"""The colour of what was changed against the scenario that a title names."""
+"""Colour of overrides and limits."""
 
 LONGEST = 3000
 """Characters of a title, a note and changes in a figure; chosen: a page full, drawn in less than a second."""
 NOTE_WIDTH = 72
-"""Characters of a note above a panel of half the figure's width."""
+"""Largest line length of a note above a panel of half the figure's width."""
 
 
 def line_style(number: int) -> dict[str, Any]:
-    """Return the style of the run of that number, counted from 0; they repeat after the last."""
+    """Return the line style of a run by its number, counted from 0; styles repeat after the last."""
     return dict(LINES[number % len(LINES)])
 
 
 @contextmanager
 def new_figure() -> Iterator[Figure]:
-    """Give an empty figure; what is drawn within the context has the look of all figures."""
+    """Context that yields an empty figure; what is drawn within it has the common style."""
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -106,7 +107,7 @@ def save(figure: Figure, stem: Path) -> list[Path]:
     import matplotlib
 
     with matplotlib.rc_context(RC), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing from font")  # shown as a box
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")  # it is shown as a box
         if (layout := figure.get_layout_engine()) is not None:
             layout.execute(figure)  # once, not once per file
             figure.set_layout_engine("none")
@@ -121,7 +122,7 @@ def save(figure: Figure, stem: Path) -> list[Path]:
 
 
 def reference_words(lines: Iterable[Line2D]) -> str | None:
-    """Return what the legend says of the pale lines among those drawn; None if there are none."""
+    """Return the legend entry of the reference lines among those drawn; None if there are none."""
     pale = [line for line in lines if line.get_label() == "reference"]
     own = any(line.get_color() != REFERENCE["color"] for line in pale)
     return ("wide and pale: the run's own reference" if own else "reference") if pale else None
@@ -138,21 +139,21 @@ def note_above(axes: Axes, note: str) -> None:
 
 
 def literal(text: str) -> str:
-    """Return a user's text with control characters written out, and so that no `$` in it begins a formula."""
+    """Return a user's text with control characters escaped and `$` not starting a formula."""
     return printable(text).replace("$", r"\$")
 
 
 def frame(
     figure: Figure, height: float, handles: Sequence[Artist], title: str, note: str, changed: str = ""
 ) -> None:
-    """Set title and legend above the panels and the note below, in room of their own.
+    """Place title and legend above the panels and the note below them.
 
     Args:
         figure: with constrained layout.
         height: of all its panels [inches].
-        handles: what the legend shows.
+        handles: entries of the legend.
         title, note: broken into lines as needed.
-        changed: what was changed against the scenario that the title names; it stands below the title.
+        changed: overrides of the scenario that the title names; shown below the title.
     """
     titles, notes = textwrap.wrap(cut(title, LONGEST), 95), textwrap.wrap(cut(note, LONGEST), 165)
     changes = textwrap.wrap(cut(f"changed: {changed}", LONGEST), 110) if changed else []
@@ -181,22 +182,22 @@ def frame(
 
 
 RESOLUTION = 1e-3
-"""Of angles and their rates, as shown [°, °/s, °/s²]; chosen: less than any sensor of a car can tell."""
+"""Resolution of displayed angles and rates [°, °/s, °/s²]; chosen: finer than any sensor of a car."""
 ROUNDING = 1e-12
-"""Relative difference of two numbers that is none."""
+"""Relative difference up to which two numbers count as equal."""
 DIGITS, EXACT = 3, 17
-"""Significant digits of a number, and with how many no two floats read alike."""
+"""Default significant digits, and the number with which no two floats read alike."""
 
 
 class LabelledRun(NamedTuple):
-    """A run and what the legend calls it."""
+    """A run and its label in the legend."""
 
     label: str
     results: Results
 
 
 def in_formula(signal: str) -> str:
-    """Return the symbol of a signal as matplotlib sets it, or nothing where the field has none."""
+    """Return the symbol of a signal in matplotlib's math text, "" if it has none."""
     if symbol(signal) == variable_of(signal):
         return ""
     head, _, index = symbol(signal).partition("_")
@@ -204,7 +205,7 @@ def in_formula(signal: str) -> str:
 
 
 def shown_unit(unit: str) -> tuple[str, float]:
-    """Return the unit that people read and the factor to it; `%` stands for a ratio in per cent."""
+    """Return the displayed unit and the factor to it; `%` marks a ratio in per cent."""
     if unit in SHOWN:
         return SHOWN[unit]
     si, to_si = si_of(unit)
@@ -213,7 +214,7 @@ def shown_unit(unit: str) -> tuple[str, float]:
 
 
 def shown(value: float, unit: str, *, digits: int = DIGITS, half: float = 0.0) -> str:
-    """Return a value given in SI as text in the unit that people read, e.g. `3.94 %`; `< 0.001 °` of less.
+    """Format an SI value in its displayed unit, e.g. `3.94 %`; smaller than the resolution: `< 0.001 °`.
 
     With `half`, half the width of its confidence interval: `3.94 ± 0.12 %`.
     """
@@ -228,9 +229,9 @@ def shown(value: float, unit: str, *, digits: int = DIGITS, half: float = 0.0) -
 
 
 def digits_apart(pairs: Iterable[tuple[float, float]], unit: str, digits: int = DIGITS) -> int:
-    """Return the least digits, at least so many, with which the numbers of each pair read differently.
+    """Return the fewest digits, at least `digits`, with which the numbers of each pair read differently.
 
-    Numbers that are equal are left alone, and so are those that differ by nothing but rounding.
+    Pairs that are equal, or differ only by rounding, are ignored.
     """
     for a, b in pairs:
         if not math.isfinite(a) or not math.isfinite(b) or math.isclose(a, b, rel_tol=ROUNDING):
@@ -241,7 +242,7 @@ def digits_apart(pairs: Iterable[tuple[float, float]], unit: str, digits: int = 
 
 
 def digits_of(value: float, digits: int = DIGITS) -> str:
-    """Return a number with so many significant digits, whole digits all kept, no exponent if readable."""
+    """Format a number with `digits` significant digits, all integer digits kept, no exponent if readable."""
     if math.isinf(value):
         return "never" if value > 0 else "-∞"
     if math.isnan(value):

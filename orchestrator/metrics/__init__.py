@@ -1,4 +1,4 @@
-"""Stage five: what a run is judged by."""
+"""Metrics of runs and plausibility warnings."""
 
 from .measures import MeasureEntry, catalogue
 

@@ -1,10 +1,8 @@
-"""The table of measures: a number for a signal, or for a signal and its reference.
+"""Measures: functions from a signal, or a signal and its reference, to a number; their symbols and units.
 
-All functions take time `t` [s] and samples of equal shape (n,), n >= 2, in SI units, and give SI
-units. Integrals are taken by the trapezoidal rule, so uneven samples are right too. Measures of the
-phase plane take the signal and its rate: the recorded one, else the difference quotient.
-
-Signals in symbols and words: what the field calls a variable of the signal dictionary.
+All functions take time `t` [s] and samples of equal shape (n,), n >= 2, in SI units, and return SI units.
+Integrals use the trapezoidal rule, so uneven samples are handled correctly. Measures of the phase plane take
+the signal and its rate: the recorded one, else the difference quotient.
 """
 
 from __future__ import annotations
@@ -24,7 +22,7 @@ from vocabulary.wheels import WHEEL_NAMES
 from ..scenario.quantities import conversion, measure_of, parse_unit
 
 SETTLING_BAND = 0.05
-"""Half-width of the band a settled signal stays in, relative to the reference's peak."""
+"""Half-width of the band of a settled signal, relative to the reference's peak."""
 
 RETURN_RATE = 4.0
 """Slope of the lines that bound the stable strip in the plane of sideslip and its rate [1/s]."""
@@ -38,7 +36,7 @@ B1 = 4/24 and B2 = 1/24 s per degree, values in common use; they are not measure
 
 
 JERK_WINDOW = 0.1
-"""Over which a signal is averaged before its slope is taken [s]. Chosen: the bare difference quotient of an
+"""Averaging time of a signal before its slope is taken [s]. Chosen: the plain difference quotient of an
 acceleration is the jump at a controller's samples; people feel some 10 Hz at most."""
 
 Function = Callable[..., Any]
@@ -46,18 +44,18 @@ Function = Callable[..., Any]
 
 @dataclass(frozen=True)
 class Measure:
-    """A row of the table of measures: a function of time and of what its other arguments name.
+    """A row of the table of measures: a function of time and of the signals that its other parameters name.
 
     These are a signal `x`, perhaps with its reference `x_ref` or its rate `x_rate`, or signals of the
-    dictionary: then it is of the first of them alone, where the others are recorded for the same wheel.
+    vocabulary: then the measure is one of the first of them, with the others recorded for the same wheel.
     """
 
     function: Function
     formula: str  # x the signal, x_ref its reference, T the duration
     definition: str
-    unit: str  # "{x}" the signal's, "{x}/s" per second, "%" a ratio shown in per cent, or a unit
+    unit: str  # "{x}": the signal's; "{x}/s": that per second; "%": a ratio shown in per cent; else a unit
     takes: tuple[str, ...]
-    signal_unit: str | None = None  # the only unit of a signal that it means anything for
+    signal_unit: str | None = None  # the only unit that a signal may have
 
     @property
     def needs_reference(self) -> bool:
@@ -69,23 +67,23 @@ class Measure:
 
     @property
     def signal(self) -> str | None:
-        """The only signal, or one of each wheel; None: any."""
+        """The signal that the measure is defined for, perhaps one per wheel; None: any."""
         return None if self.takes[0] == "x" else self.takes[0]
 
     @property
     def beside(self) -> tuple[str, ...]:
-        """Other signals that it takes, of the same wheel."""
+        """The further signals that it takes, of the same wheel."""
         return self.takes[1:] if self.signal else ()
 
 
 MEASURES: dict[str, Measure] = {}
-"""All measures, the one table that definitions and units are taken from."""
+"""All measures by name, the only source of their definitions and units."""
 
 
 def measure(
     formula: str, definition: str, unit: str, *, signal_unit: str | None = None, name: str = ""
 ) -> Callable[[Function], Function]:
-    """Return a decorator that enters a function into the table, under its own name if none is given."""
+    """Return a decorator that registers a function in the table, by default under its own name."""
 
     def enter(function: Function) -> Function:
         takes = tuple(inspect.signature(function).parameters)[1:]
@@ -126,7 +124,7 @@ def peak_error(t: np.ndarray, x: np.ndarray, x_ref: np.ndarray) -> float:
 
 
 def _relative(error: str) -> Function:
-    """Enter an error over the reference's peak into the table; it is NaN for a reference of zero."""
+    """Register an error divided by the reference's peak; it is NaN for a reference of zero."""
     absolute = MEASURES[error]
 
     @measure(
@@ -180,7 +178,7 @@ def displacement(t: np.ndarray, x: np.ndarray) -> float:
 
 @measure("1 if {x} ≠ {x}(0) ever, else 0", "whether it ever leaves its first value", "%")
 def changes(t: np.ndarray, x: np.ndarray) -> float:
-    return float(np.any(x != x[0]))  # the mean of repeats is the share
+    return float(np.any(x != x[0]))  # 0 or 1, so that the mean over repeats is a fraction
 
 
 @measure("t: {x} ≠ {x}(0) for the first time", "time until it leaves its first value", "s")
@@ -243,7 +241,7 @@ def grip_use(
     t: np.ndarray, tyre_force_x: np.ndarray, tyre_force_y: np.ndarray, vertical_load: np.ndarray
 ) -> float:
     force, load = tyre_force_x**2 + tyre_force_y**2, vertical_load**2
-    in_the_air = (force == 0.0) & (load == 0.0)  # such a wheel uses nothing
+    in_the_air = (force == 0.0) & (load == 0.0)  # a wheel in the air uses no friction
     used = np.divide(force, load, out=np.zeros_like(load), where=~in_the_air)
     return math.sqrt(_mean(t, used))
 
@@ -262,7 +260,7 @@ def relative_path_error(
     yaw_rate_ref: np.ndarray,
     sideslip_ref: np.ndarray,
 ) -> float:
-    """The car that follows its reference begins where and as this one does, and is as fast."""
+    """Compare the path with that of a car which starts here, is as fast, and follows the references."""
     course = yaw_angle[0] + running_integral(t, yaw_rate_ref) + sideslip_ref
     wanted = running_integral(t, velocity_x * np.sin(course))
     return relative_rms_error(t, position_y - position_y[0], wanted)
@@ -274,7 +272,7 @@ def relative_path_error(
     "{x}2/s",
 )
 def phase_area(t: np.ndarray, x: np.ndarray, x_rate: np.ndarray) -> float:
-    return integral(t, x_rate**2)  # that of dx/dt over x, by time
+    return integral(t, x_rate**2)  # of dx/dt over x, substituted to an integral over time
 
 
 @measure(
@@ -294,19 +292,19 @@ def stability_index(t: np.ndarray, x: np.ndarray, x_rate: np.ndarray) -> float:
     signal_unit="rad",
 )
 def time_beyond(t: np.ndarray, x: np.ndarray, x_rate: np.ndarray) -> float:
-    outside = np.abs(x_rate + RETURN_RATE * x) > BOUNDARY  # by whole samples
+    outside = np.abs(x_rate + RETURN_RATE * x) > BOUNDARY  # counted in whole samples
     return float(np.sum(np.diff(t)[outside[:-1]])) / float(t[-1] - t[0])
 
 
 @dataclass(frozen=True)
 class MeasureEntry:
-    """A measure as a table of the documentation shows it."""
+    """A measure as a row of the table in the documentation."""
 
     name: str
     definition: str
-    formula: str  # of x, its reference x_ref, its duration T
+    formula: str  # in terms of x, its reference x_ref, the duration T
     unit: str  # in words: "of the signal", "of the signal, per s"
-    needs: str  # what it takes beside the signal, in words
+    needs: str  # further signals that it takes, in words
 
 
 _UNITS = {
@@ -334,12 +332,12 @@ def catalogue() -> list[MeasureEntry]:
 
 
 SI = ("1", "s", "m", "kg", "N", "Pa", "rad", "m/s", "rad/s", "m/s2", "rad/s2", "N.m")
-"""Units that the signals of the dictionary have."""
+"""Units of the signals in the vocabulary."""
 
 
 @cache
 def si_of(unit: str) -> tuple[str, float]:
-    """Return the unit of the dictionary that measures the same, and the factor to it."""
+    """Return the vocabulary's unit of the same dimension, and the factor to it."""
     measure = measure_of(unit)
     for si in SI if measure is not None and unit not in SI else ():
         factors = conversion(measure, parse_unit(si))  # type: ignore[arg-type]
@@ -349,17 +347,17 @@ def si_of(unit: str) -> tuple[str, float]:
 
 
 def si(unit: str) -> str:
-    """Return the unit of a number as files have it: there a ratio has the unit 1, not per cent."""
+    """Return the unit as written to files: "1" for a ratio, not per cent."""
     return "1" if unit == "%" else unit
 
 
 def variable_of(column: str) -> str:
-    """Return the variable's name of `unit.variable`, or the name itself."""
+    """Return the variable's name in `instance.variable`, or the name itself."""
     return column.rpartition(".")[2]
 
 
 def symbol(signal: str) -> str:
-    """Return the symbol of a signal, or its name where the field has none."""
+    """Return the symbol of a signal, or its name if it has none."""
     name = variable_of(signal)
     if name.endswith("_ref"):
         return f"{symbol(name.removesuffix('_ref'))}_ref"
@@ -367,7 +365,7 @@ def symbol(signal: str) -> str:
 
 
 def words(signal: str) -> str:
-    """Return the signal in words, with a capital; of one wheel with that: "Wheel torque, front left"."""
+    """Return the signal in words, capitalized, with its wheel: "Wheel torque, front left"."""
     name = variable_of(signal)
     if name[-2:] in WHEEL_NAMES and name[-3:-2] == "_":
         return f"{words(f'{name[:-2]}*')}, {WHEEL_NAMES[name[-2:]]}"

@@ -1,7 +1,7 @@
-"""Remarks on a finished run that no engineer would let pass: it spins, lifts wheels, leaves its model.
+"""Plausibility warnings for a run: the car spins, lifts wheels, leaves the range of its model.
 
-`CHECKS` is the whole list; a line more there is a check more. Each looks at the signals that a run recorded,
-block by block while it runs. None is an error: a car without control does spin.
+`CHECKS` lists all checks; to add one, add an entry. Each looks at the recorded signals block by block during
+the run. None is an error: a car without control does spin.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ SignalArrays = Sequence[np.ndarray]
 
 @dataclass(frozen=True)
 class PlausibilityCheck:
-    """What counts as remarkable: some value of signals beyond a limit.
+    """A limit of signals beyond which a warning is given.
 
-    `says` may hold `{limit}`, `{value}`, `{size}` (without its sign), `{time}`, `{column}` and `{wheel}`.
+    `says` may contain `{limit}`, `{value}`, `{size}` (absolute value), `{time}`, `{column}` and `{wheel}`.
     """
 
     kind: str
-    signals: tuple[str, ...]  # of the dictionary; with `*` every wheel is looked at for itself
+    signals: tuple[str, ...]  # in the vocabulary; with `*`, every wheel is checked separately
     value: Callable[[SignalArrays], np.ndarray]
-    limit: float  # remarkable are values above it, in the unit that `says` uses
+    limit: float  # values above it give a warning; in the unit that `says` uses
     says: str
-    why: str  # where the limit comes from
-    below: bool = False  # remarkable are values below the limit
+    why: str  # source of the limit
+    below: bool = False  # warn of values below the limit instead
     over_friction: bool = False  # the value is divided by the highest friction of the road
 
 
@@ -83,11 +83,11 @@ CHECKS: tuple[PlausibilityCheck, ...] = (
         "chosen: tyres of the catalogue reach 1.2 of the friction they are told", over_friction=True,
     ),
 )  # fmt: skip
-"""What is looked at after every run."""
+"""The checks made in every run."""
 
 
 class PlausibilityWatch:
-    """Looks at the rows of a run as they come, and tells what was remarkable in them."""
+    """Applies the checks to the rows of a run as they are recorded."""
 
     def __init__(self, plan: Plan, checks: Iterable[PlausibilityCheck] = CHECKS) -> None:
         results = results_to_be(plan)
@@ -95,7 +95,7 @@ class PlausibilityWatch:
         reals = [f"{unit}.{name}" for unit, name in plan.record if units[unit][name].type == "Real"]
         place = {column: 1 + k for k, column in enumerate(reals)}
         friction = _highest_friction(plan)
-        self._seen: list[_Seen] = []
+        self._seen: list[_CheckState] = []
         for check in (*checks, *_ranges(plan)):
             if check.over_friction and not friction:
                 continue
@@ -103,20 +103,20 @@ class PlausibilityWatch:
             found = [columns_of(results, signal) for signal in check.signals]
             for columns in zip(*found, strict=False):
                 if all(column in place for column in columns):
-                    self._seen.append(_Seen(check, columns, [place[c] for c in columns], scale))
+                    self._seen.append(_CheckState(check, columns, [place[c] for c in columns], scale))
 
     def look(self, rows: np.ndarray) -> None:
-        """Look at rows: shape (n, 1 + Real columns), time first."""
+        """Check rows: shape (n, 1 + Real columns), time first."""
         for one in self._seen:
             one.look(rows)
 
     def findings(self) -> tuple[Finding, ...]:
-        """Return what was remarkable, in the order of the checks."""
+        """Return the findings so far, in the order of the checks."""
         return tuple(filter(None, (one.finding() for one in self._seen)))
 
 
-class _Seen:
-    """What one check has seen so far of its columns."""
+class _CheckState:
+    """The state of one check: what it has found so far in its columns."""
 
     def __init__(
         self, check: PlausibilityCheck, columns: Sequence[str], places: list[int], scale: float
@@ -154,7 +154,7 @@ class _Seen:
 
 
 def _ranges(plan: Plan) -> Iterator[PlausibilityCheck]:
-    """Yield a check for every recorded output that its FMU, or one that it feeds, states limits for."""
+    """Yield a check for every recorded output whose range is limited by its FMU or by one that it feeds."""
     units = {unit.name: unit.fmu.variables for unit in plan.instances}
     limits = {(unit, name): [units[unit][name]] for unit, name in plan.record}
     for wire in plan.wires:
@@ -167,7 +167,7 @@ def _ranges(plan: Plan) -> Iterator[PlausibilityCheck]:
         for limit, below in ((lowest, True), (highest, False)):
             if limit is not None:
                 says = "{column} is {value} at {time} s, beyond the {limit} that its model is valid for"
-                # a little beyond is rounding
+                # tolerate rounding
                 margin = 1e-9 * max(1.0, abs(limit)) * (-1 if below else 1)
                 yield PlausibilityCheck(
                     "range", (f"{unit}.{name}",), itemgetter(0), limit + margin, says, why, below
@@ -175,7 +175,7 @@ def _ranges(plan: Plan) -> Iterator[PlausibilityCheck]:
 
 
 def _highest_friction(plan: Plan) -> float | None:
-    """Return the highest friction that units are told; None if it is no constant, or not told at all."""
+    """Return the highest friction given to any instance; None if it is not constant or not given."""
     known = [
         float(value)
         for unit in plan.instances
@@ -188,7 +188,7 @@ def _highest_friction(plan: Plan) -> float | None:
 
 
 def findings_in(run: Mapping[str, Any]) -> tuple[Finding, ...]:
-    """Return the findings in a run's record."""
+    """Return the findings in a run record."""
     given = run.get("findings")
     return tuple(
         Finding(
@@ -200,14 +200,14 @@ def findings_in(run: Mapping[str, Any]) -> tuple[Finding, ...]:
 
 
 def remarks_of(findings: Iterable[Finding]) -> list[str]:
-    """Return sentences: all on given values, each once, and the first of each kind on the run's course."""
+    """Return warnings as sentences: each suspicious value once, then the first finding of each kind."""
     every = list(findings)
     values = dict.fromkeys(one.says for one in every if one.time is None)
     return [*values, *(one.says for one in first_of_each(one for one in every if one.time is not None))]
 
 
 def first_of_each(findings: Iterable[Finding]) -> list[Finding]:
-    """Return the earliest finding of each kind: four wheels are one matter."""
+    """Return the earliest finding of each kind, so that four wheels give one warning."""
     first: dict[str, Finding] = {}
     for found in findings:
         known = first.setdefault(found.kind, found)

@@ -1,16 +1,17 @@
-"""What a run is judged by: measures of signals, each with its definition and unit.
+"""Metrics of runs: measures of signals over a run or a part of it, each with a definition and a unit.
 
 A metric is a measure of a signal, written `measure(signal)`: `relative_peak_error(sideslip)`,
-`total_variation_rate(wheel_torque_*)`. Signals are named as in the signal dictionary, whatever the
-scenario calls its units or an FMU from elsewhere its outputs; where several units have one of that name it
-is the plant's, or the only one that is neither measured nor estimated, and `estimator.sideslip` names any.
-A bare name never means what is measured or estimated.
-The reference of a signal `x` is the signal `x_ref`, of several units' that of the one which acts. Another is
-named behind a comma, `relative_peak_error(yaw_rate, ideal.yaw_rate_ref)`: so a metric says against which
-truth it judges. Measures that need no reference also take a difference,
+`total_variation_rate(wheel_torque_*)`. Signals are named as in the vocabulary, whatever the scenario calls
+its instances or an FMU from another tool its outputs. If several instances have a signal of that name, it is
+the plant's, or the only one that is neither measured nor estimated; `estimator.sideslip` selects any of them.
+A bare name never means a measured or estimated signal.
+
+The reference of a signal `x` is the signal `x_ref`; if several instances have one, that of the instance whose
+output is used. Another reference follows a comma, `relative_peak_error(yaw_rate, ideal.yaw_rate_ref)`, which
+makes explicit against which truth a metric judges. Measures that need no reference also take a difference,
 `rms(estimator.sideslip - plant.sideslip)`. Of four wheels (`*`) the largest value counts. A metric whose
-signals a run does not have is absent, never zero. It may be of a stretch of time,
-`peak(sideslip) from 1 s to 3 s`, or of a point, `value(sideslip) at 2 s`.
+signals a run does not have is absent, never zero. A metric may be restricted to a time window,
+`peak(sideslip) from 1 s to 3 s`, or to a point in time, `value(sideslip) at 2 s`.
 """
 
 from __future__ import annotations
@@ -56,23 +57,23 @@ STANDARD = (
     "total_variation_rate(yaw_moment)",
     "total_variation_rate(wheel_torque_*)",
 )
-"""The metrics shown where nobody has chosen others."""
+"""The default metrics."""
 
 AT_A_TIME = "value"
-"""The measure of a point of time; all others are of a stretch."""
+"""The measure for a point in time; all others need a time span."""
 TimeWindow = tuple[float, float]
-"""From, to [s]; equal: a point of time."""
+"""Start and end [s]; equal: a point in time."""
 
 
 @dataclass(frozen=True)
 class Metric:
-    """A measure of a signal, perhaps against another."""
+    """A measure of a signal, perhaps relative to another signal."""
 
     name: str
     measure: Measure
     signal: str
-    window: TimeWindow | None = None  # in place of the whole run
-    other: str = ""  # the reference, in place of the signal's own; or what is subtracted
+    window: TimeWindow | None = None  # default: the whole run
+    other: str = ""  # a reference other than the signal's own, or the signal to subtract
 
     @property
     def formula(self) -> str:
@@ -96,7 +97,7 @@ class Metric:
 
     @property
     def title(self) -> str:
-        """The signal and the measure in few words."""
+        """The signal and the measure in a few words."""
         measure = self.name.partition("(")[0].replace("_", " ").replace("rms", "RMS")
         return f"{words(self.signal)}: {measure}{self._against}{during(self.window)}"
 
@@ -122,9 +123,9 @@ def _times_seconds(unit: str, power: int) -> str:
 
 @dataclass(frozen=True)
 class MetricValue:
-    """What a metric comes to in one run: SI; `unit` "%" marks a ratio that is shown in per cent.
+    """The value of a metric in one run, in SI; `unit` "%" marks a ratio that is shown in per cent.
 
-    Of several repeats it is the mean, and `half` half the width of its confidence interval.
+    Over several repeats it is the mean, and `half` is half the width of its confidence interval.
     """
 
     number: float
@@ -133,7 +134,7 @@ class MetricValue:
 
 
 def during(window: TimeWindow | None, lead: str = "") -> str:
-    """Return a window as the end of a phrase: ", 1 to 6 s", after a `lead` such as "from "; ", at 2 s"."""
+    """Return a window as the end of a phrase: ", 1 to 6 s", with `lead` before the times; ", at 2 s"."""
     if window is None:
         return ""
     first, last = window
@@ -144,7 +145,7 @@ def window_of(text: str) -> TimeWindow:
     """Return the window [s] written as `from 1 s to 3 s`, `1 to 3 s` or `at 2 s`.
 
     Raises:
-        ValueError: it is none.
+        ValueError: the text is not a window.
     """
     match = re.fullmatch(r"at\s+(.+)|(?:from\s+)?(.+?)\s+to\s+(.+)", text.strip())
     if match is None:
@@ -157,17 +158,17 @@ def window_of(text: str) -> TimeWindow:
 
 
 def _time(text: str) -> float:
-    """Return a time in s, with its unit or without."""
+    """Return a time in s from a text with or without unit."""
     return float(convert(text if re.search(r"[a-z]", text) else f"{text} s", "s"))
 
 
 def metric(name: str) -> Metric:
-    """Return the metric written as `measure(signal)`, perhaps with a window behind it: see `window_of`.
+    """Parse a metric written as `measure(signal)`, perhaps followed by a window: see `window_of`.
 
     The signal may be `signal, reference` or `signal - other`.
 
     Raises:
-        ScenarioError: the name is not of that form, or there is no such measure.
+        ScenarioError: the name is not of that form, or the measure does not exist.
     """
     match = _METRIC.fullmatch(name)
     if match is None:
@@ -209,8 +210,8 @@ _METRIC = re.compile(r"\s*(\w+)\s*\(\s*([\w.*]+)\s*(?:([,-])\s*([\w.*]+)\s*)?\)\
 def columns_of(results: Results, signal: str) -> list[str]:
     """Return the columns of a signal: one, or four for a `*`; empty if they were not recorded.
 
-    Where units share the name, the plant's is taken, else the only one that is no sensor's or estimator's. A
-    bare name never means what is measured or estimated, even if nothing else is recorded.
+    If several instances have the name, the plant's is taken, else the only one that is not of a sensor or an
+    estimator. A bare name never means a measured or estimated signal, even if nothing else is recorded.
     """
     names = wheels(signal)
     found = [column for name in names if (column := _column(results, name)) is not None]
@@ -221,16 +222,19 @@ def _column(results: Results, name: str) -> str | None:
     for role in (None, "plant"):
         found = results.candidates(name, role=role)
         if len(found) == 1:
-            meant = found[0] == name or not _is_seen(results, found[0])
+            meant = found[0] == name or not _is_measured_or_estimated(results, found[0])
             return found[0] if meant and np.issubdtype(results.columns[found[0]].dtype, np.number) else None
-    found = [c for c in results.columns if variable_of(c) == name and not _is_seen(results, c)]
+    found = [
+        c for c in results.columns if variable_of(c) == name and not _is_measured_or_estimated(results, c)
+    ]
     return found[0] if len(found) == 1 and np.issubdtype(results.columns[found[0]].dtype, np.number) else None
 
 
 def evaluate(results: Results, chosen: Metric, window: TimeWindow | None = None) -> MetricValue | None:
-    """Return a metric of a run over the whole run or a window [s], if none is given the metric's own.
+    """Compute a metric over a window [s], by default its own or the whole run.
 
-    None if the run has no such signal or does not last for the window: part of it is another metric.
+    None if the run does not have the signal or does not cover the window: over a part of it, it would be a
+    different metric.
     """
     time, signals = results.time, _signals(results, chosen)
     if not time.size or not signals:
@@ -239,7 +243,7 @@ def evaluate(results: Results, chosen: Metric, window: TimeWindow | None = None)
     first, last = window or (-math.inf, math.inf)
     if window and not time[0] - 1e-9 <= first <= last <= time[-1] + 1e-9:
         return None
-    if first == last:  # the nearest row, wherever the run has recorded one
+    if first == last:  # a point in time: the nearest recorded row
         inside = np.array([np.argmin(np.abs(time - first))])
     else:
         inside = np.flatnonzero((time >= first - 1e-9) & (time <= last + 1e-9))
@@ -254,14 +258,14 @@ def evaluate(results: Results, chosen: Metric, window: TimeWindow | None = None)
         if chosen.measure.needs_rate and len(samples) == 1:
             samples.append(np.gradient(samples[0], t))
         numbers.append(chosen.measure.function(t, *samples))
-    number = float(np.max(numbers))  # a NaN of one wheel is not lost
+    number = float(np.max(numbers))  # np.max, unlike max, propagates the NaN of any wheel
     if math.isnan(number):
         return None
     return MetricValue(number, chosen.unit(si_of(results.units[signals[0][0]])[0]))
 
 
 def results_to_be(plan: Plan) -> Results:
-    """Return results without rows: the columns that a plan will record."""
+    """Return results without rows that have the columns which a plan will record."""
     from ..results.read import Results
     from ..results.run_record import connections_of
 
@@ -274,10 +278,10 @@ def results_to_be(plan: Plan) -> Results:
 
 
 def check_metrics(plan: Plan, chosen: Iterable[Metric]) -> None:
-    """Make sure that a run of a plan will record what metrics are made of.
+    """Check that a run of a plan will record the signals that metrics need.
 
     Raises:
-        ScenarioError: with a sentence for each metric that it will not.
+        ScenarioError: with a sentence for each metric that cannot be computed.
     """
     results, end = results_to_be(plan), plan.time(plan.n_steps)
     if problems := [why for one in chosen if (why := why_none(results, one, one.window, end))]:
@@ -285,12 +289,16 @@ def check_metrics(plan: Plan, chosen: Iterable[Metric]) -> None:
 
 
 def why_none(results: Results, one: Metric, window: TimeWindow | None, end: float) -> str:
-    """Return why there is no such metric of a run that lasts until `end` [s], "" if there is one."""
+    """Return why a metric has no value in a run that ends at `end` [s], "" if it has one."""
     missing = [s for s in filter(None, (one.signal, one.other)) if not columns_of(results, s)]
     if missing:
         names = fold(list(dict.fromkeys(variable_of(column) for column in results)))
         whole = list(results) if "." in missing[0] else names
-        seen = [c for c in results if variable_of(c) in wheels(missing[0]) and _is_seen(results, c)]
+        seen = [
+            c
+            for c in results
+            if variable_of(c) in wheels(missing[0]) and _is_measured_or_estimated(results, c)
+        ]
         if seen:
             named = listed(fold(seen), last="or")
             return f"{one.name}: {missing[0]} is recorded only as it is seen, name it so: {named}"
@@ -303,7 +311,7 @@ def why_none(results: Results, one: Metric, window: TimeWindow | None, end: floa
 
 
 def _unfit(results: Results, one: Metric) -> str:
-    """Return why a metric cannot be made of signals that are all there."""
+    """Return why a metric cannot be computed although all its signals were recorded, "" if it can."""
     wanted = f"{variable_of(one.signal)}_ref"
     having = [column for column in results if variable_of(column) == wanted]
     if one.other:
@@ -325,13 +333,13 @@ def unit_in(results: Results, chosen: Metric) -> str | None:
 
 
 def columns_for(results: Results, names: Iterable[str]) -> list[str]:
-    """Return the columns that metrics are made of; `results` may be without rows."""
+    """Return the columns that metrics need; `results` may have no rows."""
     every = [signals for name in names for signals in _signals(results, metric(name))]
     return list(dict.fromkeys(column for columns in every for column in columns))
 
 
 def _signals(results: Results, chosen: Metric) -> list[list[str]]:
-    """Return the columns that each function call takes, one call per wheel; empty if any is missing."""
+    """Return the columns of each function call, one call per wheel; empty if any is missing."""
     signals = []
     others = columns_of(results, chosen.other) if chosen.other else []
     for k, column in enumerate(columns_of(results, chosen.signal)):
@@ -361,7 +369,7 @@ def _signals(results: Results, chosen: Metric) -> list[list[str]]:
 
 
 def _beside(results: Results, column: str, measure: Measure) -> list[str]:
-    """Return the columns that a measure takes beside its signal; none if one is missing."""
+    """Return the further columns that a measure takes; none if one is missing."""
     name, signal = variable_of(column), measure.signal or ""
     wheel = name[len(signal) :]
     if not name.startswith(signal) or (wheel and wheel[1:] not in WHEELS):
@@ -371,13 +379,17 @@ def _beside(results: Results, column: str, measure: Measure) -> list[str]:
 
 
 def _rate_of(results: Results, column: str) -> str | None:
-    """Return the column of a signal's rate; that of what is measured or estimated only of the same unit."""
+    """Return the column of a signal's rate; for measured or estimated signals only of the same instance."""
     if f"{column}_rate" in results:
         return f"{column}_rate"
-    return None if _is_seen(results, column) else _column(results, f"{variable_of(column)}_rate")
+    return (
+        None
+        if _is_measured_or_estimated(results, column)
+        else _column(results, f"{variable_of(column)}_rate")
+    )
 
 
-def _is_seen(results: Results, column: str) -> bool:
+def _is_measured_or_estimated(results: Results, column: str) -> bool:
     """Return whether a column is a measurement or an estimate."""
     return any(column.partition(".")[0] in results.units_of_role(role) for role in SENSING)
 
@@ -385,7 +397,7 @@ def _is_seen(results: Results, column: str) -> bool:
 def reference_of(results: Results, column: str) -> str | None:
     """Return the column of the signal's reference, `x_ref` for `x`, if it was recorded.
 
-    Of several that of the unit which a wire leaves: one that only watches may stand beside it.
+    If several instances have one, it is that of the instance whose output is connected; others only observe.
     """
     name = f"{variable_of(column)}_ref"
     if found := _column(results, name):
@@ -396,6 +408,6 @@ def reference_of(results: Results, column: str) -> str | None:
 
 
 def evaluate_all(results: Results, names: Iterable[str] = STANDARD) -> dict[str, MetricValue]:
-    """Return those of the metrics that the run has the signals for."""
+    """Return the values of those metrics whose signals the run has recorded."""
     values = {name: evaluate(results, metric(name)) for name in names}
     return {name: value for name, value in values.items() if value is not None}

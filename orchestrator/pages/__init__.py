@@ -1,1 +1,1 @@
-"""Pages for people: self-contained HTML files made from results."""
+"""Self-contained HTML pages made from results."""

@@ -1,11 +1,10 @@
-"""Runs seen from above, as a part of a page or a page of its own, with no server.
+"""Animations of runs seen from above, as part of a page or as a page, without a server.
 
-    {{ assets() }}              once a page: style and script
-    {{ fragment(runs) }}        as often as there are animations
+    {{ assets() }}              once per page: style and script
+    {{ fragment(runs) }}        once per animation
 
-What is drawn is what was recorded, thinned; between two moments kept the browser interpolates.
-
-What an animation shows of a run: the car's motion and forces over at most 600 recorded moments.
+An animation shows recorded data: the car's motion and forces at up to 600 recorded instants, between which
+the browser interpolates.
 """
 
 from __future__ import annotations
@@ -32,19 +31,19 @@ from .friction_map import FrictionPatch, ground_of
 from .rendering import render
 
 STANDS = 0.5
-"""Speed below which a car goes nowhere and its sideslip angle tells nothing [m/s]; chosen: below any walk."""
+"""Speed below which a car counts as standing, with undefined sideslip [m/s]; chosen: below walking pace."""
 FRAMES = 600
-"""Moments kept of a run; chosen: 75 per second of an 8 s manoeuvre, more than a screen shows."""
+"""Largest number of frames of a run; chosen: 75 per second of an 8 s manoeuvre, above a screen's rate."""
 OVERHANG_FRONT, OVERHANG_REAR = 0.85, 1.0
-"""Outline beyond the axles [m], where no driver knows its car's ends; chosen: a saloon."""
+"""Overhangs beyond the axles [m], if the driver has no dimensions of the car; chosen: a saloon."""
 BESIDE = 0.2
-"""Body's width beyond the track width [m]; chosen: a tyre's width."""
+"""Width of the body minus track width [m]; chosen: a tyre's width."""
 USUAL = {"cg_to_front_axle": 1.3, "cg_to_rear_axle": 1.4, "track_width": 1.55}
-"""The car of a plant that tells no sizes [m]; chosen: a mid-size car."""
+"""Dimensions for a plant that has none [m]; chosen: a mid-size car."""
 
 POSE = ("position_x", "position_y", "yaw_angle")
 ROUNDABOUT = ("velocity_x", "velocity_y", "path_offset")
-"""Signals that are not shown as they are."""
+"""Signals used only to compute others."""
 SIGNALS = ("sideslip", "yaw_rate", "steer_angle", "yaw_moment", "cone_overrun", *ROUNDABOUT)
 
 
@@ -62,7 +61,7 @@ class CarOutline:
 
 @dataclass(frozen=True)
 class Frames:
-    """A run at the moments kept.
+    """The data of a run at the instants of an animation.
 
     `channels` are SI arrays of one length: time, x, y, yaw, and as recorded speed, sideslip, yaw_rate,
     steer_angle, yaw_moment, cone_overrun, path_y (the path the driver follows, at x), and per wheel
@@ -73,15 +72,15 @@ class Frames:
     channels: dict[str, np.ndarray]
     lanes: tuple[Lane, ...]
     ground: tuple[FrictionPatch, ...]
-    notes: tuple[str, ...]  # what could not be drawn
+    notes: tuple[str, ...]  # on what could not be drawn
     failed: bool = False
 
 
 def frames_of(results: Results) -> Frames:
-    """Return the frames of a run; those of a failed run end where its position was last a number.
+    """Return the frames of a run; those of a failed run end where its position ceases to be finite.
 
     Raises:
-        ResultsError: the position or the yaw angle was not recorded, or of no moment at all.
+        ResultsError: the position or the yaw angle was not recorded, or never finite.
     """
     time, (x, y, yaw) = _pose(results)
     kept = thinned(time)
@@ -120,7 +119,7 @@ def frames_of(results: Results) -> Frames:
 
 
 def thinned(time: np.ndarray, most: int = FRAMES) -> np.ndarray:
-    """Return the indices of at most so many rows [at least 2], even in time, the ends among them."""
+    """Return at most `most` (at least 2) row indices, evenly spaced in time, first and last row included."""
     if time.size <= most:
         return np.arange(time.size)
     wanted = np.linspace(time[0], time[-1], most)
@@ -131,13 +130,13 @@ def thinned(time: np.ndarray, most: int = FRAMES) -> np.ndarray:
 
 
 def rotated(along: np.ndarray, across: np.ndarray, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return a vector given in axes turned by `angle` [rad] in the axes they were turned from."""
+    """Rotate a vector by `angle` [rad]: from axes turned by that angle to the original axes."""
     c, s = np.cos(angle), np.sin(angle)
     return along * c - across * s, along * s + across * c
 
 
 def _pose(results: Results) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Return time, and x, y, yaw from the start to where one of them ends to be a number."""
+    """Return time, and x, y, yaw from the start until one of them is no longer finite."""
     pose = [_signal(results, name) for name in POSE]
     there = [values for values in pose if values is not None]
     if len(there) < len(pose):
@@ -161,7 +160,7 @@ def _signal(results: Results, name: str) -> np.ndarray | None:
 
 
 def _forces(results: Results, kept: np.ndarray, steer: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the tyre forces in vehicle axes, N."""
+    """Return the tyre forces in vehicle axes [N]."""
     along, across = columns_of(results, "tyre_force_x_*"), columns_of(results, "tyre_force_y_*")
     if not along or not across:
         return {}
@@ -174,7 +173,7 @@ def _forces(results: Results, kept: np.ndarray, steer: np.ndarray) -> dict[str, 
 
 
 def _grip(results: Results, kept: np.ndarray) -> dict[str, np.ndarray]:
-    """Return friction times load of every wheel, N: the radius of its friction circle."""
+    """Return friction times load of every wheel [N], the radius of its friction circle."""
     loads, forces = columns_of(results, "vertical_load_*"), columns_of(results, "tyre_force_x_*")
     if not loads or not forces:
         return {}
@@ -189,7 +188,7 @@ def _grip(results: Results, kept: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _friction(results: Results, wheel: str, *, tyre: str) -> np.ndarray | float | None:
-    """Return the friction at a wheel: as a road recorded it, or the constant that the tyre was given."""
+    """Return the friction at a wheel: as recorded by a road, or the constant input of the tyre."""
     if (recorded := _signal(results, f"friction_{wheel}")) is not None:
         return recorded
     fmu = results.record.fmus.get(tyre)
@@ -199,14 +198,14 @@ def _friction(results: Results, wheel: str, *, tyre: str) -> np.ndarray | float 
 
 
 def _parameters(results: Results, role: str) -> Iterator[Mapping[str, Any]]:
-    """Yield the parameters of the units of a role."""
+    """Yield the parameters of the instances with a role."""
     for unit in results.units_of_role(role):
         fmu = results.record.fmus[unit]
         yield {**fmu.defaults, **fmu.parameters}
 
 
 def _car(results: Results) -> tuple[CarOutline, bool]:
-    """Return the car's sizes, and False if the plant tells none of them."""
+    """Return the car's outline, and whether the plant has any of its dimensions."""
     told: dict[str, float] = {}
     for known in _parameters(results, "plant"):
         told |= {
@@ -216,7 +215,7 @@ def _car(results: Results) -> tuple[CarOutline, bool]:
         }
     front, rear, track = (told.get(name, usual) for name, usual in USUAL.items())
     ends = {"front": front + OVERHANG_FRONT, "rear": rear + OVERHANG_REAR, "width": track + BESIDE}
-    for known in _parameters(results, "driver"):  # whom the cones are measured with
+    for known in _parameters(results, "driver"):  # the cones are judged with the driver's dimensions
         if lanes_of(known):
             ends["width"] = float(known["vehicle_width"])
             ends["front"] = float(known.get("cg_to_front_end", ends["front"]))
@@ -233,11 +232,11 @@ READOUTS = (
     ("yaw_moment", "Yaw moment", "N.m", 0),
     ("cone_overrun", "Beyond the cones", "m", 2),
 )
-"""Channel, words, SI unit, decimals shown."""
+"""Channel, label, SI unit, decimals shown."""
 STRIP = ("sideslip", "yaw_rate", "steer_angle")
-"""What the curve above the slider may show: the first that was recorded."""
+"""Channels for the curve above the slider: the first that was recorded is shown."""
 NAMED = 6
-"""Frictions of the ground that are named one by one; of more, the least and the largest."""
+"""Number of ground frictions listed in the legend; if there are more, only the range is given."""
 MOST = len(LINES)
 """Runs in one animation: as many as there are colours."""
 
@@ -245,7 +244,7 @@ NamedRuns = Sequence[tuple[str, Results]]
 
 
 def fragment(runs: NamedRuns, *, title: str = "") -> Markup:
-    """Return the animation of up to seven runs (label, results) as a part of a page; it waits to be played.
+    """Return the animation of up to seven runs (label, results) as part of a page; it starts when played.
 
     Raises:
         ResultsError: a run's position or yaw angle was not recorded.
@@ -263,13 +262,13 @@ def assets() -> Markup:
 
 
 def page(runs: NamedRuns, *, title: str = "", below: str = "", changed: str = "") -> str:
-    """Return a page of its own; it plays by itself unless the reader has asked for less motion.
+    """Return an animation as a page; it starts by itself unless the reader prefers reduced motion.
 
     Args:
         runs: up to seven (label, results).
         title: of the page; default: the labels.
         below: a line under the title.
-        changed: what was changed against the scenario that the title names.
+        changed: overrides of the scenario that the title names.
 
     Raises:
         ResultsError: a run's position or yaw angle was not recorded.
@@ -288,7 +287,7 @@ def _facts(runs: NamedRuns, title: str, *, alone: bool = False) -> dict[str, Any
 
 
 def _key(runs: Sequence[Frames]) -> str:
-    """Return what the signs of the drawing mean, those that are drawn."""
+    """Return the legend of the symbols that are drawn."""
     drawn = {name for frames in runs for name in frames.channels}
     signs = (
         ("path_y", "grey dashes: the path the driver follows"),
@@ -308,7 +307,7 @@ def _key(runs: Sequence[Frames]) -> str:
 
 
 def data_of(runs: Sequence[tuple[str, Frames]]) -> dict[str, Any]:
-    """Return what the script draws: see `animation_frames.js` for how it is read."""
+    """Return the data for the script; see `animation_frames.js` for its format."""
     every = [frames for _, frames in runs]
     end = max(frames.channels["time"][-1] for frames in every)
     return {
@@ -326,7 +325,10 @@ def data_of(runs: Sequence[tuple[str, Frames]]) -> dict[str, Any]:
 
 
 def _run(number: int, label: str, frames: Frames, end: float, before: Sequence[Frames]) -> dict[str, Any]:
-    """Return one run, with its ground unless one `before` has the same; `end` [s] is that of the longest."""
+    """Return the data of one run; its ground only if none of `before` has the same.
+
+    `end` [s] is that of the longest run.
+    """
     ground = () if frames.ground in [other.ground for other in before] else frames.ground
     last = frames.channels["time"][-1]
     early = [f"this run ends at {last:.2f} s"] if last < end - 1e-6 and not frames.failed else []
@@ -350,7 +352,7 @@ def packed(values: np.ndarray) -> str:
 
 
 def still_of(runs: Sequence[Frames]) -> float:
-    """Return the moment [s] that tells most when nothing moves: that of the largest sideslip angle.
+    """Return the instant [s] shown while nothing moves: that of the largest sideslip angle.
 
     Without sideslip, that of the largest yaw rate; without both, the middle.
     """
@@ -367,7 +369,7 @@ def still_of(runs: Sequence[Frames]) -> float:
 
 
 def force_scale(runs: Sequence[Frames]) -> float:
-    """Return the length [m/N] that forces are drawn at, one for all wheels and runs.
+    """Return the length per force [m/N] for drawing, the same for all wheels and runs.
 
     Friction circles of an axle never overlap; without circles, no arrow is longer than half the track.
     """

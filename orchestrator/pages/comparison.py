@@ -1,6 +1,7 @@
-"""What a comparison's page begins with: metrics with their differences, the signals that differ most.
+"""Comparison of runs: metrics with differences, differences between records, signals that diverge.
 
-What differs between two runs: what they were made of; in which signals, when and how far they part.
+`divergence` finds when and how far the signals of two runs diverge, `differences` what differs between their
+records, `comparison_facts` what a page on several runs shows.
 """
 
 from __future__ import annotations
@@ -25,38 +26,39 @@ from ..results.read import Results
 from .page_parts import PageFigure, figure_of
 
 SAME = 1e-9
-"""A difference over the signal's peak that is none; chosen: far above rounding, far below any physics."""
+"""Differences below this, relative to the signal's peak, are ignored; chosen: far above rounding, far below
+any physics."""
 SEEN = 0.01
-"""A difference over the signal's peak that a reader of curves sees; chosen: a line's width in a figure."""
+"""Difference that is visible in a figure, relative to the signal's peak; chosen: the width of a line."""
 
 
 @dataclass(frozen=True)
 class SignalDifference:
-    """A signal that two runs do not share: when they part, and how far apart they get."""
+    """A signal that differs between two runs: from when on, and by how much."""
 
-    signal: str  # unit.variable, four wheels as one with `*`
-    targets: tuple[str, ...]  # units that take it as an input
+    signal: str  # instance.variable, four wheels as one with `*`
+    targets: tuple[str, ...]  # instances that take it as an input
     first: float  # s
-    seen: float | None  # s; when they differ by SEEN of the signal's peak; None: never
+    seen: float | None  # [s], when they differ by SEEN of the signal's peak; None: never
     largest: float  # in the signal's unit
     largest_at: float  # s
     unit: str
-    relative: float = 1.0  # the largest difference over the signal's peak
+    relative: float = 1.0  # largest difference over the signal's peak
 
 
 @dataclass(frozen=True)
 class RunComparison:
-    """All signals that differ, those that part first in front; and what could not be compared."""
+    """All signals that differ, earliest first, and those that could not be compared."""
 
     partings: tuple[SignalDifference, ...]
-    compared: int  # signals
+    compared: int  # number of signals
     notes: tuple[str, ...]
 
 
 def divergence(one: Results, other: Results) -> RunComparison:
-    """Compare all signals that both runs recorded, at the times that both have.
+    """Compare all signals that both runs recorded, at their common times.
 
-    Signals that part at the same time stand in the order of evaluation, so that causes come first.
+    Signals that begin to differ at the same time are in evaluation order, so that causes come first.
     """
     rows, others = _common(one.time, other.time)
     notes = [
@@ -85,7 +87,7 @@ def divergence(one: Results, other: Results) -> RunComparison:
 
 
 def _common(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rows of both at which the times are the same to a nanosecond."""
+    """Return the row indices of both arrays at which the times agree to a nanosecond."""
     _, rows, others = np.intersect1d(
         np.round(one * 1e9).astype(np.int64), np.round(other * 1e9).astype(np.int64), return_indices=True
     )
@@ -125,7 +127,7 @@ def _parting(
 
 
 def _together(one: SignalDifference, other: SignalDifference) -> SignalDifference:
-    """Return one parting of two wheels: the earliest moments, the largest difference."""
+    """Merge the differences of two wheels: the earliest times, the largest difference."""
     widest = max(one, other, key=lambda parting: parting.largest)
     seen = [parting.seen for parting in (one, other) if parting.seen is not None]
     return SignalDifference(
@@ -135,17 +137,17 @@ def _together(one: SignalDifference, other: SignalDifference) -> SignalDifferenc
 
 
 def targets_of(run: Mapping[str, Any], signal: str) -> tuple[str, ...]:
-    """Return the units that take a recorded signal, as the run's record says."""
+    """Return the instances that a recorded signal is connected to, taken from the run record."""
     wires = run.get("connections", [])
     return tuple(dict.fromkeys(wire["to"].partition(".")[0] for wire in wires if wire["from"] == signal))
 
 
 OF_RUN = ("status", "title", "algorithm", "step_size", "stop_time", "rows")
-"""Parts of a record that stand in the table by themselves."""
+"""Entries of a record that have a row each."""
 
 
 class RecordDifference(NamedTuple):
-    """A part of two records that is not the same; None where a record has no such part."""
+    """An entry that differs between two records; None where a record does not have it."""
 
     place: str
     one: Any
@@ -153,14 +155,14 @@ class RecordDifference(NamedTuple):
 
 
 def differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[RecordDifference]:
-    """Return what differs between the records of two runs: scenario, units, wires, versions."""
+    """Return what differs between the records of two runs: scenario, instances, wires, versions."""
     first, second = dict(_facts(one)), dict(_facts(other))
     exchanged = tuple(f"{unit}." for unit in _names(one) if _names(one)[unit] != _names(other).get(unit))
     both = first.keys() & second.keys()
     return [
         RecordDifference(place, first.get(place), second.get(place))
         for place in dict.fromkeys([*first, *second])
-        # units of two kinds share few parameters; that one of them has others is no news
+        # different FMUs have different parameters: list only those that both have
         if first.get(place) != second.get(place) and (place in both or not place.startswith(exchanged))
     ]
 
@@ -170,7 +172,7 @@ def _names(run: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _facts(run: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield place and value of everything that may differ."""
+    """Yield location and value of all entries of a record that are compared."""
     scenario = run.get("scenario", {})
     yield "scenario", scenario.get("file")
     yield "vehicle file", scenario.get("vehicle")
@@ -192,7 +194,7 @@ def _facts(run: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def differences_table(found: list[RecordDifference], one: str, other: str) -> Table:
-    """Return the table of what differs between two runs called so."""
+    """Return the table of differences between two records; `one`, `other`: the names of the runs."""
     rows: list[Any] = [[place, _text(a), _text(b)] for place, a, b in found]
     return Table("What the runs were made of", ["", one, other], rows)
 
@@ -204,7 +206,7 @@ def _text(value: Any) -> str | None:
 
 
 def partings_table(found: RunComparison, one: Results, other: Results) -> Table:
-    """Return the table of signals in which the results of two runs part, the earliest first."""
+    """Return the table of signals that differ between two runs, the earliest first."""
     headings = ["signal", "differs from", "visibly from", "largest difference", "at"]
     table = Table("What came out", headings, notes=list(found.notes))
     for parting in found.partings:
@@ -222,9 +224,9 @@ def partings_table(found: RunComparison, one: Results, other: Results) -> Table:
 
 
 MOST_DIFFERENT = 6
-"""Signals drawn that differ most; chosen: three rows of two panels are one screen."""
+"""Number of most different signals drawn; chosen: three rows of two panels fill a screen."""
 AT_ONCE = 8
-"""Partings that are shown; the others unfold. Chosen: more than the wires around one unit."""
+"""Differences shown; the rest are collapsed. Chosen: more than the wires of one instance."""
 RULE = (
     f"A difference counts from {SAME * 1e9:g} billionth of the signal's largest value; curves can be seen to "
     f"part from {100 * SEEN:g} %."
@@ -233,9 +235,9 @@ LESS_IS_BETTER = (
     "relative_peak_error", "mean_error", "rms_error", "stability_index", "overshoot", "settling_time",
     "slope_variation_rate", "effort", "total_variation_rate",
 )  # fmt: skip
-"""Measures of which the least is the best; of others, such as a path's displacement, that depends."""
+"""Measures that are better the smaller they are; for others, such as displacement, it depends."""
 OF_CONTROL = ("effort", "total_variation_rate")
-"""Measures of what a controller does: of one that does nothing they are no merit."""
+"""Measures of control activity: small values are no merit of a controller that does nothing."""
 
 
 class MetricCell(NamedTuple):
@@ -247,7 +249,7 @@ class MetricCell(NamedTuple):
 
 
 def comparison_facts(findings: ExperimentResult) -> dict[str, Any] | None:
-    """Return what a page says that compares the runs with the first one; None if none has results."""
+    """Return the template data of a page that compares runs with the first one; None if none has results."""
     runs = [
         LabelledRun(run.label, findings.results[name])
         for name, run in findings.experiment.runs.items()
@@ -289,7 +291,7 @@ def metric_rows(findings: ExperimentResult) -> list[dict[str, Any]]:
 
 
 def _idle(findings: ExperimentResult) -> set[int]:
-    """Return the numbers of runs in which nothing controls: some signal has no effort or chatter at all."""
+    """Return the indices of runs without control: the effort or chatter of some signal is zero."""
     of_control = [
         key
         for key, spec in findings.spec.metrics.items()
@@ -300,11 +302,11 @@ def _idle(findings: ExperimentResult) -> set[int]:
 
 
 def _best(values: Sequence[MetricValue | None], apart: Collection[int]) -> int | None:
-    """Return the number of the run whose value is the least, as it reads; None if no single one is.
+    """Return the index of the run whose displayed value is smallest; None if several share it.
 
     Args:
         values: of all runs.
-        apart: numbers of runs that do not take part.
+        apart: indices of runs to leave out.
     """
     known = sorted((one.number, k) for k, one in enumerate(values) if one is not None and k not in apart)
     if len(known) < 2:
@@ -315,7 +317,7 @@ def _best(values: Sequence[MetricValue | None], apart: Collection[int]) -> int |
 
 
 def _most_different(runs: Sequence[LabelledRun], found: Sequence[RunComparison]) -> PageFigure | None:
-    """Return the signals in which any run differs most from the first, relative to their peaks."""
+    """Return the figure of the signals that differ most from the first run, relative to their peaks."""
     apart: dict[str, float] = {}
     for parting in (parting for one in found for parting in one.partings):
         name = variable_of(parting.signal)
@@ -326,7 +328,7 @@ def _most_different(runs: Sequence[LabelledRun], found: Sequence[RunComparison])
 
 
 def difference(first: MetricValue | None, other: MetricValue | None) -> str:
-    """Return how a value differs from the first, with its sign; per cents differ by points."""
+    """Return the signed difference of a value from the first; ratios in per cent differ by points."""
     if first is None or other is None:
         return ""
     apart = other.number - first.number
@@ -350,7 +352,7 @@ def _parted(label: str, first: str, found: RunComparison) -> dict[str, Any]:
 
 
 def parting_summary(found: RunComparison) -> str:
-    """Return in a sentence which signals part first."""
+    """Return a sentence on the signals that differ first."""
     if not found.compared:
         return "The runs have no signal in common."
     if not found.partings:
@@ -371,7 +373,7 @@ def parting_summary(found: RunComparison) -> str:
 
 
 def parting_table(partings: Sequence[SignalDifference]) -> Table:
-    """Return a table of signals that differ, in the order in which they part."""
+    """Return a table of signals that differ, the earliest first."""
     headings = ["signal", "goes to", "differs from", "seen from", "largest difference", "at"]
     table = Table("", headings, numbers={2, 3, 4, 5} if partings else set())
     for one in partings:

@@ -1,9 +1,8 @@
-"""Block diagrams of a system as SVG: units on a diagonal for wide pages, one below the other for narrow ones.
+"""Block diagrams of a system as SVG: instances on a diagonal for wide pages, in a column for narrow ones.
 
-On the diagonal, signals run from a unit sideways into the column of the unit that takes them: above the
-diagonal to later units, below it back to earlier ones. Both drawings show the same wires.
-
-The system of one run or of several alike: its units, what may stand for each, what flows between them.
+On the diagonal, signals run from an instance sideways into the column of the instance that takes them: above
+the diagonal to later instances, below it back to earlier ones. Both drawings show the same wires. A diagram
+may cover several runs with the same instances; a block then lists all FMUs used for its instance.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from ..plan import Plan
 
 @dataclass(frozen=True)
 class DiagramBlock:
-    """A unit and the FMUs that stand for it in one run or another."""
+    """An instance and the FMUs used for it in any of the runs."""
 
     name: str
     fmus: tuple[str, ...]
@@ -30,18 +29,18 @@ class DiagramBlock:
 
 @dataclass(frozen=True)
 class SystemDiagram:
-    """Blocks in the order of the scenario, and the signals from one to another."""
+    """Blocks in the order of the scenario, and the signals between them."""
 
     blocks: tuple[DiagramBlock, ...]
     signals: dict[tuple[str, str], tuple[str, ...]]  # (source, target) -> names, four wheels as one with `*`
 
     def sources_of(self, target: str) -> list[str]:
-        """Return the units that a unit has inputs from, in order."""
+        """Return the instances that an instance has inputs from, in order."""
         return [block.name for block in self.blocks if (block.name, target) in self.signals]
 
 
 def system_of(plans: Iterable[Plan]) -> SystemDiagram:
-    """Return what the plans have together; they have the same units."""
+    """Return the diagram of plans that have the same instances."""
     fmus: dict[str, dict[str, None]] = {}
     wires: dict[tuple[str, str], dict[tuple[str, str], None]] = {}
     for plan in plans:
@@ -61,7 +60,7 @@ def system_of(plans: Iterable[Plan]) -> SystemDiagram:
 
 
 def systems_of(plans: Sequence[Plan]) -> list[tuple[SystemDiagram, list[int]]]:
-    """Return one system for each set of units that the plans have, with the numbers of its plans."""
+    """Return a diagram for each set of instances that occurs in the plans, with the indices of its plans."""
     groups: dict[frozenset[str], list[int]] = {}
     for number, plan in enumerate(plans):
         groups.setdefault(frozenset(unit.name for unit in plan.instances), []).append(number)
@@ -69,15 +68,15 @@ def systems_of(plans: Sequence[Plan]) -> list[tuple[SystemDiagram, list[int]]]:
 
 
 WIDE = 0.62
-"""Width of a character over the font size, of the widest usual sans-serif font (DejaVu Sans)."""
+"""Width of a character over the font size in the widest common sans-serif font (DejaVu Sans)."""
 NAME, SMALL, SIGNAL = 13, 10, 10.5
-"""Font sizes of a unit's name, of its FMUs, of signals [px]."""
+"""Font sizes of an instance's name, of its FMUs, of signals [px]."""
 LEADING = 1.25
-"""Distance of lines over the font size."""
+"""Line spacing over the font size."""
 PAD, GAP = 7, 20
-"""Room inside a block, between two blocks [px]."""
+"""Padding inside a block and gap between blocks [px]."""
 ARROW = 7
-"""Length of an arrow's head [px]."""
+"""Length of an arrowhead [px]."""
 
 BLOCK = {"rx": 5, "fill": "#eef4fa", "stroke": "#0072B2", "stroke_width": 1.6}
 LABEL = {"rx": 2, "fill": "#ffffff", "stroke": "#c9c9c9", "stroke_width": 0.8}
@@ -87,7 +86,7 @@ DiagramParts = list[Markup]
 
 
 def _tag(name: str, content: str = "", **attributes: Any) -> Markup:
-    """Return an element of SVG; `_` in the name of an attribute stands for `-`."""
+    """Return an SVG element; `_` in the name of an attribute becomes `-`."""
     given = (
         Markup(' {}="{}"').format(key.replace("_", "-"), round(one, 1) if isinstance(one, float) else one)
         for key, one in attributes.items()
@@ -100,7 +99,7 @@ def _width(texts: Sequence[str], size: float) -> float:
 
 
 def _lines(x: float, y: float, texts: Sequence[str], size: float, **look: Any) -> DiagramParts:
-    """Return lines of text from the top y on."""
+    """Return lines of text, top-aligned at y."""
     return [
         _tag("text", text, x=x, y=y + (i * LEADING + 0.95) * size, font_size=size, **look)
         for i, text in enumerate(texts)
@@ -108,7 +107,7 @@ def _lines(x: float, y: float, texts: Sequence[str], size: float, **look: Any) -
 
 
 def _arrow(x: float, y: float, dx: int, dy: int, colour: str) -> Markup:
-    """Return an arrow's head with its tip at (x, y), pointing along (dx, dy)."""
+    """Return an arrowhead with its tip at (x, y), pointing along (dx, dy)."""
     back_x, back_y, half = x - ARROW * dx, y - ARROW * dy, 0.5 * ARROW
     left, right = (back_x + half * dy, back_y + half * dx), (back_x - half * dy, back_y - half * dx)
     return _tag("polygon", points=_places([(x, y), left, right]), fill=colour)
@@ -139,7 +138,7 @@ def _block_size(block: DiagramBlock) -> tuple[float, float]:
 
 
 def diagonal(system: SystemDiagram, title: str) -> Markup:
-    """Return the diagram with units on the diagonal, for wide pages."""
+    """Return the diagram with instances on the diagonal, for wide pages."""
     blocks, count = system.blocks, len(system.blocks)
     place = {block.name: i for i, block in enumerate(blocks)}
     cells = {(place[a], place[b]): names for (a, b), names in system.signals.items()}
@@ -178,16 +177,16 @@ def diagonal(system: SystemDiagram, title: str) -> Markup:
 STACK = 372
 """Width of the narrow diagram [px]; chosen: a phone's 400 less its margins."""
 LANE = 11
-"""Distance of lanes [px]."""
+"""Distance between lanes [px]."""
 
 
 def stack(system: SystemDiagram, title: str) -> Markup:
-    """Return the diagram with one unit below the other, for phones and print.
+    """Return the diagram with the instances in a column, for phones and print.
 
-    Each source has a lane on the right; an arrow into a unit points at the line that says what it brings.
+    Each source has a lane on the right; an arrow into a block points at the line that lists its signals.
     """
     sources = [block.name for block in system.blocks if any(a == block.name for a, _ in system.signals)]
-    right = STACK - LANE * len(sources) - 10  # of the blocks
+    right = STACK - LANE * len(sources) - 10  # right edge of the blocks
     characters = int((right - 2 * PAD) / (SIGNAL * WIDE))
     lane = {name: right + 14 + LANE * k for k, name in enumerate(sources)}
     leaves: dict[str, float] = {}
@@ -229,5 +228,5 @@ def stack(system: SystemDiagram, title: str) -> Markup:
 
 
 def diagrams(system: SystemDiagram, title: str) -> Markup:
-    """Return both drawings; the page's style shows the one that fits."""
+    """Return both drawings; the style of the page shows the one that fits."""
     return diagonal(system, title) + stack(system, title)

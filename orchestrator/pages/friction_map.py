@@ -1,4 +1,4 @@
-"""The ground of an animation: which friction lies where, by the patches and table in the road's record."""
+"""Friction map under an animation, from the patches and the table in the road's recorded parameters."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from vocabulary.friction_table import FrictionTable, table_of
 from vocabulary.patches import Patch, Point, Span, patches_of
 
 BESIDE = (50.0, 25.0)
-"""Ground drawn beyond the car's path along x and y [m]; chosen: what is in sight of it."""
+"""Ground drawn beyond the car's path along x and y [m]; chosen: about the visible surroundings."""
 MOST = 4000
-"""Pieces drawn; chosen: a chequerboard of 2 m over 200 m by 60 m, and what a browser paints at once."""
+"""Largest number of polygons; chosen: a 2 m chequerboard of 200 m by 60 m, which browsers draw at once."""
 
 Bounds = tuple[float, float]
 
 
 class FrictionPatch(NamedTuple):
-    """A polygon of one friction."""
+    """A polygon of constant friction."""
 
     friction: float
     corners: tuple[Point, ...]
 
 
 def ground_of(parameters: Mapping[str, Any], x: Bounds, y: Bounds) -> list[FrictionPatch]:
-    """Return the ground around a path from x[0] to x[1], y[0] to y[1] [m], upper pieces behind lower ones.
+    """Return the polygons around a path within x[0] to x[1], y[0] to y[1] [m], in drawing order.
 
-    None without patches and table, or if there would be more than `MOST` pieces.
+    Empty without patches and table, or if there would be more than `MOST` polygons.
     """
     text, base, patch = (parameters.get(name) for name in ("patches", "base_friction", "patch_friction"))
     if not isinstance(text, str) or not isinstance(base, (int, float)) or not isinstance(patch, (int, float)):
@@ -49,11 +49,11 @@ def ground_of(parameters: Mapping[str, Any], x: Bounds, y: Bounds) -> list[Frict
 
 
 class _TooFineError(Exception):
-    """There would be more intervals than can be drawn."""
+    """There are more intervals than can be drawn."""
 
 
 def _of_table(table: FrictionTable | None, box: Sequence[Bounds]) -> Iterator[FrictionPatch]:
-    """Yield around every point of a table what is nearer to it than to others, within a box."""
+    """Yield for every point of a table the area nearest to it, within a box."""
     if table is None:
         return
     along, across = (_around(axis, within) for axis, within in zip((table.x, table.y), box, strict=True))
@@ -62,14 +62,14 @@ def _of_table(table: FrictionTable | None, box: Sequence[Bounds]) -> Iterator[Fr
 
 
 def _around(places: Sequence[float], within: Bounds) -> list[tuple[int, Bounds]]:
-    """Return (number, from middle to middle) of the places whose surroundings reach into an interval."""
+    """Return (index, interval between midpoints) of the positions whose interval overlaps `within`."""
     middles = [0.5 * (a + b) for a, b in pairwise(places)]
     edges = np.clip([places[0], *middles, places[-1]], *within).tolist()
     return [(i, (a, b)) for i, (a, b) in enumerate(pairwise(edges)) if a < b]
 
 
 def _of_patches(patches: Iterable[Patch], otherwise: float, box: Sequence[Bounds]) -> Iterator[FrictionPatch]:
-    """Yield the parts of patches within a box; `otherwise`: friction of those that name none."""
+    """Yield the parts of patches within a box; `otherwise`: friction of patches that state none."""
     for one in patches:
         for corners in _polygons(one, box):
             yield FrictionPatch(otherwise if one.friction is None else one.friction, corners)
@@ -85,7 +85,7 @@ def _polygons(patch: Patch, box: Sequence[Bounds]) -> Iterable[tuple[Point, ...]
 
 
 def _intervals(spans: Iterable[Span], within: Bounds) -> list[Bounds]:
-    """Return where all spans of one axis hold, within an interval."""
+    """Return the intervals within `within` in which all spans of an axis hold."""
     found = [within]
     for _, low, high, period in spans:
         if period:

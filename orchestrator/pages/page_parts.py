@@ -1,9 +1,7 @@
-"""What report and comparison pages share: figures, animations, FMUs and settings as facts for templates.
+"""Parts shared by report, comparison and ranking pages: figures, animations, tables of FMUs and versions.
 
-The panels of a figure one by one, as small SVG images that a page puts side by side or below each other.
-
-What stands above a panel in a figure, title and legend, is text of the page here, so that it can be read
-on a phone.
+Figures are embedded panel by panel, as small SVG images that a page puts next to or below each other. Their
+titles and legends are HTML text of the page, so that they can be read on a phone.
 """
 
 from __future__ import annotations
@@ -37,18 +35,18 @@ if TYPE_CHECKING:
 
 
 WIDTH, ROW = 4.7, 2.15
-"""Width of a panel and height of a row [inches]; chosen: 9 points of type stay 7 on a phone."""
+"""Width of a panel and height of a row [inches]; chosen: 9 pt text is still 7 pt on a phone."""
 BUCKETS = 450
-"""Buckets that a line over time is thinned to; chosen: one per pixel of a panel."""
+"""Number of buckets that a line over time is thinned to; chosen: one per pixel of a panel."""
 CURLY = str.maketrans("'\"", "’”")
-"""Quotes in a text, so that those of the markup can be told from them."""
+"""Typographic quotes for text, so that straight ones occur only in the markup."""
 LOOK: Any = {**RC, "svg.fonttype": "none", "axes.titlesize": 9}
-"""As in figures, but with text as text."""
+"""Style of figures, with text kept as text."""
 
 
 @dataclass(frozen=True)
 class PanelImage:
-    """A panel: what it shows, and its image as the address of an `<img>`."""
+    """A panel: its title, and its image as a `data:` URL for an `<img>`."""
 
     name: str
     heading: Markup
@@ -57,7 +55,7 @@ class PanelImage:
 
 @dataclass(frozen=True)
 class LegendEntry:
-    """What a line stands for; its colour, width [px] and dashes (SVG)."""
+    """A line of a legend: label, colour, width [px] and dashes (SVG)."""
 
     label: str
     colour: str
@@ -68,9 +66,9 @@ class LegendEntry:
 def panel_images(
     runs: Sequence[LabelledRun], names: Sequence[str], *, whole: bool = False
 ) -> tuple[list[PanelImage], list[LegendEntry]]:
-    """Return the panels that the runs have the signals for, and the legend that they share.
+    """Return the panels whose signals the runs have recorded, and their common legend.
 
-    `whole`: no run leaves the axes, however far it goes.
+    `whole`: axes include all lines, however far they go.
     """
     import matplotlib
 
@@ -96,7 +94,7 @@ def panel_images(
 
 
 def _path_beside(panel: Panel, runs: Sequence[LabelledRun]) -> Panel:
-    """Return the panel; a path as one of the shape of the others."""
+    """Return the panel; a path panel gets the shape of the others."""
     if panel.name != "path":
         return panel
     room = (ROW - 0.5) / (WIDTH - 0.6)
@@ -121,10 +119,10 @@ def _draw(panel: Panel) -> Figure:
 
 
 def _align(drawn: Sequence[Figure]) -> None:
-    """Give the axes of all panels the same left and right ends."""
+    """Align the left and right ends of the axes of all panels."""
     for figure in drawn:
         if (layout := figure.get_layout_engine()) is not None:
-            layout.execute(figure)  # nothing need be drawn for that
+            layout.execute(figure)  # runs the layout without drawing
             figure.set_layout_engine("none")
     places = [figure.axes[0].get_position(original=True) for figure in drawn]
     left = max((place.x0 for place in places), default=0.0)
@@ -140,7 +138,7 @@ def _entry(label: str, style: dict[str, Any]) -> LegendEntry:
 
 
 def _take_title(axes: Axes) -> Markup:
-    """Take the title away from the axes and return it for the page."""
+    """Remove the title from the axes and return it as HTML."""
     heading = axes.get_title(loc="left")
     axes.set_title("", loc="left")
     return in_html(heading)
@@ -153,21 +151,21 @@ def _address(figure: Figure) -> Markup:
 
 
 def address_of(svg: str) -> Markup:
-    """Return an SVG image as a `data:` address for an attribute in double quotes, as short as it can be."""
+    """Return an SVG image as a short `data:` URL for an attribute in double quotes."""
     svg = svg[svg.index("<svg") :]
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
     svg = re.sub(r"(?<=>)[^<]+(?=<)", lambda text: text[0].translate(CURLY), svg)
     svg = svg.replace("'", "").replace('"', "'")
     svg = re.sub(
         r"(scale\([^)]*\))|(\.\d\d)\d+", lambda found: found[1] or found[2], svg
-    )  # glyphs keep their size
+    )  # glyphs keep their aspect ratio
     svg = re.sub(r"\s*\n\s*", "\n", svg)
     return Markup("data:image/svg+xml," + quote(svg, safe=" =:/'(),;.-+*!?@$[]{}|^`~"))
 
 
 @dataclass(frozen=True)
 class FigureImage:
-    """A whole figure: what it is called, and its image as the address of an `<img>`."""
+    """A whole figure: its title, and its image as a `data:` URL for an `<img>`."""
 
     title: str
     address: Markup
@@ -204,9 +202,9 @@ class PageFigure:
 def figure_of(
     wanted: tuple[str, str, Sequence[LabelledRun], Sequence[str], tuple[str, ...]], *, whole: bool = False
 ) -> PageFigure | None:
-    """Return a figure of (id, title, runs, panels, files); None if the runs recorded nothing of it.
+    """Return a figure of (id, title, runs, panels, files); None if the runs recorded none of its signals.
 
-    `whole`: no run leaves the axes, however far it goes.
+    `whole`: axes include all lines, however far they go.
     """
     name, title, runs, panels, files = wanted
     images, legend = panel_images(runs, panels, whole=whole)
@@ -215,7 +213,7 @@ def figure_of(
 
 @dataclass(frozen=True)
 class Animation:
-    """Runs seen from above, and which runs of the figure are not among them."""
+    """An animation of runs seen from above, and the runs of the figure that are not in it."""
 
     title: str
     drawing: Markup
@@ -223,7 +221,7 @@ class Animation:
 
 
 def animation_of(runs: Sequence[LabelledRun], title: str) -> Animation | None:
-    """Return the animation of as many runs as have colours; None if none recorded its position."""
+    """Return the animation of as many runs as there are colours; None if none recorded its position."""
     placed = [_is_placed(run) for run in runs]
     able = list(compress(runs, placed))
     if not able:
@@ -236,7 +234,7 @@ def animation_of(runs: Sequence[LabelledRun], title: str) -> Animation | None:
 
 
 def fmus_of(runs: Iterable[Results | Plan]) -> Table:
-    """Return every FMU that took part in the runs, as their records or plans say."""
+    """Return the table of all FMUs in the runs, taken from their records or plans."""
     found: dict[tuple[str, str], dict[str, None]] = {}
     for one in runs:
         for unit, name, sha256 in _fmus_in(one):
@@ -247,7 +245,7 @@ def fmus_of(runs: Iterable[Results | Plan]) -> Table:
 
 
 def _is_placed(run: LabelledRun) -> bool:
-    """Return whether a run recorded where its car is."""
+    """Return whether a run recorded the position of its car."""
     try:
         frames_of(run.results)
     except ResultsError:
@@ -256,7 +254,7 @@ def _is_placed(run: LabelledRun) -> bool:
 
 
 def _fmus_in(one: Results | Plan) -> Iterator[tuple[str, str, str]]:
-    """Yield unit, FMU and its hash."""
+    """Yield instance, FMU and its hash."""
     if isinstance(one, Plan):
         yield from ((unit.name, unit.fmu.name, unit.fmu.sha256) for unit in one.instances)
     else:
@@ -265,9 +263,9 @@ def _fmus_in(one: Results | Plan) -> Iterator[tuple[str, str, str]]:
 
 
 def programs_of(runs: Iterable[Results | Plan]) -> dict[str, str]:
-    """Return the versions of the programs that made the runs, as their records say.
+    """Return the versions of the programs that made the runs, taken from their records.
 
-    Of a run without a record, known by its key in the journal, they are those of today: the key tells them.
+    Runs without a record, known by their key in the journal, have today's versions: the key includes them.
     """
     found: dict[str, dict[str, None]] = {}
     for one in runs:
@@ -278,7 +276,7 @@ def programs_of(runs: Iterable[Results | Plan]) -> dict[str, str]:
 
 
 def made_by() -> dict[str, object]:
-    """Return what the foot of every page says."""
+    """Return the content of the footer of every page."""
     return {
         "versions": versions(),
         "made": f"{datetime.now(timezone.utc):%Y-%m-%d %H:%M} UTC",
@@ -286,5 +284,5 @@ def made_by() -> dict[str, object]:
 
 
 def anchor(text: str) -> str:
-    """Return a text as the name of a place in a page."""
+    """Return a text as an HTML anchor name."""
     return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")

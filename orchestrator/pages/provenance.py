@@ -1,8 +1,8 @@
-"""Where every parameter's value comes from: a paper, a choice, an erratum, or the study itself.
+"""The provenance of parameter values: from a paper, an erratum, our choice, or the study itself.
 
-That is said where the value stands: as the source of the parameter in its FMU, in the comment beside it in
-the scenario or vehicle file, or in that file's `source`. The first word of a source tells what it is:
-`paper`, `erratum`, `chosen`; any other is literature.
+It is read from where the value is: from the parameter's source in its FMU, from the comment next to it in the
+scenario or vehicle file, or from that file's `source`. The first word of a source is its kind: `paper`,
+`erratum`, `chosen`; anything else is literature.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _COMMENT = re.compile(r"#\s*(.*?)\s*$")
 
 @dataclass(frozen=True)
 class ValueSource:
-    """Where a value comes from: its kind, and the words of the source."""
+    """The provenance of a value: its kind, and the text of the source."""
 
     kind: str
     says: str
@@ -42,25 +42,25 @@ VARIED_BY_STUDY = ValueSource(VARIED, "set by the study")
 
 @dataclass
 class PageParameter:
-    """A parameter in all runs of a study."""
+    """A parameter with its values in all runs of a study."""
 
     name: str
     meaning: str
     unit: str
-    default: ValueSource  # of the FMU's own value
-    given: ValueSource | None = None  # of the value that the scenario or the vehicle file gives
+    default: ValueSource  # of the FMU's default
+    given: ValueSource | None = None  # of the value in the scenario or vehicle file
     set_by_study: bool = False
     values: dict[str, None] = field(default_factory=dict)  # as text, each once
 
     @property
     def origin(self) -> ValueSource:
-        """Where the value comes from that stands where the study sets no other."""
+        """The provenance of the value that applies where the study does not override it."""
         return self.given or self.default
 
 
 @dataclass
 class ParameterGroup:
-    """The parameters of a vehicle file, of a unit's FMU, or the constants of a scenario."""
+    """The parameters of a vehicle file or of an instance's FMU, or the constants of a scenario."""
 
     title: str
     below: str
@@ -69,7 +69,7 @@ class ParameterGroup:
     def note(
         self, name: str, variable: Variable, meaning: str, value: str, origin: ValueSource | None
     ) -> None:
-        """Note the value of a variable in one run, and where that comes from; None: from the FMU."""
+        """Add the value of a variable in one run, and its provenance; None: the FMU's default."""
         default = origin_of(variable.source)
         row = self.parameters.setdefault(name, PageParameter(name, meaning, variable.unit or "", default))
         row.values[value] = None
@@ -80,7 +80,7 @@ class ParameterGroup:
 
 
 def origin_of(source: str, otherwise: str = "") -> ValueSource:
-    """Return what a source says as an origin; one that names no kind is of the kind that is given."""
+    """Parse a source; `otherwise` is the kind of a source that names none."""
     return ValueSource(_first_word(source) or otherwise or (LITERATURE if source else NEUTRAL), source)
 
 
@@ -90,14 +90,14 @@ def _first_word(source: str) -> str:
 
 
 def said_in(comment: str, file: str) -> ValueSource:
-    """Return what a comment says of a value, "its unit, remarks; source", in a file with a source."""
+    """Parse a comment, "its unit, remarks; source", in a file with a source."""
     parts = comment.split("; ")
     begin = next((i for i, part in enumerate(parts) if _first_word(part)), 0)
     return origin_of("; ".join(parts[begin:]), _first_word(file) or NEUTRAL)
 
 
 def groups_of(runs: Sequence[tuple[LoadedScenario, Plan]]) -> list[ParameterGroup]:
-    """Return all parameters of the runs: the vehicles', then those of every unit's FMUs, then constants."""
+    """Return all parameters of the runs: the vehicles', those of each instance's FMUs, constants."""
     vehicles: dict[str, ParameterGroup] = {}
     units: dict[tuple[str, str], ParameterGroup] = {}
     constants = ParameterGroup("Constant inputs", "no unit gives them")
@@ -133,7 +133,7 @@ def _vehicle_group(scenario: LoadedScenario, file: Path) -> ParameterGroup:
 
 
 def _constants(group: ParameterGroup, scenario: LoadedScenario, unit: Instance) -> None:
-    """Note the constants of a unit; four wheels that are alike as one name that ends with `*`."""
+    """Add the constants of an instance; four equal wheels become one name that ends with `*`."""
     alike: dict[str, list[str]] = {}
     for name, value in unit.constants.items():
         series = unit.series.get(name)
@@ -150,29 +150,29 @@ def _constants(group: ParameterGroup, scenario: LoadedScenario, unit: Instance) 
 
 
 def _origin_of_constant(scenario: LoadedScenario, unit: Instance, name: str) -> ValueSource | None:
-    """Return where the value of an input comes from, None if its FMU gives it."""
+    """Return the provenance of an input's constant, None if it is the FMU's own."""
     origin = unit.origins.get(name, DEFAULT)
     if origin.kind == "scenario":
         given = [pattern for pattern in scenario.inputs if _names(pattern, unit.name, name)]
         exact = max(given, key=lambda one: ("*" not in one, "." in one), default=None)
-        return _said(scenario, ("inputs", exact) if exact else (_fact(scenario, name),))
+        return _provenance_in_scenario(scenario, ("inputs", exact) if exact else (_fact(scenario, name),))
     return None if origin == DEFAULT else VARIED_BY_STUDY
 
 
 def _names(pattern: str, unit: str, name: str) -> bool:
-    """Return whether a pattern of the scenario's inputs, `[unit.]name` with a `*`, means an input."""
+    """Return whether a pattern of the scenario's inputs, `[instance.]name` with `*`, matches an input."""
     whole = f"{unit}.{name}" if "." in pattern else name
     return fnmatchcase(whole, pattern)
 
 
 def _origin(scenario: LoadedScenario, unit: Instance, name: str) -> ValueSource | None:
-    """Return where a value comes from if the scenario or the vehicle gives it, None if the FMU does."""
+    """Return the provenance of a value from the scenario or vehicle file, None if it is the FMU's own."""
     origin = unit.origins.get(name, DEFAULT)
     if origin == DEFAULT:
         return None
     if origin.kind == "vehicle":
         measure = unit.fmu.variables[name].unit or "1"
-        words = _beside(scenario.vehicle_document, ("parameters", name))
+        words = _comment_on_line(scenario.vehicle_document, ("parameters", name))
         words = re.sub(rf"^{re.escape(measure)}(?![\w/.])[,;]?\s*", "", words)
         return said_in(words, scenario.vehicle_file.source)
     if origin.kind == "derived":
@@ -180,34 +180,34 @@ def _origin(scenario: LoadedScenario, unit: Instance, name: str) -> ValueSource 
     if origin.kind == "scenario":
         own = name in scenario.units[unit.name].parameters
         key: KeyPath = ("units", unit.name, "parameters", name) if own else (_fact(scenario, name),)
-        return _said(scenario, key)
+        return _provenance_in_scenario(scenario, key)
     if origin.kind == "file":
         of_tyres = any(origin.detail == file.path.name for file in scenario.tyre_files.values())
         return ValueSource(LITERATURE, f"{'tyre property ' if of_tyres else ''}file {origin}")
     return VARIED_BY_STUDY
 
 
-def _said(scenario: LoadedScenario, key: KeyPath) -> ValueSource:
-    """Return what the scenario says of a value where it stands, beside it or above its unit."""
-    words = _beside(scenario.document, key)
+def _provenance_in_scenario(scenario: LoadedScenario, key: KeyPath) -> ValueSource:
+    """Return the provenance in the scenario's comment on a value, next to it or above its instance."""
+    words = _comment_on_line(scenario.document, key)
     if key[0] == "units":
-        words = words or _above(scenario.document, key[:2])
+        words = words or _comment_above(scenario.document, key[:2])
     return said_in(words or scenario.source, scenario.source)
 
 
 def _fact(scenario: LoadedScenario, name: str) -> str:
-    """Return the fact of the scenario that gives a parameter or an input, "" if none does."""
+    """Return the scenario's global value that sets a parameter or an input, "" if none does."""
     facts = (fact for fact, one, _, _ in facts_of(scenario) if name in (*one.inputs, *one.parameters))
     return next(facts, "")
 
 
-def _beside(document: Document, key: KeyPath) -> str:
-    """Return the comment in the line of a value, nothing if there is none."""
+def _comment_on_line(document: Document, key: KeyPath) -> str:
+    """Return the comment on the line of a value, "" if there is none."""
     match = _COMMENT.search(linecache.getline(str(document.path), document.lines.get(key, 0)))
     return match[1] if match else ""
 
 
-def _above(document: Document, key: KeyPath) -> str:
+def _comment_above(document: Document, key: KeyPath) -> str:
     """Return the comment lines right above a key."""
     number = document.lines.get(key, 1) - 1
     found: list[str] = []
@@ -218,13 +218,13 @@ def _above(document: Document, key: KeyPath) -> str:
 
 
 def text_of(value: Value | None) -> str:
-    """Return a value as a scenario file would have it, numbers with six digits."""
+    """Return a value as written in a scenario file, numbers with six digits."""
     if isinstance(value, bool):
         return str(value).lower()
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def count_kinds(groups: Iterable[ParameterGroup]) -> dict[str, int]:
-    """Return how many parameters there are of each kind of origin."""
+    """Return the number of parameters by kind of provenance."""
     kinds = Counter(one.origin.kind for group in groups for one in group.parameters.values())
     return {kind: kinds[kind] for kind in (PAPER, ERRATUM, CHOSEN, LITERATURE, NEUTRAL) if kind in kinds}

@@ -1,4 +1,4 @@
-"""The page of a ranking: who passes what on the first screen, every cell one click from its runs."""
+"""The HTML page of a ranking: the overview first, every cell linked to its runs."""
 
 from __future__ import annotations
 
@@ -41,16 +41,16 @@ STATES = {
     "missing": "runs are missing in this build",
 }
 OTHERS = ("speed_lost", "intervention", "chatter")
-"""Numbers of a cell that are told beside margin and sideslip."""
+"""Numbers of a cell shown in addition to margin and sideslip."""
 
 
 def ranking_page(ranked: RankingResult, folder: Path, command: str) -> str:
     """Return the page as HTML.
 
     Args:
-        ranked: what the ranking comes to.
-        folder: of its results, in which the page lies.
-        command: that makes it.
+        ranked: the result of the ranking.
+        folder: its results folder, which also holds the page.
+        command: command line that repeats it.
     """
     ranking = ranked.ranking
     digits = deciding_digits(ranked.standings)
@@ -89,7 +89,7 @@ def _image(file: Path, title: str) -> FigureImage | None:
 
 
 def _row(ranked: RankingResult, one: EntryScore, after: list[str], digits: Digits) -> dict[str, Any]:
-    """Return a controller's row of the first table."""
+    """Return the row of a controller in the first table."""
     row = row_of(one, digits)
     texts = Table("", after, [[row[heading] for heading in after]]).text()[0]
     return {
@@ -116,7 +116,7 @@ def _id(cell: RankingCell) -> str:
 
 
 def _cell(ranked: RankingResult, one: EntryScore, cell: RankingCell, folder: Path) -> dict[str, Any]:
-    """Return what stands behind a cell: its numbers, all its runs, its figure, its command."""
+    """Return the details of a cell: its numbers, all its runs, its figure, its command."""
     condition = ranked.ranking.conditions[cell.condition]
     kept = next((run.drive for run in cell.runs if run.drive.job and run.drive.job.keep), None)
     picture = None
@@ -150,13 +150,13 @@ def _text(number: float | None, unit: str) -> str | None:
 
 
 def again_command(ranked: RankingResult, cell: RankingCell, folder: Path) -> str:
-    """Return the command that makes a cell's runs again, beside those that are there."""
+    """Return the command that repeats the runs of a cell, in another folder."""
     chosen = ["--only", cell.entry, "--condition", cell.condition, "--out", str(folder / "again")]
     return shlex.join(["yawbench", "rank", str(ranked.ranking.path), *chosen])
 
 
 def series_command(ranked: RankingResult, cell: RankingCell) -> str:
-    """Return the command that drives the regulation's whole series of a cell, with a figure of every run."""
+    """Return the command that drives the regulation's whole series for a cell, with a figure of every run."""
     ranking = ranked.ranking
     condition = ranking.spec.conditions[cell.condition]
     words = ["yawbench", "drive", "sine-with-dwell", "--figures"]
@@ -172,7 +172,7 @@ def series_command(ranked: RankingResult, cell: RankingCell) -> str:
 
 
 def _option(change: Override) -> list[str]:
-    """Return a change as an option of the command line."""
+    """Return an override as an option of the command line."""
     if change.place == "vehicle":
         return ["--vehicle", os.path.relpath(str(change.value))]
     if change.faulty:
@@ -182,7 +182,7 @@ def _option(change: Override) -> list[str]:
 
 
 def _conditions(ranked: RankingResult) -> Table:
-    """Return what the conditions are."""
+    """Return the table of conditions."""
     ranking = ranked.ranking
     headings = ["condition", "car", "A", "scenario", "changed", "runs of a controller", "responsiveness"]
     table = Table("", headings)
@@ -198,7 +198,7 @@ def _conditions(ranked: RankingResult) -> Table:
 
 
 def _entries(ranked: RankingResult) -> Table:
-    """Return who the controllers are."""
+    """Return the table of controllers."""
     table = Table("", ["controller", "name", "FMU", "parameters", "gains", "source"])
     for one in ranked.standings:
         spec: EntrySpec = one.spec

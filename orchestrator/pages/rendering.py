@@ -1,4 +1,4 @@
-"""From facts to HTML: the templates of all pages, their style, and how tables become HTML."""
+"""HTML rendering: the Jinja templates of all pages, their style, and verdict symbols."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ SIGNS = {
     NOT_JUDGED: ("open", "–"),
     **{word: ("bad", "✗") for word in FAILS.values()},
 }
-"""Verdict -> class of its style, sign: told apart without colours too."""
+"""Verdict -> CSS class and symbol, which differ even without colours."""
 
 
 def render(template: str, **facts: Any) -> str:
-    """Return a template filled with facts; a fact that it lacks is an error, not an empty place."""
+    """Render a template; a variable that is missing is an error, not empty text."""
     return _templates().get_template(template).render(facts)
 
 
 @functools.cache
 def _templates() -> Environment:
-    """Return the templates, each compiled once."""
+    """Return the template environment; each template is compiled once."""
     environment = Environment(
         loader=PackageLoader("orchestrator.pages"),
         autoescape=True,
@@ -42,12 +42,12 @@ def _templates() -> Environment:
 
 
 def style() -> Markup:
-    """Return the style of all pages with text."""
+    """Return the style sheet shared by all pages with text."""
     return Markup((files(__package__) / "static" / "page.css").read_text(encoding="utf-8"))
 
 
 def verdict_sign(word: str) -> Markup:
-    """Return a verdict as a sign with its word; other text as it is."""
+    """Return a verdict as a symbol with its word; other text unchanged."""
     if word not in SIGNS:
         return Markup.escape(word)
     kind, sign = SIGNS[word]

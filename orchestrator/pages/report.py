@@ -1,6 +1,6 @@
-"""An experiment as a chapter of a page: verdicts, system, figures, tables, parameters, how to repeat it.
+"""The report page of one or several experiments, a chapter for each, in a single HTML file.
 
-The page of an experiment, or of several: one file, made from what stands on disk.
+A chapter has the verdicts, system, figures, tables and parameters of an experiment, and how to repeat it.
 """
 
 from __future__ import annotations
@@ -67,15 +67,15 @@ def chapter(
     shown_in: Path,
     each: Each = map,
 ) -> dict[str, Any]:
-    """Return what an experiment's chapter says.
+    """Return the template data of an experiment's chapter.
 
     Args:
-        findings: the experiment and what it comes to.
-        command: that makes it.
+        findings: the experiment and its results.
+        command: command line that repeats it.
         stale: run -> why its results are not those of its plan.
         folder: of its results and figures.
         shown_in: folder of the page.
-        each: how to draw many panels.
+        each: `map` used to draw panels, perhaps in parallel.
     """
     experiment, spec = findings.experiment, findings.spec
     name = anchor(f"{experiment.path.absolute().parent.name} {experiment.path.stem}")
@@ -97,7 +97,7 @@ def chapter(
         "limits": limit_tables(findings),
         "systems": systems(plans, spec.title),
         "animation": animation(findings),
-        "figures": figures(findings, name, _beside(folder / FIGURES, shown_in), each),
+        "figures": figures(findings, name, _relative_to(folder / FIGURES, shown_in), each),
         "charts": charts(findings, folder / FIGURES),
         "tables": [*run_tables(findings), *derived_tables(findings, apart=True)],
         "definitions": definitions(findings),
@@ -119,7 +119,7 @@ def chapter(
 
 
 def runs_made(findings: ExperimentResult) -> list[Results | Plan]:
-    """Return the results of all runs, along axes the plans of those that have been made."""
+    """Return the results of all runs; along axes, the plans of those that have been made."""
     if not findings.spec.axes or findings.planned is None:
         return [*findings.results.values()]
     jobs = zip(findings.planned.jobs, findings.records, strict=True)
@@ -127,7 +127,7 @@ def runs_made(findings: ExperimentResult) -> list[Results | Plan]:
 
 
 def repeats(findings: ExperimentResult) -> str:
-    """Return what numbers over repeats are, in a sentence; "" without repeats."""
+    """Return a sentence that explains numbers over repeats; "" without repeats."""
     spec = findings.spec
     if not spec.repeats:
         return ""
@@ -141,7 +141,7 @@ def repeats(findings: ExperimentResult) -> str:
 
 
 def plans_of(findings: ExperimentResult) -> list[tuple[Job, tuple[LoadedScenario, Plan]]]:
-    """Return jobs with scenario and plan: of all named runs; along axes the first with each set of FMUs."""
+    """Return jobs with scenario and plan: all named runs; along axes the first with each set of FMUs."""
     jobs: dict[Any, Job] = {}
     for job in findings.planned.jobs if findings.planned else ():
         fmus = tuple(unit.fmu.sha256 for unit in job.plan.instances) if job.plan else ()
@@ -155,9 +155,9 @@ def plans_of(findings: ExperimentResult) -> list[tuple[Job, tuple[LoadedScenario
 
 
 def conclusions(findings: ExperimentResult) -> list[dict[str, Any]]:
-    """Return what an overview tells: claims and checks that do not hold or are undecided.
+    """Return the claims and checks for the overview: those that do not hold or are undecided.
 
-    Over a region claims that hold are told, too, and robust verdicts come first.
+    With a region, claims that hold are included, and robust verdicts come first.
     """
     told = [
         judged(one)
@@ -168,7 +168,7 @@ def conclusions(findings: ExperimentResult) -> list[dict[str, Any]]:
 
 
 def judged(one: ClaimResult) -> dict[str, Any]:
-    """Return a claim with what was measured and its verdict."""
+    """Return a claim with its measured values and verdict."""
     return {
         "says": one.said.says,
         "source": one.said.source,
@@ -185,7 +185,7 @@ def judged(one: ClaimResult) -> dict[str, Any]:
 
 
 def systems(plans: Sequence[tuple[Job, tuple[LoadedScenario, Plan]]], title: str) -> list[dict[str, Any]]:
-    """Return a drawing for each set of units, and of which scenarios it is."""
+    """Return a diagram for each set of instances, with the scenarios that it applies to."""
     drawn = []
     for system, numbers in systems_of([plan for _, (_, plan) in plans]):
         files = dict.fromkeys(plans[k][0].scenario.name for k in numbers)
@@ -194,11 +194,11 @@ def systems(plans: Sequence[tuple[Job, tuple[LoadedScenario, Plan]]], title: str
 
 
 LIVELY = tuple(map(metric, ("peak(sideslip)", "peak(yaw_rate)")))
-"""What tells how much happens in a run, the first that all have."""
+"""Metrics of how lively a run is; the first that all runs have is used."""
 
 
 def animation(findings: ExperimentResult) -> Animation | None:
-    """Return the animation of the figure with a path in which most happens, all of its runs."""
+    """Return the animation of the liveliest figure with a path, with all of its runs."""
     found = [
         (figure, runs)
         for figure in findings.spec.figures
@@ -220,7 +220,7 @@ def _liveliest(runs: Sequence[LabelledRun]) -> float:
 
 
 def figures(findings: ExperimentResult, chapter: str, files: str, each: Each = map) -> list[Any]:
-    """Return the overlays, those that runs have results for."""
+    """Return the overlay figures that runs have results for."""
     wanted = []
     for spec in findings.spec.figures:
         runs = runs_of(findings, spec)
@@ -232,7 +232,7 @@ def figures(findings: ExperimentResult, chapter: str, files: str, each: Each = m
 
 
 def charts(findings: ExperimentResult, folder: Path) -> list[FigureImage]:
-    """Return the figures over axes, those that have been drawn, as images."""
+    """Return the figures over axes that have been drawn, as images."""
     found = []
     for spec in findings.spec.figures:
         file = folder / f"{spec.name}.svg"
@@ -242,7 +242,7 @@ def charts(findings: ExperimentResult, folder: Path) -> list[FigureImage]:
 
 
 def definitions(findings: ExperimentResult) -> list[dict[str, str]]:
-    """Return how every metric of the study is defined."""
+    """Return the definition of every metric of the study."""
     every = [(spec, metric(spec.metric)) for spec in findings.spec.metrics.values()]
     return [
         {
@@ -255,7 +255,7 @@ def definitions(findings: ExperimentResult) -> list[dict[str, str]]:
 
 
 def settings(findings: ExperimentResult) -> Table:
-    """Return how every run differs from its scenario; along axes how many runs of it ended how."""
+    """Return the table of every run's overrides; along axes, of how many runs ended with each status."""
     statuses = list(dict.fromkeys(record.status for record in findings.records)) if findings.spec.axes else []
     headings = ["run", "scenario", "changed", "faults", *statuses]
     rows: list[list[Cell]] = []
@@ -273,7 +273,7 @@ def settings(findings: ExperimentResult) -> Table:
 
 
 def grid_of_times(runs: Iterable[Results | Plan]) -> list[str]:
-    """Return algorithm, step and end of the runs, each combination once, as plans or records say."""
+    """Return each combination of algorithm, step size and stop time that occurs in plans or records."""
     found: Counter[str] = Counter()
     for one in runs:
         algorithm: str
@@ -285,8 +285,8 @@ def grid_of_times(runs: Iterable[Results | Plan]) -> list[str]:
     return [f"{text} ({counted(count, 'run')})" for text, count in found.items()]
 
 
-def _beside(path: Path, folder: Path) -> str:
-    """Return a path as a reader of a page in a folder finds it."""
+def _relative_to(path: Path, folder: Path) -> str:
+    """Return a path relative to the folder of a page."""
     try:
         return path.resolve().relative_to(folder.resolve()).as_posix()
     except ValueError:
@@ -294,16 +294,16 @@ def _beside(path: Path, folder: Path) -> str:
 
 
 PAGE = "report.html"
-"""Name of the page."""
+"""File name of the page."""
 RANKING = Path("results/proving_ground/ranking", PAGE)
-"""Where the page of the ranking is unless its command is told otherwise."""
+"""Default path of the ranking's page."""
 SCENARIOS = Path("scenarios")
-"""Where studies are looked for when none is named."""
+"""Folder searched for studies if none is given."""
 TITLE = "Yaw-stability control: what papers say, and what comes out"
 
 
 def found_studies(folder: Path = SCENARIOS) -> list[Path]:
-    """Return all study files in the folders of a folder, sorted by title.
+    """Return all study files in the subfolders of a folder, sorted by title.
 
     The studies of one folder stay together, `study.yaml` first.
 
@@ -321,7 +321,7 @@ def found_studies(folder: Path = SCENARIOS) -> list[Path]:
 
 
 def report_page(chapters: Sequence[dict[str, Any]], ranking: str = "") -> str:
-    """Return the page of one chapter or of several as HTML; `ranking`: address of its page if it is there."""
+    """Return the HTML page of one or several chapters; `ranking`: link to the ranking's page."""
     title = TITLE if len(chapters) > 1 else str(chapters[0]["title"])
     return render(
         "report.html.j2", title=title, chapters=chapters, ranking=ranking, style=style(), assets=assets(),

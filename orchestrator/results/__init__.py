@@ -1,1 +1,1 @@
-"""Stage four: results written while a run goes on, and read back."""
+"""Recorded results of runs: written while a run goes on, read back afterwards."""

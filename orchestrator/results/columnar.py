@@ -1,7 +1,4 @@
-"""Recording by columns, in memory: for good, or for formats that write columns.
-
-Results that are in memory written to a folder, as a run would have written them.
-"""
+"""Recorders that keep columns in memory: `MemoryRecorder`, the base of column formats, `write_results`."""
 
 from __future__ import annotations
 
@@ -18,11 +15,11 @@ from .recorder import BLOCK, Recorder, RowBlock
 
 
 class Columns:
-    """Blocks of rows as they come, and the columns they add up to.
+    """Accumulates blocks of rows and returns them as columns.
 
     Args:
-        order: where each column stands in a row of Reals followed by the others; see `Block`.
-        reals: how many stand in the row of Reals, time included.
+        order: index of each column in a row of Reals followed by the others; see `RowBlock`.
+        reals: number of Reals in a row, time included.
     """
 
     def __init__(self, order: Sequence[int], reals: int) -> None:
@@ -37,7 +34,7 @@ class Columns:
         self._others: list[list[Value]] = []
 
     def add(self, block: np.ndarray, others: Sequence[list[Value]]) -> None:
-        """Take over rows; both are copied."""
+        """Append rows; both arguments are copied."""
         self._blocks.append(block.copy())
         self._others.extend(others)
         self.rows += len(block)
@@ -58,7 +55,7 @@ class Columns:
 
 
 class MemoryRecorder(RowBlock):
-    """A run's results in memory alone, as if they had been written and read back."""
+    """Records a run in memory only; `results` is what reading the files back would give."""
 
     folder = place = None
 
@@ -74,23 +71,23 @@ class MemoryRecorder(RowBlock):
         self._columns.add(block, others)
 
     def finish(self, run: dict[str, Any]) -> None:
-        """Make `results` of what has been written."""
+        """Make `results` from the rows written so far."""
         time, *values = (plain(array) for array in self._columns.arrays())
         units = {name: self.units.get(name) or "" for name in ("time", *self.columns)}
         record = {**run, "rows": self.written, **self.extremes()}
         self.results = Results(Path(), time, dict(zip(self.columns, values, strict=True)), units, record)
 
     def announce(self, run: dict[str, Any]) -> None:
-        """Nothing: there are no files."""
+        """Do nothing: there are no files."""
 
     def close(self, run: dict[str, Any] | None = None) -> None:
-        """Add to the record what has changed in it since `finish`."""
+        """Update the run record with what has changed since `finish`."""
         if self.results is not None:
             self.results.run.update(run or {})
 
 
 class ColumnRecorder(Recorder):
-    """A recorder that keeps rows until there are `CHUNK` of them, or until the run ends."""
+    """Base of recorders that buffer rows until there are `CHUNK` of them or the run ends."""
 
     rows_stay = False
     CHUNK: int | None = None
@@ -104,19 +101,19 @@ class ColumnRecorder(Recorder):
             self._pass_on()
 
     def _pass_on(self) -> None:
-        """Write the columns so far and forget them."""
+        """Write the buffered columns and clear the buffer."""
         raise NotImplementedError
 
     def _make_room(self, needed: int) -> bool:
-        return False  # half a file of columns is no use
+        return False  # part of a columnar file cannot be read
 
 
 def write_results(results: Results, folder: Path, *, format: str = "csv") -> None:
-    """Write columns and record into a folder; results that stand there are replaced as a whole.
+    """Write results that are in memory to a folder as a run would; results already there are replaced.
 
     Raises:
-        ScenarioError: there is no such format.
-        ResultsError: they cannot be written.
+        ScenarioError: the format does not exist.
+        ResultsError: the files cannot be written.
     """
     names = list(results)
     real = [np.issubdtype(results[name].dtype, np.number) for name in names]

@@ -1,6 +1,7 @@
-"""Reading results.csv in blocks of rows, so that a long run needs no more memory than is kept of it.
+"""Reader of results.csv in blocks of rows, so that a long run needs no more memory than the rows kept.
 
-Columns of Apache Arrow from arrays and back: Reals by their memory, as all else imports pandas first.
+`column_of` and `values_of` convert between NumPy arrays and Apache Arrow columns. Reals share their memory;
+pyarrow's own conversions would import pandas first.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ REAL = np.dtype(float)
 
 
 def column_of(values: np.ndarray) -> pa.Array:
-    """Return an array as a column."""
+    """Return an array as an Arrow column."""
     import pyarrow as pa
 
     if values.dtype != REAL:
@@ -34,7 +35,7 @@ def column_of(values: np.ndarray) -> pa.Array:
 
 
 def values_of(column: pa.Array) -> np.ndarray:
-    """Return a column as an array."""
+    """Return an Arrow column as an array."""
     import pyarrow as pa
 
     if column.type != pa.float64() or column.null_count or not len(column):
@@ -44,18 +45,18 @@ def values_of(column: pa.Array) -> np.ndarray:
 
 
 BLOCK = 8_000_000
-"""Bytes read at a time; chosen: some thousand rows of a hundred variables."""
+"""Bytes read at a time; chosen: a few thousand rows of a hundred variables."""
 
 
 class CsvFile:
     """A CSV file: the `names` of its columns, and its rows in blocks.
 
     Args:
-        path: of the file.
-        texts: columns of text; None: those whose first value is no number.
+        path: path of the file.
+        texts: columns that hold text; None: those whose first value is not a number.
 
     Raises:
-        OSError, ValueError: it cannot be read; so does `blocks`.
+        OSError, ValueError: the file cannot be read; `blocks` raises them too.
     """
 
     def __init__(self, path: Path, texts: Sequence[str] | None = None) -> None:
@@ -64,7 +65,7 @@ class CsvFile:
             with open_regular(path) as stream:
                 lines = (_line(raw) for raw in iter(lambda: stream.readline(BLOCK), b""))
                 self.names = [name.lstrip("\ufeff") for name in next(csv.reader(lines), [])]
-                self._begin = stream.tell()  # a name may go over lines
+                self._begin = stream.tell()  # the header may span several lines
                 first = next(csv.reader(lines), [])
         except csv.Error as error:
             raise ValueError(str(error)) from None
@@ -73,7 +74,7 @@ class CsvFile:
         self._texts = set(texts)
 
     def blocks(self, columns: Sequence[str]) -> Iterator[list[np.ndarray]]:
-        """Yield some rows after the other of chosen columns."""
+        """Yield the chosen columns, a block of rows at a time."""
         import pyarrow as pa
         from pyarrow import csv as arrow
 
@@ -95,7 +96,7 @@ class CsvFile:
                 raise ValueError(self._fault() or " ".join(str(error).split())) from None
 
     def _fault(self) -> str | None:
-        """Return a sentence on the first row that is none, None if all are."""
+        """Return a sentence on the first malformed row, None if there is none."""
         with self._path.open(encoding="utf-8", errors="replace", newline="") as stream:
             reader = csv.reader(stream)
             try:

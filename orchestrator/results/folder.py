@@ -1,22 +1,20 @@
-"""The folder of a run: what stands in it, and how new results take their place.
+"""The results folder of a run: its files, their final renames, and where it is by default.
 
-While a run goes on its files are called `.part`, and the record among them says "running"; earlier
-results stay beside them. At its end the record is replaced by the final one, and the files get their
-names. A record that is still called `.part` while nobody holds the folder is that of a run that has died.
-Readers say so and change nothing; the next run there, or `salvage`, puts in place what is whole.
+While a run goes on its files end in `.part`, and its record says "running"; earlier results stay next to
+them. At the end the final record replaces that one, and the files get their names. If a record still ends in
+`.part` while no process has the folder locked, the run has died. Readers report that and change nothing; the
+next run in the folder, or `salvage`, completes the renames that are missing.
 
-Results that reached their end are replaced only by such. Those of a run that failed go to `failed`
-below them, until a run reaches its end again.
+Results of a completed run are replaced only by those of another completed run. Those of a failed run go to
+`failed` below them, until a run completes again.
 
-The content of a folder may come from anybody. Only files are moved that have the names of our formats and
-stand in the folder itself; a link among them is never followed.
+The content of a folder is not trusted. Only files that have the names of our formats and are in the folder
+itself are moved; links are never followed.
 
-Where results go if nothing else is said: a folder named after the file and what was changed.
+Without `--out`, results go to a folder named after the file and its overrides:
 
-    results/<folder of the file>/<its name>                                        as it stands
-    results/<folder of the file>/<its name>,controller=controller_off,stop_time=2  changed
-
-Whoever looks for the results of a scenario asks here, with the changes of its plan.
+    results/<folder of the file>/<its name>                                        no overrides
+    results/<folder of the file>/<its name>,controller=controller_off,stop_time=2  with overrides
 """
 
 from __future__ import annotations
@@ -41,29 +39,29 @@ from .lock import holder_of
 RUN_FILE = "run.json"
 
 PART = ".part"
-"""What the names of a run's files end in while it goes on."""
+"""Suffix of a run's files until it has ended."""
 LARGEST = 100_000_000
-"""Bytes of a record. Chosen: a thousand times what one of ours has."""
+"""Largest size of a record [bytes]. Chosen: a thousand times that of ours."""
 FAILED = "failed"
-"""Folder of a failed run's results below those of one that reached its end."""
+"""Subfolder for the results of a failed run when the folder has those of a completed one."""
 RUNNING, COMPLETED, DIED = "running", "completed", "died"
-"""What a record says of a run that goes on, that reached its end, that was salvaged after its death."""
+"""Status in a record: the run is going on, it completed, it died and was salvaged."""
 FINAL = (COMPLETED, "failed", "interrupted", DIED)
-"""What it says of a run that has ended."""
+"""Statuses of runs that have ended."""
 
 
 def place_of(folder: Path, status: str) -> Path:
-    """Return where the results of a run that has ended so go."""
+    """Return the folder for the results of a run that has ended with `status`."""
     return folder if status == COMPLETED or _status(folder / RUN_FILE) != COMPLETED else folder / FAILED
 
 
 def put_in_place(folder: Path) -> Path:
-    """Give the files of a run whose record is final their names; return the folder they are in.
+    """Give the files of a run that has ended their final names; return the folder they are in.
 
-    Further calls go on where an earlier one has ended. To be called by the holder of the folder.
+    If a process dies halfway, the next call completes the renames. The caller must have the folder locked.
 
     Raises:
-        OSError: they cannot be renamed.
+        OSError: the files cannot be renamed.
     """
     part = folder / f"{RUN_FILE}{PART}"
     run = _record(part, follow=False)
@@ -83,7 +81,7 @@ def put_in_place(folder: Path) -> Path:
 
 
 def remove_results(folder: Path) -> None:
-    """Remove the results in a folder, and the folder if it is empty then; nothing through a link."""
+    """Remove the results in a folder, and the folder if it is then empty; links are not followed."""
     if folder.is_symlink():
         return
     for name in (*FILES.values(), RUN_FILE):
@@ -94,7 +92,7 @@ def remove_results(folder: Path) -> None:
 
 
 def is_regular(path: Path) -> bool:
-    """Return whether a path names a regular file, not by a link."""
+    """Return whether a path is a regular file and not a link to one."""
     try:
         return stat.S_ISREG(path.lstat().st_mode)
     except (OSError, ValueError):
@@ -102,9 +100,9 @@ def is_regular(path: Path) -> bool:
 
 
 def tidy(folder: Path) -> None:
-    """Deal with what a dead run has left, before the next: keep what is whole, remove the rest.
+    """Clean up after a run that died: keep finished results, remove everything else.
 
-    To be called by the holder of the folder.
+    The caller must have the folder locked.
 
     Raises:
         OSError: files cannot be renamed or removed.
@@ -117,17 +115,17 @@ def tidy(folder: Path) -> None:
 
 
 def refuse_dead(folder: Path) -> None:
-    """Make sure that the last run in a folder has not died.
+    """Raise if the last run in a folder has died.
 
     Raises:
-        ResultsError: it has.
+        ResultsError: it has died.
     """
     if is_dead(folder):
         raise ResultsError(death(folder))
 
 
 def death(folder: Path) -> str:
-    """Return a sentence on a run that has died in a folder."""
+    """Return the message on a run that has died in a folder."""
     begun = _record(folder / f"{RUN_FILE}{PART}", follow=False).get("started")
     when = f" begun at {cut(begun, 60)}" if begun and isinstance(begun, str) else ""
     if is_final(folder):
@@ -145,24 +143,24 @@ def death(folder: Path) -> str:
 def is_dead(folder: Path) -> bool:
     """Return whether the last run in a folder has died."""
     part = folder / f"{RUN_FILE}{PART}"
-    # the second look is for a run that has ended between the first one and that at its lock
+    # look again: the run may have ended between the first look and that at its lock
     return os.path.lexists(part) and holder_of(folder) is None and os.path.lexists(part)
 
 
 def unfinished(folder: Path) -> dict[str, Any] | None:
-    """Return the record of the run that goes on in a folder, or has died there; None if there is none."""
+    """Return the record of a run that is going on or has died in a folder; None if there is none."""
     part = folder / f"{RUN_FILE}{PART}"
     return _record(part, follow=False) if os.path.lexists(part) else None
 
 
 def is_final(folder: Path) -> bool:
-    """Return whether a run that has ended has yet to get its files put in their places."""
+    """Return whether a run has ended but its files still have their temporary names."""
     run = _record(folder / f"{RUN_FILE}{PART}", follow=False)
     return run.get("status") in FINAL and _file_of(run) in FILES.values()
 
 
 def _file_of(run: dict[str, Any]) -> str:
-    """Return the name of the file of results that a record names."""
+    """Return the name of the results file that a record refers to."""
     return str(run.get("results") or RESULTS_FILE)
 
 
@@ -171,7 +169,7 @@ def _status(path: Path) -> str:
 
 
 def _record(path: Path, *, follow: bool = True) -> dict[str, Any]:
-    """Return a record without looking into it; an empty one if there is none."""
+    """Return a record without validating it; an empty dictionary if there is none."""
     try:
         found = json.loads(read_bytes(path, largest=LARGEST, follow=follow))
     except (OSError, ValueError, RecursionError, MemoryError):
@@ -180,24 +178,24 @@ def _record(path: Path, *, follow: bool = True) -> dict[str, Any]:
 
 
 RESULTS = Path("results")
-"""Folder in the working folder that holds all results."""
+"""Folder for all results, in the working directory."""
 LONGEST = 100
-"""Characters of a name; chosen: short enough for a table, and far from what disks allow (255 bytes)."""
+"""Largest length of a name. Chosen: short enough for a table, well below what disks allow (255 bytes)."""
 
 
 def default_folder(
     file: Path, changes: Iterable[Override] = (), *, suffix: str = "", name: str | None = None
 ) -> Path:
-    """Return the folder of the results of a scenario, study or sweep file.
+    """Return the results folder of a scenario, study or sweep file.
 
     Args:
-        file: whose results they are.
-        changes: against the file, in their order.
-        suffix: of the file's name, for other results than those of a run of it.
-        name: in place of one made of the file and the changes.
+        file: the scenario or experiment file.
+        changes: its overrides, in their order.
+        suffix: appended to the file's name, for results other than those of a run of it.
+        name: replaces the name made from the file and the overrides.
 
     Raises:
-        ScenarioError: no folder can be called so.
+        ScenarioError: the name cannot be that of a folder.
         ResultsError: see `below_results`.
     """
     above, stem = names_of(file)
@@ -209,10 +207,10 @@ def default_folder(
 
 
 def names_of(file: Path) -> tuple[str, str]:
-    """Return what results of a file are called: the name of its folder, "" of the root's, and its own.
+    """Return the names that results of a file have: that of its folder ("" for the root) and its own.
 
     Raises:
-        ScenarioError: no folder can be called as the file is.
+        ScenarioError: the file's name cannot be that of a folder.
     """
     above = Path(os.path.abspath(file)).parent.name
     if not _is_name(file.stem) or (above and not _is_name(above)):
@@ -221,14 +219,14 @@ def names_of(file: Path) -> tuple[str, str]:
 
 
 def below_results(*names: str) -> Path:
-    """Return a folder below `results`, which may itself be a link; none below it is followed.
+    """Return a folder below `results`. `results` may itself be a link; links below it are refused.
 
     Args:
-        names: of a folder in each other; empty ones are left out.
+        names: of nested folders; empty ones are skipped.
 
     Raises:
-        ScenarioError: no folder can be called so.
-        ResultsError: one of them is a link.
+        ScenarioError: a name cannot be that of a folder.
+        ResultsError: one of the folders is a link.
     """
     place = RESULTS
     for name in filter(None, names):
@@ -244,12 +242,12 @@ def below_results(*names: str) -> Path:
 
 
 def _is_name(text: str) -> bool:
-    """Return whether a folder can be called so: neither itself, nor the one above, nor a path."""
+    """Return whether a text is a single folder name: not a path, and neither `.` nor `..`."""
     return bool(text.strip(". ")) and "/" not in text and os.sep not in text
 
 
 def _with_changes(stem: str, changes: Iterable[Override]) -> str:
-    """Return a name with changes behind it: readable, and with a hash where that does not say all."""
+    """Return a name followed by its overrides, shortened and with a hash where they cannot be written out."""
     given = list(changes)
     values = [_text(one.plain) for one in given]
     of_files = [one.names_file for one in given]

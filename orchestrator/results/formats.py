@@ -1,7 +1,4 @@
-"""The formats of recorded results: what each one's file is called, who writes and who reads it.
-
-How much room the results of a run will take.
-"""
+"""File formats of recorded results: file names, recorders, readers, and the expected size of results."""
 
 from __future__ import annotations
 
@@ -29,12 +26,12 @@ RESULTS_FILE = "results.csv"
 
 @dataclass(frozen=True)
 class Format:
-    """One format."""
+    """A file format of results."""
 
     file: str
-    recorder: str  # module here and class: what writes it
-    source: str  # likewise: what reads it, given its path and which columns hold text
-    bytes: int  # per value, measured on one run of each of the papers A to D and rounded
+    recorder: str  # "module:class" in this package that writes it
+    source: str  # "module:class" that reads it, called with its path and the columns that hold text
+    bytes: int  # per value; measured on one run of each of the papers A to D, rounded
 
 
 FORMATS = {
@@ -42,16 +39,16 @@ FORMATS = {
     "parquet": Format("results.parquet", "parquet_and_mdf.ParquetRecorder", "parquet_and_mdf.ParquetFile", 7),
     "mf4": Format("results.mf4", "parquet_and_mdf.MdfRecorder", "parquet_and_mdf.MdfFile", 5),
 }
-"""CSV is the default: every program reads it, and it survives a kill."""
+"""Format name -> format. CSV is the default: every program reads it, and killed runs can be salvaged."""
 FILES = {name: one.file for name, one in FORMATS.items()}
-"""Format -> name of its file."""
+"""Format name -> file name."""
 
 
 def check_format(name: str) -> str:
-    """Return the name of a format, or raise.
+    """Return the name of a format if it can be used.
 
     Raises:
-        ScenarioError: there is no such format, or a package that it needs is missing.
+        ScenarioError: the format does not exist, or a package that it needs is missing.
     """
     if name not in FORMATS:
         raise ScenarioError(f"--format {name}: no such format{hint(name, FORMATS, lead='there are')}")
@@ -61,10 +58,10 @@ def check_format(name: str) -> str:
 
 
 def asammdf() -> ModuleType:
-    """Return the package that reads and writes MDF.
+    """Import and return the package that reads and writes MDF.
 
     Raises:
-        ResultsError: it is not installed.
+        ResultsError: asammdf is not installed.
     """
     try:
         import asammdf
@@ -76,19 +73,19 @@ def asammdf() -> ModuleType:
 
 
 def recorder_of(name: str) -> type[Recorder]:
-    """Return what writes a format: a subclass of `Recorder`."""
+    """Return the recorder class of a format, a subclass of `Recorder`."""
     return _class(FORMATS[check_format(name)].recorder)
 
 
 def source_of(path: Path, texts: Sequence[str] | None = None) -> ResultsSource:
-    """Return a file of results, to be read.
+    """Open a results file for reading.
 
     Args:
-        path: of the file; its name says the format.
-        texts: columns that hold text, if the file itself does not say; None: they look like it.
+        path: path of the file; its name determines the format.
+        texts: columns that hold text, for formats that do not record it; None: guess from the first row.
 
     Raises:
-        OSError, ValueError: it is not what a run writes.
+        OSError, ValueError: it is not a file that a run writes.
         ResultsError: a package that the format needs is missing.
     """
     (source,) = (one.source for one in FORMATS.values() if one.file == path.name)
@@ -101,34 +98,34 @@ def _class(place: str) -> Any:
 
 
 class ResultsSource(Protocol):
-    """A file of results that is read in blocks of rows.
+    """A results file that is read in blocks of rows.
 
-    Its methods raise OSError or ValueError if the file is not what a run writes.
+    Its methods raise OSError or ValueError if the file is not one that a run writes.
     """
 
     names: list[str]
-    """Of all columns, `time` first."""
+    """Names of all columns, `time` first."""
 
     def blocks(self, columns: Sequence[str]) -> Iterator[list[np.ndarray]]:
-        """Yield some rows after the other of chosen columns, each `plain`."""
+        """Yield the chosen columns, a block of rows at a time, each passed through `plain`."""
 
 
 def plain(array: np.ndarray) -> np.ndarray:
-    """Return a column as results have it: float64, or text."""
+    """Return a column in the type that `Results` uses: float64, or text."""
     return array.astype(str) if array.dtype.kind in "OSU" else array.astype(float, copy=False)
 
 
 HUGE = 2e9
-"""Bytes from which on a run says so before it starts; chosen: what takes a minute to read back."""
+"""Size of results above which a run warns before it starts [bytes]. Chosen: takes a minute to read."""
 
 
 def expected_size(plan: Plan, format: str) -> int:
-    """Return about how many bytes the results of a run will take in a format."""
+    """Return the approximate size in bytes of the results of a run in a format."""
     return (plan.n_steps + 1) * (len(plan.record) + 1) * FORMATS[format].bytes
 
 
 def size_note(plan: Plan, folder: Path, format: str) -> str | None:
-    """Return a warning of results that are huge or will not fit into `folder`, None of others."""
+    """Return a warning if the results will be huge or will not fit on the disk of `folder`, else None."""
     size, free = expected_size(plan, format), _free(folder)
     if size < HUGE and size <= free:
         return None
@@ -145,7 +142,7 @@ def size_note(plan: Plan, folder: Path, format: str) -> str | None:
 
 
 def _free(folder: Path) -> float:
-    """Return the free bytes of the disk that a folder is on or will be made on."""
+    """Return the free bytes of the disk that a folder is, or will be, on."""
     absolute = folder.absolute()
     try:
         return shutil.disk_usage(

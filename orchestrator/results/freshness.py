@@ -1,6 +1,7 @@
-"""Whether recorded results are those that a run made now would give: same scenario, FMUs and programs.
+"""Decides whether recorded results are up to date: what a run of the plan would produce now.
 
-What tells two runs apart: a hash of everything that their numbers follow from.
+`key_of` hashes everything that the numbers of a run depend on; results are up to date if their key is that
+of the plan.
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ from .run_record import PROGRAMS, connections_of, load_record, run_record, units
 
 
 def key_of(plan: Plan, also: Any = None) -> str:
-    """Return the key of the run that a plan describes; runs of one key are one run.
+    """Return the key of the run that a plan describes; runs with the same key give the same results.
 
-    It is made of the content of its FMUs, all parameters and constants, wires, faults, the time grid, the
-    algorithm, what is recorded under which title, and the program's versions and code.
+    It is a hash of the content of the FMUs, all parameters and constants, wires, faults, the time grid, the
+    algorithm, the recorded columns, the title, and the program's versions and code.
 
     Args:
-        plan: of the run.
-        also: what else the numbers follow from, such as the metrics made of the results.
+        plan: plan of the run.
+        also: other data that the numbers depend on, such as the metrics computed from the results.
     """
     content = {
         "versions": [*map(version_of, PROGRAMS), sources_hash(OF_RESULTS)],
@@ -64,7 +65,7 @@ COMPARED = {
     "units": "what is recorded has changed",
     "title": "the scenario has changed",
 }
-"""Key of a run's record -> what it means if it differs from the plan's."""
+"""Key of the run record -> explanation if it differs from the plan."""
 _OF_UNIT = {
     "parameters": "parameters",
     "constants": "constants",
@@ -75,9 +76,9 @@ _OF_UNIT = {
 
 
 def staleness(plan: Plan, folder: Path) -> str | None:
-    """Return why the results in a folder are not those of the plan, None if they are: their keys are one.
+    """Return why the results in a folder are not those of the plan; None if their keys are equal.
 
-    What carries no checksums, as results of earlier versions, is never those of the plan.
+    Results without checksums, such as those of earlier versions, always count as out of date.
     """
     if not (folder / RUN_FILE).is_file():
         return "no results yet"
@@ -100,7 +101,7 @@ def staleness(plan: Plan, folder: Path) -> str | None:
 
 
 def altered(folder: Path) -> str:
-    """Return in a sentence what in a folder is not as its run has written it, "" if nothing is."""
+    """Return a sentence on what has been changed in a folder since its run wrote it, "" if nothing has."""
     if not (folder / RUN_FILE).is_file() or is_dead(folder):
         return ""
     try:
@@ -114,7 +115,7 @@ def altered(folder: Path) -> str:
 
 
 def _reason(plan: Plan, recorded: Mapping[str, Any]) -> str:
-    """Return in words why the key of a record is not that of a plan."""
+    """Return in words why the key of a record differs from that of a plan."""
     planned = run_record(plan, status="completed", started=datetime.now(timezone.utc))
     wanted = json.loads(json.dumps(planned, default=str))
     for key, sentence in COMPARED.items():
@@ -135,7 +136,7 @@ def _reason(plan: Plan, recorded: Mapping[str, Any]) -> str:
 
 
 def _whole(results: Path, recorded: Mapping[str, Any]) -> bool:
-    """Return whether a file of results is the one that its run has written."""
+    """Return whether a results file is unchanged since its run wrote it."""
     try:
         if known := recorded.get("checksum"):
             return known == checksum(results)

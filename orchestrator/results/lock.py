@@ -1,7 +1,7 @@
-"""Who writes into a folder: one command at a time.
+"""Locks on folders: one command at a time writes into a folder.
 
-A lock is a small file in the folder that says who holds it. The operating system ends the hold when
-the process ends, however it does; the file that a killed process leaves is taken over by the next.
+A lock is a locked file in the folder that names its holder. The operating system releases it when the
+process ends, however it ends; the file that a killed process leaves behind is taken over by the next one.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from ..errors import ResultsError
 from ..files import LOCK_FILE, claim, fcntl, lock_note, reason, refuse_links_within
 
 LOOKS = 100
-"""Times that a lock is asked for again, 10 ms apart; chosen: runs whose command was killed end sooner."""
+"""Attempts to get a lock, 10 ms apart. Chosen: runs whose command was killed end within that time."""
 
 
 @dataclass(frozen=True)
 class LockHolder:
-    """A command that writes into a folder."""
+    """The command that has a folder locked."""
 
     command: str
     process: int
@@ -36,7 +36,7 @@ class LockHolder:
 
     @classmethod
     def here(cls) -> LockHolder:
-        """Return this process."""
+        """Return the holder that describes this process."""
         name = Path(sys.argv[0]).stem if sys.argv else ""
         command = shlex.join(["yawbench" if name in ("", "cli", "-c") else name, *sys.argv[1:]])
         now = datetime.now().astimezone().isoformat(timespec="seconds")
@@ -48,10 +48,10 @@ class LockHolder:
 
 
 class FolderLock:
-    """The hold of a folder, until it is released. The folder is made if it does not exist.
+    """An exclusive lock on a folder until `release`. The folder is created if it does not exist.
 
     Raises:
-        ResultsError: somebody else holds it, or nothing can be written there.
+        ResultsError: another process has the lock, or the folder is not writable.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -71,17 +71,20 @@ class FolderLock:
                 f"{folder}: results cannot be written here: it is no folder; name another with --out."
             ) from None
         except BlockingIOError:
-            raise _held(folder, holder_of(home) or _said(b"")) from None
+            raise _held(folder, holder_of(home) or _holder_in(b"")) from None
         except OSError as error:
             self.release()
             raise ResultsError(f"{folder}: results cannot be written here: {reason(error)}.") from None
 
     def release(self) -> None:
-        """Let go of the folder; one that was made for nothing is removed. Further calls do nothing."""
+        """Release the lock; remove the folder if it was created here and is still empty.
+
+        Further calls do nothing.
+        """
         descriptor, self._descriptor = self._descriptor, None
         if descriptor is not None:
             if fcntl is None:
-                os.close(descriptor)  # Windows removes no open file
+                os.close(descriptor)  # Windows cannot remove open files
             with contextlib.suppress(OSError):
                 self._path.unlink()
             if fcntl is not None:
@@ -92,7 +95,7 @@ class FolderLock:
 
 
 def _claimed(path: Path) -> int:
-    """Claim a file; one who only looks at it (`holder_of`), or is about to end, is no reason to give up."""
+    """Open and lock a file, retrying: readers (`holder_of`) and ending processes lock it only briefly."""
     for _ in range(LOOKS):
         with contextlib.suppress(BlockingIOError):
             return claim(path)
@@ -102,12 +105,12 @@ def _claimed(path: Path) -> int:
 
 @contextlib.contextmanager
 def writing(*folders: Path) -> Iterator[None]:
-    """Hold folders, and all that is below them, while the block runs.
+    """Lock folders, and everything below them, while the block runs.
 
     Runs of the same command lock their own folders below.
 
     Raises:
-        ResultsError: another command holds one of them or a folder above, or nothing can be written there.
+        ResultsError: another command has locked one of them or a folder above, or one is not writable.
     """
     with contextlib.ExitStack() as stack:
         for folder in {folder.resolve(): folder for folder in folders}.values():
@@ -117,10 +120,10 @@ def writing(*folders: Path) -> Iterator[None]:
 
 
 def refuse_below_others(folder: Path) -> None:
-    """Make sure that no other process holds a folder above.
+    """Raise if another process has locked a folder above this one.
 
     Raises:
-        ResultsError: one does.
+        ResultsError: another process has.
     """
     for above in folder.absolute().parents:
         holder = holder_of(above)
@@ -129,13 +132,13 @@ def refuse_below_others(folder: Path) -> None:
 
 
 def holder_of(folder: Path) -> LockHolder | None:
-    """Return who writes into a folder, None if nobody does. Nothing is changed there."""
+    """Return the holder of the lock on a folder, None if it is not locked. Changes nothing there."""
     note = lock_note(folder)
-    return None if note is None else _said(note)
+    return None if note is None else _holder_in(note)
 
 
-def _said(note: bytes) -> LockHolder:
-    """Return what a lock file says of its holder, who may not have come to say it."""
+def _holder_in(note: bytes) -> LockHolder:
+    """Return the holder that a lock file names; the file may be incomplete."""
     try:
         said = json.loads(note)
         holder = LockHolder(str(said["command"]), int(said["process"]), str(said["host"]), str(said["since"]))

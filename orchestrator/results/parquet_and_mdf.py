@@ -1,6 +1,7 @@
-"""Results as Parquet: a column per variable, its measurement unit in the field's metadata.
+"""Recorders and readers of results as Apache Parquet and as ASAM MDF 4.
 
-Results as ASAM MDF 4, the format of measurement tools: one channel group, units in its channels.
+Parquet: a column per variable, its unit in the field's metadata. MDF 4, the format of measurement tools: one
+channel group, units in its channels.
 """
 
 from __future__ import annotations
@@ -25,10 +26,10 @@ UNIT = b"unit"
 
 
 class ParquetRecorder(ColumnRecorder):
-    """The results of one run as Parquet. The file can be read once the run has ended."""
+    """Records a run as Parquet. The file can be read only once the run has ended."""
 
     file = FILES["parquet"]
-    CHUNK = 32_768  # rows of a row group; chosen: 2 MB of 64 columns in memory are soon compressed
+    CHUNK = 32_768  # rows per row group; chosen: 64 columns take 2 MB, which is compressed quickly
 
     def _begin(self) -> None:
         super()._begin()
@@ -56,7 +57,7 @@ class ParquetRecorder(ColumnRecorder):
             raise
 
     def _complete(self, run: dict[str, Any]) -> None:
-        if self._lost is not None:  # a file with a hole is no use
+        if self._lost is not None:  # a file with a gap is useless
             raise ResultsError(self._lost.problems)
         if self._columns.rows or self._writer is None:
             self._pass_on()
@@ -64,7 +65,7 @@ class ParquetRecorder(ColumnRecorder):
 
 
 class _Sink:
-    """What pyarrow writes into. It takes no notice of a file that accepts less than it is given."""
+    """File object that pyarrow writes to; it passes on all data, where pyarrow would ignore short writes."""
 
     closed = False
 
@@ -76,29 +77,29 @@ class _Sink:
         return len(data)
 
     def flush(self) -> None:
-        """Nothing: the file has no buffer."""
+        """Do nothing: the file has no buffer."""
 
     def close(self) -> None:
-        """Nothing: the recorder closes its file."""
+        """Do nothing: the recorder closes the file."""
 
 
 class ParquetFile:
-    """A Parquet file of results (see `formats.Source`)."""
+    """A Parquet file of results (see `formats.ResultsSource`)."""
 
     def __init__(self, path: Path, texts: Sequence[str] | None = None) -> None:
         import pyarrow.parquet as pq
 
-        self._file = pq.ParquetFile(path)  # by itself, whatever the folder above is called
+        self._file = pq.ParquetFile(path)  # pyarrow must not interpret the names of its folders as partitions
         self.names = list(self._file.schema_arrow.names)
 
     def blocks(self, columns: Sequence[str]) -> Iterator[list[np.ndarray]]:
-        """Yield some rows after the other of chosen columns."""
+        """Yield the chosen columns, a block of rows at a time."""
         for batch in self._file.iter_batches(columns=list(columns)):
             yield [plain(values_of(batch.column(name))) for name in columns]
 
 
 class MdfRecorder(ColumnRecorder):
-    """The results of one run as MDF 4. All rows are in memory until the run has ended."""
+    """Records a run as MDF 4. All rows stay in memory until the run has ended."""
 
     file = FILES["mf4"]
 
@@ -131,14 +132,14 @@ def _samples(array: np.ndarray) -> np.ndarray:
 
 
 class MdfFile:
-    """An MDF file of results, of one channel group (see `formats.Source`).
+    """An MDF file of results with one channel group (see `formats.ResultsSource`).
 
     Raises:
         ResultsError: asammdf is not installed.
     """
 
     ROWS = 200_000
-    """Read at a time; chosen: a column of them is no more than some megabytes."""
+    """Rows read at a time; chosen: a column of them takes a few megabytes at most."""
 
     def __init__(self, path: Path, texts: Sequence[str] | None = None) -> None:
         self._path = path
@@ -160,7 +161,7 @@ class MdfFile:
             raise ValueError(" ".join(str(error).split()) or type(error).__name__) from None
 
     def blocks(self, columns: Sequence[str]) -> Iterator[list[np.ndarray]]:
-        """Yield some rows after the other of chosen columns."""
+        """Yield the chosen columns, a block of rows at a time."""
         with self._open() as mdf:
             for begin in range(0, self._rows, self.ROWS):
                 part: dict[str, Any] = {"record_offset": begin, "record_count": self.ROWS}

@@ -1,11 +1,8 @@
-"""Reading back what a run has recorded: run.json of one folder, and the results beside it.
+"""Reader of recorded runs: `Results` of one folder, and all runs below a folder.
 
-The runs whose results stand below a folder.
-
-Long results thinned while they are read, for drawings in which every peak stays.
-
-Of each stretch of rows those are kept in which a column, or a signal's distance from its reference, is
-smallest or largest, and the first and last. The rows are kept whole: values of one moment stay together.
+`thinned` drops rows of long results while they are read, for figures. In each stretch of rows it keeps the
+first, the last and those in which a column, or the distance of a signal from its reference, is smallest or
+largest, so that every peak stays. Rows are kept whole: values of one instant stay together.
 """
 
 from __future__ import annotations
@@ -31,24 +28,24 @@ from .formats import FILES, RESULTS_FILE, source_of
 from .run_record import ConnectionRecord, RunRecord, check_record, load_record, warn_if_unchecked
 
 UNREADABLE = "unreadable"
-"""Status of a run whose record cannot be read, or is not as it was written."""
+"""Status of a run whose record cannot be read or has been changed."""
 
 
 @dataclass(frozen=True)
 class FoundRun:
-    """A run by its folder and its record."""
+    """A run found on disk: its folder, status and record."""
 
     folder: Path
     status: str  # "completed", "failed", "interrupted", "running", "died", or UNREADABLE
     record: dict[str, Any]
-    problem: str = ""  # why it has no results, or none to the end
+    problem: str = ""  # why its results are missing or incomplete
 
 
 def found_runs(folder: Path) -> list[FoundRun]:
     """Return all runs in and below a folder, the earliest first.
 
     Raises:
-        ResultsError: there is no such folder, or no run in it.
+        ResultsError: the folder does not exist, or there is no run in it.
     """
     if not folder.is_dir():
         raise ResultsError(f"{folder}: there is no such folder; name one that holds results")
@@ -66,13 +63,13 @@ def _folders(folder: Path) -> Iterator[Path]:
 
 
 def _runs_in(folder: Path) -> Iterator[FoundRun]:
-    """Yield the run whose results stand in a folder, and the one that goes on or has died there."""
+    """Yield the run whose results are in a folder, and the one that is going on or has died there."""
     going = unfinished(folder)
     if going is not None:
         dead = is_dead(folder)
         try:
             record = check_record(going, folder / f"{RUN_FILE}{PART}")
-        except ResultsError:  # of a run that has died, perhaps before it had written its record
+        except ResultsError:  # the run may have died before it had written its record
             record = {}
         yield FoundRun(folder, DIED if dead else RUNNING, record, "it ended without a word" if dead else "")
     if going is not None and not os.path.lexists(folder / RUN_FILE):
@@ -88,20 +85,20 @@ def _runs_in(folder: Path) -> Iterator[FoundRun]:
 
 
 LONG = 200_000
-"""Rows from which on results are thinned; chosen: ten times those of the papers' longest run."""
+"""Number of rows above which results are thinned; chosen: ten times the papers' longest run."""
 STRETCHES = 1500
-"""Stretches that a run is divided into: as many as a line drawn over the width of a page has points."""
+"""Number of stretches that a thinned run is divided into: the points of a line across a page."""
 
 
 def thinned(
     blocks: Iterator[list[np.ndarray]], columns: Sequence[str], rows: int
 ) -> Iterator[list[np.ndarray]]:
-    """Yield the blocks of rows without those that a drawing can do without.
+    """Yield the blocks without the rows that a figure does not need.
 
     Args:
         blocks: arrays of equal length, one for each column.
         columns: their names.
-        rows: in all blocks, as far as is known; short results are left as they are.
+        rows: number of rows in all blocks, as far as it is known; short results are not thinned.
     """
     if rows < LONG:
         yield from blocks
@@ -125,7 +122,7 @@ def thinned(
 
 
 def _reference(name: str, columns: Sequence[str]) -> str | None:
-    """Return the only column that holds the reference of a signal."""
+    """Return the column of a signal's reference if there is exactly one."""
     found = [other for other in columns if other.partition(".")[2] == f"{name.partition('.')[2]}_ref"]
     return found[0] if len(found) == 1 and name.partition(".")[2] else None
 
@@ -135,33 +132,33 @@ class Results:
     """The recorded values of one run.
 
     `results["plant.yaw_rate"]` is a column by its full name; `results.find("yaw_rate")` is the only
-    recorded variable of that name, whatever its unit is called in the scenario.
+    recorded variable of that name, whatever its instance is called in the scenario.
     """
 
     folder: Path
     time: np.ndarray  # shape (rows,) [s]
-    columns: dict[str, np.ndarray]  # "<unit>.<variable>" -> shape (rows,)
-    units: dict[str, str]  # "time" and "<unit>.<variable>" -> measurement unit; "" if it has none
+    columns: dict[str, np.ndarray]  # "<instance>.<variable>" -> shape (rows,)
+    units: dict[str, str]  # "time" and "<instance>.<variable>" -> unit; "" if it has none
     run: dict[str, Any]  # run.json
 
     @cached_property
     def record(self) -> RunRecord:
-        """What `run` holds, typed; as it was when this was first asked for."""
+        """The run record `run` as a typed object, created at the first access."""
         return RunRecord.model_validate(self.run)
 
     @property
     def file(self) -> Path:
-        """The file that the columns come from."""
+        """The file that the columns were read from."""
         return self.folder / self.record.results
 
     @property
     def where(self) -> str:
-        """What a message calls them: by their file, or if they are in memory alone by their title."""
+        """The name used in messages: the file, or the title for results that are only in memory."""
         return str(self.file) if self.folder != Path() else self.record.title or "this run"
 
     @property
     def ended(self) -> str | None:
-        """Why a unit ended the run before its stop time, None if none did."""
+        """Why an instance ended the run before its stop time; None if none did."""
         ended = self.record.ended
         return ended.message if ended else None
 
@@ -182,15 +179,15 @@ class Results:
         return self.columns[self.column(variable, role=role)]
 
     def column(self, variable: str, *, role: str | None = None) -> str:
-        """Return the column's full name for a variable, whatever its unit is called.
+        """Return the full column name of a variable, whatever its instance is called.
 
-        Where no unit has an output of that name, it is the output that feeds inputs of that name: the
-        `Mz` of an FMU from elsewhere, connected to `plant.yaw_moment`, is the yaw moment.
+        If no instance has an output of that name, it is the output that feeds inputs of that name: the
+        `Mz` of an FMU from another tool, connected to `plant.yaw_moment`, is the yaw moment.
 
         Args:
-            variable: name of a variable; a full name `unit.variable` is given back as it is.
-            role: only units of this role ("plant", "controller", ...): units whose FMU's name
-                begins with `<role>_`, else the unit that is called so.
+            variable: name of a variable; a full name `instance.variable` is returned unchanged.
+            role: only instances with this role ("plant", "controller", ...): those whose FMU's name
+                begins with `<role>_`, else the instance of that name.
 
         Raises:
             ResultsError: no such column, or more than one.
@@ -205,7 +202,7 @@ class Results:
         )
 
     def candidates(self, variable: str, *, role: str | None = None) -> list[str]:
-        """Return the columns that a variable may stand for (see `column`): none, one or several."""
+        """Return all columns that `variable` may refer to (see `column`)."""
         if role is None and variable in self.columns:
             return [variable]
         found = [name for name in self.columns if name.partition(".")[2] == variable]
@@ -215,7 +212,7 @@ class Results:
         return found if found or role is not None else self._feeding(variable)
 
     def _feeding(self, variable: str) -> list[str]:
-        """Return the columns that feed inputs of a name as they are, but for the unit of measurement."""
+        """Return the columns that feed inputs of this name unchanged, apart from a conversion of units."""
         feeding = [
             wire.source
             for wire in self.record.connections
@@ -224,7 +221,7 @@ class Results:
         return [column for column in dict.fromkeys(feeding) if column in self.columns]
 
     def units_of_role(self, role: str) -> list[str]:
-        """Return the names of the scenario's units that have the role, in evaluation order."""
+        """Return the names of the instances that have the role, in evaluation order."""
         fmus = self.record.fmus
         found = [unit for unit, fmu in fmus.items() if fmu.name.startswith(role + "_")]
         return found or [unit for unit in fmus if unit == role]
@@ -238,7 +235,7 @@ class Results:
 
 
 def _is_the_same(wire: ConnectionRecord, unit: str | None) -> bool:
-    """Return whether a wire hands on what the output of this unit says: at most in another unit."""
+    """Return whether a wire passes on an output of this unit as it is, at most converted to another unit."""
     if wire.gain is None:
         return True
     one, other = measure_of(unit), measure_of(str(wire.unit))
@@ -253,16 +250,16 @@ def load_results(
     only: Callable[[Results], Iterable[str]] | None = None,
     thin: bool = False,
 ) -> Results:
-    """Read the results of one run; those of a failed run too, as far as they go.
+    """Read the results of one run; of a failed run, the part that was recorded.
 
     Args:
-        folder: of the results.
-        only: returns which columns are read, given results without rows; default: all.
-        thin: leave out rows that a drawing of a long run can do without (see `thinning`).
+        folder: the results folder.
+        only: selects the columns to read, given results without rows; default: all.
+        thin: drop rows of a long run that a figure does not need (see `thinned`).
 
     Raises:
-        ResultsError: a file is missing, unreadable, cut off, changed or not what `yawbench run` writes, or
-            the last run in the folder has died.
+        ResultsError: a file is missing, unreadable, truncated, changed or not one that `yawbench run` writes,
+            or the last run in the folder has died.
     """
     folder = Path(folder)
     run = load_record(folder)
@@ -301,16 +298,16 @@ def _check_names(names: Sequence[str]) -> None:
 
 
 def _empty(folder: Path, names: Sequence[str], run: dict[str, Any]) -> Results:
-    """Return the results of a run without rows."""
+    """Return results with these columns and no rows."""
     units = {name: str(run.get("units", {}).get(name) or "") for name in names}
     return Results(folder, np.empty(0), {name: np.empty(0) for name in names[1:]}, units, run)
 
 
 def _check_checksum(path: Path, run: dict[str, Any]) -> None:
-    """Make sure that a file of results is the one that its run wrote, as far as the record can tell.
+    """Check a results file against the checksum in its record, if there is one.
 
     Raises:
-        ValueError: it is another, or cut off.
+        ValueError: it is a different file, or truncated.
     """
     known = run.get("checksum")
     if not known:
@@ -323,7 +320,7 @@ def _check_checksum(path: Path, run: dict[str, Any]) -> None:
 
 
 def _in_order(blocks: Iterator[list[np.ndarray]]) -> Iterator[list[np.ndarray]]:
-    """Yield the blocks after making sure that time goes on from row to row."""
+    """Yield the blocks, checking that time increases from row to row."""
     last, row = -np.inf, 0
     for block in blocks:
         time = block[0]
@@ -339,11 +336,11 @@ def _in_order(blocks: Iterator[list[np.ndarray]]) -> Iterator[list[np.ndarray]]:
 
 
 def _joined(blocks: Iterable[list[np.ndarray]], columns: int) -> list[np.ndarray]:
-    """Return the columns of all blocks."""
+    """Return the concatenated columns of all blocks."""
     parts = list(blocks)
     found = []
     for k in range(columns):
         found.append(np.concatenate([part[k] for part in parts]) if parts else np.empty(0))
         for part in parts:
-            part[k] = np.empty(0)  # a long run would need twice the memory
+            part[k] = np.empty(0)  # free the parts, else a long run would need twice the memory
     return found

@@ -1,9 +1,9 @@
-"""Writing results.csv (the other formats: `columnar`) and run.json.
+"""Recorder of results.csv and run.json, and the base class of the recorders of other formats.
 
-Both are written under temporary names and take their places together at the end (see `folder`), so a
-folder holds either the earlier results or the new ones; while a run writes there, no other may. Rows go
-out in blocks during the run: whatever ends it, what has been recorded stays. Numbers are written so that
-reading them gives the same bits.
+Both files are written under temporary names and renamed together at the end (see `folder`), so a folder has
+either the earlier results or the new ones; the folder is locked while a run writes. Rows are written in
+blocks during the run: whatever ends it, the rows recorded so far stay. Numbers are written so that reading
+them gives the same bits.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from .formats import RESULTS_FILE
 from .lock import FolderLock
 
 BLOCK = 512
-"""Rows kept in memory before they are written."""
+"""Rows buffered in memory before they are written."""
 
 
 class RowBlock:
-    """The rows that a run has made last. Fill `rows` (and `others`), then call `write`.
+    """The buffer for the latest rows of a run. Fill `rows` (and `others`), then call `write`.
 
     Args:
-        columns: names below the header, `<unit>.<variable>`.
-        real: which of them are Real; the others come in `others`, one list per row.
+        columns: names in the header, `<instance>.<variable>`.
+        real: which of them are Real; the values of the others go into `others`, one list per row.
     """
 
     def __init__(self, columns: Sequence[str], real: Sequence[bool]) -> None:
@@ -49,16 +49,18 @@ class RowBlock:
         self.lay(np.zeros((BLOCK, 1 + sum(real))))
         self.others: list[list[Value]] = []
         self._real = [name for name, is_real in zip(columns, real, strict=True) if is_real]
-        self.looks: list[Callable[[np.ndarray], None]] = []  # told of every block: time, then Reals
+        self.looks: list[
+            Callable[[np.ndarray], None]
+        ] = []  # observers, called with every block: time, then Reals
         self._extremes = np.full((2, sum(real)), np.nan)
 
     def lay(self, block: np.ndarray) -> None:
-        """Take rows from this memory from here on, of shape (at most BLOCK, 1 + Reals)."""
+        """Use this memory as the row buffer from now on; shape (at most BLOCK, 1 + Reals)."""
         self._block = block
         self.rows = list(block)
 
     def write(self, count: int) -> None:
-        """Take over the first `count` of `rows`; they are then free again."""
+        """Record the first `count` of `rows`, which can then be overwritten."""
         if count <= 0:
             return
         self._look_at(self._block[:count])
@@ -68,16 +70,16 @@ class RowBlock:
         self.written += count
 
     def _take(self, block: np.ndarray, others: list[list[Value]]) -> None:
-        """Keep rows that will be overwritten."""
+        """Store rows; the arrays will be overwritten after the call."""
         raise NotImplementedError
 
     def extremes(self) -> dict[str, dict[str, float]]:
-        """Return the smallest and the largest value of every Real in what has been written."""
+        """Return the smallest and largest value so far of every Real column."""
         smallest, largest = (dict(zip(self._real, row.tolist(), strict=True)) for row in self._extremes)
         return {"smallest": smallest, "largest": largest}
 
     def _look_at(self, rows: np.ndarray) -> None:
-        """Take note of the extremes of a block, in which NaN are none; let others look at it."""
+        """Update the extremes with a block, ignoring NaN, and pass the block to the observers."""
         np.fmin(self._extremes[0], np.fmin.reduce(rows[:, 1:]), out=self._extremes[0])
         np.fmax(self._extremes[1], np.fmax.reduce(rows[:, 1:]), out=self._extremes[1])
         for look in self.looks:
@@ -85,25 +87,25 @@ class RowBlock:
 
 
 class Recorder(RowBlock):
-    """The results of one run on disk. Call `write` for every block; at the end `finish`.
+    """Records a run on disk. Call `write` for every block; at the end `finish`.
 
     Args:
-        folder: made if it does not exist.
-        columns, real: see `Block`.
-        units: column -> measurement unit, for formats that carry it.
+        folder: created if it does not exist.
+        columns, real: see `RowBlock`.
+        units: column -> unit, for formats that store it.
 
     Attributes:
         place: where the results are once the run has ended: `folder`, or a folder below it if the run
-            failed and those of one that did not stand there.
+            failed and `folder` has results of a completed run.
 
     Raises:
         ResultsError: another run is writing into the folder, or it or a file in it cannot be written;
-            so do the methods.
+            the methods raise it too.
     """
 
     file = RESULTS_FILE
     rows_stay = True
-    """Whether rows that have been written can be read if no more follow."""
+    """Whether rows already written can be read if the run dies."""
 
     def __init__(
         self,
@@ -121,7 +123,7 @@ class Recorder(RowBlock):
         self._lock = FolderLock(folder)
         try:
             tidy(self._home)
-            self._file = self._path.open("xb", buffering=0)  # not through a link that stands there
+            self._file = self._path.open("xb", buffering=0)  # "x": does not follow a link of that name
         except OSError as error:
             self._lock.release()
             raise ResultsError(f"{folder}: results cannot be written here: {reason(error)}.") from None
@@ -134,7 +136,7 @@ class Recorder(RowBlock):
             raise
 
     def announce(self, run: dict[str, Any]) -> None:
-        """Write down that a run has begun; should it die, its record is there."""
+        """Write the record of a run that is starting, so that it is there if the run dies."""
         try:
             self._write_record({**run, "status": RUNNING})
         except OSError as error:
@@ -142,7 +144,7 @@ class Recorder(RowBlock):
             raise self._unwritable(error) from None
 
     def _begin(self) -> None:
-        """Write what stands before the rows."""
+        """Write the header, if the format has one."""
         header = io.StringIO()
         csv.writer(header, lineterminator="\n").writerow(["time", *self.columns])
         self._append(header.getvalue().encode())
@@ -150,7 +152,7 @@ class Recorder(RowBlock):
     def _take(self, block: np.ndarray, others: list[list[Value]]) -> None:
         values = block.tolist()
         if len(self._order) == self._block.shape[1]:
-            # the text of a list of lists is the fastest way to many shortest decimal numbers
+            # repr of a list of lists is the fastest way to format many shortest decimal numbers
             text = repr(values)[2:-2].replace("], [", "\n").replace(", ", ",") + "\n"
         else:
             text = self._mixed(values, others)
@@ -177,7 +179,7 @@ class Recorder(RowBlock):
             self._digest.update(data)
 
     def _cut_back(self, arrived: bytes) -> None:
-        """Keep the whole rows of a block that did not fit."""
+        """Keep the whole rows of a block that did not fit on the disk."""
         whole = arrived.rfind(b"\n") + 1
         self.written += arrived[:whole].count(b"\n") if self._size else 0
         self._size += whole
@@ -186,10 +188,10 @@ class Recorder(RowBlock):
             self._file.truncate(self._size)
 
     def finish(self, run: dict[str, Any]) -> None:
-        """Write the record of the run, see that all is on the disk, and put both files in their places.
+        """Write the run record, flush everything to disk, and give both files their final names.
 
-        On a full disk the last rows give way to the record, without which the others are no use. The
-        folder is held until `close`.
+        On a full disk the last rows are dropped to make room for the record, without which the others are
+        useless. The folder stays locked until `close`.
         """
         try:
             self._complete(run)
@@ -210,22 +212,22 @@ class Recorder(RowBlock):
             raise self._unwritable(error) from None
 
     def close(self, run: dict[str, Any] | None = None) -> None:
-        """Let go of the folder.
+        """Release the folder.
 
         Args:
             run: what has changed in the record since `finish`.
         """
         if run is not None:
             record = self._home / self.place.relative_to(self.folder) / RUN_FILE
-            with contextlib.suppress(OSError):  # the results are there, and so is what is known of them
+            with contextlib.suppress(OSError):  # results and record are in place already
                 self._write_record({**self._record, **run}, record)
         self._lock.release()
 
     def _complete(self, run: dict[str, Any]) -> None:
-        """Write what stands behind the rows."""
+        """Write what follows the rows, if the format needs it."""
 
     def _whole(self, run: dict[str, Any]) -> dict[str, Any]:
-        """Return a run's record with what only the recorder knows."""
+        """Return a run's record completed with what only the recorder knows."""
         file = {} if self.file == RESULTS_FILE else {"results": self.file}
         known = {"rows": self.written, **file, "checksum": self._checksum(), **self.extremes()}
         self._record = {**run, **known}
@@ -241,7 +243,7 @@ class Recorder(RowBlock):
         return ResultsError(f"{self.folder}: results cannot be written: {reason(error)}.")
 
     def _make_room(self, needed: int) -> bool:
-        """Cut rows off the end of the results; return whether that gave any room."""
+        """Truncate the results by at least one row; return whether that freed any space."""
         size = self._size - 2 * needed - 2 * 4096
         if size <= 0:
             return False
@@ -265,7 +267,7 @@ class Recorder(RowBlock):
 
 
 def _order(real: Sequence[bool]) -> list[int]:
-    """Return where each column stands in time, Reals, others."""
+    """Return the index of each column in a row of time, Reals and others."""
     reals, others = 1, 1 + sum(real)
     order = []
     for is_real in real:
@@ -275,12 +277,12 @@ def _order(real: Sequence[bool]) -> list[int]:
 
 
 def record_text(run: Mapping[str, Any]) -> str:
-    """Return the record of a run as it is written, with its checksums."""
+    """Return the JSON text of a run record, with its checksums."""
     return json.dumps(with_checksums(_plain(run)), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _plain(value: Any) -> Any:
-    """Return `value` as JSON can hold it: numbers that are not finite become text."""
+    """Return `value` as JSON can represent it: non-finite numbers become text."""
     if isinstance(value, dict):
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):

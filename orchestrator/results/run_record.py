@@ -1,8 +1,7 @@
-"""What run.json says about a run: everything needed to repeat and to judge it.
+"""The run record, run.json: everything needed to repeat a run and to judge it.
 
-`RunRecord` is the one definition: what a run writes has its fields, and what is read back is checked by it.
-
-The record of a run, run.json, read back: every part that is used is of the kind that a run writes.
+`RunRecord` is its only definition: what a run writes has these fields, and what is read back is validated
+against them.
 """
 
 from __future__ import annotations
@@ -31,17 +30,17 @@ from .folder import FAILED, LARGEST, RUN_FILE, refuse_dead
 from .formats import FILES
 
 PROGRAMS = ("yawbench", "fmpy", "pythonfmu", "numpy")
-"""Packages that have a say in the numbers."""
+"""Packages that influence the numbers."""
 
 
 class _Part(BaseModel):
-    """A part of a record. All of it may be missing, and earlier versions may have written more."""
+    """Base of the parts of a record. Any field may be missing, and earlier versions may have written more."""
 
     model_config = ConfigDict(strict=True, extra="allow")
 
 
 class SeriesRecord(_Part):
-    """Where an input that is a time series comes from."""
+    """The file and column that a time-series input comes from."""
 
     file: str = ""
     column: str = ""
@@ -50,7 +49,7 @@ class SeriesRecord(_Part):
 
 
 class FmuRecord(_Part):
-    """An FMU as a unit of the run had it."""
+    """An FMU with the values that its instance had in the run."""
 
     name: str = ""
     file: str = ""
@@ -64,7 +63,7 @@ class FmuRecord(_Part):
     tolerance: float | None = None
     parameters: dict[str, Any] = {}
     origins: dict[str, str] = {}
-    defaults: dict[str, Any] = {}  # of parameters that the run leaves as they are
+    defaults: dict[str, Any] = {}  # the FMU's values of parameters that the run does not set
     constants: dict[str, Any] = {}
     series: dict[str, SeriesRecord] = {}
 
@@ -80,7 +79,7 @@ class ErrorRecord(_Part):
 
 
 class EndRecord(_Part):
-    """Which unit ended a run before its stop time, when [s] and why."""
+    """Which instance ended a run before its stop time, when [s] and why."""
 
     unit: str | None = None
     time: float | None = None
@@ -88,7 +87,7 @@ class EndRecord(_Part):
 
 
 class ConnectionRecord(_Part):
-    """A wire: `gain` and `offset` where it converts, and then the unit that it converts to."""
+    """A wire; `gain`, `offset` and the resulting unit only if it converts."""
 
     source: str = Field("", alias="from")
     target: str = Field("", alias="to")
@@ -98,7 +97,7 @@ class ConnectionRecord(_Part):
 
 
 class FindingRecord(_Part):
-    """A remark on the run's course."""
+    """A plausibility warning about the run."""
 
     kind: str
     place: str | None = None
@@ -108,7 +107,7 @@ class FindingRecord(_Part):
 
 
 class FaultRecord(_Part):
-    """A fault, and from when until when [s] it acts."""
+    """A fault and the time span [s] in which it acts."""
 
     on: str
     fault: str
@@ -118,26 +117,26 @@ class FaultRecord(_Part):
 
     @property
     def words(self) -> str:
-        """What it is, in words."""
+        """The fault in words."""
         return f"{self.on}: {self.fault}"
 
 
 class ChangeRecord(_Part):
-    """Something other than in the scenario file."""
+    """An override of a value of the scenario file."""
 
     place: str
     value: Any
 
 
 NotFinite = Literal["nan", "inf", "-inf"]
-"""How a record holds what JSON cannot."""
+"""Text for numbers that JSON cannot represent."""
 
 
 class RunRecord(_Part):
     """The record of a run."""
 
     id: str | None = None
-    key: str | None = None  # see `key.key_of`
+    key: str | None = None  # see `freshness.key_of`
     status: str = ""
     error: ErrorRecord | None = None
     title: str | None = None
@@ -152,7 +151,7 @@ class RunRecord(_Part):
     stop_time: float = 0.0  # [s]
     ended: EndRecord | None = None
     evaluation_order: list[str] = []
-    units: dict[str, str | None] = {}  # of measurement, of time and columns
+    units: dict[str, str | None] = {}  # units of time and of the columns
     texts: list[str] | None = None  # columns that hold text
     fmus: dict[str, FmuRecord] = {}
     changes: list[ChangeRecord] = []
@@ -171,7 +170,7 @@ class RunRecord(_Part):
 
 
 def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
-    """Return the record of a run without what comes later: wall time, error, rows and warnings.
+    """Return the record of a run as known at its start: no wall time, error, rows or warnings yet.
 
     Args:
         status: "completed", "failed" or "interrupted".
@@ -204,20 +203,20 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
 
 
 def units_of(plan: Plan) -> dict[str, str | None]:
-    """Return the measurement units of time and of all that is recorded."""
+    """Return the units of time and of all recorded columns."""
     units = {unit.name: unit for unit in plan.instances}
     columns = {f"{u}.{name}": units[u].fmu.variables[name].unit for u, name in plan.record}
     return {"time": "s", **columns}
 
 
 def connections_of(plan: Plan) -> list[dict[str, Any]]:
-    """Return the wires of a plan: from, to, and where a number is converted how and into which unit."""
+    """Return the wires of a plan: source, target, and the conversion if there is one."""
     units = {unit.name: unit for unit in plan.instances}
     return [_connection(wire, units) for wire in plan.wires]
 
 
 def faults_of(plan: Plan) -> list[dict[str, Any]]:
-    """Return the faults of a plan as they are written, each with its time [s] and all that it acts on."""
+    """Return the faults of a plan as the scenario states them, with their times [s] and variables."""
     found: dict[tuple[str, str], dict[str, Any]] = {}
     for fault in plan.faults:
         begin = None if fault.begin == -math.inf else fault.begin
@@ -250,7 +249,7 @@ def _fmu(unit: Instance, plan: Plan) -> dict[str, Any]:
         "tolerance": unit.tolerance or fmu.tolerance,
         "parameters": dict(unit.parameters),
         "origins": {name: str(origin) for name, origin in unit.origins.items() if origin != DEFAULT},
-        # what the FMU has for the others
+        # the FMU's values of the parameters that the run does not set
         "defaults": {v.name: v.start for v in fmu.of("parameter") if v.name not in unit.parameters},
         "constants": {name: value for name, value in unit.constants.items() if name not in unit.series},
     } | ({"series": {name: _series(one) for name, one in unit.series.items()}} if unit.series else {})
@@ -262,7 +261,7 @@ def _series(series: InputSeries) -> dict[str, Any]:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of all that has a say in the numbers."""
+    """Return the versions of everything that influences the numbers."""
     return {
         "python": platform.python_version(),
         **{package: version_of(package) for package in PROGRAMS},
@@ -273,7 +272,7 @@ def versions() -> dict[str, str]:
 
 @cache
 def version_of(package: str) -> str:
-    """Return the version of an installed package, "unknown" if it is none; the answer costs a millisecond."""
+    """Return the version of an installed package, else "unknown". Cached: a lookup takes a millisecond."""
     try:
         return version(package)
     except PackageNotFoundError:
@@ -281,14 +280,14 @@ def version_of(package: str) -> str:
 
 
 def load_record(folder: Path, *, settled: bool = False) -> dict[str, Any]:
-    """Return the record of the run whose results stand in a folder.
+    """Read the record of the run whose results are in a folder.
 
     Args:
-        folder: of the results.
-        settled: read the record of earlier results though the last run has died.
+        folder: the results folder.
+        settled: read the record of earlier results even if the last run has died.
 
     Raises:
-        ResultsError: there is none, it is not what `yawbench run` writes, or the last run here has died.
+        ResultsError: there is none, it is not one that `yawbench run` writes, or the last run here has died.
     """
     if not settled:
         refuse_dead(folder)
@@ -313,7 +312,7 @@ def load_record(folder: Path, *, settled: bool = False) -> dict[str, Any]:
 
 
 def warn_if_unchecked(run: Mapping[str, Any], folder: Path) -> None:
-    """Tell the user of a record without checksums."""
+    """Warn the user of a record without checksums."""
     if not checksums.has_checksums(run):
         checksums.warn(
             f"{folder / RUN_FILE}: has no checksums, it is of an earlier version or was changed; "
@@ -322,7 +321,7 @@ def warn_if_unchecked(run: Mapping[str, Any], folder: Path) -> None:
 
 
 def check_record(run: Any, file: Path) -> dict[str, Any]:
-    """Return the content of a record.
+    """Validate a record and return it.
 
     Raises:
         ResultsError: it was changed, or something in it is not what a run writes.

@@ -1,4 +1,4 @@
-"""Making readable results of what a run that died has recorded."""
+"""Recovers readable results from a run that has died."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ WHY = "the process of this run ended without a word"
 
 
 def salvage(folder: Path) -> tuple[Path, int]:
-    """Give the run that died in a folder a record and a file of the whole rows that it wrote.
+    """Turn what a dead run recorded into results: a final record and a file of complete rows.
 
-    They go where those of a run that failed do. Formats other than CSV can be read only whole: of them
-    nothing is kept, and the folder is as it was before the run. A run that had ended, and whose files had
-    yet to get their names, is kept whole, in whatever format.
+    They are treated like those of a failed run. Formats other than CSV cannot be read in part: such files are
+    removed, and the folder is as it was before the run. If the run had ended and only its files had not been
+    renamed yet, everything is kept, in any format.
 
     Returns:
-        where the results are, and the number of rows.
+        The folder of the results, and the number of rows.
 
     Raises:
         ResultsError: no run has died here, or its results cannot be read or written.
@@ -56,7 +56,7 @@ def salvage(folder: Path) -> tuple[Path, int]:
 
 
 def _keep_whole_rows(path: Path) -> int:
-    """Cut off what stands behind the last whole row; return the number of rows."""
+    """Truncate the file after the last complete row; return the number of rows."""
     end = 0
     with os.fdopen(open_own(path, os.O_RDWR), "r+b") as stream:
         position = 0
@@ -69,6 +69,6 @@ def _keep_whole_rows(path: Path) -> int:
 
 
 def lost_format(folder: Path) -> str | None:
-    """Return the file of a format other than CSV that the run that died in a folder was writing."""
+    """Return the file that a dead run was writing in a format other than CSV, which is lost; else None."""
     others = (name for name in FILES.values() if name != RESULTS_FILE)
     return next((name for name in others if is_regular(folder / f"{name}{PART}")), None)

@@ -1,1 +1,1 @@
-"""Stage one: a scenario file read strictly, every problem with its line."""
+"""Strict reading of scenario, vehicle and tyre property files and SSP archives; problems have their line."""

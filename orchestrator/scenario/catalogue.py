@@ -1,4 +1,4 @@
-"""Scenario, study and sweep files by name: `fnn_sideslip/25mps` is the file in the folder of scenarios."""
+"""Finds scenario, study and sweep files by name: `fnn_sideslip/25mps` for the file in `scenarios/`."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from .validation import KINDS
 
 FOLDER = "scenarios"
 SHIPPED = Path(__file__).resolve().parents[2] / FOLDER
-"""Where this program's own scenarios lie."""
+"""Folder of the scenarios that come with this program."""
 YAML = (".yaml", ".yml")
 ENDINGS = (*YAML, ".ssp")
 LOOKED_AT = 20_000
-"""Entries of a folder that are looked at for files. Chosen: a second, and more than anybody has."""
+"""Maximum number of examined entries of a folder. Chosen: a second, and more than real folders have."""
 COMMANDS = {
     "a scenario": "run",
     "a study file": "study",
@@ -27,21 +27,21 @@ COMMANDS = {
     "a tuning file": "tune",
     "a ranking file": "rank",
 }
-"""Kind of file -> the command that is for it."""
+"""Kind of file -> the command that takes it."""
 HOMES = {"a vehicle file": "vehicles"}
-"""Kind of file -> the one folder they lie in, which names need not say: `van` for `vehicles/van`."""
+"""Kind of file -> its folder, which names may omit: `van` for `vehicles/van`."""
 _KEY = re.compile(rf"^[\"']?({'|'.join(KINDS)})[\"']?[ \t]*:", re.MULTILINE)
 
 
 def folders() -> list[Path]:
-    """Return the folders of scenarios: the nearest upward from here, then this program's own."""
+    """Return the folders of scenarios: the nearest in the working folder or above, then this program's."""
     here = Path.cwd()
     near = [folder / FOLDER for folder in (here, *here.parents) if (folder / FOLDER).is_dir()]
     return list(dict.fromkeys([*(_from_here(folder) for folder in near[:1]), _from_here(SHIPPED)]))
 
 
 def kind_of(path: Path) -> str:
-    """Return the kind of a file (`strict.KINDS`) as a glance tells it; "" if it is none of them."""
+    """Guess the kind of a file (`validation.KINDS`) from its keys, without parsing it; "" if unknown."""
     if path.suffix == ".ssp":
         return "a scenario"
     try:
@@ -52,12 +52,12 @@ def kind_of(path: Path) -> str:
 
 
 def files(folder: Path, kinds: Collection[str], *, depth: int | None = None) -> Iterator[tuple[Path, str]]:
-    """Yield every file of some kinds in a folder with its kind, in alphabetical order.
+    """Yield (path, kind) of every file of some kinds in a folder, in alphabetical order.
 
     Args:
-        folder: where they are; of very many files in it the first `LOOKED_AT` are looked at.
-        kinds: of `strict.KINDS`.
-        depth: 1: those in the folder itself, 2: those in a folder of it; None: all below.
+        folder: where to search; only the first `LOOKED_AT` entries are examined.
+        kinds: of `validation.KINDS`.
+        depth: 1: files in the folder itself, 2: files in its subfolders; None: all below.
     """
     for path in sorted(islice(_below(folder, depth), LOOKED_AT)):
         if path.suffix in ENDINGS and (kind := kind_of(path)) in kinds:
@@ -65,7 +65,7 @@ def files(folder: Path, kinds: Collection[str], *, depth: int | None = None) -> 
 
 
 def _below(folder: Path, depth: int | None) -> Iterator[Path]:
-    """Yield what is in a folder and may be read; no link to a folder is followed."""
+    """Yield the readable entries below a folder; links to folders are not followed."""
     for above, inside, names in os.walk(folder):
         place = Path(above)
         level = len(place.relative_to(folder).parts) + 1
@@ -77,7 +77,7 @@ def _below(folder: Path, depth: int | None) -> Iterator[Path]:
 
 
 def names(kind: str) -> list[str]:
-    """Return the names that `find` takes for a kind of file, each once."""
+    """Return the names that `find` accepts for a kind of file, without duplicates."""
     found = (
         path.relative_to(folder).with_suffix("").as_posix()
         for folder in folders()
@@ -87,7 +87,7 @@ def names(kind: str) -> list[str]:
 
 
 def named(name: str | Path, kind: str = "") -> Path | None:
-    """Return the file that a name means, None if there is none: here, or in a folder of scenarios."""
+    """Return the file with a name, in the working folder or a folder of scenarios, None if there is none."""
     bases = [Path(), *folders()]
     if kind in HOMES:
         bases += [folder / HOMES[kind] for folder in folders()]
@@ -96,12 +96,12 @@ def named(name: str | Path, kind: str = "") -> Path | None:
 
 
 def find(source: str | Path, kind: str) -> Path:
-    """Return the file that a path or a name in a folder of scenarios means.
+    """Find a file by its path, or by its name in a folder of scenarios.
 
-    A path with the ending of such a file is returned as it stands, though there be no such file.
+    A path with the suffix of such a file is returned unchanged even if the file does not exist.
 
     Raises:
-        ScenarioError: there is none; names those there are.
+        ScenarioError: there is no such file; the message names existing ones.
     """
     path = Path(source)
     if os.path.isdir(path):
@@ -123,7 +123,7 @@ def find(source: str | Path, kind: str) -> Path:
 
 
 def _what_is_in(folder: Path, kind: str) -> str:
-    """Return what a folder is that was given in place of a file, and what could be meant."""
+    """Describe a folder that was given instead of a file, and suggest what could be meant."""
     if (folder / "run.json").is_file():
         return f"these are the results of a run, not {kind}; 'yawbench plot {folder}' draws them"
     for depth in (1, 2):
@@ -137,6 +137,6 @@ def _what_is_in(folder: Path, kind: str) -> str:
 
 
 def _from_here(path: Path) -> Path:
-    """Return a path as one would type it."""
+    """Return a path relative to the working folder if it is below it."""
     here = Path.cwd()
     return path.relative_to(here) if path.is_relative_to(here) else path

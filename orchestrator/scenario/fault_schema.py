@@ -1,14 +1,14 @@
-"""Faults as scenarios have them: where, of which kind, from when until when.
+"""Faults in scenario files: location, kind, beginning and end.
 
     faults:
       - {on: sensor.yaw_rate, kind: freeze, from: 1.5, until: 3.0}
       - {on: plant.yaw_rate -> sensor, kind: bias, value: 0.5 deg/s}
 
-A place is `unit.output`, for all who take it and in the results; `unit.output -> unit`, or
-`-> unit.input`, on the way to one of them; or `unit.input`. A `*` stands for several, four wheels say. In one
-line, as `--fault` and experiments have it, a place is followed by
-`KIND VALUE share N every T seed N from T until T`, of which only the kind has to be there; several faults at
-one place stand one after the other with a `;` between, and act so.
+A location is `unit.output`, which affects everything that the output feeds and the results;
+`unit.output -> unit` or `-> unit.input`, a wire to one target; or `unit.input`. A `*` matches several
+variables, such as those of four wheels. In one line, as for `--fault` and in experiments, the location is
+followed by `KIND VALUE share N every T seed N from T until T`, of which only the kind is required; several
+faults at one location are separated by `;` and act in this order.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from . import quantities, yaml_lines
 from .validation import Instant, StrictModel, Time
 
 EVERY = Fraction(1, 100)
-"""Time from one message to the next [s]. Chosen: what the buses of cars have."""
+"""Default time between two messages [s]. Chosen: typical of vehicle buses."""
 
 KindName = Literal[
     "bias", "gain", "drift", "noise", "freeze", "value", "dropout", "outlier", "delay", "saturation",
@@ -37,16 +37,16 @@ KindName = Literal[
 
 @dataclass(frozen=True)
 class FaultKind:
-    """A kind of fault: what becomes of a signal x, and what it is told."""
+    """A kind of fault: its effect on a signal x, and its options."""
 
     does: str
     unit: str | None = None  # of its value: "{x}" that of the signal; None: it takes no value
     default: float | None = None  # of the value
-    needs: bool = True  # a value
-    least: float | None = None  # the value may be
-    most: float | None = None
-    drawn: bool = False  # it takes seed and every
-    shared: bool = False  # it takes share
+    needs: bool = True  # whether a value is required
+    least: float | None = None  # minimum of the value
+    most: float | None = None  # maximum of the value
+    drawn: bool = False  # random: takes seed and every
+    shared: bool = False  # takes share
 
 
 KINDS: dict[str, FaultKind] = {
@@ -69,12 +69,12 @@ KINDS: dict[str, FaultKind] = {
         "of an actuator: value, by default the x at which the fault began", "{x}", needs=False
     ),
 }
-"""Kind -> what it does. A line more here and in `master.faulting` is a kind more."""
+"""All kinds of faults. To add a kind, add a row here, its name above, and it to `master.fault_injection`."""
 assert tuple(KINDS) == get_args(KindName)
 
 
 class FaultLocation(NamedTuple):
-    """Where a fault is: at a variable of a unit, or on the wires from there to a unit."""
+    """Location of a fault: a variable of an instance, or the wires from there to another instance."""
 
     instance: str
     variable: str
@@ -90,10 +90,10 @@ _PLACE = re.compile(r"\s*(\w+)\.([^\s>]+?)\s*(?:->\s*(\w+)(?:\.(\S+))?\s*)?")
 
 
 def place_of(value: object) -> FaultLocation:
-    """Return a place as written.
+    """Parse the location of a fault.
 
     Raises:
-        ValueError: it is none.
+        ValueError: not a location.
     """
     found = _PLACE.fullmatch(value) if isinstance(value, str) else None
     if found is None or any((part or "").count("*") > 1 for part in found.groups()):
@@ -104,10 +104,10 @@ def place_of(value: object) -> FaultLocation:
 
 
 def read_line(line: str) -> FaultList:
-    """Return the faults that a line gives, as written behind a place.
+    """Parse the faults in one line, as written after a location.
 
     Raises:
-        ValueError: something stands there twice.
+        ValueError: an option is given twice.
     """
     if line.strip() == NO_FAULTS:
         return FaultList()
@@ -144,10 +144,10 @@ Share = Annotated[float, PlainValidator(_share)]
 
 
 class FaultSpec(StrictModel):
-    """What goes wrong with a signal, for a time.
+    """A disturbance of a signal for some time.
 
-    Kinds are bias, gain, drift, noise, freeze, value, dropout, outlier, delay and saturation, of actuators
-    also loss and stuck.
+    Kinds are bias, gain, drift, noise, freeze, value, dropout, outlier, delay and saturation, and for
+    actuators loss and stuck.
     """
 
     on: FaultLocationText = Field(description="unit.output, unit.input or unit.output -> unit")
@@ -180,19 +180,19 @@ class FaultSpec(StrictModel):
 
     @property
     def item(self) -> dict[str, Value]:
-        """The fault as a file has it, without its place."""
+        """The fault as in a file, without its location."""
         times = {"every": self.every, "from": self.begin, "until": self.end}
-        given = {"kind": self.kind, "value": self.value, "share": self.share, "seed": self.seed}
-        told = given | {name: None if time is None else float(time) for name, time in times.items()}
-        return {name: value for name, value in told.items() if value is not None}
+        fields = {"kind": self.kind, "value": self.value, "share": self.share, "seed": self.seed}
+        fields |= {name: None if time is None else float(time) for name, time in times.items()}
+        return {name: value for name, value in fields.items() if value is not None}
 
     def __str__(self) -> str:
-        """The fault without its place, in one line."""
+        """The fault in one line, without its location."""
         return fault_line(self.item)
 
 
 def by_place(faults: Iterable[FaultSpec]) -> dict[str, FaultList]:
-    """Return place -> the faults there."""
+    """Group faults by location."""
     found: dict[str, FaultList] = {}
     for fault in faults:
         place = str(fault.on)

@@ -1,4 +1,4 @@
-"""Reading a scenario file: changes applied, validated, every problem reported in one go."""
+"""Loads a scenario file: applies overrides, validates it, and reports all problems at once."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .tir import TyreFile, read_tir
 from .yaml_lines import Document, KeyPath
 
 STEPS = 1_000_000_000
-"""Steps of a run. Chosen: a computer makes about as many in a day."""
+"""Maximum number of steps of a run. Chosen: about as many as a computer makes in a day."""
 
 __all__ = ["Connection", "Endpoint", "LoadedScenario", "ScenarioSpec", "load_scenario"]
 
@@ -34,12 +34,12 @@ def load_scenario(
 
     Args:
         path: the YAML file, or the archive.
-        changes: what is other than in the file; see `overrides`.
-        read: how to read a file, called as `yaml_lines.read`; what it returns is changed.
-        validate: False: use FMUs though their model descriptions are formally wrong.
+        changes: overrides of the file; see `overrides`.
+        read: reads a file, called like `yaml_lines.read`; the returned document is modified.
+        validate: False: accept FMUs with invalid model descriptions.
 
     Raises:
-        ScenarioError: with everything that is wrong with the file, its vehicle file, the changes.
+        ScenarioError: with all problems of the file, its vehicle file and the overrides.
     """
     archive = Path(path).suffix.lower() == ".ssp"
     document = _read_archive(Path(path)) if archive else read(Path(path), what="scenario file")
@@ -80,7 +80,7 @@ def _read_archive(path: Path) -> Document:
 
 
 def _ask_for_times(document: Document) -> None:
-    """Refuse an archive that lacks a time, as those from elsewhere do, if no option gives it."""
+    """Refuse an archive without stop time or step size (as from other tools) if no option gives it."""
     from . import ssp_read
 
     missing = ssp_read.missing_times(document)
@@ -103,7 +103,7 @@ def _read_vehicle(document: Document, read: Callable[..., Document]) -> Document
 def _read_tyres(
     scenario: ScenarioSpec | None, vehicle: Vehicle | None, document: Document, vehicle_document: Document
 ) -> dict[str, TyreFile]:
-    """Return the tyre property file of each axle; report what is wrong with it, note what is unusual."""
+    """Return the tyre property file of each axle; report its problems and note its warnings."""
     if scenario is None or vehicle is None:
         return {}
     named, where = (scenario.tyres, document) if scenario.tyres else (vehicle.tyres, vehicle_document)
@@ -121,7 +121,7 @@ def _read_tyres(
 
 
 def _check_time_grid(document: Document) -> None:
-    """Report every time that is no integer multiple of the communication step."""
+    """Report every time that is not an integer multiple of the communication step."""
     data = document.data
     step = _seconds(data.get("step_size"))
     if step is None:
@@ -170,7 +170,7 @@ def _read(parse: Callable[[object], Fraction], value: object) -> Fraction | None
 
 
 def _check_unit_names(document: Document) -> None:
-    """Report every unit that is named in a connection or a record but does not exist."""
+    """Report every instance that is named in `connections` or `record` but does not exist."""
     data = document.data
     units = data.get("units")
     if not isinstance(units, dict):
@@ -188,7 +188,7 @@ def _check_unit_names(document: Document) -> None:
 
 
 def _units_in(value: object) -> list[str]:
-    """Return the units that an end of a connection names; none if it is malformed."""
+    """Return the instances that an end of a connection names; none if it is malformed."""
     if isinstance(value, list):
         return [name for name in value if isinstance(name, str)]
     try:

@@ -1,15 +1,19 @@
-"""What is changed in a scenario before it is validated.
+"""Overrides: values that replace those of a scenario before it is validated.
 
-`--swap unit=fmu` replaces a unit's FMU; `--set unit.parameter=value` gives a parameter. Some names
-that no unit may have stand for more: `--set vehicle.mass=1200` changes the parameter set that all
-units share, `--set inputs.friction*=0.3` a constant, `--set friction=0.3` and `speed` what every unit that
-has to know it is told. `--set stop_time=2`, `step_size` and `algorithm` change the run,
-`--set unit.step_size=0.01` the step of a unit, `--set unit.validate=false` whether its FMU has to be
-formally right, `--set tyres=my.tir` (or `tyres.front`, `tyres.rear`) the tyre property file, and
-`--fault 'sensor.yaw_rate: freeze from 2 s'`, which is `faults.sensor.yaw_rate` to files, what goes wrong at a
-place, where `none` takes away what the scenario has. Studies and sweeps change the same places, and `vehicle`
-is the vehicle file itself. A value that was changed remembers by what, so that later messages name that in
-place of a line.
+    --swap INSTANCE=FMU                  the FMU of an instance
+    --set INSTANCE.PARAMETER=VALUE       a parameter of an instance
+    --set vehicle.mass=1200              a parameter of the vehicle file, for all instances
+    --set inputs.friction*=0.3           a constant
+    --set friction=0.3, speed=...        a fact (see `wiring.context`)
+    --set stop_time=2, step_size=..., algorithm=...     the run
+    --set INSTANCE.step_size=0.01        the step of an instance
+    --set INSTANCE.validate=false        accept an FMU with an invalid model description
+    --set tyres=my.tir                   the tyre property file; also `tyres.front`, `tyres.rear`
+    --fault 'sensor.yaw_rate: freeze from 2 s'          the faults of a signal; `none` removes them
+
+Studies and sweeps have the same targets, `faults.sensor.yaw_rate` for faults, and also `vehicle`, the vehicle
+file itself. Documents store which override set a value, so that later messages name the override instead of
+a line.
 """
 
 from __future__ import annotations
@@ -30,31 +34,31 @@ from .fault_schema import place_of, read_line
 from .yaml_lines import Document, KeyPath
 
 HOLDERS = ("vehicle", "inputs")
-"""Words that `--set` understands in place of a unit."""
+"""Words that `--set` accepts instead of an instance."""
 OF_UNIT = ("step_size", "validate")
-"""What `--set` changes of a unit that is no parameter of its FMU."""
+"""Settings of an instance that are not parameters of its FMU."""
 RESERVED = (*HOLDERS, *FACTS, TYRES, FAULTS)
-"""Names that no unit may have."""
+"""Names that no instance may have."""
 
 
 def is_path(fmu: str) -> bool:
-    """Return whether `fmu` is a path of an archive, not a name in the folder of FMUs."""
+    """Return whether `fmu` is the path of an archive rather than a name in the folder of FMUs."""
     return fmu.lower().endswith(".fmu") or "/" in fmu or "\\" in fmu
 
 
 def read_changes(
     swaps: Iterable[str] = (), settings: Iterable[str] = (), faults: Iterable[str] = ()
 ) -> tuple[Override, ...]:
-    """Return what the options of a command line change.
+    """Parse the overrides given as command-line options.
 
     Args:
         swaps: `unit=fmu`, as given to --swap; a path is relative to the working directory. An FMU may bring
             parameters along, `unit=fmu:parameter=value`.
         settings: `unit.parameter=value`, as given to --set.
-        faults: `place: kind ...`, as given to --fault (see `fault_schema`); those of one place add up.
+        faults: `location: kind ...`, as given to --fault (see `fault_schema`); those of one location add up.
 
     Raises:
-        ScenarioError: with every option that is none.
+        ScenarioError: with all malformed options.
     """
     changes: list[Override] = []
     problems: list[str | Problem] = []
@@ -92,10 +96,10 @@ def read_changes(
 
 
 def setting(place: str, value: Value, origin: str) -> Override:
-    """Return the change of a place to a value as it is written: faults come in a line, and leave as data.
+    """Return the override of a target; faults are parsed from their line.
 
     Raises:
-        ScenarioError: the line gives something twice.
+        ScenarioError: the line of a fault has an option twice.
     """
     holder, _, at = place.partition(".")
     if holder != FAULTS or not at:
@@ -110,7 +114,7 @@ def setting(place: str, value: Value, origin: str) -> Override:
 def changes_of(
     swaps: Mapping[str, str], settings: Mapping[str, Value], folder: Path, origin: str
 ) -> list[Override]:
-    """Return the changes that a file in a folder gives as unit -> FMU (see `swap_of`) and place -> value."""
+    """Return the overrides in a file of a folder: instance -> FMU (see `swap_of`) and target -> value."""
     changes = [
         setting(place, str(folder / str(value)) if place.split(".")[0] == TYRES else value, origin)
         for place, value in settings.items()
@@ -123,7 +127,7 @@ def changes_of(
 
 
 def changes_of_run(spec: Any, origin: str) -> list[Override]:
-    """Return the changes that the fields `stop_time`, `step_size` and `algorithm` of a file's part give."""
+    """Return the overrides in the fields `stop_time`, `step_size` and `algorithm` of a specification."""
     given = [(place, getattr(spec, place, None)) for place in OF_RUN]
     return [
         Override(place, float(value) if isinstance(value, Fraction) else value, origin)
@@ -133,7 +137,7 @@ def changes_of_run(spec: Any, origin: str) -> list[Override]:
 
 
 def swap_of(unit: str, text: str, origin: str) -> list[Override]:
-    """Return the changes of `fmu:parameter=value:parameter=value` for a unit, first its FMU."""
+    """Parse `fmu:parameter=value:parameter=value` for an instance into overrides, its FMU first."""
     match = re.fullmatch(r"(.*?)((?::\w+=[^:]*)*)", text, re.DOTALL)
     assert match is not None
     given = (one.partition("=") for one in match[2].split(":")[1:])
@@ -144,12 +148,12 @@ def swap_of(unit: str, text: str, origin: str) -> list[Override]:
 def apply_changes(
     document: Document, vehicle: Document, changes: Iterable[Override]
 ) -> tuple[dict[str, str], tuple[Override, ...]]:
-    """Enter changes into a scenario and its vehicle file; report those that do not fit.
+    """Apply overrides to a scenario and its vehicle file; report those that do not apply.
 
-    Of several changes of a place the last one counts.
+    Of several overrides of a target, the last one wins.
 
     Returns:
-        unit -> the FMU that the file names, of all that are swapped; the changes that make a difference.
+        swapped instance -> its FMU in the file; the overrides that make a difference.
     """
     replaced: dict[str, str] = {}
     effective: list[Override] = []
@@ -187,14 +191,14 @@ def apply_changes(
 
 
 def apply_vehicle(document: Document, changes: Iterable[Override]) -> None:
-    """Name another vehicle file, relative to the working directory, where a change asks for it."""
+    """Apply overrides of the vehicle file, relative to the working directory."""
     for change in changes:
         if change.place == "vehicle":
             _put(document, ("vehicle",), change, os.path.abspath(str(change.value)))
 
 
 def _put_tyres(document: Document, vehicle: Document, change: Override) -> bool:
-    """Name other tyre property files, relative to the working directory; return whether they are others."""
+    """Override tyre property files, relative to the working directory; return whether they differ."""
     file = os.path.abspath(str(change.value))
     axle = change.place.removeprefix(f"{TYRES}.")
     holder = next(
@@ -209,7 +213,7 @@ def _put_tyres(document: Document, vehicle: Document, change: Override) -> bool:
 
 
 def spelled(place: str) -> str:
-    """Return the place of a fault as it is written here, as it stands if it is none."""
+    """Return the location of a fault in its canonical spelling, unchanged if it is malformed."""
     try:
         return str(place_of(place))
     except ValueError:
@@ -217,10 +221,10 @@ def spelled(place: str) -> str:
 
 
 def _put_faults(document: Document, change: Override, place: str) -> bool:
-    """Give a place other faults than the file does, behind those of other places; return whether they are."""
+    """Replace the faults of a location, after those of other locations; return whether they differ."""
     given = document.data.get(FAULTS) or []
     if not isinstance(given, list):
-        return True  # the schema will say what is wrong
+        return True  # the schema will report what is wrong
     assert isinstance(change.value, FaultList)
     items = [{"on": place, **item} for item in change.value]
     places = [spelled(str(one.get("on"))) if isinstance(one, dict) else None for one in given]
@@ -237,14 +241,14 @@ def _put_faults(document: Document, change: Override, place: str) -> bool:
 
 
 def leave_unvalidated(document: Document) -> None:
-    """Let every unit use its FMU though the model description is formally wrong."""
+    """Let every instance use its FMU even if the model description is invalid."""
     for spec in _mapping(document.data, "units").values():
         if isinstance(spec, dict):
             spec["validate"] = False
 
 
 def apply_to_all_runs(document: Document, changes: Iterable[Override]) -> None:
-    """Enter changes into the `swap` and `set` of a file that has many runs of a scenario."""
+    """Add overrides to the `swap`, `set` and `faults` of an experiment, for all of its runs."""
     for change in changes:
         if change.place in OF_RUN:
             _put(document, (change.place,), change)
@@ -255,7 +259,7 @@ def apply_to_all_runs(document: Document, changes: Iterable[Override]) -> None:
 
 
 def _swap(document: Document, unit: str, change: Override) -> bool:
-    """Replace the FMU of a unit; return whether it is another one."""
+    """Replace the FMU of an instance; return whether it differs."""
     fmu = str(change.value)
     key: KeyPath = ("units", unit, "fmu")
     before = document.data["units"][unit].get("fmu")
@@ -267,7 +271,7 @@ def _swap(document: Document, unit: str, change: Override) -> bool:
 
 
 def _put(document: Document, key: KeyPath, change: Override, value: Any = None) -> bool:
-    """Give the value at a key, a change's own if no other is given; return whether it was another before."""
+    """Set the value at a key, by default that of the override; return whether it differs from before."""
     holder = document.data
     for part in key[:-1]:
         if isinstance(holder, dict) and holder.get(part) is None:
@@ -282,6 +286,6 @@ def _put(document: Document, key: KeyPath, change: Override, value: Any = None) 
 
 
 def _mapping(data: Any, name: str) -> dict[str, Any]:
-    """Return data[name] if both are mappings, else an empty one: the schema will say what is wrong."""
+    """Return data[name] if both are mappings, else an empty mapping: the schema reports what is wrong."""
     inner = data.get(name) if isinstance(data, dict) else None
     return inner if isinstance(inner, dict) else {}

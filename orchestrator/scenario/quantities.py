@@ -1,15 +1,13 @@
-"""Quantities with a unit, as people write them: '90 km/h', '5 deg', '12 bar', '2 N.m/deg'.
+"""Units of measurement, and quantities written with one: '90 km/h', '5 deg', '12 bar', '2 N.m/deg'.
 
-A lone `g` is a gram where a mass is meant, else standard gravity, 9.80665 m/s2.
+A unit is a product of powers: symbols of the tables below, many with a decimal prefix, joined by `.` (also
+`*`, a raised dot or a space), each with an exponent (`m2`, `m^2`, `s-1`), divided by `/`; a denominator of
+several symbols is put in parentheses, or each of them after its own `/`. It is represented by powers of kg,
+m, s, A, K, mol, cd, rad (FMI 2.0.4, section 2.2.2), a factor and an offset. Factors are exact fractions with
+a separate power of pi, so that 90 km/h is 25 m/s to the last bit. The definition of an FMU takes precedence
+over the tables, unless both agree except for rounding: then the tables have more digits.
 
-Units of measurement by what they mean: 'N.m', 'km/h', 'm/s2', or as an FMU defines them.
-
-A unit is a product of powers: symbols of the table below, most with a decimal prefix, joined by
-`.` (also `*`, a raised dot or a space), each with an exponent (`m2`, `m^2`, `s-1`), divided by `/`;
-a denominator of several symbols stands in parentheses or behind a `/` each. It stands for powers of
-kg, m, s, A, K, mol, cd, rad (FMI 2.0.4, section 2.2.2), a factor and an offset. Factors are exact
-fractions, with powers of pi beside them, so that 90 km/h is 25 m/s to the last bit. What an FMU
-defines goes before the table; where both agree but for rounding, the table has more digits.
+A lone `g` is standard gravity, 9.80665 m/s2, where an acceleration is expected, otherwise a gram.
 """
 
 from __future__ import annotations
@@ -106,18 +104,18 @@ _TOKEN = re.compile(r"(?P<symbol>[A-Za-zµ°%]+|1)(?:\^?(?P<power>-?\d{1,2}))?|(
 
 
 class UnknownUnitError(ValueError):
-    """A text is no unit."""
+    """A text is not a unit of measurement."""
 
     def __init__(self, text: str) -> None:
         super().__init__(f"{short(text)} is not a unit")
 
 
 LONGEST_UNIT = 60
-"""Characters of a unit; chosen: three times the longest that makes sense."""
+"""Maximum characters of a unit. Chosen: three times the longest that makes sense."""
 
 
 def parse_unit(text: str) -> Unit:
-    """Return what the unit `text` means.
+    """Parse a unit of measurement.
 
     Raises:
         ValueError: not a unit.
@@ -180,7 +178,7 @@ def _factor(tokens: list[Unit | str], text: str) -> tuple[Unit, list[Unit | str]
 
 @cache
 def measure_of(unit: str | None, definition: UnitDefinition | None = None) -> Unit | None:
-    """Return what a unit means that an FMU declares, None if neither the FMU nor the table says."""
+    """Return the unit that an FMU declares, None if neither the FMU nor the tables define it."""
     try:
         known = parse_unit(unit) if unit else None
     except ValueError:
@@ -195,27 +193,27 @@ def measure_of(unit: str | None, definition: UnitDefinition | None = None) -> Un
 
 
 def conversion(source: Unit, target: Unit) -> tuple[float, float] | None:
-    """Return gain and offset that make a number in `source` one in `target`, None if they do not fit.
+    """Return gain and offset that convert from `source` to `target`, None if they are incompatible.
 
-    They are 1 and 0 exactly where both mean the same (see `ROUNDING`).
+    They are exactly 1 and 0 for equal units (see `ROUNDING`).
     """
     if source.powers != target.powers:
         return None
     try:
         gain = float(source.factor / target.factor) * math.pi ** (source.pi - target.pi)
         offset = float((source.offset - target.offset) / target.factor) / math.pi**target.pi
-    except OverflowError:  # by definitions of FMUs
+    except OverflowError:  # extreme definitions in FMUs
         return None
     same = math.isclose(gain, 1.0, rel_tol=ROUNDING) and abs(offset) <= ROUNDING
     return (1.0, 0.0) if same else (gain, offset)
 
 
 LONGEST_QUANTITY = 1e9
-"""The longest time that is taken for one [s]."""
+"""Longest accepted time [s]."""
 WRITTEN = 200
-"""Characters of a quantity. Chosen: ten times the longest that makes sense."""
+"""Maximum characters of a quantity. Chosen: ten times the longest that makes sense."""
 SHORTEST = Fraction(1, 10**9)
-"""The shortest [s]; below, steps are lost in the rounding of time."""
+"""Shortest accepted time [s]; shorter steps are lost in the rounding of time."""
 
 _GRAVITY = replace(parse_unit("m/s2"), factor=Fraction("9.80665"))
 _COMMON = (  # noqa: SIM905 - units read better as one line of text
@@ -223,7 +221,7 @@ _COMMON = (  # noqa: SIM905 - units read better as one line of text
     "kg g t kg.m2 kg/m3 N kN N.m kN.m N/rad kN/rad N/deg N/m kN/m N/mm N.s/m N.m/rad N.m/deg N.m.s/rad "
     "Pa kPa MPa bar Pa/s MPa/s bar/s K degC 1 %"
 ).split()
-"""Spellings to offer in a message."""
+"""Units to suggest in messages."""
 
 _NUMBER = re.compile(
     r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(?P<unit>[A-Za-zµμ°%1(].*?)?\s*",
@@ -234,18 +232,18 @@ _COMMA = re.compile(r"\s*([+-]?\d+),(\d+\s*[^,]*?)\s*", re.ASCII)
 
 
 def number_and_unit(text: str) -> tuple[str, str] | None:
-    """Return what a quantity is written as, ("80", "km/h"); None if `text` is no number with a unit."""
+    """Split a quantity into number and unit, ("80", "km/h"); None if `text` is not a number with a unit."""
     match = _NUMBER.fullmatch(text) if len(text) <= WRITTEN else None
     return (match["number"], match["unit"]) if match and match["unit"] else None
 
 
 def convert(text: str, unit: str | None, definition: UnitDefinition | None = None) -> Fraction | float:
-    """Return the quantity `text` as a number in `unit`: a Fraction where that is exact.
+    """Convert the quantity `text` to a number in `unit`: a Fraction where that is exact.
 
-    `definition` is what the FMU that declares the unit says about it.
+    `definition` is that of the FMU which declares the unit.
 
     Raises:
-        ValueError: a sentence that says what `text` should have been.
+        ValueError: not such a quantity; the message says what is expected.
     """
     written = number_and_unit(text)
     if written is None:
@@ -278,7 +276,7 @@ def convert(text: str, unit: str | None, definition: UnitDefinition | None = Non
 
 
 def _source(given: str, target: Unit) -> Unit:
-    """Return what a unit means where a quantity is wanted in another: `g` of an acceleration is gravity.
+    """Parse the unit of a quantity that is to be converted; for accelerations `g` is standard gravity.
 
     Raises:
         ValueError: not a unit.
@@ -287,7 +285,7 @@ def _source(given: str, target: Unit) -> Unit:
 
 
 def gain_and_offset(given: str, target: Unit) -> tuple[float, float] | None:
-    """Return what makes a number in a unit one in another, None if they do not fit or one is no unit."""
+    """Return the conversion from a unit to another, None if `given` is not a unit or incompatible."""
     try:
         return conversion(_source(given, target), target)
     except ValueError:
@@ -295,9 +293,9 @@ def gain_and_offset(given: str, target: Unit) -> tuple[float, float] | None:
 
 
 def converted(number: Fraction, source: Unit, target: Unit) -> Fraction | float:
-    """Return a number in `source` as one in `target`, a unit of the same powers.
+    """Convert a number from `source` to `target`, a unit of the same dimension.
 
-    It is exact where that can be, and infinite where no float is as large.
+    The result is exact where possible, and infinite where it is too large for a float.
     """
     exact = (number * source.factor + source.offset - target.offset) / target.factor
     turns = source.pi - target.pi
@@ -311,7 +309,7 @@ def converted(number: Fraction, source: Unit, target: Unit) -> Fraction | float:
 
 
 def _guess(given: str, unit: str, target: Unit) -> str:
-    """Return "; did you mean ...?" for what is no unit, or the units that fit."""
+    """Return "; did you mean ...?" for an unknown unit, or a list of the compatible units."""
     fitting = _spellings(unit, target)
     plain = {re.sub(r"[^a-z0-9]", "", name.lower()): name for name in reversed([*_COMMON, *fitting])}
     likely = plain.get(re.sub(r"[^a-z0-9]", "", given.lower())) or closest(given, fitting)
@@ -319,7 +317,7 @@ def _guess(given: str, unit: str, target: Unit) -> str:
 
 
 def _spellings(unit: str, target: Unit) -> list[str]:
-    """Return units that fit, the one in question first."""
+    """Return common compatible units, `unit` first."""
     fitting = [name for name in _COMMON if parse_unit(name).powers == target.powers]
     if target.powers == _GRAVITY.powers:
         fitting.append("g")
@@ -330,10 +328,10 @@ def meant_unit(number: float, given: str, unit: str, fits: Callable[[float], boo
     """Return the unit in which a number would be a plausible value, "" if there is none.
 
     Args:
-        number: as it is written.
-        given: the unit that it was taken to be in.
+        number: as written.
+        given: the unit that the number was assumed to be in.
         unit: of the quantity.
-        fits: whether a value in that unit is plausible.
+        fits: returns whether a value in `unit` is plausible.
     """
     target = parse_unit(unit)
     others = (one for one in _spellings(unit, target) if one != given)
@@ -342,12 +340,12 @@ def meant_unit(number: float, given: str, unit: str, fits: Callable[[float], boo
 
 
 def spellings(unit: str) -> list[str]:
-    """Return the common units of what a unit measures, itself first."""
+    """Return the common units of the same dimension as `unit`, itself first."""
     return _spellings(unit, parse_unit(unit))
 
 
 def instant(value: object) -> Fraction:
-    """Return a point of time in s as an exact fraction of what is written: 0.001 is 1/1000.
+    """Return a point of time in s as the exact fraction of its decimal text: 0.001 is 1/1000.
 
     Raises:
         ValueError: not a time.
@@ -359,7 +357,7 @@ def instant(value: object) -> Fraction:
 
 
 def seconds(value: object) -> Fraction:
-    """Return a span of time in s as an exact fraction of what is written.
+    """Return a duration in s as the exact fraction of its decimal text.
 
     Raises:
         ValueError: not a positive time.

@@ -1,8 +1,8 @@
-"""The schema of scenario files and vehicle files: every key, strictly.
+"""The schema of scenario files and vehicle files.
 
-Paths (`vehicle`, an `fmu` that is a path) are relative to the scenario file. Values may name their
-unit ('90 km/h'); which unit a parameter wants is known only when its FMU is, so they are converted
-in wiring.
+Paths (`vehicle`, an `fmu` that is a path) are relative to the scenario file. Values may be given with a unit
+('90 km/h'). The unit of a parameter is known only when its FMU has been opened, so values are converted
+during wiring.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ AXLES = ("front", "rear")
 
 
 class Endpoint(NamedTuple):
-    """A variable of a unit, or with a `*` several of them."""
+    """A variable of an instance, or several with a `*`."""
 
     instance: str
     variable: str
@@ -114,7 +114,7 @@ UnitName = Annotated[str, AfterValidator(_unit_name)]
 
 
 class TextSpec(StrictModel):
-    """The text of a file, UTF-8, in place of a value: for parameters that are text, as a road's patches."""
+    """The text of a file (UTF-8) as the value of a text parameter, such as the patches of a road."""
 
     file: str = Field(description="Path, relative to the scenario", min_length=1)
 
@@ -129,7 +129,7 @@ ParameterValue = Annotated[
 
 
 class UnitSpec(StrictModel):
-    """One unit as the scenario gives it."""
+    """An instance of an FMU."""
 
     fmu: str = Field(description="Name of an FMU in fmus/, or the path of any .fmu", min_length=1)
     step_size: Time | None = Field(None, description="s, an integer multiple of the communication step")
@@ -143,11 +143,11 @@ class UnitSpec(StrictModel):
 
 
 class SeriesSpec(StrictModel):
-    """A time series from a file, CSV, Parquet or ASAM MDF 4, in place of a constant.
+    """A time series from a file (CSV, Parquet or ASAM MDF 4) for an input.
 
-    Headers may name units (`delta [deg]`), and values are converted to that of the input. Under
-    `extrapolated`, an input that is integrated takes the value in the middle of the step, so a straight
-    line between two values counts to second order; `jacobi` takes that at its beginning.
+    Headers may name units (`delta [deg]`), and values are converted to the unit of the input. With the
+    algorithm `extrapolated`, an integrated input uses the value in the middle of the step, so that linear
+    interpolation is accurate to second order; `jacobi` uses the value at its beginning.
     """
 
     file: str = Field(description="Path, relative to the scenario", min_length=1)
@@ -170,17 +170,18 @@ InputValue = Annotated[
 
 
 class Connection(StrictModel):
-    """Connections beyond equal names; `*` in both ends connects everything that matches in pairs.
+    """Connections in addition to equal names; a `*` in both ends connects all matching pairs.
 
-    Numbers are converted from the output's unit into the input's. With `gain` or `offset` the units do
-    not count: the input is gain times the output plus offset, in plain numbers.
+    Numbers are converted from the unit of the output to that of the input. With `gain` or `offset`, units
+    are ignored: the input is gain times the output plus offset, in plain numbers.
 
-    Lists of units choose among equal names: `{from: [estimator, sensor], to: [controller, reference]}`
-    lets each input of the latter take the output of its name from the first of the former that has it,
-    before any other unit; what none of them has comes from elsewhere. Several lists for one unit have to
-    agree on an order. A list of units to a pattern, `{from: [plant, driver], to: sensor.*_true}`, lets each
-    input take the output that the `*` names from the first unit that has it, as a connection of each would.
-    `from: null` leaves inputs without a source, whatever outputs there are.
+    Lists of instances choose among equal names: with
+    `{from: [estimator, sensor], to: [controller, reference]}`, each input of the latter takes the output of
+    the same name from the first of the former that has it, in preference to any other instance; inputs for
+    which none of them has an output are connected as usual. Several lists for one instance must agree on an
+    order. With a list of instances and a pattern, `{from: [plant, driver], to: sensor.*_true}`, each input
+    takes the output matched by the `*` from the first instance that has it. `from: null` leaves inputs
+    without a source, whatever outputs there are.
     """
 
     source: SourceEndpoint = Field(alias="from", description="unit.output, or units in order, or null")
@@ -210,7 +211,7 @@ class Connection(StrictModel):
 
 
 class Vehicle(StrictModel):
-    """A vehicle file: parameters that every unit takes if it declares them."""
+    """A vehicle file: parameters for every instance that declares them."""
 
     title: str = ""
     source: str = ""
@@ -221,15 +222,15 @@ class Vehicle(StrictModel):
 
 
 class ScenarioSpec(StrictModel):
-    """A scenario file with all changes applied.
+    """A scenario file with all overrides applied.
 
-    Every input has one source: what `connections` names; else a constant whose key names the unit
+    Every input has one source: a connection; else a constant whose key names the instance
     (`tyre.friction_*`); else the output of the same name; else a constant by name or pattern alone
-    (`friction*`), which is refused where an output drives the input; else, if its unit declares it as
+    (`friction*`), which is an error if an output drives the input; else, if its FMU declares it as
     optional, its start value.
 
-    A pattern under `record` means outputs. Where it matches none that is a number, it means any variable:
-    inputs, parameters, internal ones, text.
+    A pattern under `record` matches outputs. If it matches no numeric output, it matches any variable:
+    inputs, parameters, local variables, text.
     """
 
     title: str = ""
@@ -253,24 +254,24 @@ class ScenarioSpec(StrictModel):
 
 
 class LoadedScenario(ScenarioSpec):
-    """A scenario as loaded: its file, what came with it, and where every value stands, for messages."""
+    """A loaded scenario with its vehicle and tyre files, overrides, and the lines of all values."""
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
 
     document: InstanceOf[Document]
     vehicle_document: InstanceOf[Document]
     vehicle_file: Vehicle
-    """Every unit takes the parameters that it declares; empty: none."""
+    """Parameters for every instance that declares them; empty if there is no vehicle file."""
     tyre_files: dict[str, InstanceOf[TyreFile]]
-    """Axle -> its tyre property file; every unit takes the parameters it declares. Empty: none."""
+    """Axle -> its tyre property file, for every instance that declares the parameters; may be empty."""
     replaced: dict[str, str]
-    """Unit -> the FMU that the file names, for units that are swapped."""
+    """Swapped instance -> its FMU in the file."""
     changes: tuple[InstanceOf[Override], ...]
-    """What is other than in the file."""
+    """The overrides that make a difference."""
     explicit: bool
-    """Whether only what `connections` names is connected, and start values stand for the rest.
+    """Whether only `connections` connects inputs, and other inputs keep their start values.
 
-    So it is in SSP archives, but for units that are swapped.
+    True for SSP archives, except for their swapped instances.
     """
 
     @property
@@ -280,11 +281,11 @@ class LoadedScenario(ScenarioSpec):
 
     @property
     def tyres_place(self) -> tuple[Document, KeyPath]:
-        """Where the tyre property files are named, for messages."""
+        """Document and key that name the tyre property files, for messages."""
         return (self.vehicle_document if self.tyres is None else self.document), ("tyres",)
 
     def as_run(self) -> dict[str, Any]:
-        """Return everything that the file, the vehicle file and the changes say, as JSON-ready data."""
+        """Return the scenario with vehicle file and overrides applied, as JSON-ready data."""
         data = dict(self.document.data)
         times = {"stop_time": float(self.stop_time), "step_size": float(self.step_size)}
         if self.start_time:

@@ -1,8 +1,6 @@
-"""The members of an SSP archive: descriptions as XML, and what its FMUs declare.
+"""Access to the members of an SSP archive, and the names used by both reading and writing of SSP.
 
-Nothing is unpacked to disk, and no address leads out of the archive.
-
-Names that the SSP archives written here and those read here have in common.
+Nothing is unpacked to disk, and references outside of the archive are refused.
 """
 
 from __future__ import annotations
@@ -27,13 +25,13 @@ from ..plan import UnitDefinition
 from .quantities import BASE_UNITS, Unit, measure_of
 
 LARGEST = 100_000_000
-"""Bytes that a description may take, unpacked. Chosen: a thousand times what one of ours takes."""
+"""Maximum bytes of an unpacked description. Chosen: a thousand times the size of ours."""
 
 _DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, ValueError, RuntimeError, NotImplementedError)
 
 
 class SspError(Exception):
-    """What cannot be read, in one sentence, and the element that says so."""
+    """An SSP archive cannot be read; has the XML element with the error."""
 
     def __init__(self, sentence: str, element: _Element | None = None) -> None:
         super().__init__(sentence)
@@ -41,14 +39,14 @@ class SspError(Exception):
         self.member = "" if element is None else element.getroottree().docinfo.URL or ""
 
     def problem(self, path: Path) -> Problem:
-        """Return it as a problem of the archive `path`, with the place in it that it speaks of."""
+        """Convert to a problem of the archive `path`, with member and line if known."""
         if self.line and self.member:
             return Problem(str(self), file=path / self.member, line=self.line)
         return Problem(str(self), file=path)
 
 
 class SspVariable(NamedTuple):
-    """A variable as an FMU declares it."""
+    """A variable or connector as declared by an FMU or an archive."""
 
     causality: str
     unit: str | None = None
@@ -56,7 +54,7 @@ class SspVariable(NamedTuple):
 
     @property
     def measure(self) -> Unit | None:
-        """What its unit means, None if it has none or one that nobody knows."""
+        """Its parsed unit, None if it has none or an unknown one."""
         return measure_of(self.unit, self.definition)
 
 
@@ -64,7 +62,7 @@ class SspArchive:
     """An SSP archive, read into memory.
 
     Raises:
-        Refused: it is missing or damaged.
+        SspError: the archive is missing or damaged.
     """
 
     def __init__(self, path: Path, *, what: str) -> None:
@@ -85,10 +83,10 @@ class SspArchive:
         self._variables: dict[str, dict[str, SspVariable]] = {}
 
     def member(self, element: _Element) -> str:
-        """Return the member that the `source` of an element means.
+        """Return the name of the member that the `source` of an element refers to.
 
         Raises:
-            Refused: it is outside of the archive, or in an FMU.
+            SspError: the source is outside of the archive, or inside an FMU.
         """
         source = element.get("source", "")
         try:
@@ -105,10 +103,10 @@ class SspArchive:
         return member
 
     def xml(self, member: str, tag: str) -> _Element:
-        """Return the root of a description.
+        """Parse an XML member and return its root.
 
         Raises:
-            Refused: there is none, it is damaged, or its root is not a `tag`.
+            SspError: the member is missing or damaged, or its root is not a `tag`.
         """
         try:
             if self._archive.getinfo(member).file_size > LARGEST:
@@ -125,10 +123,10 @@ class SspArchive:
         return root
 
     def variables(self, member: str, component: _Element) -> dict[str, SspVariable]:
-        """Return the variables of an FMU; none if it cannot be read, as opening it will say.
+        """Return the variables of an FMU; none if it cannot be read, which is reported when it is opened.
 
         Raises:
-            Refused: the archive does not hold it.
+            SspError: the FMU is not in the archive.
         """
         if member not in self._variables:
             try:
@@ -160,7 +158,7 @@ def _declared(description: _Element) -> Iterator[tuple[str, SspVariable]]:
 
 
 def unit_definitions(units: Iterable[_Element]) -> dict[str, UnitDefinition]:
-    """Return what `Unit` elements define, those of FMI or of SSP, by name."""
+    """Return the definitions in `Unit` elements of FMI or SSP, by name."""
     found = {}
     for unit in units:
         base = unit.find("{*}BaseUnit")
@@ -180,7 +178,7 @@ def _parser() -> etree.XMLParser:
 DESCRIPTION_FILE = "SystemStructure.ssd"
 RESOURCES = "resources"
 PARAMETER_SET = "scenario"
-"""One set for all components: other programs apply a set by its name."""
+"""Name of the parameter set; one for all components, because other programs apply a set by its name."""
 
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
@@ -190,8 +188,8 @@ OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
 OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
 OWN = "urn:yawbench:ssp:1"
 NAMESPACES = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP, "oms": OMS, "yawbench": OWN}
-"""All declared at the root, with the prefixes that libcosim and Ecos take for granted: they compare
-text, and libcosim takes a declaration further down for content."""
+"""Namespaces, all declared at the root with the prefixes that libcosim and Ecos expect: they compare text,
+and libcosim mistakes a declaration further down for content."""
 
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 VALUES_TYPE = "application/x-ssp-parameter-set"

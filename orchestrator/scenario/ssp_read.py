@@ -1,19 +1,17 @@
-"""An SSP 1.0 archive as a scenario: the content that a YAML file of the same system would have.
+"""Reads an SSP 1.0 archive as a scenario, with the content of an equivalent YAML file.
 
-Every component becomes a unit whose FMU is the member of the archive. Only what the archive connects
-is connected, and an input that it neither connects nor gives a value keeps its FMU's start value, as
-the standard has it. The communication step and the units' own come from the annotations of the Open
-Simulation Platform or of OMSimulator, all that SSP cannot say from our own; archives from elsewhere may
-lack them.
+Every component becomes an instance whose FMU is the member of the archive. Only the connections of the
+archive are made, and an input without connection and value keeps its FMU's start value, as the standard
+requires. The communication step and the steps of instances come from annotations of the Open Simulation
+Platform or of OMSimulator, everything else that SSP cannot express from annotations of our own; archives of
+other tools may lack them.
 
-What has no counterpart here is refused by name: signal dictionaries, mappings in connections,
-components that are no FMUs.
+On every connection a number is first converted from the unit of its start to that of its end, unless the
+connection suppresses that, and then linearly transformed. A connector of an FMU without a unit has that of
+its variable, a connector of a system that of the connector it is connected to.
 
-What the connections of an SSP archive do to numbers: units of connectors, linear transformations.
-
-On every connection a number is first converted from the unit of its start into that of its end, unless
-the connection suppresses that, and then transformed. A connector without a unit has that of its FMU's
-variable, a system's that of what it is connected to.
+Unsupported features are refused by name: signal dictionaries, mappings in connections, components that are
+not FMUs.
 """
 
 from __future__ import annotations
@@ -50,10 +48,10 @@ AS_IT_IS: Scale = (1.0, 0.0)
 
 
 def scale(structure: SspStructure, chain: Sequence[SspEnd]) -> Scale:
-    """Return what becomes of a number on its way, from what gives it through connectors to what takes it.
+    """Return the total gain and offset along a chain of connectors from source to target.
 
     Raises:
-        Refused: units that do not fit, or a transformation that is not linear.
+        SspError: units are incompatible, or a transformation is not linear.
     """
     total = AS_IT_IS
     measure: Unit | None = None
@@ -75,7 +73,7 @@ def scale(structure: SspStructure, chain: Sequence[SspEnd]) -> Scale:
 
 
 def automatic(structure: SspStructure, source: SspEnd, target: SspEnd) -> Scale | None:
-    """Return what a wire does by itself, of what the two FMUs declare; None if it is refused."""
+    """Return the conversion that wiring makes from the units of two FMUs; None if they are incompatible."""
     of, to = (structure.components[end.element].variables.get(end.name) for end in (source, target))
     if of is None or to is None or of.measure is None or to.measure is None:
         return AS_IT_IS
@@ -98,7 +96,7 @@ def _then(first: Scale, second: Scale) -> Scale:
 
 
 def read(path: Path, *, what: str = "SSP archive") -> Document:
-    """Read the archive `path`; whatever is wrong with it stands in the document's problems."""
+    """Read the archive `path`; errors are added to the problems of the document."""
     document = Document(path)
     try:
         document.data = _scenario(SspArchive(path, what=what), document)
@@ -108,7 +106,7 @@ def read(path: Path, *, what: str = "SSP archive") -> Document:
 
 
 def missing_times(document: Document) -> list[str]:
-    """Return a sentence for each time that neither the archive nor an option gives."""
+    """Return a message for each time that neither the archive nor an option gives."""
     wanted = {"stop_time": ("stop time", "10"), "step_size": ("communication step", "0.001")}
     return [
         f"{document.path}: the archive says no {words}: give one in s, such as --set {name}={such_as}"
@@ -118,7 +116,7 @@ def missing_times(document: Document) -> list[str]:
 
 
 def _scenario(archive: SspArchive, document: Document) -> dict[str, Any]:
-    """Return what a scenario file of this system would hold."""
+    """Return the content of an equivalent scenario file."""
     root = archive.xml(DESCRIPTION_FILE, f"{{{SSD}}}SystemStructureDescription")
     system = root.find(f"{{{SSD}}}System")
     if system is None:
@@ -163,14 +161,14 @@ def _scenario(archive: SspArchive, document: Document) -> dict[str, Any]:
 
 
 def _title(root: _Element) -> str:
-    """Return the title, which the name of a structure, an identifier, cannot hold."""
+    """Return the title from our annotation, else the name of the structure, which is only an identifier."""
     own = root.find(f".//{{{OWN}}}Scenario")
     name = root.get("name", "")
     return name if own is None else own.get("title", name)
 
 
 def _unit_names(structure: SspStructure, document: Document) -> dict[ElementPath, str]:
-    """Return what each component is called as a unit: as in the archive, where that can name a unit."""
+    """Return the instance name of each component: that in the archive, changed where it is not allowed."""
     names: dict[ElementPath, str] = {}
     for path, component in structure.components.items():
         name = re.sub(r"[^A-Za-z0-9_]", "_", "_".join(path))
@@ -188,7 +186,7 @@ def _unit_names(structure: SspStructure, document: Document) -> dict[ElementPath
 def _values_through_connectors(
     structure: SspStructure, given: Mapping[SspEnd, SspValue]
 ) -> dict[SspEnd, SspValue]:
-    """Return the values, with those that a system's connector passes on in place of a component's own."""
+    """Return the values, with those from connectors of systems replacing those of components."""
     passed = {}
     for end in structure.sources:
         through = [
@@ -200,7 +198,7 @@ def _values_through_connectors(
 
 
 def _passed_on(structure: SspStructure, given: SspValue, connector: SspEnd, end: SspEnd) -> SspValue:
-    """Return a value that a system's connector has as it arrives at a component."""
+    """Return the value of a system's connector after conversion on its way to a component."""
     ways = structure.upstream(end)
     way = scale(structure, [*reversed(ways[: ways.index(connector) + 1]), end])
     if way == AS_IT_IS:
@@ -214,7 +212,7 @@ def _passed_on(structure: SspStructure, given: SspValue, connector: SspEnd, end:
 def _connections(
     structure: SspStructure, names: Mapping[ElementPath, str]
 ) -> tuple[list[dict[str, Any]], set[SspEnd]]:
-    """Return the connections from component to component, and what they drive."""
+    """Return the connections between components, and the ends that they drive."""
     connections: list[dict[str, Any]] = []
     driven = set()
     for end in structure.sources:
@@ -235,7 +233,7 @@ def _connections(
 
 
 def _experiment(root: _Element) -> dict[str, Any]:
-    """Return times, algorithm and what is recorded, as far as the archive says."""
+    """Return times, algorithm and recorded signals, as far as the archive gives them."""
     found: dict[str, Any] = {}
     experiment = root.find(f"{{{SSD}}}DefaultExperiment")
     if experiment is not None:

@@ -1,12 +1,11 @@
-"""The components of an SSP archive and what feeds what, with systems in systems laid flat.
+"""Components, connections and parameter values of an SSP archive, with nested systems flattened.
 
-A connection's ends are called start and end, but that says nothing of its direction: the kinds of its
-connectors do. Seen from inside a system, its own inputs give values and its outputs take them.
+The start and end of a connection do not determine its direction: the kinds of its connectors do. Inside a
+system, its own inputs are sources and its outputs are targets.
 
-The values that an SSP archive binds to variables, by name, of inner systems and then of outer ones.
-
-Of several values for one variable that of the outermost system counts, and on one level the last. A
-name that nothing has is passed over, as the standard has it, but not without a word.
+Parameter values are bound to variables by name, first those of inner systems, then those of outer ones. Of
+several values for a variable, that of the outermost system wins, on the same level the last. Unknown names
+are ignored, as the standard requires, but with a note.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ from .ssp_archive import (
 )
 
 ElementPath = tuple[str, ...]
-"""Of an element: the names of the systems it is in, below the outermost, then its own."""
+"""Path of an element: the names of the systems that contain it, without the outermost, then its own."""
 
 _GIVES = {"output": True, "calculatedParameter": True, "input": False, "parameter": False}
 
@@ -62,34 +61,34 @@ class SspComponent:
 
 @dataclass
 class SspStructure:
-    """Everything that a system and the systems in it hold."""
+    """The components, nested systems, connectors and connections of a system."""
 
     components: dict[ElementPath, SspComponent] = field(default_factory=dict)
     systems: dict[ElementPath, _Element] = field(default_factory=dict)
-    """From the inside out: the outermost is the last."""
+    """From the innermost to the outermost."""
     connectors: dict[ElementPath, dict[str, SspVariable]] = field(default_factory=dict)
-    """Of each element, by name: kind and unit, as far as the archive says them."""
+    """Element -> name of a connector -> its kind and unit, if given."""
     sources: dict[SspEnd, tuple[SspEnd, _Element]] = field(default_factory=dict)
-    """What gives an end its value, and the connection that says so."""
+    """Target -> its source and the connection between them."""
 
     def unit_inside(self, end: SspEnd) -> Unit | None:
-        """Return the unit of a variable as its FMU declares it, or if it does not, that of the connector."""
+        """Return the unit of a variable from its FMU, else that of its connector."""
         known = self.components[end.element].variables if end.element in self.components else {}
         return (known[end.name].measure if end.name in known else None) or self.connector(end).measure
 
     def unit_outside(self, end: SspEnd) -> Unit | None:
-        """Return the unit of a connector, or if it has none, that of the variable behind it."""
+        """Return the unit of a connector, else that of its variable."""
         return self.connector(end).measure or self.unit_inside(end)
 
     def connector(self, end: SspEnd) -> SspVariable:
-        """Return what the archive says of a connector; nothing, if that is nothing."""
+        """Return the declaration of a connector, an empty one if the archive has none."""
         return self.connectors[end.element].get(end.name, SspVariable(""))
 
     def upstream(self, end: SspEnd) -> list[SspEnd]:
-        """Return what an end takes its value from: connectors of systems, then perhaps a component's output.
+        """Return the chain of sources of an end: connectors of systems, then a component's output, if any.
 
         Raises:
-            Refused: connections go round in a circle.
+            SspError: connections form a cycle.
         """
         found: list[SspEnd] = []
         while end in self.sources:
@@ -102,7 +101,7 @@ class SspStructure:
         return found
 
     def find(self, path: ElementPath, name: str) -> SspEnd | None:
-        """Return what a hierarchical name means in the element `path`, None if there is no such variable."""
+        """Resolve a hierarchical name in the element `path`, None if there is no such variable."""
         if path in self.components:
             known = self.components[path].variables
             return SspEnd(path, name) if name in known or not known else None
@@ -120,7 +119,7 @@ def read_structure(archive: SspArchive, system: _Element) -> SspStructure:
     """Read a system.
 
     Raises:
-        Refused: it holds what has no counterpart here.
+        SspError: it has unsupported features.
     """
     structure = SspStructure()
     definitions = unit_definitions(system.iterfind(f"../{{{SSD}}}Units/*"))
@@ -182,7 +181,7 @@ def _component(archive: SspArchive, element: _Element, path: ElementPath) -> Ssp
 
 
 def _directed(structure: SspStructure, connection: _Element, path: ElementPath) -> tuple[SspEnd, SspEnd]:
-    """Return what gives and what takes a value by a connection in the system `path`."""
+    """Return source and target of a connection in the system `path`."""
     start, end = (_end(structure, connection, which, path) for which in ("start", "end"))
     start_gives, end_gives = (_gives(structure, one, path) for one in (start, end))
     if start_gives is not None and start_gives == end_gives:
@@ -205,7 +204,7 @@ def _end(structure: SspStructure, connection: _Element, which: str, path: Elemen
 
 
 def _gives(structure: SspStructure, end: SspEnd, path: ElementPath) -> bool | None:
-    """Return whether an end gives a value in the system `path`, None if nothing says so."""
+    """Return whether an end is a source in the system `path`, None if undeclared."""
     kind = structure.connector(end).causality
     if end.element in structure.components:
         declared = structure.components[end.element].variables.get(end.name)
@@ -216,7 +215,7 @@ def _gives(structure: SspStructure, end: SspEnd, path: ElementPath) -> bool | No
 
 @dataclass(frozen=True)
 class SspValue:
-    """A value as the archive gives it."""
+    """A parameter value as in the archive."""
 
     value: Any
     unit: str | None
@@ -226,10 +225,10 @@ class SspValue:
     offset: float = 0.0
 
     def for_variable(self, declared: SspVariable | None) -> Any:
-        """Return what a scenario file would say for a variable: a plain value, or one with its unit.
+        """Return the value for a variable as in a scenario file: a plain value, or one with its unit.
 
         Raises:
-            Refused: a transformation of what is no number, or of a unit that does not fit.
+            SspError: a transformation of something other than a number, or with an incompatible unit.
         """
         value = self._in_unit_of(declared)
         if (self.factor, self.offset) == (1.0, 0.0):
@@ -246,7 +245,7 @@ class SspValue:
         return int(result)
 
     def _in_unit_of(self, declared: SspVariable | None) -> Any:
-        """Return the value converted, or with its unit where that does not fit, for wiring to refuse it."""
+        """Return the converted value; if units are incompatible, with its unit, so that wiring refuses it."""
         unit = declared.unit if declared else None
         if not isinstance(self.value, float) or self.unit is None or unit is None or self.unit == unit:
             return self.value
@@ -262,17 +261,17 @@ class SspValue:
 
 @dataclass
 class SspValues:
-    """What is given to variables and connectors, and the names that nothing has."""
+    """The values of variables and connectors, and the unknown names."""
 
     given: dict[SspEnd, SspValue] = field(default_factory=dict)
     unknown: list[str] = field(default_factory=list)
 
 
 def read_values(archive: SspArchive, structure: SspStructure) -> SspValues:
-    """Return everything that is bound in a structure.
+    """Read all parameter bindings of a structure.
 
     Raises:
-        Refused: values that cannot be read.
+        SspError: values cannot be read.
     """
     values = SspValues()
     elements = {path: one.element for path, one in structure.components.items()}
@@ -287,7 +286,7 @@ def read_values(archive: SspArchive, structure: SspStructure) -> SspValues:
 
 
 def _bound(archive: SspArchive, element: _Element) -> Iterator[tuple[str, SspValue]]:
-    """Yield the names that an element's bindings give values to."""
+    """Yield (name, value) of an element's parameter bindings."""
     for binding in element.iterfind(f"{{{SSD}}}ParameterBindings/{{{SSD}}}ParameterBinding"):
         _check_type(binding, VALUES_TYPE)
         values = binding.find(f"{{{SSD}}}ParameterValues/{{{SSV}}}ParameterSet")
@@ -307,7 +306,7 @@ def _bound(archive: SspArchive, element: _Element) -> Iterator[tuple[str, SspVal
 
 
 def _mapping(archive: SspArchive, binding: _Element) -> dict[str, list[_Element]] | None:
-    """Return the entries of a binding's mapping by the name they are for, None if it has none."""
+    """Return the entries of a binding's mapping by source name, None if it has no mapping."""
     mapping = binding.find(f"{{{SSD}}}ParameterMapping")
     if mapping is None:
         return None
@@ -327,7 +326,7 @@ def _check_type(element: _Element, allowed: str) -> None:
 
 
 def _transformed(given: SspValue, entry: _Element) -> SspValue:
-    """Return a value with what a mapping does to it."""
+    """Return a value with the transformation of a mapping entry."""
     if entry.get("suppressUnitConversion") in ("true", "1"):
         given = replace(given, unit=None)
     factor, offset = linear(entry)
@@ -335,10 +334,10 @@ def _transformed(given: SspValue, entry: _Element) -> SspValue:
 
 
 def linear(element: _Element) -> tuple[float, float]:
-    """Return factor and offset by which a connection or a mapping transforms numbers.
+    """Return factor and offset of the linear transformation of a connection or mapping entry.
 
     Raises:
-        Refused: its transformation is of another kind, or one of them is no number.
+        SspError: the transformation is of another kind, or has a malformed number.
     """
     for one in element.iterchildren("{*}*"):
         kind = etree.QName(one).localname
@@ -372,10 +371,10 @@ def _value(parameter: _Element) -> SspValue:
 
 
 def number(element: _Element, attribute: str, default: float | None = None) -> float:
-    """Return an attribute's number; what is read from its shortest decimal is exact.
+    """Return an attribute as a number.
 
     Raises:
-        Refused: it is none.
+        SspError: it is not a number.
     """
     text = element.get(attribute)
     if text is None and default is not None:

@@ -1,16 +1,12 @@
-"""Tyre property files (`.tir`): the coefficients of MF-Tyre 5.2 (PAC2002), 6.1 or 6.2, in SI units.
+"""Reads tyre property files (`.tir`): the coefficients of MF-Tyre 5.2 (PAC2002), 6.1 or 6.2, in SI units.
 
-A file says of itself what kind it is (FITTYP, else PROPERTY_FILE_FORMAT) and in which units it is written.
-What it leaves out is neutral: scalings are one, other coefficients zero, so nothing of another tyre gets in.
-What cannot be used is refused; what is unusual is read, with a warning.
+A file declares its kind (FITTYP, else PROPERTY_FILE_FORMAT) and its units. Missing values are neutral:
+scalings are one, other coefficients zero, so that no value of another tyre is used. Unusable files are
+refused; unusual ones are read with a warning.
 
-The lines of a tyre property file: sections, keys and values, whatever program has written them.
-
-Read are files with any line ends and any order of sections, in UTF-8, UTF-16 or cp1252. `$` and `!` begin a
-comment, tables (`{pen fz}`) are passed over, and so is a line without `=`: mostly the rest of a comment that
-an editor has wrapped.
-
-What stands in tyre property files: kinds, coefficients, units, and the spellings that are met.
+Files may have any line ends and any order of sections, in UTF-8, UTF-16 or cp1252. `$` and `!` begin a
+comment. Tables (`{pen fz}`) are ignored, and so are lines without `=`: mostly the rest of a comment that an
+editor has wrapped.
 """
 
 from __future__ import annotations
@@ -34,7 +30,7 @@ _SECTION = re.compile(r"\[\s*([^\]]*?)\s*\]")
 
 
 class TirEntry(NamedTuple):
-    """A key with its value as text, None if it has none, in upper case the key and its section."""
+    """A key with its value as text (None if empty); key and section are in upper case."""
 
     line: int
     section: str
@@ -71,9 +67,9 @@ KINDS = {
     61: "MF-Tyre 6.1",
     62: "MF-Tyre 6.2",
 }
-"""FITTYP -> what it means."""
+"""FITTYP -> model."""
 FORMATS = {"PAC2002": 6, "MF52": 6, "MF_52": 6, "MF61": 61, "MF_61": 61, "MF62": 62, "MF_62": 62}
-"""PROPERTY_FILE_FORMAT -> the FITTYP that it means where the file has none."""
+"""PROPERTY_FILE_FORMAT -> FITTYP, for files without FITTYP."""
 OTHER_MODELS = (
     *("PAC89", "PAC94", "PAC96", "PAC_MC", "PAC-MC", "PAC_TIME", "PAC-TIME", "PAC_CT", "PAC-CT"),
     *("FIALA", "FTIRE", "UATIRE", "521_TIRE", "5.2.1"),
@@ -111,9 +107,9 @@ ALIASES = {
     **{"LFZ0": "LFZO", "LKYG": "LKYC", "LKG": "LKYC", "QPMX1": "PPMX1", "QPZ1": "PPZ1"},
     **{"IP_NOM": "NOMPRES", "IP": "INFLPRES"},
 }
-"""Other spellings that are met."""
+"""Alternative spelling -> key."""
 NEEDED = ("FNOMIN", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
-"""Without these, or with zero, there is no force."""
+"""Required keys: if they are missing or zero, there is no force."""
 
 UNITS = {
     "LENGTH": {
@@ -146,7 +142,7 @@ UNITS = {
 
 @dataclass(frozen=True)
 class TyreFile:
-    """A tyre property file as read."""
+    """The content of a tyre property file."""
 
     path: Path
     sha256: str
@@ -155,11 +151,11 @@ class TyreFile:
     values: dict[str, float]
     """Parameter name without axle, such as pcx1 -> its value in SI units."""
     rolling_radius: float | None
-    """Effective rolling radius at nominal load [m], where the file lets it be known."""
+    """Effective rolling radius at nominal load [m], None if the file does not determine it."""
     warnings: tuple[str, ...] = ()
 
     def record(self) -> dict[str, object]:
-        """Return what a run's record says about it."""
+        """Return its entry in the run record."""
         return {
             "file": str(self.path),
             "sha256": self.sha256,
@@ -174,7 +170,7 @@ def read_tir(path: Path | str) -> TyreFile:
     """Read a tyre property file.
 
     Raises:
-        ScenarioError: with everything for which it cannot be used.
+        ScenarioError: with all reasons why the file cannot be used.
     """
     path = Path(path)
     try:
@@ -193,7 +189,7 @@ def read_tir(path: Path | str) -> TyreFile:
 
 @dataclass
 class _Reading:
-    """A file while it is read."""
+    """State while a file is read."""
 
     path: Path
     entries: dict[str, TirEntry] = field(default_factory=dict)
@@ -204,7 +200,7 @@ class _Reading:
     warnings: list[str] = field(default_factory=list)
 
     def take(self, entries: Iterable[TirEntry]) -> None:
-        """Keep what is understood; of a key that is given twice, the last."""
+        """Store the known entries; of a key that is given twice, the last."""
         for entry in entries:
             key = ALIASES.get(entry.key, entry.key)
             if entry.section == "UNITS":
@@ -261,7 +257,7 @@ class _Reading:
         return None
 
     def _factors(self) -> Callable[[dict[str, int]], float]:
-        """Return what turns powers of the file's units into a factor to SI."""
+        """Return a function from powers of the file's units to the factor to SI."""
         given = {}
         for name, known in UNITS.items():
             entry = self.units.get(name)
@@ -344,7 +340,7 @@ class _Reading:
     # ---- values ---------------------------------------------------------------------------------------
 
     def _complete(self, kind: int, side: str) -> dict[str, float]:
-        """Return all parameters; of what is missing, the neutral value."""
+        """Return all parameters, with neutral values for missing ones."""
         values = {key: self._at(key, 1.0) for key in SCALINGS}
         values |= {key: self._at(key) for key in COEFFICIENTS}
         values["PKY4"] = self._at("PKY4", 2.0)
@@ -366,7 +362,7 @@ class _Reading:
         return {key.lower(): value for key, value in values.items()}
 
     def _largest_load(self, values: dict[str, float]) -> float:
-        """Return FZMAX; without one three times the nominal load, or less if a stiffness vanishes below."""
+        """Return FZMAX, by default three times the nominal load, or less if a stiffness vanishes below."""
         load = values["FNOMIN"] * values["LFZO"]
         turn, bend = abs(values["PKY4"]), abs(values["PKY2"])
         sound = load * bend * tan(pi / turn) if turn > 2.0 else inf
@@ -395,7 +391,7 @@ class _Reading:
         return self.values.get(key, default)
 
     def _number(self, entry: TirEntry) -> float | None:
-        """Return the number that an entry gives, None if it gives none, which then is a problem."""
+        """Return the number of an entry; if it is not a number, report a problem and return None."""
         try:
             value = float((entry.text or "").upper().replace("D", "E"))
         except ValueError:

@@ -1,4 +1,4 @@
-"""Strict schemas of YAML files: every problem of a file as a sentence with its place and what is allowed."""
+"""Strict validation of YAML files with pydantic; problems are messages with line, key and allowed values."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Time = Annotated[Fraction, PlainValidator(seconds), PlainSerializer(float)]
 
 
 class StrictModel(BaseModel):
-    """A part of a file: no unknown keys, no silent conversions."""
+    """Base of all schemas: no unknown keys, no silent conversions."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -34,11 +34,11 @@ KINDS: dict[str, tuple[str, type, str]] = {
     "units": ("a scenario", dict, "; it is for `yawbench run`"),
     "parameters": ("a vehicle file", dict, "; a scenario names it under 'vehicle'"),
 }
-"""Key that tells a kind of file from the others -> the kind, what stands at the key, where it belongs."""
+"""Key that identifies a kind of file -> the kind, type of the key's value, hint at the intended use."""
 
 
 def validate(model: type[Model], document: Document) -> Model | None:
-    """Return the validated content, or None with the problems noted in the document."""
+    """Return the validated content; if it is invalid, add the problems to the document and return None."""
     if document.data is None:
         return None
     if another := _another_kind(model, document.data):
@@ -53,7 +53,7 @@ def validate(model: type[Model], document: Document) -> Model | None:
 
 
 def _another_kind(model: type[BaseModel], data: Any) -> str | None:
-    """Return a sentence if a file is plainly of another kind than its place asks for."""
+    """Return a message if a file is obviously of another kind than expected, else None."""
     own = [key for key in KINDS if key in model.model_fields]
     if not own or not isinstance(data, dict) or any(key in data for key in own):
         return None
@@ -63,7 +63,7 @@ def _another_kind(model: type[BaseModel], data: Any) -> str | None:
 
 
 def _place(data: Any, location: KeyPath) -> KeyPath:
-    """Return where an error stands in the file, without what only the schema has there."""
+    """Convert pydantic's location of an error to the key in the file, without parts of the schema."""
     key: KeyPath = ()
     for i, part in enumerate(location):
         in_list = isinstance(data, list) and isinstance(part, int)
@@ -120,7 +120,7 @@ def _keys(model: type[BaseModel], key: KeyPath) -> list[str]:
 
 
 def _plain(annotation: Any) -> Any:
-    """Return an annotation without `| None` and without what Annotated adds."""
+    """Return an annotation without `| None` and without the metadata of Annotated."""
     if typing.get_origin(annotation) is typing.Annotated:
         return _plain(typing.get_args(annotation)[0])
     if typing.get_origin(annotation) in (types.UnionType, typing.Union):

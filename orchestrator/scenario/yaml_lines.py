@@ -1,4 +1,4 @@
-"""Plain values from a YAML 1.2 file, with the line of every key kept aside for messages."""
+"""Reads YAML 1.2 files into plain values, with the line of every key for messages."""
 
 from __future__ import annotations
 
@@ -13,42 +13,42 @@ from ..messages import closest, listed, short, unprintable
 from ..plan import Override
 
 PROBLEMS = 200
-"""Problems of one file that are told. Chosen: nobody mends more before looking again."""
+"""Maximum number of reported problems of a file. Chosen: users check again before correcting more."""
 DEEPEST = 40
-"""Collections in collections. Chosen: four times what the schemas know."""
+"""Maximum nesting depth. Chosen: four times that of the schemas."""
 LARGEST_WHOLE = 2**64
-"""Whole numbers are smaller; chosen: what every program takes."""
+"""Whole numbers must be smaller. Chosen: the range that other programs accept."""
 ALIASED = 100_000
-"""Values that the aliases of a file may repeat: aliases of aliases multiply, and a few lines could fill
-the memory. Chosen: a hundred times what a study of a hundred runs needs."""
+"""Maximum number of values repeated by aliases: nested aliases multiply, and a few lines could exhaust the
+memory. Chosen: a hundred times what a study of a hundred runs needs."""
 
 KeyPath = tuple[str | int, ...]
-"""Where a value stands: ('connections', 3, 'from')."""
+"""Path of a value in a file: ('connections', 3, 'from')."""
 
 
 @dataclass
 class Document:
-    """A YAML file's content as dicts, lists and scalars; where everything stands; what is wrong with it."""
+    """The content of a YAML file as dicts, lists and scalars, with its lines, overrides and problems."""
 
     path: Path
     data: Any = None
     lines: dict[KeyPath, int] = field(default_factory=dict)
     overrides: dict[KeyPath, Override] = field(default_factory=dict)
-    """Values that do not come from the file -> what gave them."""
+    """Key of an overridden value -> its override."""
     problems: dict[Problem, None] = field(default_factory=dict)
-    """Each once."""
+    """An ordered set."""
     notes: list[str] = field(default_factory=list)
-    """Remarks on what is no mistake, for the plan."""
+    """Messages that are not errors, for the plan."""
 
     def report(self, key: KeyPath, sentence: str) -> None:
-        """Note a problem with the value (or the missing value) at `key`."""
+        """Add a problem with the value (or the missing value) at `key`."""
         self.note(self.problem(key, sentence))
 
     def note(self, problem: Problem) -> None:
-        """Note a problem.
+        """Add a problem.
 
         Raises:
-            ScenarioError: with all problems, if they have become very many.
+            ScenarioError: with all problems, if there are too many to continue.
         """
         self.problems[problem] = None
         if len(self.problems) >= PROBLEMS:
@@ -56,7 +56,7 @@ class Document:
             raise ScenarioError([*self.sentences(), Problem(more, file=self.path)])
 
     def problem(self, key: KeyPath, sentence: str) -> Problem:
-        """Return a problem with the value at `key`: of its line, or of the change that it came from."""
+        """Return a problem with the value at `key`, located at its line or its override."""
         change = self.override(key)
         if change is not None:
             return Problem(sentence, place=str(change))
@@ -64,14 +64,14 @@ class Document:
         return Problem(sentence, file=self.path, line=line, place=dotted(key))
 
     def override(self, key: KeyPath) -> Override | None:
-        """Return the change that gave the value at `key`, None if the file did."""
+        """Return the override that set the value at `key`, None if it is from the file."""
         for n in range(len(key), 0, -1):
             if key[:n] in self.overrides:
                 return self.overrides[key[:n]]
         return None
 
     def remove(self, key: KeyPath, i: int) -> None:
-        """Take item `i` out of the list at `key`, whose later items move up with their lines and changes."""
+        """Remove item `i` of the list at `key`; the lines and overrides of later items move with them."""
         holder = self.data
         for part in key:
             holder = holder[part]
@@ -86,7 +86,7 @@ class Document:
                     kept[moved] = value
 
     def sentences(self) -> list[Problem]:
-        """Return all problems, first those of changes, then the file's from top to bottom."""
+        """Return all problems, first those of overrides, then those of the file in the order of lines."""
         return sorted(self.problems, key=lambda problem: problem.line or 0)
 
 
@@ -99,7 +99,7 @@ def dotted(key: KeyPath) -> str:
 
 
 def read(path: Path, *, what: str) -> Document:
-    """Read the YAML file `path`; whatever is wrong with it stands in the document's problems.
+    """Read the YAML file `path`; errors are added to the problems of the document.
 
     Args:
         path: the file.
@@ -159,11 +159,11 @@ class _NotYamlError(Exception):
 
 
 def _composed(text: str) -> tuple[Any, Any]:
-    """Return the node of a text, None if it is empty, and what makes values of scalars.
+    """Return the root node of a text (None if it is empty), and the constructor of scalars.
 
     Raises:
-        _NotYamlError: with the line, 0 if it is not known.
-        RecursionError: it is nested too deeply.
+        _NotYamlError: with the line, 0 if unknown.
+        RecursionError: the text is nested too deeply.
     """
     from ruamel.yaml import YAML
     from ruamel.yaml.docinfo import DocInfo
@@ -172,7 +172,7 @@ def _composed(text: str) -> tuple[Any, Any]:
     yaml = YAML(typ="safe", pure=True)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # an anchor that is given again is no mistake
+            warnings.simplefilter("ignore")  # redefined anchors are legal
             yaml.doc_infos.append(DocInfo())  # where a %YAML line goes
             constructor, _ = yaml.get_constructor_parser(text)
             _limit_depth(yaml)
@@ -189,7 +189,7 @@ def _composed(text: str) -> tuple[Any, Any]:
 
 
 def _limit_depth(yaml: Any) -> None:
-    """Let a scanner refuse very many brackets in each other: its work is that of their square."""
+    """Make a scanner refuse deeply nested brackets, for which its time grows quadratically."""
     scanner, begin = yaml.scanner, yaml.scanner.fetch_flow_collection_start
 
     def fetch(*arguments: Any, **options: Any) -> Any:
@@ -211,12 +211,12 @@ _TAGS = {
     "sequence": {"seq"},
     "mapping": {"map"},
 }
-"""Kind of a node -> the tags that it may have; a timestamp is text here."""
+"""Kind of a node -> its allowed tags; timestamps are read as text."""
 
 
 @dataclass
 class _Reader:
-    """Turns YAML nodes into plain values, noting lines and problems on the way."""
+    """Converts YAML nodes to plain values, and collects lines and problems."""
 
     document: Document
     constructor: Any
@@ -295,7 +295,7 @@ class _Reader:
         return mapping
 
     def _merged(self, name: Any, item: Any) -> list[Any]:
-        """Return the mappings that a merge key takes in: one, or several in a list."""
+        """Return the mappings that a merge key includes: one, or a list of several."""
         nodes = item.value if item.id == "sequence" else [item]
         if all(one.id == "mapping" for one in nodes):
             return list(nodes)
@@ -305,7 +305,7 @@ class _Reader:
 
 
 def _neighbours(path: Path) -> str:
-    """Return what the folder of a missing file holds in its place."""
+    """Return a hint at the YAML files in the folder of a missing one."""
     try:
         names = {p.stem: p.name for p in sorted(path.parent.iterdir()) if p.suffix in (".yaml", ".yml")}
     except (OSError, ValueError):

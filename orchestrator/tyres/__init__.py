@@ -1,1 +1,1 @@
-"""Tyres by themselves: an FMU stepped on a stand, and what it gives drawn."""
+"""Tyre FMUs on a test stand."""

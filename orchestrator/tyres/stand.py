@@ -1,8 +1,6 @@
-"""A tyre FMU by itself: its forces at slips, slip angles and loads that are given, and their slopes.
+"""A test stand for tyre FMUs: forces at given slips, slip angles and loads, stiffnesses, and their figure.
 
-The cornering stiffness of a scenario's own tyres at given loads.
-
-What tyre people expect to see of a tyre, in one figure.
+`cornering_stiffness` measures the tyres of a scenario at given loads.
 """
 
 from __future__ import annotations
@@ -34,20 +32,20 @@ if TYPE_CHECKING:
 
 
 FOR_FILES = "tyre_magic_formula_62_transient"
-"""The FMU on which a tyre property file is looked at: it tells relaxation lengths, too."""
+"""FMU used for tyre property files: it also has relaxation lengths as outputs."""
 SPEED = 20.0
-"""At which the wheel travels [m/s]."""
+"""Speed of the wheel [m/s]."""
 WHEEL = "fl"
 KNOWN_BY = ("tyre_force_x_fl", "tyre_force_y_fl", "slip_angle_fl", "vertical_load_fl")
-"""Variables of a tyre."""
+"""Variables by which a tyre FMU is recognized."""
 RADIUS = 0.3
-"""Of the wheel [m], for tyres that want its speed and have none of their own."""
+"""Wheel radius [m] for tyre FMUs that take the wheel speed and have no radius parameter."""
 SMALL = 1e-4
-"""Slip [1] and slip angle [rad] to each side of zero for stiffnesses."""
+"""Slip [1] and slip angle [rad] on each side of zero for stiffnesses."""
 
 
 class WheelState(NamedTuple):
-    """How a wheel stands and rolls: slip angle [rad], longitudinal slip [1] of the interface, load [N]."""
+    """The state of a wheel: slip angle [rad], longitudinal slip [1] as in the interface, load [N]."""
 
     alpha: float = 0.0
     kappa: float = 0.0
@@ -56,26 +54,26 @@ class WheelState(NamedTuple):
 
 @dataclass(frozen=True)
 class TyreStand:
-    """A tyre on a stand, front left unless another wheel is named."""
+    """A tyre on a stand, by default the front left one."""
 
     plan: Plan
     wheel: str = WHEEL
 
     @property
     def unit(self) -> Instance:
-        """The tyre."""
+        """The tyre instance."""
         return self.plan.instances[0]
 
     @property
     def nominal_load(self) -> float:
-        """The tyre's own [N], or that of a passenger car's."""
+        """The tyre's nominal load [N], or that of a passenger car's tyre."""
         given = self.unit.parameter("fnomin_front") or self.unit.parameter("nominal_load")
         return float(given) if given else 4000.0
 
     def measure(self, states: Sequence[WheelState]) -> dict[str, np.ndarray]:
         """Return every output of the wheel, by its name without the wheel; shape (n,), SI.
 
-        The wheel rolls on in every state until forces that lag have settled.
+        In every state the wheel keeps rolling until lagging forces have settled.
 
         Raises:
             SimulationError: the FMU failed.
@@ -107,7 +105,7 @@ class TyreStand:
 
 
 def stiffnesses(stand: TyreStand, loads: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return dF_x/dkappa [N] and -dF_y/dalpha [N/rad] at zero slip for some loads; shape (n,) each."""
+    """Return dF_x/dkappa [N] and -dF_y/dalpha [N/rad] at zero slip for the loads; shape (n,) each."""
     slopes = []
     for force, sign, states in (
         ("tyre_force_x", 1.0, [WheelState(0.0, k, load) for load in loads for k in (-SMALL, SMALL)]),
@@ -125,10 +123,10 @@ def put_on_stand(source: str, *, friction: float, fmus: Path | None, build: bool
         source: a tyre property file, a tyre FMU's path or its name in the folder of FMUs.
         friction: coefficient of the road [1].
         fmus: folder of FMUs given by name; None: the nearest.
-        build: build the FMU first if it is stale.
+        build: build the FMU first if it is out of date.
 
     Raises:
-        YawbenchError: there is no such tyre, or something is wrong with it.
+        YawbenchError: the tyre does not exist or is invalid.
     """
     file = source.lower().endswith(".tir")
     place = Path(source).parent / "stand"
@@ -137,7 +135,7 @@ def put_on_stand(source: str, *, friction: float, fmus: Path | None, build: bool
     inputs = [variable.name for variable in fmu.of("input")]
     data = {
         "title": Path(source).name,
-        "step_size": 1.0,  # s: far beyond any relaxation length
+        "step_size": 1.0,  # [s], far beyond any relaxation length
         "stop_time": 1.0,
         "algorithm": "jacobi",
         "units": {"tyre": {"fmu": str(fmu.path.absolute())}},
@@ -150,18 +148,18 @@ def put_on_stand(source: str, *, friction: float, fmus: Path | None, build: bool
 def open_given(
     fmu: str, role: str, known_by: Iterable[str], *, place: Path, fmus: Path | None, opener: Opener
 ) -> Fmu:
-    """Return the FMU that somebody names for a role, by a path from here or its name in a folder.
+    """Open the FMU that a user names for a role, by a path or by its name in a folder.
 
     Args:
         fmu: path or name.
-        role: it is to have.
-        known_by: variables that it then has.
-        place: from where the folder is looked for.
+        role: the role it must have.
+        known_by: variables that FMUs of this role have.
+        place: where the search for the folder starts.
         fmus: the folder; None: the nearest.
         opener: opens it.
 
     Raises:
-        YawbenchError: there is none, or it is something else.
+        YawbenchError: it does not exist, or has another role.
     """
     path = is_path(fmu)
     folder = Path() if path else fmus or find_folder(place, opener=opener)
@@ -173,7 +171,7 @@ def open_given(
 
 
 def reader_of(data: dict[str, Any]) -> Callable[..., Document]:
-    """Return what reads a scenario that is no file, and the files that it names."""
+    """Return a reader for a scenario given as data, and for the files that it names."""
 
     def read(path: Path, *, what: str) -> Document:
         return Document(path, data=data) if what == "scenario file" else yaml_lines.read(path, what=what)
@@ -182,16 +180,16 @@ def reader_of(data: dict[str, Any]) -> Callable[..., Document]:
 
 
 def cornering_stiffness(tyres: Instance, loads: Mapping[str, float]) -> dict[str, float]:
-    """Return the cornering stiffness [N/rad] of one tyre on some wheels, each under its load [N].
+    """Return the cornering stiffness [N/rad] of one tyre for each wheel, under the wheel's load [N].
 
-    The road is what the unit is told of it; where a wire tells that, and of the motion, the tyre rolls
-    straight ahead on a dry road, friction 1.
+    The road is given by the instance's constants; where a wire gives road or motion, the tyre rolls straight
+    ahead on a dry road, friction 1.
 
     Raises:
         SimulationError: the FMU failed.
-        ValueError: it cannot be stepped beside the run.
+        ValueError: it cannot be stepped outside the run.
     """
-    pass  # needs numpy, which most plans can do without
+    pass  # the module imports NumPy, which most plans do not need
 
     if tyres.fmu.once_per_process:
         raise ValueError(f"{tyres.fmu.name} can be instantiated only once per process")
@@ -205,7 +203,7 @@ def cornering_stiffness(tyres: Instance, loads: Mapping[str, float]) -> dict[str
 
 
 OF_NOMINAL = (0.5, 1.0, 1.5, 2.0)
-"""Loads of the curves over the nominal one."""
+"""Loads of the curves over the nominal load."""
 ANGLES = (0.0, 2.0, 4.0, 7.0, 12.0)
 """Slip angles of the friction ellipse [deg]."""
 LARGEST_ANGLE, LARGEST_SLIP = np.radians(15.0), 0.5

@@ -1,1 +1,1 @@
-"""Cars by themselves: a vehicle file driven on its plant and tyres, and what that tells of it."""
+"""Cars on a test track: handling figures of a vehicle file with its plant and tyres."""

@@ -1,16 +1,14 @@
-"""What a car is like: loads at rest, understeer, yaw and body modes, roll, stopping distance, from runs.
+"""Handling figures of a car from runs on a test track: loads, understeer, yaw and body modes, roll, stopping.
 
-    K(a_y) = d(delta - L r / v_x) / d a_y        in a slowly increasing steer (`evaluation.understeer`)
+A vehicle file is driven on a plant and tyres, in scenarios generated for it: steered, braked or dropped.
+
+    K(a_y) = d(delta - L r / v_x) / d a_y        in a slowly increasing steer (`evaluation.steering_tests`)
     v_ch   = sqrt(L / K(0))                      characteristic speed, of an understeering car
     x_k+1  = A x_k + B (delta_k, delta_k+1)      x = (v_y, r), with a roll angle also (phi, dphi)
 
 The yaw mode is the pair of eigenvalues of A that takes most part in v_y and r; its natural frequency and
 damping ratio follow from product and sum, also where the two are real. A is a least-squares fit to the
-response to one small sine of the steering, so it holds whatever is in the plant.
-
-A car of a vehicle file on a plant and tyres, steered, braked or dropped, in scenarios made for it.
-
-What a car is like, in one figure: understeer and roll over lateral acceleration, yaw over speed.
+response to one small sine of the steering, so it holds for any plant.
 """
 
 from __future__ import annotations
@@ -45,13 +43,13 @@ if TYPE_CHECKING:
 
 
 PLANTS = ("plant_fourteen_dof", "plant_eight_dof", "plant_seven_dof", "plant_two_dof")
-"""In the order in which one is looked for that a file describes a car for."""
+"""Plants in the order in which they are tried for a vehicle file."""
 STEP = 0.002
 """Communication step [s]. Chosen: steady turns and yaw differ by less than 1e-4 from those at 1 ms."""
 TORQUES = "wheel_torque_fl"
-"""An input of plants whose wheels are driven and braked."""
+"""Input by which plants with driven and braked wheels are recognized."""
 PLANT_KNOWN_BY = ("velocity_y", "yaw_rate", "acceleration_y", "vertical_load_fl", "slip_angle_fl")
-"""Variables of a plant."""
+"""Variables by which a plant FMU is recognized."""
 
 
 @dataclass(frozen=True)
@@ -59,15 +57,15 @@ class TestTrack:
     """A car on a dry, flat road.
 
     Args:
-        vehicle: its file.
+        vehicle: the vehicle file.
         plant: an FMU, by name or path.
-        tyre: likewise; "": what the file is made for.
+        tyre: likewise; "": the tyre that the file is made for.
         friction: coefficient of the road [1].
         fmus: folder of FMUs given by name; None: the nearest.
-        opener: opens FMUs, building first what is stale if it may.
+        opener: opens FMUs, and may first build those that are out of date.
     """
 
-    __test__ = False  # no test of pytest's
+    __test__ = False  # not a pytest class
 
     vehicle: Path
     plant: str
@@ -78,7 +76,7 @@ class TestTrack:
 
     @cached_property
     def place(self) -> Path:
-        """Where the scenario stands, which is no file: messages name the car's."""
+        """Path used for the generated scenario: messages name the vehicle file."""
         return Path(os.path.relpath(self.vehicle))
 
     @cached_property
@@ -94,7 +92,7 @@ class TestTrack:
 
     @cached_property
     def tyres(self) -> str:
-        """The tyres' FMU: as told, or that which takes the file's tyre property files or stiffness."""
+        """The tyres' FMU: as given, or the one that takes the file's tyre property files or stiffness."""
         data = yaml_lines.read(self.vehicle, what="vehicle file").data
         given = data if isinstance(data, dict) else {}
         if self.tyre or given.get("tyres"):
@@ -106,13 +104,13 @@ class TestTrack:
         """Return the plan of a run.
 
         Args:
-            driver: the unit, as a scenario has it.
-            speed: at the start, and held if the driver does [m/s].
+            driver: the instance, as in a scenario.
+            speed: at the start, and held if the driver does so [m/s].
             stop_time: [s].
             of_plant: parameters of the plant.
 
         Raises:
-            YawbenchError: the file, the plant or the tyres are none, or do not go together.
+            YawbenchError: the file, the plant or the tyres are invalid, or do not fit together.
         """
         open_given(self.tyres, "tyre", KNOWN_BY, place=self.place, fmus=self.fmus, opener=self.opener)
         units: dict[str, Any] = {"driver": dict(driver)}
@@ -145,7 +143,7 @@ class TestTrack:
         """Return the results of a run; arguments as of `plan`.
 
         Raises:
-            YawbenchError: as `plan`, or the run failed: a car has rolled over.
+            YawbenchError: as `plan`, or the run failed, as when a car rolls over.
         """
         return simulate_in_memory(self.plan(driver, speed, stop_time, **of_plant))
 
@@ -154,10 +152,10 @@ class TestTrack:
 
 
 def fitting_plant(vehicle: Path, tyre: str, fmus: Path | None, opener: Opener) -> str:
-    """Return the plant of the most degrees of freedom that a file describes a car for.
+    """Return the plant with the most degrees of freedom that a file has the values for.
 
     Raises:
-        YawbenchError: it describes one for none; why not for that of the fewest.
+        YawbenchError: there is none; says why not for the plant with the fewest.
     """
     steer = {"fmu": "driver_sine"}
     for plant in PLANTS[:-1]:
@@ -171,21 +169,21 @@ def fitting_plant(vehicle: Path, tyre: str, fmus: Path | None, opener: Opener) -
 
 
 SPEEDS = tuple(v / 3.6 for v in (40.0, 60.0, 80.0, 100.0, 120.0, 140.0))
-"""Of the yaw modes [m/s]."""
+"""Speeds of the yaw modes [m/s]."""
 TURN_SPEED = 80.0 / 3.6
-"""Of the slowly increasing steer [m/s]: that of UN R140."""
+"""Speed of the slowly increasing steer [m/s]: UN R140."""
 HAND_RATE = 13.5 / 180.0 * pi
 """Rate of the hand wheel [rad/s], UN R140."""
 WANTED = 9.0
-"""Lateral acceleration up to which the wheel is turned, were the car linear [m/s2]."""
+"""Lateral acceleration that a linear car would reach at the end of the steer [m/s2]."""
 SMALL = 0.3
-"""Lateral acceleration of the sine, about [m/s2]."""
+"""Approximate lateral acceleration of the sine [m/s2]."""
 SAMPLE = 0.01
-"""Time between states of the fit [s]."""
+"""Sampling time of the fit [s]."""
 STOP_SPEED = 100.0 / 3.6
-"""From which it stops [m/s]."""
+"""Initial speed of the stopping distance [m/s]."""
 LARGEST_FORCE = -60e3
-"""Braking that no tyre follows [N]: the brakes' slip release holds the wheels."""
+"""Braking force beyond any tyre [N]: the slip control of the brakes limits it."""
 BODY = ("roll_angle", "roll_rate")
 
 
@@ -199,7 +197,7 @@ class Mode:
 
 @dataclass
 class Handling:
-    """What runs tell of a car; what its plant or its runs do not tell is missing."""
+    """Handling figures of a car; those that its plant or its runs do not provide are missing."""
 
     plant: str
     loads: tuple[float, ...] = ()  # of fl, fr, rl, rr at rest [N]
@@ -215,7 +213,7 @@ class Handling:
     roll_mode: Mode | None = None  # at TURN_SPEED
     heave: Mode | None = None
     stopping_distance: float | None = None  # from STOP_SPEED [m]
-    failed: list[str] = field(default_factory=list)  # runs that gave nothing, and why
+    failed: list[str] = field(default_factory=list)  # runs that failed, and why
 
     @property
     def characteristic_speed(self) -> float | None:
@@ -225,10 +223,10 @@ class Handling:
 
 
 def handling_of(track: TestTrack) -> Handling:
-    """Drive a car and return what it is like.
+    """Drive a car and return its handling figures.
 
     Raises:
-        YawbenchError: the file, the plant or the tyres are none, or do not go together.
+        YawbenchError: the file, the plant or the tyres are invalid, or do not fit together.
     """
     found = Handling(track.plant)
     plan = track.plan({"fmu": "driver_sine"}, TURN_SPEED, STEP)
@@ -246,7 +244,7 @@ def handling_of(track: TestTrack) -> Handling:
 
 
 def _modes(track: TestTrack, found: Handling) -> None:
-    """Note loads at rest, steady gains and yaw modes over speed."""
+    """Add loads at rest, steady gains and yaw modes over speed."""
     names = ["velocity_y", "yaw_rate", *(BODY if track.has(BODY[0]) else ())]
     every = round(SAMPLE / STEP)
     for speed in SPEEDS:
@@ -272,7 +270,7 @@ def _modes(track: TestTrack, found: Handling) -> None:
 
 
 def fit(states: np.ndarray, steer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return A, shape (k, k), and B, (k, 2), of states, (n, k), that follow a steer angle [rad], (n,)."""
+    """Fit A, shape (k, k), and B, (k, 2), to states, (n, k), that respond to a steer angle [rad], (n,)."""
     known = np.column_stack([states[:-1], steer[:-1], steer[1:]])
     scale = np.maximum(np.max(np.abs(known), axis=0), 1e-30)
     solved = (np.linalg.lstsq(known / scale, states[1:], rcond=None)[0].T) / scale
@@ -281,11 +279,11 @@ def fit(states: np.ndarray, steer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def modes_of(transition: np.ndarray) -> tuple[Mode, Mode | None]:
-    """Return the yaw mode, and of four states the roll mode, from the transition over `SAMPLE`.
+    """Return the yaw mode and, given four states, the roll mode of the transition matrix over `SAMPLE`.
 
-    Two complex eigenvalues that belong together are one mode, and so are two real ones.
+    A pair of conjugate complex eigenvalues is one mode, and so are two real ones.
     """
-    values, right = np.linalg.eig(transition)  # of a real matrix, so that pairs are exactly such
+    values, right = np.linalg.eig(transition)  # the matrix is real, so conjugate pairs are exact
     left = np.linalg.inv(right)
     part = np.abs(right[0] * left[:, 0]) + np.abs(right[1] * left[:, 1])  # in v_y and r
     rates = np.log(values.astype(complex)) / SAMPLE
@@ -302,7 +300,7 @@ def _mode(rates: np.ndarray) -> Mode:
 
 
 def _turn(track: TestTrack, found: Handling) -> None:
-    """Note understeer and roll over lateral acceleration."""
+    """Add understeer and roll over lateral acceleration."""
     last = WANTED / (found.gains[TURN_SPEED] * TURN_SPEED)
     ratio = 17.0  # cancels: the hand wheel turns so much faster than the road wheels
     duration = max(last * ratio / HAND_RATE, 2.0)
@@ -328,7 +326,7 @@ def _turn(track: TestTrack, found: Handling) -> None:
 
 
 def _bounce(track: TestTrack, found: Handling) -> None:
-    """Note how the body bounces, let go from a centimetre above its place."""
+    """Add the bounce modes of the body, released a centimetre above its rest position."""
     if not (track.has("heave") and track.has("initial_heave")):
         return
     results = track.drive({"fmu": "driver_sine"}, 10.0, 2.0, initial_heave=0.01)
@@ -343,7 +341,7 @@ def _bounce(track: TestTrack, found: Handling) -> None:
 
 
 def _stop(track: TestTrack, found: Handling) -> None:
-    """Note how far the car goes from the moment the pedal is pressed down."""
+    """Add the distance from the instant at which the pedal is pressed until the car stops."""
     if not track.has(TORQUES):
         return
     of_pulse = {"force": LARGEST_FORCE, "start_time": 0.1, "duration": 100.0}
@@ -355,7 +353,7 @@ def _stop(track: TestTrack, found: Handling) -> None:
 
 
 def draw_cars(cars: Sequence[Handling], title: str, note: str) -> Figure:
-    """Return the figure of a car on some plants."""
+    """Return the figure of a car with one or several plants."""
     with new_figure() as figure:
         axes = list(figure.subplots(2, 2).flat)
         for number, car in enumerate(cars):

@@ -1,1 +1,1 @@
-"""Stage two: from a scenario to a plan in which every input has its one source."""
+"""Wiring: turns a validated scenario into a plan in which every input has exactly one source."""

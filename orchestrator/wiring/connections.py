@@ -1,10 +1,11 @@
-"""One source for every input: connections, constants of its own, equal names, constants for what is left.
+"""Finds the one source of every input, and the gain and offset of every wire.
 
-An input that its unit declares as optional, and that nothing drives, keeps its start value: it counts
-among the constants, so it is shown and recorded like them. So does any input in an SSP archive, where
-nothing is connected by equal names.
+Sources are, in this order: connections of the scenario, constants whose key names the instance, outputs of
+the same name, other constants.
 
-Whether an output can feed an input, with what gain and offset: types, units of measurement, items.
+An input that its FMU declares as optional, and that nothing drives, keeps its start value: it is listed
+among the constants, so it is shown and recorded like them. The same holds for any input in an SSP archive,
+where nothing is connected by equal names.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ from .order import in_order
 
 
 def conversion_between(source: Variable, target: Variable) -> tuple[float, float] | None:
-    """Return gain and offset from one end's unit to the other's, None if they do not fit.
+    """Return gain and offset between the units of two variables, None if the units are incompatible.
 
-    A unit that an end does not declare is taken to be the other's.
+    A variable without a unit is taken to have that of the other.
     """
     if source.unit is None or target.unit is None:
         return 1.0, 0.0
@@ -47,7 +48,7 @@ def contradicts_its_name(variable: Variable) -> bool:
 def difference(
     source: Variable, target: Variable, scale: tuple[float, float] | None
 ) -> tuple[str, str | None, str | None] | None:
-    """Return in what two ends differ that cannot be connected, and what each has of it."""
+    """Return why two variables cannot be connected (what differs, the source's, the target's), else None."""
     if source.type != target.type:
         return "types", source.type, target.type
     if scale is None:
@@ -60,9 +61,9 @@ def difference(
 
 
 def alike(output: str, name: str) -> bool:
-    """Return whether an output may be what an input of another name means: names share a word.
+    """Return whether an output is a plausible suggestion for an input: their names share a word.
 
-    A unit of measurement alone says nothing, and a reference is not the value that should follow it.
+    Words of up to two letters do not count, and a reference value does not match an actual value.
     """
     words = [{word for word in one.split("_") if len(word) > 2} for one in (output, name)]
     return bool(words[0] & words[1]) and ("ref" in words[0]) == ("ref" in words[1])
@@ -74,7 +75,7 @@ def fits(source: Variable, target: Variable) -> bool:
 
 
 class Connector:
-    """Finds every input's source."""
+    """Finds the source of every input."""
 
     def __init__(self, system: WiringContext) -> None:
         self._system = system
@@ -83,17 +84,17 @@ class Connector:
         self._outputs, self._inputs = system.outputs, system.inputs
         self._notes = system.notes
         self._report = system.report
-        self._having: dict[str, list[str]] = {}  # name of an output -> units that have it
-        for unit, outputs in self._outputs.items():
+        self._having: dict[str, list[str]] = {}  # name of an output -> instances that have it
+        for instance, outputs in self._outputs.items():
             for name in outputs:
-                self._having.setdefault(name, []).append(unit)
-        self._preferring: dict[str, list[tuple[list[str], KeyPath]]] = {}  # unit -> lists of sources
-        self._preferred: dict[str, list[tuple[str, KeyPath]]] = {}  # unit -> sources of equal names, in order
-        self._refused: set[Input] = set()  # by equal names
+                self._having.setdefault(name, []).append(instance)
+        self._preferring: dict[str, list[tuple[list[str], KeyPath]]] = {}  # instance -> lists of sources
+        self._preferred: dict[str, list[tuple[str, KeyPath]]] = {}  # instance -> preferred sources, in order
+        self._refused: set[Input] = set()  # not to be driven by equal names (`from: null`)
         self._fitting: dict[object, dict[str, list[str]]] = {}  # kind of an input -> see `_fitting_outputs`
 
     def connect(self) -> tuple[list[Wire], dict[str, dict[str, Value | InputSeries]]]:
-        """Return all wires, and each unit's constants and time series."""
+        """Return all wires, and the constants and time series of each instance."""
         wires = self._by_connections()
         self._put_in_order()
         given = constants(self._system)
@@ -105,39 +106,41 @@ class Connector:
             values[target] = constant.value
             self._system.origins[target[0]][target[1]] = constant.origin
         fed = wires.keys() | given.keys() | ambiguous
-        for unit, inputs in self._inputs.items():
+        for instance, inputs in self._inputs.items():
             for name, variable in inputs.items():
-                if (unit, name) in fed:
+                if (instance, name) in fed:
                     continue
-                if (variable.optional or self._explicit(unit)) and variable.start is not None:
-                    values[(unit, name)] = variable.start
-                    self._system.origins[unit][name] = DEFAULT
+                if (variable.optional or self._explicit(instance)) and variable.start is not None:
+                    values[(instance, name)] = variable.start
+                    self._system.origins[instance][name] = DEFAULT
                 else:
-                    self._report(("units", unit), self._undriven(unit, variable))
+                    self._report(("units", instance), self._undriven(instance, variable))
         fitted = [self._fitted(wire, key) for wire, key in wires.values()]
         self._note_units(wire for wire, key in wires.values() if self._scale(key) is None)
-        by_unit: dict[str, dict[str, Value | InputSeries]] = {unit: {} for unit in self._fmus}
-        for (unit, name), value in values.items():
-            by_unit[unit][name] = value
+        by_unit: dict[str, dict[str, Value | InputSeries]] = {instance: {} for instance in self._fmus}
+        for (instance, name), value in values.items():
+            by_unit[instance][name] = value
         return fitted, by_unit
 
     def _note_overruled(self, inputs: Set[Input]) -> None:
-        """Note the inputs that have a constant of their own though an output has their name."""
+        """Note inputs with a constant that takes precedence over an output of the same name."""
         overruled: dict[Input, list[str]] = {}  # unit and source -> names
-        for unit, name in inputs:
-            sources = [] if self._explicit(unit) else self._sources(unit, name)[0]
+        for instance, name in inputs:
+            sources = [] if self._explicit(instance) else self._sources(instance, name)[0]
             for source in sources[:1]:
-                overruled.setdefault((unit, source), []).append(name)
-        for (unit, source), names in sorted(overruled.items()):
-            for name in fold([v for v in self._inputs[unit] if v in names]):
-                self._notes.append(f"{unit}.{name} has a value of its own: {source}.{name} does not drive it")
+                overruled.setdefault((instance, source), []).append(name)
+        for (instance, source), names in sorted(overruled.items()):
+            for name in fold([v for v in self._inputs[instance] if v in names]):
+                self._notes.append(
+                    f"{instance}.{name} has a value of its own: {source}.{name} does not drive it"
+                )
 
-    def _explicit(self, unit: str) -> bool:
-        """Return whether only the scenario's connections count for the inputs of a unit."""
-        return self._scenario.explicit and unit not in self._scenario.replaced
+    def _explicit(self, instance: str) -> bool:
+        """Return whether inputs of an instance are connected by the scenario's connections only."""
+        return self._scenario.explicit and instance not in self._scenario.replaced
 
     def _by_connections(self) -> dict[Input, tuple[Wire, KeyPath]]:
-        """Return the wires that the scenario names, each with the key it comes from."""
+        """Return the wires of the scenario's connections, each with the key of its connection."""
         wires: dict[Input, tuple[Wire, KeyPath]] = {}
         for i, connection in enumerate(self._scenario.connections):
             key: KeyPath = ("connections", i)
@@ -152,7 +155,7 @@ class Connector:
         return wires
 
     def _expand(self, connection: Connection, key: KeyPath) -> list[Wire]:
-        """Return the wires of a connection; lists of units and null are kept for equal names."""
+        """Return the wires of a connection; store lists of instances and null for `_by_names`."""
         ends = connection.source, connection.target
         if isinstance(ends[1], list):
             assert isinstance(ends[0], list)
@@ -175,7 +178,7 @@ class Connector:
         found = [(source, matching(from_pattern, self._outputs[source])) for source in sources]
         if one and not found[0][1]:
             self._no_such((*key, "from"), one.instance, from_pattern, "output")
-        outputs: dict[str, tuple[str, str]] = {}  # part -> unit and output, of the first unit that has it
+        outputs: dict[str, tuple[str, str]] = {}  # part -> first instance that has it, and output
         for source, named in found:
             outputs = {part: (source, name) for part, name in named.items()} | outputs
         if not (outputs and inputs):
@@ -197,11 +200,11 @@ class Connector:
             self._report(key, f"names {twice} twice")
 
     def _prefer(self, sources: list[str], targets: list[str], key: KeyPath) -> None:
-        """Keep which sources go first for units; report lists that mean nothing."""
+        """Store which sources instances prefer; report lists without any effect."""
         for end, names in (("from", sources), ("to", targets)):
             self._refuse_twice(names, (*key, end))
-        for unit in targets:
-            self._preferring.setdefault(unit, []).append((sources, key))
+        for instance in targets:
+            self._preferring.setdefault(instance, []).append((sources, key))
         ends = [(s, t) for s in sources for t in targets if s != t]
         if any(self._outputs[s].keys() & self._inputs[t].keys() for s, t in ends):
             return
@@ -212,8 +215,8 @@ class Connector:
         self._report(key, f"nothing matches: no output of {given} has the name of an input of {wanted}")
 
     def _put_in_order(self) -> None:
-        """Put the sources that a unit prefers in the one order that agrees with every list of them."""
-        for unit, lists in self._preferring.items():
+        """Sort the preferred sources of each instance into an order that agrees with all of its lists."""
+        for instance, lists in self._preferring.items():
             keys: dict[str, KeyPath] = {}
             edges: dict[tuple[str, str], KeyPath] = {}
             for sources, key in lists:
@@ -224,61 +227,64 @@ class Connector:
             try:
                 order = in_order(keys, edges)
             except CycleError as error:
-                order = list(keys)  # so that nothing else is reported of it
+                order = list(keys)  # avoids further errors about this instance
                 circle = [f"{a} to {b} ({dotted(edges[a, b])})" for a, b in pairwise(error.args[1])]
-                self._report(lists[-1][1], f"{unit} cannot prefer {listed(circle)}")
-            self._preferred[unit] = [(source, keys[source]) for source in order]
+                self._report(lists[-1][1], f"{instance} cannot prefer {listed(circle)}")
+            self._preferred[instance] = [(source, keys[source]) for source in order]
 
-    def _no_such(self, key: KeyPath, unit: str, pattern: str, kind: str) -> None:
-        """Report a pattern without a match, or note it if the FMU that was replaced has one."""
-        if self._system.had([unit], pattern, kind):
-            self._notes.append(f"{dotted(key[:2])} is left out: {unit} has no {kind} {pattern!r} any more")
+    def _no_such(self, key: KeyPath, instance: str, pattern: str, kind: str) -> None:
+        """Report a pattern without a match; only note it if the replaced FMU has a match."""
+        if self._system.had([instance], pattern, kind):
+            self._notes.append(
+                f"{dotted(key[:2])} is left out: {instance} has no {kind} {pattern!r} any more"
+            )
             return
-        variable = self._fmus[unit].variables.get(pattern)
+        variable = self._fmus[instance].variables.get(pattern)
         if variable is not None:
-            self._report(key, f"{unit}.{pattern} is no {kind}: its causality is {variable.causality}")
+            self._report(key, f"{instance}.{pattern} is no {kind}: its causality is {variable.causality}")
             return
-        if pattern in self._fmus[unit].refused:
-            self._report(key, f"{unit}.{pattern} {self._fmus[unit].refused[pattern]}")
+        if pattern in self._fmus[instance].refused:
+            self._report(key, f"{instance}.{pattern} {self._fmus[instance].refused[pattern]}")
             return
-        names = fold([v.name for v in self._fmus[unit].of(kind)])
-        self._report(key, f"{unit} has no {kind} {pattern!r}{hint(pattern, names, lead='it has')}")
+        names = fold([v.name for v in self._fmus[instance].of(kind)])
+        self._report(key, f"{instance} has no {kind} {pattern!r}{hint(pattern, names, lead='it has')}")
 
     def _by_names(self, wires: dict[Input, tuple[Wire, KeyPath]], taken: Set[Input]) -> set[Input]:
-        """Add the wires of equal names but to inputs `taken`; return those with more than one candidate."""
+        """Add wires between equal names, except to inputs `taken`; return inputs with several candidates."""
         ambiguous = set()
-        for unit, inputs in self._inputs.items():
-            if self._explicit(unit):
+        for instance, inputs in self._inputs.items():
+            if self._explicit(instance):
                 continue
             for name in inputs:
-                if (unit, name) in wires or (unit, name) in taken:
+                if (instance, name) in wires or (instance, name) in taken:
                     continue
-                sources, key = self._sources(unit, name)
+                sources, key = self._sources(instance, name)
                 if len(sources) == 1:
-                    wires[(unit, name)] = (Wire(sources[0], name, unit, name), key)
+                    wires[(instance, name)] = (Wire(sources[0], name, instance, name), key)
                 elif sources:
-                    ambiguous.add((unit, name))
+                    ambiguous.add((instance, name))
                     choices = listed(f"{source}.{name}" for source in sources)
                     self._report(
                         key,
-                        f"{unit}.{name} has more than one source: {choices}; name one under 'connections'",
+                        f"{instance}.{name} has more than one source: {choices}; "
+                        "name one under 'connections'",
                     )
         return ambiguous
 
-    def _sources(self, unit: str, name: str) -> tuple[list[str], KeyPath]:
-        """Return the units that an input takes the output of its name from, and the key that says so."""
-        having = [source for source in self._having.get(name, ()) if source != unit]
-        for preferred, key in self._preferred.get(unit, ()):
+    def _sources(self, instance: str, name: str) -> tuple[list[str], KeyPath]:
+        """Return the candidate instances for an input by its name, and the key responsible for them."""
+        having = [source for source in self._having.get(name, ()) if source != instance]
+        for preferred, key in self._preferred.get(instance, ()):
             if preferred in having:
                 return [preferred], key
-        return having, ("units", unit)
+        return having, ("units", instance)
 
     def _given(
         self, given: Mapping[Input, Constant], wires: Mapping[Input, tuple[Wire, KeyPath]]
     ) -> dict[Input, Constant]:
-        """Return the constants without those for inputs that a wire drives, which are reported.
+        """Return the constants of inputs without a wire; report the others.
 
-        A fact is for those of its inputs that nothing drives.
+        Facts are not reported: they apply to those inputs of theirs that nothing drives.
         """
         for target in given.keys() & wires.keys():
             wire, constant = wires[target][0], given[target]
@@ -289,19 +295,19 @@ class Connector:
             self._report(constant.key, f"{driven}: a constant is for inputs that no unit drives{unless}")
         return {target: constant for target, constant in given.items() if target not in wires}
 
-    def _undriven(self, unit: str, variable: Variable) -> str:
-        """Return the sentence for an input without a source."""
+    def _undriven(self, instance: str, variable: Variable) -> str:
+        """Return the message for an input without a source."""
         choices = [
             f"{source}.{name}"
             for source, names in self._fitting_outputs(variable).items()
-            if source != unit
+            if source != instance
             for name in names
             if alike(name, variable.name)
         ]
         connect = f"connect {listed(choices, last='or')}, or give" if 0 < len(choices) <= 8 else "give"
         measure = f" [{variable.unit}]" if variable.unit else ""
         return (
-            f"{unit}.{variable.name}{measure} has no source: no unit has an output of this name; "
+            f"{instance}.{variable.name}{measure} has no source: no unit has an output of this name; "
             f"{connect} a constant under 'inputs'"
         )
 
@@ -316,11 +322,11 @@ class Connector:
         return self._fitting[kind]
 
     def _scale(self, key: KeyPath) -> tuple[float, float] | None:
-        """Return the gain and offset that the connection at `key` gives, None if it gives none."""
+        """Return the gain and offset of the connection at `key`, None if it has none."""
         return self._scenario.connections[key[1]].scale if key[0] == "connections" else None  # type: ignore[index]
 
     def _fitted(self, wire: Wire, key: KeyPath) -> Wire:
-        """Return a wire with what it does to numbers; report ends that do not fit."""
+        """Return a wire with its gain and offset; report incompatible ends."""
         source, target = self._outputs[wire.source][wire.output], self._inputs[wire.target][wire.input]
         between, given = conversion_between(source, target), self._scale(key)
         scale = given or between
@@ -345,7 +351,7 @@ class Connector:
         return replace(wire, gain=scale[0], offset=scale[1])
 
     def _note_units(self, wires: Iterable[Wire]) -> None:
-        """Note ends without a unit, and units that an FMU defines otherwise than their name says."""
+        """Note variables without a unit, and units that an FMU defines otherwise than usual."""
         missing: dict[str, list[str]] = {}
         odd: dict[tuple[str, str], None] = {}
         for wire in wires:
@@ -353,13 +359,17 @@ class Connector:
                 (wire.source, self._outputs[wire.source][wire.output]),
                 (wire.target, self._inputs[wire.target][wire.input]),
             )
-            lacking = [(unit, v.name) for unit, v in ends if v.type == "Real" and v.unit is None]
+            lacking = [(instance, v.name) for instance, v in ends if v.type == "Real" and v.unit is None]
             if len(lacking) == 1:
                 missing.setdefault(lacking[0][0], []).append(lacking[0][1])
-            odd.update({(unit, v.unit): None for unit, v in ends if v.unit and contradicts_its_name(v)})
-        for unit, names in missing.items():
+            odd.update(
+                {(instance, v.unit): None for instance, v in ends if v.unit and contradicts_its_name(v)}
+            )
+        for instance, names in missing.items():
             text = listed(fold(list(dict.fromkeys(names))))
-            self._notes.append(f"{unit} ({self._fmus[unit].name}) declares no unit for {text}: not checked")
-        for unit, measure in odd:
-            who = f"{unit} ({self._fmus[unit].name})"
+            self._notes.append(
+                f"{instance} ({self._fmus[instance].name}) declares no unit for {text}: not checked"
+            )
+        for instance, measure in odd:
+            who = f"{instance} ({self._fmus[instance].name})"
             self._notes.append(f"{who} defines {measure} otherwise than usual: taken as it defines it")

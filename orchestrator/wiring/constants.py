@@ -1,4 +1,4 @@
-"""What the scenario gives to inputs: constants and time series by the most specific pattern, then facts."""
+"""Constants and time series of inputs: the most specific pattern of the scenario wins, then facts."""
 
 from __future__ import annotations
 
@@ -12,37 +12,37 @@ from ..scenario.yaml_lines import KeyPath
 from .context import WiringContext, facts_of, matching
 from .parameters import origin, value_for
 
-Input = tuple[str, str]  # unit, variable
+Input = tuple[str, str]  # instance, variable
 
 
 FACT, INPUTS, CHANGED_FACT, CHANGED_INPUTS = range(4)
-"""What goes before what: a changed fact before what the file gives, not before other changes."""
+"""Levels of precedence, ascending: an overridden fact beats the file, but not other overrides."""
 
 
 @dataclass(frozen=True)
 class Constant:
-    """What the scenario gives to one input."""
+    """The constant or time series that the scenario gives to one input."""
 
     value: Value | InputSeries
     key: KeyPath
     origin: ValueOrigin
-    of_unit: bool  # the key names the unit, so it goes before equal names
-    exact: bool  # the key is no pattern
+    of_unit: bool  # the key names the instance, so it takes precedence over equal names
+    exact: bool  # the key is not a pattern
     level: int = INPUTS
 
     @property
     def rank(self) -> tuple[int, bool, bool]:
-        """By name before by `*`, then with the unit before without; all of `inputs` before facts."""
+        """Precedence: by level, then names before patterns, then keys with the instance before others."""
         return self.level, self.exact, self.of_unit
 
     @property
     def of_fact(self) -> bool:
-        """Whether a fact gives it, to those of many inputs that nothing drives."""
+        """Whether it comes from a fact, which applies only to inputs that nothing drives."""
         return self.level in (FACT, CHANGED_FACT)
 
 
 def constants(system: WiringContext) -> dict[Input, Constant]:
-    """Return what `inputs` and facts give to each input."""
+    """Return the constant of each input, from the scenario's `inputs` and facts."""
     scenario, fmus, inputs = system.scenario, system.fmus, system.inputs
     read = None
     if any(isinstance(raw, SeriesSpec) for raw in scenario.inputs.values()):
@@ -55,15 +55,17 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
         key: KeyPath = ("inputs", pattern)
         prefix, _, rest = pattern.partition(".")
         of_unit = prefix in fmus
-        units, name_pattern = ([prefix], rest) if of_unit else (list(fmus), pattern)
-        parts = {(u, name): part for u in units for part, name in matching(name_pattern, inputs[u]).items()}
-        if not parts and system.had(units, name_pattern, "input"):
+        instances, name_pattern = ([prefix], rest) if of_unit else (list(fmus), pattern)
+        parts = {
+            (u, name): part for u in instances for part, name in matching(name_pattern, inputs[u]).items()
+        }
+        if not parts and system.had(instances, name_pattern, "input"):
             system.notes.append(f"inputs.{pattern} is left out: no unit has such an input after the swap")
         elif not parts:
-            names = fold(list(dict.fromkeys(name for unit in units for name in inputs[unit])))
+            names = fold(list(dict.fromkeys(name for instance in instances for name in inputs[instance])))
             system.report(key, f"no input matches{hint(name_pattern, names, lead='there are')}")
-        for (unit, name), part in parts.items():
-            variable = inputs[unit][name]
+        for (instance, name), part in parts.items():
+            variable = inputs[instance][name]
             value: Value | InputSeries = 0
             try:
                 if isinstance(raw, SeriesSpec):
@@ -72,40 +74,44 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
                 else:
                     value = value_for(variable, raw)
             except ValueError as error:
-                system.report(key, f"{error}, for {unit}.{name}")
+                system.report(key, f"{error}, for {instance}.{name}")
             level = CHANGED_INPUTS if fact_changed and scenario.document.override(key) else INPUTS
             given_by = origin(scenario.document, key)
             one = Constant(value, key, given_by, of_unit, "*" not in pattern, level)
-            other = found.setdefault((unit, name), one)
+            other = found.setdefault((instance, name), one)
             if other.rank < one.rank:
-                found[unit, name] = one
-            elif other.of_fact and of_unit:  # the changed fact stands where a constant of the unit did
-                found[unit, name] = replace(other, of_unit=True)
+                found[instance, name] = one
+            elif other.of_fact and of_unit:  # the overridden fact replaces a constant of the instance
+                found[instance, name] = replace(other, of_unit=True)
             elif other.rank == one.rank and other is not one:
-                system.report(key, f"{unit}.{name} has another constant already, by inputs.{other.key[1]}")
+                system.report(
+                    key, f"{instance}.{name} has another constant already, by inputs.{other.key[1]}"
+                )
     return found
 
 
 def _of_facts(system: WiringContext) -> Iterator[tuple[Input, Constant]]:
-    """Yield what facts give to inputs."""
+    """Yield the constants of inputs that come from facts."""
     scenario, known = system.scenario, system.inputs
     for name, fact, raw, changed in facts_of(scenario):
         key: KeyPath = (name,)
-        takers = [(unit, one) for unit, inputs in known.items() for one in fact.inputs if one in inputs]
+        takers = [
+            (instance, one) for instance, inputs in known.items() for one in fact.inputs if one in inputs
+        ]
         if fact.inputs and not takers:
             if not changed and any(system.had(known, one, "input") for one in fact.inputs):
                 system.notes.append(f"{name} is left out: no unit has such an input after the swap")
             else:
                 system.report(key, f"no unit has an input {name}")
         refused: dict[str, list[str]] = {}
-        for unit, one in takers:
+        for instance, one in takers:
             value = raw
             try:
-                value = value_for(known[unit][one], raw)
+                value = value_for(known[instance][one], raw)
             except ValueError as error:
-                refused.setdefault(str(error), []).append(f"{unit}.{one}")
+                refused.setdefault(str(error), []).append(f"{instance}.{one}")
             level = CHANGED_FACT if changed else FACT
-            yield (unit, one), Constant(value, key, origin(scenario.document, key), False, True, level)
+            yield (instance, one), Constant(value, key, origin(scenario.document, key), False, True, level)
         everywhere = [len(inputs) for inputs in refused.values()] == [len(takers)]
         for sentence, inputs in refused.items():
             for one in inputs:

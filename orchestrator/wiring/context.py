@@ -1,16 +1,14 @@
-"""A scenario with its FMUs opened, and what is found while it is wired.
+"""State shared by all steps of wiring: the scenario, its opened FMUs, problems and notes so far.
 
-What one name tells all units that have to know it: the friction of the road, the speed of the car.
+Also *facts*, values that reach all instances which need them, and the matching of patterns with a `*`.
 
     friction: 0.65         # every parameter `base_friction` of a road, and every input `friction`,
-                           # `friction_fl` .. `friction_rr` that no unit drives
+                           # `friction_fl` .. `friction_rr` that no wire drives
     speed: 80 km/h         # every parameter `initial_speed`, `target_speed`
 
-In a scenario a fact stands behind what is given by its own name; as a change (`--set friction=0.3`) it goes
-before what the file gives, so that one change reaches all. A line more in the table is a fact more, with
-a key of the same name in the schema of scenarios and in `plan.FACTS`.
-
-Which names a pattern with a `*` means.
+In a scenario file, a value given by its own name takes precedence over a fact; as an override
+(`--set friction=0.3`), a fact takes precedence over the file, so that one override reaches all instances. To
+add a fact, add a row to `FACTS`, its name to `plan.FACTS`, and a key to the schema of scenarios.
 """
 
 from __future__ import annotations
@@ -31,18 +29,18 @@ from ..scenario.yaml_lines import PROBLEMS, Document, KeyPath
 
 @dataclass(frozen=True)
 class Fact:
-    """What a fact reaches."""
+    """Which inputs and parameters a fact sets."""
 
-    instance: str
+    unit: str  # of measurement, of the value
     inputs: tuple[str, ...] = ()
     parameters: dict[str, str] = field(default_factory=dict)
-    """Parameter -> the one of the same unit that turns it off if it is 0; "" if it always counts."""
+    """Parameter -> another of the same instance that disables it if 0; "" if it is always in use."""
 
-    def counts(self, unit: Instance, parameter: str) -> bool:
-        """Return whether a unit's parameter is one of the fact's, and not turned off."""
+    def counts(self, instance: Instance, parameter: str) -> bool:
+        """Return whether the fact sets a parameter of an instance, and the parameter is in use."""
         if parameter not in self.parameters:
             return False
-        return unit.parameter(self.parameters[parameter]) != 0
+        return instance.parameter(self.parameters[parameter]) != 0
 
 
 FACTS = {
@@ -53,7 +51,7 @@ assert tuple(FACTS) == NAMES
 
 
 def facts_of(scenario: LoadedScenario) -> Iterator[tuple[str, Fact, Value, bool]]:
-    """Yield name, fact, value and whether a change gave it, of all facts that a scenario tells."""
+    """Yield the facts of a scenario: name, fact, value, and whether the value is an override."""
     for name, fact in FACTS.items():
         value = getattr(scenario, name)
         if value is not None:
@@ -61,7 +59,7 @@ def facts_of(scenario: LoadedScenario) -> Iterator[tuple[str, Fact, Value, bool]
 
 
 def match(pattern: str, name: str) -> str | None:
-    """Return what the `*` of a pattern stands for in a name, '' without `*`, None if they differ."""
+    """Return the part of a name that the `*` of a pattern matches ('' without `*`), None without a match."""
     head, star, tail = pattern.partition("*")
     if not star:
         return "" if name == pattern else None
@@ -70,80 +68,80 @@ def match(pattern: str, name: str) -> str | None:
 
 
 def matching(pattern: str, names: Collection[str]) -> dict[str, str]:
-    """Return the names that fit a pattern, each under what the `*` stands for in it."""
+    """Return the names that match a pattern, as part matched by `*` -> name."""
     if "*" not in pattern:
         return {"": pattern} if pattern in names else {}
     return {part: name for name in names if (part := match(pattern, name)) is not None}
 
 
 ByUnit = dict[str, dict[str, Variable]]
-"""Unit -> name -> variable."""
+"""Instance -> name -> variable."""
 
 
 @dataclass
 class WiringContext:
-    """What all that wire a scenario have in common.
+    """The scenario that is being wired, its FMUs, and the problems and notes so far.
 
-    A value that is meant for an FMU which a change has replaced is no mistake if that FMU has a use for it
-    (`had`): it is left out, with a note.
+    A value for an FMU that an override has replaced is not an error if the replaced FMU has such a variable
+    (`had`): it is ignored, with a note.
     """
 
     scenario: LoadedScenario
     fmus: Mapping[str, Fmu]
     replaced: Callable[[str], Fmu | None]
-    """Returns the FMU of a unit that a change has replaced, None if it is not there."""
+    """Returns the replaced FMU of an instance, None if it does not exist."""
     notes: list[str] = field(default_factory=list)
-    """Remarks on what is no mistake, for the plan."""
+    """Messages that are not errors, for the plan."""
     found: list[tuple[tuple[bool, KeyPath], str]] = field(default_factory=list)
-    """What is wrong, with its key and whether that is one of the vehicle file."""
+    """Problems, each with its key and whether that key is in the vehicle file."""
 
     @cached_property
     def origins(self) -> dict[str, dict[str, ValueOrigin]]:
-        """Unit -> parameter or constant -> where its value comes from, as far as that is known yet."""
-        return {unit: {} for unit in self.fmus}
+        """Instance -> parameter or constant -> where its value comes from, as far as known yet."""
+        return {instance: {} for instance in self.fmus}
 
     @cached_property
     def inputs(self) -> ByUnit:
-        """All inputs."""
-        return {unit: {v.name: v for v in fmu.of("input")} for unit, fmu in self.fmus.items()}
+        """All inputs by instance and name."""
+        return {instance: {v.name: v for v in fmu.of("input")} for instance, fmu in self.fmus.items()}
 
     @cached_property
     def outputs(self) -> ByUnit:
-        """All outputs."""
-        return {unit: {v.name: v for v in fmu.of("output")} for unit, fmu in self.fmus.items()}
+        """All outputs by instance and name."""
+        return {instance: {v.name: v for v in fmu.of("output")} for instance, fmu in self.fmus.items()}
 
-    def before(self, units: Iterable[str] | None = None) -> Iterator[Fmu]:
-        """Yield the FMUs that changes have replaced, in some units or in all, as far as they are there."""
-        for unit in self.fmus if units is None else units:
-            if unit in self.scenario.replaced and (fmu := self.replaced(unit)) is not None:
+    def before(self, instances: Iterable[str] | None = None) -> Iterator[Fmu]:
+        """Yield the existing FMUs that overrides have replaced, of some instances or of all."""
+        for instance in self.fmus if instances is None else instances:
+            if instance in self.scenario.replaced and (fmu := self.replaced(instance)) is not None:
                 yield fmu
 
-    def had(self, units: Iterable[str], pattern: str, causality: str | None = None) -> bool:
-        """Return whether an FMU that a change has replaced in one of the units has such a variable.
+    def had(self, instances: Iterable[str], pattern: str, causality: str | None = None) -> bool:
+        """Return whether a replaced FMU of one of the instances has such a variable.
 
         Args:
-            units: where it was.
+            units: names of the instances.
             pattern: of the variable's name.
             causality: of the variable; None: any.
         """
         return any(
             match(pattern, variable.name) is not None and causality in (None, variable.causality)
-            for fmu in self.before(units)
+            for fmu in self.before(instances)
             for variable in fmu.variables.values()
         )
 
     def report(self, key: KeyPath, sentence: str, document: Document | None = None) -> None:
-        """Report a problem with what the scenario says at `key`, or the vehicle file if that is the document.
+        """Report a problem with the value at `key` of the scenario, or of the vehicle file if given.
 
         Raises:
-            WiringError: problems have become very many.
+            WiringError: there are too many problems to continue.
         """
         self.found.append(((document is self.scenario.vehicle_document, key), sentence))
         if len(self.found) >= len(WHEELS) * PROBLEMS:
             raise WiringError(self.problems())
 
     def problems(self) -> list[Problem]:
-        """Return all problems from top to bottom of the files, those that are alike for four wheels once."""
+        """Return all problems in the order of the files' lines, with those of the four wheels merged."""
         problems: list[Problem] = []
         folded = fold_sentences(self.found)
         for of_vehicle, document in enumerate((self.scenario.document, self.scenario.vehicle_document)):

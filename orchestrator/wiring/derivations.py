@@ -1,13 +1,13 @@
-"""What follows from a vehicle file's values: one table of names and formulas.
+"""Formulas that derive quantities of a car from those that its vehicle file gives.
 
-A car is described once, by what is known of it; every unit takes what it declares. What the file does not
-give is derived where a formula here has all that it needs, also from what was derived before; the first that
-fits is taken. A formula whose result the file gives as well must agree with it.
+A vehicle file describes a car by the quantities that are known; every instance takes those that it declares
+as parameters. A quantity that the file does not give is derived by the first formula whose inputs are
+known, given or derived. If the file gives the result of a formula as well, the two must agree.
 
-All are identities of masses, distances and inertias, but for two that say so in their formula: the one track
-of a plant is the mean of two, and the roll stiffness and damping of an axle are those of springs and dampers
-in series with the tyres (Milliken, Race Car Vehicle Dynamics, 1995, section 16.2), exact for slow roll about
-an axis on the road.
+All formulas are identities of masses, distances and inertias, with two exceptions, which their text states:
+the single track width of a plant is the mean of two, and the roll stiffness and damping of an axle are those
+of springs and dampers in series with the tyres (Milliken, Race Car Vehicle Dynamics, 1995, section 16.2),
+exact for slow roll about an axis on the road.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from vocabulary.gravity import G
 from vocabulary.vehicle import CAR
 
 AGREES = 0.01
-"""Relative difference of what is given from what follows. Chosen: rounding of data sheets."""
+"""Tolerated relative difference between a given and a derived value. Chosen: rounding of data sheets."""
 
 
 class Derivation(NamedTuple):
-    """How a quantity follows from others."""
+    """A formula that derives a quantity from others."""
 
     name: str
     formula: str
-    """As people read it."""
+    """The formula as shown to users."""
     inputs: tuple[str, ...]
     value: Callable[..., float]
 
 
 def in_series(stiffness: float, bar: float, track: float, tyre: float) -> tuple[float, float]:
-    """Return an axle's roll stiffness on its tyres [N.m/rad] and the tyres' part in it [1]."""
+    """Return an axle's roll stiffness with its tyres [N.m/rad], and its ratio to that without them [1]."""
     springs, tyres = 0.5 * track * track * (stiffness + 2.0 * bar), 0.5 * track * track * tyre
     part = tyres / (springs + tyres)
     return springs * part, part
@@ -46,9 +46,9 @@ def of_points(mass: float, share: float, a: float, b: float, track: float) -> fl
 
 
 def _follows(name: str, expression: str, words: str = "") -> Derivation:
-    """Return the derivation of a quantity by an expression in the names of others.
+    """Return the derivation of a quantity by a Python expression in the names of others.
 
-    `words` stand for the formula where that is more than people want to read.
+    `words` replace the expression in messages where it is too long to read.
     """
     known = {"g": G, "in_series": in_series, "of_points": of_points}
     inputs = tuple(one for one in compile(expression, name, "eval").co_names if one not in known)
@@ -58,7 +58,7 @@ def _follows(name: str, expression: str, words: str = "") -> Derivation:
 
 
 def _on_tyres(axle: str) -> tuple[Derivation, Derivation]:
-    """Return the roll stiffness and damping of an axle."""
+    """Return the derivations of the roll stiffness and damping of an axle."""
     springs = f"spring_stiffness_{axle}, anti_roll_stiffness_{axle}, track_width, tyre_vertical_stiffness"
     return (
         _follows(
@@ -119,21 +119,21 @@ DERIVATIONS = (
     _follows("static_load_rear", "0.5 * mass * g * cg_to_front_axle / wheelbase"),
 )
 NEUTRAL = {"front_unsprung_share": 0.5}
-"""What a formula takes where nothing gives a quantity: as the plants have it, equal wheels."""
+"""Defaults of quantities that nothing gives, as in the plants: equal unsprung masses of both axles."""
 
 
 @dataclass(frozen=True)
 class CarQuantities:
-    """What is known of a car: numbers in SI by name, and of those that were derived the formula."""
+    """All known quantities of a car: SI values by name, and the formulas of the derived ones."""
 
     values: dict[str, float]
     formulas: dict[str, str] = field(default_factory=dict)
     used: frozenset[str] = frozenset()
-    """Names that formulas were made of."""
+    """Names of the quantities that formulas have used."""
 
 
 def car_of(given: Mapping[str, float]) -> CarQuantities:
-    """Return all that follows from what is given of a car.
+    """Derive all quantities that follow from the given ones.
 
     Args:
         given: name of `CAR` -> value in SI.
@@ -153,9 +153,9 @@ def car_of(given: Mapping[str, float]) -> CarQuantities:
 
 
 def contradictions(given: Mapping[str, float]) -> list[tuple[str, str]]:
-    """Return the (name, sentence) of every value that does not agree with what follows from the others.
+    """Return (name, message) of every given value that disagrees with the value derived from the others.
 
-    Of formulas between the same quantities the first counts.
+    Of several formulas between the same quantities, only the first is checked.
     """
     known = car_of(given).values
     found, seen = [], set()
@@ -179,7 +179,7 @@ def contradictions(given: Mapping[str, float]) -> list[tuple[str, str]]:
 
 
 def _number(one: Derivation, inputs: Sequence[float | None]) -> tuple[float] | None:
-    """Return the value in a tuple, None where there is none: a car that weighs nothing."""
+    """Return the derived value in a tuple (0 must stay true), None if undefined: a car without mass."""
     try:
         return (float(one.value(*inputs)),)
     except (ZeroDivisionError, OverflowError):

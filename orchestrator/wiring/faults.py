@@ -1,4 +1,4 @@
-"""Which outputs and inputs the faults of a scenario act on, and how, in numbers of the signals' own units."""
+"""Resolves the faults of a scenario: to outputs and inputs, with values in the units of the signals."""
 
 from __future__ import annotations
 
@@ -61,10 +61,10 @@ def _fault(spec: FaultSpec, unit: str, name: str, of_output: bool, value: float 
 
 
 def _value(spec: FaultSpec, variable: Variable) -> float | None:
-    """Return the value of a fault in the unit that its kind has it in.
+    """Return the value of a fault, converted into the unit that its kind requires.
 
     Raises:
-        ValueError: it is none.
+        ValueError: not a valid value for this kind and signal.
     """
     kind = KINDS[spec.kind]
     if spec.value is None:
@@ -92,7 +92,7 @@ def _said(scenario: LoadedScenario, key: KeyPath) -> str:
 
 @dataclass
 class _Finder:
-    """Finds what a fault acts on."""
+    """Finds the variables that a fault acts on."""
 
     system: WiringContext
     wires: Sequence[Wire]
@@ -100,7 +100,7 @@ class _Finder:
     key: KeyPath
 
     def at(self, spec: FaultSpec) -> list[tuple[str, str, bool]]:
-        """Return unit, variable and whether it is an output of all that the fault acts on."""
+        """Return (instance, variable, whether it is an output) of everything that the fault acts on."""
         place = spec.on
         for unit in filter(None, (place.instance, place.target)):
             if unit not in self.system.fmus:
@@ -146,7 +146,7 @@ class _Finder:
         return [(w.target, w.input, False) for w in found]
 
     def _way(self, place: FaultLocation) -> str:
-        """Return what there is in place of a wire from a place to its target."""
+        """Return a hint at existing wires similar to the missing one."""
         of = [w for w in self.wires if w.source == place.instance]
         if targets := dict.fromkeys(w.target for w in of if match(place.variable, w.output) is not None):
             return f"; it goes to {listed(targets)}"

@@ -1,18 +1,14 @@
-"""From a scenario to a plan: FMUs opened, parameters distributed, every input given its one source.
+"""Makes the plan of a scenario: opens FMUs, distributes parameters, connects inputs, selects what to record.
 
-An output feeds every input of the same name in other units. Before equal names go, in this order, a
-connection of the scenario and a constant whose key names the unit; a list of units under `connections`
-chooses among equal names. Any other constant is for inputs that nothing drives, one given by name
-before one given by a pattern. Whatever then has no source, or more than one, is an error: the start
-value that an FMU carries for an input is never used in silence.
+An output feeds every input of the same name in other instances. Two things take precedence over equal names,
+in this order: a connection of the scenario, and a constant whose key names the instance; a list of instances
+under `connections` chooses among equal names. Any other constant applies to inputs that nothing drives, one
+given by name before one given by a pattern. An input without a source, or with more than one, is an error:
+the start value of an input in its FMU is never used silently.
 
-Units of measurement fit if they have one dimension, and the wire converts; where an FMU declares none,
-nothing can be checked and a note says so. Types must be equal, and an enumeration's items must all be
-among those of the input it feeds, with the same numbers.
-
-Functions that an FMU's library lacks and a plan needs.
-
-What is recorded: the variables that the scenario's patterns mean.
+Units of measurement are compatible if they have the same dimension, and the wire converts; where an FMU
+declares no unit, nothing can be checked and a note says so. Types must be equal, and an enumeration's items
+must all be among those of the input it feeds, with the same numbers.
 """
 
 from __future__ import annotations
@@ -41,51 +37,57 @@ from .warnings import exact, remarks
 
 
 def missing_functions(
-    units: Iterable[Instance], wires: Sequence[Wire], record: Sequence[tuple[str, str]]
+    instances: Iterable[Instance], wires: Sequence[Wire], record: Sequence[tuple[str, str]]
 ) -> list[str]:
-    """Return a sentence for every function that is lacking; one that nothing asks for may be."""
+    """Return a message for every FMI function that the plan needs and an FMU's library does not export."""
     problems = []
-    for unit in units:
-        if not unit.fmu.lacking:
+    for instance in instances:
+        if not instance.fmu.lacking:
             continue
-        needed: dict[str, list[str]] = {f"fmi{unit.fmu.fmi}{name}": [] for name in CORE[unit.fmu.fmi]}
-        given = [*unit.parameters, *unit.constants, *(w.input for w in wires if w.target == unit.name)]
+        needed: dict[str, list[str]] = {f"fmi{instance.fmu.fmi}{name}": [] for name in CORE[instance.fmu.fmi]}
+        given = [
+            *instance.parameters,
+            *instance.constants,
+            *(w.input for w in wires if w.target == instance.name),
+        ]
         asked = [
-            *(w.output for w in wires if w.source == unit.name),
-            *(n for u, n in record if u == unit.name),
+            *(w.output for w in wires if w.source == instance.name),
+            *(n for u, n in record if u == instance.name),
         ]
         for verb, names in (("Set", given), ("Get", asked)):
             for name in dict.fromkeys(names):
-                kind = unit.fmu.variables[name].place.type
-                needed.setdefault(f"fmi{unit.fmu.fmi}{verb}{kind}", []).append(name)
+                kind = instance.fmu.variables[name].place.type
+                needed.setdefault(f"fmi{instance.fmu.fmi}{verb}{kind}", []).append(name)
         for function, names in needed.items():
-            if function in unit.fmu.lacking:
+            if function in instance.fmu.lacking:
                 purpose = f", which {listed(names)} needs" if names else ""
-                problems.append(f"{unit.name}: the library of {unit.fmu.name} lacks {function}{purpose}")
+                problems.append(
+                    f"{instance.name}: the library of {instance.fmu.name} lacks {function}{purpose}"
+                )
     return problems
 
 
 def recorded(system: WiringContext) -> tuple[tuple[str, str], ...]:
-    """Return (unit, variable) of each column, in the order of the scenario's list or units.
+    """Return (instance, variable) of each recorded column, in the order of the scenario's `record`.
 
-    Without a list these are all outputs but text.
+    Without `record`, these are all outputs except text, in the order of the instances.
     """
     fmus, record = system.fmus, system.scenario.record
     if record is None:
-        return tuple((unit, v.name) for unit, fmu in fmus.items() for v in _usual(fmu))
+        return tuple((instance, v.name) for instance, fmu in fmus.items() for v in _usual(fmu))
     chosen: dict[tuple[str, str], None] = {}
-    for i, (unit, pattern) in enumerate(record):
-        units = list(fmus) if unit == "*" else [unit]
-        found = _matching(units, fmus, pattern, _usual) or _matching(units, fmus, pattern, _all)
+    for i, (instance, pattern) in enumerate(record):
+        instances = list(fmus) if instance == "*" else [instance]
+        found = _matching(instances, fmus, pattern, _usual) or _matching(instances, fmus, pattern, _all)
         chosen.update(dict.fromkeys(found))
         if found:
             continue
-        if system.had(units, pattern):
-            system.notes.append(f"record[{i}] is left out: {unit} has no variable {pattern!r} any more")
+        if system.had(instances, pattern):
+            system.notes.append(f"record[{i}] is left out: {instance} has no variable {pattern!r} any more")
             continue
-        usual, every = ([v.name for u in units for v in of(fmus[u])] for of in (_usual, _all))
+        usual, every = ([v.name for u in instances for v in of(fmus[u])] for of in (_usual, _all))
         names = every if closest(pattern, usual) is None and closest(pattern, every) else usual
-        who = "no unit has a" if unit == "*" else f"{unit} has no"
+        who = "no unit has a" if instance == "*" else f"{instance} has no"
         more = hint(pattern, fold(list(dict.fromkeys(names))), lead="its outputs are")
         system.report(("record", i), f"{who} variable {pattern!r} to record{more}")
     return tuple(chosen)
@@ -100,15 +102,20 @@ def _all(fmu: Fmu) -> list[Variable]:
 
 
 def _matching(
-    units: Iterable[str], fmus: Mapping[str, Fmu], pattern: str, of: Callable[[Fmu], list[Variable]]
+    instances: Iterable[str], fmus: Mapping[str, Fmu], pattern: str, of: Callable[[Fmu], list[Variable]]
 ) -> list[tuple[str, str]]:
-    return [(unit, v.name) for unit in units for v in of(fmus[unit]) if match(pattern, v.name) is not None]
+    return [
+        (instance, v.name)
+        for instance in instances
+        for v in of(fmus[instance])
+        if match(pattern, v.name) is not None
+    ]
 
 
 TYRE_FORCES = tuple(f"tyre_force_y_{wheel}" for wheel in WHEELS)
-"""Outputs by which tyres are known."""
+"""Outputs that identify an instance as tyres."""
 TyreMeasurement = Callable[[Instance, Mapping[str, float]], Mapping[str, float]]
-"""Returns the cornering stiffness [N/rad] of one tyre on some wheels: of a unit, by wheel -> load [N]."""
+"""Callback: (instance of tyres, wheel -> load [N]) -> wheel -> cornering stiffness of one tyre [N/rad]."""
 
 
 def make_plan(
@@ -122,17 +129,17 @@ def make_plan(
     """Open the scenario's FMUs and connect them.
 
     Args:
-        scenario: as loaded.
-        fmus: the folder that holds FMUs given by name; None: the nearest `fmus/` that holds any.
-        opener: of the FMUs; default: one that builds nothing.
-        isolated: each unit will have a process of its own (see `master.isolation`).
-        measure: tells the stiffness of tyres, for units that want that of axles which the vehicle file
-            does not give (see `tyres.axle_stiffness`).
+        scenario: the loaded scenario.
+        fmus: folder of the FMUs given by name; None: the nearest `fmus/` that contains any.
+        opener: opens the FMUs; default: an opener that builds nothing.
+        isolated: whether each instance will run in its own process (see `master.isolation`).
+        measure: measures the cornering stiffness of tyres, for instances that need it if the vehicle file
+            does not give it (see `tyres.stand.cornering_stiffness`).
 
     Raises:
-        ModelDescriptionError: FMUs that are missing, damaged or not supported.
-        BuildError: FMUs that are stale and cannot be built.
-        WiringError: everything that is wrong with parameters and connections.
+        ModelDescriptionError: FMUs are missing, damaged or not supported.
+        BuildError: FMUs are stale and cannot be built.
+        WiringError: with all problems of parameters and connections.
     """
     system = _open_all(scenario, fmus, opener or Opener())
     opened, notes = system.fmus, system.notes
@@ -152,11 +159,11 @@ def make_plan(
         "one of these units has to give an output that does not follow its input directly"
         for loop in evaluation.loops
     ]
-    units = {name: _unit(system, name, parameters[name], values[name]) for name in opened}
+    instances = {name: _instance(system, name, parameters[name], values[name]) for name in opened}
     if not problems and not of_all:  # all variables are known
-        of_all = missing_functions(units.values(), wires, record)
+        of_all = missing_functions(instances.values(), wires, record)
     if not problems and not of_all:
-        problems += _take_from_tyres(scenario, units, distributed, measure)
+        problems += _take_from_tyres(scenario, instances, distributed, measure)
     problems += [Problem(text, file=scenario.path) for text in of_all]
     if problems:
         raise WiringError([*_misplaced(scenario), *problems])
@@ -165,10 +172,10 @@ def make_plan(
         "so a wire against the evaluation order uses earlier values"
         for loop in evaluation.possible_loops[:1]
     ]
-    notes += exact(list(units.values()), wires)
-    findings = remarks(scenario, units)
+    notes += exact(list(instances.values()), wires)
+    findings = remarks(scenario, instances)
     return Plan(
-        instances=tuple(units[name] for name in evaluation.order),
+        instances=tuple(instances[name] for name in evaluation.order),
         wires=_sorted(wires, evaluation.order, opened),
         record=record,
         step=scenario.step_size,
@@ -186,15 +193,15 @@ def make_plan(
 
 def _take_from_tyres(
     scenario: LoadedScenario,
-    units: dict[str, Instance],
+    instances: dict[str, Instance],
     distributed: Parameters,
     measure: TyreMeasurement | None,
 ) -> list[Problem]:
-    """Give units the cornering stiffnesses of axles that tyres at static loads have; return what is wrong."""
+    """Set missing cornering stiffnesses of axles to those of the tyres at static loads; return problems."""
     if not distributed.lacking:
         return []
     loads = [distributed.car.values[name] for name in STATIC_LOADS]
-    tyres = [u for u in units.values() if {v.name for v in u.fmu.of("output")} >= {*TYRE_FORCES}]
+    tyres = [u for u in instances.values() if {v.name for v in u.fmu.of("output")} >= {*TYRE_FORCES}]
     try:
         if len(tyres) != 1 or measure is None:
             raise ValueError("there is no one unit for the tyres to take it from")
@@ -202,29 +209,29 @@ def _take_from_tyres(
     except (ValueError, YawbenchError) as error:
         return [
             scenario.document.problem(
-                ("units", unit),
+                ("units", instance),
                 f"the vehicle file does not give {listed(names)}, and the tyres do not tell: {error}",
             )
-            for unit, names in distributed.lacking.items()
+            for instance, names in distributed.lacking.items()
         ]
     stiffness = dict(zip(STIFFNESSES, (2.0 * found[wheel] for wheel in WHEELS[::2]), strict=True))
-    for unit, names in distributed.lacking.items():
+    for instance, names in distributed.lacking.items():
         formula = {
             name: ValueOrigin("derived", f"two of {tyres[0].fmu.name} at {load:.6g} N each")
             for name, load in zip(STIFFNESSES, loads, strict=True)
         }
-        units[unit] = replace(
-            units[unit],
-            parameters=units[unit].parameters | {name: stiffness[name] for name in names},
-            origins=units[unit].origins | {name: formula[name] for name in names},
+        instances[instance] = replace(
+            instances[instance],
+            parameters=instances[instance].parameters | {name: stiffness[name] for name in names},
+            origins=instances[instance].origins | {name: formula[name] for name in names},
         )
     return []
 
 
-def _unit(
+def _instance(
     system: WiringContext, name: str, parameters: dict[str, Value], inputs: Mapping[str, Value | InputSeries]
 ) -> Instance:
-    """Return a unit with the values of its parameters and of the inputs that no unit drives."""
+    """Return an instance with the values of its parameters and of the inputs without a wire."""
     spec, step, start = (
         system.scenario.units[name],
         system.scenario.step_size,
@@ -243,18 +250,18 @@ def _unit(
 
 
 def _misplaced(scenario: LoadedScenario) -> list[str]:
-    """Return a sentence for every swap by an FMU whose name begins with that of another unit."""
+    """Return a message for every swap to an FMU whose name begins with that of another instance."""
     found = []
     for change in scenario.changes:
         name = Path(str(change.value)).stem
-        others = [unit for unit in scenario.units if name.startswith(f"{unit}_")]
+        others = [instance for instance in scenario.units if name.startswith(f"{instance}_")]
         if change.swaps and others and change.place not in others:
             found.append(f"{change}: by its name {name} is for the unit {others[0]!r}")
     return found
 
 
 def _open_all(scenario: LoadedScenario, fmus: Path | None, opener: Opener) -> WiringContext:
-    """Return a scenario with the FMU of each unit."""
+    """Open the FMU of each instance of a scenario."""
     document = scenario.document
     problems: dict[Problem, None] = {}
     folder = fmus or Path()
@@ -268,9 +275,9 @@ def _open_all(scenario: LoadedScenario, fmus: Path | None, opener: Opener) -> Wi
         path = find_fmu(fmu, scenario=scenario.path, fmus=folder, opener=opener, build=build)
         return opener.open(path, validate=validate)
 
-    def replaced(unit: str) -> Fmu | None:
+    def replaced(instance: str) -> Fmu | None:
         try:
-            return opened(scenario.replaced[unit], scenario.units[unit].validate_, build=False)
+            return opened(scenario.replaced[instance], scenario.units[instance].validate_, build=False)
         except ModelDescriptionError:
             return None
 
@@ -291,7 +298,7 @@ def _open_all(scenario: LoadedScenario, fmus: Path | None, opener: Opener) -> Wi
 
 
 def _check_instances(system: WiringContext) -> None:
-    """Report an FMU used by two units though it allows one instance per process."""
+    """Report FMUs with several instances that allow only one per process."""
     first: dict[str, str] = {}
     for name, fmu in system.fmus.items():
         other = first.setdefault(fmu.sha256, name)
@@ -304,8 +311,10 @@ def _check_instances(system: WiringContext) -> None:
 
 
 def _sorted(wires: Sequence[Wire], order: Sequence[str], fmus: Mapping[str, Fmu]) -> tuple[Wire, ...]:
-    """Return the wires by target in evaluation order, then by input as the FMU lists them."""
+    """Return the wires sorted by their target in evaluation order, then by input in the FMU's order."""
     place = {
-        (unit, name): (i, j) for i, unit in enumerate(order) for j, name in enumerate(fmus[unit].variables)
+        (instance, name): (i, j)
+        for i, instance in enumerate(order)
+        for j, name in enumerate(fmus[instance].variables)
     }
     return tuple(sorted(wires, key=lambda wire: place[(wire.target, wire.input)]))

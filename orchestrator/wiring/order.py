@@ -1,20 +1,19 @@
-"""The order in which units are evaluated, from what their outputs follow at the same instant.
+"""Evaluation order of the instances, and algebraic loops, from direct feedthrough.
 
-Two graphs tell two things apart. The graph of *variables* joins every wire with every declared
-direct dependency; a cycle there is a real algebraic loop: values that define each other at one
-instant, for which no order of calls is right. The graph of *units* has an edge for each wire into
-an input that some output follows directly ("direct wire"); it says who has to be stepped first for
-the other to see values of the same instant. It may have cycles where the variables have none: a
-plant gives the tyre its slip angles and reports accelerations that follow the tyre's forces. Since
-every unit is stepped by one call, such a cycle is cut: the units in it are put in the order that
-leaves the fewest direct wires pointing backwards, counting first those whose followers feed another
-unit (a value that is only recorded matters less). Over a wire that points backwards, the master
-uses values of earlier communication points, held or extrapolated. Everything else keeps the order
-in which the scenario lists the units.
+Two graphs serve two purposes. The graph of *variables* joins every wire with every declared direct
+dependency; a cycle in it is a real algebraic loop: values that define each other at one instant, for which
+no order of calls is right. The graph of *instances* has an edge for each wire into an input with direct
+feedthrough to some output ("direct wire"); it determines which instance has to be stepped first for another
+to get values of the same instant. It may have cycles where the variables have none: a plant gives the tyre
+its slip angles and reports accelerations that depend on the tyre's forces. Since every instance is stepped by
+one call, such a cycle is cut: its instances are put in the order with the fewest backward direct wires,
+counting first those whose dependent outputs feed another instance (a value that is only recorded matters
+less). Over a backward wire, the master uses values of earlier communication points, held or extrapolated.
+Apart from that, instances keep the order of the scenario.
 
-An FMU that does not say what an output follows must be taken, by FMI 2.0.4, section 2.2.8, to
-follow every input. A loop that exists only through such outputs is possible, not certain: it is
-noted, not refused.
+If an FMU does not declare the dependencies of an output, by FMI 2.0.4, section 2.2.8, the output must be
+assumed to depend on every input. A loop that exists only through such outputs is possible, not certain: it
+is noted, not refused.
 """
 
 from __future__ import annotations
@@ -29,57 +28,57 @@ from itertools import chain
 from ..messages import star
 from ..plan import Fmu, Wire
 
-Node = tuple[str, str]  # unit, variable
-Edge = tuple[str, str]  # source unit, target unit
-Graph = dict[Node, dict[Node, None]]  # variable -> those that follow it, in order
+Node = tuple[str, str]  # instance, variable
+Edge = tuple[str, str]  # source instance, target instance
+Graph = dict[Node, dict[Node, None]]  # variable -> those that depend on it, in order
 
 EXACT_UP_TO = 12
-"""Units in one cycle for which the best order is searched; beyond, a good one."""
+"""Instances in a cycle up to which the best order is searched; for larger cycles, a good one."""
 LOOPS = 10
-"""Loops told of. Chosen: whoever mends one checks again."""
+"""Maximum number of reported loops. Chosen: users check again after correcting some."""
 EFFORT = 300_000
-"""Edges looked at for the shortest loop; beyond, a short one. Chosen: a tenth of a second."""
+"""Edges examined for the shortest loop; beyond, any short loop. Chosen: a tenth of a second."""
 LONGEST = 20
-"""Variables of a loop that are named. Chosen: a screen's line or four."""
-UNSAID = ""
-"""Stands, in a graph, for all outputs of a unit of which it is not said what they follow."""
+"""Maximum number of variables named in a loop. Chosen: four lines of a terminal."""
+UNDECLARED = ""
+"""Name of the node for all outputs of an instance without declared dependencies."""
 
 
 @dataclass(frozen=True)
 class EvaluationOrder:
-    """The order of the units, and why."""
+    """The evaluation order of the instances, with direct wires and algebraic loops."""
 
     order: tuple[str, ...]
     direct: tuple[Wire, ...]
-    """Wires whose target has an output that follows them at the same instant."""
+    """Wires whose target has an output with direct feedthrough from them."""
     backward: tuple[Wire, ...]
     """Direct wires against the order: their target uses values of earlier communication points."""
     loops: tuple[str, ...]
-    """Real algebraic loops, each as 'a.x -> b.y -> ...'; the first ones."""
+    """Real algebraic loops, each as 'a.x -> b.y -> ...'; at most `LOOPS`."""
     possible_loops: tuple[str, ...]
-    """A loop through outputs of which the FMU does not say what they follow, if there is no real one."""
+    """A loop through outputs without declared dependencies, if there is no real loop."""
 
 
-class _Following:
-    """What the outputs of an FMU follow at the same instant."""
+class _Feedthrough:
+    """Direct feedthrough of an FMU: which outputs depend on which inputs at the same instant."""
 
     def __init__(self, fmu: Fmu) -> None:
-        self.said: dict[str, list[str]] = {}  # input -> outputs
-        self.unsaid: list[str] = []  # outputs that may follow every input
+        self.declared: dict[str, list[str]] = {}  # input -> outputs
+        self.undeclared: list[str] = []  # outputs that may depend on every input
         for output in fmu.of("output"):
             if output.depends_on is None:
-                self.unsaid.append(output.name)
+                self.undeclared.append(output.name)
             for name in output.depends_on or ():
-                self.said.setdefault(name, []).append(output.name)
+                self.declared.setdefault(name, []).append(output.name)
 
     def outputs(self, name: str) -> Iterator[str]:
-        """Yield the outputs that may follow an input."""
-        return chain(self.unsaid, self.said.get(name, ()))
+        """Yield the outputs that may depend on an input."""
+        return chain(self.undeclared, self.declared.get(name, ()))
 
 
 def evaluate(fmus: Mapping[str, Fmu], wires: Sequence[Wire]) -> EvaluationOrder:
-    """Find the evaluation order of the units `fmus`, given in the order of the scenario."""
-    following = {unit: _Following(fmu) for unit, fmu in fmus.items()}
+    """Find the evaluation order of the instances `fmus`, given in the order of the scenario."""
+    following = {instance: _Feedthrough(fmu) for instance, fmu in fmus.items()}
     direct = [wire for wire in wires if any(following[wire.target].outputs(wire.input))]
     weights = _weights(following, wires, direct)
     cycles = _cycles(list(fmus), weights)
@@ -93,25 +92,25 @@ def evaluate(fmus: Mapping[str, Fmu], wires: Sequence[Wire]) -> EvaluationOrder:
     return EvaluationOrder(tuple(order), tuple(direct), tuple(backward), tuple(sure), tuple(possible))
 
 
-def _variable_graph(following: Mapping[str, _Following], wires: Iterable[Wire], *, assume: bool) -> Graph:
-    """Return who follows each variable; `assume`: also where the FMU does not say."""
+def _variable_graph(following: Mapping[str, _Feedthrough], wires: Iterable[Wire], *, assume: bool) -> Graph:
+    """Return the graph of variables; `assume`: undeclared outputs depend on every input."""
     graph: Graph = {}
     for wire in wires:
         target = (wire.target, wire.input)
         graph.setdefault((wire.source, wire.output), {})[target] = None
         known = following[wire.target]
-        graph[target] = {(wire.target, name): None for name in known.said.get(wire.input, ())}
-        if assume and known.unsaid:
-            unsaid = (wire.target, UNSAID)
-            graph[target][unsaid] = None
-            graph.setdefault(unsaid, {(wire.target, name): None for name in known.unsaid})
+        graph[target] = {(wire.target, name): None for name in known.declared.get(wire.input, ())}
+        if assume and known.undeclared:
+            undeclared = (wire.target, UNDECLARED)
+            graph[target][undeclared] = None
+            graph.setdefault(undeclared, {(wire.target, name): None for name in known.undeclared})
     return graph
 
 
 def _loops(graph: Graph, most: int) -> list[str]:
-    """Return loops that share no variable, the shortest first, alike ones of the four wheels once.
+    """Return disjoint loops, the shortest first, with those of the four wheels reported once.
 
-    The graph is used up.
+    The graph is consumed.
     """
     texts: dict[str, str] = {}
     effort = EFFORT
@@ -123,7 +122,7 @@ def _loops(graph: Graph, most: int) -> list[str]:
             loop = error.args[1][::-1]  # the sorter has it against the direction of the wires
         shortest, effort = _shortest_loop(graph, effort)
         loop = shortest or loop
-        names = [f"{unit}.{name}" for unit, name in loop if name != UNSAID]
+        names = [f"{instance}.{name}" for instance, name in loop if name != UNDECLARED]
         if len(names) > LONGEST:
             names[LONGEST - 2 : -1] = [f"{len(names) - LONGEST + 1} more"]
         text = " -> ".join(names)
@@ -134,12 +133,12 @@ def _loops(graph: Graph, most: int) -> list[str]:
 
 
 def _shortest_loop(graph: Graph, effort: int) -> tuple[list[Node], int]:
-    """Return the shortest loop as far as the effort reaches, and what is left of that.
+    """Return the shortest loop found within the effort, and the remaining effort.
 
     The loop has its first node at both ends; it is empty if none was found.
     """
     best: list[Node] = []
-    for start in (node for node in graph if node[1] != UNSAID):
+    for start in (node for node in graph if node[1] != UNDECLARED):
         if effort <= 0:
             break
         found, looked_at = _way_back(graph, start)
@@ -150,9 +149,9 @@ def _shortest_loop(graph: Graph, effort: int) -> tuple[list[Node], int]:
 
 
 def _way_back(graph: Graph, start: Node) -> tuple[list[Node], int]:
-    """Return the shortest path from a node to itself, both ends included, and how many edges it took.
+    """Return the shortest path from a node to itself, both ends included, and the number of edges examined.
 
-    It is empty if there is none.
+    The path is empty if there is none.
     """
     came_from: dict[Node, Node] = {}
     queue = deque([start])
@@ -173,9 +172,9 @@ def _way_back(graph: Graph, start: Node) -> tuple[list[Node], int]:
 
 
 def _weights(
-    following: Mapping[str, _Following], wires: Iterable[Wire], direct: Iterable[Wire]
+    following: Mapping[str, _Feedthrough], wires: Iterable[Wire], direct: Iterable[Wire]
 ) -> dict[Edge, int]:
-    """Return what it costs to have source after target: wires whose followers feed a unit, then wires."""
+    """Return the cost of evaluating source after target: first wires whose followers are used, then wires."""
     used = {(wire.source, wire.output) for wire in wires}
     weights: Counter[Edge] = Counter()
     for wire in direct:
@@ -188,7 +187,7 @@ def _weights(
 def _unit_order(
     names: Sequence[str], weights: Mapping[Edge, int], cycles: Iterable[Sequence[str]]
 ) -> list[str]:
-    """Return the units so that sources stand before targets, else as the scenario lists them."""
+    """Sort the instances with sources before targets, otherwise in the scenario's order."""
     rank = {name: i for group in cycles for i, name in enumerate(_cheapest_order(group, weights))}
     group = {name: i for i, cycle in enumerate(cycles) for name in cycle}
     edges = [
@@ -200,10 +199,10 @@ def _unit_order(
 
 
 def in_order(names: Iterable[str], edges: Iterable[Edge]) -> list[str]:
-    """Return names so that the first of every edge stands before the second, else in the order given.
+    """Sort names topologically by edges (before, after), otherwise keeping their order.
 
     Raises:
-        CycleError: the edges lead in a circle.
+        CycleError: the edges form a cycle.
     """
     place = {name: i for i, name in enumerate(names)}
     sorter: TopologicalSorter[str] = TopologicalSorter({name: () for name in place})
@@ -221,7 +220,7 @@ def in_order(names: Iterable[str], edges: Iterable[Edge]) -> list[str]:
 
 
 def _cycles(names: Sequence[str], edges: Iterable[Edge]) -> list[list[str]]:
-    """Return the groups of units that reach each other."""
+    """Return the strongly connected groups of instances."""
     after: dict[str, list[str]] = {name: [] for name in names}
     for source, target in edges:
         after[source].append(target)
@@ -234,7 +233,7 @@ def _cycles(names: Sequence[str], edges: Iterable[Edge]) -> list[list[str]]:
 
 
 def _reached(name: str, after: Mapping[str, Sequence[str]]) -> set[str]:
-    """Return all that can be reached from a unit; itself only if a cycle leads back."""
+    """Return all instances that can be reached from one, itself only through a cycle."""
     found: set[str] = set()
     waiting = list(after[name])
     while waiting:
@@ -246,9 +245,9 @@ def _reached(name: str, after: Mapping[str, Sequence[str]]) -> set[str]:
 
 
 def _cheapest_order(group: Sequence[str], weights: Mapping[Edge, int]) -> list[str]:
-    """Return the order of a cycle's units that costs least; of equals, the scenario's.
+    """Return the cheapest order of the instances in a cycle; of equals, the scenario's.
 
-    Of a large cycle it is a good order: each unit the one that costs least at its place.
+    For large cycles it is a greedy order: the next instance is always the cheapest.
     """
     sources: dict[str, dict[str, int]] = {name: {} for name in group}
     for (source, target), cost in weights.items():

@@ -1,8 +1,8 @@
-"""Values for parameters and constants: type, unit, limits and choices checked against the FMU.
+"""Distributes parameters to instances, and checks values by type, unit, limits and choices of the FMU.
 
-A vehicle file describes a car for all plants: what no unit here takes of it is left alone if it is a quantity
-that some unit may know (`vocabulary.vehicle`), and what a unit lacks is derived (`derivations`). A unit that
-takes part of a car takes all of it: the rest of another car, which its FMU begins with, is no answer.
+A vehicle file describes a car for all plants: quantities of a car (`vocabulary.vehicle`) that no instance
+takes are ignored, and those that an instance lacks are derived (`derivations`). An instance that takes some
+quantities of the car must get all of them, because the defaults of its FMU describe a different car.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from .derivations import CarQuantities, car_of, contradictions
 
 STIFFNESSES = ("cornering_stiffness_front", "cornering_stiffness_rear")
 STATIC_LOADS = ("static_load_front", "static_load_rear")
-"""What follows from tyres, and what of the car that takes (see `make_plan`)."""
+"""Quantities of the car from which `make_plan` gets the `STIFFNESSES` of the tyres."""
 WRITTEN: dict[str, Callable[[str], object]] = {"patches": patches_of, "friction_table": table_of}
-"""Parameters that are text of a form of its own, and what reads it: its mistakes are told before a run."""
+"""Text parameters with a format -> their parser, so that errors are reported before the run."""
 LARGEST, LARGEST_SINGLE = sys.float_info.max, (2 - 2**-23) * 2.0**127
-"""Numbers of double and single precision."""
+"""Largest numbers of double and single precision."""
 
 
 def value_for(variable: Variable, given: Value) -> Value:
-    """Return what the scenario gives for a variable, in the variable's type and unit.
+    """Convert a value from a scenario to the type and unit of a variable.
 
     Raises:
-        ValueError: a sentence that says what is allowed.
+        ValueError: the value is not allowed; the message says what is.
     """
     convert = {"Real": _real, "Integer": _integer, "Enumeration": _enumeration}.get(variable.type, _other)
     value = convert(variable, given)
@@ -96,13 +96,13 @@ def _other(variable: Variable, given: Value) -> Value:
 
 
 def origin(document: Document, key: KeyPath) -> ValueOrigin:
-    """Return where the value at a key comes from: the file's kind, or what changed it."""
+    """Return where the value at a key comes from: the kind of file, or the override."""
     change = document.override(key)
     return ValueOrigin(change.origin if change else "vehicle" if key[0] == "parameters" else "scenario")
 
 
 class Parameters:
-    """The parameters of all units: their own, then the vehicle's for those that declare them."""
+    """The parameters of all instances: their own, else facts, the vehicle's and the tyre files' values."""
 
     def __init__(self, system: WiringContext) -> None:
         self._system = system
@@ -111,10 +111,10 @@ class Parameters:
         self._given: dict[str, dict[str, Value]] = {unit: {} for unit in system.fmus}
         self.car = CarQuantities({})
         self.lacking: dict[str, list[str]] = {}
-        """Unit -> those of `STIFFNESSES` that only the tyres at their static loads can tell it."""
+        """Instance -> those of its `STIFFNESSES` that have to be measured on the tyres at static loads."""
 
     def of_units(self) -> dict[str, dict[str, Value]]:
-        """Return each unit's values."""
+        """Return the parameter values of each instance."""
         for unit, fmu in self._fmus.items():
             self._system.origins[unit].update((variable.name, DEFAULT) for variable in fmu.of("parameter"))
         self._from_tyre_files()
@@ -137,7 +137,7 @@ class Parameters:
         came: ValueOrigin | None = None,
         says: str = "",
     ) -> None:
-        """Give a unit a value; what is wrong with it is reported at its place, behind what it says."""
+        """Set a parameter of an instance; report errors at `place`, with the prefix `says`."""
         document, key = place
         try:
             self._given[unit][name] = value_for(self._fmus[unit].variables[name], raw)
@@ -149,7 +149,7 @@ class Parameters:
         return [unit for unit, fmu in self._fmus.items() if _is_parameter(fmu, name)]
 
     def _give_own(self, unit: str, name: str, raw: Value | TextSpec, key: KeyPath) -> None:
-        """Give a unit its own value, or the text of a file."""
+        """Set a parameter listed under its instance: to a value, or the text of a file."""
         fmu, place = self._fmus[unit], (self._scenario.document, key)
         if not _is_parameter(fmu, name):
             if self._is_left_out(unit, name, key):
@@ -169,7 +169,7 @@ class Parameters:
                 self._give(unit, name, text, place, ValueOrigin("file", raw.file), f"{raw.file}: ")
 
     def _from_facts(self) -> set[tuple[str, str]]:
-        """Give what facts tell; return the (unit, parameter) whose fact was changed."""
+        """Set the parameters that facts reach; return the (instance, parameter) of overridden facts."""
         by_change: set[tuple[str, str]] = set()
         for fact_name, fact, raw, changed in facts_of(self._scenario):
             takers = [(unit, name) for name in fact.parameters for unit in self._takers(name)]
@@ -177,7 +177,7 @@ class Parameters:
                 self._give(unit, name, raw, (self._scenario.document, (fact_name,)))
             by_change.update(takers if changed else ())
             if not fact.parameters or fact.inputs or takers:
-                continue  # a fact with inputs is judged by these
+                continue  # for a fact with inputs, `constants` reports whether it has an effect
             before = any(self._system.had(self._fmus, name, "parameter") for name in fact.parameters)
             if before and not changed:
                 self._system.notes.append(
@@ -189,7 +189,7 @@ class Parameters:
         return by_change
 
     def _from_tyre_files(self) -> None:
-        """Give the coefficients of tyre property files to every unit that declares them."""
+        """Set the coefficients of tyre property files in every instance that declares them."""
         place = self._scenario.tyres_place
         for axle, file in self._scenario.tyre_files.items():
             came = ValueOrigin("file", file.path.name)
@@ -244,9 +244,10 @@ class Parameters:
                 )
 
     def _refuse_half_a_car(self) -> None:
-        """Report units that the vehicle file gives part of a car; note what tyres have to tell.
+        """Report instances that get only part of their car; store which stiffnesses tyres must supply.
 
-        A file that not even static loads follow from is no car, but some values for the FMUs' own.
+        A vehicle file from which not even static loads follow does not describe a car: it only replaces some
+        defaults of the FMUs.
         """
         wrong = any(of_vehicle for (of_vehicle, _), _ in self._system.found)
         if wrong or not self.car.values.keys() >= {*STATIC_LOADS}:
@@ -266,7 +267,7 @@ class Parameters:
                 )
 
     def _is_left_out(self, unit: str, name: str, key: KeyPath) -> bool:
-        """Return whether a value was meant for the FMU that an option has replaced."""
+        """Return whether a value was meant for the replaced FMU of an instance."""
         if unit not in self._scenario.replaced or self._scenario.document.override(key):
             return False
         before = self._system.replaced(unit)
@@ -274,10 +275,10 @@ class Parameters:
 
 
 def _text_of(path: Path) -> str:
-    """Return the text of a file that stands in place of a value.
+    """Return the text of a file given instead of a value.
 
     Raises:
-        ValueError: why it cannot be read.
+        ValueError: the file cannot be read; the message says why.
     """
     try:
         return read_bytes(path, largest=TEXT).decode("utf-8-sig")
@@ -288,16 +289,16 @@ def _text_of(path: Path) -> str:
 
 
 def known_car(given: Mapping[str, Value]) -> CarQuantities:
-    """Return what follows from the values of a vehicle file, which fit the quantities of a car."""
+    """Return the quantities of a car that follow from the (valid) values of a vehicle file."""
     of_car = {name: raw for name, raw in given.items() if name in CAR}
     return car_of({name: float(value_for(_quantity(name), raw)) for name, raw in of_car.items()})
 
 
 def _quantity(name: str) -> Variable:
-    """Return a quantity of a car as if it were a parameter."""
-    one = CAR[name]
+    """Return a parameter with the unit and limits of a quantity of a car."""
+    quantity = CAR[name]
     return Variable(
-        name, 0, "Real", "parameter", "fixed", one.unit, None, one.minimum, None, one.text
+        name, 0, "Real", "parameter", "fixed", quantity.unit, None, quantity.minimum, None, quantity.text
     )  # fmt: skip
 
 

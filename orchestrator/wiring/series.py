@@ -1,10 +1,8 @@
-"""Time series for inputs: in the unit and type of the input, and complete for the run.
+"""Reads time series for inputs from files, converted to unit and type of the input and checked for the run.
 
-Files of time series: columns by name, with the units of measurement that their headers give.
-
-CSV (`,`, `;` or tab), Parquet, ASAM MDF 4. A header may name a unit, `delta [deg]`, and CSV may have a row
-of units below its header; Parquet has it in the field's metadata, MDF in the channel. Results of a run here
-have theirs in the run.json beside them.
+Formats are CSV (separated by `,`, `;` or tab), Parquet and ASAM MDF 4. A header may name a unit,
+`delta [deg]`, and CSV may have a row of units below its header; Parquet has units in the metadata of fields,
+MDF in channels. The units of results of this program are in the run.json next to them.
 """
 
 from __future__ import annotations
@@ -35,13 +33,13 @@ from ..scenario.scenario_schema import SeriesSpec
 from .parameters import value_for
 
 LARGEST = 1_000_000_000
-"""Bytes of a file. Chosen: it is held in memory."""
+"""Bytes of a file. Chosen: it fits into memory."""
 BESIDE = "run.json"
 _HEADER = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*")
 
 
 class FileColumn(NamedTuple):
-    """A column as it stands in the file, and the times of its values."""
+    """A column as in the file, and the times of its values."""
 
     times: np.ndarray  # shape (rows,) [time_unit]
     values: np.ndarray  # shape (rows,), numbers or text
@@ -50,20 +48,20 @@ class FileColumn(NamedTuple):
 
 
 class _Table(NamedTuple):
-    """Columns as a kind of file has them; their functions take the number of a column."""
+    """The columns of a file, independent of its format; the callables take the index of a column."""
 
     headers: list[str]
-    units: Sequence[str | None]  # beside the headers
+    units: Sequence[str | None]  # where the format has them apart from headers
     values: Callable[[int], np.ndarray]
-    times: Callable[[int], np.ndarray] | None = None  # if every column has its own, in s
+    times: Callable[[int], np.ndarray] | None = None  # in s, if every column has its own times
 
 
 class SeriesFile:
     """A file of columns, read into memory.
 
     Raises:
-        OSError: it cannot be read.
-        ValueError: a sentence; so does `column`.
+        OSError: the file cannot be read.
+        ValueError: its content is not usable; also raised by `column`.
     """
 
     def __init__(self, path: Path) -> None:
@@ -83,7 +81,7 @@ class SeriesFile:
             self._units.append((found and found["unit"].strip()) or unit or beside.get(name))
 
     def column(self, name: str, time: str) -> FileColumn:
-        """Return a column and the one of its times, which in MDF every channel has of its own."""
+        """Return a column with its times: those of the column `time`, in MDF those of the channel."""
         table, at = self._table, self._find(name)
         if table.times:
             return FileColumn(table.times(at), table.values(at), "s", self._units[at])
@@ -101,7 +99,7 @@ class SeriesFile:
 
 
 def _csv(raw: bytes) -> _Table:
-    """Return the table of a file whose rows are read again for every column: as text, all would be large."""
+    """Return the table of a CSV file; its text is parsed again for every column, to save memory."""
     first = raw.partition(b"\n")[0].decode("utf-8-sig", "replace")
     delimiter = max(",;\t", key=first.count)
 
@@ -133,9 +131,9 @@ def _csv(raw: bytes) -> _Table:
 
 
 def _row_of_units(row: Sequence[str]) -> list[str | None] | None:
-    """Return what a row of units says of each column, None if it is a row of values, which has a number.
+    """Return the unit of each column from a row of units, None if the row has a number or no unit at all.
 
-    Nothing and `-` stand for no unit.
+    An empty cell and `-` mean no unit.
     """
     cells = [cell.strip().removeprefix("[").removesuffix("]").strip() for cell in row]
     units = [cell if cell not in ("", "-") else None for cell in cells]
@@ -191,10 +189,10 @@ def _mdf(raw: bytes) -> _Table:
 
 
 def _units_beside(path: Path) -> Mapping[str, str]:
-    """Return the units of recorded results.
+    """Return the units of recorded results, from the run record next to them.
 
     Raises:
-        ValueError: the record beside them is not what their run has written.
+        ValueError: the run record was changed after its run, or cannot be read.
     """
     if path.stem != "results":
         return {}
@@ -216,16 +214,16 @@ def _units_beside(path: Path) -> Mapping[str, str]:
 
 
 Reader = Callable[[SeriesSpec, str, Variable], InputSeries]
-"""Gives an input what a specification says, for what the `*` of its key stands for ("" without one)."""
+"""Callback: (specification, part matched by the `*` of its key, input) -> time series."""
 
 SECOND = measure_of("s")
 
 
 def series_reader(scenario: LoadedScenario) -> Reader:
-    """Return what reads the time series of a scenario, every file once.
+    """Return a reader for the time series of a scenario, which reads every file once.
 
-    It raises ValueError with a sentence: the file or a column is missing or no use, the unit does not
-    fit, the times do not cover the run.
+    The reader raises ValueError if the file or a column is missing or unusable, the unit is incompatible, or
+    the times do not cover the run.
     """
 
     @cache
@@ -250,7 +248,7 @@ def series_reader(scenario: LoadedScenario) -> Reader:
 
 @contextlib.contextmanager
 def reading_series(path: Path | str) -> Iterator[None]:
-    """As `files.reading` a file of time series, with ValueError for every sentence."""
+    """Like `files.reading` for files of time series, but raise ValueError."""
     try:
         with reading("file of time series", path, ScenarioError):
             try:
@@ -262,16 +260,16 @@ def reading_series(path: Path | str) -> Iterator[None]:
 
 
 def numbers_in(column: np.ndarray, unit: str | None, wanted: Unit | None, says: str, what: str) -> np.ndarray:
-    """Return a column as finite numbers in the unit that is wanted; without one of its own it is in that.
+    """Convert a column to finite numbers in a unit; a column without a unit is taken to be in that unit.
 
     Args:
         column: numbers or text.
         unit: of the column.
-        wanted, says: the unit that is wanted, and in words.
-        what: the column is, for sentences.
+        wanted, says: the unit to convert to, and its name for messages.
+        what: name of the column for messages.
 
     Raises:
-        ValueError: a sentence.
+        ValueError: the column is not numeric, not finite, or in an incompatible unit.
     """
     numbers = _numbers(column, what)
     if unit is None or wanted is None:
@@ -284,7 +282,7 @@ def numbers_in(column: np.ndarray, unit: str | None, wanted: Unit | None, says: 
 
 
 def _numbers(column: np.ndarray, what: str) -> np.ndarray:
-    """Return a column as finite numbers."""
+    """Convert a column to finite numbers."""
     try:
         numbers = column.astype(float)
     except (TypeError, ValueError):
@@ -301,7 +299,7 @@ def _numbers(column: np.ndarray, what: str) -> np.ndarray:
 
 
 def _values(column: np.ndarray, unit: str | None, name: str, variable: Variable) -> np.ndarray:
-    """Return a column's values as the variable takes them."""
+    """Convert the values of a column to the type and unit of a variable."""
     if variable.type == "Real":
         wanted = measure_of(variable.unit, variable.definition)
         numbers = numbers_in(column, unit, wanted, variable.unit or "none", f"column {name!r}")
@@ -318,7 +316,7 @@ def _values(column: np.ndarray, unit: str | None, name: str, variable: Variable)
 
 
 def _plain(cell: Any, variable: Variable) -> Value:
-    """Return a cell as a scenario would say it: files know no whole numbers, and truth as 1."""
+    """Return a cell as in a scenario: files have whole numbers as floats, and booleans as 0 and 1."""
     if variable.type == "Boolean" and cell in (0, 1):
         return bool(cell)
     return int(cell) if isinstance(cell, float) and cell.is_integer() else cell
@@ -335,7 +333,7 @@ def _check_times(times: np.ndarray, scenario: LoadedScenario, spec: SeriesSpec) 
     slack = 1e-9 * max(abs(start), abs(stop))
     last = float(times[-1])
     if spec.interpolation == "held" and len(times) > 1:
-        last += float(times[-1] - times[-2])  # its last value holds as long as the one before
+        last += float(times[-1] - times[-2])  # the last value holds as long as the previous one
     if times[0] > start + slack or last < stop - slack:
         raise ValueError(
             f"covers {times[0]:g} to {times[-1]:g} s of a run from {start:g} to {stop:g} s; "

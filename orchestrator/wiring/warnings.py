@@ -1,15 +1,13 @@
-"""Remarks on values that are hardly meant: two for one matter, another car's, a slip of the pen.
+"""Warnings about suspicious values: conflicting, left over from another car, implausible, or probably typos.
 
-What the control side sees of the car: the truth, a measurement of it, or an estimate.
+Implausible are quantities outside the ranges of `vocabulary.vehicle`: a mass in grams, a wheelbase in mm, a
+yaw inertia that does not fit the mass. Defaults of FMUs are not checked: they are the responsibility of
+their authors.
 
-Whoever computes with a signal sees it as its source's role says: an estimator gives estimates, a sensor
-measurements, and what comes from neither nor from the control side itself, from the plant, say, or the
-driver, is the truth, exact and at once, as no car has it.
-
-Remarks on cars that cannot be: a mass in grams, a wheelbase in mm, a yaw inertia that no mass has.
-
-Ranges are beside the quantities (`vocabulary.vehicle`). What an FMU begins with is not looked at: it is its
-author's.
+There is also a note on instances of the control side that use the truth although there is a sensor. The role
+of its source determines what a signal is: an estimator gives estimates, a sensor measurements; a signal from
+elsewhere (the plant, the driver), but not from the control side itself, is the truth, exact and without
+delay, which no real car has.
 """
 
 from __future__ import annotations
@@ -34,15 +32,15 @@ TRUTH = "truth"
 
 
 def role_of(unit: str, fmu: Fmu) -> str:
-    """Return a unit's role as far as it counts here: its FMU's name begins with it, or it is its name."""
+    """Return the role of an instance from the prefix of its FMU's name, else the instance's name."""
     roles = (*SENSING, *CONTROL)
     return next((role for role in roles if fmu.name.startswith(f"{role}_")), unit)
 
 
 def seen_as(wire: Wire, units: Iterable[Instance]) -> str:
-    """Return "truth", "late truth", "measurement" or "estimate".
+    """Return what a wire gives to the control side: "truth", "late truth", "measurement" or "estimate".
 
-    "" for what the control side says itself, or does not see.
+    "" if the source is on the control side itself, or the target is not.
     """
     roles = {unit.name: role_of(unit.name, unit.fmu) for unit in units}
     if roles[wire.target] not in (*CONTROL, "estimator") or roles[wire.source] in CONTROL:
@@ -52,10 +50,10 @@ def seen_as(wire: Wire, units: Iterable[Instance]) -> str:
 
 
 def exact(units: Sequence[Instance], wires: Iterable[Wire]) -> list[str]:
-    """Return a note on all that the control side sees exactly although there is a sensor.
+    """Return a note on signals that the control side gets exactly although there is a sensor.
 
-    Units that only watch, such as a reference for comparison, may see the truth: nothing that the car does
-    follows from them.
+    Instances that only observe, such as a reference for comparison, may use the truth: they do not affect
+    the car.
     """
     wires = list(wires)
     if not any(role_of(unit.name, unit.fmu) == "sensor" for unit in units):
@@ -70,7 +68,7 @@ def exact(units: Sequence[Instance], wires: Iterable[Wire]) -> list[str]:
 
 
 def _steering(units: Iterable[Instance], wires: Iterable[Wire]) -> set[str]:
-    """Return the units from which a way along wires leads to one that is not on the control side."""
+    """Return the instances that affect, directly or through others, one outside the control side."""
     inside = {unit.name for unit in units if role_of(unit.name, unit.fmu) in (*CONTROL, "estimator")}
     found = {unit.name for unit in units} - inside
     while more := {w.source for w in wires if w.target in found} - found:
@@ -80,11 +78,11 @@ def _steering(units: Iterable[Instance], wires: Iterable[Wire]) -> set[str]:
 
 KIND = "no car"
 INERTIA = ("yaw_inertia", "mass", "cg_to_front_axle", "cg_to_rear_axle")
-"""What the dynamic index follows from."""
+"""Parameters that determine the dynamic index."""
 
 
 class _Given(NamedTuple):
-    """A quantity of the car as it is given, in a place."""
+    """A quantity of the car with its value, and where it is given."""
 
     place: str
     name: str
@@ -93,7 +91,7 @@ class _Given(NamedTuple):
 
 
 def remarks_on_car(scenario: LoadedScenario, units: Mapping[str, Instance]) -> list[Finding]:
-    """Return a remark for every quantity of the car that no car has, and for inertias that do not fit."""
+    """Return a warning for every implausible quantity of the car, and for inertias that do not fit."""
     of_file = remarks_on_values(scenario.vehicle_file.parameters)
     told = {(one.name, one.value) for one in _of_file(scenario.vehicle_file.parameters)}
     own = [one for one in _of_units(scenario, units) if (one.name, one.value) not in told]
@@ -101,7 +99,7 @@ def remarks_on_car(scenario: LoadedScenario, units: Mapping[str, Instance]) -> l
 
 
 def remarks_on_values(parameters: Mapping[str, Value]) -> list[Finding]:
-    """Return a remark for every value of a vehicle file that no car has."""
+    """Return a warning for every implausible value of a vehicle file."""
     return [*filter(None, map(_beyond, _of_file(parameters)))]
 
 
@@ -110,12 +108,12 @@ def _of_file(parameters: Mapping[str, Value]) -> Iterator[_Given]:
         if name in CAR:
             try:
                 yield _Given(f"vehicle.{name}", name, known_car({name: raw}).values[name], raw)
-            except ValueError:  # in a unit that an FMU alone knows
+            except ValueError:  # in a unit that only an FMU defines
                 continue
 
 
 def _of_units(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[_Given]:
-    """Yield what single units are given, by the scenario or by a change."""
+    """Yield the quantities that the scenario or an override gives to single instances."""
     for unit in units.values():
         for name, value in unit.parameters.items():
             origin = unit.origins.get(name, DEFAULT).kind
@@ -126,7 +124,7 @@ def _of_units(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterat
 
 
 def _beyond(one: _Given) -> Finding | None:
-    """Return a remark on a value outside its range, None if it is inside or has none."""
+    """Return a warning about a value outside its range, None if it is inside or has no range."""
     quantity = CAR[one.name]
     if quantity.plausible is None:
         return None
@@ -144,9 +142,9 @@ def _beyond(one: _Given) -> Finding | None:
 
 
 def _index(units: Mapping[str, Instance]) -> Iterator[Finding]:
-    """Yield a remark on the first unit whose yaw inertia does not fit its mass and wheelbase.
+    """Yield a warning about the first instance whose yaw inertia does not fit its mass and wheelbase.
 
-    Not where one of them is no car's by itself, or all are the FMU's own.
+    None if one of the values is implausible by itself, or all are defaults of the FMU.
     """
     for unit in units.values():
         values = {name: unit.parameter(name) for name in INERTIA if name in unit.fmu.variables}
@@ -170,22 +168,22 @@ def _index(units: Mapping[str, Instance]) -> Iterator[Finding]:
 
 
 OF_CAR = (*(name for name, one in CAR.items() if one.needed), *STIFFNESSES, "steering_ratio")
-"""Parameters that describe the car, whichever unit has to know them."""
+"""Parameters that describe the car in any instance."""
 OF_FILES = ("default", "vehicle", "derived", "scenario", "file")
-"""Origins of values that no change has given."""
+"""Origins of values that are not overrides."""
 SAME = 1e-9
 """Relative difference of values that count as equal: rounding of a conversion."""
 RADIUS = 0.03
-"""Relative difference of a wheel's radius from that of its tyre. Chosen: the load changes it by 1 to 2 %."""
+"""Tolerated relative difference of wheel and tyre radius. Chosen: the load changes it by 1 to 2 %."""
 SLIPS = (
     ("m/s", 70.0, "km/h", 3.6),  # chosen: above the top speed of nearly all cars
     ("rad", 4 * math.pi, "deg", 180 / math.pi),  # chosen: two turns of a hand wheel
 )
-"""Measurement unit, the largest plausible value in it, the unit that was perhaps meant, factor to it."""
+"""Unit, largest plausible value in it, unit that was probably meant, factor to it."""
 
 
 class GivenValue(NamedTuple):
-    """What a unit is told of something."""
+    """The value of a parameter or constant of an instance, with its origin."""
 
     instance: str
     name: str
@@ -195,7 +193,7 @@ class GivenValue(NamedTuple):
 
 
 def remarks(scenario: LoadedScenario, units: Mapping[str, Instance]) -> list[Finding]:
-    """Return remarks on the values that a scenario's units are given."""
+    """Return warnings about the values of a scenario's instances."""
     return [
         *_two_values(units),
         *_other_cars(scenario, units),
@@ -207,7 +205,7 @@ def remarks(scenario: LoadedScenario, units: Mapping[str, Instance]) -> list[Fin
 
 
 def _idle_units(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Finding]:
-    """Yield a remark for every unit that would take its first step after the end of the run."""
+    """Yield a warning for every instance that would take its first step after the end of the run."""
     lasts = scenario.stop_time - scenario.start_time
     for unit in units.values():
         step = unit.period * scenario.step_size
@@ -220,7 +218,7 @@ def _idle_units(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iter
 
 
 def _of_tyres(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Finding]:
-    """Yield a remark for what does not go with the tyre property files."""
+    """Yield a warning for every value that contradicts the tyre property files."""
     tyres = [unit for unit in units.values() if "pcy1_front" in unit.parameters]
     if not tyres or not scenario.tyre_files:
         return
@@ -243,10 +241,11 @@ def _of_tyres(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterat
 
 
 def _two_values(units: Mapping[str, Instance]) -> Iterator[Finding]:
-    """Yield a remark for everything that two units are told differently.
+    """Yield a warning for every quantity that has different values in several instances.
 
-    Not if the scenario gives both values for their units, or both are the FMUs' own of what is no
-    property of the car: then they are meant. But a speed held that is not that of the start is always told.
+    Exceptions are values that the scenario gives to the single instances, and defaults of FMUs for
+    quantities that are not properties of the car: these are intended. A target speed that differs from the
+    initial speed is always reported.
     """
     in_facts = {name for fact in FACTS.values() for name in (*fact.inputs, *fact.parameters)}
     groups: dict[str, list[GivenValue]] = {}
@@ -265,7 +264,7 @@ def _two_values(units: Mapping[str, Instance]) -> Iterator[Finding]:
 
 
 def _one_matter(name: str, told: list[GivenValue]) -> bool:
-    """Return whether a parameter of several units is meant to have one value."""
+    """Return whether a parameter of several instances should have the same value in all of them."""
     origins = {one.origin for one in told}
     measured_alike = len({one.variable.unit or "1" for one in told}) == 1
     if len(told) < 2 or not measured_alike or origins == {"scenario"}:
@@ -276,7 +275,7 @@ def _one_matter(name: str, told: list[GivenValue]) -> bool:
 
 
 def _differ(told: list[GivenValue], *, start: bool = False) -> bool:
-    """Return whether numbers differ: the values, or those that the FMUs have themselves."""
+    """Return whether numeric values differ; `start`: whether the FMUs' start values do."""
     values = [one.variable.start if start else one.value for one in told]
     if any(isinstance(value, bool) or not isinstance(value, (int, float)) for value in values):
         return False
@@ -316,9 +315,9 @@ def _finding(name: str, told: list[GivenValue], way_out: str) -> Finding:
 
 
 def _other_cars(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Finding]:
-    """Yield a remark if units have properties of the car by default beside a vehicle file.
+    """Yield a warning if there is a vehicle file, but instances use defaults for properties of the car.
 
-    A ratio of 1 is no car's: it says that angles are those of the road wheels.
+    A ratio of 1 is exempt: it means that angles are those of the road wheels.
     """
     found = [
         one
@@ -333,7 +332,7 @@ def _other_cars(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iter
 
 
 def _slips(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterator[Finding]:
-    """Yield a remark for every number that was probably meant in another unit."""
+    """Yield a warning for every number that was probably meant in another unit."""
     for one in _parameters(units.values()):
         spec = scenario.units[one.instance].parameters.get(one.name)
         raw = scenario.vehicle_file.parameters.get(one.name) if spec is None else spec

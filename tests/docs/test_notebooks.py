@@ -79,4 +79,4 @@ def test_every_controller_that_the_sliders_offer_can_be_connected():
     base = yb.load("fnn_sideslip/25mps")
     assert len(set(offered)) >= 4
     for name in set(offered):
-        assert base.swap(controller=name).plan().units
+        assert base.swap(controller=name).plan().instances

@@ -117,8 +117,8 @@ def test_a_round_trip_gives_the_same_numbers_to_the_last_bit(scenario, fmus, tmp
     back = make_plan(load_scenario(tmp_path / "system.ssp"))
     assert back.n_steps == plan.n_steps
     assert back.algorithm == plan.algorithm == "extrapolated"
-    assert [unit.constants for unit in back.units] == [unit.constants for unit in plan.instances]
-    assert [unit.period for unit in back.units] == [unit.period for unit in plan.instances]
+    assert [unit.constants for unit in back.instances] == [unit.constants for unit in plan.instances]
+    assert [unit.period for unit in back.instances] == [unit.period for unit in plan.instances]
     assert results_of(back, tmp_path / "back") == results_of(plan, tmp_path / "plan")
 
 
