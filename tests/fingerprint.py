@@ -14,6 +14,7 @@ import gzip
 import importlib.util
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -116,6 +117,11 @@ tuning:
 """
 FILES = {"sweep": SWEEP, "campaign": CAMPAIGN, "tuning": TUNING}
 """Experiments of its own, small enough: a file of scenarios/fingerprint/ each."""
+
+
+KILLED = -9
+"""The exit status of a process that SIGKILL has ended."""
+PROGRESS = re.compile(r"^\[ *\d+/\d+\].*\n?", re.MULTILINE)
 
 
 class Job(NamedTuple):
@@ -251,10 +257,7 @@ def fingerprint(folder: Path, quick: bool = False, only: Sequence[str] = ()) -> 
     for name, text in FILES.items():
         (own / f"{name}.yaml").write_text(text, encoding="utf-8")
     (work / "out").mkdir()
-    built = subprocess.run(
-        [*_console_script(), "build", "--out", "fmus"],
-        cwd=work, env=_environment(work), capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    built = _call(("build", "--out", "fmus"), work)
     if built.returncode:
         raise SystemExit(built.stderr)
     found = {f"fmus/{name}": text for name, text in artefacts_in(work / "fmus", work).items()}
@@ -271,20 +274,26 @@ def fingerprint(folder: Path, quick: bool = False, only: Sequence[str] = ()) -> 
 def _run(job: Job, work: Path) -> dict[str, str]:
     found = {}
     for k, command in enumerate(job.commands, start=1):
-        ended = subprocess.run(
-            [*_console_script(), *command],
-            cwd=work, env=_environment(work), capture_output=True, text=True, encoding="utf-8", check=False,
-        )  # fmt: skip
+        ended = _call(command, work)
+        if ended.returncode == KILLED:  # by somebody else: for want of memory, say
+            ended = _call(command, work)
         name = f"{job.name}/{k} {command[0]}"
         found[f"{name}: exit status"] = f"{ended.returncode}\n"
         if job.printed:
             found[f"{name}: printed"] = masked(ended.stdout, work)
         if ended.returncode:
-            found[f"{name}: error"] = masked(ended.stderr, work)
+            found[f"{name}: error"] = masked(PROGRESS.sub("", ended.stderr), work)
     folder = work / "out" / job.name
     if folder.is_dir():
         found |= {f"{job.name}/{name}": text for name, text in artefacts_in(folder, work).items()}
     return found
+
+
+def _call(command: Sequence[str], work: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [*_console_script(), *command],
+        cwd=work, env=_environment(work), capture_output=True, text=True, encoding="utf-8", check=False,
+    )  # fmt: skip
 
 
 def _console_script() -> list[str]:

@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from tests import fingerprint
 from tests.artefacts import artefacts_in, masked, numbers_in, texts_of
 from tests.checkout import ROOT
 from tests.fingerprint import (
@@ -165,6 +166,17 @@ def test_a_hash_counts_as_a_number_whatever_it_begins_with():
 
 def test_numbers_are_found_with_signs_and_exponents_and_not_within_names():
     assert numbers_in("fl_2 x1 -3.5e-06, +4 \u22122 (40mps) 7") == ["-3.5e-06", "+4", "\u22122", "40", "7"]
+
+
+@pytest.mark.parametrize(("times", "statuses"), [(1, ["0"]), (2, ["-9"])])
+def test_a_command_that_somebody_kills_is_run_once_again(tmp_path, monkeypatch, times, statuses):
+    calls = tmp_path / "calls"
+    body = f'echo >> "{calls}"; [ $(wc -l < "{calls}") -gt {times} ] || kill -KILL $$; echo figures'
+    script = put(tmp_path / "yawbench", f"#!/bin/sh\n{body}\n")
+    monkeypatch.setattr(fingerprint, "_console_script", lambda: ["sh", str(script)])
+    found = fingerprint._run(fingerprint.Job("sweep", (("sweep",),)), tmp_path)
+    assert found["sweep/1 sweep: exit status"].split() == statuses
+    assert found["sweep/1 sweep: printed"] == ("figures\n" if statuses == ["0"] else "")
 
 
 def test_every_scenario_is_run_and_what_is_named_exists():
