@@ -38,7 +38,7 @@ MASKED = (
     (re.compile(r"\d+(\.\d+)? MB\b"), "SIZE"),
 )
 """The same within a text."""
-KEYED = re.compile(r"(?=\d*[a-f])[0-9a-f]{12,}")
+KEYED = re.compile(r"[0-9a-f]{12,}")
 """Folders named by a hash that covers the program's code; what they hold is collected under `*`."""
 NUMBER = re.compile(r"\b[0-9a-f]{64}\b|(?<![\w.])[-+\u2212]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 """A number, or a hash that stands for many."""

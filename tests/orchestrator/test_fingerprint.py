@@ -94,14 +94,14 @@ def test_runs_in_folders_named_by_a_hash_are_one_artefact_whatever_the_hash(tmp_
     first, second = ROWS, ROWS.replace("0.25", "0.26")
     for side, folders in {
         "a": ("3127e3a68cc2", "6db878bf86c0"),
-        "b": ("f27e3a68cc2d", "1db878bf86c0"),
+        "b": ("f27e3a68cc2d", "156788339393"),
     }.items():
         for folder, text in zip(folders, (first, second), strict=True):
             put(tmp_path / side / "runs" / folder / "results.csv", text)
     found = artefacts_in(tmp_path / "a", tmp_path)
     assert found.keys() == {"runs/*/results.csv", "runs/*/results.csv#bytes"}
     assert found == artefacts_in(tmp_path / "b", tmp_path)
-    put(tmp_path / "b" / "runs" / "1db878bf86c0" / "results.csv", first)
+    put(tmp_path / "b" / "runs" / "156788339393" / "results.csv", first)
     assert found != artefacts_in(tmp_path / "b", tmp_path)
 
 
