@@ -96,6 +96,7 @@ def build_all(
     tell = progress or (lambda name, what: None)
     stale = []
     for name in chosen:
+        remove_draft(out / f"{name}.fmu")
         if not force and _is_current(known[name], out / f"{name}.fmu", root):
             report.current.append(name)
             tell(name, "current")

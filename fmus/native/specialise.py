@@ -11,6 +11,7 @@ import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 from . import ir
@@ -24,6 +25,10 @@ WIDEST = 40
 """Times a step is followed until the state has its form."""
 STACK = 512 * 1024 * 1024
 """Of the thread that translates [bytes]: calls within calls are followed by calls within calls."""
+
+
+HOOKS = ("configure", "start", "advance", "output")
+"""Methods of a component that are translated."""
 
 
 @dataclass
@@ -52,6 +57,7 @@ def specialise(component: type[Any], home: Path) -> Program:
     Raises:
         Refused: what cannot be translated, with file and line.
     """
+    _refuse_replaced_life_cycle(component, home)
     found: list[Any] = []
 
     def run() -> None:
@@ -72,6 +78,21 @@ def specialise(component: type[Any], home: Path) -> Program:
     if isinstance(found[0], BaseException):
         raise found[0]
     return found[0]  # type: ignore[no-any-return]
+
+
+def _refuse_replaced_life_cycle(component: type[Any], home: Path) -> None:
+    """Refuse a component that overrides more of the base class than the `HOOKS`."""
+    mro = component.__mro__
+    names = [(cls.__name__, cls.__module__.rpartition(".")[2]) for cls in mro]
+    base = names.index(("Component", "component"))
+    for cls in mro[:base]:
+        for name, member in vars(cls).items():
+            function = getattr(member, "__func__", member)
+            if name in vars(mro[base]) and name not in HOOKS and isinstance(function, FunctionType):
+                file = Path(function.__code__.co_filename)
+                place = file.relative_to(home) if file.is_relative_to(home) else file.name
+                line = function.__code__.co_firstlineno
+                raise Refused(f"{cls.__name__} replaces {name} of the base class", f"{place}:{line}")
 
 
 class _Specialising:

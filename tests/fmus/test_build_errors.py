@@ -143,6 +143,8 @@ def test_a_package_that_the_component_declares_may_be_imported(tmp_path, unpack)
 
 
 def test_a_host_without_a_declared_package_is_told_in_one_sentence(tmp_path, monkeypatch):
+    monkeypatch.setenv("YAWBENCH_UNITS", "python")  # a native unit needs no package
+    restart_checker()
     module = tmp_path / "modules" / "rare_package.py"
     module.parent.mkdir()
     module.touch()

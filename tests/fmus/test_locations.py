@@ -54,14 +54,18 @@ def test_a_resource_location_is_understood_however_it_is_spelled(archive, unpack
     unit.free()
 
 
-def test_a_folder_that_pythonfmu_cannot_read_is_refused_with_a_sentence(archive, unpack, tmp_path):
+def test_a_folder_that_pythonfmu_cannot_read_is_refused_with_a_sentence(
+    archive, unpack, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("YAWBENCH_UNITS", "python")
     folder = tmp_path / "a%20b%20c"
     shutil.copytree(unpack(archive("driver_sine")), folder)
     with pytest.raises(Refused, match=r"the FMU lies in a folder that PythonFMU cannot read: .*a%20b%20c"):
         Unit(Fmu(folder))
 
 
-def test_incomplete_resources_are_refused_with_a_sentence(archive, unpack, tmp_path):
+def test_incomplete_resources_are_refused_with_a_sentence(archive, unpack, tmp_path, monkeypatch):
+    monkeypatch.setenv("YAWBENCH_UNITS", "python")
     folder = tmp_path / "fmu"
     shutil.copytree(unpack(archive("driver_sine")), folder)
     next(folder.glob("resources/driver_sine_*.py")).unlink()

@@ -99,12 +99,12 @@ def test_no_process_outlives_a_run(fmus, tmp_path):
 def test_units_end_when_the_master_is_killed(fmus, tmp_path):
     code = (
         "import sys, os, signal; from pathlib import Path\n"
-        "from orchestrator.plan import Change\n"
+        "from orchestrator.plan import Override\n"
         "from orchestrator.scenario.load import load_scenario\n"
         "from orchestrator.wiring.make_plan import make_plan\n"
         "from orchestrator.master.isolation import Isolation\n"
         "from orchestrator.master.simulate import simulate\n"
-        f"short = [Change('stop_time', 0.01, 'test')]\n"
+        f"short = [Override('stop_time', 0.01, 'test')]\n"
         f"plan = make_plan(load_scenario({str(CAR)!r}, changes=short), fmus=Path({str(fmus)!r}))\n"
         "isolation = Isolation(plan.instances)\n"
         f"simulate(plan, {str(tmp_path)!r}, opener=isolation)\n"
@@ -211,13 +211,13 @@ def test_a_limit_that_is_no_time_is_refused(option, says, capsys):
 
 NOBODY = """
 import os, threading
-from orchestrator.master.ipc import Channel
+from orchestrator.master.ipc import PipeChannel
 from orchestrator.master.process_state import StopFlag
 from orchestrator.master.child_run import _tell_where
 nobody, writing = os.pipe()
 os.close(nobody)
 asking, ask = os.pipe()
-_tell_where(Channel(asking, writing), asking, StopFlag())
+_tell_where(PipeChannel(asking, writing), asking, StopFlag())
 (thread,) = set(threading.enumerate()) - {threading.main_thread()}
 os.write(ask, b"?")
 thread.join(10)

@@ -424,7 +424,7 @@ def repeat_runs(scenario, fmus, out):
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 def test_300_runs_in_one_process_neither_leak_nor_take_more_work(fmus, tmp_path):
     scenario = car(tmp_path, stop=0.004)
-    slave = open_unit(make_plan(load_scenario(scenario), fmus=fmus).units[0], log.Log(), set())
+    slave = open_unit(make_plan(load_scenario(scenario), fmus=fmus).instances[0], log.Log(), set())
     alive = live_components()
     slave.free()
     assert live_components() == alive - 1  # so instances are counted

@@ -149,7 +149,7 @@ def test_plans_hold_what_the_axes_say(sweep, fmus, tmp_path):
     }  # fmt: skip
     assert [unit["reference"].parameters["mass"] for unit in units[:2]] == [1100, 1500]
     assert [unit["controller"].parameters.get("moment_range") for unit in units[:4]] == [None, None, 500, 500]
-    assert planned.instances == {"amplitude": "m/s", "both": "rad"}
+    assert planned.units == {"amplitude": "m/s", "both": "rad"}
     assert planned.number("amplitude", planned.experiment.points[0][0]) == 10.0
     assert len({run.key for run in planned.jobs}) == 16
 
@@ -163,7 +163,7 @@ def test_steps_and_algorithms_can_be_varied(sweep, fmus, tmp_path):
     assert [(float(run.plan.step), run.plan.algorithm) for run in planned.jobs] == [
         (0.01, "jacobi"), (0.01, "extrapolated"), (0.005, "jacobi"), (0.005, "extrapolated"),
     ]  # fmt: skip
-    assert planned.instances == {"amplitude": "s"}
+    assert planned.units == {"amplitude": "s"}
     assert planned.number("amplitude", planned.experiment.points[-1][0]) == 0.005
 
 

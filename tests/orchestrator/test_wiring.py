@@ -172,7 +172,7 @@ def test_no_folder_of_fmus_is_said(folder: Path, tmp_path: Path) -> None:
         f"no folder fmus/ with FMUs in {tmp_path}, in {tmp_path} or above them; "
         "make them with 'yawbench build' or name their folder with --fmus"
     ]
-    assert len(plan(fmus=tmp_path / "elsewhere").units) == 4
+    assert len(plan(fmus=tmp_path / "elsewhere").instances) == 4
     with pytest.raises(ModelDescriptionError, match=r"^--fmus nowhere: no such folder$"):
         plan(fmus=Path("nowhere"))
 
@@ -212,7 +212,7 @@ def test_an_fmu_for_one_instance_is_not_used_twice(folder: Path) -> None:
         "a.yaml:9: units.two.fmu: lonely can be instantiated only once per process, and one uses it already; "
         "with --isolate each unit has a process of its own"
     ]
-    assert len(make_plan(load_scenario(path), isolated=True).units) == 6
+    assert len(make_plan(load_scenario(path), isolated=True).instances) == 6
 
 
 def test_units_that_would_run_each_others_code_are_refused(folder: Path) -> None:
@@ -220,7 +220,7 @@ def test_units_that_would_run_each_others_code_are_refused(folder: Path) -> None
         files = {"resources/slavemodule.txt": b"model", "resources/model_of_mine.py": text}
         make_fmu(folder / f"{name}.fmu", files=files)
     make_fmu(folder / "four.fmu", files={"resources/slavemodule.txt": b"json", "resources/json.py": b""})
-    assert len(plan(scenario(UNITS + "  a: {fmu: two}\n  b: {fmu: three}\n")).units) == 6
+    assert len(plan(scenario(UNITS + "  a: {fmu: two}\n  b: {fmu: three}\n")).instances) == 6
     path = scenario(UNITS + "  a: {fmu: one}\n  b: {fmu: two}\n  c: {fmu: four}\n")
     assert problems(path) == [
         "a.yaml: b (two) would run code of a (one): both FMUs bring a Python module 'model_of_mine', and a "
@@ -240,7 +240,7 @@ def test_a_unit_whose_module_is_loaded_already_is_refused(
     monkeypatch.syspath_prepend(str(folder))
     __import__("fakes_xyz")
     path = scenario(UNITS + "  a: {fmu: one}\n")
-    assert len(plan(path).units) == 5  # the same code: no harm
+    assert len(plan(path).instances) == 5  # the same code: no harm
     loaded.write_text("x = 2")
     assert problems(path) == [
         "a.yaml: a (one) would run other code: another Python module 'fakes_xyz' is loaded in this process "
@@ -263,7 +263,7 @@ def test_a_unit_whose_folder_of_modules_is_loaded_from_another_archive_is_refuse
     monkeypatch.syspath_prepend(str(folder))
     __import__("fakes_ns.m")
     path = scenario(UNITS + "  a: {fmu: one}\n")
-    assert len(plan(path).units) == 5
+    assert len(plan(path).instances) == 5
     loaded.write_text("x = 2")
     assert "another Python module 'fakes_ns' is loaded in this process already" in problems(path)[0]
 

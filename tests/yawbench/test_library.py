@@ -79,7 +79,7 @@ def test_swap_and_set_leave_the_scenario_as_it_was(base):
     assert [change.place for change in other.changes] == [
         "stop_time", "controller", "vehicle.mass", "plant.initial_speed",
     ]  # fmt: skip
-    plant = next(unit for unit in other.plan().units if unit.name == "plant")
+    plant = next(unit for unit in other.plan().instances if unit.name == "plant")
     assert plant.parameters["mass"] == 1200
     assert plant.parameters["initial_speed"] == pytest.approx(80 / 3.6)
 
