@@ -87,11 +87,10 @@ def _refuse_replaced_life_cycle(component: type[Any], home: Path) -> None:
     base = names.index(("Component", "component"))
     for cls in mro[:base]:
         for name, member in vars(cls).items():
-            function = getattr(member, "__func__", member)
-            if name in vars(mro[base]) and name not in HOOKS and isinstance(function, FunctionType):
-                file = Path(function.__code__.co_filename)
+            if name in vars(mro[base]) and name not in HOOKS and isinstance(member, FunctionType):
+                file = Path(member.__code__.co_filename)
                 place = file.relative_to(home) if file.is_relative_to(home) else file.name
-                line = function.__code__.co_firstlineno
+                line = member.__code__.co_firstlineno
                 raise Refused(f"{cls.__name__} replaces {name} of the base class", f"{place}:{line}")
 
 
