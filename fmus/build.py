@@ -10,11 +10,11 @@ it has; who runs scenarios does not use it (see `upkeep`).
 
 from __future__ import annotations
 
+import json
 import os
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from orchestrator.errors import BuildError
 from orchestrator.files import draft_of, remove_draft
 from orchestrator.fmu.native import NATIVE, runs_as
 
+from .build_worker import build_apart
 from .c.c_recipe import CRecipe, find_c_components
 from .check import defects, reference_files
 from .closure import Parts, Sources
@@ -139,17 +140,13 @@ def _built(
     """Build components, as many at a time as there are processors; yield each with what is wrong with it."""
     if len(names) < 2:
         for name in names:
-            yield name, _problems(name, out, root, known)
-        return
-    workers = min(len(names), os.cpu_count() or 1)
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        jobs = {pool.submit(_problems, name, out, root): name for name in names}
-        for job in as_completed(jobs):
-            yield jobs[job], job.result()
+            yield name, problems_of(known[name], out, root)
+    else:
+        yield from build_apart(names, out, root, min(len(names), os.cpu_count() or 1))
 
 
-def _problems(name: str, out: Path, root: Path, known: Mapping[str, Recipe] | None = None) -> list[str]:
-    recipe = (known or find_recipes(root))[name]
+def problems_of(recipe: Recipe, out: Path, root: Path) -> list[str]:
+    """Build a component and return what is wrong with it."""
     try:
         bring_up_to_date(recipe, out / f"{recipe.name}.fmu", component_mark(recipe, root), force=True)
     except BuildError as error:
@@ -275,3 +272,13 @@ def put(target: Path, content: bytes, *modules: str) -> None:
             raise BuildError(problems)
         draft.chmod(0o644)
         os.replace(draft, target)
+
+
+def main(out: str, root: str) -> None:
+    """Build the components whose names come through standard input; answer with the problems of each."""
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # what components print while they are imported is no answer
+    known = find_recipes(Path(root))
+    for line in sys.stdin:
+        name = line.rstrip("\n")
+        print(json.dumps(problems_of(known[name], Path(out), Path(root))), file=answers, flush=True)
