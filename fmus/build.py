@@ -279,6 +279,9 @@ def main(out: str, root: str) -> None:
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what components print while they are imported is no answer
     known = find_recipes(Path(root))
-    for line in sys.stdin:
-        name = line.rstrip("\n")
-        print(json.dumps(problems_of(known[name], Path(out), Path(root))), file=answers, flush=True)
+    try:
+        for line in sys.stdin:
+            problems = problems_of(known[line.rstrip("\n")], Path(out), Path(root))
+            print(json.dumps(problems), file=answers, flush=True)
+    except (BrokenPipeError, KeyboardInterrupt):  # whoever asked has ended, or is ending
+        os._exit(1)
