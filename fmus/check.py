@@ -9,6 +9,7 @@ from __future__ import annotations
 import atexit
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -67,6 +68,7 @@ def main() -> None:
         from orchestrator.master.supervisor import die_with_parent
 
         die_with_parent()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends this process
     answers: IO[str] = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     answering = {"defects": _defects, "reference_files": _reference_files}
