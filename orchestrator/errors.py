@@ -92,7 +92,7 @@ class YawbenchWarning(UserWarning):
     ...     warnings.simplefilter("error", yb.YawbenchWarning)
     ...     base.set({"speed": 300}).run()
     Traceback (most recent call last):
-    orchestrator.errors.YawbenchWarning: ...300 m/s is 1080 km/h; did you mean '300 km/h'?...
+    yawbench.YawbenchWarning: ...300 m/s is 1080 km/h; did you mean '300 km/h'?...
     """
 
 
@@ -101,7 +101,7 @@ class ScenarioError(YawbenchError):
 
     >>> base.set({"stop_time": -1})
     Traceback (most recent call last):
-    orchestrator.errors.ScenarioError: set stop_time=-1: must be a time above 0 s (got -1)
+    yawbench.ScenarioError: set stop_time=-1: must be a time above 0 s (got -1)
     """
 
 
@@ -110,7 +110,7 @@ class ModelDescriptionError(YawbenchError):
 
     >>> base.swap(tyre="tyre_pacejka").run()
     Traceback (most recent call last):
-    orchestrator.errors.ModelDescriptionError: swap tyre=tyre_pacejka: no FMU 'tyre_pacejka' in ...
+    yawbench.ModelDescriptionError: swap tyre=tyre_pacejka: no FMU 'tyre_pacejka' in ...
     """
 
 
@@ -119,7 +119,7 @@ class WiringError(YawbenchError):
 
     >>> base.swap(controller=lambda roll_angle: -1e5 * roll_angle).run()
     Traceback (most recent call last):
-    orchestrator.errors.WiringError: ...controller.roll_angle ...
+    yawbench.WiringError: ...controller.roll_angle ...
     """
 
 
@@ -128,11 +128,11 @@ class ResultsError(YawbenchError):
 
     >>> yb.open("results/nothing")
     Traceback (most recent call last):
-    orchestrator.errors.ResultsError: results/nothing: no results here, run.json is missing; ...
+    yawbench.ResultsError: results/nothing: no results here, run.json is missing; ...
     """
 
 
-class RecordWarning(UserWarning):
+class RecordWarning(YawbenchWarning):
     """A results folder was changed after it was written, or cannot be verified.
 
     >>> import warnings
@@ -199,3 +199,7 @@ class Interrupted(KeyboardInterrupt):
     def of(cls, error: KeyboardInterrupt) -> Interrupted:
         """Convert a KeyboardInterrupt to this type; return the error itself if it is of it already."""
         return error if isinstance(error, cls) else cls()
+
+
+for _public in (YawbenchError, *YawbenchError.__subclasses__(), YawbenchWarning, RecordWarning):
+    _public.__module__ = "yawbench"  # where users import them from, and what tracebacks shall say

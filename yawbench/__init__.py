@@ -15,38 +15,45 @@ proved itself:
 
     yb.load("fnn_sideslip/25mps").swap(controller=proportional).run().metric("peak(sideslip)")
 
-Scenarios never change: `swap` and `set` give new ones. Nothing is written, and nothing is printed,
-unless asked for. Errors are of one tree; each has `problems`, sentences that know their `file` and `line`,
-and is itself at those of the first:
+Scenarios are immutable: `swap`, `set` and `fault` return new ones. Nothing is written or printed unless
+requested. All errors derive from YawbenchError; `problems` are their messages, `file` and `line` the location
+of the first:
 
     YawbenchError
-    ├── ScenarioError             the scenario or a change of it is wrong
+    ├── ScenarioError             the scenario or an override of it is wrong
     ├── ModelDescriptionError     an FMU is missing, corrupt or not supported
-    ├── WiringError               units cannot be connected as asked
+    ├── WiringError               instances cannot be connected as requested
     ├── ResultsError              recorded results are missing or unreadable
     ├── BuildError                a component cannot be made into an FMU
-    └── SimulationError           a run failed; knows `unit` and `time`
+    └── SimulationError           a run failed; has `instance` and `time`
 
-What is no failure but hardly meant, such as a car that spins, is a `YawbenchWarning`: once per run.
+A run that succeeds but is probably not as intended (the car spins) issues one `YawbenchWarning`.
 """
 
-from orchestrator.errors import (
-    BuildError,
-    ModelDescriptionError,
-    RecordWarning,
-    ResultsError,
-    ScenarioError,
-    SimulationError,
-    WiringError,
-    YawbenchError,
-    YawbenchWarning,
-)
+import sys
+from importlib import import_module
+from importlib.machinery import PathFinder
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from ._controller import output, parameter, signal
-from ._experiment import Experiment, Runs, experiment
-from ._ranking import Ranking, rank
-from ._run import Run, open
-from ._scenario import Scenario, load
+if TYPE_CHECKING:
+    from components.fmi.variables import output, parameter, signal
+    from orchestrator.errors import (
+        BuildError,
+        ModelDescriptionError,
+        RecordWarning,
+        ResultsError,
+        ScenarioError,
+        SimulationError,
+        WiringError,
+        YawbenchError,
+        YawbenchWarning,
+    )
+
+    from ._experiment import Experiment, Runs, experiment
+    from ._ranking import Ranking, rank
+    from ._run import Run, open
+    from ._scenario import Scenario, load
 
 __all__ = [
     "BuildError",
@@ -71,3 +78,46 @@ __all__ = [
     "rank",
     "signal",
 ]
+
+_PACKAGES = ("components", "fmus", "orchestrator", "scenarios", "vocabulary")
+_MODULES = {
+    "components.fmi.variables": ("output", "parameter", "signal"),
+    "yawbench._experiment": ("Experiment", "Runs", "experiment"),
+    "yawbench._ranking": ("Ranking", "rank"),
+    "yawbench._run": ("Run", "open"),
+    "yawbench._scenario": ("Scenario", "load"),
+}
+_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
+"""Where the public names are defined; all others are in `orchestrator.errors`."""
+
+
+def _refuse_foreign_packages() -> None:
+    """Raise ImportError if a package of another project hides one of those that belong to yawbench."""
+    home = Path(__file__).resolve().parents[1]
+    for name in _PACKAGES:
+        loaded = sys.modules.get(name)
+        spec = loaded.__spec__ if loaded else PathFinder.find_spec(name)
+        folders = [Path(folder) for folder in (spec and spec.submodule_search_locations) or ()]
+        if spec and home / name not in [folder.resolve() for folder in folders]:
+            where = folders[0] if folders else spec.origin
+            raise ImportError(
+                f"yawbench needs its own package {name!r}, but {where} hides it; "
+                "rename that, or start Python in another folder",
+                name="yawbench",
+            )
+
+
+_refuse_foreign_packages()
+
+
+def __getattr__(name: str) -> object:
+    """Import a public name when it is first used: `import yawbench` alone loads nothing else."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_MODULE_OF.get(name, "orchestrator.errors")), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

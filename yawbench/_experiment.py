@@ -124,6 +124,8 @@ class Experiment:
     1              0.03  completed
     """
 
+    __module__ = "yawbench"
+
     base: Scenario
     design: Design
 
@@ -187,6 +189,8 @@ class Runs:
         findings: metrics and reasons, as studies and sweeps have them.
         runs: every run with its results, None for one that failed; None if they were not kept.
     """
+
+    __module__ = "yawbench"
 
     findings: ExperimentResult
     runs: list[Run | None] | None = None

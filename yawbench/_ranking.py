@@ -145,6 +145,8 @@ class Ranking:
     [['none', 'hard', 'failed']]
     """
 
+    __module__ = "yawbench"
+
     ranked: RankingResult
 
     def __post_init__(self) -> None:

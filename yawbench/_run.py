@@ -54,6 +54,8 @@ class Run:
     'rad/s'
     """
 
+    __module__ = "yawbench"
+
     def __init__(self, results: Results) -> None:
         self.results = arguments.instance(results, "results", Results, "a run; yawbench.open reads folders")
 

@@ -61,6 +61,8 @@ class Scenario:
         changes: what is other than in the file.
     """
 
+    __module__ = "yawbench"
+
     path: Path
     changes: tuple[Override, ...] = ()
     programs: Mapping[Path, PythonComponent] = field(default_factory=dict, repr=False)

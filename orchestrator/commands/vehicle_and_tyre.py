@@ -36,6 +36,7 @@ VehicleFriction = Annotated[float, typer.Option(min=0.05, help="Coefficient of t
 VehicleOutput = Annotated[
     Path | None,
     typer.Option(
+        "--out",
         metavar="FILE",
         help="The figure, written as .svg and .png; default: results/vehicles/<name>.",
     ),
@@ -50,7 +51,7 @@ def vehicle(
     plant: Plants = None,
     tyre: TyreOption = "",
     friction: VehicleFriction = 1.0,
-    output: VehicleOutput = None,
+    out: VehicleOutput = None,
 ) -> None:
     """Show what a car is like, by driving its FMUs.
 
@@ -83,7 +84,7 @@ def vehicle(
         for why in car.failed:
             say(f"note: {car.plant}: {why}")
     note = f"on {tracks[0].tyres}, friction {friction:g}"
-    save_figure(draw_cars(cars, file.stem, note), output, below_results("vehicles", file.stem))
+    save_figure(draw_cars(cars, file.stem, note), out, below_results("vehicles", file.stem))
 
 
 def _tables(cars: list[Handling]) -> list[Table]:
@@ -145,6 +146,7 @@ TyreSource = Annotated[
 TyreOutput = Annotated[
     Path | None,
     typer.Option(
+        "--out",
         metavar="FILE",
         help="The figure, written as .svg and .png; default: results/tyres/<name>.",
     ),
@@ -157,7 +159,7 @@ def tyre(
     action: TyreAction,
     source: TyreSource,
     wishes: RunOptions,
-    output: TyreOutput = None,
+    out: TyreOutput = None,
     friction: TyreFriction = 1.0,
 ) -> None:
     """Show what a tyre is like, by stepping its FMU.
@@ -178,4 +180,4 @@ def tyre(
             say(f"warning: {warning}")
     note = f"front left wheel, friction {friction:g}, no camber · {fmu.name} ({fmu.sha256[:8]})"
     default = below_results("tyres", Path(source).stem)
-    save_figure(draw_tyre(stand, f"{name}{kind}{side}", note), output, default)
+    save_figure(draw_tyre(stand, f"{name}{kind}{side}", note), out, default)

@@ -73,7 +73,7 @@ def test_the_figure_shows_all_that_the_tyre_tells(tmp_path, fmus):
 
 def test_the_command_writes_one_figure_and_tells_warnings(tmp_path, fmus, capsys):
     path = write(tmp_path / "a.tir", {"TYRESIDE": "UNKNOWN"})
-    assert not status_of("tyre", "show", path, "--fmus", fmus, "--output", tmp_path / "shown.png")
+    assert not status_of("tyre", "show", path, "--fmus", fmus, "--out", tmp_path / "shown.png")
     assert {"shown.svg", "shown.png"} <= {file.name for file in tmp_path.iterdir()}
     assert "TYRESIDE: UNKNOWN: read as LEFT" in capsys.readouterr().err
 

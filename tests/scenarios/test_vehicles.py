@@ -183,7 +183,7 @@ def test_a_file_that_is_no_car_says_what_it_lacks(fmus, tmp_path):
 
 def test_the_command_prints_tables_and_draws_one_figure(fmus, tmp_path, capsys):
     with pytest.raises(SystemExit) as done:
-        given = ("--plant", "plant_two_dof", "--fmus", str(fmus), "--output", str(tmp_path / "car.png"))
+        given = ("--plant", "plant_two_dof", "--fmus", str(fmus), "--out", str(tmp_path / "car.png"))
         main(["vehicle", "show", str(file("esp_saloon")), *given])
     assert not done.value.code
     said = " ".join(capsys.readouterr().out.split())
@@ -214,7 +214,7 @@ def test_the_command_prints_tables_and_draws_one_figure(fmus, tmp_path, capsys):
 def test_what_cannot_be_driven_is_answered_in_sentences(fmus, capsys, tmp_path, monkeypatch, arguments, says):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as done:
-        main(["vehicle", "show", *arguments, "--fmus", str(fmus), "--output", str(tmp_path / "x")])
+        main(["vehicle", "show", *arguments, "--fmus", str(fmus), "--out", str(tmp_path / "x")])
     said = capsys.readouterr().err
     assert done.value.code == 2
     assert says in said and "Traceback" not in said

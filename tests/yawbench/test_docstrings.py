@@ -20,7 +20,7 @@ FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
 def examples(name: str) -> list[doctest.DocTest]:
     """Return the examples of a public name, those of its methods too."""
     finder = doctest.DocTestFinder(exclude_empty=True)
-    return [found for found in finder.find(getattr(yb, name), name) if found.examples]
+    return [found for found in finder.find(getattr(yb, name), name, module=False) if found.examples]
 
 
 @pytest.fixture(scope="module")
