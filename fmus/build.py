@@ -18,10 +18,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from components.fmi.roles import ROLES
 from orchestrator.errors import BuildError
 from orchestrator.files import draft_of, remove_draft
 from orchestrator.fmu.native import NATIVE, runs_as
+from vocabulary.roles import ROLES
 
 from .build_worker import build_apart
 from .c.c_recipe import CRecipe, find_c_components

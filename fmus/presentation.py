@@ -13,7 +13,7 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from xml.etree import ElementTree
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, SubElement
 
 from jinja2 import Environment, Template
 
@@ -50,6 +50,7 @@ def presented(
     for key, value in {**credits, **generated}.items():
         if key in generated or not root.get(key):
             root.set(key, value)
+    SubElement(_annotation(root), "role", name=role)
     shown = {
         DESCRIPTION: ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n",
         "documentation/index.html": _page(root, sources, files).encode(),
@@ -57,6 +58,16 @@ def presented(
     for file in icon(role):
         shown["model.png"] = file.read_bytes()
     return {**files, **shown}
+
+
+def _annotation(root: Element) -> Element:
+    """Return yawbench's own annotation in a model description, added where the standard wants it."""
+    annotations = root.find("VendorAnnotations")
+    if annotations is None:
+        annotations = Element("VendorAnnotations")
+        root.insert([child.tag for child in root].index("ModelVariables"), annotations)
+    tool = annotations.find("Tool[@name='yawbench']")
+    return SubElement(annotations, "Tool", name="yawbench") if tool is None else tool
 
 
 def icon(role: str) -> list[Path]:

@@ -11,9 +11,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from components.fmi.roles import ROLES
 from orchestrator.errors import BuildError
 from orchestrator.fmu.native import REASON
+from vocabulary.roles import ROLES
 
 from .closure import Parts, Sources
 from .compiler import compile_launcher, compiler_tools

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
 
-from components.fmi.roles import Role
 from orchestrator.errors import BuildError
+from vocabulary.roles import Role
 from vocabulary.wheels import wheels
 
 from .closure import Parts

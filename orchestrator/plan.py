@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 if TYPE_CHECKING:
     import numpy as np
 
+from vocabulary.roles import role_of
+
 from .messages import cut
 
 Value = float | int | bool | str
@@ -113,6 +115,7 @@ class Fmu:
     generation_tool: str
     variables: dict[str, Variable]
     description: str = ""
+    role: str = ""  # if the model description declares it, as FMUs built by this program do
     once_per_process: bool = False
     fmi: int = 2  # major version of the standard
     host_packages: tuple[str, ...] = ()  # Python packages that the host process must have
@@ -201,6 +204,11 @@ class Instance:
     """Relative tolerance of the FMU's solver; None: that of its default experiment, if it has one."""
     series: dict[str, InputSeries] = field(default_factory=dict)
     """Input -> the time series that it follows."""
+
+    @property
+    def role(self) -> str:
+        """What the instance does: "driver", "controller", "plant", ... (see `vocabulary.roles`)."""
+        return role_of(self.name, self.fmu.name, self.fmu.role)
 
     def parameter(self, name: str) -> Value | None:
         """Return the value of a parameter, by default the FMU's start value; None if there is no such one."""

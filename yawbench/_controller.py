@@ -25,7 +25,6 @@ from xml.etree import ElementTree
 import numpy as np
 
 from components.fmi.component import Component
-from components.fmi.roles import ROLES
 from components.fmi.variables import VariableSpec, output, parameter, signal
 from orchestrator.errors import ScenarioError
 from orchestrator.fmu.description import describe
@@ -33,6 +32,7 @@ from orchestrator.master.instance import Buffers, ExperimentSetup, Status, StepC
 from orchestrator.master.log import ERROR, OK, Log
 from orchestrator.messages import counted, listed, short
 from orchestrator.plan import Fmu, Instance, Value, ValueRef
+from vocabulary.roles import ROLES
 from vocabulary.wheels import wheels
 
 from . import arguments
@@ -74,7 +74,7 @@ class PythonComponent:
         self.path = HOME / f"{name}.fmu"
         digest = hashlib.sha256(xml + _source(given)).hexdigest()
         described = describe({"modelDescription.xml": xml}, _archived(xml), self.path)
-        self.fmu: Fmu = replace(described, sha256=digest, generation_tool="Python, no FMU")
+        self.fmu: Fmu = replace(described, sha256=digest, generation_tool="Python, no FMU", role=role)
 
     def open(self, unit: Instance, log: Log) -> PythonInstance:
         """Return an instance of the component for a run."""

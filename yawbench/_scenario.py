@@ -22,6 +22,7 @@ from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import setting, spelled
 from orchestrator.tyres.stand import cornering_stiffness
 from orchestrator.wiring.make_plan import make_plan
+from vocabulary.roles import role_of
 
 from . import arguments
 from ._calls import opener_of
@@ -104,7 +105,7 @@ class Scenario:
             if arguments.names_file(wanted):
                 changes.append(Override(unit, fmu_of(wanted, unit), "swap"))
                 continue
-            role = _role(self.loaded.replaced.get(unit, given[unit].fmu), unit)
+            role = role_of(unit, Path(self.loaded.replaced.get(unit, given[unit].fmu)).stem)
             program = PythonComponent(wanted, unit=unit, role=role)
             programs[program.path] = program
             changes.append(Override(unit, str(program.path), "swap"))
@@ -269,11 +270,3 @@ def _plain(place: str, value: Any) -> Value:
     """Return the value for a target as plain Python."""
     of_file = place == "vehicle" or place.partition(".")[0] == TYRES
     return str(arguments.path(value, place)) if of_file else arguments.scalar(value, place)
-
-
-def _role(fmu: str, unit: str) -> str:
-    """Return the role of an instance: the prefix of its FMU's name, else its own name."""
-    from components.fmi.roles import ROLES
-
-    names = [role.name for role in ROLES.values()]
-    return next((name for name in names if Path(fmu).stem.startswith(f"{name}_")), unit)

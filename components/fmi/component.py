@@ -40,10 +40,10 @@ from xml.etree.ElementTree import Element
 from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
+from vocabulary.roles import ROLES
 from vocabulary.wheels import wheels
 
 from . import model_description
-from .roles import ROLES
 from .variables import (
     NoParameters,
     VariableSpec,

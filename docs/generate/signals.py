@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from components.fmi import roles
-from components.fmi.roles import ROLES
-from vocabulary import signals
+from vocabulary import roles, signals
+from vocabulary.roles import ROLES
 from vocabulary.signals import SIGNALS
 
 from .text import NOTE, cell, code, docstring, table

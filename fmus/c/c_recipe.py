@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
-from components.fmi.roles import ROLES
 from orchestrator.errors import BuildError
 from orchestrator.fmu.binary import platform
+from vocabulary.roles import ROLES
 
 from ..compiler import compile_library, compiler_command, compiler_tools, compiler_version
 from ..evidence import SourceDigests

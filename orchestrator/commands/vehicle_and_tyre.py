@@ -91,11 +91,13 @@ def _tables(cars: list[Handling]) -> list[Table]:
     """Return the tables, with a column for each plant."""
     import math
 
+    from vocabulary.roles import without_role
+
     from ..evaluation.steering_tests import LEVELS, G
     from ..experiments.tables import Table
     from ..vehicles.handling import SPEEDS
 
-    names = [car.plant.removeprefix("plant_") for car in cars]
+    names = [without_role(car.plant) for car in cars]
     numbers = set(range(1, len(names) + 1))
     whole = Table("The car", ["", *names], numbers=numbers)
     per_g = math.degrees(G)  # of rad s2/m

@@ -290,6 +290,7 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
         generation_tool=description.generationTool or "",
         variables=variables,
         description=description.description or "",
+        role=_annotated(root, "role", "name"),
         once_per_process=kind.canBeInstantiatedOnlyOncePerProcess,
         python_modules=_python_modules(files),
         fmi=fmi,
@@ -298,7 +299,7 @@ def describe(files: Mapping[str, bytes], raw: bytes, path: Path) -> Fmu:
         lacking=lacking(files.get(binary_of(fmi, identifier)), fmi),
         tolerance=_tolerance(experiment),
         needs_tool=kind.needsExecutionTool,
-        host_packages=_host_packages(root),
+        host_packages=tuple(_annotated(root, "hostPackages", "names").split()),
     )
 
 
@@ -322,10 +323,10 @@ def _dangling(root: ElementTree.Element, fmi: int) -> str | None:
     return None
 
 
-def _host_packages(root: ElementTree.Element) -> tuple[str, ...]:
-    """Return the packages beyond the standard library that an FMU of yawbench needs in its host."""
-    needed = root.find("VendorAnnotations/Tool[@name='yawbench']/hostPackages")
-    return () if needed is None else tuple(needed.get("names", "").split())
+def _annotated(root: ElementTree.Element, tag: str, key: str) -> str:
+    """Return an attribute of yawbench's own annotation of an FMU, "" if there is none."""
+    element = root.find(f"VendorAnnotations/Tool[@name='yawbench']/{tag}")
+    return "" if element is None else element.get(key, "")
 
 
 def _one_line(problem: object) -> str:

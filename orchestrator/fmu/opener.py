@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import fmus
+from vocabulary.roles import role_in
 
 from ..errors import ModelDescriptionError
 from ..messages import closest, listed, printable, short
@@ -139,8 +140,8 @@ def find_fmu(fmu: str, *, scenario: Path, fmus: Path, opener: Opener, build: boo
     names = opener.names(fmus)
     if not names:
         raise ModelDescriptionError(f"no FMU {short(fmu)}: the folder {fmus} holds no FMUs")
-    role = fmu.partition("_")[0] + "_"
-    related = [name for name in names if name.startswith(role)] or names
+    role = role_in(fmu)
+    related = [name for name in names if role and role_in(name) == role] or names
     likely = closest(fmu, names)
     guess = f"did you mean {likely!r}? " if likely else ""
     raise ModelDescriptionError(f"no FMU {short(fmu)} in {fmus}; {guess}there are: {listed(related)}")

@@ -186,8 +186,8 @@ class Results:
 
         Args:
             variable: name of a variable; a full name `instance.variable` is returned unchanged.
-            role: only instances with this role ("plant", "controller", ...): those whose FMU's name
-                begins with `<role>_`, else the instance of that name.
+            role: only instances with this role ("plant", "controller", ...): see
+                `vocabulary.roles.role_of`.
 
         Raises:
             ResultsError: no such column, or more than one.
@@ -222,9 +222,7 @@ class Results:
 
     def units_of_role(self, role: str) -> list[str]:
         """Return the names of the instances that have the role, in evaluation order."""
-        fmus = self.record.fmus
-        found = [unit for unit, fmu in fmus.items() if fmu.name.startswith(role + "_")]
-        return found or [unit for unit in fmus if unit == role]
+        return [name for name, fmu in self.record.fmus.items() if fmu.role_as(name) == role]
 
     def _unknown(self, variable: str, role: str | None = None) -> str:
         of = f" of a {role}" if role else ""

@@ -19,6 +19,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, ValidationError
 
+from vocabulary.roles import role_of
+
 from .. import checksums
 from ..cache import OF_RESULTS, sources_hash
 from ..errors import ResultsError
@@ -52,6 +54,7 @@ class FmuRecord(_Part):
     """An FMU with the values that its instance had in the run."""
 
     name: str = ""
+    role: str | None = None  # of the instance; earlier versions did not write it
     file: str = ""
     sha256: str = ""
     guid: str | None = None
@@ -66,6 +69,10 @@ class FmuRecord(_Part):
     defaults: dict[str, Any] = {}  # the FMU's values of parameters that the run does not set
     constants: dict[str, Any] = {}
     series: dict[str, SeriesRecord] = {}
+
+    def role_as(self, instance: str) -> str:
+        """The role of the instance of that name."""
+        return self.role or role_of(instance, self.name)
 
 
 class ErrorRecord(_Part):
@@ -238,6 +245,7 @@ def _fmu(unit: Instance, plan: Plan) -> dict[str, Any]:
     fmu = unit.fmu
     return {
         "name": fmu.name,
+        "role": unit.role,
         "file": fmu.path.name,
         "sha256": fmu.sha256,
         "guid": fmu.guid,

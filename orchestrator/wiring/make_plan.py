@@ -18,6 +18,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+from vocabulary.roles import role_in, role_of
 from vocabulary.wheels import WHEELS
 
 from ..errors import BuildError, ModelDescriptionError, Problem, WiringError, YawbenchError
@@ -250,11 +251,13 @@ def _instance(
 
 
 def _misplaced(scenario: LoadedScenario) -> list[str]:
-    """Return a message for every swap to an FMU whose name begins with that of another instance."""
+    """Return a message for every swap to an FMU whose name has the role of another instance."""
+    before = {name: scenario.replaced.get(name, spec.fmu) for name, spec in scenario.units.items()}
+    roles = {name: role_of(name, Path(fmu).stem) for name, fmu in before.items()}
     found = []
     for change in scenario.changes:
         name = Path(str(change.value)).stem
-        others = [instance for instance in scenario.units if name.startswith(f"{instance}_")]
+        others = [instance for instance, role in roles.items() if role == role_in(name)]
         if change.swaps and others and change.place not in others:
             found.append(f"{change}: by its name {name} is for the unit {others[0]!r}")
     return found

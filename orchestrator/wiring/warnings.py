@@ -17,10 +17,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from typing import NamedTuple
 
+from vocabulary.roles import without_role
 from vocabulary.vehicle import CAR, DYNAMIC_INDEX
 
 from ..messages import fold, listed
-from ..plan import DEFAULT, SENSING, Finding, Fmu, Instance, Value, Variable, Wire
+from ..plan import DEFAULT, SENSING, Finding, Instance, Value, Variable, Wire
 from ..scenario.load import LoadedScenario
 from ..scenario.quantities import meant_unit, number_and_unit
 from .context import FACTS
@@ -31,18 +32,12 @@ CONTROL = ("reference", "controller", "allocator", "wheel_control", "monitor")
 TRUTH = "truth"
 
 
-def role_of(unit: str, fmu: Fmu) -> str:
-    """Return the role of an instance from the prefix of its FMU's name, else the instance's name."""
-    roles = (*SENSING, *CONTROL)
-    return next((role for role in roles if fmu.name.startswith(f"{role}_")), unit)
-
-
 def seen_as(wire: Wire, units: Iterable[Instance]) -> str:
     """Return what a wire gives to the control side: "truth", "late truth", "measurement" or "estimate".
 
     "" if the source is on the control side itself, or the target is not.
     """
-    roles = {unit.name: role_of(unit.name, unit.fmu) for unit in units}
+    roles = {unit.name: unit.role for unit in units}
     if roles[wire.target] not in (*CONTROL, "estimator") or roles[wire.source] in CONTROL:
         return ""
     truth = "late truth" if wire.output.endswith("_delayed") else TRUTH
@@ -56,7 +51,7 @@ def exact(units: Sequence[Instance], wires: Iterable[Wire]) -> list[str]:
     the car.
     """
     wires = list(wires)
-    if not any(role_of(unit.name, unit.fmu) == "sensor" for unit in units):
+    if not any(unit.role == "sensor" for unit in units):
         return []
     steering = _steering(units, wires)
     found: dict[tuple[str, str], list[str]] = {}
@@ -69,7 +64,7 @@ def exact(units: Sequence[Instance], wires: Iterable[Wire]) -> list[str]:
 
 def _steering(units: Iterable[Instance], wires: Iterable[Wire]) -> set[str]:
     """Return the instances that affect, directly or through others, one outside the control side."""
-    inside = {unit.name for unit in units if role_of(unit.name, unit.fmu) in (*CONTROL, "estimator")}
+    inside = {unit.name for unit in units if unit.role in (*CONTROL, "estimator")}
     found = {unit.name for unit in units} - inside
     while more := {w.source for w in wires if w.target in found} - found:
         found |= more
@@ -222,7 +217,7 @@ def _of_tyres(scenario: LoadedScenario, units: Mapping[str, Instance]) -> Iterat
     tyres = [unit for unit in units.values() if "pcy1_front" in unit.parameters]
     if not tyres or not scenario.tyre_files:
         return
-    law = tyres[0].fmu.name.removeprefix("tyre_").removesuffix("_transient")
+    law = without_role(tyres[0].fmu.name).removesuffix("_transient")
     for one in _parameters(units.values()):
         if one.name == "tyre" and "pcx1_front" in units[one.instance].parameters and one.value != law:
             says = f"{one.instance}.tyre is {one.value}: it does not ask the law of {tyres[0].name}, {law}"

@@ -13,7 +13,6 @@ from scipy.integrate import solve_ivp
 from components.cars.load_transfer import quasi_static_loads
 from components.drivers.sine import Sine
 from components.fmi.component import Component
-from components.fmi.roles import ROLES
 from components.fmi.variables import parameter
 from components.plants.two_dof import TwoDof, TwoDofParameters
 from components.tyre_models.bakker_1987 import (
@@ -24,6 +23,7 @@ from components.tyre_models.bakker_1987 import (
 from components.tyres.linear import LinearTyre
 from components.tyres.magic_formula_1987 import MagicFormula1987
 from tests.evidence import measured
+from vocabulary.roles import ROLES
 from vocabulary.wheels import WHEELS, wheels
 
 from .loop import Loop

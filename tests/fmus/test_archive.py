@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from dataclasses import replace
 from importlib.metadata import version
 from xml.etree import ElementTree
 
@@ -17,7 +18,6 @@ from fmpy.util import read_csv, read_ref_opt_file
 from fmpy.validation import validate_fmu
 from lxml import html
 
-from components.fmi.roles import ROLES
 from fmus import compiler
 from fmus.build import COMPONENTS, build_all, build_component, find_components, put
 from fmus.build import HERE as FMUS
@@ -28,6 +28,9 @@ from fmus.packing import to_bytes
 from fmus.reference_result import FOLDER
 from orchestrator.cache import content_of
 from orchestrator.errors import BuildError
+from orchestrator.fmu.archive import open_fmu
+from orchestrator.plan import Instance
+from vocabulary.roles import ROLES, role_in
 
 NAMES = list(find_components())
 SOME = ["controller_off", "driver_sine", "tyre_linear"]
@@ -99,6 +102,17 @@ def test_a_host_is_shown_who_made_an_fmu_what_it_is_and_that_it_needs_no_tool(ar
         assert row[-1 - len(source) :] == [variable.get("description"), *source]
         assert row[1] == variable[0].get("unit", "")
     assert "class " in page.xpath("//h3/following-sibling::pre")[0].text_content()
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.sampled(8)
+def test_an_fmu_declares_its_role_whatever_its_file_is_called(archive, name, tmp_path):
+    (copy := tmp_path / "sensor_of_ours.fmu").write_bytes(archive(name).read_bytes())
+    fmu = open_fmu(copy)
+    assert fmu.role == role_in(name) != ""
+    assert Instance("car", fmu, 1, {}, {}).role == fmu.role
+    assert Instance("car", replace(fmu, role=""), 1, {}, {}).role == "sensor"
+    assert Instance("car", replace(fmu, role="", name="body"), 1, {}, {}).role == "car"
 
 
 def test_credits_of_a_users_own_component_are_those_that_it_declares(tmp_path):

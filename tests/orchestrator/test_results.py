@@ -68,6 +68,15 @@ def test_a_role_is_that_of_the_fmu_s_name_else_of_the_unit_s(folder):
     assert results.column("yaw_rate", role="plant") == "car.yaw_rate"
 
 
+def test_a_recorded_role_comes_before_the_names(folder):
+    fmus = {"car": {"name": "body"}, "ecu": {"name": "plant_of_ours", "role": "controller"}}
+    fmus["car"]["role"] = "plant"
+    (folder / "run.json").write_text(json.dumps({**RUN, "fmus": fmus}))
+    results = load_results(folder)
+    assert results.units_of_role("plant") == ["car"]
+    assert results.units_of_role("controller") == ["ecu"]
+
+
 def test_a_variable_of_two_units_is_ambiguous_until_a_role_is_given(folder):
     (folder / "results.csv").write_text("time,car.yaw_rate,ecu.yaw_rate\n0.0,1.0,2.0\n")
     results = load_results(folder)

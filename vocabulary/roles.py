@@ -1,7 +1,7 @@
-"""The roles a unit can play and the signals each of them must show.
+"""The roles of instances, and the signals that each role must have.
 
-A unit that keeps this contract can replace any other of its role. The folder a component
-stands in gives its role, folder and file name together the name of its FMU:
+An FMU that keeps this contract can replace any other of its role. The folder of a component
+gives its role, folder and file name together the name of its FMU:
 `controllers/fnn.py` becomes `controller_fnn`.
 """
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Role:
-    """A role: its name and the signals that every unit of it declares (`*` = four wheels)."""
+    """A role: its name and the signals that every FMU of it declares (`*` = four wheels)."""
 
     name: str
     inputs: tuple[str, ...] = ()
@@ -55,3 +55,26 @@ ROLES: dict[str, Role] = {
     "monitors": Role("monitor", inputs=("yaw_moment_wanted",), outputs=("yaw_moment",)),
 }
 """Folder below `components/` -> role."""
+
+
+def role_in(fmu: str) -> str:
+    """Return the role in the name of an FMU, `<role>_<name>`; "" if there is none."""
+    return next((role.name for role in ROLES.values() if fmu.startswith(f"{role.name}_")), "")
+
+
+def without_role(fmu: str) -> str:
+    """Return the name of an FMU without its role."""
+    return fmu.removeprefix(f"{role_in(fmu)}_")
+
+
+def role_of(instance: str, fmu: str, declared: str = "") -> str:
+    """Return the role of an instance.
+
+    It is what the FMU declares, else the role in the FMU's name, else the instance's name.
+
+    Args:
+        instance: its name in the scenario.
+        fmu: the name of its FMU.
+        declared: the role in the FMU's model description, "" if there is none.
+    """
+    return declared or role_in(fmu) or instance
