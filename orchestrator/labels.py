@@ -38,7 +38,7 @@ def in_words(change: Override) -> str:
 
 def faults_of(plan: Plan) -> str:
     """Return the faults of a plan in words."""
-    return "; ".join(dict.fromkeys(f"{fault.place}: {fault.says}" for fault in plan.faults))
+    return "; ".join(dict.fromkeys(f"{signal.fault.on}: {signal.fault}" for signal in plan.faults))
 
 
 def with_changes(title: str, changes: Iterable[Override]) -> str:

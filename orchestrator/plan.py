@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -14,6 +12,7 @@ if TYPE_CHECKING:
 
 from vocabulary.roles import role_of
 
+from .fault_kinds import FaultList, FaultySignal
 from .messages import cut
 
 Value = float | int | bool | str
@@ -25,10 +24,6 @@ TYRES = "tyres"
 """Override target of the tyre property files: of both axles, or `tyres.front`, `tyres.rear` of one."""
 FAULTS = "faults"
 """Prefix of override targets that set the faults of a signal: `faults.sensor.yaw_rate`."""
-FAULT_WORDS = ("share", "every", "seed", "from", "until")
-"""Options of a fault that are written as a keyword and a value."""
-NO_FAULTS = "none"
-"""The text for no faults."""
 SENSING = {"sensor": "measurement", "estimator": "estimate"}
 """Role of an instance -> kind of values that its outputs are, as opposed to the truth."""
 Algorithm = Literal["jacobi", "gauss_seidel", "extrapolated"]
@@ -234,46 +229,6 @@ class Wire:
 
 
 @dataclass(frozen=True)
-class Fault:
-    """A disturbance of a signal: of an output for everything that it feeds, or of a single input."""
-
-    instance: str
-    variable: str
-    of_output: bool
-    kind: str  # see `scenario.fault_schema.KINDS`
-    value: float | None = None  # in the variable's unit, or in that of the kind
-    begin: float = -math.inf  # [s]
-    end: float = math.inf  # [s], no longer faulty then
-    share: float = 0.0  # of the messages
-    every: float = 0.0  # time from one message to the next [s]
-    stream: int = 0  # seed of its random numbers, below 2**64
-    place: str = ""  # as written: "plant.yaw_rate -> sensor"
-    says: str = ""  # as written: "freeze from 2 s"
-
-
-class FaultList(tuple[Mapping[str, Value], ...]):
-    """The faults of one location in the order in which they act: each as in a file, without the location."""
-
-    __slots__ = ()
-
-    def __str__(self) -> str:
-        """The faults in one line, as `--fault` takes them after the location."""
-        return "; ".join(map(fault_line, self)) or NO_FAULTS
-
-
-def fault_line(fault: Mapping[str, Value]) -> str:
-    """Return a fault from a file in one line: kind, value, then its options as `name value`."""
-    named = [f"{name} {_text(fault[name], name)}" for name in FAULT_WORDS if name in fault]
-    return " ".join([str(fault["kind"]), *([_text(fault["value"])] if "value" in fault else []), *named])
-
-
-def _text(value: Value, name: str = "") -> str:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return str(value)
-    return f"{value:.10g}" + (" s" if name in ("every", "from", "until") else "")
-
-
-@dataclass(frozen=True)
 class Override:
     """A value that replaces one of the scenario file."""
 
@@ -285,6 +240,11 @@ class Override:
     def plain(self) -> Value:
         """The value as in names and records, with faults as text."""
         return str(self.value) if isinstance(self.value, FaultList) else self.value
+
+    @property
+    def faults(self) -> FaultList:
+        """The faults that it sets, none if its target is something else."""
+        return self.value if isinstance(self.value, FaultList) else FaultList()
 
     @property
     def names_file(self) -> bool:
@@ -336,7 +296,7 @@ class Plan:
     notes: tuple[str, ...] = ()  # messages to the user that are not errors
     changes: tuple[Override, ...] = ()  # of the scenario file
     findings: tuple[Finding, ...] = ()  # warnings about values
-    faults: tuple[Fault, ...] = ()  # those of one variable in the order in which they act
+    faults: tuple[FaultySignal, ...] = ()  # those of one variable in the order in which they act
 
     def time(self, k: int) -> float:
         """Return the time [s] of communication point `k`, correctly rounded."""

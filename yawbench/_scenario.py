@@ -11,15 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import Problem, ScenarioError, SimulationError, YawbenchWarning
+from orchestrator.fault_kinds import FaultList
 from orchestrator.fmu.opener import Opener
 from orchestrator.master.log import Log
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, short
 from orchestrator.metrics.plausibility import remarks_of
-from orchestrator.plan import FAULTS, TYRES, FaultList, Instance, Override, Plan, Value
+from orchestrator.plan import TYRES, Instance, Override, Plan, Value
 from orchestrator.scenario import catalogue, scenario_schema
 from orchestrator.scenario.load import load_scenario
-from orchestrator.scenario.overrides import setting, spelled
+from orchestrator.scenario.overrides import faults_at, setting
 from orchestrator.tyres.stand import cornering_stiffness
 from orchestrator.wiring.make_plan import make_plan
 from vocabulary.roles import role_of
@@ -161,7 +162,7 @@ class Scenario:
         Args:
             place: `unit.output` for all who take it and the results, `unit.output -> unit` on the way to
                 one of them, `unit.input`; a `*` stands for several.
-            kind: bias, gain, drift, noise, freeze, value, dropout, outlier, delay, saturation, loss or stuck.
+            kind: one of the reference of scenario files, such as bias or freeze.
             value: as the kind has it: in SI, or with its unit.
             start, until: when it begins and ends [s]; default: with the run.
             told: `share` of the messages, `every` how often they come [s], `seed` of what is random.
@@ -173,11 +174,11 @@ class Scenario:
         given = {"kind": kind, "value": value, **told, "from": start, "until": until}
         with arguments.as_scenario_errors("fault"):
             item = {name: arguments.scalar(x, name) for name, x in given.items() if x is not None}
-        at = f"{FAULTS}.{spelled(place)}"
-        earlier = next((c for c in self.changes if (c.place, c.origin) == (at, "fault")), None)
-        before = earlier.value if earlier and isinstance(earlier.value, FaultList) else ()
+        new = faults_at(place, item, "fault")
+        earlier = next((c for c in self.changes if (c.place, c.origin) == (new.place, "fault")), None)
+        both = FaultList((*(earlier.faults if earlier else ()), *new.faults))
         others = [change for change in self.changes if change is not earlier]
-        scenario = replace(self, changes=(*others, Override(at, FaultList((*before, item)), "fault")))
+        scenario = replace(self, changes=(*others, replace(new, value=both)))
         scenario.loaded  # noqa: B018 - what is wrong is said now
         return scenario
 

@@ -14,7 +14,7 @@ from pydantic.fields import FieldInfo
 
 from orchestrator.experiments import ranking as ranking
 from orchestrator.experiments import schema as experiment
-from orchestrator.scenario import fault_schema
+from orchestrator.fault_kinds import KINDS, FaultLocation
 from orchestrator.scenario import scenario_schema as scenario
 
 from .text import NOTE, cell, code, docstring, table
@@ -27,7 +27,12 @@ def scenario_page() -> str:
     example = (
         f"## An example\n\n`scenarios/fnn_sideslip/25mps.yaml`:\n\n```yaml\n{EXAMPLE.read_text('utf-8')}```"
     )
-    return _page("Scenario files", scenario, [scenario.ScenarioSpec, scenario.Vehicle], example)
+    page = _page("Scenario files", scenario, [scenario.ScenarioSpec, scenario.Vehicle], example)
+    kinds = [(code(name), cell(kind.does), code(kind.unit or "")) for name, kind in KINDS.items()]
+    meaning = "Of a signal x, whose unit is {x}."
+    return "\n\n".join([
+        page, "## Kinds of faults", cell(meaning), table(("kind", "effect", "unit"), kinds)
+    ])  # fmt: skip
 
 
 def experiment_page() -> str:
@@ -104,7 +109,7 @@ def _kind(annotation: Any, models: list[type[BaseModel]]) -> str:
         return f"[{title(annotation)}](#{title(annotation).lower()})"
     if annotation is scenario.Endpoint:
         return "text: unit.variable"
-    if annotation is fault_schema.FaultLocation:
+    if annotation is FaultLocation:
         return "text: unit.variable, unit.output -> unit"
     if origin is typing.Annotated:
         return _kind(arms[0], models)

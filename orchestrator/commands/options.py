@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..fault_kinds import KINDS, NO_FAULTS
+
 if TYPE_CHECKING:
     from ..plan import Override, Plan
 
@@ -72,9 +74,8 @@ class RunOptions:
             "--fault",
             metavar="'PLACE: KIND VALUE'",
             help="Let something go wrong, such as 'plant.yaw_rate -> sensor: freeze from 2 s until 3 s'; "
-            "place: unit.output, unit.output -> unit or unit.input; kind: bias, gain, drift, noise, freeze, "
-            "value, dropout, outlier, delay, saturation, loss, stuck; none takes away the scenario's own. "
-            "Repeatable.",
+            "place: unit.output, unit.output -> unit or unit.input; "
+            f"kind: {', '.join(KINDS)}; {NO_FAULTS} takes away the scenario's own. Repeatable.",
         ),
     ] = None
     out: Annotated[

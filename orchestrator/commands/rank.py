@@ -99,7 +99,7 @@ def _entry(given: str) -> tuple[str, EntrySpec]:
     """Return the name and the entry of a controller given on the command line."""
     from ..errors import ScenarioError
     from ..experiments.ranking import UNIT, EntrySpec
-    from ..plan import FaultList
+    from ..fault_kinds import FaultList
     from ..scenario.overrides import is_path, swap_of
 
     fmu, *brought = swap_of(UNIT, given, "--controller")

@@ -20,7 +20,7 @@ from pydantic import Field, PlainValidator, model_validator
 from ..messages import short
 from ..plan import FACTS, FAULTS, OF_RUN, TYRES, Algorithm, Override, Value
 from ..scenario import overrides, yaml_lines
-from ..scenario.fault_schema import FaultSpec, by_place
+from ..scenario.fault_schema import FaultSpec, by_location
 from ..scenario.quantities import parse_unit
 from ..scenario.scenario_schema import Scalar
 from ..scenario.validation import StrictModel, Time
@@ -352,5 +352,6 @@ def changes_of_file(given: OverrideSpec, folder: Path, origin: str) -> list[Over
     """Return the overrides in one part of an experiment file; file names are relative to `folder`."""
     vehicle = [Override("vehicle", str(folder / given.vehicle), origin)] if given.vehicle else []
     of_run = overrides.changes_of_run(given, origin)
-    faults = [Override(f"{FAULTS}.{place}", ones, origin) for place, ones in by_place(given.faults).items()]
+    at = by_location(spec.fault for spec in given.faults)
+    faults = [Override(f"{FAULTS}.{location}", ones, origin) for location, ones in at.items()]
     return vehicle + of_run + overrides.changes_of(given.swap, given.set, folder, origin) + faults

@@ -45,7 +45,7 @@ def key_of(plan: Plan, also: Any = None) -> str:
             [u.name, name, s.sha256, s.column, s.held] for u in plan.instances for name, s in u.series.items()
         ],
         "wires": connections_of(plan),
-        "faults": [list(astuple(fault)) for fault in plan.faults],
+        "faults": [list(astuple(signal)) for signal in plan.faults],
         "record": plan.record,
         "time": [str(plan.start), str(plan.step), plan.n_steps],
         "algorithm": plan.algorithm,

@@ -225,11 +225,11 @@ def connections_of(plan: Plan) -> list[dict[str, Any]]:
 def faults_of(plan: Plan) -> list[dict[str, Any]]:
     """Return the faults of a plan as the scenario states them, with their times [s] and variables."""
     found: dict[tuple[str, str], dict[str, Any]] = {}
-    for fault in plan.faults:
-        begin = None if fault.begin == -math.inf else fault.begin
-        end = None if fault.end == math.inf else fault.end
-        new: dict[str, Any] = {"on": fault.place, "fault": fault.says, "from": begin, "until": end, "at": []}
-        found.setdefault((fault.place, fault.says), new)["at"].append(f"{fault.instance}.{fault.variable}")
+    for signal in plan.faults:
+        place, says = str(signal.fault.on), str(signal.fault)
+        begin, end = (t if math.isfinite(t) else None for t in (signal.fault.begin, signal.fault.end))
+        new: dict[str, Any] = {"on": place, "fault": says, "from": begin, "until": end, "at": []}
+        found.setdefault((place, says), new)["at"].append(f"{signal.instance}.{signal.variable}")
     return list(found.values())
 
 

@@ -13,83 +13,25 @@ faults at one location are separated by `;` and act in this order.
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass
-from fractions import Fraction
-from typing import Annotated, Any, Literal, NamedTuple, get_args
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated
 
-from pydantic import Field, PlainSerializer, PlainValidator, model_validator
+from pydantic import AfterValidator, Field, PlainSerializer, PlainValidator, model_validator
 
-from ..messages import short
-from ..plan import FAULT_WORDS, NO_FAULTS, FaultList, Value, fault_line
+from ..errors import Problem, ScenarioError
+from ..fault_kinds import KINDS, NO_FAULTS, WORDS, Fault, FaultList, FaultLocation
+from ..messages import listed, short
+from ..plan import Value
 from . import quantities, yaml_lines
-from .validation import Instant, StrictModel, Time
-
-EVERY = Fraction(1, 100)
-"""Default time between two messages [s]. Chosen: typical of vehicle buses."""
-
-KindName = Literal[
-    "bias", "gain", "drift", "noise", "freeze", "value", "dropout", "outlier", "delay", "saturation",
-    "loss", "stuck",
-]  # fmt: skip
-
-
-@dataclass(frozen=True)
-class FaultKind:
-    """A kind of fault: its effect on a signal x, and its options."""
-
-    does: str
-    unit: str | None = None  # of its value: "{x}" that of the signal; None: it takes no value
-    default: float | None = None  # of the value
-    needs: bool = True  # whether a value is required
-    least: float | None = None  # minimum of the value
-    most: float | None = None  # maximum of the value
-    drawn: bool = False  # random: takes seed and every
-    shared: bool = False  # takes share
-
-
-KINDS: dict[str, FaultKind] = {
-    "bias": FaultKind("x + value", "{x}"),
-    "gain": FaultKind("x * value", "1"),
-    "drift": FaultKind("x + value * (time since the fault began)", "{x}/s"),
-    "noise": FaultKind(
-        "x + value * normally distributed numbers, a new one every message", "{x}", least=0, drawn=True
-    ),
-    "freeze": FaultKind("the x at which the fault began"),
-    "value": FaultKind("value", "{x}"),
-    "dropout": FaultKind("a share of the messages is lost, the last x before holds", drawn=True, shared=True),
-    "outlier": FaultKind("a share of the messages is x + value or x - value", "{x}", drawn=True, shared=True),
-    "delay": FaultKind("the x of so long ago", "s", least=0),
-    "saturation": FaultKind("x, but at most value and at least -value", "{x}", least=0),
-    "loss": FaultKind(
-        "of an actuator: x without this part of it, by default nothing is left", "1", 1.0, least=0, most=1
-    ),
-    "stuck": FaultKind(
-        "of an actuator: value, by default the x at which the fault began", "{x}", needs=False
-    ),
-}
-"""All kinds of faults. To add a kind, add a row here, its name above, and it to `master.fault_injection`."""
-assert tuple(KINDS) == get_args(KindName)
-
-
-class FaultLocation(NamedTuple):
-    """Location of a fault: a variable of an instance, or the wires from there to another instance."""
-
-    instance: str
-    variable: str
-    target: str = ""
-    input: str = "*"
-
-    def __str__(self) -> str:
-        to = f".{self.input}" if self.input != "*" else ""
-        return f"{self.instance}.{self.variable}" + (f" -> {self.target}{to}" if self.target else "")
-
+from .validation import Instant, StrictModel, Time, validate
 
 _PLACE = re.compile(r"\s*(\w+)\.([^\s>]+?)\s*(?:->\s*(\w+)(?:\.(\S+))?\s*)?")
 
 
-def place_of(value: object) -> FaultLocation:
+def location_of(value: object) -> FaultLocation:
     """Parse the location of a fault.
 
     Raises:
@@ -103,25 +45,47 @@ def place_of(value: object) -> FaultLocation:
     return FaultLocation(found[1], found[2], found[3] or "", found[4] or "*")
 
 
-def read_line(line: str) -> FaultList:
-    """Parse the faults in one line, as written after a location.
+def read_line(line: str) -> list[dict[str, Value]]:
+    """Split the faults in one line, as written after a location, into their options as in a file.
 
     Raises:
         ValueError: an option is given twice.
     """
-    if line.strip() == NO_FAULTS:
-        return FaultList()
-    items = []
-    for text in line.split(";"):
-        head, *rest = re.split(rf"(?:^|\s+)({'|'.join(FAULT_WORDS)})\s+", text.strip())
+    items: list[dict[str, Value]] = []
+    for text in () if line.strip() == NO_FAULTS else line.split(";"):
+        head, *rest = re.split(rf"(?:^|\s+)({'|'.join(WORDS)})\s+", text.strip())
         kind, _, value = head.strip().partition(" ")
-        item: dict[str, Any] = {"kind": kind} | ({"value": yaml_lines.scalar(value.strip())} if value else {})
+        item: dict[str, Value] = {"kind": kind}
+        if value:
+            item["value"] = yaml_lines.scalar(value.strip())
         for name, given in zip(rest[::2], rest[1::2], strict=True):
             if name in item:
                 raise ValueError(f"has {name} twice")
             item[name] = yaml_lines.scalar(given.strip())
         items.append(item)
-    return FaultList(items)
+    return items
+
+
+def parse_faults(location: FaultLocation, items: Sequence[Mapping[str, Value]], where: str) -> FaultList:
+    """Return the faults of a location, each given by its options as in a file.
+
+    Raises:
+        ScenarioError: with all that is wrong with them; `where`: what messages name as their place.
+    """
+    document = yaml_lines.Document(Path(where))
+    specs = []
+    for item in items:
+        document.data = {"on": str(location), **item}
+        specs.append(validate(FaultSpec, document))
+    if document.problems:
+        raise ScenarioError([Problem(problem.text, place=where) for problem in document.problems])
+    return FaultList(spec.fault for spec in specs if spec is not None)
+
+
+def _kind(name: str) -> str:
+    if name not in KINDS:
+        raise ValueError(f"must be {listed(map(repr, KINDS), last='or')} (got {short(name)})")
+    return name
 
 
 def _value(value: object) -> float | str | None:
@@ -138,20 +102,17 @@ def _share(value: object) -> float:
     return float(value)
 
 
-FaultLocationText = Annotated[FaultLocation, PlainValidator(place_of), PlainSerializer(str)]
+FaultLocationText = Annotated[FaultLocation, PlainValidator(location_of), PlainSerializer(str)]
+KindName = Annotated[str, AfterValidator(_kind)]
 FaultValue = Annotated[float | str, PlainValidator(_value)]
 Share = Annotated[float, PlainValidator(_share)]
 
 
 class FaultSpec(StrictModel):
-    """A disturbance of a signal for some time.
-
-    Kinds are bias, gain, drift, noise, freeze, value, dropout, outlier, delay and saturation, and for
-    actuators loss and stuck.
-    """
+    """A disturbance of a signal for some time."""
 
     on: FaultLocationText = Field(description="unit.output, unit.input or unit.output -> unit")
-    kind: KindName = Field(description="What becomes of the signal")
+    kind: KindName = Field(description=f"What becomes of the signal: {listed(KINDS, last='or')}")
     value: FaultValue | None = Field(None, description="As the kind has it, with its unit or in the signal's")
     share: Share | None = Field(None, description="Of the messages, of dropout and outlier")
     every: Time | None = Field(
@@ -179,22 +140,20 @@ class FaultSpec(StrictModel):
         return self
 
     @property
-    def item(self) -> dict[str, Value]:
-        """The fault as in a file, without its location."""
-        times = {"every": self.every, "from": self.begin, "until": self.end}
-        fields = {"kind": self.kind, "value": self.value, "share": self.share, "seed": self.seed}
-        fields |= {name: None if time is None else float(time) for name, time in times.items()}
-        return {name: value for name, value in fields.items() if value is not None}
+    def fault(self) -> Fault:
+        """The fault, with all times in seconds."""
+        return Fault(
+            self.on, self.kind, self.value, self.share,
+            every=None if self.every is None else float(self.every),
+            seed=self.seed,
+            begin=-math.inf if self.begin is None else float(self.begin),
+            end=math.inf if self.end is None else float(self.end),
+        )  # fmt: skip
 
-    def __str__(self) -> str:
-        """The fault in one line, without its location."""
-        return fault_line(self.item)
 
-
-def by_place(faults: Iterable[FaultSpec]) -> dict[str, FaultList]:
+def by_location(faults: Iterable[Fault]) -> dict[str, FaultList]:
     """Group faults by location."""
     found: dict[str, FaultList] = {}
     for fault in faults:
-        place = str(fault.on)
-        found[place] = FaultList((*found.get(place, ()), fault.item))
+        found[str(fault.on)] = FaultList((*found.get(str(fault.on), ()), fault))
     return found

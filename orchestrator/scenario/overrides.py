@@ -24,13 +24,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from ..errors import Problem, ScenarioError
+from ..fault_kinds import WORDS, FaultList
 from ..messages import hint, listed
-from ..plan import FACTS, FAULTS, OF_RUN, TYRES, FaultList, Override, Value
+from ..plan import FACTS, FAULTS, OF_RUN, TYRES, Override, Value
 from . import yaml_lines
-from .fault_schema import place_of, read_line
+from .fault_schema import location_of, parse_faults, read_line
 from .yaml_lines import Document, KeyPath
 
 HOLDERS = ("vehicle", "inputs")
@@ -84,11 +85,11 @@ def read_changes(
             problems.append(f"--fault {text}: write --fault 'UNIT.OUTPUT: KIND VALUE from TIME until TIME'")
             continue
         try:
-            one = setting(f"{FAULTS}.{place}", line, "--fault")
+            one = faults_at(place, line, "--fault")
         except ScenarioError as error:
             problems += error.problems
             continue
-        at[one.place] = FaultList((*at.get(one.place, ()), *cast(FaultList, one.value)))
+        at[one.place] = FaultList((*at.get(one.place, ()), *one.faults))
     changes += [Override(place, given, "--fault") for place, given in at.items()]
     if problems:
         raise ScenarioError(problems)
@@ -99,16 +100,31 @@ def setting(place: str, value: Value, origin: str) -> Override:
     """Return the override of a target; faults are parsed from their line.
 
     Raises:
-        ScenarioError: the line of a fault has an option twice.
+        ScenarioError: there is no such kind of fault, or it takes something else.
     """
     holder, _, at = place.partition(".")
     if holder != FAULTS or not at:
         return Override(place, value, origin)
-    change = Override(f"{FAULTS}.{spelled(at)}", str(value), origin)
+    return faults_at(at, str(value), origin)
+
+
+def faults_at(place: str, stated: str | Mapping[str, Value], origin: str) -> Override:
+    """Return the override of the faults of a location: all in one line, or one with its options as in a file.
+
+    Raises:
+        ScenarioError: there is no such place or kind, or it takes something else.
+    """
+    line = stated
+    if not isinstance(stated, str):
+        named = [f"{name} {stated[name]}" for name in WORDS if name in stated]
+        line = " ".join([*(str(stated[name]) for name in ("kind", "value") if name in stated), *named])
+    where = str(Override(f"{FAULTS}.{place}", str(line), origin))
     try:
-        return replace(change, value=read_line(str(value)))
+        location = location_of(place)
+        items = read_line(stated) if isinstance(stated, str) else [stated]
     except ValueError as error:
-        raise ScenarioError([Problem(str(error), place=str(change))]) from None
+        raise ScenarioError([Problem(str(error), place=where)]) from None
+    return Override(f"{FAULTS}.{location}", parse_faults(location, items, where), origin)
 
 
 def changes_of(
@@ -215,7 +231,7 @@ def _put_tyres(document: Document, vehicle: Document, change: Override) -> bool:
 def spelled(place: str) -> str:
     """Return the location of a fault in its canonical spelling, unchanged if it is malformed."""
     try:
-        return str(place_of(place))
+        return str(location_of(place))
     except ValueError:
         return place
 
@@ -225,8 +241,7 @@ def _put_faults(document: Document, change: Override, place: str) -> bool:
     given = document.data.get(FAULTS) or []
     if not isinstance(given, list):
         return True  # the schema will report what is wrong
-    assert isinstance(change.value, FaultList)
-    items = [{"on": place, **item} for item in change.value]
+    items = [{"on": place, **fault.item} for fault in change.faults]
     places = [spelled(str(one.get("on"))) if isinstance(one, dict) else None for one in given]
     there = [i for i, at in enumerate(places) if at == place]
     before = [given[i] for i in there]

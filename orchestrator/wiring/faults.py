@@ -7,9 +7,9 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from ..fault_kinds import KINDS, Fault, FaultLocation, FaultySignal
 from ..messages import fold, hint, listed
-from ..plan import Fault, Variable, Wire
-from ..scenario.fault_schema import EVERY, KINDS, FaultLocation, FaultSpec
+from ..plan import Variable, Wire
 from ..scenario.load import LoadedScenario
 from ..scenario.quantities import convert
 from ..scenario.yaml_lines import KeyPath, dotted
@@ -18,70 +18,57 @@ from .context import WiringContext, match, matching
 
 def faults_of(
     system: WiringContext, wires: Sequence[Wire], record: Iterable[tuple[str, str]]
-) -> tuple[Fault, ...]:
-    """Return the faults of a scenario."""
+) -> tuple[FaultySignal, ...]:
+    """Return the signals that the faults of a scenario act on."""
     scenario = system.scenario
-    found: list[Fault] = []
+    found: list[FaultySignal] = []
     record = set(record)
-    for i, spec in enumerate(scenario.faults):
+    for i, fault in enumerate(spec.fault for spec in scenario.faults):
         key: KeyPath = ("faults", i)
-        at = _Finder(system, wires, record, key).at(spec)
+        at = _Finder(system, wires, record, key).at(fault)
         for unit, name, of_output in at:
             variable = system.fmus[unit].variables[name]
             if variable.type != "Real":
                 system.report((*key, "on"), f"{unit}.{name} is {variable.type}: faults are for Real")
                 continue
             try:
-                value = _value(spec, variable)
+                value = _value(fault, variable)
             except ValueError as error:
                 system.report((*key, "value"), f"{unit}.{name}: {error}")
                 continue
             before = sum((f.instance, f.variable, f.of_output) == (unit, name, of_output) for f in found)
-            found.append(_fault(spec, unit, name, of_output, value, before))
-        if at and spec.begin is not None and spec.begin >= scenario.stop_time:
+            text = f"{fault.seed or 0} {unit}.{name} {of_output} {before}"
+            stream = int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big")
+            drawn = KINDS[fault.kind].drawn
+            found.append(FaultySignal(fault, unit, name, of_output, value, stream if drawn else 0))
+        if at and fault.begin >= scenario.stop_time:
             ends = f"the run ends at {float(scenario.stop_time):g} s"
-            system.notes.append(
-                f"{_said(scenario, key)} never acts: it begins at {float(spec.begin):g} s, {ends}"
-            )
+            system.notes.append(f"{_said(scenario, key)} never acts: it begins at {fault.begin:g} s, {ends}")
     return tuple(found)
 
 
-def _fault(spec: FaultSpec, unit: str, name: str, of_output: bool, value: float | None, before: int) -> Fault:
-    kind = KINDS[spec.kind]
-    text = f"{spec.seed or 0} {unit}.{name} {of_output} {before}"
-    stream = int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big") if kind.drawn else 0
-    return Fault(
-        unit, name, of_output, spec.kind, value,
-        begin=-math.inf if spec.begin is None else float(spec.begin),
-        end=math.inf if spec.end is None else float(spec.end),
-        share=spec.share or 0.0,
-        every=float(spec.every or EVERY) if kind.drawn else 0.0,
-        stream=stream, place=str(spec.on), says=str(spec),
-    )  # fmt: skip
-
-
-def _value(spec: FaultSpec, variable: Variable) -> float | None:
+def _value(fault: Fault, variable: Variable) -> float | None:
     """Return the value of a fault, converted into the unit that its kind requires.
 
     Raises:
         ValueError: not a valid value for this kind and signal.
     """
-    kind = KINDS[spec.kind]
-    if spec.value is None:
+    kind = KINDS[fault.kind]
+    if fault.value is None:
         return kind.default
     assert kind.unit is not None
     of_signal = f"({variable.unit})" if variable.unit and "/" in variable.unit and "/" in kind.unit else None
     unit = kind.unit.replace("{x}", of_signal or variable.unit or "1")
-    value = spec.value
+    value = fault.value
     if isinstance(value, str):
         if "{x}" in kind.unit and variable.unit is None:
             raise ValueError(f"{value!r} names a unit, but the FMU declares none: give a plain number")
         value = float(convert(value, unit, variable.definition if kind.unit == "{x}" else None))
     if not math.isfinite(value):
-        raise ValueError(f"must be a finite number (got {spec.value!r})")
+        raise ValueError(f"must be a finite number (got {fault.value!r})")
     if (kind.least is not None and value < kind.least) or (kind.most is not None and value > kind.most):
         bounds = f"at least {kind.least:g}" + (f" and at most {kind.most:g}" if kind.most is not None else "")
-        raise ValueError(f"{spec.kind} must be {bounds} {unit if unit != '1' else ''}".rstrip())
+        raise ValueError(f"{fault.kind} must be {bounds} {unit if unit != '1' else ''}".rstrip())
     return value
 
 
@@ -99,15 +86,15 @@ class _Finder:
     record: set[tuple[str, str]]
     key: KeyPath
 
-    def at(self, spec: FaultSpec) -> list[tuple[str, str, bool]]:
+    def at(self, fault: Fault) -> list[tuple[str, str, bool]]:
         """Return (instance, variable, whether it is an output) of everything that the fault acts on."""
-        place = spec.on
+        place = fault.on
         for unit in filter(None, (place.instance, place.target)):
             if unit not in self.system.fmus:
                 self._report(f"there is no unit {unit!r}{hint(unit, self.system.fmus, lead='units')}")
                 return []
         if place.target:
-            return self._on_wires(spec)
+            return self._on_wires(fault)
         signal = place.instance, place.variable
         return self._on_outputs(*signal) or self._on_inputs(*signal)
 
@@ -129,8 +116,8 @@ class _Finder:
             self._no_such(unit, pattern)
         return [(unit, name, False) for name in names if name in driven]
 
-    def _on_wires(self, spec: FaultSpec) -> list[tuple[str, str, bool]]:
-        place = spec.on
+    def _on_wires(self, fault: Fault) -> list[tuple[str, str, bool]]:
+        place = fault.on
         between = [w for w in self.wires if (w.source, w.target) == (place.instance, place.target)]
         found = [
             w for w in between

@@ -7,9 +7,10 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from orchestrator.fault_kinds import FaultySignal
 from orchestrator.master.instance import ExperimentSetup, FmuInstance, StepCalls
 from orchestrator.master.log import ERROR, OK, Log
-from orchestrator.plan import Algorithm, Fault, Fmu, Instance, Plan, ValueRef, Variable, Wire
+from orchestrator.plan import Algorithm, Fmu, Instance, Plan, ValueRef, Variable, Wire
 
 
 class Behaviour:
@@ -153,7 +154,7 @@ def make_plan(
     constants: Mapping[str, Mapping[str, Any]] | None = None,
     parameters: Mapping[str, Mapping[str, Any]] | None = None,
     record: Iterable[str] | None = None,
-    faults: Iterable[Fault] = (),
+    faults: Iterable[FaultySignal] = (),
 ) -> Plan:
     """Return a plan of fake units in the order given; wires are written `a.x -> b.y [gain offset]`."""
     made = tuple(

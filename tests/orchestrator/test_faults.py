@@ -16,17 +16,16 @@ from orchestrator.cli import main
 from orchestrator.commands.experiments import command_of
 from orchestrator.errors import ScenarioError, YawbenchError
 from orchestrator.experiments.experiment import load_experiment
+from orchestrator.fault_kinds import KINDS, CountedNoise, Fault, FaultLocation, FaultySignal
 from orchestrator.figures.panels import FAULTY, LabelledRun
 from orchestrator.figures.plots import draw
-from orchestrator.master.fault_injection import CountedNoise, disturbance
 from orchestrator.master.log import Log
 from orchestrator.master.master import Master
 from orchestrator.master.process_state import StopFlag
 from orchestrator.master.simulate import simulate, simulate_in_memory
-from orchestrator.plan import Fault, Override
+from orchestrator.plan import Override
 from orchestrator.results.freshness import key_of, staleness
 from orchestrator.results.read import load_results
-from orchestrator.scenario.fault_schema import KINDS
 from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import read_changes
 from orchestrator.wiring.make_plan import make_plan as plan_of_scenario
@@ -64,7 +63,17 @@ WIRES = ["source.x -> target.middle", "source.x -> target.end"]
 
 def faulty(kind, *, of_output, variable=None, **given):
     unit, name = ("source", "x") if of_output else ("target", variable)
-    return Fault(unit, name, of_output, kind, **{"begin": BEGIN, "end": END, **given})
+    return on(unit, name, of_output, kind, **{"begin": BEGIN, "end": END, **given})
+
+
+def on(unit, name, of_output, kind, value=None, stream=0, **given):
+    """Return a fault on a signal, with its value in the signal's unit."""
+    fault = Fault(FaultLocation(unit, name), kind, value, **given)
+    return FaultySignal(fault, unit, name, of_output, value, stream)
+
+
+def disturbance(signal, *, held):
+    return KINDS[signal.fault.kind].disturbance(signal, held)
 
 
 def witnessed(faults, algorithm, *, periods=None, step="1/8", n_steps=24, source=signal):
@@ -134,7 +143,7 @@ def test_a_fault_from_the_start_also_holds_at_initialization(algorithm):
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 def test_a_loop_with_a_faulty_wire_settles_at_the_start_and_moves_as_its_equation_says(algorithm):
     units = {"state": Integrator(), "law": Function(lambda t, u: {"rate": -u["x"]}, ["x"], ["rate"])}
-    fault = Fault("law", "x", False, "bias", 0.5)
+    fault = on("law", "x", False, "bias", 0.5)
     made = make_plan(
         units, ["state.x -> law.x", "law.rate -> state.rate"], step="1/1000", n_steps=2000,
         algorithm=algorithm, faults=[fault],
@@ -155,7 +164,7 @@ def test_faults_of_one_signal_act_one_after_the_other():
 
 
 def test_a_sampled_signal_that_is_late_stays_a_staircase():
-    late = disturbance(Fault("a", "x", True, "delay", 0.15), held=True)
+    late = disturbance(on("a", "x", True, "delay", 0.15), held=True)
     seen = [late(k / 10, float(k)) for k in range(6)]
     assert seen == [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]
 
@@ -165,7 +174,7 @@ def test_a_sampled_signal_that_is_late_stays_a_staircase():
 
 def drawn(kind, n=4000, step=0.01, x=lambda t: 0.0, **given):
     """Return what becomes of a signal at every step."""
-    made = Fault("a", "x", True, kind, **{"every": 0.01, "stream": 7, **given})
+    made = on("a", "x", True, kind, **{"every": 0.01, "stream": 7, **given})
     disturb = disturbance(made, held=False)
     return np.array([disturb(k * step, x(k * step)) for k in range(n)])
 
@@ -209,7 +218,7 @@ def test_what_is_random_disturbs_a_run_as_it_is_drawn(kind, algorithm):
 
 
 def test_numbers_are_those_of_their_message_whatever_was_asked_before():
-    fault = Fault("a", "x", True, "noise", 1.0, every=0.01, stream=2**63 + 5)
+    fault = on("a", "x", True, "noise", 1.0, every=0.01, stream=2**63 + 5)
     forth, back = (CountedNoise(fault, lambda made: made.standard_normal(1024)) for _ in range(2))
     times = [-0.02, 0.0, 0.07, 0.29, 12.0, 1e6]
     assert [forth.at(t) for t in times] == [back.at(t) for t in reversed(times)][::-1]
@@ -301,11 +310,9 @@ def test_an_option_and_a_file_say_the_same(folder):
     )
     assert by_file.faults == by_option.faults
     frozen, noisy = by_file.faults
-    assert frozen == Fault(
-        "gyro", "yaw_rate", True, "freeze", None, 0.5, 1.5, place="gyro.yaw_rate",
-        says="freeze from 0.5 s until 1.5 s",
-    )  # fmt: skip
-    assert (noisy.instance, noisy.variable, noisy.of_output, noisy.every) == (
+    assert frozen == on("gyro", "yaw_rate", True, "freeze", begin=0.5, end=1.5)
+    assert (str(frozen.fault.on), str(frozen.fault)) == ("gyro.yaw_rate", "freeze from 0.5 s until 1.5 s")
+    assert (noisy.instance, noisy.variable, noisy.of_output, noisy.fault.every) == (
         "gyro",
         "yaw_rate_true",
         False,
@@ -313,7 +320,7 @@ def test_an_option_and_a_file_say_the_same(folder):
     )
     assert noisy.value == pytest.approx(math.radians(0.5))
     assert by_file.changes == ()
-    assert str(by_option.changes[0]) == "--fault gyro.yaw_rate: freeze from 0.5 s until 1500 ms"
+    assert str(by_option.changes[0]) == "--fault gyro.yaw_rate: freeze from 0.5 s until 1.5 s"
 
 
 def test_an_option_takes_the_place_of_what_the_file_has_there(folder):
@@ -321,11 +328,11 @@ def test_an_option_takes_the_place_of_what_the_file_has_there(folder):
         "faults:\n  - {on: gyro.yaw_rate, kind: freeze}\n  - {on: plant.yaw_rate, kind: gain, value: 2}\n"
     )
     made = planned("gyro.yaw_rate: bias 1; drift 0.1", "gyro.yaw_rate: loss", text=text)
-    assert [(f.place, f.kind, f.value) for f in made.faults] == [
+    assert [(str(f.fault.on), f.fault.kind, f.value) for f in made.faults] == [
         ("plant.yaw_rate", "gain", 2.0), ("gyro.yaw_rate", "bias", 1.0), ("gyro.yaw_rate", "drift", 0.1),
         ("gyro.yaw_rate", "loss", 1.0),
     ]  # fmt: skip
-    assert [f.place for f in planned("gyro.yaw_rate: none", text=text).faults] == ["plant.yaw_rate"]
+    assert [str(f.fault.on) for f in planned("gyro.yaw_rate: none", text=text).faults] == ["plant.yaw_rate"]
     assert planned("gyro.yaw_rate: freeze", text=text).changes == ()
 
 
@@ -406,7 +413,7 @@ def test_a_run_with_a_fault_is_another_run(folder):
 
 def test_the_record_says_what_was_faulty_and_results_are_known_to_be_of_another_fault(tmp_path):
     units = {"source": Clock(x=signal), "target": Witness()}
-    frozen = faulty("freeze", of_output=True, place="source.x", says="freeze from 1 s until 2 s")
+    frozen = faulty("freeze", of_output=True)
     made = make_plan(units, WIRES, faults=[frozen])
     simulate(made, tmp_path, opener=Stage(units))
     assert load_results(tmp_path).run["faults"] == [
@@ -445,7 +452,7 @@ def test_faults_are_an_axis_of_an_experiment(folder):
     Path("sweep.yaml").write_text(CAMPAIGN)
     experiment = load_experiment(Path("sweep.yaml"))
     plans = [plan_of_scenario(load_scenario("a.yaml", changes=case.changes)) for case in experiment.cases]
-    told = [[f"{f.place}: {f.says}" for f in plan.faults] for plan in plans]
+    told = [[f"{f.fault.on}: {f.fault}" for f in plan.faults] for plan in plans]
     gain, late = "plant.yaw_rate: gain 1.1", "gyro.yaw_rate -> law: delay 20 ms"
     frozen = "gyro.yaw_rate: freeze from 1 s"
     off = ["gyro.yaw_rate: bias 1 deg/s", "gyro.yaw_rate: noise 0.1"]
@@ -459,9 +466,7 @@ def test_faults_are_an_axis_of_an_experiment(folder):
     ]
     assert len({key_of(plan) for plan in plans}) == 6
     of_option = load_experiment(Path("sweep.yaml"), changes=read_changes(faults=["plant.yaw_rate: none"]))
-    assert [
-        f.kind for f in plan_of_scenario(load_scenario("a.yaml", changes=of_option.cases[0].changes)).faults
-    ] == []
+    assert plan_of_scenario(load_scenario("a.yaml", changes=of_option.cases[0].changes)).faults == ()
 
 
 def test_faults_stay_data_on_the_way_from_where_they_are_written(folder):
@@ -470,15 +475,16 @@ def test_faults_stay_data_on_the_way_from_where_they_are_written(folder):
     Path("sweep.yaml").write_text(CAMPAIGN.replace("value: 1.1", f"value: {exact!r}, from: {exact!r}"))
     (change, *_) = load_experiment(Path("sweep.yaml")).cases[0].changes
     (fault,) = plan_of_scenario(load_scenario("a.yaml", changes=[change])).faults
-    assert (fault.value, fault.begin) == (exact, exact)
-    assert change.value == ({"kind": "gain", "value": exact, "from": exact},)
+    assert (fault.value, fault.fault.begin) == (exact, exact)
+    assert change.faults == (Fault(FaultLocation("plant", "yaw_rate"), "gain", exact, begin=exact),)
     assert str(change) == "sweep plant.yaw_rate: gain 0.123456789 from 0.123456789 s"
     one, other = read_changes(faults=["a.x: bias 1 deg until 2", "a.y: none"])
-    assert one.value == ({"kind": "bias", "value": "1 deg", "until": 2},)
+    assert one.faults == (Fault(FaultLocation("a", "x"), "bias", "1 deg", end=2.0),)
+    assert other.faults == ()
     assert (str(one), str(other)) == ("--fault a.x: bias 1 deg until 2 s", "--fault a.y: none")
     both = yb.load("a.yaml").fault("gyro.yaw_rate", kind="freeze", start=exact)
     both = both.fault("gyro.yaw_rate", kind="noise", value="1 deg/s", seed=3)
-    assert [(f.kind, f.begin, f.value) for f in both.plan().faults] == [
+    assert [(f.fault.kind, f.fault.begin, f.value) for f in both.plan().faults] == [
         ("freeze", exact, None),
         ("noise", -math.inf, pytest.approx(math.radians(1.0))),
     ]

@@ -18,7 +18,18 @@ PRODUCT = ("components", "vocabulary", "fmus", "orchestrator", "yawbench")
 ROOT = Path(__file__).parents[2]
 ORCHESTRATOR = Path(__file__).parents[2] / "orchestrator"
 STAGES = (
-    {"errors", "messages", "plan", "labels", "cache", "checksums", "files", "processes", "quiet"},
+    {
+        "errors",
+        "messages",
+        "fault_kinds",
+        "plan",
+        "labels",
+        "cache",
+        "checksums",
+        "files",
+        "processes",
+        "quiet",
+    },
     {"scenario"},
     {"fmu"},
     {"wiring"},
