@@ -19,7 +19,7 @@ from orchestrator.errors import BuildError
 from orchestrator.messages import printable
 
 HERE = Path(__file__).resolve().parent
-SOURCES = ("launcher.c", "fmi2.h", "find_python.h", "text.h")
+SOURCES = ("launcher.c", "calling_sequence.h", "fmi2.h", "find_python.h", "text.h")
 FLAGS = ("-std=c11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-Wl,--build-id=none", "-s")
 LIBRARIES = ("-ldl", "-pthread")
 STORE = "launcher"

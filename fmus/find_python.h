@@ -5,6 +5,7 @@
 #include <dlfcn.h>
 #include <limits.h>
 #include <link.h>
+#include <locale.h>
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -180,7 +181,8 @@ static bool is_plain_locale(void)
  *
  * We do it, not a PythonFMU library: the library that starts Python also ends it when it is
  * unloaded, under the feet of all other FMUs. Ours stays until the process ends. The home is named
- * because Python would search it from a python3 on PATH, which may be another one.
+ * because Python would search it from a python3 on PATH, which may be another one. Python sets the
+ * process's LC_CTYPE; the host gets its own back.
  */
 static void start_python(const Python *python, int minor)
 {
@@ -210,7 +212,13 @@ static void start_python(const Python *python, int minor)
     if (utf8_mode != NULL && is_plain_locale()) {
         *utf8_mode = 1;
     }
+    const char *set = setlocale(LC_CTYPE, NULL);
+    char *locale = set == NULL ? NULL : strdup(set);
     python->Py_InitializeEx(0);
+    if (locale != NULL) {
+        setlocale(LC_CTYPE, locale);
+    }
+    free(locale);
     python->PyEval_SaveThread();
 }
 

@@ -10,7 +10,8 @@
  *   and errors are logged even if debug logging is off, so that no host can miss them;
  * - after fmi2Fatal the instance has been released already: nothing is called on it any more;
  * - reset makes a new instance, because the library touches a freed list if that fails;
- * - arguments that are NULL, empty or no UTF-8 are refused instead of ending the process.
+ * - arguments that are NULL, empty or no UTF-8 are refused instead of ending the process;
+ * - a GUID of another FMU, calls out of order and steps from a wrong time are refused (calling_sequence.h).
  */
 #define _GNU_SOURCE
 
@@ -18,6 +19,7 @@
 #include <stdarg.h>
 #include <stdint.h>
 
+#include "calling_sequence.h"
 #include "fmi2.h"
 
 #include "find_python.h"
@@ -42,6 +44,12 @@ static struct {
 static Python python;
 static pthread_mutex_t loading = PTHREAD_MUTEX_INITIALIZER;
 
+/* What the host gets as the state of an instance. */
+typedef struct {
+    fmi2FMUstate stock; /* the library's */
+    Progress at;
+} State;
+
 typedef struct {
     fmi2Component stock; /* PythonFMU's instance */
     fmi2CallbackFunctions host;
@@ -53,10 +61,11 @@ typedef struct {
     bool error_logged; /* during the call in progress */
     bool failed;       /* an error has been logged since the last reset or restored state */
     bool dead;         /* PythonFMU's instance has been released by a fatal error */
+    Progress at;
     bool log_all;
     char **categories; /* the host's choice; none means all */
     size_t n_categories;
-    fmi2FMUstate *states; /* not freed yet */
+    State **states; /* not freed yet */
     size_t n_states;
 } Instance;
 
@@ -123,6 +132,13 @@ static inline fmi2Status checked(Instance *in, fmi2Status status)
 {
     return UNLIKELY(in->error_logged || status == fmi2Fatal) ? settled(in, status) : status;
 }
+
+/* Refuse a call, unless it is allowed. */
+#define ALLOWED(condition)                                                                                   \
+    Refusal why;                                                                                             \
+    if (UNLIKELY(!(condition))) {                                                                            \
+        return refused(in, why.text);                                                                        \
+    }
 
 static fmi2Status refused(Instance *in, const char *text)
 {
@@ -244,8 +260,22 @@ static bool is_complete(const char *folder)
     return named && exists("%s/%s.py", folder, module);
 }
 
+/* True if `guid` is the one that was packed with the resources. */
+static bool is_guid_of(const char *folder, const char *guid)
+{
+    char file[PATH_MAX], packed[64] = "";
+    int length = snprintf(file, sizeof file, "%s/guid.txt", folder);
+    FILE *text = length < (int)sizeof file ? fopen(file, "r") : NULL;
+    if (text == NULL) {
+        return false;
+    }
+    bool read = fgets(packed, sizeof packed, text) != NULL;
+    fclose(text);
+    return read && strcmp(packed, guid) == 0;
+}
+
 /* Return the resource folder as PythonFMU's library must be told it; NULL with a sentence in `problem`. */
-static char *find_resources(const char *location, char *problem, size_t size)
+static char *find_resources(const char *location, const char *guid, char *problem, size_t size)
 {
     char folder[PATH_MAX], own[PATH_MAX + sizeof "/../../resources"];
     char *decoded = strdup(location == NULL ? "" : without_scheme(location));
@@ -262,26 +292,30 @@ static char *find_resources(const char *location, char *problem, size_t size)
         snprintf(own, sizeof own, "%s/../../resources", folder);
     }
     const char *candidates[] = {decoded, plain, own};
-    char *found = NULL;
-    for (size_t i = 0; found == NULL && i < sizeof candidates / sizeof *candidates; i++) {
+    for (size_t i = 0; i < sizeof candidates / sizeof *candidates; i++) {
         if (candidates[i][0] != '\0' && realpath(candidates[i], folder) != NULL && is_complete(folder)) {
-            found = spelled_for_pythonfmu(folder);
+            char *found = spelled_for_pythonfmu(folder);
             if (found == NULL || !is_utf8(folder)) {
                 snprintf(problem, size, "the FMU lies in a folder that PythonFMU cannot read: %s", folder);
-                free(found);
+            } else if (!is_guid_of(folder, guid)) {
+                snprintf(problem, size,
+                         "the GUID is not that of this FMU: the model description is of another build");
+            } else {
                 free(decoded);
                 free(plain);
-                return NULL;
+                return found;
             }
+            free(found);
+            free(decoded);
+            free(plain);
+            return NULL;
         }
     }
-    if (found == NULL) {
-        snprintf(problem, size, "the FMU's resources are incomplete or not at %s",
-                 location == NULL ? "(none)" : location);
-    }
+    snprintf(problem, size, "the FMU's resources are incomplete or not at %s",
+             location == NULL ? "(none)" : location);
     free(decoded);
     free(plain);
-    return found;
+    return NULL;
 }
 
 /* ---- FMI: life cycle ---- */
@@ -315,6 +349,9 @@ static void choose_categories(Instance *in, size_t count, const fmi2String categ
 static void discard(Instance *in)
 {
     choose_categories(in, 0, NULL);
+    for (size_t i = 0; i < in->n_states; i++) {
+        free(in->states[i]);
+    }
     free(in->states);
     free(in->name);
     free(in->resources);
@@ -359,8 +396,8 @@ EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String 
     in->visible = visible;
     in->log_all = logging_on != fmi2False;
     in->guid = strdup(guid == NULL ? "" : guid);
-    if (!library.native) { /* a native unit needs none */
-        in->resources = find_resources(location, problem, sizeof problem);
+    if (!library.native && in->guid != NULL) { /* a native unit needs none */
+        in->resources = find_resources(location, in->guid, problem, sizeof problem);
     }
     if (in->resources == NULL && !library.native) {
         tell(functions, name, problem);
@@ -382,7 +419,7 @@ EXPORT void fmi2FreeInstance(fmi2Component c)
         return;
     }
     for (size_t i = 0; i < in->n_states; i++) {
-        library.FreeFMUstate(in->stock, &in->states[i]);
+        library.FreeFMUstate(in->stock, &in->states[i]->stock);
     }
     if (!in->dead) {
         library.FreeInstance(in->stock);
@@ -404,6 +441,7 @@ EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_def
                                       fmi2Real start, fmi2Boolean stop_defined, fmi2Real stop)
 {
     INSTANCE(c)
+    ALLOWED(set_up(&in->at, start, stop_defined, stop, &why))
     return checked(
         in, library.SetupExperiment(in->stock, tolerance_defined, tolerance, start, stop_defined, stop));
 }
@@ -411,18 +449,21 @@ EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_def
 EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
     INSTANCE(c)
+    ALLOWED(pass_on(&in->at, BEFORE_INITIALIZATION, DURING_INITIALIZATION, "fmi2EnterInitializationMode", &why))
     return checked(in, library.EnterInitializationMode(in->stock));
 }
 
 EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 {
     INSTANCE(c)
+    ALLOWED(pass_on(&in->at, DURING_INITIALIZATION, AFTER_INITIALIZATION, "fmi2ExitInitializationMode", &why))
     return checked(in, library.ExitInitializationMode(in->stock));
 }
 
 EXPORT fmi2Status fmi2Terminate(fmi2Component c)
 {
     INSTANCE(c)
+    ALLOWED(terminate(&in->at, &why))
     return checked(in, library.Terminate(in->stock));
 }
 
@@ -437,6 +478,7 @@ EXPORT fmi2Status fmi2Reset(fmi2Component c)
     library.FreeInstance(in->stock);
     in->stock = fresh;
     in->failed = false;
+    in->at = (Progress){.phase = BEFORE_INITIALIZATION};
     return checked(in, fmi2OK);
 }
 
@@ -487,17 +529,18 @@ SET(String, REQUIRE(all_utf8(n, value), "fmi2SetString: a string is missing or n
 
 /* ---- FMI: state ---- */
 
-/* Take note of a new state, so that none outlives its instance. */
-static void keep(Instance *in, fmi2FMUstate state)
+/* Take note of a new state, so that none outlives its instance; false where there is no memory for it. */
+static bool keep(Instance *in, State *state)
 {
-    fmi2FMUstate *states = realloc(in->states, (in->n_states + 1) * sizeof *states);
+    State **states = realloc(in->states, (in->n_states + 1) * sizeof *states);
     if (states != NULL) {
         in->states = states;
         states[in->n_states++] = state;
     }
+    return states != NULL;
 }
 
-static bool forget(Instance *in, fmi2FMUstate state)
+static bool forget(Instance *in, const State *state)
 {
     for (size_t i = 0; i < in->n_states; i++) {
         if (in->states[i] == state) {
@@ -506,6 +549,14 @@ static bool forget(Instance *in, fmi2FMUstate state)
         }
     }
     return false;
+}
+
+static fmi2Status release(Instance *in, State *state)
+{
+    forget(in, state);
+    fmi2Status status = library.FreeFMUstate(in->stock, &state->stock);
+    free(state);
+    return status;
 }
 
 static bool is_empty(fmi2FMUstate state)
@@ -520,21 +571,21 @@ static bool is_empty(fmi2FMUstate state)
 }
 
 /* Hand a new state over in place of the one that `*target` may hold; a failed unit gives an empty one. */
-static fmi2Status deliver(Instance *in, fmi2Status status, fmi2FMUstate fresh, fmi2FMUstate *target,
+static fmi2Status deliver(Instance *in, fmi2FMUstate fresh, Progress at, fmi2FMUstate *target,
                           const char *failure)
 {
-    if (status == fmi2OK && is_empty(fresh)) {
+    State *state = is_empty(fresh) ? NULL : malloc(sizeof *state);
+    if (state == NULL || !keep(in, state)) {
+        free(state);
         library.FreeFMUstate(in->stock, &fresh);
         return refused(in, failure);
     }
-    if (status == fmi2OK) {
-        if (*target != NULL && forget(in, *target)) {
-            library.FreeFMUstate(in->stock, target);
-        }
-        keep(in, fresh);
-        *target = fresh;
+    *state = (State){fresh, at};
+    if (*target != NULL && forget(in, *target)) {
+        release(in, *target);
     }
-    return status;
+    *target = state;
+    return fmi2OK;
 }
 
 EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
@@ -546,15 +597,18 @@ EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
     if (status == fmi2Error && fresh != NULL) {
         library.FreeFMUstate(in->stock, &fresh);
     }
-    return deliver(in, status, fresh, state, "fmi2GetFMUstate: the state is empty");
+    return status != fmi2OK ? status
+                            : deliver(in, fresh, in->at, state, "fmi2GetFMUstate: the state is empty");
 }
 
 EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
 {
     INSTANCE(c)
     REQUIRE(state != NULL, "fmi2SetFMUstate: no state given")
+    const State *saved = state;
     in->failed = false;
-    return checked(in, library.SetFMUstate(in->stock, state));
+    in->at = saved->at;
+    return checked(in, library.SetFMUstate(in->stock, saved->stock));
 }
 
 EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
@@ -566,18 +620,19 @@ EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
     if (state == NULL || *state == NULL) {
         return fmi2OK;
     }
-    forget(in, *state);
-    fmi2Status status = library.FreeFMUstate(in->stock, state);
+    fmi2Status status = release(in, *state);
     *state = NULL;
     return status;
 }
 
+/* A saved state in bytes: what the library makes of it, then how far the instance had come. */
 EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
 {
     INSTANCE(c)
     REQUIRE(state != NULL && size != NULL, "fmi2SerializedFMUstateSize: no state, or no place for its size")
-    fmi2Status status = checked(in, library.SerializedFMUstateSize(in->stock, state, size));
+    fmi2Status status = checked(in, library.SerializedFMUstateSize(in->stock, ((State *)state)->stock, size));
     REQUIRE(status != fmi2OK || *size > 0, "fmi2SerializedFMUstateSize: this state cannot be serialized")
+    *size += sizeof(Progress);
     return status;
 }
 
@@ -585,21 +640,31 @@ EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi
 {
     INSTANCE(c)
     REQUIRE(bytes != NULL, "fmi2SerializeFMUstate: no place for the bytes")
-    size_t needed = 0; /* the library copies `size` bytes, however many there are */
+    size_t needed = 0; /* the library copies as many as it is told, however many there are */
     fmi2Status status = fmi2SerializedFMUstateSize(c, state, &needed);
-    REQUIRE(status != fmi2OK || size >= needed, "fmi2SerializeFMUstate: the place for the bytes is too small")
-    return status != fmi2OK ? status
-                            : checked(in, library.SerializeFMUstate(in->stock, state, bytes, needed));
+    if (status != fmi2OK) {
+        return status;
+    }
+    REQUIRE(size >= needed, "fmi2SerializeFMUstate: the place for the bytes is too small")
+    const State *saved = state;
+    needed -= sizeof saved->at;
+    memcpy(bytes + needed, &saved->at, sizeof saved->at);
+    return checked(in, library.SerializeFMUstate(in->stock, saved->stock, bytes, needed));
 }
 
 EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
                                           fmi2FMUstate *state)
 {
+    static const char failure[] = "fmi2DeSerializeFMUstate: these bytes are no state of this FMU";
     INSTANCE(c)
     REQUIRE(bytes != NULL && state != NULL, "fmi2DeSerializeFMUstate: no bytes, or no place for the state")
+    Progress at;
+    REQUIRE(size > sizeof at, failure)
+    size -= sizeof at;
+    memcpy(&at, bytes + size, sizeof at);
     fmi2FMUstate fresh = NULL;
     fmi2Status status = checked(in, library.DeSerializeFMUstate(in->stock, bytes, size, &fresh));
-    return deliver(in, status, fresh, state, "fmi2DeSerializeFMUstate: these bytes are no state of this FMU");
+    return status != fmi2OK ? status : deliver(in, fresh, at, state, failure);
 }
 
 /* ---- FMI: step ---- */
@@ -607,7 +672,11 @@ EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[
 EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_set_state_prior)
 {
     INSTANCE(c)
+    ALLOWED(in->failed || may_step(&in->at, t, h, &why))
     fmi2Status status = checked(in, library.DoStep(in->stock, t, h, no_set_state_prior));
+    if (status <= fmi2Warning) {
+        in->at.time = t + h;
+    }
     return UNLIKELY(status == fmi2Discard && in->failed) ? fmi2Error : status;
 }
 
@@ -640,6 +709,15 @@ EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueR
     return checked(in, library.GetRealOutputDerivatives(in->stock, vr, n, order, value));
 }
 
+EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
+{
+    INSTANCE(c)
+    REQUIRE(value != NULL, "fmi2GetRealStatus: no place for the value")
+    REQUIRE(kind == fmi2LastSuccessfulTime, "fmi2GetRealStatus knows of fmi2LastSuccessfulTime alone")
+    *value = in->at.time;
+    return fmi2OK;
+}
+
 #define STATUS(Name, Type)                                                                                   \
     EXPORT fmi2Status fmi2Get##Name(fmi2Component c, const fmi2StatusKind kind, Type *value)                 \
     {                                                                                                        \
@@ -649,7 +727,6 @@ EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueR
     }
 
 STATUS(Status, fmi2Status)
-STATUS(RealStatus, fmi2Real)
 STATUS(IntegerStatus, fmi2Integer)
 STATUS(BooleanStatus, fmi2Boolean)
 STATUS(StringStatus, fmi2String)

@@ -44,7 +44,9 @@ def pack(
     content = hashlib.sha256(ElementTree.tostring(description))
     for path, data in files.items():
         content.update(path.encode() + b"\0" + hashlib.sha256(data).digest())
-    description.set("guid", f"{{{uuid.UUID(bytes=content.digest()[:16])}}}")
+    guid = f"{{{uuid.UUID(bytes=content.digest()[:16])}}}"
+    description.set("guid", guid)
+    files["resources/guid.txt"] = guid.encode()  # for the launcher, which refuses any other
     ElementTree.indent(description)
     files[DESCRIPTION] = ElementTree.tostring(description, encoding="UTF-8", xml_declaration=True) + b"\n"
     for library in LIBRARIES:

@@ -30,6 +30,7 @@ SHARED = (
     Path(__file__),
     HERE / "declaration.py",
     HERE / "unit.h",
+    HERE.parent / "calling_sequence.h",
     HERE.parent / "fmi2.h",
     HERE.parent / "compiler.py",
     HERE.parent / "packing.py",

@@ -18,6 +18,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "calling_sequence.h"
 #include "fmi2.h"
 
 #if defined _WIN32
@@ -30,6 +31,7 @@ typedef struct {
     Variables v;
     State state;
     double start_time;
+    Progress at;
     int initializing; /* until initialization ends, outputs follow what is set */
     int stale;        /* something has been set since the outputs were computed */
 } Content;
@@ -113,9 +115,9 @@ FMI2_EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2St
     }
     unit->host = *host;
     snprintf(unit->name, sizeof unit->name, "%s", name);
-    if (type != fmi2CoSimulation || strcmp(guid, GUID) != 0) {
+    if (type != fmi2CoSimulation || guid == NULL || strcmp(guid, GUID) != 0) {
         fail(unit, type != fmi2CoSimulation ? "this unit is for co-simulation"
-                                            : "the model description belongs to another build of this unit");
+                                            : "the GUID is not that of this FMU: the model description is of another build");
         free(unit);
         return NULL;
     }
@@ -131,21 +133,33 @@ FMI2_EXPORT void fmi2FreeInstance(fmi2Component c)
 FMI2_EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance,
                                            fmi2Real start_time, fmi2Boolean stop_defined, fmi2Real stop_time)
 {
-    (void)tolerance_defined, (void)tolerance, (void)stop_defined, (void)stop_time;
-    ((Unit *)c)->now.start_time = start_time;
-    ((Unit *)c)->now.stale = 1;
+    Unit *unit = c;
+    Refusal why;
+    (void)tolerance_defined, (void)tolerance;
+    if (!set_up(&unit->now.at, start_time, stop_defined, stop_time, &why)) {
+        return fail(unit, "%s", why.text);
+    }
+    unit->now.start_time = start_time;
+    unit->now.stale = 1;
     return fmi2OK;
 }
 
 FMI2_EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
-    (void)c;
-    return fmi2OK;
+    Unit *unit = c;
+    Refusal why;
+    return pass_on(&unit->now.at, BEFORE_INITIALIZATION, DURING_INITIALIZATION, "fmi2EnterInitializationMode", &why)
+               ? fmi2OK
+               : fail(unit, "%s", why.text);
 }
 
 FMI2_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 {
     Unit *unit = c;
+    Refusal why;
+    if (!pass_on(&unit->now.at, DURING_INITIALIZATION, AFTER_INITIALIZATION, "fmi2ExitInitializationMode", &why)) {
+        return fail(unit, "%s", why.text);
+    }
     fmi2Status status = unit->now.stale ? refresh(unit) : fmi2OK;
     unit->now.initializing = 0;
     return status;
@@ -154,16 +168,23 @@ FMI2_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 FMI2_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean keep)
 {
     (void)keep;
-    Content *now = &((Unit *)c)->now;
+    Unit *unit = c;
+    Content *now = &unit->now;
+    Refusal why;
+    if (!may_step(&now->at, t, h, &why)) {
+        return fail(unit, "%s", why.text);
+    }
     advance(&now->state, &now->v, t, h);
     output(&now->state, &now->v, t + h);
+    now->at.time = t + h;
     return fmi2OK;
 }
 
 FMI2_EXPORT fmi2Status fmi2Terminate(fmi2Component c)
 {
-    (void)c;
-    return fmi2OK;
+    Unit *unit = c;
+    Refusal why;
+    return terminate(&unit->now.at, &why) ? fmi2OK : fail(unit, "%s", why.text);
 }
 
 FMI2_EXPORT fmi2Status fmi2Reset(fmi2Component c)
@@ -288,6 +309,15 @@ FMI2_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size
     return fmi2OK; /* only errors are logged, and they always are */
 }
 
+FMI2_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
+{
+    if (kind != fmi2LastSuccessfulTime) {
+        return fail(c, "fmi2GetRealStatus knows of fmi2LastSuccessfulTime alone");
+    }
+    *value = ((Unit *)c)->now.at.time;
+    return fmi2OK;
+}
+
 #define FMI2_UNSUPPORTED(name, parameters)                                                                  \
     FMI2_EXPORT fmi2Status fmi2##name parameters { return fail(c, "fmi2%s is not supported", #name); }
 FMI2_UNSUPPORTED(GetDirectionalDerivative,
@@ -299,7 +329,6 @@ FMI2_UNSUPPORTED(GetRealOutputDerivatives, (fmi2Component c, const fmi2ValueRefe
                                             const fmi2Integer order[], fmi2Real values[]))
 FMI2_UNSUPPORTED(CancelStep, (fmi2Component c))
 FMI2_UNSUPPORTED(GetStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Status *value))
-FMI2_UNSUPPORTED(GetRealStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Real *value))
 FMI2_UNSUPPORTED(GetIntegerStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value))
 FMI2_UNSUPPORTED(GetBooleanStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value))
 FMI2_UNSUPPORTED(GetStringStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2String *value))

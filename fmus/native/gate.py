@@ -298,7 +298,6 @@ def compare(library: Path, guid: str, component: type[Any], resources: Path, ste
                 if beside.call("step", t, 0.001):
                     beside.outputs()
                     beside.call("step", t + 0.001, 0.001)
-                beside.call("step", t + 0.002, 0.0)
 
 
 def _restored(beside: _Beside, inputs: Iterator[list[float]], h: float, t: float) -> None:

@@ -10,6 +10,7 @@
  * which return 0, or 1 with the exception that the component would have raised in `problem`, and includes this
  * file last. What it does when is what components/fmi/component.py does, and so are its sentences. Nothing is
  * global, so any number of instances may live in any number of threads. */
+#include "calling_sequence.h"
 #include "fmi2.h"
 
 #if defined _WIN32
@@ -31,6 +32,7 @@ typedef struct {
     int stale;        /* something has been set since the outputs were computed */
     int configured;   /* since a parameter has been set */
     int failed;
+    Progress at;
     char wrong[LONGEST_TEXT]; /* the last text that was no choice */
 } Content;
 
@@ -79,6 +81,11 @@ static double *real_at(Unit *unit, size_t i)
 static int *other_at(Unit *unit, size_t i)
 {
     return (int *)((char *)&unit->now.content.v + DECLARED[i].place);
+}
+
+static fmi2Status refuse(const Unit *unit, const Refusal *why)
+{
+    return complain(unit, why->text);
 }
 
 /* Log an exception as the component would; the instance is of no more use. */
@@ -334,7 +341,11 @@ FMI2_EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranc
                                            fmi2Real start_time, fmi2Boolean stop_defined, fmi2Real stop_time)
 {
     UNIT(c)
-    (void)tolerance_defined, (void)tolerance, (void)stop_defined, (void)stop_time;
+    Refusal why;
+    (void)tolerance_defined, (void)tolerance;
+    if (!set_up(&now->at, start_time, stop_defined, stop_time, &why)) {
+        return refuse(unit, &why);
+    }
     now->start_time = start_time;
     now->stale = 1;
     return fmi2OK;
@@ -343,14 +354,22 @@ FMI2_EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranc
 FMI2_EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
     UNIT(c)
+    Refusal why;
     Problem problem;
+    if (!pass_on(&now->at, BEFORE_INITIALIZATION, DURING_INITIALIZATION, "fmi2EnterInitializationMode", &why)) {
+        return refuse(unit, &why);
+    }
     return bring_up_to_date(unit, &problem) ? fail(unit, "initialization failed", now->start_time, &problem) : fmi2OK;
 }
 
 FMI2_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 {
     UNIT(c)
+    Refusal why;
     Problem problem;
+    if (!pass_on(&now->at, DURING_INITIALIZATION, AFTER_INITIALIZATION, "fmi2ExitInitializationMode", &why)) {
+        return refuse(unit, &why);
+    }
     if (now->stale && refresh(unit, &problem)) {
         return fail(unit, "initialization failed", now->start_time, &problem);
     }
@@ -362,23 +381,29 @@ FMI2_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2B
 {
     UNIT(c)
     (void)keep;
+    Refusal why;
     Problem problem;
     double y[sizeof now->y / sizeof *now->y];
     if (now->failed) {
         return fmi2Error;
+    }
+    if (!may_step(&now->at, t, h, &why)) {
+        return refuse(unit, &why);
     }
     if (advance(&problem, &now->v, &now->c, &now->s, unit->now.lists, t, h) ||
         output(&problem, &now->v, &now->c, &now->s, unit->now.lists, y, t + h)) {
         return fail(unit, "step failed", t, &problem);
     }
     memcpy(now->y, y, sizeof y);
+    now->at.time = t + h;
     return fmi2OK;
 }
 
 FMI2_EXPORT fmi2Status fmi2Terminate(fmi2Component c)
 {
     UNIT(c)
-    return fmi2OK;
+    Refusal why;
+    return terminate(&now->at, &why) ? fmi2OK : refuse(unit, &why);
 }
 
 FMI2_EXPORT fmi2Status fmi2Reset(fmi2Component c)
@@ -680,6 +705,15 @@ FMI2_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size
     return fmi2OK; /* only errors are logged, and they always are */
 }
 
+FMI2_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
+{
+    UNIT(c)
+    REQUIRE(value != NULL, "fmi2GetRealStatus: no place for the value")
+    REQUIRE(kind == fmi2LastSuccessfulTime, "fmi2GetRealStatus knows of fmi2LastSuccessfulTime alone")
+    *value = now->at.time;
+    return fmi2OK;
+}
+
 #define UNSUPPORTED(name, parameters)                                                                       \
     FMI2_EXPORT fmi2Status fmi2##name parameters                                                            \
     {                                                                                                       \
@@ -695,7 +729,6 @@ UNSUPPORTED(GetRealOutputDerivatives,
             (fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Integer order[], fmi2Real values[]))
 UNSUPPORTED(CancelStep, (fmi2Component c))
 UNSUPPORTED(GetStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Status *value))
-UNSUPPORTED(GetRealStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Real *value))
 UNSUPPORTED(GetIntegerStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value))
 UNSUPPORTED(GetBooleanStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value))
 UNSUPPORTED(GetStringStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2String *value))

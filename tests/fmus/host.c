@@ -3,12 +3,13 @@
  *     host LIBRARY RESOURCES GUID FIRST_OUTPUT N_REALS [REFERENCE=VALUE ...]
  *
  * Prints the name of every logged message to stderr and all Real values after ten steps of 1 ms to
- * stdout. Exit status 0 if everything answered as the standard says, 1 if not, 2 if the library
+ * stdout. The process's locale must stay what it was. Exit status 0 if everything answered as the standard says, 1 if not, 2 if the library
  * cannot be loaded, 3 if it cannot be instantiated.
  */
 #define _GNU_SOURCE
 
 #include <dlfcn.h>
+#include <locale.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -110,6 +111,8 @@ int main(int argc, char *argv[])
     symbol = function("fmi2FreeInstance");
     memcpy(&free_instance, &symbol, sizeof symbol);
 
+    char locale[256];
+    snprintf(locale, sizeof locale, "%s", setlocale(LC_ALL, NULL));
     fmi2Component first = prepare(instantiate, argv, argc, "first", &callbacks);
     fmi2Component second = prepare(instantiate, argv, argc, "second", &callbacks);
     for (int k = 0; k < 10; k++) {
@@ -140,6 +143,7 @@ int main(int argc, char *argv[])
     CALL(FreeFMUstate, second, &copy);
     check(state == NULL && copy == NULL, "states freed");
 
+    check(strcmp(locale, setlocale(LC_ALL, NULL)) == 0, "the locale untouched");
     CALL(Reset, first);
     CALL(Terminate, second);
     for (size_t i = 0; i < n; i++) {

@@ -30,5 +30,5 @@ int main(int argc, char *argv[])
     fmi2InstantiateFn make;
     symbol = dlsym(library, "fmi2Instantiate");
     memcpy(&make, &symbol, sizeof symbol);
-    return make("unit", fmi2CoSimulation, "", argv[3], &callbacks, fmi2False, fmi2False) == NULL;
+    return make("unit", fmi2CoSimulation, argv[4], argv[3], &callbacks, fmi2False, fmi2False) == NULL;
 }

@@ -21,13 +21,14 @@ typedef struct {
     void *library;
     fmi2Component unit;
 } Loaded;
-static Loaded load(const char *binary, const char *resources)
+/* Load the FMU of a binary, its resources and its GUID. */
+static Loaded load(char *of[])
 {
-    Loaded l = {dlopen(binary, RTLD_NOW | RTLD_LOCAL), NULL};
+    Loaded l = {dlopen(of[0], RTLD_NOW | RTLD_LOCAL), NULL};
     fmi2InstantiateFn make;
     void *symbol = get(l.library, "fmi2Instantiate");
     memcpy(&make, &symbol, sizeof symbol);
-    l.unit = make("unit", fmi2CoSimulation, "", resources, &callbacks, fmi2False, fmi2False);
+    l.unit = make("unit", fmi2CoSimulation, of[2], of[1], &callbacks, fmi2False, fmi2False);
     return l;
 }
 static int call(Loaded l, const char *name)
@@ -55,12 +56,12 @@ static void unload(Loaded l)
 int main(int argc, char *argv[])
 {
     (void)argc;
-    Loaded first = load(argv[1], argv[2]), second = load(argv[3], argv[4]);
+    Loaded first = load(argv + 1), second = load(argv + 4);
     int status = call(first, "fmi2EnterInitializationMode") + call(first, "fmi2ExitInitializationMode");
     unload(first);
     status += call(second, "fmi2EnterInitializationMode") + call(second, "fmi2ExitInitializationMode");
     status += step(second);
-    first = load(argv[1], argv[2]);
+    first = load(argv + 1);
     status += call(first, "fmi2EnterInitializationMode") + call(first, "fmi2ExitInitializationMode");
     unload(second);
     status += step(first);

@@ -145,6 +145,7 @@ def test_an_archive_holds_what_the_fmu_needs_and_nothing_else(archive):
         "model.png",
         "modelDescription.xml",
         f"resources/{module}.py",
+        "resources/guid.txt",
         "resources/slavemodule.txt",
     ]
     inside = {name.removeprefix(f"resources/{package}/") for name in names if f"/{package}/" in name}

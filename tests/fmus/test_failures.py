@@ -161,13 +161,14 @@ def test_a_reset_makes_a_failed_unit_work_again(failing):
 
 
 def test_a_state_from_before_the_failure_makes_the_unit_work_again(failing):
-    unit = failing(where="advance", when=0.0005)
+    unit = failing(where="advance", when=0.0015)
     unit.start()
     unit.step(0.0)
     state = unit.save()
-    assert unit.try_step(0.001) == ERROR
+    unit.step(0.001)
+    assert unit.try_step(0.002) == ERROR
     unit.restore(state)
-    assert unit.try_step(0.0) == OK
+    assert unit.try_step(0.001) == OK
     assert unit.get("yaw_moment") == [2.0]
 
 

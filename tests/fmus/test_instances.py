@@ -150,7 +150,7 @@ def test_different_fmus_share_one_interpreter_that_no_unloading_ends(load, unpac
     program = compiled("host_two_fmus.c", tmp_path)
     arguments = []
     for fmu in (first, second):
-        arguments += [str(fmu.binary), (fmu.folder / "resources").as_uri()]
+        arguments += [str(fmu.binary), (fmu.folder / "resources").as_uri(), fmu.guid]
     environment = {"PATH": os.environ["PATH"], "YAWBENCH_UNITS": "python"}
     done = subprocess.run([program, *arguments], env=environment, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
@@ -164,7 +164,7 @@ def test_python_loaded_with_local_symbols_is_found_and_used(load, tmp_path, host
     fmu = load("driver_sine")
     program = compiled("host_local_python.c", tmp_path)
     for library in libraries:
-        command = [program, library, str(fmu.binary), (fmu.folder / "resources").as_uri()]
+        command = [program, library, str(fmu.binary), (fmu.folder / "resources").as_uri(), fmu.guid]
         # No other Python may be opened: this variable would lead to an error.
         environment = {"PATH": "/nowhere", "YAWBENCH_LIBPYTHON": "/nowhere", "YAWBENCH_UNITS": "python"}
         if "/usr/lib" not in library:

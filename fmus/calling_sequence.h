@@ -1,0 +1,97 @@
+/* Which call FMI 2.0 allows when, and the time that an instance has reached: one definition for the launcher,
+ * native units and units in C. What is refused leaves the instance as it was. */
+#ifndef YAWBENCH_CALLING_SEQUENCE_H
+#define YAWBENCH_CALLING_SEQUENCE_H
+
+#include <math.h>
+#include <stdio.h>
+
+enum { BEFORE_INITIALIZATION, DURING_INITIALIZATION, AFTER_INITIALIZATION, AFTER_TERMINATE };
+
+typedef struct {
+    int phase;
+    int stop_defined;
+    double time; /* reached [s] */
+    double stop; /* [s] */
+} Progress;
+
+typedef struct {
+    char text[160];
+} Refusal;
+
+/* Hosts compute their times by sums, products or from whole nanoseconds: a time within this counts as the same.
+ * A hundredth of the step is far more than any of them is off, and far less than a step too many. */
+static inline double time_tolerance(const Progress *at, double h)
+{
+    return 0.01 * h + 1e-12 * fabs(at->time);
+}
+
+static inline int not_allowed(const Progress *at, const char *call, Refusal *why)
+{
+    static const char *const when[] = {"before initialization", "during initialization", "after initialization",
+                                       "after fmi2Terminate"};
+    snprintf(why->text, sizeof why->text, "%s is not allowed %s", call, when[at->phase]);
+    return 0;
+}
+
+/* Write a refusal that holds one or two numbers, with a point whatever the host's locale. */
+static inline int refuse_step(Refusal *why, const char *format, double x, double y)
+{
+    snprintf(why->text, sizeof why->text, format, x, y);
+    for (char *c = why->text; *c != '\0'; c++) {
+        if (*c == ',') {
+            *c = '.';
+        }
+    }
+    return 0;
+}
+
+/* Note a call that leads from one phase to another; 0 with the reason if it is not allowed now. */
+static inline int pass_on(Progress *at, int from, int to, const char *call, Refusal *why)
+{
+    if (at->phase != from) {
+        return not_allowed(at, call, why);
+    }
+    at->phase = to;
+    return 1;
+}
+
+static inline int set_up(Progress *at, double start, int stop_defined, double stop, Refusal *why)
+{
+    if (at->phase != BEFORE_INITIALIZATION) {
+        return not_allowed(at, "fmi2SetupExperiment", why);
+    }
+    at->time = start, at->stop_defined = stop_defined != 0, at->stop = stop;
+    return 1;
+}
+
+/* Hosts terminate what failed in initialization as well. */
+static inline int terminate(Progress *at, Refusal *why)
+{
+    if (at->phase == AFTER_TERMINATE) {
+        return not_allowed(at, "fmi2Terminate", why);
+    }
+    at->phase = AFTER_TERMINATE;
+    return 1;
+}
+
+/* 1 if the instance may step from t to t + h [s], 0 with the reason if not. */
+static inline int may_step(const Progress *at, double t, double h, Refusal *why)
+{
+    if (at->phase != AFTER_INITIALIZATION) {
+        return not_allowed(at, "fmi2DoStep", why);
+    }
+    if (!(h > 0.0 && h < HUGE_VAL)) {
+        return refuse_step(why, "fmi2DoStep: the step must be positive and finite (got %.9g s)", h, 0.0);
+    }
+    double tolerance = time_tolerance(at, h);
+    if (!(fabs(t - at->time) <= tolerance)) {
+        return refuse_step(why, "fmi2DoStep at t = %.9g s: the instance has reached t = %.9g s", t, at->time);
+    }
+    if (at->stop_defined && t + h > at->stop + tolerance) {
+        return refuse_step(why, "fmi2DoStep to t = %.9g s: the stop time is %.9g s", t + h, at->stop);
+    }
+    return 1;
+}
+
+#endif

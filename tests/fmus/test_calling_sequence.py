@@ -1,0 +1,203 @@
+"""A wrong GUID, calls out of order, steps from a wrong time: refused by every FMU, native and in Python."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import os
+import random
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from fmus.build import build_component, find_components
+from orchestrator.commands.new import begin
+from tests.fmus.bare import ERROR, OK, Fmu, Refused, Unit
+from tests.fmus.plausible import plausible
+
+IN_C = "a unit in C"
+H = 0.002
+LAST_SUCCESSFUL_TIME = 2
+
+pytestmark = [
+    pytest.mark.parametrize("runs_as", ["native", "python"]),
+    pytest.mark.parametrize("name", [IN_C, *find_components()]),
+    pytest.mark.sampled(12),
+]
+
+
+@pytest.fixture(scope="module")
+def fmu_of(archive, unpack, tmp_path_factory) -> Callable[[str, str], Fmu]:
+    """Return the FMU of a name, from a copy of its own for each way to run."""
+    loaded: dict[tuple[str, str], Fmu] = {}
+
+    def find(name: str, runs_as: str) -> Fmu:
+        if name == IN_C and runs_as == "python":
+            pytest.skip("it has no Python")
+        if (name, runs_as) not in loaded:
+            copy = tmp_path_factory.mktemp(runs_as) / "fmu"
+            shutil.copytree(unpack(in_c(copy.parent) if name == IN_C else archive(name)), copy)
+            loaded[name, runs_as] = fmu = Fmu(copy)
+            given = os.environ.pop("YAWBENCH_UNITS", None)
+            os.environ["YAWBENCH_UNITS"] = runs_as
+            Unit(fmu).free()  # the launcher decides at the first instance
+            del os.environ["YAWBENCH_UNITS"]
+            if given is not None:
+                os.environ["YAWBENCH_UNITS"] = given
+        return loaded[name, runs_as]
+
+    return find
+
+
+def in_c(folder: Path) -> Path:
+    for path, text in begin("controller", "idea", "c", in_checkout=True).files.items():
+        file = folder / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+    return build_component(folder / "components" / "controllers" / "idea", folder / "out")
+
+
+@pytest.fixture
+def unit(fmu_of, name, runs_as):
+    """An instance with plausible inputs, freed in the end."""
+    fmu = fmu_of(name, runs_as)
+    made = Unit(fmu, **plausible(fmu.names("input"), random.Random(fmu.name)))
+    yield made
+    made.free()
+
+
+def set_up(unit: Unit, start: float, stop: float | None = None) -> int:
+    times = ctypes.c_double(start), int(stop is not None), ctypes.c_double(stop or 0.0)
+    return unit.call("fmi2SetupExperiment", 0, ctypes.c_double(0.0), *times)
+
+
+def started(unit: Unit, start: float = 0.0, stop: float | None = None) -> None:
+    assert set_up(unit, start, stop) == OK
+    unit.do("fmi2EnterInitializationMode")
+    unit.do("fmi2ExitInitializationMode")
+
+
+def reached(unit: Unit) -> float:
+    time = ctypes.c_double(math.nan)
+    unit.do("fmi2GetRealStatus", LAST_SUCCESSFUL_TIME, ctypes.byref(time))
+    return time.value
+
+
+def refusal(unit: Unit, call: str, *arguments: object) -> str:
+    """Make a call that must be refused with one sentence, and return that."""
+    before = len(unit.log)
+    assert unit.call(call, *arguments) == ERROR
+    ((status, category, text),) = unit.log[before:]
+    assert (status, category) == (ERROR, "logStatusError")
+    return text
+
+
+def step_refused(unit: Unit, t: float, h: float = H) -> str:
+    return refusal(unit, "fmi2DoStep", ctypes.c_double(t), ctypes.c_double(h), 1)
+
+
+def test_another_guid_is_refused_with_a_sentence(fmu_of, name, runs_as):
+    fmu = fmu_of(name, runs_as)
+    right = fmu.guid
+    try:
+        for fmu.guid in ("", "{00000000-0000-0000-0000-000000000000}", right[:-1], right + " "):
+            with pytest.raises(Refused, match="the GUID is not that of this FMU"):
+                Unit(fmu)
+    finally:
+        fmu.guid = right
+    Unit(fmu).free()
+
+
+def test_calls_out_of_order_are_refused_and_change_nothing(unit):
+    assert step_refused(unit, 0.0) == "fmi2DoStep is not allowed before initialization"
+    assert refusal(unit, "fmi2ExitInitializationMode").endswith("is not allowed before initialization")
+    unit.do("fmi2EnterInitializationMode")
+    assert step_refused(unit, 0.0) == "fmi2DoStep is not allowed during initialization"
+    assert refusal(unit, "fmi2EnterInitializationMode").endswith("is not allowed during initialization")
+    times = [ctypes.c_double(0.0)] * 2
+    assert refusal(unit, "fmi2SetupExperiment", 0, *times, 0, times[0]).endswith("during initialization")
+    unit.do("fmi2ExitInitializationMode")
+    assert refusal(unit, "fmi2SetupExperiment", 0, *times, 0, times[0]).endswith("after initialization")
+    unit.step(0.0, H)
+    unit.do("fmi2Terminate")
+    assert step_refused(unit, H) == "fmi2DoStep is not allowed after fmi2Terminate"
+    assert refusal(unit, "fmi2Terminate") == "fmi2Terminate is not allowed after fmi2Terminate"
+    unit.outputs()
+    unit.do("fmi2Reset")
+    started(unit)
+    unit.step(0.0, H)
+
+
+@pytest.mark.parametrize("h", [0.0, -H, math.nan, math.inf, -math.inf])
+def test_a_step_that_is_not_positive_and_finite_is_refused(unit, h):
+    started(unit)
+    unit.step(0.0, H)
+    before = unit.outputs()
+    said = step_refused(unit, H, h)
+    assert said.startswith("fmi2DoStep: the step must be positive and finite (got ")
+    assert (reached(unit), unit.outputs()) == (H, before)
+    unit.step(H, H)
+
+
+def test_a_step_from_another_time_than_the_one_reached_is_refused(unit):
+    started(unit, 0.5)
+    for t in (0.0, 0.5 - H, 0.5 + H, math.nan, math.inf):
+        assert step_refused(unit, t).endswith("the instance has reached t = 0.5 s")
+    unit.step(0.5, H)
+    assert step_refused(unit, 0.5) == "fmi2DoStep at t = 0.5 s: the instance has reached t = 0.502 s"
+    unit.step(0.5 + H, H)
+
+
+def test_the_time_reached_is_that_of_the_last_step_that_succeeded(unit):
+    assert set_up(unit, 0.25) == OK
+    assert reached(unit) == 0.25
+    started(unit, 0.25)
+    unit.step(0.25, H)
+    step_refused(unit, 0.25)
+    assert reached(unit) == 0.25 + H
+    with pytest.raises(Refused):
+        unit.do("fmi2GetRealStatus", 0, ctypes.byref(ctypes.c_double()))
+    unit.do("fmi2Reset")
+    assert reached(unit) == 0.0
+
+
+def test_no_step_leads_beyond_the_stop_time(unit):
+    started(unit, 0.0, 3 * H)
+    for k in range(3):
+        unit.step(k * H, H)
+    assert step_refused(unit, 3 * H) == "fmi2DoStep to t = 0.008 s: the stop time is 0.006 s"
+    assert reached(unit) == 3 * H
+
+
+def test_the_time_reached_is_saved_and_restored_with_the_state(unit):
+    started(unit, 0.0, 5 * H)
+    unit.step(0.0, H)
+    saved = unit.save()
+    content = unit.to_bytes(saved)
+    unit.step(H, H)
+    unit.step(2 * H, H)
+    for state in (saved, unit.from_bytes(content)):
+        unit.restore(state)
+        assert reached(unit) == H
+        step_refused(unit, 2 * H)
+        unit.step(H, H)
+    unit.do("fmi2Reset")
+    unit.restore(saved)
+    unit.step(H, H)
+    assert step_refused(unit, 2 * H, 4 * H).endswith("the stop time is 0.01 s")
+
+
+@pytest.mark.parametrize("times", ["sums", "products", "whole nanoseconds", "single precision"])
+def test_times_that_hosts_round_are_taken(unit, times):
+    third, n = 0.001 / 3, 400
+    points = {
+        "sums": lambda k: sum([third] * k, 7.0),
+        "products": lambda k: 7.0 + k * third,
+        "whole nanoseconds": lambda k: round((7.0 + k * third) * 1e9) * 1e-9,
+        "single precision": lambda k: ctypes.c_float(7.0 + k * third).value,
+    }[times]
+    started(unit, 7.0, points(n))
+    for k in range(n):
+        unit.step(points(k), third)
