@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from components.fmi.component import Component
 from orchestrator.errors import ScenarioError
-from orchestrator.experiments.execution import finish, left_to_do
+from orchestrator.experiments.execution import Executor, finish, left_to_do
 from orchestrator.experiments.jobs import Job, OnOutcome, PlanningCache, run_job
 from orchestrator.experiments.journal import Journal
 from orchestrator.experiments.ranking import UNIT, EntrySpec, load_ranking
-from orchestrator.experiments.ranking_scores import RankingResult, drive_ranking
+from orchestrator.experiments.ranking_scores import RankingResult, run_ranking
 from orchestrator.experiments.ranking_tables import (
     columns_of_cells,
     columns_of_entries,
@@ -104,8 +104,8 @@ def rank(
         def make(_: str, jobs: Sequence[Job]) -> None:
             finish(left_to_do(jobs, journal.records), journal, runner=runner)
 
-        base = Job("", loaded.path, folder, format="parquet", keep=out is not None)
-        return Ranking(drive_ranking(loaded, base, journal, once, make))
+        execute = Executor(folder, journal, once, make, {"format": "parquet"})
+        return Ranking(run_ranking(loaded, execute, keep=out is not None))
 
 
 def _entry(given: Any, name: str) -> tuple[dict[str, EntrySpec], dict[Path, PythonComponent]]:

@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -18,9 +18,11 @@ from ..messages import counted, printable
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from ..experiments.execution import Executor
     from ..experiments.jobs import Job, Outcome
     from ..experiments.journal import Journal
     from ..experiments.outcome import Each
+    from ..experiments.planning import PlannedExperiment
     from ..experiments.tables import Table
     from .options import RunOptions
 
@@ -69,6 +71,36 @@ def stoppable(folder: Path) -> Iterator[None]:
     except KeyboardInterrupt as error:
         number = Interrupted.of(error).number
         raise Interrupted(f"Interrupted; what was recorded until then: {folder}", number=number) from None
+
+
+@contextlib.contextmanager
+def executing(identity: str, folder: Path, wishes: RunOptions, **of_jobs: Any) -> Iterator[Executor]:
+    """Provide the executor of experiments in a results folder, with its journal.
+
+    Args:
+        identity: of the experiments in the folder.
+        folder: locked results folder.
+        wishes: the options of the command.
+        of_jobs: fields of all jobs in place of the options'.
+
+    Raises:
+        YawbenchError: the folder holds another experiment, or cannot be written.
+    """
+    from ..experiments.execution import Executor
+    from ..experiments.jobs import PlanningCache
+    from ..experiments.journal import Journal
+    from ..fmu.opener import stale_fmus
+
+    def on_planned(planned: PlannedExperiment) -> None:
+        for note in stale_fmus(planned.fmus.values()):
+            say(f"note: {note}")
+
+    with contextlib.closing(Journal(folder, identity, fresh=wishes.fresh)) as journal:
+        yield Executor(
+            folder, journal, PlanningCache(build=wishes.build),
+            lambda title, jobs: make(title, jobs, wishes, journal),
+            wishes.of_jobs | of_jobs, lambda total: bar("planning", total, quiet=True), on_planned,
+        )  # fmt: skip
 
 
 def make(

@@ -9,7 +9,7 @@ import typer
 
 from .experiments import command_of
 from .options import MAKING, RunOptions, named, takes
-from .progress import bar, hold, make, pooled, print_tables, say, stoppable
+from .progress import executing, hold, pooled, print_tables, say, stoppable
 
 if TYPE_CHECKING:
     from ..experiments.outcome import Each
@@ -58,13 +58,9 @@ def rank(
     have been made already, of the same scenario, FMUs and program, are not made again; an entry that lacks
     some has no place. A ranking that was stopped goes on where it was.
     """
-    import contextlib
-
     from ..errors import ScenarioError
-    from ..experiments.jobs import Job, PlanningCache
-    from ..experiments.journal import Journal
     from ..experiments.ranking import load_ranking
-    from ..experiments.ranking_scores import drive_ranking
+    from ..experiments.ranking_scores import run_ranking
     from ..experiments.ranking_tables import table_of
     from ..messages import hint
     from ..results.folder import default_folder
@@ -78,16 +74,8 @@ def rank(
             )
     folder = wishes.out or default_folder(file)
     hold(context, folder)
-    base = Job("", file, folder, **wishes.of_jobs | {"format": "parquet"})
-    with (
-        stoppable(folder),
-        contextlib.closing(Journal(folder, ranking.identity, fresh=wishes.fresh)) as journal,
-    ):
-        ranked = drive_ranking(
-            ranking, base, journal, PlanningCache(build=wishes.build),
-            lambda title, jobs: make(title, jobs, wishes, journal),
-            only=only or (), planning=lambda total: bar("planning", total, quiet=True),
-        )  # fmt: skip
+    with stoppable(folder), executing(ranking.identity, folder, wishes, format="parquet") as execute:
+        ranked = run_ranking(ranking, execute, only=only or ())
         command = command_of("rank", file, quick=quick, controller=controller, condition=condition)
         _write(ranked, folder, command, pooled(context, wishes))
     print_tables([table_of(ranked, "gains", "speed lost", "chatter")])
@@ -135,9 +123,7 @@ def _write(ranked: RankingResult, folder: Path, command: str, each: Each) -> Non
     from ..pages.ranking_page import ranking_page
     from ..pages.report import PAGE
 
-    kept = [
-        (one.job.out, one.angle) for one in ranked.drives if one.job and one.job.keep and one.job.out.is_dir()
-    ]
+    kept = [(run.picture, run.angle) for run in ranked.runs if run.picture and run.picture.is_dir()]
     list(each(draw_run, *zip(*kept, strict=True)) if kept else ())
     for name, columns in (
         ("table", columns_of_entries),

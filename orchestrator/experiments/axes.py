@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -265,6 +265,12 @@ class Level:
 
     value: Value
     words: str
+
+
+def axis_of_levels(place: str, levels: Iterable[Level], **more: Any) -> DesignAxisSpec:
+    """Return an axis over computed levels of a target; `more`: its other fields."""
+    values = {one.value: one.words for one in levels}
+    return DesignAxisSpec.model_construct(vary=[place], values=values, **more)
 
 
 def levels_of(axis: AxisSpec) -> list[Level]:

@@ -32,11 +32,10 @@ from ..plan import Value as Plain
 from ..results.read import Results
 from ..scenario.load import load_scenario
 from ..scenario.overrides import is_path, swap_of
-from .experiment import LoadedExperiment, NamedRun
+from .experiment import LoadedExperiment, NamedRun, experiment_of
 from .judged_schema import text_of
 from .outcome import ExperimentResult
 from .record import TableColumn
-from .schema import ExperimentSpec
 from .tables import Cell, Table, marked, remarks
 
 if TYPE_CHECKING:
@@ -55,6 +54,11 @@ PANELS = (
 )
 FIGURES = {"overview": PANELS, "wheel_torques": ("wheel_torque_*",)}
 """Figure name -> panels."""
+FIGURE_SPECS = [
+    {"name": name, "title": name.replace("_", " ").capitalize(), "runs": ["*"], "panels": [*panels]}
+    for name, panels in FIGURES.items()
+]
+"""The same as in an experiment file."""
 
 
 def comparison(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) -> LoadedExperiment:
@@ -62,27 +66,8 @@ def comparison(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]
     runs = variants(scenario, swaps, changes)
     title = load_scenario(scenario, changes=changes).title or scenario.stem
     exchanged = " and ".join(dict.fromkeys(text.partition("=")[0].strip() for text in swaps))
-    return of_runs(runs, f"{title} ({exchanged} exchanged)", scenario, changes, FIGURES)
-
-
-def of_runs(
-    runs: Sequence[NamedRun],
-    title: str,
-    path: Path,
-    changes: Sequence[Override],
-    figures: dict[str, tuple[str, ...]],
-) -> LoadedExperiment:
-    """Build an experiment without a file; `changes`: overrides of all runs; `figures`: name -> panels."""
-    given = {
-        "title": title,
-        "runs": [{"name": run.name, "scenario": run.scenario.name} for run in runs],
-        "figures": [
-            {"name": name, "title": name.replace("_", " ").capitalize(), "runs": ["*"], "panels": [*panels]}
-            for name, panels in figures.items()
-        ],
-    }
-    spec = ExperimentSpec.model_validate(given)
-    return LoadedExperiment(path, spec, {run.name: run for run in runs}, (), tuple(changes))
+    title = f"{title} ({exchanged} exchanged)"
+    return experiment_of(scenario, runs, changes=changes, title=title, figures=FIGURE_SPECS)
 
 
 def variants(scenario: Path, swaps: Sequence[str], changes: Sequence[Override]) -> list[NamedRun]:
@@ -209,7 +194,7 @@ def refinements(
             label = f"{algorithm}, {_milliseconds(float(step))}"
             runs.append(NamedRun(name, label, label, scenario, refined))
     title = with_changes(f"Convergence of {signal}, {scenario.stem}", changes)
-    return of_runs(runs, title, scenario, changes, {})
+    return experiment_of(scenario, runs, changes=changes, title=title)
 
 
 def _milliseconds(step: float) -> str:

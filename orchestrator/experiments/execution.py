@@ -1,22 +1,86 @@
-"""Execution of an experiment's jobs: which are still to be run, by which runner, noted in the journal."""
+"""Execution of experiments: which runs are still to be made, by which runner, noted in the journal.
+
+An experiment may depend on the results of earlier ones in the same folder: the next generation of a search,
+amplitudes that are multiples of a measured angle, the next step of a bisection. Such a sequence is a function
+that builds experiments and hands each to an `Executor`. It is deterministic and finished runs are in the
+journal, so calling it again resumes it where it was interrupted.
+"""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from .. import checksums
 from ..errors import ResultsError, ScenarioError
 from ..metrics.run_metrics import metric, results_to_be, unit_in
 from ..plan import Plan
 from ..results.freshness import altered, staleness
-from .jobs import Job, MeasuredRun, MetricRequests, OnOutcome, Outcome, read_back
+from .experiment import Case, LoadedExperiment, NamedRun
+from .jobs import Job, MeasuredRun, MetricRequests, OnOutcome, Outcome, PlanningCache, read_back, ready
 from .journal import Journal
+from .outcome import ExperimentResult, judge_records
+from .planning import PlannedExperiment, plan_experiment
 from .workers import execute
 
 Runner = Callable[[Sequence[Job], OnOutcome], object]
 """Executes jobs and reports each outcome; see `runner_of`."""
+MakeRuns = Callable[[str, Sequence[Job]], object]
+"""Executes those of the jobs that are not in the journal, under a title, and adds them to it."""
+ShowProgress = Callable[[int], AbstractContextManager[Callable[[int], None]]]
+"""Shows the progress of planning a number of runs."""
+
+
+@dataclass(frozen=True)
+class Executor:
+    """Executes experiments in one results folder, with one journal and one cache of files and FMUs."""
+
+    folder: Path
+    journal: Journal
+    once: PlanningCache
+    make: MakeRuns
+    of_jobs: Mapping[str, Any] = field(default_factory=dict)  # fields of all jobs, see `jobs_of`
+    planning: ShowProgress = lambda total: nullcontext(lambda done: None)
+    on_planned: Callable[[PlannedExperiment], object] = lambda planned: None
+
+    def plans(self, runs: Iterable[NamedRun]) -> list[Plan]:
+        """Return the plans of named runs, for experiments that depend on values in their scenarios.
+
+        Raises:
+            ScenarioError: some of the runs cannot start; lists each problem once.
+        """
+        jobs = [Job(run.label, run.scenario, self.folder, run.changes, **self.of_jobs) for run in runs]
+        return [job.plan for job in ready(jobs, once=self.once) if job.plan]
+
+    def __call__(
+        self,
+        experiment: LoadedExperiment,
+        *,
+        only: Callable[[Case], bool] = lambda case: True,
+        **of_jobs: Any,
+    ) -> ExperimentResult:
+        """Execute the missing runs of an experiment with axes and return its result.
+
+        Args:
+            experiment: with axes.
+            only: whether a missing case is executed; a finished one counts in any case.
+            of_jobs: fields of all jobs in place of the executor's.
+
+        Raises:
+            YawbenchError: a run cannot start; none has been started.
+        """
+        with self.planning(len(experiment.cases)) as progress:
+            planned = plan_experiment(
+                experiment, self.folder, once=self.once, progress=progress, **{**self.of_jobs, **of_jobs}
+            )
+        self.on_planned(planned)
+        cases = zip(planned.experiment.cases, planned.jobs, strict=True)
+        self.make(experiment.spec.title, [job for case, job in cases if only(case)])
+        return judge_records(planned, self.journal.records)
 
 
 def left_to_do(jobs: Sequence[Job], records: Mapping[str, MeasuredRun]) -> list[Job]:

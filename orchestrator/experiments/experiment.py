@@ -8,8 +8,8 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
@@ -18,11 +18,13 @@ from typing import Any, TypeVar
 from ..errors import ScenarioError
 from ..files import reads
 from ..messages import hint, short
+from ..metrics.run_metrics import TimeWindow
 from ..plan import Override
 from ..scenario import overrides, yaml_lines
 from ..scenario.validation import validate
 from ..scenario.yaml_lines import Document, KeyPath
-from .axes import DesignPoint, changes_at, changes_of_file, points
+from .axes import DesignAxisSpec, DesignPoint, changes_at, changes_of_file, points
+from .jobs import TestRequest
 from .judged_schema import Claim, DerivedSpec
 from .names_check import check_axes, check_names
 from .schema import ChoiceSpec, ExperimentSpec, RunSpec
@@ -48,6 +50,9 @@ class NamedRun:
     row: str
     scenario: Path
     changes: tuple[Override, ...]
+    test: TestRequest | None = None  # the standard test that judges it
+    windows: Mapping[str, TimeWindow] = field(default_factory=dict)
+    """Key of a metric -> window [s] in place of the metric's."""
 
 
 @dataclass(frozen=True)
@@ -191,6 +196,10 @@ class LoadedExperiment:
     runs: dict[str, NamedRun]
     for_all: tuple[Override, ...] = ()  # by the file's own `swap`, `set`, ...
     by_options: tuple[Override, ...] = ()  # of all runs, on the command line
+    design: tuple[tuple[str, DesignPoint], ...] = ()
+    """Run and point of every case, where not all runs have the same points; empty: all runs at all points."""
+    origin: str = "sweep"
+    """Origin of the overrides that the axes make."""
 
     @property
     def changed(self) -> tuple[Override, ...]:
@@ -205,15 +214,15 @@ class LoadedExperiment:
     @cached_property
     def points(self) -> list[DesignPoint]:
         """All points of the design; without axes a single one without levels."""
-        return points(self.spec)
+        return list(dict.fromkeys(point for _, point in self.design)) or points(self.spec)
 
     @cached_property
     def cases(self) -> list[Case]:
-        """All runs at all points, ordered by run."""
-        pairs = itertools.product(self.runs.values(), self.points)
+        """All runs at all points, ordered by run, or those of `design`."""
+        pairs = self.design or itertools.product(self.runs, self.points)
         return [
             Case(number, run, point, (*self.for_all, *run.changes, *self.by_options, *self._at(point, run)))
-            for number, (run, point) in enumerate(pairs)
+            for number, (run, point) in enumerate((self.runs[name], point) for name, point in pairs)
         ]
 
     def setting(self, point: DesignPoint) -> DesignPoint:
@@ -251,7 +260,9 @@ class LoadedExperiment:
         return [self.runs[name] for name in dict.fromkeys(names)]
 
     def axis_of(self, place: str) -> tuple[str, str] | None:
-        """Return the axis, and the target on it, whose override a problem names; None if it names none."""
+        """Return the axis of the file, and the target on it, that a problem names; None if it names none."""
+        if self.design:
+            return None
         changes = itertools.chain.from_iterable(map(self._at, self.points))
         change = next((one for one in changes if str(one) == place), None)
         axes = self.spec.axes.items()
@@ -264,7 +275,36 @@ class LoadedExperiment:
             for axis, level in zip(self.spec.axes.values(), point, strict=True)
             if run is None or any(fnmatchcase(run.name, pattern) for pattern in axis.runs)
         ]
-        return [change for axis, level in pairs for change in changes_at(axis, level, self.path.parent)]
+        return [
+            change
+            for axis, level in pairs
+            for change in changes_at(axis, level, self.path.parent, self.origin)
+        ]
+
+
+def experiment_of(
+    path: Path,
+    runs: Iterable[NamedRun],
+    *,
+    changes: Sequence[Override] = (),
+    axes: Mapping[str, DesignAxisSpec] | None = None,
+    design: Sequence[tuple[str, DesignPoint]] = (),
+    origin: str = "sweep",
+    **keys: Any,
+) -> LoadedExperiment:
+    """Return an experiment that is not read from an experiment file.
+
+    Args:
+        path: the file that it is made of; its folder and name identify it.
+        runs: the named runs.
+        changes: overrides of all runs.
+        axes, design, origin: see `LoadedExperiment`.
+        keys: of the schema, such as its title, metrics and figures.
+    """
+    named = {run.name: run for run in runs}
+    listed = [{"name": run.name, "scenario": run.scenario.name} for run in named.values()]
+    spec = ExperimentSpec.model_validate({"runs": listed, **keys}).model_copy(update={"axes": axes or {}})
+    return LoadedExperiment(path, spec, named, (), tuple(changes), tuple(design), origin)
 
 
 @reads("experiment file", ScenarioError)

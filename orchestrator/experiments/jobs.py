@@ -18,6 +18,7 @@ from ..results.freshness import key_of
 from ..results.read import Results, load_results
 from ..scenario import yaml_lines
 from ..scenario.yaml_lines import Document
+from ..wiring.context import match
 
 if TYPE_CHECKING:
     from ..master.run_loop import OpenInstance
@@ -45,7 +46,7 @@ class Job:
     out: Path
     changes: tuple[Override, ...] = ()
     fmus: Path | None = None
-    record: tuple[str, ...] = ()  # signals; default: those the scenario records
+    record: tuple[str, ...] = ()  # signals, or patterns of names; default: those the scenario records
     format: str = "csv"  # of the results
     call_limit: float | None = None  # of an FMU call [s], isolates the instances; None: not isolated
     metrics: MetricRequests = ()  # computed when the run ends
@@ -160,11 +161,16 @@ def planned(job: Job, once: PlanningCache | None = None) -> tuple[LoadedScenario
     if not job.record:
         return scenario, plan
     recorded = {f"{unit}.{variable}": (unit, variable) for unit, variable in plan.record}
-    unknown = [name for name in job.record if name not in recorded]
+    unknown = [name for name in job.record if name not in recorded and "*" not in name]
     if unknown:
         guess = hint(unknown[0], recorded, lead="recorded are")
         raise ScenarioError(f"{job.scenario}: {unknown[0]!r} is not recorded{guess}")
-    return scenario, replace(plan, record=tuple(recorded[name] for name in job.record))
+    chosen = [
+        pair
+        for name, pair in recorded.items()
+        if any(match(pattern, one) is not None for pattern in job.record for one in (name, pair[1]))
+    ]
+    return scenario, replace(plan, record=tuple(chosen))
 
 
 def ready(

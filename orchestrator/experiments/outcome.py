@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -93,7 +94,7 @@ class ExperimentResult:
     @cached_property
     def at(self) -> dict[DesignPoint, dict[tuple[str, str], MetricValue]]:
         """Setting -> (run, metric) -> value, where there is one; over repeats the mean."""
-        return self._means(self._at_points)
+        return self._means(self._at_points, lambda key, setting: len(self._cases.get((key[0], setting), ())))
 
     @cached_property
     def _at_points(self) -> dict[DesignPoint, dict[tuple[str, str], MetricValue]]:
@@ -120,18 +121,24 @@ class ExperimentResult:
         return self.at[self.experiment.setting(case.point)].get((case.run.name, key))
 
     def _means(
-        self, found: Mapping[DesignPoint, Mapping[K, MetricValue]]
+        self,
+        found: Mapping[DesignPoint, Mapping[K, MetricValue]],
+        repeats_of: Callable[[K, DesignPoint], int] | None = None,
     ) -> dict[DesignPoint, dict[K, MetricValue]]:
-        """Return setting -> key -> mean over repeats, of the keys that all repeats have."""
+        """Return setting -> key -> mean over repeats, of the keys that all repeats have.
+
+        `repeats_of`: number of repeats of a key at a setting; default: all points of the setting.
+        """
         repeats: dict[DesignPoint, list[Mapping[K, MetricValue]]] = {}
         for point, values in found.items():
             repeats.setdefault(self.experiment.setting(point), []).append(values)
         means: dict[DesignPoint, dict[K, MetricValue]] = {}
         for setting, several in repeats.items():
             here = means[setting] = {}
-            for key in several[0]:
+            for key in dict.fromkeys(itertools.chain(*several)):
                 every = [values[key] for values in several if key in values]
-                over = interval([value.number for value in every]) if len(every) == len(several) else None
+                number = repeats_of(key, setting) if repeats_of else len(several)
+                over = interval([value.number for value in every]) if len(every) == number else None
                 if over is not None:
                     here[key] = MetricValue(over.mean, every[0].unit, over.half)
         return means

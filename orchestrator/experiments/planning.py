@@ -16,7 +16,7 @@ from ..scenario import quantities
 from ..scenario.yaml_lines import dotted
 from ..wiring.context import FACTS
 from .axes import AxisSpec, Level
-from .experiment import RUNS, Case, LoadedExperiment
+from .experiment import RUNS, Case, LoadedExperiment, NamedRun
 from .jobs import Job, MetricRequests, PlanningCache, keyed, ready
 from .judged_schema import MetricReference, MetricSpec, si_number
 
@@ -56,25 +56,32 @@ def number_of(axis: AxisSpec, level: Level, unit: str) -> float:
     return float(quantities.convert(f"{level.value!r} {axis.unit}", unit))
 
 
-def metrics_of(experiment: LoadedExperiment) -> MetricRequests:
-    """Return the metrics of an experiment as requests for its jobs."""
-    return tuple((key, spec.metric, spec.window) for key, spec in experiment.spec.metrics.items())
+def metrics_of(experiment: LoadedExperiment, run: NamedRun | None = None) -> MetricRequests:
+    """Return the metrics of an experiment as requests for jobs; those of a run have its own windows."""
+    windows = run.windows if run else {}
+    return tuple(
+        (key, spec.metric, windows.get(key, spec.window)) for key, spec in experiment.spec.metrics.items()
+    )
 
 
-def jobs_of(experiment: LoadedExperiment, out: Path, *, keep: bool = True, **of_jobs: Any) -> list[Job]:
+Keep = bool | Callable[[Case], bool]
+"""Whether runs along axes keep their results: all or none, or those of chosen cases."""
+
+
+def jobs_of(experiment: LoadedExperiment, out: Path, *, keep: Keep = True, **of_jobs: Any) -> list[Job]:
     """Return a job for every case, not planned yet.
 
     Args:
         experiment: as loaded.
         out: its results folder.
-        keep: whether runs along axes keep their results; named runs always do.
+        keep: which runs along axes keep their results; named runs always do.
         of_jobs: other fields of all jobs.
     """
     axes = bool(experiment.spec.axes)
     return [
         Job(
             case.label, case.run.scenario, out / (RUNS if axes else case.run.name), case.changes,
-            keep=keep or not axes, **of_jobs,
+            keep=not axes or (keep(case) if callable(keep) else keep), test=case.run.test, **of_jobs,
         )
         for case in experiment.cases
     ]  # fmt: skip
@@ -88,7 +95,7 @@ def plan_experiment(
     progress: Callable[[int], None] = lambda done: None,
     **of_jobs: Any,
 ) -> PlannedExperiment:
-    """Plan all cases (see `ready`); an experiment without metrics gets the standard ones it can compute.
+    """Plan all cases (see `ready`); one without metrics or tests gets the standard metrics it can compute.
 
     Args:
         experiment: as loaded.
@@ -110,7 +117,7 @@ def plan_experiment(
     jobs = ready(jobs_of(experiment, out, **of_jobs), once=once, progress=progress, place=place)
     plans = [job.plan for job in jobs if job.plan]
     made_up = [*{tuple(plan.record): results_to_be(plan) for plan in plans}.values()]
-    if not experiment.spec.metrics:
+    if not experiment.spec.metrics and not any(job.test for job in jobs):
         found = {
             name: MetricSpec.model_validate({"metric": name})
             for name in STANDARD
@@ -119,7 +126,8 @@ def plan_experiment(
         experiment = replace(experiment, spec=experiment.spec.model_copy(update={"metrics": found}))
     units, metric_units = _units(experiment, plans), _metric_units(experiment, made_up)
     if experiment.spec.axes:
-        jobs = [keyed(job, metrics_of(experiment)) for job in jobs]
+        requests = {name: metrics_of(experiment, run) for name, run in experiment.runs.items()}
+        jobs = [keyed(job, requests[case.run.name]) for job, case in zip(jobs, experiment.cases, strict=True)]
         jobs = [replace(job, out=job.out / job.key[:12]) for job in jobs]
     else:
         jobs = [keyed(job) for job in jobs]

@@ -17,16 +17,15 @@
 A condition overrides its scenario like a run of a study. An entry swaps its FMU in for the instance
 `controller` and sets its parameters, the same in all conditions.
 
-The runs are jobs as in every experiment: planned before the first one starts, executed in separate
-processes, added to the journal as they end, and not executed again by the same build. The steering angle A is
-determined once for each car, on a dry road without control, so all controllers drive the same amplitudes.
-`ranking_scores` computes their scores.
+A ranking is two experiments. The first determines the steering angle A of every car, on a dry road without
+control, so that all controllers drive the same amplitudes. In the second, conditions are named runs; entry,
+repeats and amplitude (positive: left first) are axes. `ranking_scores` computes scores from its result.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -42,17 +41,20 @@ from ..evaluation.sine_with_dwell import amplitudes
 from ..evaluation.steering_tests import characteristic_angle
 from ..files import reads
 from ..messages import hint
-from ..plan import Override, Plan, Value
+from ..metrics.run_metrics import TimeWindow
+from ..plan import Override, Plan
 from ..scenario import overrides, yaml_lines
 from ..scenario.scenario_schema import Scalar
 from ..scenario.validation import StrictModel, Time, validate
-from .axes import OverrideSpec, changes_of_file
-from .jobs import Job, MeasuredRun, MetricRequests, PlanningCache, keyed, ready
-from .standard_test_runs import AMPLITUDE, SIDES, slow_steer_jobs, steered
+from .axes import DesignAxisSpec, Level, OverrideSpec, VariantSpec, axis_of_levels, changes_of_file
+from .execution import Executor
+from .experiment import Case, LoadedExperiment, NamedRun, experiment_of
+from .judged_schema import text_of
+from .outcome import ExperimentResult
+from .standard_test_runs import AMPLITUDE, SIDES, slow_steer_amplitude
 
 UNIT = "controller"
 """The instance that all entries swap."""
-NAME = r"^[\w.+-]+$"
 
 
 class CarSpec(OverrideSpec):
@@ -148,23 +150,20 @@ class RankingSpec(StrictModel):
         return self
 
 
-RUNS = "runs"
-"""Folder of the kept results: those of every cell's last amplitude."""
 SERIES, SLOW = "sine-with-dwell", "slowly-increasing-steer"
-METRICS: MetricRequests = (
-    ("effort", "effort(yaw_moment)", None),
-    ("chatter", "total_variation_rate(yaw_moment)", None),
-)
-"""Metrics besides those of the test and the intervention."""
-INTERVENTION = "effort(wheel_torque_*)"
-"""Measured from the beginning of steer: before it, wheel torque comes from the driver's accelerator."""
+METRICS = {
+    "intervention": "effort(wheel_torque_*)",
+    "effort": "effort(yaw_moment)",
+    "chatter": "total_variation_rate(yaw_moment)",
+}
+"""Metrics besides the test's; the intervention begins with steering: before, wheel torque is the driver's."""
 STEERING_BEGINS = "start_time"
 """Parameter of the driver: beginning of steer [s]."""
 RECORDED = (
-    "steering_wheel_angle", "yaw_rate", "sideslip", "acceleration_y", "velocity_x", "yaw_moment",
-    "wheel_torque", "torque_request",
+    "steering_wheel_angle*", "yaw_rate*", "sideslip*", "acceleration_y*", "velocity_x*", "yaw_moment*",
+    "wheel_torque*", "torque_request*",
 )  # fmt: skip
-"""Prefixes of the recorded signals; the others would only take space."""
+"""The recorded signals; the others would only take space."""
 
 
 @dataclass(frozen=True)
@@ -206,11 +205,17 @@ class LoadedRanking:
         ]
         return (*own, *(one for part in parts for one in changes_of_file(part, self.path.parent, "ranking")))
 
+    def variant(self, name: str) -> VariantSpec:
+        """Return an entry as a level of an axis: its controller is put into a scenario."""
+        spec, folder = self.entries[name]
+        elsewhere = overrides.is_path(spec.fmu) and folder != self.path.parent
+        fmu = str((folder / spec.fmu).absolute()) if elsewhere else spec.fmu
+        settings = {f"{UNIT}.{parameter}": value for parameter, value in spec.parameters.items()}
+        return VariantSpec.model_validate({"swap": {UNIT: fmu}, "set": settings})
+
     def changes_of_entry(self, name: str) -> list[Override]:
         """Return the overrides that put an entry's controller into a scenario."""
-        spec, folder = self.entries[name]
-        given = {f"{UNIT}.{parameter}": value for parameter, value in spec.parameters.items()}
-        return overrides.changes_of({UNIT: spec.fmu}, given, folder, "ranking")
+        return changes_of_file(self.variant(name), self.path.parent, "ranking")
 
     def changes_of_condition(self, name: str) -> tuple[Override, ...]:
         """Return the overrides that a condition makes in its scenario."""
@@ -269,126 +274,128 @@ def load_ranking(
     return LoadedRanking(path, spec, entries, quick, tuple(chosen), tuple(edited))
 
 
-def jobs_for_angles(ranking: LoadedRanking, base: Job, once: PlanningCache) -> dict[str, list[Job]]:
-    """Return car -> runs of slowly increasing steer, which determine A; `base`: as in `plan_drives`.
+def angle_experiment(ranking: LoadedRanking, execute: Executor) -> LoadedExperiment:
+    """Return the runs of slowly increasing steer to both sides that determine A, a named run per car.
 
     Raises:
-        ScenarioError: they cannot start.
+        ScenarioError: a scenario is wrong, or its driver has no amplitude.
     """
-    found = {}
+    runs = []
     for name in ranking.cars:
         car = ranking.spec.cars[name]
-        asis = replace(
-            base, label=name, scenario=ranking.path.parent / car.slow_steer, test=(SLOW, None), keep=False,
-            changes=ranking.changes(car, stop=False),
-        )  # fmt: skip
-        found[name] = slow_steer_jobs(asis, once)
-    return found
+        scenario, changes = ranking.path.parent / car.slow_steer, ranking.changes(car, stop=False)
+        runs.append(NamedRun(name, car.title, car.title, scenario, changes, (SLOW, None)))
+    given = [
+        slow_steer_amplitude(plan, run.scenario) for run, plan in zip(runs, execute.plans(runs), strict=True)
+    ]
+    design = [
+        (run.name, (Level(side * amplitude, words),))
+        for run, amplitude in zip(runs, given, strict=True)
+        for words, side in SIDES
+    ]
+    axes = {"side": axis_of_levels(AMPLITUDE, [level for _, (level,) in design])}
+    title = "A, the angle at 0.3 g"
+    return experiment_of(ranking.path, runs, title=title, axes=axes, design=design, origin="ranking")
 
 
-def angle_of(records: Sequence[MeasuredRun], car: str) -> float:
-    """Return the angle A of a car [rad] from its runs of slowly increasing steer.
+def angles_of(ranking: LoadedRanking, found: ExperimentResult) -> dict[str, float]:
+    """Return car -> angle A [rad], from the result of `angle_experiment`.
 
     Raises:
         ResultsError: the runs do not yield it.
     """
-    judged = []
-    for record in records:
-        found = record.values.get("angle")
-        one = Evaluation(car)
-        one.notes += [record.reason or "0.375 g is not reached"]
-        one.add("angle", "", found[0] if found else None, "rad")
-        judged.append(one)
-    try:
-        return characteristic_angle(judged)
-    except NotJudged as why:
-        raise ResultsError(str(why)) from None
+    angles = {}
+    for car in ranking.cars:
+        judged = []
+        for case, record in zip(found.experiment.cases, found.records, strict=True):
+            if case.run.name == car:
+                measured = record.values.get("angle")
+                judged.append(Evaluation(car))
+                judged[-1].notes.append(record.reason or "0.375 g is not reached")
+                judged[-1].add("angle", "", measured[0] if measured else None, "rad")
+        try:
+            angles[car] = characteristic_angle(judged)
+        except NotJudged as why:
+            raise ResultsError(str(why)) from None
+    return angles
 
 
-@dataclass(frozen=True)
-class RankingRun:
-    """One run of a ranking: an entry under a condition at one amplitude."""
+def dwell_experiment(
+    ranking: LoadedRanking, angles: Mapping[str, float], execute: Executor
+) -> LoadedExperiment:
+    """Return the runs of sine with dwell: a named run per condition; axes: entry, repeats, amplitude.
 
-    entry: str
-    condition: str
-    amplitude: float  # [rad], positive: left first
-    angle: float  # A of the car [rad]
-    repeat: Value | None = None
-    last: bool = False  # whether this is the regulation's last amplitude
-    job: Job | None = None  # None until planned
-
-    @property
-    def key(self) -> str:
-        """Key of the run's job; "" if not planned."""
-        return self.job.key if self.job else ""
-
-    @property
-    def multiple(self) -> float:
-        """The amplitude as a multiple of A."""
-        return abs(self.amplitude) / self.angle
-
-
-def drives_of(ranking: LoadedRanking, angles: Mapping[str, float]) -> list[RankingRun]:
-    """Return all runs, condition by condition; `angles`: car -> A [rad]."""
-    found = []
-    for (name, condition), entry in product(ranking.conditions.items(), ranking.entries):
-        angle = angles[condition.car]
-        rungs = amplitudes(angle)[:: -(condition.every or ranking.spec.every)][::-1]
-        if ranking.quick:
-            rungs = rungs[-1:]
-        sides = SIDES[:1] if condition.mirrored else SIDES
-        repeats = next(iter(condition.repeats.values()), [None])
-        found += [
-            RankingRun(entry, name, sign * rung, angle, repeat, rung == rungs[-1])
-            for (_, sign), repeat, rung in product(sides, repeats, rungs)
-        ]
-    return found
-
-
-def plan_drives(
-    ranking: LoadedRanking,
-    drives: Sequence[RankingRun],
-    base: Job,
-    once: PlanningCache,
-    progress: Callable[[int], None] = lambda done: None,
-) -> list[RankingRun]:
-    """Return the runs with planned jobs; `base`: common fields of all jobs, with the results folder.
+    Args:
+        ranking: as loaded.
+        angles: car -> A [rad], of which the amplitudes are multiples.
+        execute: makes plans.
 
     Raises:
-        ScenarioError: some runs cannot start; lists each problem once.
+        ScenarioError: a scenario is wrong.
     """
-    jobs = []
-    for drive in drives:
-        condition = ranking.spec.conditions[drive.condition]
-        value = drive.repeat
-        repeated = [Override(place, value, "ranking") for place in condition.repeats if value is not None]
-        changes = (
-            *ranking.changes_of_condition(drive.condition),
-            *ranking.changes_of_entry(drive.entry),
-            *repeated,
-            steered(drive.amplitude, "ranking"),
-        )
-        first = drive.repeat is None or drive.repeat == next(iter(condition.repeats.values()))[0]
-        jobs.append(replace(
-            base, label=f"{drive.entry}, {drive.condition}, {math.degrees(drive.amplitude):.1f} deg",
-            scenario=ranking.path.parent / condition.scenario, changes=changes,
-            test=(SERIES, drive.angle), timed=UNIT,
-            keep=base.keep and drive.last and first and drive.amplitude > 0,
-        ))  # fmt: skip
-    planned = ready(jobs, once=once, progress=progress)
-    made = [keyed(replace(job, plan=_lean(job.plan)), _metrics(job.plan)) for job in planned]
-    made = [replace(job, out=base.out / RUNS / job.key[:12]) for job in made]
-    return [replace(drive, job=job) for drive, job in zip(drives, made, strict=True)]
+    runs, repeated = [], dict[str, dict[Any, str]]()
+    for name, condition in ranking.conditions.items():
+        scenario, test = ranking.path.parent / condition.scenario, (SERIES, angles[condition.car])
+        changes = ranking.changes_of_condition(name)
+        runs.append(NamedRun(name, condition.title, condition.title, scenario, changes, test))
+        for place, values in condition.repeats.items():
+            repeated.setdefault(place, {}).update((value, text_of(value)) for value in values)
+    runs = [
+        replace(run, windows={"intervention": window} if (window := _since_steering(plan)) else {})
+        for run, plan in zip(runs, execute.plans(runs), strict=True)
+    ]
+    design = [
+        (run.name, (Level(entry, entry), *repeat, amplitude))
+        for run in runs
+        for entry in ranking.entries
+        for repeat, amplitude in _levels(ranking, run.name, repeated, angles)
+    ]
+    axes = {
+        "entry": DesignAxisSpec.model_construct(variants={n: ranking.variant(n) for n in ranking.entries})
+    }
+    for place, levels in repeated.items():
+        of = [name for name, one in ranking.conditions.items() if place in one.repeats]
+        axes[place] = axis_of_levels(place, [Level(*one) for one in levels.items()], runs=of, repeats=True)
+    axes["amplitude"] = axis_of_levels(AMPLITUDE, [point[-1] for _, point in design])
+    return experiment_of(
+        ranking.path, runs, title=ranking.spec.title, axes=axes, design=design, origin="ranking",
+        metrics={key: {"metric": name} for key, name in METRICS.items()},
+    )  # fmt: skip
 
 
-def _metrics(plan: Plan | None) -> MetricRequests:
-    assert plan is not None
+def _levels(
+    ranking: LoadedRanking, name: str, repeated: Mapping[str, Mapping[Any, str]], angles: Mapping[str, float]
+) -> Iterator[tuple[list[Level], Level]]:
+    """Yield the levels of repeats and amplitude of a condition; `repeated`: all levels of repeats."""
+    condition = ranking.spec.conditions[name]
+    rungs = amplitudes(angles[condition.car])[:: -(condition.every or ranking.spec.every)][::-1]
+    sides = SIDES[:1] if condition.mirrored else SIDES
+    repeats = [
+        [Level(value, values[value]) for value in condition.repeats.get(place, [*values][:1])]
+        for place, values in repeated.items()
+    ]
+    for _, sign in sides:
+        for repeat in product(*repeats):
+            for rung in rungs[-1:] if ranking.quick else rungs:
+                yield [*repeat], Level(sign * rung, f"{math.degrees(sign * rung):.1f} deg")
+
+
+def _since_steering(plan: Plan) -> TimeWindow | None:
+    """Return the time from the beginning of steer to the end of a run; None if there is none between."""
     driver = AMPLITUDE.partition(".")[0]
     begins = next(unit.parameter(STEERING_BEGINS) for unit in plan.instances if unit.name == driver)
     first, last = float(begins or 0.0), plan.time(plan.n_steps)
-    return (("intervention", INTERVENTION, (first, last) if first < last else None), *METRICS)
+    return (first, last) if first < last else None
 
 
-def _lean(plan: Plan | None) -> Plan:
-    assert plan is not None
-    return replace(plan, record=tuple(one for one in plan.record if one[1].startswith(RECORDED)))
+def kept_cases(experiment: LoadedExperiment) -> frozenset[int]:
+    """Return the numbers of the cases that keep their results.
+
+    Of each entry under each condition it is the last amplitude, left first, of the first repeat.
+    """
+    kept: dict[tuple[str, Level], Case] = {}
+    for case in experiment.cases:
+        cell = kept.setdefault((case.run.name, case.point[0]), case)
+        if float(case.point[-1].value) > float(cell.point[-1].value):
+            kept[case.run.name, case.point[0]] = case
+    return frozenset(case.number for case in kept.values())

@@ -6,26 +6,37 @@ turns round though its yaw-rate ratio may meet them. A condition is passed if al
 Controllers are ranked by the number of conditions passed; ties by the share of runs that pass, then by the
 peak sideslip, both averaged over conditions. A controller with missing runs is not ranked.
 
-`drive_ranking` executes a ranking: first the runs for the angle A of every car, then all runs still missing.
+`run_ranking` executes a ranking: first the runs for the angle A of every car, then all runs still missing.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import ResultsError
 from ..evaluation.sine_with_dwell import FROM, RATIOS, SLIGHT, SPUN
 from ..figures.style import digits_apart
-from .jobs import STEP_TIME, Job, MeasuredRun, PlanningCache
-from .journal import Journal
+from ..plan import Value
+from .execution import Executor
+from .jobs import STEP_TIME, Job, MeasuredRun
 from .judging import ConfidenceInterval, interval
-from .ranking import EntrySpec, LoadedRanking, RankingRun, angle_of, drives_of, jobs_for_angles, plan_drives
+from .outcome import ExperimentResult
+from .ranking import (
+    RECORDED,
+    UNIT,
+    EntrySpec,
+    LoadedRanking,
+    angle_experiment,
+    angles_of,
+    dwell_experiment,
+    kept_cases,
+)
 
 UNHELD = 1.0
 """Yaw-rate ratio without a second peak after the reversal: the car keeps turning as before."""
@@ -35,11 +46,26 @@ WORST = -100.0
 
 @dataclass(frozen=True)
 class RankedRun:
-    """A run with its record, which is None if the run is missing."""
+    """A run of an entry under a condition at one amplitude."""
 
-    drive: RankingRun
-    dry: bool  # whether responsiveness counts
-    record: MeasuredRun | None
+    entry: str
+    condition: str
+    amplitude: float  # [rad], positive: left first
+    angle: float  # A of the car [rad]
+    record: MeasuredRun | None  # None: missing
+    repeat: Value | None = None
+    dry: bool = True  # whether responsiveness counts
+    job: Job | None = None
+
+    @property
+    def multiple(self) -> float:
+        """The amplitude as a multiple of A."""
+        return abs(self.amplitude) / self.angle
+
+    @property
+    def picture(self) -> Path | None:
+        """Folder of its results, where its figure is drawn; None if it keeps none."""
+        return self.job.out if self.job and self.job.keep else None
 
     def __getitem__(self, key: str) -> float | None:
         if key in ("margin", "speed_lost"):
@@ -53,7 +79,7 @@ class RankedRun:
         """Whether the regulation's criteria are met."""
         if self["stability"] != 1.0:
             return False
-        asked = self.dry and self.drive.multiple >= FROM * (1.0 - SLIGHT)
+        asked = self.dry and self.multiple >= FROM * (1.0 - SLIGHT)
         return not asked or self["responsiveness"] == 1.0
 
     @property
@@ -126,8 +152,8 @@ class RankingCell:
         """Average over repeats a number computed from the runs of each."""
         if self.missing:
             return None
-        repeats = dict.fromkeys(one.drive.repeat for one in self.runs)
-        return interval([number([one for one in self.runs if one.drive.repeat == r]) for r in repeats])
+        repeats = dict.fromkeys(one.repeat for one in self.runs)
+        return interval([number([one for one in self.runs if one.repeat == r]) for r in repeats])
 
     @cached_property
     def margin(self) -> ConfidenceInterval | None:
@@ -142,7 +168,7 @@ class RankingCell:
     @cached_property
     def displacement(self) -> float | None:
         """Smallest displacement of the runs at amplitudes where responsiveness counts [m]."""
-        asked = [one for one in self.runs if one.drive.multiple >= FROM * (1.0 - SLIGHT)]
+        asked = [one for one in self.runs if one.multiple >= FROM * (1.0 - SLIGHT)]
         return min((x for one in asked if (x := one["displacement"]) is not None), default=None)
 
     def number(self, key: str) -> float | None:
@@ -201,26 +227,22 @@ class EntryScore:
         return (-self.count("passed"), -round(self.share, 9), math.inf if slip is None else round(slip, 9))
 
 
-def standings(
-    ranking: LoadedRanking, drives: Sequence[RankingRun], records: Mapping[str, MeasuredRun]
-) -> list[EntryScore]:
+def standings(ranking: LoadedRanking, runs: Iterable[RankedRun]) -> list[EntryScore]:
     """Return the scores of all entries, best first, those that are not ranked last.
 
     Args:
         ranking: with the conditions that count.
-        drives: all runs.
-        records: job key -> record of the run.
+        runs: all runs.
     """
-    runs: dict[tuple[str, str], list[RankedRun]] = {}
-    for drive in drives:
-        dry = ranking.spec.conditions[drive.condition].dry
-        driven = RankedRun(drive, dry, records.get(drive.key))
-        runs.setdefault((drive.entry, drive.condition), []).append(driven)
-    every = []
-    for name, (spec, _) in ranking.entries.items():
-        cells = {key: RankingCell(name, key, runs[name, key]) for key in ranking.conditions}
-        every.append(EntryScore(name, spec, cells))
-    return placed(every)
+    cells: dict[tuple[str, str], list[RankedRun]] = {}
+    for run in runs:
+        cells.setdefault((run.entry, run.condition), []).append(run)
+    return placed([
+        EntryScore(
+            name, spec, {key: RankingCell(name, key, cells[name, key]) for key in ranking.conditions}
+        )
+        for name, (spec, _) in ranking.entries.items()
+    ])  # fmt: skip
 
 
 class Digits(NamedTuple):
@@ -253,56 +275,64 @@ def placed(every: Sequence[EntryScore]) -> list[EntryScore]:
     return found + [one for one in every if one.missing]
 
 
-RunJobs = Callable[[str, Sequence[Job]], object]
-"""Executes the jobs still missing, under a title, and adds them to the journal."""
-Planning = Callable[[int], AbstractContextManager[Callable[[int], None]]]
-"""Progress display of planning a total number of runs."""
-
-
 @dataclass(frozen=True)
 class RankingResult:
     """Result of a ranking."""
 
     ranking: LoadedRanking
     angles: dict[str, float]  # car -> A [rad]
-    drives: list[RankingRun]
+    runs: list[RankedRun]
     standings: list[EntryScore]
 
 
-def drive_ranking(
-    ranking: LoadedRanking,
-    base: Job,
-    journal: Journal,
-    once: PlanningCache,
-    make: RunJobs,
-    *,
-    only: Collection[str] = (),
-    planning: Planning = lambda total: nullcontext(lambda done: None),
+def run_ranking(
+    ranking: LoadedRanking, execute: Executor, *, only: Collection[str] = (), keep: bool = True
 ) -> RankingResult:
     """Execute the missing runs of a ranking and return its scores.
 
     Args:
         ranking: as loaded.
-        base: common fields of all jobs; results go to its folder.
-        journal: finished runs.
-        once: cache of files and FMUs.
-        make: executes runs.
+        execute: executes experiments.
         only: entries whose runs are executed; empty: all. The others are scored by the runs in the journal.
-        planning: displays the progress of planning.
+        keep: keep the results of the runs that figures show.
 
     Raises:
         YawbenchError: a run cannot start, or A cannot be determined.
     """
-    slow = jobs_for_angles(ranking, base, once)
-    make("A, the angle at 0.3 g", [job for jobs in slow.values() for job in jobs])
-    angles = {}
-    for car, jobs in slow.items():
-        if any(job.key not in journal.records for job in jobs):
-            raise ResultsError(f"{base.out}: holds no A of {car!r} of this build; rank without --no-run")
-        angles[car] = angle_of([journal.records[job.key] for job in jobs], car)
-    drives = drives_of(ranking, angles)
-    with planning(len(drives)) as progress:
-        drives = plan_drives(ranking, drives, base, once, progress)
-    wanted = [one.job for one in drives if one.job and (not only or one.entry in only)]
-    make(ranking.spec.title, wanted)
-    return RankingResult(ranking, angles, drives, standings(ranking, drives, journal.records))
+    slow = execute(angle_experiment(ranking, execute), keep=False)
+    for case, record in zip(slow.experiment.cases, slow.records, strict=True):
+        if not record.made:
+            car = case.run.name
+            raise ResultsError(
+                f"{execute.folder}: holds no A of {car!r} of this build; rank without --no-run"
+            )
+    angles = angles_of(ranking, slow)
+    dwell = dwell_experiment(ranking, angles, execute)
+    kept = kept_cases(dwell) if keep else ()
+    found = execute(
+        dwell,
+        only=lambda case: not only or case.point[0].value in only,
+        keep=lambda case: case.number in kept,
+        record=RECORDED,
+        timed=UNIT,
+    )
+    runs = _ranked_runs(ranking, angles, found)
+    return RankingResult(ranking, angles, runs, standings(ranking, runs))
+
+
+def _ranked_runs(
+    ranking: LoadedRanking, angles: Mapping[str, float], found: ExperimentResult
+) -> list[RankedRun]:
+    assert found.planned is not None
+    names = [*found.spec.axes]
+    runs = []
+    for case, job, record in zip(found.experiment.cases, found.planned.jobs, found.records, strict=True):
+        condition, at = ranking.spec.conditions[case.run.name], dict(zip(names, case.point, strict=True))
+        repeat = next((at[place].value for place in condition.repeats), None)
+        runs.append(
+            RankedRun(
+                str(at["entry"].value), case.run.name, float(at["amplitude"].value), angles[condition.car],
+                record if record.made else None, repeat, condition.dry, job,
+            )
+        )  # fmt: skip
+    return runs

@@ -223,22 +223,22 @@ def table_of(ranked: RankingResult, *left_out: str) -> Table:
 
 def runs_table(cell: RankingCell) -> Table:
     """Return the table of all runs of a cell."""
-    repeated = len({one.drive.repeat for one in cell.runs}) > 1
-    mirrored = any(one.drive.amplitude < 0 for one in cell.runs)
+    repeated = len({one.repeat for one in cell.runs}) > 1
+    mirrored = any(one.amplitude < 0 for one in cell.runs)
     units = {"displacement": "m", **{key: unit for key, unit in UNITS.items() if unit != "points"}}
-    rows: list[dict[str, Words]] = []
-    for one in cell.runs:
-        drive = one.drive
-        rows.append({
-            "amplitude": degrees(drive.amplitude),
-            "over A": f"{drive.multiple:.2f}",
-            **({"first to the": "left" if drive.amplitude > 0 else "right"} if mirrored else {}),
-            **({"seed": str(drive.repeat)} if repeated else {}),
+    rows: list[dict[str, Words]] = [
+        {
+            "amplitude": degrees(one.amplitude),
+            "over A": f"{one.multiple:.2f}",
+            **({"first to the": "left" if one.amplitude > 0 else "right"} if mirrored else {}),
+            **({"seed": str(one.repeat)} if repeated else {}),
             "COS + 1 s": _ratio(one["ratio_1000"]),
             "COS + 1.75 s": _ratio(one["ratio_1750"]),
             **{k.replace("_", " "): words_of(one[k], unit) for k, unit in units.items() if k != "effort"},
             "verdict": one.verdict,
-        })  # fmt: skip
+        }
+        for one in cell.runs
+    ]  # fmt: skip
     headings = list(rows[0])
     texts = ("amplitude", "over A", "COS + 1 s", "COS + 1.75 s")
     return Table("", headings, [[*row.values()] for row in rows], numbers=set(map(headings.index, texts)))
@@ -308,11 +308,11 @@ def columns_of_runs(ranked: RankingResult) -> list[TableColumn]:
         "speed_end": "m/s", "intervention": "N.m.s", "effort": "N.m.s", "chatter": "N.m/s",
     }  # fmt: skip
     return [
-        _text("entry", (run.drive.entry for run in runs)),
-        _text("condition", (run.drive.condition for run in runs)),
-        _numbers("amplitude", "rad", (run.drive.amplitude for run in runs)),
-        _text("repeat", (run.drive.repeat for run in runs)),
+        _text("entry", (run.entry for run in runs)),
+        _text("condition", (run.condition for run in runs)),
+        _numbers("amplitude", "rad", (run.amplitude for run in runs)),
+        _text("repeat", (run.repeat for run in runs)),
         _text("verdict", (run.verdict for run in runs)),
         *(_numbers(key, unit, [run[key] for run in runs]) for key, unit in units.items()),
-        _text("key", (run.drive.key for run in runs)),
+        _text("key", (run.job and run.job.key for run in runs)),
     ]

@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from ..errors import ScenarioError
 from ..evaluation.judgement import Evaluation, TestSeries
 from ..evaluation.lane_change import evaluate_lane_change, highest_clean, is_clean, judge_entry_speeds
 from ..evaluation.sine_with_dwell import amplitudes
 from ..evaluation.trace import Trace, trace_of
-from ..plan import Override
+from ..plan import Override, Plan
 from ..results.read import load_results
 from ..scenario.quantities import convert
 from .jobs import Job, PlanningCache, keyed, planned, ready
@@ -38,7 +39,7 @@ def slow_steer_jobs(base: Job, once: PlanningCache) -> list[Job]:
     Raises:
         ScenarioError: they cannot start, or the driver has no amplitude.
     """
-    given = _amplitude_of(base, once)
+    given = slow_steer_amplitude(planned(base, once)[1], base.scenario)
     sides = [_varied(base, name, steered(side * given, "slowly increasing steer")) for name, side in SIDES]
     return list(map(keyed, ready(sides, once=once)))
 
@@ -116,16 +117,15 @@ def _varied(base: Job, name: str, *changes: Override) -> Job:
     return replace(base, label=label, out=base.out / name, changes=(*base.changes, *changes))
 
 
-def _amplitude_of(job: Job, once: PlanningCache) -> float:
-    """Return the absolute amplitude of a job's driver [rad].
+def slow_steer_amplitude(plan: Plan, scenario: Path) -> float:
+    """Return the absolute amplitude of the driver in a plan of slowly increasing steer [rad].
 
     Raises:
-        ScenarioError: the driver has none.
+        ScenarioError: the driver has none; names the scenario.
     """
-    _, plan = planned(job, once)
     unit, _, name = AMPLITUDE.partition(".")
     for one in plan.instances:
         value = one.parameter(name) if one.name == unit else None
         if isinstance(value, (int, float)) and value != 0:
             return abs(float(value))
-    raise ScenarioError(f"{job.scenario}: {AMPLITUDE} is no amplitude of a hand wheel other than 0")
+    raise ScenarioError(f"{scenario}: {AMPLITUDE} is no amplitude of a hand wheel other than 0")

@@ -118,10 +118,10 @@ def _id(cell: RankingCell) -> str:
 def _cell(ranked: RankingResult, one: EntryScore, cell: RankingCell, folder: Path) -> dict[str, Any]:
     """Return the details of a cell: its numbers, all its runs, its figure, its command."""
     condition = ranked.ranking.conditions[cell.condition]
-    kept = next((run.drive for run in cell.runs if run.drive.job and run.drive.job.keep), None)
+    kept = next((run for run in cell.runs if run.picture), None)
     picture = None
-    if kept and kept.job and (kept.job.out / f"{RUN}.svg").is_file():
-        picture = Path(os.path.relpath(kept.job.out / f"{RUN}.svg", folder)).as_posix()
+    if kept and kept.picture and (kept.picture / f"{RUN}.svg").is_file():
+        picture = Path(os.path.relpath(kept.picture / f"{RUN}.svg", folder)).as_posix()
     sums = {
         "runs that pass": f"{sum(run.passed for run in cell.runs)} of {len(cell.runs)}",
         "stability margin": spread(cell.margin, lambda x: f"{x:.1f} points"),
@@ -136,7 +136,7 @@ def _cell(ranked: RankingResult, one: EntryScore, cell: RankingCell, folder: Pat
         "state": cell.state,
         "says": STATES[cell.state],
         "sums": [(name, text) for name, text in sums.items() if text is not None],
-        "repeats": len({run.drive.repeat for run in cell.runs}),
+        "repeats": len({run.repeat for run in cell.runs}),
         "table": runs_table(cell),
         "picture": picture,
         "amplitude": degrees(kept.amplitude) if kept else "",
@@ -187,7 +187,7 @@ def _conditions(ranked: RankingResult) -> Table:
     headings = ["condition", "car", "A", "scenario", "changed", "runs of a controller", "responsiveness"]
     table = Table("", headings)
     for name, one in ranking.conditions.items():
-        runs = sum(drive.condition == name for drive in ranked.drives) // max(1, len(ranking.entries))
+        runs = sum(run.condition == name for run in ranked.runs) // max(1, len(ranking.entries))
         own = ranking.changes_of_condition(name)
         told = [change for change in own if change.place not in ("vehicle", "step_size", "stop_time")]
         table.rows.append([

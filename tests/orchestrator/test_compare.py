@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 
 from orchestrator.commands.results import distinct
 from orchestrator.errors import ScenarioError
-from orchestrator.experiments.comparison import FIGURES, comparison_table, of_runs, variants
-from orchestrator.experiments.experiment import NamedRun
+from orchestrator.experiments.comparison import FIGURE_SPECS, comparison_table, variants
+from orchestrator.experiments.experiment import NamedRun, experiment_of
 from orchestrator.experiments.figures import draw_all
 from orchestrator.experiments.jobs import Job, Outcome
 from orchestrator.experiments.judged_schema import MetricSpec
@@ -149,7 +149,7 @@ METRICS = {
 def findings(tmp_path):
     """What a comparison of three made-up runs comes to, of which one failed."""
     runs = [NamedRun(name, name, name, Path("s.yaml"), ()) for name in ("off", "broken", "fnn")]
-    experiment = of_runs(runs, "title", Path("s.yaml"), (), FIGURES)
+    experiment = experiment_of(Path("s.yaml"), runs, title="title", figures=FIGURE_SPECS)
     spec = ExperimentSpec.model_validate(
         experiment.spec.model_dump(exclude_defaults=True, by_alias=True) | METRICS
     )

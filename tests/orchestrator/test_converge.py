@@ -15,10 +15,9 @@ from orchestrator.experiments.comparison import (
     convergence_figure,
     convergence_table,
     measure,
-    of_runs,
     refinements,
 )
-from orchestrator.experiments.experiment import NamedRun
+from orchestrator.experiments.experiment import NamedRun, experiment_of
 from orchestrator.experiments.jobs import Job, Outcome
 from orchestrator.experiments.outcome import judge_results
 from orchestrator.experiments.record import to_csv
@@ -41,7 +40,7 @@ def made(folder: Path, orders: dict[str, int], halvings: int = 3, scale: float =
             write(recorded, folder / name / str(k), wall_time=float(2**k))
             given = changed(step_size=step, algorithm=name)
             runs.append(NamedRun(f"{name}/{k}", f"{name} {k}", "", Path("x.yaml"), given))
-    experiment = of_runs(runs, "title", Path("x.yaml"), (), {})
+    experiment = experiment_of(Path("x.yaml"), runs, title="title")
     failed = [Outcome(Job(name, Path(), folder), (why,), 1) for name, why in lost]
     return judge_results(experiment, folder, failed)
 

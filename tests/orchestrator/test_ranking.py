@@ -15,7 +15,7 @@ import pytest
 
 from orchestrator.errors import RecordWarning
 from orchestrator.experiments.jobs import MeasuredRun
-from orchestrator.experiments.ranking import EntrySpec, RankingRun, load_ranking
+from orchestrator.experiments.ranking import EntrySpec, load_ranking
 from orchestrator.experiments.ranking_scores import (
     UNHELD,
     WORST,
@@ -36,9 +36,8 @@ GOOD = {"stability": 1.0, "responsiveness": 1.0, "ratio_1000": 0.05, "ratio_1750
 
 def driven(multiple: float = 5.0, *, repeat: int | None = None, dry: bool = True, **numbers: float | None):
     """Return a run of a multiple of A that passes, but for what is given."""
-    drive = RankingRun("x", "c", multiple * A, A, repeat)
     known = {key: None if x is None else (x, "1") for key, x in {**GOOD, **numbers}.items()}
-    return RankedRun(drive, dry, MeasuredRun(known))
+    return RankedRun("x", "c", multiple * A, A, MeasuredRun(known), repeat, dry)
 
 
 def standing(name: str, *cells: list[RankedRun]) -> EntryScore:
@@ -112,7 +111,7 @@ def test_numbers_that_decide_places_read_differently():
 
 
 def test_an_entry_without_a_run_is_missing_and_has_no_place():
-    missing = RankedRun(RankingRun("x", "c", A, A), True, None)
+    missing = RankedRun("x", "c", A, A, None)
     first, last = placed([standing("lacks", [driven()], [driven(), missing]), standing("has", [driven()])])
     assert (first.entry, first.place) == ("has", 1)
     assert (last.entry, last.place, last.missing) == ("lacks", None, 1)
@@ -121,7 +120,7 @@ def test_an_entry_without_a_run_is_missing_and_has_no_place():
 
 
 def test_a_run_that_broke_off_counts_as_lost():
-    lost = RankedRun(RankingRun("x", "c", A, A), True, MeasuredRun({}, ("the controller has crashed",)))
+    lost = RankedRun("x", "c", A, A, MeasuredRun({}, ("the controller has crashed",)))
     cell = RankingCell("x", "c", [driven(), lost])
     assert cell.state == "failed"
     assert cell.margin.mean == pytest.approx(100 * (0.20 - UNHELD))

@@ -163,3 +163,12 @@ def test_mistakes_are_told_in_a_sentence(load, change, sentence):
     with pytest.raises(ScenarioError) as refused:
         load(change)
     assert sentence in "\n".join(refused.value.problems)
+
+
+def test_a_design_gives_every_run_points_of_its_own(load, findings, fmus, tmp_path):
+    loaded = load()
+    design = [(name, at) for name in loaded.runs for at in loaded.points[: 4 if "noisy" in name else 1]]
+    planned = plan_experiment(replace(loaded, design=tuple(design)), tmp_path, fmus=fmus, keep=False)
+    assert len(planned.jobs) == 2 + 2 * 4
+    records = {job.key: one for job, one in zip(findings.planned.jobs, findings.records, strict=True)}
+    assert judge_records(planned, records).values == findings.values

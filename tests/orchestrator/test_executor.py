@@ -1,0 +1,122 @@
+"""Experiments that depend on the results of earlier ones: a bisection, side by side for several runs."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from dataclasses import replace
+
+import pytest
+
+from orchestrator.errors import ScenarioError
+from orchestrator.experiments.axes import DesignAxisSpec, Level, axis_of_levels
+from orchestrator.experiments.execution import Executor, finish, left_to_do
+from orchestrator.experiments.experiment import NamedRun, experiment_of
+from orchestrator.experiments.jobs import Outcome, PlanningCache, run_job
+from orchestrator.experiments.journal import Journal
+from orchestrator.plan import Override
+
+from .test_repeats import SCENARIO
+
+UNITS = ("sensor_ideal",)
+GAIN = "sensor.yaw_rate_gain"
+RATES = {"slow": 1.0, "fast": 2.0}
+"""Run -> true yaw rate [rad/s]."""
+
+
+def named_runs(folder):
+    (folder / "gyro.yaml").write_text(SCENARIO)
+    given = {name: Override("inputs.sensor.yaw_rate_true", rate, "test") for name, rate in RATES.items()}
+    return [NamedRun(name, name, name, folder / "gyro.yaml", (change,)) for name, change in given.items()]
+
+
+def bisected(folder, execute, limit, width):
+    """Return run -> gain, to a width, from which on the last value is above a limit."""
+    runs = named_runs(folder)
+    brackets = dict.fromkeys(RATES, (0.0, 1.0))
+    while any(high - low > width for low, high in brackets.values()):
+        tried = {name: Level(0.5 * (low + high), "") for name, (low, high) in brackets.items()}
+        axis = axis_of_levels(GAIN, tried.values())
+        found = execute(
+            experiment_of(
+                folder / "bisection.yaml", runs, title="bisection", axes={"gain": axis},
+                design=[(name, (level,)) for name, level in tried.items()],
+                metrics={"last": {"metric": "final(sensor.yaw_rate)"}},
+            ),
+            keep=False,
+        )  # fmt: skip
+        for case in found.experiment.cases:
+            (low, high), gain = brackets[case.run.name], float(case.point[0].value)
+            above = found.value(case, "last").number > limit
+            brackets[case.run.name] = (low, gain) if above else (gain, high)
+    return {name: high for name, (_, high) in brackets.items()}
+
+
+@pytest.fixture
+def executor(tmp_path, fmus):
+    """Return an executor with a journal in the folder, and the list of runs that it makes."""
+    made = []
+
+    def runner(jobs, done):
+        for job in jobs:
+            made.append(job)
+            done(Outcome(job, value=run_job(job)))
+
+    def opened():
+        journal = Journal(tmp_path, "bisection")
+
+        def make(_, jobs):
+            finish(left_to_do(jobs, journal.records), journal, runner=runner)
+
+        return Executor(tmp_path, journal, PlanningCache(), make, {"fmus": fmus}), made
+
+    return opened
+
+
+def test_a_bisection_of_several_runs_resumes_with_what_is_in_the_journal(executor, tmp_path):
+    execute, made = executor()
+    with closing(execute.journal):
+        found = bisected(tmp_path, execute, 0.7, 1 / 8)
+    assert found == {"slow": 0.75, "fast": 0.375}  # 0.7 and 0.35 rounded up to eighths
+    assert len(made) == len(RATES) * 3
+    execute, made = executor()
+    with closing(execute.journal):
+        assert bisected(tmp_path, execute, 0.7, 1 / 16) == {"slow": 0.75, "fast": 0.375}
+    assert len(made) == len(RATES) * 4  # one more halving
+
+
+def test_cases_left_out_count_only_if_they_are_finished(executor, tmp_path):
+    execute, made = executor()
+    axis = DesignAxisSpec.model_validate({"vary": GAIN, "values": [0.5, 1.0]})
+    metrics = {"last": {"metric": "final(sensor.yaw_rate)"}}
+    runs = named_runs(tmp_path)
+    experiment = experiment_of(tmp_path / "e.yaml", runs, title="t", axes={"g": axis}, metrics=metrics)
+    with closing(execute.journal):
+        first = execute(experiment, only=lambda case: case.run.name == "slow")
+        assert [record.made for record in first.records] == [True, True, False, False]
+        again = execute(experiment, only=lambda case: case.run.name == "fast")
+        assert [again.value(case, "last").number for case in experiment.cases] == [0.5, 1.0, 1.0, 2.0]
+    assert len(made) == 4
+    assert all((job.out / "run.json").is_file() for job in made)
+
+
+def test_plans_of_runs_hold_what_an_experiment_may_depend_on(executor, tmp_path):
+    execute, _ = executor()
+    with closing(execute.journal):
+        (plan, _) = execute.plans(named_runs(tmp_path))
+        assert plan.time(plan.n_steps) == pytest.approx(0.1)
+        wrong = replace(named_runs(tmp_path)[0], changes=(Override("sensor.gian", 1.0, "test"),))
+        with pytest.raises(ScenarioError):
+            execute.plans([wrong])
+
+
+def test_signals_are_recorded_by_patterns_of_their_names(executor, tmp_path):
+    execute, _ = executor()
+    run = named_runs(tmp_path)[0]
+    with closing(execute.journal):
+        every = execute.plans([run])[0].record
+        some = replace(execute, of_jobs={**execute.of_jobs, "record": ("yaw_rate*", "*.steer_angle")})
+        assert some.plans([run])[0].record == tuple(
+            one for one in every if one[1].startswith("yaw_rate") or one[1] == "steer_angle"
+        )
+        with pytest.raises(ScenarioError):
+            replace(execute, of_jobs={**execute.of_jobs, "record": ("yaw_rate",)}).plans([run])
