@@ -10,7 +10,8 @@ it has; who runs scenarios does not use it (see `upkeep`).
 
 from __future__ import annotations
 
-import json
+import contextlib
+import functools
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -21,9 +22,9 @@ from typing import Any
 from orchestrator.errors import BuildError
 from orchestrator.files import draft_of, remove_draft
 from orchestrator.fmu.native import NATIVE, runs_as
+from orchestrator.workers import Pool
 from vocabulary.roles import ROLES
 
-from .build_worker import build_apart
 from .c.c_recipe import CRecipe, find_c_components
 from .check import defects, reference_files
 from .closure import Parts, Sources
@@ -138,11 +139,27 @@ def _built(
     names: list[str], known: Mapping[str, Recipe], out: Path, root: Path
 ) -> Iterator[tuple[str, list[str]]]:
     """Build components, as many at a time as there are processors; yield each with what is wrong with it."""
-    if len(names) < 2:
+    if len(names) < 2 or sys.platform == "win32":
         for name in names:
             yield name, problems_of(known[name], out, root)
-    else:
-        yield from build_apart(names, out, root, min(len(names), os.cpu_count() or 1))
+        return
+    with Pool(preload=[__name__]) as pool:
+        for finished in pool.each(_build_one, [(name, out, root) for name in names]):
+            name = names[finished.number]
+            died = [f"{name}: the process that built it {finished.died}"] if finished.died else []
+            if finished.error is not None:
+                raise finished.error
+            yield name, died or finished.value
+
+
+def _build_one(name: str, out: Path, root: Path) -> list[str]:
+    """Build a component in a worker and return what is wrong with it."""
+    with contextlib.redirect_stdout(sys.stderr):  # components may print while they are imported
+        return problems_of(_recipes(root)[name], out, root)
+
+
+_recipes = functools.cache(find_recipes)
+"""`find_recipes`, once for each worker process."""
 
 
 def problems_of(recipe: Recipe, out: Path, root: Path) -> list[str]:
@@ -272,16 +289,3 @@ def put(target: Path, content: bytes, *modules: str) -> None:
             raise BuildError(problems)
         draft.chmod(0o644)
         os.replace(draft, target)
-
-
-def main(out: str, root: str) -> None:
-    """Build the components whose names come through standard input; answer with the problems of each."""
-    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # what components print while they are imported is no answer
-    known = find_recipes(Path(root))
-    try:
-        for line in sys.stdin:
-            problems = problems_of(known[line.rstrip("\n")], Path(out), Path(root))
-            print(json.dumps(problems), file=answers, flush=True)
-    except (BrokenPipeError, KeyboardInterrupt):  # whoever asked has ended, or is ending
-        os._exit(1)

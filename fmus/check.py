@@ -17,7 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
-from orchestrator.processes import how_it_ended, python
+from orchestrator.processes import die_with_parent, how_it_ended, python
 
 _checker: subprocess.Popen | None = None
 
@@ -64,10 +64,7 @@ def _end(checker: subprocess.Popen) -> None:
 
 def main() -> None:
     """Answer requests until there is nobody to ask; what FMUs print goes to stderr."""
-    if sys.platform == "linux":  # others may have inherited the pipe that would tell
-        from orchestrator.master.supervisor import die_with_parent
-
-        die_with_parent()
+    die_with_parent()  # others may have inherited the pipe that would tell
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends this process
     answers: IO[str] = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)

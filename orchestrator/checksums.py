@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import multiprocessing
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -74,9 +73,8 @@ def has_checksums(content: Mapping[str, Any]) -> bool:
 
 
 def warn(sentence: str) -> None:
-    """Warn the user about a record; only in the main process, so that workers do not repeat it."""
-    if multiprocessing.parent_process() is None:
-        warnings.warn(RecordWarning(sentence), stacklevel=3)
+    """Warn the user about a record; worker processes ignore these warnings."""
+    warnings.warn(RecordWarning(sentence), stacklevel=3)
 
 
 def _named(keys: list[str]) -> str:

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.experiments import workers
 from tests.commands import status_of
 from tests.fmu_copies import put_fmus
 
@@ -26,8 +25,6 @@ LONGEST_FIRST = (
 
 gc.set_threshold(50_000, 20, 20)
 """Python looks for garbage less often: thousands of tests keep much, and leave little."""
-workers.NEEDED += workers.FOR_TESTS
-"""The first test that makes runs starts the server of processes for all others."""
 
 
 @pytest.hookimpl(tryfirst=True)

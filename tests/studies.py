@@ -13,10 +13,10 @@ from fmus.build import build_all
 from orchestrator.cli import main
 from orchestrator.experiments.execution import left_to_do
 from orchestrator.experiments.experiment import load_experiment
+from orchestrator.experiments.jobs import execute
 from orchestrator.experiments.outcome import judge_results
 from orchestrator.experiments.planning import plan_experiment
 from orchestrator.experiments.record import RECORD, write_findings
-from orchestrator.experiments.workers import execute
 
 
 def judge_some(file: Path, out: Path, *runs: str) -> dict[str, Any]:

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import YawbenchError
-from orchestrator.experiments.jobs import Job, Outcome
-from orchestrator.experiments.workers import execute
+from orchestrator.experiments.jobs import Job, Outcome, execute
 from orchestrator.master.fmi import open_unit
 from orchestrator.master.log import Log
 from orchestrator.plan import Instance

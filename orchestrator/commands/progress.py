@@ -54,7 +54,7 @@ def pooled(context: typer.Context, wishes: RunOptions) -> Each:
     Raises:
         YawbenchError: this process may not open as many files as that needs.
     """
-    from ..experiments.workers import Pool
+    from ..workers import Pool
 
     return context.with_resource(Pool(wishes.jobs)).map
 

@@ -33,8 +33,7 @@ def recorded(sources: Sequence[Path], wishes: RunOptions) -> list[Path]:
         ScenarioError: a scenario or an option is invalid.
     """
     from ..errors import ScenarioError
-    from ..experiments.jobs import Job, PlanningCache, ready
-    from ..experiments.workers import execute
+    from ..experiments.jobs import Job, PlanningCache, execute, ready
     from ..fmu.opener import stale_fmus
     from ..results.folder import default_folder
     from ..results.freshness import staleness

@@ -28,8 +28,7 @@ from ..fmu.archive import open_fmu, read_archive
 from ..master.process_state import terminable
 from ..messages import listed
 from ..plan import Plan
-from .jobs import Job, OnOutcome, Outcome
-from .workers import execute
+from .jobs import Job, OnOutcome, Outcome, execute
 
 TIMEOUT = 10.0
 """Time limit for connecting to the scheduler [s]."""

@@ -21,11 +21,20 @@ from ..metrics.run_metrics import metric, results_to_be, unit_in
 from ..plan import Plan
 from ..results.freshness import altered, staleness
 from .experiment import Case, LoadedExperiment, NamedRun
-from .jobs import Job, MeasuredRun, MetricRequests, OnOutcome, Outcome, PlanningCache, read_back, ready
+from .jobs import (
+    Job,
+    MeasuredRun,
+    MetricRequests,
+    OnOutcome,
+    Outcome,
+    PlanningCache,
+    execute,
+    read_back,
+    ready,
+)
 from .journal import Journal
 from .outcome import ExperimentResult, judge_records
 from .planning import PlannedExperiment, plan_experiment
-from .workers import execute
 
 Runner = Callable[[Sequence[Job], OnOutcome], object]
 """Executes jobs and reports each outcome; see `runner_of`."""

@@ -1,16 +1,22 @@
-"""Jobs: runs planned in advance and executed by whichever process they are handed to."""
+"""Jobs: runs planned in advance and executed by whichever process they are handed to.
+
+`execute` hands them to worker processes, so that a crash does not affect other runs.
+"""
 
 from __future__ import annotations
 
 import copy
+import sys
+import traceback
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..cache import OF_METRICS, OF_TESTS, sources_hash
-from ..errors import KEPT, BuildError, ResultsError, ScenarioError, YawbenchError
-from ..messages import hint
+from ..errors import KEPT, BuildError, Interrupted, ResultsError, ScenarioError, YawbenchError
+from ..master.process_state import StopFlag, interrupts
+from ..messages import hint, printable
 from ..metrics.plausibility import findings_in
 from ..metrics.run_metrics import evaluate, metric
 from ..plan import Override, Plan
@@ -19,6 +25,7 @@ from ..results.read import Results, load_results
 from ..scenario import yaml_lines
 from ..scenario.yaml_lines import Document
 from ..wiring.context import match
+from ..workers import Finished, Pool
 
 if TYPE_CHECKING:
     from ..master.run_loop import OpenInstance
@@ -26,6 +33,13 @@ if TYPE_CHECKING:
 
 MANY = 10
 """Problems shown; the rest are only counted."""
+
+TRIES = 2
+"""Attempts at a run whose process dies; chosen: a kill from outside rarely happens twice."""
+NEEDED = ("orchestrator.experiments.jobs", "orchestrator.master.simulate", "pyarrow.csv")
+"""Modules to preload for runs, because they are slow to import."""
+FOR_TESTS = ("scipy.signal", "orchestrator.evaluation.sine_with_dwell")
+"""Further modules to preload if runs are judged by a standard test."""
 
 MetricRequests = tuple[tuple[str, str, tuple[float, float] | None], ...]
 """(key, metric, window) of each metric."""
@@ -294,3 +308,73 @@ def read_back(folder: Path, run: str | None = None) -> Results | str:
         return results
     failed = results.record.error
     return f"{folder}: this run ended early: {failed.message if failed else 'no reason recorded'}"
+
+
+def execute(
+    jobs: Sequence[Job],
+    *,
+    workers: int | None = None,
+    done: Callable[[Outcome], None] = lambda outcome: None,
+    run: Callable[[Job], Any] = run_job,
+) -> list[Outcome]:
+    """Execute all jobs, each in a fresh process, and return their outcomes in order.
+
+    A run whose process died is executed again after the others, since the process may have been killed
+    from outside.
+
+    Args:
+        jobs: the runs.
+        workers: number of processes; None: one per core.
+        done: called with each outcome as it arrives, once per job.
+        run: function that a process calls with its job, importable by name. Its return value becomes the
+            outcome's value.
+
+    Raises:
+        Interrupted: Ctrl-C or SIGTERM, after all processes have ended.
+        YawbenchError: the limit of open files is too low.
+    """
+    outcomes: dict[int, Outcome] = {}
+    stop = StopFlag()
+
+    def look() -> None:
+        if stop.requested:
+            raise Interrupted(number=stop.number)
+
+    preload = (*NEEDED, *(FOR_TESTS if any(job.test for job in jobs) else ()))
+    left = list(range(len(jobs)))
+    with interrupts(stop, lambda: None), Pool(workers, preload=preload, lasting=1) as pool:
+        for tries in reversed(range(TRIES)):
+            again = []
+            for finished in pool.each(_report_of, [(jobs[number], run) for number in left], look=look):
+                number = left[finished.number]
+                outcome = _outcome(jobs[number], finished)
+                if outcome.died and tries:
+                    again.append(number)
+                    continue
+                outcomes[number] = outcome
+                done(outcome)
+            left = again
+    return [outcomes[number] for number in range(len(jobs))]
+
+
+def _outcome(job: Job, finished: Finished) -> Outcome:
+    """Return the outcome that the process of a run reported, or how it died."""
+    if finished.died:
+        problem = f"the process of this run {finished.died}"
+        return Outcome(job, (problem,), 1, finished.seconds, died=True)
+    if finished.error is not None:
+        raise finished.error
+    status, problems, value, interrupted = finished.value
+    return Outcome(job, tuple(problems), status, finished.seconds, value, interrupted)
+
+
+def _report_of(job: Job, run: Callable[[Job], Any]) -> tuple[int, list[str], Any, bool]:
+    """Execute a job in a worker; return exit status, problems, value, and whether it was interrupted."""
+    try:
+        return 0, [], run(job), False
+    except (YawbenchError, Interrupted) as error:
+        interrupted = isinstance(error, Interrupted)
+        return error.exit_status, [*error.problems] or [type(error).__name__], None, interrupted
+    except BaseException as error:
+        print(printable("".join(traceback.format_exception(error))), file=sys.stderr)
+        return 1, [f"{type(error).__name__}: {error}"], None, False

@@ -20,10 +20,8 @@ import contextlib
 import ctypes
 import itertools
 import json
-import math
 import mmap
 import os
-import signal
 import sys
 import threading
 import time
@@ -37,16 +35,17 @@ import numpy as np
 from ..errors import Interrupted, SimulationError, YawbenchError
 from ..messages import listed
 from ..plan import Plan, Value
+from ..processes import ForkedChild, die_with_parent
 from ..results.recorder import BLOCK, RowBlock
+from ..supervisor import LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
 from .fmi import open_unit
 from .instance import CtypesInstance
-from .ipc import REPLY, LogRelay, PipeChannel, ProtocolError, rebuilt, told
+from .ipc import FmuProcess, LogRelay, rebuilt, told
 from .isolation import Isolation
 from .log import MASTER, WARNING, Log
 from .master import WORDS, EndRequested, Master
 from .process_state import StopFlag, flush_output, stop_requested_at
 from .run_loop import OpenInstance, RunLoop, RunProgress
-from .supervisor import ProcessLost, SupervisedProcess, die_with_parent
 
 ROWS, PROGRESS, ENDED, WHERE = 0x90, 0x91, 0x92, 0x93
 """First bytes of records from the child: a block of rows, progress, end of the run, current instance."""
@@ -241,26 +240,24 @@ def can_be_apart() -> bool:
     return sys.platform == "linux" and threading.current_thread() is threading.main_thread()
 
 
-class ChildRun(RunLoop, SupervisedProcess):
+class ChildRun(RunLoop, FmuProcess):
     """Runs a plan in a child process."""
 
-    unasked = (ROWS, PROGRESS, WHERE)
+    unasked = (LOG, ROWS, PROGRESS, WHERE)
 
     def __init__(
         self, plan: Plan, rows: RowBlock, log: Log, stop: StopFlag, progress: RunProgress | None
     ) -> None:
-        super().__init__(plan, rows, log, stop, progress)
+        RunLoop.__init__(self, plan, rows, log, stop, progress)
         self._rows: RowBlock = rows
         self._shared = SharedProgress(len(rows.rows[0]))
         self._blocks = 0  # written
         self._inputs: dict[str, Value] = {}
         self._where: tuple[str, str] | None = None
-        self._process: int | None = None
-        self._status = 0
-        self._deadline = math.inf
+        self._started = False
         self._suspects: list[str] = []  # instances that may have ended the process
         self._told_end = False
-        self._closed = False  # no more rows are written
+        self._sealed = False  # no more rows are written
 
     def inputs_of(self, unit: str) -> dict[str, Value]:
         """Return the inputs with which the failed instance was last stepped."""
@@ -271,11 +268,12 @@ class ChildRun(RunLoop, SupervisedProcess):
             self._suspects = [u.name for u in self.plan.instances if u.fmu.compiled]
         asked, self._asking = os.pipe()
         try:
-            self._process = self._start(partial(self._forked, opener, asked))
+            FmuProcess.__init__(self, partial(self._forked, opener, asked), self.log)
+            self._started = True
         finally:
             os.close(asked)
         try:
-            self.passes, ending, failed = self._hear(ENDED)
+            self.passes, ending, failed = self.hear(ENDED)
         except ProcessLost as lost:
             raise self._death(lost) from None
         self._told_end = True
@@ -286,14 +284,14 @@ class ChildRun(RunLoop, SupervisedProcess):
             self._inputs = failed["inputs"]
             raise rebuilt(failed) if failed["kind"] else RuntimeError(failed["problems"])
 
-    def _forked(self, opener: OpenInstance, asked: int, commands: int, answers: int) -> int:
+    def _forked(self, opener: OpenInstance, asked: int, commands: int, answers: int) -> ForkedChild:
         flush_output()
         process = os.fork()
         if process == 0:
             step_units(self.plan, opener, self._stop, self._shared, PipeChannel(commands, answers), asked)
-        return process
+        return ForkedChild(process)
 
-    def _take(self, kind: int, content: Any) -> None:
+    def take(self, kind: int, content: Any) -> None:
         match kind, content:
             case _, [int() as first, int() as count, list() as others] if kind == ROWS:
                 if first != self.handed_over:
@@ -310,17 +308,17 @@ class ChildRun(RunLoop, SupervisedProcess):
             case _, None if kind == WHERE:
                 pass
             case _:
-                raise ProtocolError(f"a record {kind}")
+                super().take(kind, content)
 
     def _record(self, count: int, others: list[list[Value]]) -> None:
-        if self._closed:
+        if self._sealed:
             self.handed_over += count
             return
-        self._closed = True  # if this fails, later rows must not be written either
+        self._sealed = True  # if this fails, later rows must not be written either
         self._rows.lay(self._shared.blocks[self._blocks % 2])
         self._rows.others[:] = others
         self._hand_over(count)
-        self._closed = False
+        self._sealed = False
 
     def flush(self) -> None:
         """Write the rows that the child has left in shared memory."""
@@ -330,9 +328,9 @@ class ChildRun(RunLoop, SupervisedProcess):
             others = self._shared.kept(count) if count <= BLOCK else []
             count = len(others)
         self._record(min(count, BLOCK), others)
-        self._closed = True
+        self._sealed = True
 
-    def _check_time(self) -> None:
+    def check_time(self) -> None:
         """Pass a stop request on to the child; kill it if it does not stop, or takes too long to end."""
         now, asked = time.monotonic(), stop_requested_at()
         if asked is not None:
@@ -346,25 +344,12 @@ class ChildRun(RunLoop, SupervisedProcess):
         with contextlib.suppress(OSError):
             os.write(self._asking, bytes([self._stop.number]))
 
-    def _has_ended(self, within: float) -> bool:
-        assert self._process is not None
-        end = time.monotonic() + within
-        while os.waitid(os.P_PID, self._process, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
-            if time.monotonic() >= end:
-                return False
-            time.sleep(0.001)
-        return True
-
-    def close(self) -> int:
-        if self._process is not None:
-            for kill in (os.killpg, os.kill):  # with the processes that FMUs have started
-                with contextlib.suppress(OSError):
-                    kill(self._process, signal.SIGKILL)
-            _, status = os.waitpid(self._process, 0)
-            self._process, self._status = None, os.waitstatus_to_exitcode(status)
-            self._channel.close()
+    def close(self, *, kill: bool = True) -> int:
+        """Kill the process and those that FMUs have started; return its return code."""
+        if not self._closed:
+            self.child.kill(group=True)
             os.close(self._asking)
-        return self._status
+        return super().close(kill=True)
 
     def _death(self, lost: ProcessLost) -> SimulationError | Interrupted:
         """Return the exception for the death of the child process."""
@@ -385,17 +370,17 @@ class ChildRun(RunLoop, SupervisedProcess):
 
     def end(self) -> None:
         """Let the child terminate and free the instances; a crash there is only a warning."""
-        if self._process is None:
+        if not self._started or self._closed:
             return
-        self._closed, self._where = True, None
+        self._sealed, self._where = True, None
         self._deadline = time.monotonic() + END_LIMIT
         try:
             if not self._told_end:
                 self._ask()
-                self._hear(ENDED)
+                self.hear(ENDED)
             self._where = None  # an answer from before the end of the run
             self._channel.say(FREE)
-            self._hear(REPLY)
+            self.hear(REPLY)
         except (ProcessLost, OSError) as lost:
             unit = self._where[0] if self._where else ", ".join(self._suspects) or "the units"
             text = f"when units were terminated and freed, the process of the run {lost}"

@@ -1,4 +1,4 @@
-"""Inter-process communication between the master and its child processes: pipes and shared memory.
+"""Inter-process communication between the master and processes that run FMUs: shared memory and log messages.
 
 The Real values of a step, its time and its size lie in shared memory; two pipes carry single bytes: which of
 set, step and get to do, and how that ended. Such an exchange costs 7 us on one core and 50 us from core to
@@ -6,44 +6,30 @@ core, most of it the two context switches; a pair of pipes was the fastest of th
 death of the other side at once. Everything else, and the messages that the FMU logs meanwhile, is a tagged
 record of a few hundred bytes.
 
-An FMU can write into any file that its process has open, including the pipe to the master. So records from
-there are JSON and checked, never unpickled; a stray byte is recognized by comparison with the last answer and
-its number in shared memory; and waiting for a record is limited by the time limit of a call.
+An FMU can write into the pipe to the master. So records from there are checked (see `supervisor`); a stray
+byte is recognized by comparison with the last answer and its number in shared memory; and waiting for a
+record is limited by the time limit of a call.
 """
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
-import json
 import mmap
 import os
-import pickle
 import tempfile
-import threading
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ..errors import Interrupted, YawbenchError
+from ..processes import Child
+from ..supervisor import LOG, PipeChannel, ProtocolError, SupervisedProcess
 from .log import KEPT, Log
 
 SET, STEP, GET = 1, 2, 4
 """Parts of an exchange, in this order; a sum of them asks for several."""
-ANSWER = 0x7F
-"""Largest byte that is the result of an exchange (see `isolation.InstanceServer.exchange`)."""
-REQUEST, LOG, REPLY, FAILED = 0x80, 0x81, 0x82, 0x83
-"""First bytes of records: the master's request, a log message, the reply, the reason of a failure."""
-LONGEST = 1 << 26
-"""Largest record [B]; chosen: far longer than any text of an FMU."""
-
 _HEAD = 4  # numbers before the inputs: time, step size, part being done, last answer
-_LENGTH = 4  # bytes
-
-
-class ProtocolError(Exception):
-    """Data in a pipe are not a valid record."""
 
 
 class SharedBuffer:
@@ -75,98 +61,6 @@ def shared_memory(values: int) -> int:
             descriptor = os.dup(file.fileno())
     os.truncate(descriptor, size_of(values))
     return descriptor
-
-
-class PipeChannel:
-    """One process's ends of the two pipes.
-
-    Args:
-        wait: called before every read of a record; returns when data are available, or raises.
-    """
-
-    def __init__(self, reading: int, writing: int, wait: Callable[[], None] = lambda: None) -> None:
-        self.reading = reading
-        self.writing = writing
-        self._wait = wait
-        self._process = os.getpid()
-        self._alone = threading.Lock()  # an FMU may log from another thread
-
-    def say(self, byte: bytes) -> None:
-        """Write one byte."""
-        with self._alone:
-            os.write(self.writing, byte)
-
-    def hear(self) -> int | None:
-        """Return the next byte; None if the other side is gone."""
-        byte = os.read(self.reading, 1)
-        return byte[0] if byte else None
-
-    def order(self, content: Any) -> None:
-        """Write a pickled record, for a process that trusts this one."""
-        self._send(REQUEST, pickle.dumps(content))
-
-    def ordered(self) -> Any:
-        """Return the record written by `order`, whose first byte has just been read.
-
-        Raises:
-            EOFError: the other side is gone.
-        """
-        return pickle.loads(self._content())
-
-    def send(self, kind: int, content: Any) -> None:
-        """Write a record as JSON.
-
-        Raises:
-            ProtocolError: it is too long, or not representable in JSON.
-        """
-        try:
-            data = json.dumps(content).encode()
-        except (TypeError, ValueError) as error:
-            raise ProtocolError(str(error)) from None
-        if len(data) > LONGEST:
-            raise ProtocolError(f"{len(data)} bytes cannot be passed on at once, {LONGEST} can")
-        self._send(kind, data)
-
-    def receive(self) -> Any:
-        """Return the record written by `send`, whose first byte has just been read.
-
-        Raises:
-            EOFError: the other side is gone.
-            ProtocolError: the data are not a valid record. `wait` may raise others.
-        """
-        try:
-            return json.loads(self._content())
-        except (ValueError, RecursionError):
-            raise ProtocolError("what it holds is no record") from None
-
-    def _send(self, kind: int, data: bytes) -> None:
-        if os.getpid() != self._process:
-            os._exit(0)  # a copy of this process forked by an FMU
-        rest = memoryview(bytes([kind]) + len(data).to_bytes(_LENGTH, "little") + data)
-        with self._alone:
-            while rest:
-                rest = rest[os.write(self.writing, rest) :]
-
-    def _content(self) -> bytes:
-        length = int.from_bytes(self._read(_LENGTH), "little")
-        if length > LONGEST:
-            raise ProtocolError(f"it announces {length} bytes")
-        return self._read(length)
-
-    def _read(self, count: int) -> bytes:
-        data = bytearray()
-        while len(data) < count:
-            self._wait()
-            more = os.read(self.reading, min(count - len(data), 1 << 20))
-            if not more:
-                raise EOFError
-            data += more
-        return bytes(data)
-
-    def close(self) -> None:
-        for descriptor in (self.reading, self.writing):
-            with contextlib.suppress(OSError):
-                os.close(descriptor)
 
 
 def told(error: YawbenchError | Interrupted) -> dict[str, Any]:
@@ -213,3 +107,26 @@ class LogRelay(Log):
         if self._unreported:
             count, self._unreported = self._unreported, 0
             self._channel.send(LOG, count)
+
+
+class FmuProcess(SupervisedProcess):
+    """Parent's side of a process that runs FMUs, and passes on what they log."""
+
+    unasked: ClassVar[tuple[int, ...]] = (LOG,)
+
+    def __init__(self, start: Callable[[int, int], Child], log: Log) -> None:
+        super().__init__(start)
+        self.log = log
+
+    def take(self, kind: int, content: Any) -> None:
+        """Log a message of an FMU, or the number of dropped messages (see `LogRelay`)."""
+        if kind != LOG:
+            return super().take(kind, content)
+        match content:
+            case int():
+                self.log.drop(content)
+            case [str() as unit, int() as status, str() as category, str() as text, float() | None as time]:
+                self.log.add(unit, status, category, text, time)
+            case _:
+                raise ProtocolError("a message that is none")
+        return None

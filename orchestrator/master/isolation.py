@@ -6,7 +6,7 @@ same values. Setting inputs is deferred until the step, and outputs come back wi
 one exchange per step.
 
 `InstanceServer` is the other end: it does with the FMU what the master asks for, and nothing else. Its
-process ends when the master does, and with it everything that the FMU has started (see `supervisor`).
+process ends when the master does, and with it everything that the FMU has started (see `guardian`).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -21,20 +22,89 @@ from typing import Any
 
 from ..errors import SimulationError, YawbenchError
 from ..plan import Instance, Plan, Value, ValueRef
+from ..processes import start
+from ..supervisor import ANSWER, FAILED, REPLY, REQUEST, PipeChannel, ProcessLost
 from .fmi import SLAVES, open_unit
+from .guardian import stand_guard
 from .instance import Buffers, CtypesInstance, ExperimentSetup, FmuInstance, Status, StepCalls
-from .ipc import FAILED, GET, REPLY, SET, STEP, LogRelay, PipeChannel, SharedBuffer, rebuilt, told
+from .ipc import GET, LOG, SET, STEP, FmuProcess, LogRelay, SharedBuffer, rebuilt, shared_memory, told
 from .log import FATAL, OK, PROCESS, WARNING, Log, known
-from .process_state import ProcessState, flush_output
+from .process_state import ProcessState, flush_output, stop_requested_at
 from .step_program import copying
-from .supervisor import InstanceProcess, ProcessLost, stand_guard
 
 CALL_LIMIT = 10.0
 """Time that a call of an FMU may take [s]; chosen: ten thousand times the length of a step, and still a
 tolerable wait."""
 
+START_LIMIT = 60.0
+"""Time that a process may take to start [s]; chosen: enough to load Python from a slow disk."""
+STOP_GRACE = 1.0
+"""Time that a call may still take after a stop request [s]; chosen: a tolerable wait for the user."""
+
 _PARTS = {SET: ("set", "Set{}"), STEP: ("step", "DoStep"), GET: ("get", "Get{}")}
 """Part of an exchange -> kind of the master's operation and template of the FMI function's name."""
+
+
+class InstanceProcess(FmuProcess):
+    """The process of one isolated instance."""
+
+    unasked = (LOG, FAILED)
+
+    def __init__(self, values: int, limit: float) -> None:
+        """Start the process without waiting for it.
+
+        Args:
+            values: number of inputs and outputs to allocate shared memory for.
+            limit: time that an answer may take [s].
+        """
+        self._limit = limit
+        self.memory = memory = shared_memory(values)
+        super().__init__(
+            lambda reading, writing: start(__name__, reading, writing, memory, preload=[__name__]), Log()
+        )
+
+    def wait_until_ready(self) -> None:
+        """Wait until the process is ready for requests."""
+        self.answer(START_LIMIT, REPLY)
+
+    def ask(self, request: str, *arguments: Any) -> Any:
+        """Call a method of the process's `InstanceServer` or of its instance; return the result."""
+        with contextlib.suppress(BrokenPipeError):  # the cause is found when the answer is read
+            self._channel.send_object(REQUEST, (request, arguments))
+        return self.answer(self._limit, REPLY)
+
+    def exchange(self, parts: bytes) -> int:
+        """Have it do parts of a step; return the result (see `InstanceServer.exchange`)."""
+        with contextlib.suppress(BrokenPipeError):
+            self._channel.say(parts)
+        return self.answer(self._limit, ANSWER)
+
+    def answer(self, limit: float, wanted: int) -> Any:
+        """Return its answer, which may take a time `limit` [s]."""
+        self._deadline = time.monotonic() + limit
+        return self.hear(wanted)
+
+    def take(self, kind: int, content: Any) -> None:
+        if kind == FAILED:
+            self.close()
+            raise ProcessLost(f"failed: {content}")
+        super().take(kind, content)
+
+    def check_time(self) -> None:
+        now, asked = time.monotonic(), stop_requested_at()
+        if asked is not None and now - asked > STOP_GRACE:
+            self.close()
+            raise ProcessLost("did not come back when the run was to stop", late=True)
+        if now > self._deadline:
+            self.close()
+            limit = f"{self._limit:g} s, the limit of a call (--call-limit)"
+            raise ProcessLost(f"did not come back within {limit}", late=True)
+
+    def close(self, *, kill: bool = False) -> int:
+        """End the process by its guardian, which finds the pipe closed and kills everything that is left."""
+        if not self._closed:
+            os.close(self.memory)
+        return super().close()
 
 
 class IsolatedInstance:
@@ -255,7 +325,7 @@ class InstanceServer:
             if parts:
                 answer, count = self.exchange(parts), count + 256
             else:
-                name, arguments = self._channel.ordered()
+                name, arguments = self._channel.receive_object()
                 reply = getattr(self if hasattr(self, name) else self._slave, name)(*arguments)
                 if self._surroundings is not None:
                     self._surroundings.restore("", self._log)

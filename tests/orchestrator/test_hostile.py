@@ -6,17 +6,20 @@ import os
 import pickle
 import random
 import shutil
+import signal
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
-from orchestrator.master import supervisor
-from orchestrator.master.ipc import FAILED, LOG, REPLY, PipeChannel, ProtocolError
+from orchestrator import supervisor
+from orchestrator.master import isolation
+from orchestrator.master.isolation import InstanceProcess
 from orchestrator.master.log import Log
-from orchestrator.master.supervisor import InstanceProcess, ProcessLost
+from orchestrator.processes import Child
 from orchestrator.results.read import load_results
+from orchestrator.supervisor import FAILED, LOG, REPLY, PipeChannel, ProcessLost, ProtocolError
 
 from ..trials.hostile_fmus import VALUES_OF, Case, attack, make_files
 
@@ -55,33 +58,37 @@ def test_a_unit_that_does_harm_ends_its_run_with_a_sentence_and_the_results_so_f
     assert attack(cases, tmp_path) == {case: [] for case in cases}
 
 
-class _Pretender:
+class _Pretender(Child):
     """In place of a unit's process: has written `said` into the pipe, and waits or is gone."""
 
     said = b""
     stays = False
 
-    def __init__(self, command, pass_fds, **options):
-        self.descriptor = os.dup(pass_fds[1])
+    def __init__(self, module, reading, writing, memory, preload):
+        super().__init__(0)
+        self.descriptor = os.dup(writing)
         os.write(self.descriptor, self.said)
-        self.returncode = None
+        self.gone = False
         if not self.stays:
             self.kill()
 
-    def wait(self, limit=None):
+    def ended(self, within=0.0):
+        return self.gone
+
+    def _collect(self):
         self.kill()
         return 0
 
-    def kill(self):
-        if self.returncode is None:
+    def kill(self, number=signal.SIGKILL, *, group=False):
+        if not self.gone:
             os.close(self.descriptor)
-            self.returncode = 0
+            self.gone = True
 
 
 @pytest.fixture
 def pretend(monkeypatch):
     """Ask a process that has said something else; return the sentence on how it was lost."""
-    monkeypatch.setattr(supervisor.subprocess, "Popen", _Pretender)
+    monkeypatch.setattr(isolation, "start", _Pretender)
 
     def ask(said, *, stays=False, ask="ready"):
         monkeypatch.setattr(_Pretender, "said", said)
@@ -90,7 +97,7 @@ def pretend(monkeypatch):
         unit = InstanceProcess(3, limit=0.01)
         unit.log = Log()
         with pytest.raises(ProcessLost) as lost:
-            unit._answer(0.01, REPLY)
+            unit.answer(0.01, REPLY)
         return lost.value.in_("fmi2DoStep")
 
     return ask

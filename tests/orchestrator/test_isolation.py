@@ -91,9 +91,9 @@ def test_no_process_outlives_a_run(fmus, tmp_path):
     plan = plan_of(fmus, stop_time=0.01)
     with Isolation(plan.instances) as isolation:
         simulate(plan, tmp_path, opener=isolation)
-        processes = [process._popen for process in isolation._processes.values()]
+        processes = [process.child for process in isolation._processes.values()]
     assert len(processes) == len(UNITS)
-    assert all(process.poll() is not None for process in processes)
+    assert all(process.ended() for process in processes)
 
 
 def test_units_end_when_the_master_is_killed(fmus, tmp_path):
@@ -111,7 +111,7 @@ def test_units_end_when_the_master_is_killed(fmus, tmp_path):
         "again = Isolation(plan.instances)\n"
         "from orchestrator.master.log import Log\n"
         "[again(unit, Log(), set()) for unit in plan.instances]\n"
-        "print(*(p._popen.pid for p in again._processes.values()), flush=True)\n"
+        "print(*(p.child.pid for p in again._processes.values()), flush=True)\n"
         "os.kill(os.getpid(), signal.SIGKILL)\n"
     )
     # they have inherited the pipe: that this comes back shows that all of them have ended
@@ -211,7 +211,7 @@ def test_a_limit_that_is_no_time_is_refused(option, says, capsys):
 
 NOBODY = """
 import os, threading
-from orchestrator.master.ipc import PipeChannel
+from orchestrator.supervisor import PipeChannel
 from orchestrator.master.process_state import StopFlag
 from orchestrator.master.child_run import _tell_where
 nobody, writing = os.pipe()

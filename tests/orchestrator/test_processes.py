@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
+import uuid
 from pathlib import Path
 
 import pytest
 
-from orchestrator.processes import SafeSpawnContext, _off_path, python, safe_path
+from orchestrator import processes
+from orchestrator.processes import ForkServer, python, start
 
 SCENARIO = "fuzzy_feedback/single_sine"
 SHADOWED = ("json", "numpy", "socket", "selectors", "struct", "signal", "pickle", "multiprocessing", "random")
@@ -46,21 +49,69 @@ def test_modules_in_the_working_folder_are_left_alone(trap, arguments):
     assert done.returncode == 0, done.stderr
 
 
-def test_a_process_that_starts_afresh_leaves_the_working_folder_alone(trap, monkeypatch):
+@pytest.fixture
+def started(tmp_path, monkeypatch):
+    """Have a process call `main` made of these lines; return what it writes into a pipe, and its code."""
+
+    def start_one(*lines, start=start):
+        (tmp_path / "modules").mkdir(exist_ok=True)
+        name = f"made_{uuid.uuid4().hex}"
+        program = "\n    ".join(["import os, signal, sys\ndef main(writing):", *lines])
+        (tmp_path / "modules" / f"{name}.py").write_text(program)
+        monkeypatch.syspath_prepend(tmp_path / "modules")
+        reading, writing = os.pipe()
+        child = start(name, writing)
+        os.close(writing)
+        with open(reading, encoding="utf-8") as answer:
+            return answer.read(), child.collect()
+
+    return start_one
+
+
+SAY = "def say(*words): os.write(int(writing), ' '.join(map(str, words)).encode())"
+
+
+def test_a_forked_process_leaves_the_working_folder_alone(trap, started, monkeypatch):
     monkeypatch.chdir(trap)
     monkeypatch.setattr(sys, "path", [folder for folder in sys.path if folder])
-    process = SafeSpawnContext().Process(target=os.getpid)
-    process.start()
-    process.join()
+    server = ForkServer()
+    assert started(SAY, "say(os.getcwd())", start=server.start) == (str(trap), 0)
     assert not (trap / "taken").exists()
-    assert process.exitcode == 0
+    server.close()
 
 
-def test_a_program_of_one_line_loses_the_working_folder():
-    """As every Python before 3.11 needs it."""
-    command = ["python", "-s", "-c", "from a import main; main(1)", "--multiprocessing-fork"]
-    program = "import sys; del sys.path[0]; from a import main; main(1)"
-    assert _off_path(command) == ["python", "-s", "-c", program, "--multiprocessing-fork"]
+def test_a_forked_process_has_the_environment_and_output_of_its_caller_as_they_are_now(
+    started, monkeypatch, capfd
+):
+    started("pass")
+    monkeypatch.setenv("MOOD", "good")
+    assert started(SAY, "print('hello'); say(os.environ['MOOD'])") == ("good", 0)
+    assert capfd.readouterr().out == "hello\n"
+    monkeypatch.delenv("MOOD")
+    assert started(SAY, "say('MOOD' in os.environ)") == ("False", 0)
+
+
+def test_how_a_forked_process_ended_is_known(started, capfd):
+    assert started("os.kill(os.getpid(), signal.SIGSEGV)")[1] == -signal.SIGSEGV
+    assert started("os._exit(3)")[1] == 3
+    assert started("raise ValueError('no')")[1] == 1
+    assert "ValueError: no" in capfd.readouterr().err
+
+
+def test_a_server_that_is_killed_takes_its_children_along_and_is_replaced(started):
+    started("pass")
+    server = processes._server
+    reading, writing = os.pipe()
+    child = start("time", writing)  # `time` has no `main`
+    assert child.collect() == 1
+    waiting = start("orchestrator.workers", reading, writing)
+    server._process.kill()
+    assert waiting.ended(10)
+    assert waiting.collect() == -signal.SIGKILL
+    assert started(SAY, "say(1)") == ("1", 0)
+    assert processes._server is not server
+    for descriptor in (reading, writing):
+        os.close(descriptor)
 
 
 def test_a_program_finds_what_this_one_finds(tmp_path, monkeypatch):
@@ -68,10 +119,3 @@ def test_a_program_finds_what_this_one_finds(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     done = subprocess.run(python("told", 1, "b c"), capture_output=True, text=True, check=True, cwd="/")
     assert done.stdout == "1 b c\n"
-
-
-def test_the_environment_is_afterwards_as_it_was(monkeypatch):
-    monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
-    with safe_path():
-        assert os.environ["PYTHONSAFEPATH"] == "1"
-    assert "PYTHONSAFEPATH" not in os.environ

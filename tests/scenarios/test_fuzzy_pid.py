@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from orchestrator.experiments.experiment import load_experiment
-from orchestrator.experiments.jobs import Job
+from orchestrator.experiments.jobs import Job, execute
 from orchestrator.experiments.outcome import derive
-from orchestrator.experiments.workers import execute
 from orchestrator.figures.style import shown
 from orchestrator.metrics.run_metrics import MetricValue
 from orchestrator.results.read import load_results

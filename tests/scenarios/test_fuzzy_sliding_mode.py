@@ -10,8 +10,7 @@ import pytest
 
 from components.control_laws.slip_control import SlipControlParameters
 from orchestrator.cli import main
-from orchestrator.experiments.jobs import Job
-from orchestrator.experiments.workers import execute
+from orchestrator.experiments.jobs import Job, execute
 from orchestrator.figures.style import shown
 from orchestrator.results.read import load_results
 from tests.changed import changed

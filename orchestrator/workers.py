@@ -1,0 +1,225 @@
+"""Pools of worker processes: for runs, for reading results and drawing figures, for building FMUs.
+
+Workers are supervised processes of the fork server. They communicate through pipes only: the queues of
+`concurrent.futures` need semaphores, which leak if the command is killed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import select
+import signal
+import time
+import traceback
+import warnings
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+from .checksums import RecordWarning
+from .errors import YawbenchError
+from .processes import ServedChild, start
+from .supervisor import LOOK_EVERY, REPLY, REQUEST, PipeChannel, ProcessLost, SupervisedProcess
+
+FILES, FILES_EACH = 32, 4
+"""Required limit of open files: a base, and more per process. Chosen: 32 suffice for two processes; each
+needs two pipes and one that signals its end."""
+FIGURES = (
+    "orchestrator.experiments.figures",
+    "matplotlib.backends.backend_agg",
+    "matplotlib.backends.backend_svg",
+    "matplotlib.figure",
+    "matplotlib.mathtext",
+    "pyarrow.csv",
+)
+"""Modules to preload for reading results and drawing figures, because they are slow to import."""
+
+
+def default_workers() -> int:
+    """Return the number of processor cores that this process may use."""
+    affinity = getattr(os, "sched_getaffinity", None)
+    return len(affinity(0)) if affinity else os.cpu_count() or 1
+
+
+class Finished(NamedTuple):
+    """What became of a call: its value, the exception that it raised, or how the process ended."""
+
+    number: int  # of the call, in the order in which they were given
+    seconds: float  # from request to answer
+    value: Any = None
+    error: Exception | None = None
+    died: str = ""
+
+
+class Worker(SupervisedProcess):
+    """A process that calls functions, one at a time."""
+
+    trusted = True
+    child: ServedChild
+
+    def __init__(self, preload: Sequence[str]) -> None:
+        super().__init__(lambda *pipes: start(__name__, *pipes, preload=[__name__, *preload]))
+        self.calls = 0
+        self.busy = False
+
+    def give(self, number: int, function: Callable[..., Any], arguments: Sequence[Any]) -> None:
+        """Have it call a function, importable by name."""
+        self._number, self._began = number, time.monotonic()
+        self.calls += 1
+        self.busy = True
+        with contextlib.suppress(BrokenPipeError):  # the cause is found when the answer is read
+            self._channel.send_object(REQUEST, (function, arguments))
+
+    def descriptors(self) -> tuple[int, int]:
+        """Return the descriptors that can be read when it has answered or died."""
+        return self._channel.reading, self.child.status
+
+    def finished(self) -> Finished:
+        """Wait for the answer and return it."""
+        died, value, error = "", None, None
+        try:
+            value, error = self.hear(REPLY)
+        except ProcessLost as lost:
+            died = str(lost)
+        self.busy = False
+        return Finished(self._number, time.monotonic() - self._began, value, error, died)
+
+
+class Pool(contextlib.AbstractContextManager["Pool"]):
+    """Pool of worker processes, started on demand; all end with the `with` block.
+
+    Args:
+        workers: largest number of processes; None: one per core.
+        preload: modules that their functions need, imported once for all of them.
+        lasting: number of calls after which a worker is replaced by a fresh process.
+
+    Raises:
+        YawbenchError: the limit of open files is too low.
+    """
+
+    def __init__(
+        self, workers: int | None = None, *, preload: Sequence[str] = FIGURES, lasting: float = float("inf")
+    ) -> None:
+        self._limit = max(1, workers or default_workers())
+        _require_files(FILES + FILES_EACH * max(self._limit, default_workers()))
+        self._preload = preload
+        self._lasting = lasting
+        self._workers: list[Worker] = []
+
+    def each(
+        self,
+        function: Callable[..., Any],
+        calls: Iterable[Sequence[Any]],
+        *,
+        look: Callable[[], None] = lambda: None,
+    ) -> Iterator[Finished]:
+        """Call `function` with each set of arguments; yield what became of the calls, as they end.
+
+        Args:
+            function: importable by name, as are its arguments' types.
+            calls: arguments of each call.
+            look: called several times a second; it may raise to end all processes.
+        """
+        waiting = deque(enumerate(calls))
+        while True:
+            look()
+            while waiting and (worker := self._idle()) is not None:
+                number, arguments = waiting.popleft()
+                worker.give(number, function, arguments)
+            busy = [worker for worker in self._workers if worker.busy]
+            if not busy:
+                return
+            for worker in _answering(busy):
+                finished = worker.finished()
+                if finished.died or worker.calls >= self._lasting:
+                    self._workers.remove(worker)
+                    worker.close()
+                yield finished
+
+    def map(self, function: Callable[..., Any], *arguments: Iterable[Any]) -> list[Any]:
+        """Apply `function` to each set of arguments and return the results in order.
+
+        Raises:
+            Exception: raised by the first call that fails.
+            YawbenchError: a process was killed.
+        """
+        results: dict[int, Any] = {}
+        try:
+            for finished in self.each(function, zip(*arguments, strict=False)):
+                if finished.died:
+                    raise YawbenchError("a process that reads results or draws figures has been killed")
+                if finished.error is not None:
+                    raise finished.error
+                results[finished.number] = finished.value
+        except BaseException:
+            self._end(terminate=True)  # do not wait for other calls
+            raise
+        return [results[number] for number in range(len(results))]
+
+    def _idle(self) -> Worker | None:
+        """Return an idle process, started if need be; None if all are busy."""
+        for worker in self._workers:
+            if not worker.busy:
+                return worker
+        if len(self._workers) == self._limit:
+            return None
+        self._workers.append(Worker(self._preload))
+        return self._workers[-1]
+
+    def _end(self, *, terminate: bool) -> None:
+        workers, self._workers = self._workers, []
+        for worker in workers:
+            if terminate:
+                worker.child.kill(signal.SIGTERM)  # a run writes what it has recorded
+        for worker in workers:
+            worker.close()
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self._end(terminate=kind is not None)
+
+
+def _answering(busy: Sequence[Worker]) -> list[Worker]:
+    """Return the workers that have answered or died, after a wait of at most `LOOK_EVERY`."""
+    events = select.poll()
+    for worker in busy:
+        for descriptor in worker.descriptors():
+            events.register(descriptor, select.POLLIN)
+    ready = {descriptor for descriptor, _ in events.poll(LOOK_EVERY)}
+    return [worker for worker in busy if not ready.isdisjoint(worker.descriptors())]
+
+
+def _require_files(needed: int) -> None:
+    """Check the limit of open files before processes fail for it."""
+    import resource
+
+    allowed, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if allowed != resource.RLIM_INFINITY and allowed < needed:
+        raise YawbenchError(
+            f"only {allowed} files may be open at a time, and these processes need {needed} "
+            f"(`ulimit -n {needed}`)"
+        )
+
+
+def main(reading: str, writing: str) -> None:
+    """Execute calls until the pipe is closed."""
+    warnings.filterwarnings("ignore", category=RecordWarning)  # the parent warns
+    channel = PipeChannel(int(reading), int(writing))
+    while channel.hear() is not None:
+        function, arguments = channel.receive_object()
+        answer: tuple[Any, Exception | None]
+        try:
+            answer = function(*arguments), None
+        except Exception as error:
+            answer = None, _portable(error)
+        channel.send_object(REPLY, answer)
+
+
+def _portable(error: Exception) -> Exception:
+    """Return an exception, or if it cannot be pickled, a RuntimeError with its traceback."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        return RuntimeError("".join(traceback.format_exception(error)))
+    return error
