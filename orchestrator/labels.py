@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from .names import Target
 from .plan import Override, Plan
-
-OF_TIME = ("start_time", "stop_time", "step_size")
-"""Overrides of the run whose values are times."""
 
 
 def changed(changes: Iterable[Override]) -> str:
@@ -19,21 +18,20 @@ def changed(changes: Iterable[Override]) -> str:
 
 def in_words(change: Override) -> str:
     """Return an override in words."""
-    value = change.value
+    value, target = change.value, change.target
     if change.faulty:
         return f"{change.faulty}: {value}"
     if change.swaps:
-        return f"{fmu_of(change)} for {change.place}"
-    if change.place == "vehicle":
+        return f"{fmu_of(change)} for {target}"
+    if target.kind == "vehicle_file":
         return f"vehicle file {Path(str(value)).name}"
-    if change.names_file:
-        return f"{change.place} = {Path(str(value)).name}"
+    if target.names_file:
+        return f"{target} = {Path(str(value)).name}"
     text = str(value).lower() if isinstance(value, bool) else str(value)
     if isinstance(value, float):
         text = f"{value:.10g}"
-    is_time = change.place in OF_TIME or change.place.endswith(".step_size")
-    seconds = " s" if is_time and not isinstance(value, str) else ""
-    return f"{change.place} = {text}{seconds}"
+    seconds = " s" if target.is_time and not isinstance(value, str) else ""
+    return f"{target} = {text}{seconds}"
 
 
 def faults_of(plan: Plan) -> str:
@@ -49,12 +47,13 @@ def with_changes(title: str, changes: Iterable[Override]) -> str:
 
 def changes_in(run: Mapping[str, Any]) -> tuple[Override, ...]:
     """Return the overrides in a run record."""
-    items = run.get("changes")
-    return tuple(
-        Override(str(item["place"]), item.get("value", ""), str(item.get("origin", "")))
-        for item in (items if isinstance(items, list) else ())
-        if isinstance(item, dict) and "place" in item
-    )
+    items, found = run.get("changes"), []
+    for item in items if isinstance(items, list) else ():
+        if isinstance(item, dict) and "place" in item:
+            with contextlib.suppress(ValueError):  # the record was edited
+                target = Target.parse(str(item["place"]))
+                found.append(Override(target, item.get("value", ""), str(item.get("origin", ""))))
+    return tuple(found)
 
 
 def changes_of_all(every: Sequence[Sequence[Override]]) -> tuple[Override, ...]:
@@ -87,4 +86,4 @@ def fmu_of(swap: Override) -> str:
 
 
 def _among(change: Override, changes: Iterable[Override]) -> bool:
-    return any((other.place, other.value) == (change.place, change.value) for other in changes)
+    return any((other.target, other.value) == (change.target, change.value) for other in changes)

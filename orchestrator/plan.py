@@ -14,16 +14,9 @@ from vocabulary.roles import role_of
 
 from .fault_kinds import FaultList, FaultySignal
 from .messages import cut
+from .names import SignalName, Target
 
 Value = float | int | bool | str
-OF_RUN = ("start_time", "stop_time", "step_size", "algorithm")
-"""Override targets that concern the whole run, not an instance."""
-FACTS = ("friction", "speed")
-"""Override targets that reach all instances with a matching input or parameter (see `wiring.context`)."""
-TYRES = "tyres"
-"""Override target of the tyre property files: of both axles, or `tyres.front`, `tyres.rear` of one."""
-FAULTS = "faults"
-"""Prefix of override targets that set the faults of a signal: `faults.sensor.yaw_rate`."""
 SENSING = {"sensor": "measurement", "estimator": "estimate"}
 """Role of an instance -> kind of values that its outputs are, as opposed to the truth."""
 Algorithm = Literal["jacobi", "gauss_seidel", "extrapolated"]
@@ -232,9 +225,18 @@ class Wire:
 class Override:
     """A value that replaces one of the scenario file."""
 
-    place: str  # the target: "plant.mass", "inputs.friction*", "stop_time"; an instance (its FMU), "vehicle"
+    target: Target
     value: Value | FaultList
     origin: str  # "--set", "--swap", "study", "sweep", ...
+
+    @classmethod
+    def of(cls, target: str, value: Value | FaultList, origin: str) -> Override:
+        """Return the override of a target given as text.
+
+        Raises:
+            ValueError: the text is not a target.
+        """
+        return cls(Target.parse(target), value, origin)
 
     @property
     def plain(self) -> Value:
@@ -242,31 +244,30 @@ class Override:
         return str(self.value) if isinstance(self.value, FaultList) else self.value
 
     @property
+    def record(self) -> dict[str, Value]:
+        """The override as in records of runs."""
+        return {"place": str(self.target), "value": self.plain, "origin": self.origin}
+
+    @property
     def faults(self) -> FaultList:
         """The faults that it sets, none if its target is something else."""
         return self.value if isinstance(self.value, FaultList) else FaultList()
 
     @property
-    def names_file(self) -> bool:
-        """Whether the value names a file."""
-        return self.swaps or self.place.partition(".")[0] == TYRES or self.place == "vehicle"
-
-    @property
     def swaps(self) -> bool:
         """Whether it replaces the FMU of an instance."""
-        return "." not in self.place and self.place not in (*OF_RUN, "vehicle", TYRES, *FACTS)
+        return self.target.kind == "fmu"
 
     @property
     def faulty(self) -> str | None:
         """The location whose faults it sets, None if its target is something else."""
-        holder, _, place = self.place.partition(".")
-        return place if holder == FAULTS and place else None
+        return self.target.variable if self.target.kind == "faults" else None
 
     def __str__(self) -> str:
         value = str(self.value).lower() if isinstance(self.value, bool) else str(self.value)
         if self.faulty:
             return f"{self.origin} {cut(self.faulty)}: {cut(value)}"
-        return f"{self.origin} {cut(self.place)}={cut(value)}"
+        return f"{self.origin} {cut(str(self.target))}={cut(value)}"
 
 
 @dataclass(frozen=True)
@@ -286,7 +287,7 @@ class Plan:
 
     instances: tuple[Instance, ...]
     wires: tuple[Wire, ...]
-    record: tuple[tuple[str, str], ...]  # (instance, variable) in column order
+    record: tuple[SignalName, ...]  # in column order
     step: Fraction  # communication step size [s]
     n_steps: int
     algorithm: Algorithm

@@ -10,5 +10,5 @@ def changed(
     swaps: Iterable[str] = (), settings: Iterable[str] = (), faults: Iterable[str] = (), **of_run: Value
 ) -> tuple[Override, ...]:
     """Return what --swap, --set and --fault with these texts change, and times and the algorithm by name."""
-    named = [Override(place, value, "test") for place, value in of_run.items()]
+    named = [Override.of(place, value, "test") for place, value in of_run.items()]
     return (*read_changes(swaps, settings, faults), *named)

@@ -76,7 +76,7 @@ def experiment(
                 words = level if isinstance(level, str) else Path(str(swap.value)).stem
                 if words in variants:
                     raise ScenarioError(f"{name}: two levels are called {words}")
-                settings = {one.place: one.value for one in brought}
+                settings = {str(one.target): one.value for one in brought}
                 variants[words] = {"swap": {name: str(swap.value)}, "set": settings}
                 changed = replace(changed, programs=swapped.programs)
             given[name] = {"variants": variants}

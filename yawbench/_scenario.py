@@ -17,7 +17,8 @@ from orchestrator.master.log import Log
 from orchestrator.master.simulate import simulate_in_memory
 from orchestrator.messages import hint, short
 from orchestrator.metrics.plausibility import remarks_of
-from orchestrator.plan import TYRES, Instance, Override, Plan, Value
+from orchestrator.names import Target
+from orchestrator.plan import Instance, Override, Plan, Value
 from orchestrator.scenario import catalogue, scenario_schema
 from orchestrator.scenario.load import load_scenario
 from orchestrator.scenario.overrides import faults_at, setting
@@ -104,20 +105,21 @@ class Scenario:
                 text = f"there is no unit {short(unit)}{hint(unit, given, lead='units')}"
                 raise ScenarioError([Problem(text, file=self.path)])
             if arguments.names_file(wanted):
-                changes.append(Override(unit, fmu_of(wanted, unit), "swap"))
+                changes.append(Override(Target.of_instance(unit), fmu_of(wanted, unit), "swap"))
                 continue
             role = role_of(unit, Path(self.loaded.replaced.get(unit, given[unit].fmu)).stem)
             program = PythonComponent(wanted, unit=unit, role=role)
             programs[program.path] = program
-            changes.append(Override(unit, str(program.path), "swap"))
+            changes.append(Override(Target.of_instance(unit), str(program.path), "swap"))
             if program.step_size is not None:
-                changes.append(Override(f"{unit}.step_size", program.step_size, "swap"))
+                step_size = Target.of_instance(unit, "step_size")
+                changes.append(Override(step_size, program.step_size, "swap"))
         return replace(self, changes=tuple(changes), programs=programs)
 
     def _unswapped(self, units: Iterable[str]) -> Scenario:
         """Return the scenario without earlier swaps of instances and the step sizes set by them."""
-        places = {place for unit in units for place in (unit, f"{unit}.step_size")}
-        kept = (one for one in self.changes if one.origin != "swap" or one.place not in places)
+        targets = {Target.of_instance(unit, name) for unit in units for name in ("", "step_size")}
+        kept = (one for one in self.changes if one.origin != "swap" or one.target not in targets)
         return replace(self, changes=tuple(kept))
 
     def set(self, values: Mapping[str, Value]) -> Scenario:
@@ -136,8 +138,9 @@ class Scenario:
         """
         given = arguments.mapping(values, "values", "a mapping of places to values, {'stop_time': 2}")
         with arguments.as_scenario_errors("set"):
-            plain = {place: _plain(place, value) for place, value in given.items()}
-        changed = [setting(place, value, "set") for place, value in plain.items()]
+            targets = {name: Target.parse(name) for name in given}
+            plain = {targets[name]: _plain(targets[name], value) for name, value in given.items()}
+        changed = [setting(target, value, "set") for target, value in plain.items()]
         scenario = replace(self, changes=(*self.changes, *changed))
         scenario.loaded  # noqa: B018 - what is wrong is said now
         return scenario
@@ -175,7 +178,7 @@ class Scenario:
         with arguments.as_scenario_errors("fault"):
             item = {name: arguments.scalar(x, name) for name, x in given.items() if x is not None}
         new = faults_at(place, item, "fault")
-        earlier = next((c for c in self.changes if (c.place, c.origin) == (new.place, "fault")), None)
+        earlier = next((c for c in self.changes if (c.target, c.origin) == (new.target, "fault")), None)
         both = FaultList((*(earlier.faults if earlier else ()), *new.faults))
         others = [change for change in self.changes if change is not earlier]
         scenario = replace(self, changes=(*others, replace(new, value=both)))
@@ -267,7 +270,7 @@ def fmu_of(wanted: str | Path, name: str) -> str:
     return arguments.text(wanted, name) if isinstance(wanted, str) else str(path)
 
 
-def _plain(place: str, value: Any) -> Value:
+def _plain(target: Target, value: Any) -> Value:
     """Return the value for a target as plain Python."""
-    of_file = place == "vehicle" or place.partition(".")[0] == TYRES
-    return str(arguments.path(value, place)) if of_file else arguments.scalar(value, place)
+    of_file = target.kind in ("vehicle_file", "tyres")
+    return str(arguments.path(value, str(target))) if of_file else arguments.scalar(value, str(target))

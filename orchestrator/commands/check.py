@@ -166,7 +166,7 @@ def _values(plan: Plan, defaults: bool) -> tuple[list[Sequence[str]], int]:
 
 def _run_rows(plan: Plan) -> Iterable[Sequence[str]]:
     """Yield the rows of values that apply to the whole run."""
-    given = {change.place: change.origin for change in plan.changes}
+    given = {str(change.target): change.origin for change in plan.changes}
     run = {
         **({"start_time": f"{_number(plan.start)} s"} if plan.start else {}),
         "stop_time": f"{_number(plan.time(plan.n_steps))} s",

@@ -94,9 +94,7 @@ def _entry(given: str) -> tuple[str, EntrySpec]:
     name = Path(str(fmu.value)).stem
     if is_path(str(fmu.value)) and not Path(str(fmu.value)).is_file():
         raise ScenarioError(f"--controller {fmu.value}: there is no such file")
-    parameters = {
-        one.place.partition(".")[2]: one.value for one in brought if not isinstance(one.value, FaultList)
-    }
+    parameters = {one.target.variable: one.value for one in brought if not isinstance(one.value, FaultList)}
     words = ", ".join([name, *(f"{key} {value}" for key, value in parameters.items())])
     path = Path(str(fmu.value)).absolute() if is_path(str(fmu.value)) else fmu.value
     spec = EntrySpec(

@@ -86,7 +86,7 @@ def drive(
     folder = wishes.out or default_folder(one_run, changes, suffix="_series")
     base = Job("", one_run, folder, changes, **wishes.of_jobs | {"format": "parquet"})
     once = PlanningCache(build=wishes.build)
-    given = {change.place for change in changes}
+    given = {str(change.target) for change in changes}
     if test == "sine-with-dwell":
         if AMPLITUDE in given:
             raise ScenarioError(f"{AMPLITUDE}: the series itself says which amplitudes are driven")
@@ -177,7 +177,7 @@ def _vehicle(given: str | None) -> tuple[Override, ...]:
 
     if given is None:
         return ()
-    return (Override("vehicle", str(catalogue.find(given, "a vehicle file").resolve()), "--vehicle"),)
+    return (Override.of("vehicle", str(catalogue.find(given, "a vehicle file").resolve()), "--vehicle"),)
 
 
 def _make(title: str, jobs: Sequence[Job], base: Job, wishes: RunOptions) -> int:

@@ -210,9 +210,9 @@ def trace_of(results: Results, label: str = "") -> Trace:
         found = columns_of(results, name)
         if found:
             signals[name] = results.columns[found[0]] * si_of(results.units[found[0]])[1]
-    own = Counter(column.partition(".")[2] for column in results)
+    own = Counter(name.variable for name in results.names.values())
     for column, values in results.columns.items():  # signals of a single instance, such as overruns of cones
-        name = column.partition(".")[2]
+        name = results.names[column].variable
         if name not in signals and own[name] == 1 and np.issubdtype(values.dtype, np.number):
             signals[name] = values
     fmus = results.record.fmus

@@ -15,10 +15,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, PlainValidator, model_validator
+from pydantic import Field, PlainSerializer, PlainValidator, model_validator
 
 from ..messages import short
-from ..plan import FACTS, FAULTS, OF_RUN, TYRES, Algorithm, Override, Value
+from ..names import INPUTS, OF_RUN, VEHICLE, Target
+from ..plan import Algorithm, Override, Value
 from ..scenario import overrides, yaml_lines
 from ..scenario.fault_schema import FaultSpec, by_location
 from ..scenario.quantities import parse_unit
@@ -33,20 +34,25 @@ if TYPE_CHECKING:
 MOST = 100_000
 """Largest number of runs in an experiment; chosen: more is a typo, and would take an hour to plan."""
 
-FILES = ("vehicle", TYRES, f"{TYRES}.front", f"{TYRES}.rear")
-"""Override targets whose values are file names, relative to the experiment file."""
-
 AxisKind = Literal["setting", "fmu", "file", "variant"]
 
 
-def _places(value: object) -> list[str]:
-    places = [value] if isinstance(value, str) else value
-    if not isinstance(places, list) or not places or not all(isinstance(p, str) and p for p in places):
+def _targets(value: object) -> list[Target]:
+    texts = [value] if isinstance(value, str) else value
+    if not isinstance(texts, list) or not texts or not all(isinstance(text, str) and text for text in texts):
         raise ValueError(
             "must be unit.parameter, vehicle.parameter, inputs.pattern, a unit, vehicle or tyres "
             f"(got {short(value)})"
         )
-    return places
+    return [Target.parse(text) for text in texts]
+
+
+def _target(value: object) -> Target:
+    if isinstance(value, Target):  # in data that another specification holds
+        return value
+    if not isinstance(value, str):
+        raise ValueError(f"must be unit.parameter, vehicle.parameter or inputs.pattern (got {short(value)})")
+    return Target.parse(value)
 
 
 def _levels(value: object) -> dict[Any, str]:
@@ -67,7 +73,10 @@ def _is_plain(value: object) -> bool:
     return isinstance(value, (str, bool)) or is_finite(value)
 
 
-TargetList = Annotated[list[str], PlainValidator(_places)]
+TargetText = Annotated[Target, PlainValidator(_target), PlainSerializer(str)]
+TargetList = Annotated[
+    list[Target], PlainValidator(_targets), PlainSerializer(lambda targets: [*map(str, targets)])
+]
 Levels = Annotated[dict[Any, str], PlainValidator(_levels)]
 
 
@@ -75,7 +84,7 @@ class OverrideSpec(StrictModel):
     """Overrides of a scenario."""
 
     swap: dict[str, str] = Field({}, description="Unit -> FMU, a name or a path")
-    set: dict[str, Scalar] = Field({}, description="unit.parameter -> value")
+    set: dict[TargetText, Scalar] = Field({}, description="unit.parameter -> value")
     vehicle: str | None = Field(None, description="Vehicle file, relative to this file")
     faults: list[FaultSpec] = Field([], description="In place of the scenario's at these places")
     stop_time: Time | None = Field(None, description="In place of the scenario's")
@@ -83,10 +92,11 @@ class OverrideSpec(StrictModel):
     algorithm: Algorithm | None = Field(None, description="In place of the scenario's")
 
     @property
-    def places(self) -> list[str]:
+    def targets(self) -> list[Target]:
         """The targets of these overrides."""
-        own = [place for place in ("vehicle", *OF_RUN) if getattr(self, place, None) is not None]
-        return [*self.swap, *self.set, *(f"{FAULTS}.{one.on}" for one in self.faults), *own]
+        own = [Target.parse(name) for name in (VEHICLE, *OF_RUN) if getattr(self, name, None) is not None]
+        faults = [Target("faults", variable=str(one.on)) for one in self.faults]
+        return [*map(Target.of_instance, self.swap), *self.set, *faults, *own]
 
 
 class VariantSpec(OverrideSpec):
@@ -113,13 +123,13 @@ class AxisSpec(StrictModel):
         """What the axis varies: a value, an FMU, a file or several targets at once."""
         if self.variants:
             return "variant"
-        place = self.vary[0]
-        return "setting" if _is_setting(place) else "file" if place in FILES else "fmu"
+        target = self.vary[0]
+        return "fmu" if target.kind == "fmu" else "file" if target.names_file else "setting"
 
     @property
-    def places(self) -> list[str]:
+    def targets(self) -> list[Target]:
         """The targets that the axis overrides."""
-        return self.vary or list(dict.fromkeys(p for one in self.variants.values() for p in one.places))
+        return self.vary or list(dict.fromkeys(t for one in self.variants.values() for t in one.targets))
 
     @property
     def length(self) -> int | None:
@@ -145,9 +155,9 @@ class AxisSpec(StrictModel):
             if any(one is not None for one in given):
                 raise ValueError("variants have no values, from, to, count or unit")
             return self
-        if "inputs" in self.vary:
+        if Target.of_instance(INPUTS) in self.vary:
             raise ValueError("vary: inputs needs a name, for example inputs.friction*")
-        if len(self.vary) > 1 and not all(map(_is_setting, self.vary)):
+        if len(self.vary) > 1 and any(target.names_file for target in self.vary):
             raise ValueError("vary: only several unit.parameter may share an axis")
         ends = (self.start, self.end)
         if self.values is not None and (ends != (None, None) or self.count is not None):
@@ -194,10 +204,6 @@ class DesignAxisSpec(AxisSpec):
         if self.repeats and len(self.values or ()) < 2:
             raise ValueError("repeats: needs a list of two values or more")
         return self
-
-
-def _is_setting(place: str) -> bool:
-    return place not in FILES and ("." in place or place in (*OF_RUN, *FACTS))
 
 
 def _is_quantity(value: object) -> bool:
@@ -267,10 +273,10 @@ class Level:
     words: str
 
 
-def axis_of_levels(place: str, levels: Iterable[Level], **more: Any) -> DesignAxisSpec:
+def axis_of_levels(target: str, levels: Iterable[Level], **more: Any) -> DesignAxisSpec:
     """Return an axis over computed levels of a target; `more`: its other fields."""
     values = {one.value: one.words for one in levels}
-    return DesignAxisSpec.model_construct(vary=[place], values=values, **more)
+    return DesignAxisSpec.model_construct(vary=[Target.parse(target)], values=values, **more)
 
 
 def levels_of(axis: AxisSpec) -> list[Level]:
@@ -343,8 +349,8 @@ def changes_at(axis: AxisSpec, level: Level, folder: Path, origin: str = "sweep"
     if axis.kind == "variant":
         return changes_of_file(axis.variants[str(level.value)], folder, origin)
     if axis.kind == "fmu":
-        return overrides.changes_of({axis.vary[0]: str(level.value)}, {}, folder, origin)
-    return [overrides.setting(place, _given(axis, level), origin) for place in axis.vary]
+        return overrides.changes_of({axis.vary[0].instance: str(level.value)}, {}, folder, origin)
+    return [overrides.setting(target, _given(axis, level), origin) for target in axis.vary]
 
 
 def _given(axis: AxisSpec, level: Level) -> Value:
@@ -356,8 +362,10 @@ def _given(axis: AxisSpec, level: Level) -> Value:
 
 def changes_of_file(given: OverrideSpec, folder: Path, origin: str) -> list[Override]:
     """Return the overrides in one part of an experiment file; file names are relative to `folder`."""
-    vehicle = [Override("vehicle", str(folder / given.vehicle), origin)] if given.vehicle else []
+    vehicle = [Override.of(VEHICLE, str(folder / given.vehicle), origin)] if given.vehicle else []
     of_run = overrides.changes_of_run(given, origin)
     at = by_location(spec.fault for spec in given.faults)
-    faults = [Override(f"{FAULTS}.{location}", ones, origin) for location, ones in at.items()]
+    faults = [
+        Override(Target("faults", variable=str(location)), ones, origin) for location, ones in at.items()
+    ]
     return vehicle + of_run + overrides.changes_of(given.swap, given.set, folder, origin) + faults

@@ -20,6 +20,7 @@ from ..errors import ResultsError
 from ..figures.style import QUIET, line_style, literal, shown, shown_unit
 from ..metrics.measures import variable_of, words
 from ..metrics.run_metrics import MetricValue, metric
+from ..names import Target
 from .axes import RUN, Level
 from .experiment import Case
 from .grids import cells
@@ -120,7 +121,7 @@ class Drawing:
         if axis == RUN:
             return "Run"
         spec = self.axes[axis]
-        said = spec.says or (words(variable_of(spec.vary[0]).replace("*", "")) if spec.vary else axis)
+        said = spec.says or (_in_words(spec.vary[0]) if spec.vary else axis)
         unit = self.unit_of(axis)
         return f"{said.strip()} in {unit}" if unit else said.strip()
 
@@ -141,6 +142,13 @@ class Drawing:
             set_scale(axes, "x", self.axes[self.spec.x].spacing)
         else:
             name_ticks(axes, [level.words for level in self.levels(self.spec.x)])
+
+
+def _in_words(target: Target) -> str:
+    """Return what an override target addresses, in words."""
+    of_signal = target.kind in ("input", "faults")
+    name = variable_of(target.variable) if of_signal else target.variable or str(target)
+    return words(name.replace("*", ""))
 
 
 def set_scale(axes: Axes, which: Literal["x", "y"], scale: str) -> None:

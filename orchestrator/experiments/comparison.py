@@ -25,8 +25,9 @@ import numpy as np
 from ..errors import ResultsError, ScenarioError
 from ..figures.style import QUIET, frame, line_style, new_figure
 from ..labels import changed, with_changes
-from ..metrics.measures import words
+from ..metrics.measures import variable_of, words
 from ..metrics.run_metrics import MetricValue, metric
+from ..names import SignalName
 from ..plan import Algorithm, Override
 from ..plan import Value as Plain
 from ..results.read import Results
@@ -126,7 +127,7 @@ def _label(text: str, choices: Sequence[str]) -> str:
     others = [swap_of("", other, "--swap") for other in choices]
     name = str(fmu.value)
     shared = [one for one in brought if all(one in other for other in others)]
-    values = [f"{one.place[1:]}={text_of(one.value)}" for one in brought if one not in shared]
+    values = [f"{one.target.variable}={text_of(one.value)}" for one in brought if one not in shared]
     one_fmu = all(other[0] == fmu for other in others)
     return " ".join([*([] if one_fmu and values else [Path(name).stem if is_path(name) else name]), *values])
 
@@ -180,15 +181,15 @@ def refinements(
         ScenarioError: the scenario or an option is wrong.
     """
     loaded = load_scenario(scenario, changes=changes)
-    if signal.count(".") != 1:
+    if not all(SignalName.parse(signal)):
         raise ScenarioError(f"--signal {signal}: write UNIT.VARIABLE, for example plant.yaw_rate")
     runs = []
     for algorithm in algorithms or [loaded.algorithm]:
         for k in range(halvings + 1):
             step: Fraction = loaded.step_size / 2**k
             refined = (
-                Override("algorithm", algorithm, "converge"),
-                Override("step_size", float(step), "converge"),
+                Override.of("algorithm", algorithm, "converge"),
+                Override.of("step_size", float(step), "converge"),
             )
             name = f"{algorithm}/{_milliseconds(float(step)).replace(' ', '')}"
             label = f"{algorithm}, {_milliseconds(float(step))}"
@@ -236,9 +237,9 @@ def measure(findings: ExperimentResult, signal: str) -> list[ConvergenceRow]:
     return rows
 
 
-def _given(run: NamedRun, place: str) -> Plain:
-    """Return the value that a run's last override of a target sets."""
-    return next(change.plain for change in reversed(run.changes) if change.place == place)
+def _given(run: NamedRun, setting: str) -> Plain:
+    """Return the value that a run's last override of `algorithm` or `step_size` sets."""
+    return next(change.plain for change in reversed(run.changes) if str(change.target) == setting)
 
 
 def _samples(found: Results | None, signal: str, why: str) -> tuple[np.ndarray | None, float | None, str]:
@@ -314,8 +315,9 @@ def convergence_figure(rows: Sequence[ConvergenceRow], signal: str, title: str, 
             by_step.plot([1000 * row.step for row in mine], errors, **styles[name])
             by_cost.plot([row.wall_time for row in mine], errors, **styles[name])
         _slopes(by_step, drawn)
+        name = words(variable_of(signal))
         for axes, heading, below in (
-            (by_step, f"{words(signal)}: largest error, relative to its peak", "communication step in ms"),
+            (by_step, f"{name}: largest error, relative to its peak", "communication step in ms"),
             (by_cost, "the same over the wall time of the run", "wall time in s"),
         ):
             axes.set(xscale="log", yscale="log", xlabel=below)

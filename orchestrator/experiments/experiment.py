@@ -19,6 +19,7 @@ from ..errors import ScenarioError
 from ..files import reads
 from ..messages import hint, short
 from ..metrics.run_metrics import TimeWindow
+from ..names import Target
 from ..plan import Override
 from ..scenario import overrides, yaml_lines
 from ..scenario.validation import validate
@@ -135,18 +136,20 @@ def named_runs(document: Document, i: int, entry: RunSpec) -> Iterator[NamedRun]
     for one in fillings(document, key, entry.for_each, "runs"):
         name = one.fill(entry.name, "name")
         _check_folder(name, one)
-        changes: dict[str, Override] = {}
+        changes: dict[Target, Override] = {}
         for part in (entry, *one.choices):
             swaps = {unit: one.fill(fmu, "swap", unit) for unit, fmu in part.swap.items()}
             settings = {
-                place: yaml_lines.scalar(one.fill(value, "set", place)) if isinstance(value, str) else value
-                for place, value in part.set.items()
+                target: yaml_lines.scalar(one.fill(value, "set", str(target)))
+                if isinstance(value, str)
+                else value
+                for target, value in part.set.items()
             }
             filled = part.model_copy(update={"swap": swaps, "set": settings})
             for change in changes_of_file(filled, folder, "study"):
-                if change.place in changes:
-                    document.report((*key, "for"), f"{change.place} is given twice")
-                changes[change.place] = change
+                if change.target in changes:
+                    document.report((*key, "for"), f"{change.target} is given twice")
+                changes[change.target] = change
         label = one.fill(entry.label, "label", sentence=True) or name
         row = one.fill(entry.row, "row", sentence=True) or label
         scenario = folder / one.fill(entry.scenario, "scenario")
@@ -259,14 +262,15 @@ class LoadedExperiment:
         names = [name for pattern in patterns for name in self.runs if fnmatchcase(name, pattern)]
         return [self.runs[name] for name in dict.fromkeys(names)]
 
-    def axis_of(self, place: str) -> tuple[str, str] | None:
+    def axis_of(self, place: str) -> tuple[str, Target] | None:
         """Return the axis of the file, and the target on it, that a problem names; None if it names none."""
         if self.design:
             return None
         changes = itertools.chain.from_iterable(map(self._at, self.points))
         change = next((one for one in changes if str(one) == place), None)
         axes = self.spec.axes.items()
-        return next(((n, change.place) for n, axis in axes if change and change.place in axis.places), None)
+        target = change.target if change else None
+        return next(((name, target) for name, axis in axes if target in axis.targets), None)
 
     def _at(self, point: DesignPoint, run: NamedRun | None = None) -> list[Override]:
         """Return the overrides at a point; with `run`, only those of axes that apply to it."""
@@ -334,9 +338,9 @@ def load_experiment(path: Path | str, *, changes: Sequence[Override] = ()) -> Lo
             if run.name in runs:
                 document.report(("runs", i, "name"), f"there is already a run {run.name!r}")
             runs[run.name] = run
-    given = {change.place: change for change in changes}
+    given = {change.target: change for change in changes}
     own = changes_of_file(spec, path.parent, "sweep" if spec.axes else "study")
-    for_all = tuple(one for one in own if one.place not in given)
+    for_all = tuple(one for one in own if one.target not in given)
     experiment = LoadedExperiment(path, spec, runs, for_all, tuple(given.values()))
     if not document.problems:
         check_axes(spec, document)

@@ -19,12 +19,12 @@ from ..master.process_state import StopFlag, interrupts
 from ..messages import hint, printable
 from ..metrics.plausibility import findings_in
 from ..metrics.run_metrics import evaluate, metric
+from ..names import match
 from ..plan import Override, Plan
 from ..results.freshness import key_of
 from ..results.read import Results, load_results
 from ..scenario import yaml_lines
 from ..scenario.yaml_lines import Document
-from ..wiring.context import match
 from ..workers import Finished, Pool
 
 if TYPE_CHECKING:
@@ -174,15 +174,15 @@ def planned(job: Job, once: PlanningCache | None = None) -> tuple[LoadedScenario
     )
     if not job.record:
         return scenario, plan
-    recorded = {f"{unit}.{variable}": (unit, variable) for unit, variable in plan.record}
+    recorded = {str(name): name for name in plan.record}
     unknown = [name for name in job.record if name not in recorded and "*" not in name]
     if unknown:
         guess = hint(unknown[0], recorded, lead="recorded are")
         raise ScenarioError(f"{job.scenario}: {unknown[0]!r} is not recorded{guess}")
     chosen = [
-        pair
-        for name, pair in recorded.items()
-        if any(match(pattern, one) is not None for pattern in job.record for one in (name, pair[1]))
+        name
+        for text, name in recorded.items()
+        if any(match(pattern, one) is not None for pattern in job.record for one in (text, name.variable))
     ]
     return scenario, replace(plan, record=tuple(chosen))
 

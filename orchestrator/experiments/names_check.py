@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from ..messages import hint
+from ..names import Target
 from ..scenario.yaml_lines import Document, KeyPath
 from .axes import RUN, levels_of
 from .grids import cells
@@ -22,13 +23,13 @@ COLUMNS = (RUN, "status", "reason", "findings", "key")
 
 def check_axes(spec: ExperimentSpec, document: Document) -> None:
     """Report targets that two axes, or an axis and `set` or `swap`, override."""
-    seen: dict[str, str] = dict.fromkeys(spec.places, "set and swap")
+    seen: dict[Target, str] = dict.fromkeys(spec.targets, "set and swap")
     for name, axis in spec.axes.items():
-        for place in axis.places:
-            if place in seen:
-                also = f"axis {seen[place]!r}" if seen[place] in spec.axes else "set or swap"
-                document.report(("axes", name), f"{place} is given by {also} already")
-            seen[place] = name
+        for target in axis.targets:
+            if target in seen:
+                also = f"axis {seen[target]!r}" if seen[target] in spec.axes else "set or swap"
+                document.report(("axes", name), f"{target} is given by {also} already")
+            seen[target] = name
     for group, names in (("axes", spec.axes), ("metrics", spec.metrics)):
         for name in names:
             if name in COLUMNS or (group == "axes" and name in spec.metrics):

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
 from ..errors import ScenarioError
 from ..metrics.run_metrics import STANDARD, metric, results_to_be, unit_in
-from ..plan import Fmu, Plan
+from ..names import SignalName, Target
+from ..plan import Fmu, Instance, Plan, Variable
 from ..results.read import Results
 from ..scenario import quantities
 from ..scenario.yaml_lines import dotted
@@ -191,16 +191,31 @@ def _units(experiment: LoadedExperiment, every: list[Plan]) -> dict[str, str]:
 
 def _unit(axis: AxisSpec, plan: Plan) -> str | None:
     """Return the unit of an axis's target, or None if the plan does not have the target."""
-    holder, _, name = axis.vary[0].partition(".")
-    if (name or holder) in ("stop_time", "step_size"):
+    target = axis.vary[0]
+    if target.is_time:
         return "s"
-    if holder in FACTS:
-        return FACTS[holder].unit
-    for unit in plan.instances:
-        given = unit.constants if holder == "inputs" else unit.parameters
-        if holder not in ("inputs", "vehicle", unit.name):
-            continue
-        for variable in given:
-            if fnmatchcase(variable, name) or fnmatchcase(f"{unit.name}.{variable}", name):
-                return unit.fmu.variables[variable].unit
-    return None
+    if target.kind == "fact":
+        return FACTS[target.variable].unit
+    return next((variable.unit for _, variable in reached(plan, target)), None)
+
+
+def reached(plan: Plan, target: Target) -> Iterator[tuple[Instance, Variable]]:
+    """Yield the parameters, or the constant inputs, that a target sets in a plan."""
+    by_name = {instance.name: instance for instance in plan.instances}
+    if target.kind == "input":
+        pattern = SignalName.parse_input(target.variable, by_name)
+        for instance in plan.instances:
+            for name, variable in instance.fmu.variables.items():
+                if name in instance.constants and pattern.matches(instance.name, name):
+                    yield instance, variable
+    elif target.kind == "fact":
+        fact = FACTS[target.variable]
+        for instance in plan.instances:
+            for name, variable in instance.fmu.variables.items():
+                if fact.counts(instance, name) or (name in fact.inputs and name in instance.constants):
+                    yield instance, variable
+    elif target.kind in ("parameter", "vehicle_parameter"):
+        for instance in plan.instances:
+            own = instance.fmu.variables.get(target.variable)
+            if target.instance in ("", instance.name) and own and own.causality == "parameter":
+                yield instance, own

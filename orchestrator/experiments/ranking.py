@@ -42,6 +42,7 @@ from ..evaluation.steering_tests import characteristic_angle
 from ..files import reads
 from ..messages import hint
 from ..metrics.run_metrics import TimeWindow
+from ..names import Target
 from ..plan import Override, Plan
 from ..scenario import overrides, yaml_lines
 from ..scenario.scenario_schema import Scalar
@@ -199,7 +200,7 @@ class LoadedRanking:
     def changes(self, *parts: OverrideSpec, stop: bool = True) -> tuple[Override, ...]:
         """Return the overrides of the ranking and of parts of its file; the last one of a target counts."""
         own = [
-            Override(name, float(value), "ranking")
+            Override.of(name, float(value), "ranking")
             for name, value in (("step_size", self.spec.step_size), ("stop_time", self.spec.stop_time))
             if value is not None and (stop or name != "stop_time")
         ]
@@ -382,7 +383,7 @@ def _levels(
 
 def _since_steering(plan: Plan) -> TimeWindow | None:
     """Return the time from the beginning of steer to the end of a run; None if there is none between."""
-    driver = AMPLITUDE.partition(".")[0]
+    driver = Target.parse(AMPLITUDE).instance
     begins = next(unit.parameter(STEERING_BEGINS) for unit in plan.instances if unit.name == driver)
     first, last = float(begins or 0.0), plan.time(plan.n_steps)
     return (first, last) if first < last else None

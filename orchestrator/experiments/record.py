@@ -10,7 +10,7 @@ import io
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -57,7 +57,8 @@ def columns_of(findings: ExperimentResult) -> list[TableColumn]:
         numbers = [case.number + 1 for case in cases]
         columns = [TableColumn("run", "int64", numbers, {"description": "number of the run, from 1"})]
     for i, (name, axis) in enumerate(spec.axes.items()):
-        about = {"description": axis.says or ", ".join(axis.places), "varies": ", ".join(axis.places)}
+        varied = ", ".join(map(str, axis.targets))
+        about = {"description": axis.says or varied, "varies": varied}
         if axis.numeric and planned:
             levels = [planned.number(name, case.point[i]) for case in cases]
             columns.append(TableColumn(name, "float64", levels, about | {"unit": planned.units[name]}))
@@ -210,7 +211,7 @@ def _record(findings: ExperimentResult, drawn: dict[str, str]) -> dict[str, Any]
             run.name: {
                 "label": run.label,
                 "scenario": str(run.scenario),
-                "changes": [asdict(change) for change in run.changes],
+                "changes": [change.record for change in run.changes],
                 "status": findings.record(findings.cases_of(run, settings[0])[0]).status if alone else None,
                 "failed": (findings.failure(run, settings[0]) or None) if alone else None,
                 "fmus": _hashes(findings.results.get(run.name)),

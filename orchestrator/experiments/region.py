@@ -9,16 +9,15 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
 
 from ..errors import ScenarioError
 from ..messages import hint, listed
 from ..metrics.run_metrics import MetricValue
-from ..plan import DEFAULT, OF_RUN, TYRES, Instance, Override, Plan, Variable
+from ..names import OF_RUN, Target
+from ..plan import DEFAULT, Override, Plan
 from ..plan import Value as Given
-from ..wiring.context import FACTS
 from .axes import Level, OpenValueSpec, OpenVariantSpec, changes_at, latin_hypercube, levels_of
 from .experiment import RUNS, LoadedExperiment, NamedRun
 from .grids import ranked
@@ -27,7 +26,7 @@ from .judged_schema import Claim, MetricReference
 from .judging import ClaimResult, judge
 from .margins import TIMES, LevelVerdict, OpenValueScan, PointVerdict, Region
 from .outcome import ExperimentResult, derive
-from .planning import PlannedExperiment, metrics_of, number_of
+from .planning import PlannedExperiment, metrics_of, number_of, reached
 
 ORIGIN = "region"
 """Origin of overrides that open values make."""
@@ -40,44 +39,27 @@ RegionKey = tuple[str, int]
 """(`claims` or `checks`, index) of what is judged."""
 
 
-def found_at(plan: Plan, place: str) -> tuple[Given, str] | None:
+def found_at(plan: Plan, target: Target) -> tuple[Given, str] | None:
     """Return the value and unit that an override target has in a plan; None if it has no such target."""
-    holder, _, name = place.partition(".")
-    units = {unit.name: unit for unit in plan.instances}
-    if not name and holder in units:
-        return units[holder].fmu.name, ""
-    if place == "vehicle" and plan.scenario.get("vehicle"):
-        return str(plan.scenario["vehicle"]), ""
-    if holder == TYRES:
+    instance = next((one for one in plan.instances if one.name == target.instance), None)
+    if target.kind == "fmu":
+        return (instance.fmu.name, "") if instance else None
+    if target.kind == "vehicle_file":
+        return (str(plan.scenario["vehicle"]), "") if plan.scenario.get("vehicle") else None
+    if target.kind == "tyres":
         files = {axle: str(file["file"]) for axle, file in plan.scenario.get("tyre_files", {}).items()}
-        return (files[name or "front"], "") if files else None
-    if place in OF_RUN:
+        return (files[target.variable or "front"], "") if files else None
+    if target.kind == "run":
         values = (float(plan.start), plan.time(plan.n_steps), float(plan.step), plan.algorithm)
-        return dict(zip(OF_RUN, values, strict=True))[place], "s"
-    if holder in units and name == "step_size":
-        return float(units[holder].period * plan.step), "s"
-    for unit in plan.instances:
-        for variable in unit.fmu.variables.values():
-            given = {**unit.parameters, **unit.constants}.get(variable.name, variable.start)
-            if given is not None and _names(holder, name, unit, variable):
-                return given, variable.unit or ""
+        return dict(zip(OF_RUN, values, strict=True))[target.variable], "s"
+    if target.kind == "setting" and target.is_time and instance:
+        return float(instance.period * plan.step), "s"
+    for instance, variable in reached(plan, target):
+        given = {**instance.parameters, **instance.constants}.get(variable.name, variable.start)
+        of_vehicle = instance.origins.get(variable.name, DEFAULT).kind == "vehicle"
+        if given is not None and (of_vehicle or target.kind != "vehicle_parameter"):
+            return given, variable.unit or ""
     return None
-
-
-def _names(holder: str, name: str, unit: Instance, variable: Variable) -> bool:
-    """Return whether the target `holder.name` addresses a variable of an instance."""
-    if holder in FACTS:
-        fact = FACTS[holder]
-        return fact.counts(unit, variable.name) or (
-            variable.name in fact.inputs and variable.name in unit.constants
-        )
-    if holder == "inputs":
-        names = (variable.name, f"{unit.name}.{variable.name}")
-        return variable.name in unit.constants and any(fnmatchcase(one, name) for one in names)
-    from_vehicle = holder == "vehicle" and unit.origins.get(variable.name, DEFAULT).kind == "vehicle"
-    return (
-        variable.name == name and variable.causality == "parameter" and (from_vehicle or holder == unit.name)
-    )
 
 
 class RegionRuns:
@@ -112,38 +94,38 @@ class RegionRuns:
             raise ScenarioError(problems)
         return found
 
-    def own_value(self, run: str, place: str) -> Given | None:
+    def own_value(self, run: str, target: Target) -> Given | None:
         """Return the value that a target has in a run; None if the run has no such target."""
-        found = found_at(self.plans[run], place)
+        found = found_at(self.plans[run], target)
         return None if found is None else found[0]
 
     def _touches_none(self, name: str) -> str:
-        places = self.open_values[name].places
-        units = dict.fromkeys(unit.name for plan in self.plans.values() for unit in plan.instances)
-        missing = next((place for place in places if place.partition(".")[0] not in units), "")
-        guess = hint(missing.partition(".")[0], units, lead="units") if missing else ""
+        targets = self.open_values[name].targets
+        instances = dict.fromkeys(one.name for plan in self.plans.values() for one in plan.instances)
+        missing = next((one.instance for one in targets if one.instance not in (*instances, "")), "")
+        guess = hint(missing, instances, lead="units") if missing else ""
         return (
             f"{self.experiment.path}: region.open_values.{name}: touches no run: none has "
-            f"{listed(places, last='and')} without setting it itself{guess}"
+            f"{listed(targets, last='and')} without setting it itself{guess}"
         )
 
     def _touches(self, one: OpenValueSpec, name: str) -> bool:
-        if not any(fnmatchcase(name, pattern) for pattern in one.runs):
-            return False
         run = self.experiment.runs[name]
+        if run not in self.experiment.matching(one.runs):
+            return False
         if one.kind == "variant":
             scenarios = [self._scenario(variant, run) for variant in one.variants.values()]
-            places = [
-                place for variant in one.variants.values() if not variant.scenario for place in variant.places
-            ]
-            return all(path.is_file() for path in scenarios) and self._has(run, places, one.times)
+            own = [variant for variant in one.variants.values() if not variant.scenario]
+            targets = [target for variant in own for target in variant.targets]
+            return all(path.is_file() for path in scenarios) and self._has(run, targets, one.times)
         return self._has(run, one.vary, one.times)
 
-    def _has(self, run: NamedRun, places: Iterable[str], times: bool) -> bool:
+    def _has(self, run: NamedRun, targets: Iterable[Target], times: bool) -> bool:
         """Return whether a run has all targets without overriding them itself."""
-        own = {change.place for change in (*run.changes, *self.experiment.by_options)}
+        own = {change.target for change in (*run.changes, *self.experiment.by_options)}
         return all(
-            self.own_value(run.name, place) is not None and (times or place not in own) for place in places
+            self.own_value(run.name, target) is not None and (times or target not in own)
+            for target in targets
         )
 
     def _scenario(self, variant: OpenVariantSpec, run: NamedRun) -> Path:
@@ -182,7 +164,7 @@ class RegionRuns:
         if scenario != self.experiment.runs[name].scenario:
             return True
         if not one.numeric:
-            return any(self.own_value(name, change.place) != change.value for change in changes)
+            return any(self.own_value(name, change.target) != change.value for change in changes)
         return not math.isclose(self.number(key, level), self.chosen_number(key, [name]), rel_tol=1e-9)
 
     def number(self, key: str, level: Level) -> float:
@@ -192,14 +174,14 @@ class RegionRuns:
 
     def unit(self, key: str) -> str:
         """Return the unit of an open value in the runs that it applies to."""
-        place = self.open_values[key].vary[0]
-        found = (found_at(self.plans[name], place) for name in self.touched[key])
+        target = self.open_values[key].vary[0]
+        found = (found_at(self.plans[name], target) for name in self.touched[key])
         return next((one[1] for one in found if one and one[1]), "")
 
     def own(self, key: str, names: Iterable[str]) -> set[float]:
         """Return the distinct numbers chosen in runs for a numeric open value."""
-        place = self.open_values[key].vary[0]
-        found = [self.own_value(name, place) for name in names if name in self.touched[key]]
+        target = self.open_values[key].vary[0]
+        found = [self.own_value(name, target) for name in names if name in self.touched[key]]
         return {float(value) for value in found if value is not None}
 
     def chosen_number(self, key: str, names: Iterable[str]) -> float:
@@ -276,9 +258,11 @@ def plan_region(
     wanted = dict.fromkeys(
         cell for (group, _), one in asked.items() if group == "claims" for cell in plan.cells(one) if cell[1]
     )
-    jobs = []
+    jobs, open_value_of = [], dict[str, str]()  # override in words -> open value that makes it
     for name, place in wanted:
         scenario, own = runs.changes(name, place)
+        for key, level in place:
+            open_value_of |= {str(one): key for one in runs.changes(name, ((key, level),))[1]}
         label = ", ".join([name, *(f"{key} {level.words}" for key, level in place)])
         changes = (*runs.jobs[name].changes, *own)
         job = replace(runs.jobs[name], label=label, scenario=scenario, changes=changes, plan=None)
@@ -286,8 +270,7 @@ def plan_region(
 
     def where(problem: str) -> tuple[str, str]:
         """Report a problem of an open value once, with its key in the file."""
-        place = getattr(problem, "place", "").removeprefix(f"{ORIGIN} ").partition("=")[0]
-        key = next((key for key, one in runs.open_values.items() if place in one.places), None)
+        key = open_value_of.get(getattr(problem, "place", ""))
         at = f"{runs.experiment.path}: region.open_values.{key}: "
         return (key, f"{at}{problem}") if key else (problem, problem)
 

@@ -210,8 +210,8 @@ class TuningSpec(StrictModel):
     @model_validator(mode="after")
     def _of_one_unit(self) -> TuningSpec:
         for name, law in self.laws.items() if self.entries else ():
-            sought = [place for axis in law.axes.values() for place in axis.vary]
-            other = [place for place in (*law.places, *sought) if place.partition(".")[0] != self.entries]
+            sought = [target for axis in law.axes.values() for target in axis.vary]
+            other = [target for target in (*law.targets, *sought) if target.instance != self.entries]
             if self.entries not in law.swap or other:
                 why = f"also changes {other[0]}" if other else "names no FMU for it"
                 raise ValueError(f"entries: an entry is one FMU and its parameters; {name!r} {why}")

@@ -16,6 +16,7 @@ from ..evaluation.judgement import Evaluation, TestSeries
 from ..evaluation.lane_change import evaluate_lane_change, highest_clean, is_clean, judge_entry_speeds
 from ..evaluation.sine_with_dwell import amplitudes
 from ..evaluation.trace import Trace, trace_of
+from ..names import Target
 from ..plan import Override, Plan
 from ..results.read import load_results
 from ..scenario.quantities import convert
@@ -62,7 +63,7 @@ def dwell_jobs(base: Job, angle: float, once: PlanningCache) -> list[Job]:
 
 def steered(amplitude: float, origin: str) -> Override:
     """Return the override that sets the driver's amplitude [rad]."""
-    return Override(AMPLITUDE, amplitude, origin)
+    return Override.of(AMPLITUDE, amplitude, origin)
 
 
 def entry_speeds(
@@ -89,7 +90,7 @@ def entry_speeds(
 
     def clean(speed: float) -> bool:
         seconds = math.ceil(10.0 * duration * first / speed) / 10.0  # long enough for the same distance
-        changes = Override(SPEED, speed, "entry speed"), Override("stop_time", seconds, "entry speed")
+        changes = Override.of(SPEED, speed, "entry speed"), Override.of("stop_time", seconds, "entry speed")
         (job,) = map(keyed, ready([_varied(base, f"{speed / KMH:.2f}", *changes)], once=once))
         if not make(job):
             return False
@@ -123,9 +124,9 @@ def slow_steer_amplitude(plan: Plan, scenario: Path) -> float:
     Raises:
         ScenarioError: the driver has none; names the scenario.
     """
-    unit, _, name = AMPLITUDE.partition(".")
+    target = Target.parse(AMPLITUDE)
     for one in plan.instances:
-        value = one.parameter(name) if one.name == unit else None
+        value = one.parameter(target.variable) if one.name == target.instance else None
         if isinstance(value, (int, float)) and value != 0:
             return abs(float(value))
     raise ScenarioError(f"{scenario}: {AMPLITUDE} is no amplitude of a hand wheel other than 0")

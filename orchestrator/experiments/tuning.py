@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 from .. import checksums
 from ..errors import ScenarioError
 from ..metrics.run_metrics import MetricValue
+from ..names import Target
 from .axes import DesignAxisSpec, OverrideSpec, VariantSpec, level_at
 from .experiment import LoadedExperiment
 from .judging import MetricTable
@@ -50,7 +51,7 @@ class Trial:
     """Tried parameter values and their objective; None if a run failed or yields no number."""
 
     generation: int  # from 1
-    values: dict[str, float]  # target -> value, in the unit of its range
+    values: dict[Target, float]  # in the units of the ranges
     objective: float | None
 
     @property
@@ -146,19 +147,19 @@ def _trials(
     return replace(experiment, spec=experiment.spec.model_copy(update=changed), runs=runs)
 
 
-def _values(law: LawSpec, places: Sequence[float]) -> dict[str, float]:
+def _values(law: LawSpec, places: Sequence[float]) -> dict[Target, float]:
     """Return target -> value at a point of the unit cube."""
-    values = {}
+    values: dict[Target, float] = {}
     for axis, place in zip(law.axes.values(), places, strict=True):
         number = float(f"{level_at(axis, float(place)).value:.{DIGITS}g}")
         values.update(dict.fromkeys(axis.vary, number))
     return values
 
 
-def _changes(law: LawSpec, values: dict[str, float]) -> VariantSpec:
+def _changes(law: LawSpec, values: dict[Target, float]) -> VariantSpec:
     """Return a law's overrides together with tried values."""
-    units = {place: axis.unit for axis in law.axes.values() for place in axis.vary}
-    tried = {place: f"{x!r} {unit}" if (unit := units[place]) else x for place, x in values.items()}
+    units = {target: axis.unit for axis in law.axes.values() for target in axis.vary}
+    tried = {target: f"{x!r} {unit}" if (unit := units[target]) else x for target, x in values.items()}
     own = {name: getattr(law, name) for name in OverrideSpec.model_fields}
     return VariantSpec.model_construct(**{**own, "set": {**law.set, **tried}})
 
@@ -179,9 +180,10 @@ def tuning_table(experiment: LoadedExperiment, found: Sequence[TunedLaw]) -> Tab
             "failed" if trial.objective is None else MetricValue(trial.objective, spec.unit)
             for trial in (one.trials[0], one.best)
         )
-        units = {place: axis.unit for axis in tuning.laws[one.law].axes.values() for place in axis.vary}
+        units = {target: axis.unit for axis in tuning.laws[one.law].axes.values() for target in axis.vary}
         settings = [
-            f"{place}: {number:g} {units[place] or ''}".rstrip() for place, number in one.best.values.items()
+            f"{target}: {number:g} {units[target] or ''}".rstrip()
+            for target, number in one.best.values.items()
         ]
         table.rows.append([one.law, first, best, "\n".join(settings)])
     return table
@@ -202,7 +204,7 @@ def entries_of(experiment: LoadedExperiment, found: Sequence[TunedLaw]) -> dict[
             "title": f"{one.law}, tuned",
             "fmu": law.swap[tuning.entries],
             "gains": "tuned",
-            "parameters": {place.partition(".")[2]: value for place, value in settings.items()},
+            "parameters": {target.variable: value for target, value in settings.items()},
             "source": f"{made}; {comes_to}",
         }
     return entries
@@ -226,12 +228,15 @@ def entries_text(entries: dict[str, dict[str, Any]], command: str) -> str:
 def columns_of(found: Sequence[TunedLaw]) -> list[TableColumn]:
     """Return all trials as columns: law, generation, objective, and every varied target."""
     rows = [(one.law, trial) for one in found for trial in one.trials]
-    places = dict.fromkeys(place for _, trial in rows for place in trial.values)
+    targets = dict.fromkeys(target for _, trial in rows for target in trial.values)
     return [
         TableColumn("law", "string", [law for law, _ in rows]),
         TableColumn("generation", "int64", [trial.generation for _, trial in rows]),
         TableColumn("objective", "float64", [trial.objective for _, trial in rows]),
-        *(TableColumn(place, "float64", [trial.values.get(place) for _, trial in rows]) for place in places),
+        *(
+            TableColumn(str(target), "float64", [trial.values.get(target) for _, trial in rows])
+            for target in targets
+        ),
     ]
 
 

@@ -176,7 +176,7 @@ def check_panels(runs: Sequence[LabelledRun], names: Sequence[str], *, option: s
     Raises:
         ScenarioError: with a sentence for each name that selects nothing.
     """
-    recorded = fold(list(dict.fromkeys(variable_of(column) for run in runs for column in run.results)))
+    recorded = fold(list(dict.fromkeys(name.variable for run in runs for name in run.results.names.values())))
     errors = [f"{name}_error" for name in recorded if panels_of(runs, f"{name}_error")]
     known = [*recorded, *errors, "path"]
     problems = [
@@ -325,7 +325,7 @@ def _finish(axes: Axes, signal: str, unit: str, more: str = "") -> None:
     """Set the title of a panel over time: the signal, its symbol, its unit, and optional text."""
     text = shown_unit(unit)[0]
     formula = in_formula(signal)
-    heading = literal(words(signal)) + (more or f" {formula}".rstrip())
+    heading = literal(words(variable_of(signal))) + (more or f" {formula}".rstrip())
     comma = "" if formula or "," not in heading else ","
     axes.set_title(f"{heading}{comma} in {literal(text)}" if text else heading)
     axes.set_xlabel("$t$ in s")

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..metrics.measures import words
+from ..metrics.measures import variable_of, words
 from ..metrics.run_metrics import columns_of, reference_of
+from ..names import VARIABLE
 from ..results.read import Results
 from .style import REFERENCE, LabelledRun, digits_of, in_formula, line_style, literal, note_above, shown_unit
 
@@ -42,7 +43,7 @@ class PortraitCurve:
 
 def signals_of(name: str) -> tuple[str, str] | None:
     """Return (x, y) of a panel's name `y(x)`, or None if it is not of that form."""
-    match = re.fullmatch(r"([\w.]+)\(([\w.]+)\)", name.replace(" ", ""))
+    match = re.fullmatch(rf"({VARIABLE})\(({VARIABLE})\)", name.replace(" ", ""))
     return (match[2], match[1]) if match else None
 
 
@@ -87,14 +88,15 @@ def draw_portrait(axes: Axes, runs: Sequence[LabelledRun], x: str, y: str) -> No
         axes.plot(curve.x[-1:], curve.y[-1:], "o", ms=3.5, color=style["color"])
     results = next(results for _, results in runs if columns_of(results, x) and columns_of(results, y))
     units = [shown_unit(results.units[columns_of(results, name)[0]])[0] for name in (x, y)]
-    axes.set_title(literal(f"{words(y)} over {words(x)[0].lower()}{words(x)[1:]}"))
+    over, up = (words(variable_of(signal)) for signal in (x, y))
+    axes.set_title(literal(f"{up} over {over[0].lower()}{over[1:]}"))
     axes.set_xlabel(_label(x, units[0]))
     axes.set_ylabel(_label(y, units[1]))
     _limit(axes, curves, drawn, units)
 
 
 def _label(signal: str, unit: str) -> str:
-    name = in_formula(signal) or literal(words(signal))
+    name = in_formula(signal) or literal(words(variable_of(signal)))
     return f"{name} in {unit}" if unit else name
 
 

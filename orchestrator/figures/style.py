@@ -198,9 +198,10 @@ class LabelledRun(NamedTuple):
 
 def in_formula(signal: str) -> str:
     """Return the symbol of a signal in matplotlib's math text, "" if it has none."""
-    if symbol(signal) == variable_of(signal):
+    name = variable_of(signal)
+    if symbol(name) == name:
         return ""
-    head, _, index = symbol(signal).partition("_")
+    head, _, index = symbol(name).partition("_")
     return f"${head}_\\mathrm{{{index}}}$" if index else f"${head}$"
 
 

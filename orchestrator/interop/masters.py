@@ -44,6 +44,7 @@ from ..master.instance import FmuInstance
 from ..master.log import Log
 from ..master.master import Master
 from ..master.process_state import StopFlag
+from ..names import SignalName
 from ..plan import Override
 from ..scenario import ssp_read
 from ..scenario.load import load_scenario
@@ -100,10 +101,10 @@ def run_own(request: Request) -> Recording:
     Raises:
         YawbenchError: the archive cannot be read, or the run fails.
     """
-    jacobi = Override("algorithm", "jacobi", "second-opinion")
+    jacobi = Override.of("algorithm", "jacobi", "second-opinion")
     plan = make_plan(load_scenario(Path(request.archive), changes=[jacobi]))
     log, slaves = Log(), dict[str, FmuInstance]()
-    plan = replace(plan, record=tuple(request.columns))
+    plan = replace(plan, record=tuple(SignalName(*column) for column in request.columns))
     rows = np.zeros((request.n_steps + 1, 1 + len(request.columns)))
     try:
         for unit in plan.instances:

@@ -19,6 +19,7 @@ import numpy as np
 from vocabulary.signals import SIGNALS
 from vocabulary.wheels import WHEEL_NAMES
 
+from ..names import SignalName
 from ..scenario.quantities import conversion, measure_of, parse_unit
 
 SETTLING_BAND = 0.05
@@ -351,22 +352,20 @@ def si(unit: str) -> str:
     return "1" if unit == "%" else unit
 
 
-def variable_of(column: str) -> str:
+def variable_of(signal: str) -> str:
     """Return the variable's name in `instance.variable`, or the name itself."""
-    return column.rpartition(".")[2]
+    return SignalName.parse(signal).variable
 
 
-def symbol(signal: str) -> str:
-    """Return the symbol of a signal, or its name if it has none."""
-    name = variable_of(signal)
+def symbol(name: str) -> str:
+    """Return the symbol of a variable, or its name if it has none."""
     if name.endswith("_ref"):
         return f"{symbol(name.removesuffix('_ref'))}_ref"
     return (SIGNALS[name].symbol if name in SIGNALS else "") or name
 
 
-def words(signal: str) -> str:
-    """Return the signal in words, capitalized, with its wheel: "Wheel torque, front left"."""
-    name = variable_of(signal)
+def words(name: str) -> str:
+    """Return a variable in words, capitalized, with its wheel: "Wheel torque, front left"."""
     if name[-2:] in WHEEL_NAMES and name[-3:-2] == "_":
         return f"{words(f'{name[:-2]}*')}, {WHEEL_NAMES[name[-2:]]}"
     known = SIGNALS[name].words if name in SIGNALS else ""

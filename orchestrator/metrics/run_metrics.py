@@ -29,6 +29,7 @@ from vocabulary.wheels import WHEELS, wheels
 
 from ..errors import ScenarioError
 from ..messages import closest, fold, hint, listed, short
+from ..names import VARIABLE, SignalName
 from ..plan import SENSING
 from ..scenario.quantities import convert
 from .measures import MEASURES, Measure, si_of, symbol, variable_of, words
@@ -77,7 +78,7 @@ class Metric:
 
     @property
     def formula(self) -> str:
-        x = symbol(self.signal)
+        x = symbol(variable_of(self.signal))
         x_ref = f"{x}_ref"
         if self.other:
             needs = self.measure.needs_reference
@@ -99,7 +100,7 @@ class Metric:
     def title(self) -> str:
         """The signal and the measure in a few words."""
         measure = self.name.partition("(")[0].replace("_", " ").replace("rms", "RMS")
-        return f"{words(self.signal)}: {measure}{self._against}{during(self.window)}"
+        return f"{words(variable_of(self.signal))}: {measure}{self._against}{during(self.window)}"
 
     def unit(self, signal_unit: str) -> str:
         """Return the metric's unit for a signal in `signal_unit`."""
@@ -204,7 +205,7 @@ def metric(name: str) -> Metric:
     return Metric(written, MEASURES[measure], signal, window, other or "")
 
 
-_METRIC = re.compile(r"\s*(\w+)\s*\(\s*([\w.*]+)\s*(?:([,-])\s*([\w.*]+)\s*)?\)\s*(.*?)\s*", re.DOTALL)
+_METRIC = re.compile(rf"\s*(\w+)\s*\(\s*({VARIABLE})\s*(?:([,-])\s*({VARIABLE})\s*)?\)\s*(.*?)\s*", re.DOTALL)
 
 
 def columns_of(results: Results, signal: str) -> list[str]:
@@ -225,7 +226,9 @@ def _column(results: Results, name: str) -> str | None:
             meant = found[0] == name or not _is_measured_or_estimated(results, found[0])
             return found[0] if meant and np.issubdtype(results.columns[found[0]].dtype, np.number) else None
     found = [
-        c for c in results.columns if variable_of(c) == name and not _is_measured_or_estimated(results, c)
+        column
+        for column, one in results.names.items()
+        if one.variable == name and not _is_measured_or_estimated(results, column)
     ]
     return found[0] if len(found) == 1 and np.issubdtype(results.columns[found[0]].dtype, np.number) else None
 
@@ -292,12 +295,12 @@ def why_none(results: Results, one: Metric, window: TimeWindow | None, end: floa
     """Return why a metric has no value in a run that ends at `end` [s], "" if it has one."""
     missing = [s for s in filter(None, (one.signal, one.other)) if not columns_of(results, s)]
     if missing:
-        names = fold(list(dict.fromkeys(variable_of(column) for column in results)))
+        names = fold(list(dict.fromkeys(one.variable for one in results.names.values())))
         whole = list(results) if "." in missing[0] else names
         seen = [
-            c
-            for c in results
-            if variable_of(c) in wheels(missing[0]) and _is_measured_or_estimated(results, c)
+            column
+            for column, one in results.names.items()
+            if one.variable in wheels(missing[0]) and _is_measured_or_estimated(results, column)
         ]
         if seen:
             named = listed(fold(seen), last="or")
@@ -313,7 +316,7 @@ def why_none(results: Results, one: Metric, window: TimeWindow | None, end: floa
 def _unfit(results: Results, one: Metric) -> str:
     """Return why a metric cannot be computed although all its signals were recorded, "" if it can."""
     wanted = f"{variable_of(one.signal)}_ref"
-    having = [column for column in results if variable_of(column) == wanted]
+    having = [column for column, name in results.names.items() if name.variable == wanted]
     if one.other:
         columns = (columns_of(results, name)[0] for name in (one.signal, one.other))
         units = listed(f"{column} [{results.units[column] or '1'}]" for column in columns)
@@ -391,7 +394,7 @@ def _rate_of(results: Results, column: str) -> str | None:
 
 def _is_measured_or_estimated(results: Results, column: str) -> bool:
     """Return whether a column is a measurement or an estimate."""
-    return any(column.partition(".")[0] in results.units_of_role(role) for role in SENSING)
+    return any(results.names[column].instance in results.units_of_role(role) for role in SENSING)
 
 
 def reference_of(results: Results, column: str) -> str | None:
@@ -402,8 +405,8 @@ def reference_of(results: Results, column: str) -> str | None:
     name = f"{variable_of(column)}_ref"
     if found := _column(results, name):
         return found
-    acting = {wire.source.partition(".")[0] for wire in results.record.connections}
-    having = [c for c in results.columns if variable_of(c) == name and c.partition(".")[0] in acting]
+    acting = {SignalName.parse(wire.source).instance for wire in results.record.connections}
+    having = [c for c, one in results.names.items() if one.variable == name and one.instance in acting]
     return having[0] if len(having) == 1 else None
 
 

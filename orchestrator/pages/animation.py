@@ -179,7 +179,7 @@ def _grip(results: Results, kept: np.ndarray) -> dict[str, np.ndarray]:
         return {}
     grip = {}
     for wheel, load, force in zip(WHEELS, loads, forces, strict=True):
-        friction = _friction(results, wheel, tyre=force.partition(".")[0])
+        friction = _friction(results, wheel, tyre=results.names[force].instance)
         if friction is None:
             return {}
         mu = np.broadcast_to(np.asarray(friction, float), results.time.shape)[kept]

@@ -22,6 +22,7 @@ from ..labels import changed, changes_in
 from ..messages import counted, star
 from ..metrics.measures import variable_of
 from ..metrics.run_metrics import MetricValue, metric
+from ..names import SignalName
 from ..results.read import Results
 from .page_parts import PageFigure, figure_of
 
@@ -81,7 +82,7 @@ def divergence(one: Results, other: Results) -> RunComparison:
             found[parting.signal] = parting if known is None else _together(known, parting)
     order = {unit: i for i, unit in enumerate(one.run.get("evaluation_order", []))}
     ranked = sorted(
-        found.values(), key=lambda p: (p.first, order.get(p.signal.partition(".")[0], len(order)))
+        found.values(), key=lambda p: (p.first, order.get(SignalName.parse(p.signal).instance, len(order)))
     )
     return RunComparison(tuple(ranked), len(shared), tuple(notes))
 
@@ -138,8 +139,8 @@ def _together(one: SignalDifference, other: SignalDifference) -> SignalDifferenc
 
 def targets_of(run: Mapping[str, Any], signal: str) -> tuple[str, ...]:
     """Return the instances that a recorded signal is connected to, taken from the run record."""
-    wires = run.get("connections", [])
-    return tuple(dict.fromkeys(wire["to"].partition(".")[0] for wire in wires if wire["from"] == signal))
+    fed = (SignalName.parse(wire["to"]) for wire in run.get("connections", []) if wire["from"] == signal)
+    return tuple(dict.fromkeys(name.instance for name in fed))
 
 
 OF_RUN = ("status", "title", "algorithm", "step_size", "stop_time", "rows")

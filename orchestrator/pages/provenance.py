@@ -12,12 +12,12 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 from pathlib import Path
 
 from vocabulary.wheels import WHEEL_NAMES, WHEELS
 
 from ..messages import fold
+from ..names import SignalName
 from ..plan import DEFAULT, Instance, Plan, Value, Variable
 from ..scenario.load import LoadedScenario
 from ..scenario.yaml_lines import Document, KeyPath
@@ -153,16 +153,14 @@ def _origin_of_constant(scenario: LoadedScenario, unit: Instance, name: str) -> 
     """Return the provenance of an input's constant, None if it is the FMU's own."""
     origin = unit.origins.get(name, DEFAULT)
     if origin.kind == "scenario":
-        given = [pattern for pattern in scenario.inputs if _names(pattern, unit.name, name)]
+        given = [
+            pattern
+            for pattern in scenario.inputs
+            if SignalName.parse_input(pattern, scenario.units).matches(unit.name, name)
+        ]
         exact = max(given, key=lambda one: ("*" not in one, "." in one), default=None)
         return _provenance_in_scenario(scenario, ("inputs", exact) if exact else (_fact(scenario, name),))
     return None if origin == DEFAULT else VARIED_BY_STUDY
-
-
-def _names(pattern: str, unit: str, name: str) -> bool:
-    """Return whether a pattern of the scenario's inputs, `[instance.]name` with `*`, matches an input."""
-    whole = f"{unit}.{name}" if "." in pattern else name
-    return fnmatchcase(whole, pattern)
 
 
 def _origin(scenario: LoadedScenario, unit: Instance, name: str) -> ValueSource | None:

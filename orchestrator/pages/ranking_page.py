@@ -30,7 +30,7 @@ from ..experiments.ranking_tables import (
 )
 from ..experiments.tables import Table
 from ..labels import changed
-from ..plan import FAULTS, Override
+from ..plan import Override
 from .page_parts import FigureImage, anchor, image_of, made_by
 from .rendering import render, style
 
@@ -163,7 +163,7 @@ def series_command(ranked: RankingResult, cell: RankingCell) -> str:
     words += ["--scenario", str(ranking.path.parent / condition.scenario)]
     words += ["--angle", f"{math.degrees(ranked.angles[condition.car]):.1f} deg"]
     changes = {
-        one.place: one
+        one.target: one
         for one in (*ranking.changes_of_condition(cell.condition), *ranking.changes_of_entry(cell.entry))
     }
     for one in changes.values():
@@ -173,12 +173,12 @@ def series_command(ranked: RankingResult, cell: RankingCell) -> str:
 
 def _option(change: Override) -> list[str]:
     """Return an override as an option of the command line."""
-    if change.place == "vehicle":
+    if change.target.kind == "vehicle_file":
         return ["--vehicle", os.path.relpath(str(change.value))]
     if change.faulty:
-        return ["--fault", f"{change.place.removeprefix(f'{FAULTS}.')}: {change.value}"]
+        return ["--fault", f"{change.faulty}: {change.value}"]
     text = str(change.value).lower() if isinstance(change.value, bool) else str(change.value)
-    return ["--swap" if change.swaps else "--set", f"{change.place}={text}"]
+    return ["--swap" if change.swaps else "--set", f"{change.target}={text}"]
 
 
 def _conditions(ranked: RankingResult) -> Table:
@@ -189,7 +189,7 @@ def _conditions(ranked: RankingResult) -> Table:
     for name, one in ranking.conditions.items():
         runs = sum(run.condition == name for run in ranked.runs) // max(1, len(ranking.entries))
         own = ranking.changes_of_condition(name)
-        told = [change for change in own if change.place not in ("vehicle", "step_size", "stop_time")]
+        told = [change for change in own if str(change.target) not in ("vehicle", "step_size", "stop_time")]
         table.rows.append([
             one.title, ranking.spec.cars[one.car].title, degrees(ranked.angles[one.car]), one.scenario,
             changed(told) or None, str(runs), "asked" if one.dry else "no dry road: not asked",

@@ -250,13 +250,13 @@ def _with_changes(stem: str, changes: Iterable[Override]) -> str:
     """Return a name followed by its overrides, shortened and with a hash where they cannot be written out."""
     given = list(changes)
     values = [_text(one.plain) for one in given]
-    of_files = [one.names_file for one in given]
+    of_files = [one.target.names_file for one in given]
     names = [re.split(r"[/\\]", v)[-1] if file else v for v, file in zip(values, of_files, strict=True)]
-    readable = ",".join([stem, *(f"{one.place}={name}" for one, name in zip(given, names, strict=True))])
+    readable = ",".join([stem, *(f"{one.target}={name}" for one, name in zip(given, names, strict=True))])
     portable = re.sub(r"[^\w.,=+-]", "_", readable, flags=re.ASCII)
     if not given or (names == values and portable == readable and len(portable) <= LONGEST):
         return readable
-    exact = repr([(one.place, one.plain) for one in given])
+    exact = repr([(str(one.target), one.plain) for one in given])
     return f"{portable[: LONGEST - 7].rstrip('.')}~{hashlib.sha256(exact.encode()).hexdigest()[:6]}"
 
 

@@ -22,6 +22,7 @@ from ..checksums import checksum
 from ..errors import ResultsError
 from ..files import check_regular, reads, reason
 from ..messages import fold, listed, short
+from ..names import SignalName
 from ..scenario.quantities import conversion, measure_of
 from .folder import COMPLETED, DIED, PART, RUN_FILE, RUNNING, is_dead, unfinished
 from .formats import FILES, RESULTS_FILE, source_of
@@ -123,8 +124,9 @@ def thinned(
 
 def _reference(name: str, columns: Sequence[str]) -> str | None:
     """Return the column of a signal's reference if there is exactly one."""
-    found = [other for other in columns if other.partition(".")[2] == f"{name.partition('.')[2]}_ref"]
-    return found[0] if len(found) == 1 and name.partition(".")[2] else None
+    wanted = f"{SignalName.parse(name).variable}_ref"
+    found = [other for other in columns if SignalName.parse(other).variable == wanted]
+    return found[0] if len(found) == 1 else None
 
 
 @dataclass(frozen=True)
@@ -145,6 +147,11 @@ class Results:
     def record(self) -> RunRecord:
         """The run record `run` as a typed object, created at the first access."""
         return RunRecord.model_validate(self.run)
+
+    @cached_property
+    def names(self) -> dict[str, SignalName]:
+        """Column -> its instance and variable."""
+        return {column: SignalName.parse(column) for column in self.columns}
 
     @property
     def file(self) -> Path:
@@ -205,10 +212,10 @@ class Results:
         """Return all columns that `variable` may refer to (see `column`)."""
         if role is None and variable in self.columns:
             return [variable]
-        found = [name for name in self.columns if name.partition(".")[2] == variable]
+        found = [column for column, name in self.names.items() if name.variable == variable]
         if role is not None:
             units = self.units_of_role(role)
-            found = [name for name in found if name.partition(".")[0] in units]
+            found = [column for column in found if self.names[column].instance in units]
         return found if found or role is not None else self._feeding(variable)
 
     def _feeding(self, variable: str) -> list[str]:
@@ -216,7 +223,8 @@ class Results:
         feeding = [
             wire.source
             for wire in self.record.connections
-            if wire.target.partition(".")[2] == variable and _is_the_same(wire, self.units.get(wire.source))
+            if SignalName.parse(wire.target).variable == variable
+            and _is_the_same(wire, self.units.get(wire.source))
         ]
         return [column for column in dict.fromkeys(feeding) if column in self.columns]
 
@@ -226,7 +234,7 @@ class Results:
 
     def _unknown(self, variable: str, role: str | None = None) -> str:
         of = f" of a {role}" if role else ""
-        short = {name.partition(".")[2]: name for name in self.columns}
+        short = {name.variable: column for column, name in self.names.items()}
         close = get_close_matches(variable, [*self.columns, *short], n=1)
         hint = f"; did you mean '{close[0]}'?" if close else f"; recorded: {', '.join(fold([*self]))}."
         return f"{self.where}: no column '{variable}'{of} was recorded{hint}"

@@ -200,7 +200,7 @@ def run_record(plan: Plan, *, status: str, started: datetime) -> dict[str, Any]:
         "units": units_of(plan),
         "texts": [f"{u}.{name}" for u, name in plan.record if units[u].fmu.variables[name].type == "String"],
         "fmus": {name: _fmu(unit, plan) for name, unit in units.items()},
-        "changes": [asdict(change) | {"value": change.plain} for change in plan.changes],
+        "changes": [change.record for change in plan.changes],
         "connections": connections_of(plan),
         **({"faults": faults_of(plan)} if plan.faults else {}),
         "scenario": plan.scenario,

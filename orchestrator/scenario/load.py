@@ -12,14 +12,14 @@ from ..files import reads
 from ..messages import hint, listed
 from ..plan import Override
 from . import overrides, quantities, validation, yaml_lines
-from .scenario_schema import Connection, Endpoint, LoadedScenario, ScenarioSpec, Vehicle, endpoint
+from .scenario_schema import Connection, LoadedScenario, ScenarioSpec, Vehicle, endpoint
 from .tir import TyreFile, read_tir
 from .yaml_lines import Document, KeyPath
 
 STEPS = 1_000_000_000
 """Maximum number of steps of a run. Chosen: about as many as a computer makes in a day."""
 
-__all__ = ["Connection", "Endpoint", "LoadedScenario", "ScenarioSpec", "load_scenario"]
+__all__ = ["Connection", "LoadedScenario", "ScenarioSpec", "load_scenario"]
 
 
 @reads("scenario file", ScenarioError)

@@ -29,17 +29,11 @@ from typing import Any
 from ..errors import Problem, ScenarioError
 from ..fault_kinds import WORDS, FaultList
 from ..messages import hint, listed
-from ..plan import FACTS, FAULTS, OF_RUN, TYRES, Override, Value
+from ..names import FACTS, FAULTS, INPUTS, OF_RUN, TYRES, VEHICLE, Target
+from ..plan import Override, Value
 from . import yaml_lines
 from .fault_schema import location_of, parse_faults, read_line
 from .yaml_lines import Document, KeyPath
-
-HOLDERS = ("vehicle", "inputs")
-"""Words that `--set` accepts instead of an instance."""
-OF_UNIT = ("step_size", "validate")
-"""Settings of an instance that are not parameters of its FMU."""
-RESERVED = (*HOLDERS, *FACTS, TYRES, FAULTS)
-"""Names that no instance may have."""
 
 
 def is_path(fmu: str) -> bool:
@@ -70,42 +64,50 @@ def read_changes(
         else:
             problems.append(f"--swap {text}: write --swap UNIT=FMU")
     for text in settings:
-        place, equals, raw = (part.strip() for part in text.partition("="))
-        holder, dot, name = place.partition(".")
-        if equals and ((holder and dot and name) or place in (*OF_RUN, *FACTS, TYRES)):
-            value = os.path.abspath(raw) if holder == TYRES else yaml_lines.scalar(raw)
-            changes.append(setting(place, value, "--set"))
+        name, equals, raw = (part.strip() for part in text.partition("="))
+        target = _settable(name) if equals else None
+        if target is not None:
+            value = os.path.abspath(raw) if target.kind == "tyres" else yaml_lines.scalar(raw)
+            changes.append(setting(target, value, "--set"))
         else:
             sentence = f"write --set UNIT.PARAMETER=VALUE, or {listed((*OF_RUN, *FACTS), last='or')}=VALUE"
             problems.append(f"--set {text}: {sentence}")
-    at: dict[str, FaultList] = {}
+    at: dict[Target, FaultList] = {}
     for text in faults:
-        place, colon, line = (part.strip() for part in text.partition(":"))
-        if not (place and colon and line):
+        location, colon, line = (part.strip() for part in text.partition(":"))
+        if not (location and colon and line):
             problems.append(f"--fault {text}: write --fault 'UNIT.OUTPUT: KIND VALUE from TIME until TIME'")
             continue
         try:
-            one = faults_at(place, line, "--fault")
+            one = faults_at(location, line, "--fault")
         except ScenarioError as error:
             problems += error.problems
             continue
-        at[one.place] = FaultList((*at.get(one.place, ()), *one.faults))
-    changes += [Override(place, given, "--fault") for place, given in at.items()]
+        at[one.target] = FaultList((*at.get(one.target, ()), *one.faults))
+    changes += [Override(target, given, "--fault") for target, given in at.items()]
     if problems:
         raise ScenarioError(problems)
     return tuple(changes)
 
 
-def setting(place: str, value: Value, origin: str) -> Override:
+def _settable(text: str) -> Target | None:
+    """Return the target of `--set`, None if it is malformed or for another option."""
+    try:
+        target = Target.parse(text)
+    except ValueError:
+        return None
+    return None if target.kind in ("fmu", "vehicle_file") else target
+
+
+def setting(target: Target, value: Value, origin: str) -> Override:
     """Return the override of a target; faults are parsed from their line.
 
     Raises:
         ScenarioError: there is no such kind of fault, or it takes something else.
     """
-    holder, _, at = place.partition(".")
-    if holder != FAULTS or not at:
-        return Override(place, value, origin)
-    return faults_at(at, str(value), origin)
+    if target.kind != "faults":
+        return Override(target, value, origin)
+    return faults_at(target.variable, str(value), origin)
 
 
 def faults_at(place: str, stated: str | Mapping[str, Value], origin: str) -> Override:
@@ -118,22 +120,23 @@ def faults_at(place: str, stated: str | Mapping[str, Value], origin: str) -> Ove
     if not isinstance(stated, str):
         named = [f"{name} {stated[name]}" for name in WORDS if name in stated]
         line = " ".join([*(str(stated[name]) for name in ("kind", "value") if name in stated), *named])
-    where = str(Override(f"{FAULTS}.{place}", str(line), origin))
+    where = str(Override(Target("faults", variable=place), str(line), origin))
     try:
         location = location_of(place)
         items = read_line(stated) if isinstance(stated, str) else [stated]
     except ValueError as error:
         raise ScenarioError([Problem(str(error), place=where)]) from None
-    return Override(f"{FAULTS}.{location}", parse_faults(location, items, where), origin)
+    faults = parse_faults(location, items, where)
+    return Override(Target("faults", variable=str(location)), faults, origin)
 
 
 def changes_of(
-    swaps: Mapping[str, str], settings: Mapping[str, Value], folder: Path, origin: str
+    swaps: Mapping[str, str], settings: Mapping[Target, Value], folder: Path, origin: str
 ) -> list[Override]:
     """Return the overrides in a file of a folder: instance -> FMU (see `swap_of`) and target -> value."""
     changes = [
-        setting(place, str(folder / str(value)) if place.split(".")[0] == TYRES else value, origin)
-        for place, value in settings.items()
+        setting(target, str(folder / str(value)) if target.kind == "tyres" else value, origin)
+        for target, value in settings.items()
     ]
     for unit, text in swaps.items():
         fmu, *brought = swap_of(unit, text, origin)
@@ -144,10 +147,10 @@ def changes_of(
 
 def changes_of_run(spec: Any, origin: str) -> list[Override]:
     """Return the overrides in the fields `stop_time`, `step_size` and `algorithm` of a specification."""
-    given = [(place, getattr(spec, place, None)) for place in OF_RUN]
+    given = [(name, getattr(spec, name, None)) for name in OF_RUN]
     return [
-        Override(place, float(value) if isinstance(value, Fraction) else value, origin)
-        for place, value in given
+        Override.of(name, float(value) if isinstance(value, Fraction) else value, origin)
+        for name, value in given
         if value is not None
     ]
 
@@ -157,8 +160,10 @@ def swap_of(unit: str, text: str, origin: str) -> list[Override]:
     match = re.fullmatch(r"(.*?)((?::\w+=[^:]*)*)", text, re.DOTALL)
     assert match is not None
     given = (one.partition("=") for one in match[2].split(":")[1:])
-    brought = [Override(f"{unit}.{name}", yaml_lines.scalar(value), origin) for name, _, value in given]
-    return [Override(unit, match[1], origin), *brought]
+    brought = [
+        Override(Target.of_instance(unit, name), yaml_lines.scalar(value), origin) for name, _, value in given
+    ]
+    return [Override(Target.of_instance(unit), match[1], origin), *brought]
 
 
 def apply_changes(
@@ -174,31 +179,31 @@ def apply_changes(
     replaced: dict[str, str] = {}
     effective: list[Override] = []
     units = _mapping(document.data, "units")
-    for change in {change.place: change for change in changes}.values():
-        holder, _, name = change.place.partition(".")
+    for change in {change.target: change for change in changes}.values():
+        kind, holder, name = change.target.kind, change.target.instance, change.target.variable
         spec = units.get(holder)
-        if change.place in (*OF_RUN, *FACTS):
-            differs = _put(document, (change.place,), change)
-        elif change.place == "vehicle":
+        if kind in ("run", "fact"):
+            differs = _put(document, (name,), change)
+        elif kind == "vehicle_file":
             differs = True  # see `apply_vehicle`
-        elif holder == TYRES:
+        elif kind == "tyres":
             differs = _put_tyres(document, vehicle, change)
-        elif change.faulty:
-            differs = _put_faults(document, change, change.faulty)
-        elif holder == "vehicle":
+        elif kind == "faults":
+            differs = _put_faults(document, change, name)
+        elif kind == "vehicle_parameter":
             differs = _put(vehicle, ("parameters", name), change)
-        elif holder == "inputs":
-            differs = _put(document, ("inputs", name), change)
+        elif kind == "input":
+            differs = _put(document, (INPUTS, name), change)
         elif not isinstance(spec, dict):
-            known = (*units, *HOLDERS) if name else units
+            known = (*units, VEHICLE, INPUTS) if name else units
             sentence = f"the scenario has no unit {holder!r}{hint(holder, known, lead='it has')}"
             document.note(Problem(sentence, place=str(change)))
             continue
-        elif not name:
+        elif kind == "fmu":
             if isinstance(spec.get("fmu"), str):
                 replaced[holder] = spec["fmu"]
             differs = _swap(document, holder, change)
-        elif name in OF_UNIT:
+        elif kind == "setting":
             differs = _put(document, ("units", holder, name), change)
         else:
             differs = _put(document, ("units", holder, "parameters", name), change)
@@ -209,21 +214,21 @@ def apply_changes(
 def apply_vehicle(document: Document, changes: Iterable[Override]) -> None:
     """Apply overrides of the vehicle file, relative to the working directory."""
     for change in changes:
-        if change.place == "vehicle":
-            _put(document, ("vehicle",), change, os.path.abspath(str(change.value)))
+        if change.target.kind == "vehicle_file":
+            _put(document, (VEHICLE,), change, os.path.abspath(str(change.value)))
 
 
 def _put_tyres(document: Document, vehicle: Document, change: Override) -> bool:
     """Override tyre property files, relative to the working directory; return whether they differ."""
     file = os.path.abspath(str(change.value))
-    axle = change.place.removeprefix(f"{TYRES}.")
+    axle = change.target.variable
     holder = next(
         (d for d in (document, vehicle) if isinstance(d.data, dict) and d.data.get(TYRES)), document
     )
     before = holder.data.get(TYRES) if isinstance(holder.data, dict) else None
     named = before if isinstance(before, dict) else {"front": before, "rear": before}
     named = {key: os.path.abspath(holder.path.parent / str(name)) for key, name in named.items() if name}
-    after = {"front": file, "rear": file} if axle == TYRES else named | {axle: file}
+    after = {"front": file, "rear": file} if not axle else named | {axle: file}
     _put(document, (TYRES,), change, after)
     return after != named
 
@@ -265,12 +270,13 @@ def leave_unvalidated(document: Document) -> None:
 def apply_to_all_runs(document: Document, changes: Iterable[Override]) -> None:
     """Add overrides to the `swap`, `set` and `faults` of an experiment, for all of its runs."""
     for change in changes:
-        if change.place in OF_RUN:
-            _put(document, (change.place,), change)
+        target = str(change.target)
+        if change.target.kind == "run":
+            _put(document, (target,), change)
         elif change.faulty and isinstance(document.data, dict):
             _put_faults(document, change, change.faulty)
         else:
-            _put(document, ("swap" if change.swaps else "set", change.place), change)
+            _put(document, ("swap" if change.swaps else "set", target), change)
 
 
 def _swap(document: Document, unit: str, change: Override) -> bool:

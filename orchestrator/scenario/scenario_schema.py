@@ -11,7 +11,7 @@ import math
 import re
 from fractions import Fraction
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
@@ -25,8 +25,8 @@ from pydantic import (
 )
 
 from ..messages import short
+from ..names import RESERVED, SignalName
 from ..plan import Algorithm, Override, Value
-from . import overrides
 from .fault_schema import FaultSpec
 from .tir import TyreFile
 from .validation import Instant, StrictModel, Time
@@ -35,32 +35,22 @@ from .yaml_lines import Document, KeyPath
 AXLES = ("front", "rear")
 
 
-class Endpoint(NamedTuple):
-    """A variable of an instance, or several with a `*`."""
-
-    instance: str
-    variable: str
-
-    def __str__(self) -> str:
-        return f"{self.instance}.{self.variable}"
-
-
-def endpoint(value: object) -> Endpoint:
-    """Split 'unit.variable'.
+def endpoint(value: object) -> SignalName:
+    """Return the variable of an instance, or several with a `*`, named by 'unit.variable'.
 
     Raises:
         ValueError: not of that form.
     """
-    unit, dot, variable = str(value).partition(".")
-    if not isinstance(value, str) or not (unit and dot and variable) or variable.count("*") > 1:
+    name = SignalName.parse(value) if isinstance(value, str) else None
+    if name is None or not (name.instance and name.variable) or name.variable.count("*") > 1:
         raise ValueError(f"must be unit.variable, with at most one * in variable (got {value!r})")
-    return Endpoint(unit, variable)
+    return name
 
 
 def _unit_name(name: str) -> str:
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
         raise ValueError(f"{name!r} cannot name a unit: use letters, digits and _")
-    if name in overrides.RESERVED:
+    if name in RESERVED:
         raise ValueError(f"a unit cannot be named {name!r}: --set {name}.NAME means something else")
     return name
 
@@ -73,7 +63,7 @@ def _plain(value: object) -> Value:
     raise ValueError("has no value" if value is None else f"must be one value (got {short(value)})")
 
 
-def _end(value: object) -> Endpoint | list[str]:
+def _end(value: object) -> SignalName | list[str]:
     if not isinstance(value, list):
         return endpoint(value)
     if not value or not all(isinstance(name, str) and name and "." not in name for name in value):
@@ -81,7 +71,7 @@ def _end(value: object) -> Endpoint | list[str]:
     return value
 
 
-def _source(value: object) -> Endpoint | list[str] | None:
+def _source(value: object) -> SignalName | list[str] | None:
     return None if value is None else _end(value)
 
 
@@ -107,9 +97,9 @@ def _tolerance(value: object) -> float:
 Scalar = Annotated[Value, PlainValidator(_plain)]
 Tolerance = Annotated[float, PlainValidator(_tolerance)]
 Tyres = Annotated[dict[str, str], PlainValidator(_tyres)]
-Variables = Annotated[Endpoint, PlainValidator(endpoint)]
-SourceEndpoint = Annotated[Endpoint | list[str] | None, PlainValidator(_source)]
-TargetEndpoint = Annotated[Endpoint | list[str], PlainValidator(_end)]
+Variables = Annotated[SignalName, PlainValidator(endpoint)]
+SourceEndpoint = Annotated[SignalName | list[str] | None, PlainValidator(_source)]
+TargetEndpoint = Annotated[SignalName | list[str], PlainValidator(_end)]
 UnitName = Annotated[str, AfterValidator(_unit_name)]
 
 
@@ -198,7 +188,7 @@ class Connection(StrictModel):
             raise ValueError("from unit.variable, 'to' must be unit.variable")
         if self.source is None and isinstance(self.target, list):
             raise ValueError("with 'from: null', 'to' must be unit.variable")
-        if self.scale is not None and not isinstance(self.source, Endpoint):
+        if self.scale is not None and not isinstance(self.source, SignalName):
             raise ValueError("gain and offset are for a connection of unit.variable to unit.variable")
         return self
 

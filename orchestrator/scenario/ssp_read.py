@@ -26,7 +26,7 @@ from typing import Any
 from lxml.etree import _Element
 
 from ..messages import fold, listed
-from .overrides import RESERVED
+from ..names import RESERVED
 from .quantities import Unit, conversion
 from .ssp_archive import DESCRIPTION_FILE, OMS, OSP, OWN, SSD, SspArchive, SspError
 from .ssp_structure import (

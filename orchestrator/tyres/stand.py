@@ -19,6 +19,7 @@ from ..figures.style import QUIET, ROW, frame, line_style, new_figure
 from ..fmu.opener import Opener, find_fmu, find_folder
 from ..master.simulate import simulate_in_memory
 from ..messages import listed
+from ..names import SignalName
 from ..plan import Fmu, InputSeries, Instance, Plan, Value
 from ..scenario import yaml_lines
 from ..scenario.load import load_scenario
@@ -97,11 +98,13 @@ class TyreStand:
         }
         unit = replace(self.unit, series=series)
         results = simulate_in_memory(replace(self.plan, instances=(unit,), n_steps=2 * len(states)))
-        columns = [
-            f"{unit.name}.{v.name}" for v in unit.fmu.of("output") if v.name.endswith(f"_{self.wheel}")
-        ]
+        names = (SignalName(unit.name, v.name) for v in unit.fmu.of("output"))
         at_end = slice(2, None, 2)  # the second of two steps in each state
-        return {c.partition(".")[2].removesuffix(f"_{self.wheel}"): results[c][at_end] for c in columns}
+        return {
+            name.variable.removesuffix(f"_{self.wheel}"): results[str(name)][at_end]
+            for name in names
+            if name.variable.endswith(f"_{self.wheel}")
+        }
 
 
 def stiffnesses(stand: TyreStand, loads: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
@@ -197,7 +200,7 @@ def cornering_stiffness(tyres: Instance, loads: Mapping[str, float]) -> dict[str
         v.name: 1.0 if v.name.startswith("friction") else 0.0 for v in tyres.fmu.of("input")
     }
     unit = replace(tyres, constants=inputs | tyres.constants, series={}, period=1)
-    record = tuple((unit.name, v.name) for v in unit.fmu.of("output"))
+    record = tuple(SignalName(unit.name, v.name) for v in unit.fmu.of("output"))
     plan = Plan((unit,), (), record, Fraction(1), 1, "jacobi", title=unit.name)
     return {wheel: float(stiffnesses(TyreStand(plan, wheel), [load])[1][0]) for wheel, load in loads.items()}
 

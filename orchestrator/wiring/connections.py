@@ -16,12 +16,13 @@ from graphlib import CycleError
 from itertools import pairwise
 
 from ..messages import fold, hint, listed
+from ..names import SignalName, matching
 from ..plan import DEFAULT, InputSeries, Value, Variable, Wire
-from ..scenario.load import Connection, Endpoint
+from ..scenario.load import Connection
 from ..scenario.quantities import conversion, measure_of
 from ..scenario.yaml_lines import KeyPath, dotted
 from .constants import Constant, Input, constants
-from .context import WiringContext, matching
+from .context import WiringContext
 from .order import in_order
 
 
@@ -168,7 +169,7 @@ class Connector:
         if ends[0] is None:
             self._refused.update((target, name) for name in inputs.values())
             return []
-        one = ends[0] if isinstance(ends[0], Endpoint) else None
+        one = ends[0] if isinstance(ends[0], SignalName) else None
         sources = [one.instance] if one else list(ends[0])
         from_pattern = one.variable if one else "*"
         if target in sources:

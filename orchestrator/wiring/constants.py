@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from ..messages import fold, hint
+from ..names import SignalName, matching
 from ..plan import InputSeries, Value, ValueOrigin
 from ..scenario.scenario_schema import SeriesSpec
 from ..scenario.yaml_lines import KeyPath
-from .context import WiringContext, facts_of, matching
+from .context import WiringContext, facts_of
 from .parameters import origin, value_for
 
 Input = tuple[str, str]  # instance, variable
@@ -53,9 +54,9 @@ def constants(system: WiringContext) -> dict[Input, Constant]:
     fact_changed = any(one.level == CHANGED_FACT for one in found.values())
     for pattern, raw in scenario.inputs.items():
         key: KeyPath = ("inputs", pattern)
-        prefix, _, rest = pattern.partition(".")
+        prefix, name_pattern = SignalName.parse_input(pattern, fmus)
         of_unit = prefix in fmus
-        instances, name_pattern = ([prefix], rest) if of_unit else (list(fmus), pattern)
+        instances = [prefix] if of_unit else list(fmus)
         parts = {
             (u, name): part for u in instances for part, name in matching(name_pattern, inputs[u]).items()
         }

@@ -1,6 +1,6 @@
 """State shared by all steps of wiring: the scenario, its opened FMUs, problems and notes so far.
 
-Also *facts*, values that reach all instances which need them, and the matching of patterns with a `*`.
+Also *facts*, values that reach all instances which need them.
 
     friction: 0.65         # every parameter `base_friction` of a road, and every input `friction`,
                            # `friction_fl` .. `friction_rr` that no wire drives
@@ -8,12 +8,12 @@ Also *facts*, values that reach all instances which need them, and the matching 
 
 In a scenario file, a value given by its own name takes precedence over a fact; as an override
 (`--set friction=0.3`), a fact takes precedence over the file, so that one override reaches all instances. To
-add a fact, add a row to `FACTS`, its name to `plan.FACTS`, and a key to the schema of scenarios.
+add a fact, add a row to `FACTS`, its name to `names.FACTS`, and a key to the schema of scenarios.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -21,7 +21,8 @@ from vocabulary.wheels import WHEELS, wheels
 
 from ..errors import Problem, WiringError
 from ..messages import fold_sentences
-from ..plan import FACTS as NAMES
+from ..names import FACTS as NAMES
+from ..names import match
 from ..plan import Fmu, Instance, Value, ValueOrigin, Variable
 from ..scenario.load import LoadedScenario
 from ..scenario.yaml_lines import PROBLEMS, Document, KeyPath
@@ -56,22 +57,6 @@ def facts_of(scenario: LoadedScenario) -> Iterator[tuple[str, Fact, Value, bool]
         value = getattr(scenario, name)
         if value is not None:
             yield name, fact, value, scenario.document.override((name,)) is not None
-
-
-def match(pattern: str, name: str) -> str | None:
-    """Return the part of a name that the `*` of a pattern matches ('' without `*`), None without a match."""
-    head, star, tail = pattern.partition("*")
-    if not star:
-        return "" if name == pattern else None
-    fits = len(name) >= len(head) + len(tail) and name.startswith(head) and name.endswith(tail)
-    return name[len(head) : len(name) - len(tail)] if fits else None
-
-
-def matching(pattern: str, names: Collection[str]) -> dict[str, str]:
-    """Return the names that match a pattern, as part matched by `*` -> name."""
-    if "*" not in pattern:
-        return {"": pattern} if pattern in names else {}
-    return {part: name for name in names if (part := match(pattern, name)) is not None}
 
 
 ByUnit = dict[str, dict[str, Variable]]

@@ -26,11 +26,12 @@ from ..fmu.binary import CORE
 from ..fmu.description import shadowed_modules
 from ..fmu.opener import Opener, find_fmu, find_folder, host_needs, stale_fmus
 from ..messages import closest, fold, hint, listed
+from ..names import SignalName, match
 from ..plan import Fmu, InputSeries, Instance, Plan, Value, ValueOrigin, Variable, Wire
 from ..scenario.load import LoadedScenario
 from ..scenario.overrides import is_path
 from .connections import Connector
-from .context import WiringContext, match
+from .context import WiringContext
 from .faults import faults_of
 from .order import evaluate
 from .parameters import STATIC_LOADS, STIFFNESSES, Parameters
@@ -68,15 +69,15 @@ def missing_functions(
     return problems
 
 
-def recorded(system: WiringContext) -> tuple[tuple[str, str], ...]:
-    """Return (instance, variable) of each recorded column, in the order of the scenario's `record`.
+def recorded(system: WiringContext) -> tuple[SignalName, ...]:
+    """Return the name of each recorded column, in the order of the scenario's `record`.
 
     Without `record`, these are all outputs except text, in the order of the instances.
     """
     fmus, record = system.fmus, system.scenario.record
     if record is None:
-        return tuple((instance, v.name) for instance, fmu in fmus.items() for v in _usual(fmu))
-    chosen: dict[tuple[str, str], None] = {}
+        return tuple(SignalName(instance, v.name) for instance, fmu in fmus.items() for v in _usual(fmu))
+    chosen: dict[SignalName, None] = {}
     for i, (instance, pattern) in enumerate(record):
         instances = list(fmus) if instance == "*" else [instance]
         found = _matching(instances, fmus, pattern, _usual) or _matching(instances, fmus, pattern, _all)
@@ -104,9 +105,9 @@ def _all(fmu: Fmu) -> list[Variable]:
 
 def _matching(
     instances: Iterable[str], fmus: Mapping[str, Fmu], pattern: str, of: Callable[[Fmu], list[Variable]]
-) -> list[tuple[str, str]]:
+) -> list[SignalName]:
     return [
-        (instance, v.name)
+        SignalName(instance, v.name)
         for instance in instances
         for v in of(fmus[instance])
         if match(pattern, v.name) is not None
@@ -258,7 +259,7 @@ def _misplaced(scenario: LoadedScenario) -> list[str]:
     for change in scenario.changes:
         name = Path(str(change.value)).stem
         others = [instance for instance, role in roles.items() if role == role_in(name)]
-        if change.swaps and others and change.place not in others:
+        if change.swaps and others and change.target.instance not in others:
             found.append(f"{change}: by its name {name} is for the unit {others[0]!r}")
     return found
 

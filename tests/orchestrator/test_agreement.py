@@ -117,7 +117,7 @@ def test_a_fact_of_the_file_stands_behind_what_is_given_by_its_own_name():
 def test_one_speed_reaches_the_plant_and_the_driver():
     made = plan("speed=72 km/h", plant="initial_speed: 30", driver="target_speed: 30, speed_gain: 100")
     assert (values(made, "plant")["initial_speed"], values(made, "driver")["target_speed"]) == (20.0, 20.0)
-    assert made.changes[0].place == "speed"
+    assert str(made.changes[0].target) == "speed"
     assert made.findings == ()
 
 

@@ -45,7 +45,7 @@ def scenario(tmp_path) -> Path:
 
 def given(job):
     """Return what a job changes, by its place."""
-    return {change.place: change.value for change in job.changes}
+    return {str(change.target): change.value for change in job.changes}
 
 
 def labels(scenario, *swaps):

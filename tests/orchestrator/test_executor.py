@@ -25,7 +25,7 @@ RATES = {"slow": 1.0, "fast": 2.0}
 
 def named_runs(folder):
     (folder / "gyro.yaml").write_text(SCENARIO)
-    given = {name: Override("inputs.sensor.yaw_rate_true", rate, "test") for name, rate in RATES.items()}
+    given = {name: Override.of("inputs.sensor.yaw_rate_true", rate, "test") for name, rate in RATES.items()}
     return [NamedRun(name, name, name, folder / "gyro.yaml", (change,)) for name, change in given.items()]
 
 
@@ -104,7 +104,7 @@ def test_plans_of_runs_hold_what_an_experiment_may_depend_on(executor, tmp_path)
     with closing(execute.journal):
         (plan, _) = execute.plans(named_runs(tmp_path))
         assert plan.time(plan.n_steps) == pytest.approx(0.1)
-        wrong = replace(named_runs(tmp_path)[0], changes=(Override("sensor.gian", 1.0, "test"),))
+        wrong = replace(named_runs(tmp_path)[0], changes=(Override.of("sensor.gian", 1.0, "test"),))
         with pytest.raises(ScenarioError):
             execute.plans([wrong])
 

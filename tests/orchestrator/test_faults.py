@@ -400,7 +400,7 @@ def test_what_a_fault_never_reaches_is_noted(folder):
     make_fmu(Path("fmus/controller_off.fmu"), outputs=[out("yaw_moment", unit="N.m")])
     without = SCENARIO.replace("  - {from: [gyro], to: [law]}\n", "")
     gone = planned("gyro.yaw_rate -> law: freeze", text=without,
-                   changes=[Override("law", "controller_off", "--swap")])  # fmt: skip
+                   changes=[Override.of("law", "controller_off", "--swap")])  # fmt: skip
     assert gone.faults == ()
     assert "--fault gyro.yaw_rate -> law: freeze is left out: there is no such signal any more" in gone.notes
 

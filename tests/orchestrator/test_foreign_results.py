@@ -430,7 +430,7 @@ def test_results_of_several_files_go_below_the_folder_given(projects, work, monk
 
 @pytest.mark.parametrize("suffix", ["", "-compare", "-converge", "_series"])
 @pytest.mark.parametrize(
-    "changes", [(), (Override("controller", "../../off", "--swap"),)], ids=["", "changed"]
+    "changes", [(), (Override.of("controller", "../../off", "--swap"),)], ids=["", "changed"]
 )
 def test_a_default_folder_is_below_results_whatever_the_path_of_the_file(suffix, changes, work):
     for file in (

@@ -18,7 +18,7 @@ PRODUCT = ("components", "vocabulary", "fmus", "orchestrator", "yawbench")
 ROOT = Path(__file__).parents[2]
 ORCHESTRATOR = Path(__file__).parents[2] / "orchestrator"
 STAGES = (
-    {"errors", "messages", "fault_kinds", "plan", "labels", "cache", "checksums", "files"},
+    {"errors", "messages", "names", "fault_kinds", "plan", "labels", "cache", "checksums", "files"},
     {"processes", "supervisor", "workers"},
     {"scenario"},
     {"fmu"},

@@ -104,7 +104,7 @@ def test_units_end_when_the_master_is_killed(fmus, tmp_path):
         "from orchestrator.wiring.make_plan import make_plan\n"
         "from orchestrator.master.isolation import Isolation\n"
         "from orchestrator.master.simulate import simulate\n"
-        f"short = [Override('stop_time', 0.01, 'test')]\n"
+        f"short = [Override.of('stop_time', 0.01, 'test')]\n"
         f"plan = make_plan(load_scenario({str(CAR)!r}, changes=short), fmus=Path({str(fmus)!r}))\n"
         "isolation = Isolation(plan.instances)\n"
         f"simulate(plan, {str(tmp_path)!r}, opener=isolation)\n"

@@ -13,7 +13,7 @@ FILE = Path("scenarios/paper/25mps.yaml")
 
 def folder(*changes, **given):
     return default_folder(
-        FILE, [Override(place, value, "--set") for place, value in changes], **given
+        FILE, [Override.of(place, value, "--set") for place, value in changes], **given
     ).as_posix()
 
 

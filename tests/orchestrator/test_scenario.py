@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from orchestrator.errors import ScenarioError
-from orchestrator.scenario.load import Endpoint, ScenarioSpec, load_scenario
+from orchestrator.names import SignalName
+from orchestrator.scenario.load import ScenarioSpec, load_scenario
 from tests.changed import changed
 
 GOOD = """\
@@ -69,8 +70,8 @@ def test_everything_in_the_file_is_read(file: Path) -> None:
     assert list(scenario.units) == ["driver", "controller", "plant"]
     assert scenario.units["driver"].parameters == {"amplitude": "5 deg"}
     assert scenario.units["controller"].step_size == Fraction(1, 500)
-    assert scenario.connections[0].source == Endpoint("controller", "torque_request_*")
-    assert scenario.connections[0].target == Endpoint("plant", "wheel_torque_*")
+    assert scenario.connections[0].source == SignalName("controller", "torque_request_*")
+    assert scenario.connections[0].target == SignalName("plant", "wheel_torque_*")
     assert scenario.record is None
 
 

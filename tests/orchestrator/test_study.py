@@ -213,9 +213,9 @@ def test_for_stands_for_one_run_per_combination(study, tmp_path):
     assert (run.label, run.row) == ("neural network", "25 m/s, neural network")
     assert run.scenario == tmp_path / "25mps.yaml"
     assert run.changes == (
-        Override("driver.amplitude", 0.03, "study"),
-        Override("controller.learning", True, "study"),
-        Override("controller", "controller_fnn", "study"),
+        Override.of("driver.amplitude", 0.03, "study"),
+        Override.of("controller.learning", True, "study"),
+        Override.of("controller", "controller_fnn", "study"),
     )
     assert (runs["slow"].label, runs["slow"].row) == ("slow", "slow")
 
@@ -223,12 +223,15 @@ def test_for_stands_for_one_run_per_combination(study, tmp_path):
 def test_a_run_becomes_a_job_with_a_folder_of_its_own(study, tmp_path):
     *_, job = jobs_of(study(), tmp_path / "out")
     assert job.out == tmp_path / "out" / "slow"
-    assert job.changes == (Override("stop_time", 2.0, "study"), Override("algorithm", "jacobi", "study"))
+    assert job.changes == (
+        Override.of("stop_time", 2.0, "study"),
+        Override.of("algorithm", "jacobi", "study"),
+    )
 
 
 def test_an_fmu_given_by_its_path_is_relative_to_the_study_file(study, tmp_path):
     run = study(('"controller_{controller}"', '"mine/{controller}.fmu"')).runs["15mps/fnn"]
-    assert run.changes[-1] == Override("controller", str(tmp_path / "mine/fnn.fmu"), "study")
+    assert run.changes[-1] == Override.of("controller", str(tmp_path / "mine/fnn.fmu"), "study")
 
 
 def test_all_problems_of_a_study_are_reported_at_once(study):

@@ -126,13 +126,13 @@ def test_the_figure_of_a_sweep_names_what_options_changed(yawbench, fmus, tmp_pa
 def made(*changes):
     """Return a made-up run whose record names changes."""
     results = car()
-    results.run["changes"] = [vars(change) for change in changes]
+    results.run["changes"] = [change.record for change in changes]
     return results
 
 
-ICE = Override("inputs.friction*", 0.3, "--set")
-OFF = Override("controller", "mine/controller_off.fmu", "--swap")
-SLOW = Override("plant.initial_speed", "50 km/h", "--set")
+ICE = Override.of("inputs.friction*", 0.3, "--set")
+OFF = Override.of("controller", "mine/controller_off.fmu", "--swap")
+SLOW = Override.of("plant.initial_speed", "50 km/h", "--set")
 
 
 def test_an_overlay_names_what_was_changed_for_all_and_for_each():
@@ -148,7 +148,7 @@ def test_a_figure_with_a_title_of_its_own_names_changes_at_its_foot():
 
 
 def test_a_long_list_of_changes_is_wrapped_and_never_cut(tmp_path):
-    many = [Override(f"controller.gain_{k}", k / 7, "--set") for k in range(40)]
+    many = [Override.of(f"controller.gain_{k}", k / 7, "--set") for k in range(40)]
     figure = draw([LabelledRun("a", made(*many))])
     save(figure, tmp_path / "long")
     assert all(f"controller.gain_{k} = " in texts(figure) for k in range(40))
@@ -156,7 +156,7 @@ def test_a_long_list_of_changes_is_wrapped_and_never_cut(tmp_path):
 
 
 def test_dollars_in_titles_and_labels_are_no_formulas(tmp_path):
-    results = [made(Override("driver.name", "$x_{", "--set")), made()]
+    results = [made(Override.of("driver.name", "$x_{", "--set")), made()]
     for one in results:
         one.run["title"] = r"Costs $5_{ and $\frac"
     figure = draw([LabelledRun("$a_{$", results[0]), LabelledRun(r"$\b$", results[1])])
@@ -166,9 +166,9 @@ def test_dollars_in_titles_and_labels_are_no_formulas(tmp_path):
 
 def test_changes_are_told_in_words():
     assert changed([OFF, ICE]) == "controller_off for controller, inputs.friction* = 0.3"
-    assert changed([Override("plant.locked", True, "--set")]) == "plant.locked = true"
-    assert changed([Override("step_size", 0.002, "study")]) == "step_size = 0.002 s"
-    assert changed([Override("vehicle", "/cars/saloon.yaml", "sweep")]) == "vehicle file saloon.yaml"
+    assert changed([Override.of("plant.locked", True, "--set")]) == "plant.locked = true"
+    assert changed([Override.of("step_size", 0.002, "study")]) == "step_size = 0.002 s"
+    assert changed([Override.of("vehicle", "/cars/saloon.yaml", "sweep")]) == "vehicle file saloon.yaml"
     assert with_changes("Lane change", [ICE]) == "Lane change (changed: inputs.friction* = 0.3)"
     assert with_changes("Lane change", []) == "Lane change"
     assert changed_each([("a", [ICE]), ("b", [ICE])]) == "inputs.friction* = 0.3"
@@ -183,8 +183,8 @@ def test_a_record_of_another_shape_names_no_changes():
 def test_the_record_of_a_swap_reads_back_as_it_was(yawbench, tmp_path):
     yawbench("run", SCENARIO, "--swap", "controller=controller_off", "--set", "stop_time=0.01", "--out", "r")
     assert changes_in(load_results(tmp_path / "r").run) == (
-        Override("controller", "controller_off", "--swap"),
-        Override("stop_time", 0.01, "--set"),
+        Override.of("controller", "controller_off", "--swap"),
+        Override.of("stop_time", 0.01, "--set"),
     )
 
 

@@ -14,6 +14,7 @@ from orchestrator.errors import ScenarioError, WiringError
 from orchestrator.experiments.experiment import load_experiment
 from orchestrator.experiments.planning import plan_experiment
 from orchestrator.interop.ssp_write import write_ssp
+from orchestrator.names import Target
 from orchestrator.results.folder import default_folder
 from orchestrator.results.freshness import key_of
 from orchestrator.results.read import load_results
@@ -127,7 +128,7 @@ def test_another_file_is_another_run(folder, fmus, monkeypatch):
     other = plan(path, fmus, **{"tyres": "stiff.tir"})
     rear = plan(path, fmus, **{"tyres.rear": "stiff.tir"})
     assert plain.changes == ()
-    assert [(c.place, Path(str(c.value)).name) for c in rear.changes] == [("tyres.rear", "stiff.tir")]
+    assert [(str(c.target), Path(str(c.value)).name) for c in rear.changes] == [("tyres.rear", "stiff.tir")]
     assert (parameters(rear)["pky1_front"], parameters(rear)["pky1_rear"]) == (-12.0, -17.0)
     assert len({key_of(p, {}) for p in (plain, other, rear)}) == 3
     assert len({default_folder(path, p.changes) for p in (plain, other, rear)}) == 3
@@ -141,9 +142,9 @@ def test_files_of_options_are_found_from_here_and_those_of_studies_from_there(fo
     monkeypatch.chdir(folder)
     (option,) = read_changes(settings=["tyres.front=stiff.tir"])
     assert option.value == str(folder / "stiff.tir")
-    (of_study,) = changes_of({}, {"tyres": "stiff.tir"}, Path("/studies"), "study")
+    (of_study,) = changes_of({}, {Target("tyres"): "stiff.tir"}, Path("/studies"), "study")
     assert of_study.value == str(Path("/studies/stiff.tir"))
-    assert changes_of({}, {"tyres": option.value}, Path("/studies"), "study")[0].value == option.value
+    assert changes_of({}, {Target("tyres"): option.value}, Path("/studies"), "study")[0].value == option.value
 
 
 def test_a_run_remembers_the_files_with_their_hash_kind_and_warnings(folder, fmus, tmp_path):

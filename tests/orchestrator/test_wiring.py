@@ -952,8 +952,8 @@ def test_every_value_says_where_it_comes_from(folder: Path) -> None:
 def test_a_plan_names_what_is_other_than_in_the_scenario_file() -> None:
     made = plan(settings=["inputs.friction*=0.3", "driver.amplitude=0.05", "driver.amplitude=0.1"])
     assert made.changes == (
-        Override("inputs.friction*", 0.3, "--set"),
-        Override("driver.amplitude", 0.1, "--set"),
+        Override.of("inputs.friction*", 0.3, "--set"),
+        Override.of("driver.amplitude", 0.1, "--set"),
     )
 
 

@@ -94,7 +94,7 @@ def test_every_run_with_noise_that_a_mean_is_made_of_has_ten_seeds(name, noisy):
     study = load_experiment(ROOT / f"scenarios/real_signals/{name}.yaml")
     seeds: dict[str, set[object]] = {}
     for case in study.cases:
-        drawn = [change.value for change in case.changes if change.place == "sensor.seed"]
+        drawn = [change.value for change in case.changes if str(change.target) == "sensor.seed"]
         seeds.setdefault(case.run.name, set()).update(drawn)
     assert sorted(map(len, seeds.values())) == [0] * (len(seeds) - noisy) + [10] * noisy
     assert len(study.short.points) == 3

@@ -155,7 +155,9 @@ def load(file: Path, kind: str, once: Any) -> None:
         uses = (one for one in sorted(file.parents[1].rglob("*.yaml")) if _uses(one, name))
         base = next(uses, file.parents[1] / "fnn_sideslip" / "25mps.yaml")
         make_plan(
-            load_scenario(base, changes=(Override("vehicle", str(file), "test"),)), fmus=fmus, opener=opener
+            load_scenario(base, changes=(Override.of("vehicle", str(file), "test"),)),
+            fmus=fmus,
+            opener=opener,
         )
     else:
         make_plan(load_scenario(file), fmus=fmus, opener=opener)

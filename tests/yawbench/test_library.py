@@ -74,9 +74,9 @@ def test_swap_and_set_leave_the_scenario_as_it_was(base):
     other = base.swap(controller="controller_off").set(
         {"vehicle.mass": 1200, "plant.initial_speed": "80 km/h"}
     )
-    assert base.changes[0].place == "stop_time"
+    assert str(base.changes[0].target) == "stop_time"
     assert len(base.changes) == 1
-    assert [change.place for change in other.changes] == [
+    assert [str(change.target) for change in other.changes] == [
         "stop_time", "controller", "vehicle.mass", "plant.initial_speed",
     ]  # fmt: skip
     plant = next(unit for unit in other.plan().instances if unit.name == "plant")
