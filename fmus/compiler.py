@@ -1,4 +1,4 @@
-"""C sources as shared libraries; the launcher is kept in a cache, once per source and compiler."""
+"""C sources as shared libraries; the launcher and the step loop are kept in a cache, once per source."""
 
 from __future__ import annotations
 
@@ -24,6 +24,8 @@ FLAGS = ("-std=c11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-Wl,--bu
 LIBRARIES = ("-ldl", "-pthread")
 STORE = "launcher"
 """Of compiled launchers in the cache."""
+LOOP_FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-pthread")
+"""Of the step loop (see `orchestrator.master.compiled_loop`)."""
 
 
 def compiler_command() -> list[str]:
@@ -76,6 +78,31 @@ def compile_library(command: Sequence[str], sources: Mapping[str, bytes], *argum
         return Path(temporary, "made.so").read_bytes()
 
 
+def recalled_library(
+    store: str, sources: Mapping[str, bytes], arguments: Sequence[str], version: str | None = None
+) -> bytes:
+    """Return a shared library from the cache, where it is stored when it has been compiled once.
+
+    Args:
+        store: folder of the cache.
+        sources, arguments: as for `compile_library`.
+        version: of the compiler; None: any version makes a library that serves as well.
+
+    Raises:
+        BuildError: there is no C compiler, or what it says is wrong.
+    """
+    command = compiler_command()
+    said = "\0".join([*command, version or platform.machine(), *arguments])
+    key = hashlib.sha256(b"".join([said.encode(), *sources.values()])).hexdigest()[:16]
+    binary = recall(store, key)
+    if binary is None:
+        if version is None:
+            compiler_version(command)
+        binary = compile_library(command, sources, *arguments)
+        keep(store, key, binary)
+    return binary
+
+
 def compile_launcher() -> tuple[bytes | None, str]:
     """Return the launcher for this machine, or None with the reason why there is none.
 
@@ -90,12 +117,8 @@ def _launcher(command: tuple[str, ...]) -> tuple[bytes | None, str]:
         return None, f"it is for Linux on x86-64, this is {platform.system()} on {platform.machine()}"
     sources = {name: (HERE / name).read_bytes() for name in SOURCES}
     try:
-        said = "\0".join([*command, compiler_version(command), *FLAGS, *LIBRARIES])
-        key = hashlib.sha256(b"".join([said.encode(), *sources.values()])).hexdigest()[:16]
-        binary = recall(STORE, key)
-        if binary is None:
-            binary = compile_library(command, sources, *FLAGS, SOURCES[0], *LIBRARIES)
-            keep(STORE, key, binary)
+        arguments = [*FLAGS, SOURCES[0], *LIBRARIES]
+        binary = recalled_library(STORE, sources, arguments, compiler_version(command))
     except BuildError as error:
         why = error.problems[0]
         return None, why if "C compiler" in why else f"the C compiler failed: {why}"

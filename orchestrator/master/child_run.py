@@ -162,7 +162,7 @@ def _make(
     error = _go(course, opener)
     log.finish()
     ending = course.ended and (str(course.ended), course.ended.instance, course.ended.time)
-    channel.send(ENDED, (course.passes, ending, error))
+    channel.send(ENDED, (course.passes, course.loop, ending, error))
     while (byte := channel.hear()) != FREE[0]:
         if byte is None:
             return
@@ -219,8 +219,11 @@ def _whereabouts(thread: int) -> tuple[str, str] | None:
     while frame is not None:
         if frame.f_code.co_filename.startswith(here):
             local = frame.f_locals
-            if frame.f_code is Master.advance.__code__ and "call" in local:
+            if frame.f_code is Master._loop.__code__ and "call" in local:
                 operation = local["self"].operation_of(local["k"], local["call"])
+                return operation and (operation.instance, WORDS.get(operation.kind, operation.kind))
+            if frame.f_code is Master._walk.__code__:
+                operation = local["self"].walked_operation()
                 return operation and (operation.instance, WORDS.get(operation.kind, operation.kind))
             if isinstance(local.get("self"), CtypesInstance):
                 ending = frame.f_code.co_name == CtypesInstance.free.__name__
@@ -273,7 +276,7 @@ class ChildRun(RunLoop, FmuProcess):
         finally:
             os.close(asked)
         try:
-            self.passes, ending, failed = self.hear(ENDED)
+            self.passes, self.loop, ending, failed = self.hear(ENDED)
         except ProcessLost as lost:
             raise self._death(lost) from None
         self._told_end = True

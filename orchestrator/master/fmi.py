@@ -26,7 +26,8 @@ from fmpy.fmi3 import fmi3IntermediateUpdateCallback, fmi3LogMessageCallback
 
 from ..fmu.binary import INTEGERS
 from ..plan import Instance
-from .instance import CtypesInstance, ExperimentSetup, Status
+from .compiled_loop import Kind, OperationData
+from .instance import BoundCall, CtypesInstance, ExperimentSetup, PlainCall, Status
 from .log import DISCARD, OK, WARNING, Log, listen, receive
 from .process_state import ProcessState
 
@@ -37,6 +38,7 @@ class Fmi2Instance(CtypesInstance):
     prefix = "fmi2"
     version = 2
     real = "Real"
+    exchanging = Kind.EXCHANGE_2
     c_types = {
         "Real": ctypes.c_double,
         "Integer": ctypes.c_int,
@@ -61,7 +63,9 @@ class Fmi2Instance(CtypesInstance):
 
     def _stepping(self, time: ctypes.c_double, step: ctypes.c_double) -> Callable[[], Status]:
         component = ctypes.c_void_p(self._component)
-        return functools.partial(self._function("DoStep"), component, time, step, ctypes.c_int(1))
+        call = BoundCall(self._function("DoStep"), component, time, step, ctypes.c_int(1))
+        call.data = OperationData(Kind.STEP_2, time=time, size=step, **self._callee("DoStep"))
+        return call
 
     def setup(self, experiment: ExperimentSetup) -> Status:
         return self._announce("SetupExperiment", experiment)
@@ -116,12 +120,24 @@ def _callbacks() -> fmi2CallbackFunctions:
     return callbacks
 
 
+class _StepAnswers(ctypes.Structure):
+    """What `fmi3DoStep` answers."""
+
+    _fields_ = [
+        ("event", ctypes.c_bool),
+        ("ended", ctypes.c_bool),
+        ("early", ctypes.c_bool),
+        ("reached", ctypes.c_double),
+    ]
+
+
 class Fmi3Instance(CtypesInstance):
     """An instance of an FMI 3.0 co-simulation FMU."""
 
     prefix = "fmi3"
     version = 3
     real = "Float64"
+    exchanging = Kind.EXCHANGE_3
     c_types = {
         "Float32": ctypes.c_float,
         "Float64": ctypes.c_double,
@@ -133,8 +149,7 @@ class Fmi3Instance(CtypesInstance):
     def _instantiate(self, unit: Instance) -> int | None:
         self._listener = listen(self._log, unit.name)
         self._experiment = ExperimentSetup(0.0, 0.0)
-        self._ended = ctypes.c_bool(False)
-        self._reached = ctypes.c_double(math.nan)
+        self._answers = _StepAnswers(reached=math.nan)
         resources = str(Path(unit.fmu.directory, "resources").absolute()) + os.sep
         no, yes = False, True
         instantiate = self._function("InstantiateCoSimulation")
@@ -155,33 +170,10 @@ class Fmi3Instance(CtypesInstance):
         )
 
     def _stepping(self, time: ctypes.c_double, step: ctypes.c_double) -> Callable[[], Status]:
-        component, yes = ctypes.c_void_p(self._component), ctypes.c_bool(True)
-        event, early, ended, reached = ctypes.c_bool(), ctypes.c_bool(), self._ended, self._reached
-        answers = [ctypes.byref(value) for value in (event, ended, early, reached)]
-        do_step = self._function("DoStep")
-        call = functools.partial(do_step, component, time, step, yes, *answers)
-
-        def go_on(status: Status) -> Status:
-            """Complete a step from which the FMU returned early although it was not allowed to."""
-            end = time.value + step.value
-            while status <= WARNING and early.value and not ended.value and reached.value < end:
-                begin = reached.value
-                rest = do_step(component, ctypes.c_double(begin), ctypes.c_double(end - begin), yes, *answers)
-                status = max(status, rest)
-                if early.value and not reached.value > begin:
-                    return self._impossible(f"it returned early and stays at t = {begin:.9g} s")
-            return status
-
-        def take_step() -> Status:
-            status = call()
-            if early.value:
-                status = go_on(status)
-            return max(status, DISCARD) if ended.value else status
-
-        return take_step
+        return _Fmi3Step(self, time, step)
 
     def ended(self) -> float | None:
-        return self._reached.value if self._ended.value else None
+        return self._answers.reached if self._answers.ended else None
 
     def setup(self, experiment: ExperimentSetup) -> Status:
         self._experiment = experiment
@@ -189,6 +181,40 @@ class Fmi3Instance(CtypesInstance):
 
     def enter(self) -> Status:
         return self._announce("EnterInitializationMode", self._experiment)
+
+
+class _Fmi3Step(PlainCall):
+    """The call of `fmi3DoStep` of an instance."""
+
+    def __init__(self, of: Fmi3Instance, time: ctypes.c_double, step: ctypes.c_double) -> None:
+        self._of, self._time, self._step = of, time, step
+        answers = self._answers = of._answers
+        self._do_step, self._component = of._function("DoStep"), ctypes.c_void_p(of._component)
+        fields = [getattr(_StepAnswers, name).offset for name in ("event", "ended", "early", "reached")]
+        self._into = [ctypes.byref(answers, offset) for offset in fields]
+        self._yes = ctypes.c_bool(True)
+        self._call = functools.partial(self._do_step, self._component, time, step, self._yes, *self._into)
+        self.data = OperationData(Kind.STEP_3, time=time, size=step, answers=answers, **of._callee("DoStep"))
+
+    def __call__(self) -> Status:
+        status = self._call()
+        return self.finish(status) if self._answers.early or self._answers.ended else status
+
+    def finish(self, status: Status) -> Status:
+        if self._answers.early:
+            status = self._go_on(status)
+        return max(status, DISCARD) if self._answers.ended else status
+
+    def _go_on(self, status: Status) -> Status:
+        """Complete a step from which the FMU returned early although it was not allowed to."""
+        answers, end = self._answers, self._time.value + self._step.value
+        while status <= WARNING and answers.early and not answers.ended and answers.reached < end:
+            begin = answers.reached
+            times = ctypes.c_double(begin), ctypes.c_double(end - begin)
+            status = max(status, self._do_step(self._component, *times, self._yes, *self._into))
+            if answers.early and not answers.reached > begin:
+                return self._of._impossible(f"it returned early and stays at t = {begin:.9g} s")
+        return status
 
 
 def _log_fmi3(environment, status, category, text):

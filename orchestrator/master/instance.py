@@ -26,6 +26,7 @@ from ..errors import ModelDescriptionError, SimulationError
 from ..fmu.binary import CORE, INTEGERS, binary_of, binary_problem
 from ..messages import listed
 from ..plan import Instance, Value, ValueRef
+from .compiled_loop import Kind, OperationData
 from .log import ERROR, FATAL, OK, STATUS, WARNING, Log, known, unlisten
 
 Status = int
@@ -37,6 +38,20 @@ class StepCalls(NamedTuple):
     set: Callable[[], Status]
     step: Callable[[], Status]
     get: Callable[[], Status]
+
+
+class PlainCall:
+    """A call that the compiled loop makes by itself, too, from `data` (see `compiled_loop`)."""
+
+    data: OperationData
+
+    def finish(self, status: Status) -> Status:
+        """Return the status of the call, of which the C function that `data` name has returned `status`."""
+        return status
+
+
+class BoundCall(functools.partial, PlainCall):
+    """A C function with its arguments bound."""
 
 
 class Buffers(NamedTuple):
@@ -109,6 +124,8 @@ class CtypesInstance(FmuInstance, ABC):
     """Major version of FMI."""
     real: ClassVar[str]
     """Type, as in the function names, of the values exchanged directly with the master's buffer."""
+    exchanging: ClassVar[Kind]
+    """Kind of the operation that sets or gets these values."""
     c_types: ClassVar[dict[str, Any]]
     """Type as in the names of setters and getters -> C type."""
 
@@ -176,6 +193,11 @@ class CtypesInstance(FmuInstance, ABC):
     def _stepping(self, time: ctypes.c_double, step: ctypes.c_double) -> Callable[[], Status]:
         """Return the call of the FMU's `DoStep`."""
 
+    def _callee(self, name: str) -> dict[str, Any]:
+        """Return the C function `name` and the instance as fields of `OperationData`."""
+        function = ctypes.cast(self._library[self.prefix + name], ctypes.c_void_p).value
+        return {"function": function, "instance": self._component}
+
     def _calls(self, verb: str, values: np.ndarray, places: Sequence[ValueRef]) -> Callable[[], Status]:
         """Return the call that sets or gets floating-point values of single or double precision."""
         calls = []
@@ -193,7 +215,16 @@ class CtypesInstance(FmuInstance, ABC):
         kind, (references, at, count) = places[0].type, _layout(places)
         if kind == self.real and at == where == list(range(len(values))) and count == len(values):
             straight = (ctypes.c_double * count).from_buffer(values.data)
-            return self._call(verb + kind, references, straight)
+            call = self._call(verb + kind, references, straight)
+            call.data = OperationData(
+                self.exchanging,
+                count,
+                references=references,
+                n_references=len(references),
+                values=straight,
+                **self._callee(verb + kind),
+            )
+            return call
         buffer = (self.c_types[kind] * count)()
         call = self._call(verb + kind, references, buffer)
         staged, here, there = np.frombuffer(buffer, self.c_types[kind]), np.array(where), np.array(at)
@@ -209,12 +240,12 @@ class CtypesInstance(FmuInstance, ABC):
 
         return give if verb == "Set" else take
 
-    def _call(self, name: str, references: Any, buffer: Any) -> Callable[[], Status]:
+    def _call(self, name: str, references: Any, buffer: Any) -> BoundCall:
         """Return the C setter or getter `name` with its arguments bound."""
         counts = [ctypes.c_size_t(len(references)), buffer]
         if self.version > 2:
             counts.append(ctypes.c_size_t(len(buffer)))
-        return functools.partial(self._function(name), ctypes.c_void_p(self._component), references, *counts)
+        return BoundCall(self._function(name), ctypes.c_void_p(self._component), references, *counts)
 
     def _access(
         self, verb: str, places: Sequence[ValueRef], values: Sequence[Any]

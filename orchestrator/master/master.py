@@ -2,7 +2,8 @@
 
 Per communication step it walks a flat list of calls (see `step_program`), checks once that the sum of all
 outputs is finite, and copies the recorded values into a row: a few microseconds on top of the instances'
-own work. Time is k p / q with whole numbers, correctly rounded, so it neither drifts nor misses the end.
+own work, or a fraction of one where `compiled_loop` walks the list. Time is k p / q with whole numbers,
+correctly rounded, so it neither drifts nor misses the end.
 
 A value on a wire that is not finite ends the run, because every instance downstream computes with it. A
 recorded output that is not wired only gives a warning: FMUs use NaN for "not available" and infinity for a
@@ -16,14 +17,16 @@ import math
 import os
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import cast
 
 import numpy as np
 
 from ..errors import Interrupted, SimulationError
 from ..messages import listed
 from ..plan import Plan, Value
+from .compiled_loop import Answer, CompiledLoop, missing_loop
 from .initialization import initialize
-from .instance import Buffers, FmuInstance, Status
+from .instance import Buffers, FmuInstance, PlainCall, Status
 from .log import DISCARD, MASTER, OK, WARNING, Log, describe
 from .process_state import Copies, ProcessState, StopFlag, suspects
 from .signal_pool import SignalPool
@@ -77,6 +80,8 @@ class Master:
             s.calls = s.slave.connect(Buffers(s.u, into, s.y, of, self._clocks[period], size))
         self.programs = StepProgram(memory)
         self._operations: dict[int, list[Operation]] = {}  # of the current `advance`, by phase
+        q = math.lcm(plan.step.denominator, plan.start.denominator)
+        self._grid = int(plan.start * q), int(plan.step * q), q  # the k-th point is at (s + k p) / q
         real = [memory.index[key] for key in plan.record if key in memory.index]
         self._recorded = np.array([memory.time_at, *real], np.intp)
         self._recorded_others = [key for key in plan.record if key not in memory.index]
@@ -90,6 +95,21 @@ class Master:
         self._points: Iterator[int] = iter(())  # communication points still to be reached
         self._surroundings = ProcessState()
         self._copies = copies or Copies()
+        self._compiled: CompiledLoop | None = None
+        self.loop = self._choose_loop()
+        """Which loop makes the run: "compiled", or "Python: " and why."""
+
+    def _choose_loop(self) -> str:
+        """Have the compiled loop make the run if there is something in it that it can do by itself."""
+        if not any(isinstance(s.calls.step, PlainCall) for s in self.memory.stations):
+            return "Python: no instance is stepped in this process by a C function"
+        if missing := missing_loop(self._grid, self.plan.n_steps):
+            return f"Python: {missing}"
+        memory = self.memory
+        parts = memory.pool, memory.time_at, self._clocks, self._grid, self._recorded, self._reached
+        self._compiled = CompiledLoop(*parts, self.stop.flag)
+        self._compiled.expect(self._expected)
+        return "compiled"
 
     def initialize(self, row: np.ndarray, others: list[list[Value]]) -> None:
         """Initialize all instances and record the start as `advance` does.
@@ -107,36 +127,46 @@ class Master:
     def advance(self, end: int, rows: Sequence[np.ndarray], others: list[list[Value]]) -> None:
         """Step to communication point `end`, filling one of `rows` per point.
 
-        Recorded values that are not Real are appended to `others`, one list per row.
+        Rows lie at the same distance in memory. Recorded values that are not Real are appended to `others`,
+        one list per row.
 
         Raises:
             SimulationError: an instance fails or a wire is not finite. Rows up to `completed` are complete.
             Interrupted: a stop was requested.
             EndRequested: an instance asked to end the run.
         """
-        q = math.lcm(self.plan.step.denominator, self.plan.start.denominator)
-        s, p = int(self.plan.start * q), int(self.plan.step * q)  # the k-th point is at (s + k p) / q
-        stop, reached = self.stop, self._reached
         first, cycle = self.completed + 1, self.programs.cycle
-        points = range(first, min(end, first + cycle - 1) + 1)
-        self._operations = {k % cycle: self.programs.at(k) for k in points}
+        self._operations = {
+            k % cycle: self.programs.at(k) for k in range(first, min(end, first + cycle - 1) + 1)
+        }
+        if self._compiled is None:
+            self._loop(range(first, end + 1), rows, others)
+        else:
+            self._compiled.lay(range(first, end + 1), rows, cycle, self._operations)
+            self._walk(self._compiled, end, others)
+        if self._ending is not None:
+            raise self._ending
+
+    def _loop(self, points: range, rows: Sequence[np.ndarray], others: list[list[Value]]) -> None:
+        """Step to the points by the loop in Python, the reference."""
+        s, p, q = self._grid
+        stop, reached, cycle = self.stop.flag, self._reached, self.programs.cycle
         calls = {phase: [op.call for op in operations] for phase, operations in self._operations.items()}
         clocks = list(self._clocks.items())
         total, ones, finite = self.memory.now.dot, self._ones, math.isfinite
         getpid, process = os.getpid, self._copies.process
         take, recorded, time = self.memory.pool.take, self._recorded, self.memory.time
-        self._points = iter(range(first, end + 1))
+        self._points = iter(points)
         for k, row in zip(self._points, rows, strict=False):
-            if stop.requested:
-                now = self.plan.time(k - 1)
-                raise stop.interrupted(f"at t = {now:.9g} s", time=now)
+            if stop.value:
+                raise self._interrupted(k)
             for period, clock in clocks:
                 if k % period == 0:
                     clock.value = (s + (k - period) * p) / q
             for call in calls[k % cycle]:
                 status = call()
                 if status:
-                    self._answer(k, call, status)
+                    self._answer(k, self.operation_of(k, call), status)
             if not finite(total(ones)):
                 self._check_finite(k)
             time.value = (s + k * p) / q
@@ -146,8 +176,34 @@ class Master:
             self.completed = reached.value = k
             if getpid() != process:
                 self._copies.end()
-        if self._ending is not None:
-            raise self._ending
+
+    def _walk(self, loop: CompiledLoop, end: int, others: list[list[Value]]) -> None:
+        """Step to `end` by the compiled loop, and do what it leaves to Python."""
+        cycle = self.programs.cycle
+        while self.completed < end:
+            answer = loop.walk(self.completed + 1 if self._recorded_others else end)
+            self.completed, k = self._reached.value, loop.k
+            self._copies.end()
+            if answer == Answer.FINISHED:
+                if self._recorded_others:
+                    others.append(self._values_of_others())
+            elif answer == Answer.INTERRUPTED:
+                raise self._interrupted(k)
+            elif answer == Answer.NOT_FINITE:
+                self._check_finite(k)
+                loop.expect(self._expected)
+                loop.pass_check()
+            elif answer in (Answer.PYTHON, Answer.STATUS):
+                operation = self._operations[k % cycle][loop.at]
+                call = operation.call
+                if answer == Answer.STATUS:
+                    status: Status | None = cast(PlainCall, call).finish(loop.status)
+                else:
+                    status = call()
+                if status:
+                    self._answer(k, operation, status)
+                    end = end if self._ending is None else k
+                loop.pass_operation()
 
     def check_surroundings(self, since: int) -> None:
         """Check that no FMU has changed the floating-point environment that all instances share.
@@ -177,9 +233,17 @@ class Master:
         real = {v.name: float(u) for v, u in zip(s.inputs, s.u, strict=True)}
         return real | self.memory.given_others(s)
 
-    def operation_of(self, k: int, call: Callable[[], Status | None]) -> Operation | None:
-        """Return the operation of the step to `k` that a call belongs to, None if it is not part of it."""
-        return next((op for op in self._operations[k % self.programs.cycle] if op.call is call), None)
+    def operation_of(self, k: int, call: Callable[[], Status | None]) -> Operation:
+        """Return the operation of the step to `k` that a call belongs to."""
+        return next(op for op in self._operations[k % self.programs.cycle] if op.call is call)
+
+    def walked_operation(self) -> Operation | None:
+        """Return the operation that the compiled loop is at, None between two steps."""
+        loop = self._compiled
+        if loop is None or loop.at < 0:
+            return None
+        operations = self._operations[loop.k % self.programs.cycle]
+        return operations[loop.at] if loop.at < len(operations) else None
 
     def _values_of_others(self) -> list[Value]:
         return [self.memory.others[key] for key in self._recorded_others]
@@ -197,10 +261,8 @@ class Master:
         if self.stop.requested:
             raise self.stop.interrupted("during initialization", time=self.plan.time(0))
 
-    def _answer(self, k: int, call: Callable[[], Status | None], status: Status) -> None:
-        """Handle a call of the step from `k` - 1 to `k` that did not return OK."""
-        operation = self.operation_of(k, call)
-        assert operation is not None
+    def _answer(self, k: int, operation: Operation, status: Status) -> None:
+        """Handle an operation of the step from `k` - 1 to `k` that did not return OK."""
         station = self.memory.of[operation.instance]
         kind = station.slave.part(operation.kind)
         status = station.slave.note(status)
@@ -225,6 +287,11 @@ class Master:
             raise ending
         self._ending = self._ending or ending
         deque(self._points, maxlen=0)
+
+    def _interrupted(self, k: int) -> Interrupted:
+        """Return the exception for a stop requested before the step to `k`."""
+        now = self.plan.time(k - 1)
+        return self.stop.interrupted(f"at t = {now:.9g} s", time=now)
 
     def _failure(self, sentence: str, unit: str, time: float) -> SimulationError | Interrupted:
         """Return the exception for a failed instance: an interruption if a stop was requested."""

@@ -151,13 +151,17 @@ class StopFlag:
     """Whether the run should stop, and the signal that requested it."""
 
     def __init__(self) -> None:
-        self.requested = False
+        self.flag = ctypes.c_int32(0)  # read by the compiled loop, too
         self.number: int = signal.SIGINT
+
+    @property
+    def requested(self) -> bool:
+        return bool(self.flag.value)
 
     def request(self, number: int = signal.SIGINT) -> None:
         """Ask the run to stop."""
         global _requested_at
-        self.requested, self.number = True, number
+        self.flag.value, self.number = 1, number
         _requested_at = _requested_at or time.monotonic()
 
     def interrupted(self, how: str, *, unit: str | None = None, time: float | None = None) -> Interrupted:

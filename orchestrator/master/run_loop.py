@@ -64,6 +64,7 @@ class RunLoop:
     ) -> None:
         self.plan = plan
         self.passes = 0  # of initialization
+        self.loop = ""  # see `Master.loop`
         self.handed_over = 0  # rows written
         self.writing = False
         self.ended: EndRequested | None = None  # by an instance, before the stop time
@@ -89,6 +90,7 @@ class RunLoop:
             self._slaves[unit.name] = opener(unit, self.log, corrupted)
             self._copies.end()
         self._master = Master(self.plan, self._slaves, self.log, self._stop, self._reached, self._copies)
+        self.loop = self._master.loop
         with np.errstate(all="ignore"):  # non-finite values are found by `Master`, not by NumPy warnings
             self._master.initialize(self._rows.rows[0], self._rows.others)
             self.passes = self._master.passes

@@ -220,6 +220,7 @@ class Simulation:
         self._ended_by = getattr(error, "instance", None)
         ended: dict[str, Any] = {
             "wall_time": self.wall_time,
+            "loop": self.course.loop,
             "error": self._explained(error),
             "units_freed": False,
             "findings": [asdict(one) for one in (*self.plan.findings, *self.watch.findings())],

@@ -12,6 +12,7 @@ other (see `coupling`).
 
 from __future__ import annotations
 
+import ctypes
 import functools
 import math
 from collections.abc import Callable, Iterator
@@ -20,9 +21,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from ..plan import InputSeries, Plan, ValueRef, Variable
+from .compiled_loop import Kind, OperationData
 from .coupling import CouplingWeights, halves_ahead, weights
 from .fault_injection import FaultInjector
-from .instance import Status
+from .instance import PlainCall, Status
 from .log import OK
 from .signal_pool import InstanceSlot, SignalPool, by_type
 
@@ -32,35 +34,53 @@ LATE = 1e-9
 """Fraction of a step by which a time may fall short of a time in the series file and still count as it."""
 
 
-def feeding(memory: SignalPool, s: InstanceSlot) -> Callable[[], Status]:
-    """Return the call that updates the series inputs of an instance, once for each of its steps."""
-    real = [(i, v) for i, v in enumerate(s.inputs) if v.name in s.instance.series]
-    others = [(s.name, v.name) for v, _ in s.other_inputs if v.name in s.instance.series]
-    slots = s.sources[[i for i, _ in real]] if real else np.empty(0, np.intp)
-    named = [v for _, v in real] + [v for v, _ in s.other_inputs if v.name in s.instance.series]
-    columns = [_column(memory.plan, s, v, s.instance.series[v.name]) for v in named]
-    pool, kept, n_real = memory.pool, memory.others, len(real)
+class SeriesFeed:
+    """The call that updates the series inputs of an instance, once for each of its steps.
 
-    def feed() -> Status:
-        values = [next(column) for column in columns]
-        if n_real:
-            pool[slots] = values[:n_real]
-        if others:
-            kept.update(zip(others, values[n_real:], strict=True))
+    Samples are made in blocks; those of Reals are read from there by the compiled loop, too.
+    """
+
+    def __init__(self, memory: SignalPool, s: InstanceSlot) -> None:
+        real = [(i, v) for i, v in enumerate(s.inputs) if v.name in s.instance.series]
+        others = [v for v, _ in s.other_inputs if v.name in s.instance.series]
+        self._pool, self._kept = memory.pool, memory.others
+        self._slots = s.sources[[i for i, _ in real]] if real else np.empty(0, np.intp)
+        self._others = [(s.name, v.name) for v in others]
+        self._columns = [_column(memory.plan, s, v, s.instance.series[v.name]) for _, v in real]
+        self._other_columns = [_column(memory.plan, s, v, s.instance.series[v.name]) for v in others]
+        self._block = np.empty((BLOCK, len(real)))
+        self._row = ctypes.c_int64(BLOCK)
+        self.data: OperationData | None = None
+        if not others:
+            fields = {"first": self._slots, "factors": self._block, "row": self._row}
+            self.data = OperationData(Kind.SERIES, len(real), n_references=BLOCK, **fields)
+
+    def __call__(self) -> Status:
+        if self._row.value == BLOCK:
+            self._sample()
+        row = self._row.value
+        self._pool[self._slots] = self._block[row]
+        for key, samples in zip(self._others, self._other_samples, strict=True):
+            self._kept[key] = samples[row]
+        self._row.value = row + 1
         return OK
 
-    return feed
+    def _sample(self) -> None:
+        for i, column in enumerate(self._columns):
+            self._block[:, i] = next(column)
+        self._other_samples = [next(column).tolist() for column in self._other_columns]
+        self._row.value = 0
 
 
-def _column(plan: Plan, s: InstanceSlot, variable: Variable, series: InputSeries) -> Iterator:
-    """Yield the values of a series input, step by step."""
+def _column(plan: Plan, s: InstanceSlot, variable: Variable, series: InputSeries) -> Iterator[np.ndarray]:
+    """Yield the values of a series input, step by step, in blocks."""
     period, first = s.instance.period, 0
     ahead = halves_ahead(plan.algorithm, period, direct=s.direct(variable))
     halves, start = plan.step / 2, float(plan.start)
     while True:
         k = np.arange(first, first + period * BLOCK, period)
         times = start + (2 * k + ahead) * halves.numerator / halves.denominator
-        yield from series.at(times + LATE * float(plan.step) * series.held).tolist()
+        yield series.at(times + LATE * float(plan.step) * series.held)
         first += period * BLOCK
 
 
@@ -72,11 +92,20 @@ OperationKind = Literal["gather", "set", "step", "keep", "get", "fault"]
 
 
 class Operation(NamedTuple):
-    """One call on behalf of an instance ("" for all instances at once)."""
+    """One call on behalf of an instance ("" for all instances at once).
+
+    `data` say the same to the compiled loop; None: only Python can make the call.
+    """
 
     instance: str
     kind: OperationKind
     call: Callable[[], Status | None]
+    data: OperationData | None = None
+
+
+def _of_fmu(s: InstanceSlot, kind: OperationKind, call: Callable[[], Status]) -> Operation:
+    """Return the operation of a step call of an instance."""
+    return Operation(s.name, kind, call, call.data if isinstance(call, PlainCall) else None)
 
 
 class StepProgram:
@@ -87,11 +116,8 @@ class StepProgram:
         self.cycle = math.lcm(*(s.instance.period for s in memory.stations))
         self._made: dict[int, list[Operation]] = {}
         self._gathers: dict[tuple, list[Operation]] = {}
-        self._feeds = {
-            s.name: Operation(s.name, "gather", feeding(memory, s))
-            for s in memory.stations
-            if s.instance.series
-        }
+        feeds = {s.name: SeriesFeed(memory, s) for s in memory.stations if s.instance.series}
+        self._feeds = {name: Operation(name, "gather", feed, feed.data) for name, feed in feeds.items()}
         self._of_outputs = {s.name: _acting(s, s.output_faults, s.y) for s in memory.stations}
         self._of_inputs = {s.name: _acting(s, s.input_faults, s.u) for s in memory.stations}
 
@@ -113,14 +139,14 @@ class StepProgram:
         operations = [self._feeds[s.name] for s in beginning if s.instance.series]
         if fast:
             sources = np.concatenate([s.sources for s in fast])
-            operations.append(Operation("", "gather", _copying(m, sources, m.inputs[: len(sources)])))
+            operations.append(_copying(m, "", sources, m.inputs[: len(sources)]))
         slow = [s for s in beginning if s.instance.period > 1 and s.inputs]
-        operations += [Operation(s.name, "gather", _copying(m, s.sources, s.u)) for s in slow]
+        operations += [_copying(m, s.name, s.sources, s.u) for s in slow]
         operations += [op for s in beginning for op in _converting(s)]
         operations += [op for s in beginning for op in self._of_inputs[s.name]]
         operations += [op for s in beginning for op in _setting(m, s)]
         for s in ending:
-            operations += [Operation(s.name, "step", s.calls.step), *getting(m, s)]
+            operations += [_of_fmu(s, "step", s.calls.step), *getting(m, s)]
             operations += self._of_outputs[s.name]
         return operations
 
@@ -132,9 +158,9 @@ class StepProgram:
                 operations += [self._feeds[s.name]] if s.instance.series else []
                 operations += [*self._gathering(s, k), *self._of_inputs[s.name]]
                 operations += _setting(self._memory, s)
-                operations.append(Operation(s.name, "step", s.calls.step))
+                operations.append(_of_fmu(s, "step", s.calls.step))
                 if self._memory.plan.algorithm == "extrapolated" and s.outputs:
-                    operations.append(Operation(s.name, "keep", copying(s.y, s.y_before)))
+                    operations.append(_keeping_outputs(self._memory, s))
                 operations += [*getting(self._memory, s), *self._of_outputs[s.name]]
         return operations
 
@@ -153,9 +179,9 @@ class StepProgram:
         key = (s.name, *per_input)
         if key not in self._gathers:
             _make_room(self._gathers)
-            operations = [Operation(s.name, "gather", _gather(m, s, per_input)), *_converting(s)]
+            operations = [_gather(m, s, per_input), *_converting(s)]
             if any(w.kept for w in per_input):
-                operations.append(Operation(s.name, "keep", _copying(m, s.sources, s.kept)))
+                operations.append(_copying(m, s.name, s.sources, s.kept)._replace(kind="keep"))
             self._gathers[key] = operations
         return self._gathers[key]
 
@@ -165,8 +191,8 @@ def _make_room(kept: dict[Any, list[Operation]]) -> None:
         del kept[next(iter(kept))]  # the oldest, which is needed again last
 
 
-def _gather(m: SignalPool, s: InstanceSlot, per_input: list[CouplingWeights]) -> Callable[[], Status]:
-    """Return the call that computes an instance's inputs from weighted samples."""
+def _gather(m: SignalPool, s: InstanceSlot, per_input: list[CouplingWeights]) -> Operation:
+    """Return the operation that computes an instance's inputs from weighted samples."""
     first, second, factors = [], [], []
     for i, w in enumerate(per_input):
         now = int(s.sources[i])
@@ -180,25 +206,26 @@ def _gather(m: SignalPool, s: InstanceSlot, per_input: list[CouplingWeights]) ->
             second.append(past if w.before or w.kept else now)
             factors.append((w.now, w.before + w.kept))
     if all(factor == (1.0, 0.0) for factor in factors):
-        return _copying(m, np.array(first, np.intp), s.u)
-    return _blending(m, np.array([first, second], np.intp), np.array(factors).T.copy(), s.u)
+        return _copying(m, s.name, np.array(first, np.intp), s.u)
+    return _blending(m, s.name, np.array([first, second], np.intp), np.array(factors).T.copy(), s.u)
 
 
-def _copying(m: SignalPool, sources: np.ndarray, target: np.ndarray) -> Callable[[], Status]:
-    """Return the call that copies values of the pool, by index, into a target."""
+def _copying(m: SignalPool, instance: str, sources: np.ndarray, target: np.ndarray) -> Operation:
+    """Return the operation that copies values of the pool, by index, into a target."""
     take = m.pool.take
 
     def copy() -> Status:
         take(sources, None, target, "clip")
         return OK
 
-    return copy
+    data = OperationData(Kind.COPY, len(sources), first=sources, values=target)
+    return Operation(instance, "gather", copy, data)
 
 
 def _blending(
-    m: SignalPool, pairs: np.ndarray, factors: np.ndarray, target: np.ndarray
-) -> Callable[[], Status]:
-    """Return the call that writes weighted sums of two samples each into a target."""
+    m: SignalPool, instance: str, pairs: np.ndarray, factors: np.ndarray, target: np.ndarray
+) -> Operation:
+    """Return the operation that writes weighted sums of two samples each into a target."""
     take, multiply, add = m.pool.take, np.multiply, np.add
     terms = np.empty(pairs.shape)
     first, second = terms
@@ -209,7 +236,16 @@ def _blending(
         add(first, second, target)
         return OK
 
-    return blend
+    data = OperationData(
+        Kind.BLEND,
+        len(target),
+        first=pairs[0],
+        second=pairs[1],
+        factors=factors[0],
+        terms=factors[1],
+        values=target,
+    )
+    return Operation(instance, "gather", blend, data)
 
 
 def _converting(s: InstanceSlot) -> list[Operation]:
@@ -224,12 +260,20 @@ def _converting(s: InstanceSlot) -> list[Operation]:
         add(values, offsets, values)
         return OK
 
-    return [Operation(s.name, "gather", convert)]
+    data = OperationData(Kind.CONVERT, len(values), factors=gains, terms=offsets, values=values)
+    return [Operation(s.name, "gather", convert, data)]
 
 
 def _acting(s: InstanceSlot, faults: FaultInjector | None, values: np.ndarray) -> list[Operation]:
     """Return the operation, if any, that applies faults to outputs or inputs; all programs share it."""
     return [] if faults is None else [Operation(s.name, "fault", faults.acting(values))]
+
+
+def _keeping_outputs(m: SignalPool, s: InstanceSlot) -> Operation:
+    """Return the operation that keeps the outputs of an instance's last step."""
+    here = np.array([m.index[s.name, v.name] for v in s.outputs], np.intp)
+    data = OperationData(Kind.COPY, len(here), first=here, values=s.y_before)
+    return Operation(s.name, "keep", copying(s.y, s.y_before), data)
 
 
 def copying(source: np.ndarray, target: np.ndarray) -> Callable[[], None]:
@@ -241,7 +285,7 @@ def _setting(m: SignalPool, s: InstanceSlot) -> list[Operation]:
     """Return the operations that set an instance's inputs."""
     operations = []
     if s.driven:
-        operations.append(Operation(s.name, "set", s.calls.set))
+        operations.append(_of_fmu(s, "set", s.calls.set))
     moving = [v for v, wire in s.other_inputs if wire is not None or v.name in s.instance.series]
     driven = {v.place[:2] for v in moving}  # all elements of an array are set together
     wires = {v.name: wire for v, wire in s.other_inputs}
@@ -260,7 +304,7 @@ def getting(m: SignalPool, s: InstanceSlot) -> list[Operation]:
     """Return the operations that read an instance's outputs."""
     operations = []
     if s.outputs:
-        operations.append(Operation(s.name, "get", s.calls.get))
+        operations.append(_of_fmu(s, "get", s.calls.get))
     for chosen in by_type(s.other_outputs):
         places, keys = [v.place for v in chosen], [(s.name, v.name) for v in chosen]
 

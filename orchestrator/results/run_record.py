@@ -149,6 +149,7 @@ class RunRecord(_Part):
     title: str | None = None
     started: str | None = None  # ISO 8601
     wall_time: float = 0.0  # [s]
+    loop: str = ""  # that made the steps: "compiled", or "Python: " and why
     rows: NonNegativeInt = 0
     results: str = "results.csv"  # name of the file
     checksum: str = ""  # of that file

@@ -1,0 +1,246 @@
+"""Compiled step loop: walks step programs as plain data in C, many communication steps per call.
+
+An operation of a step program is described by `OperationData`: which C function with which arguments, which
+indices of the pool, which weights. `step_loop.c` walks these for a block of rows and returns to Python only
+for what it cannot do (a fault, a value that is not Real, an instance in another process), for a status other
+than OK, an output that is not finite, a stop request, and every `PAUSE`, so that Python's signal handlers get
+their turn. The master sees to it with the code of its own loop and has the walk go on, so that both loops
+give the same numbers and sentences. Without a compiler, and if `YAWBENCH_LOOP` is `python`, the master's loop
+in Python makes the run.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from enum import IntEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..cache import cache_folder
+from ..errors import YawbenchError
+
+WANTED = "YAWBENCH_LOOP"
+"""Environment variable: `python` asks for the loop in Python."""
+PAUSE = 20_000_000
+"""Time after which a walk returns to Python [ns]; chosen: nobody notices that Ctrl-C takes this long."""
+EXACT = 2**53
+"""Whole numbers below this are exact in double precision, and their quotients correctly rounded."""
+
+Kind = IntEnum(
+    "Kind",
+    "END CALL COPY BLEND CONVERT SERIES EXCHANGE_2 EXCHANGE_3 STEP_2 STEP_3",
+    start=0,
+)
+"""What an operation does; CALL: what only Python can do."""
+Answer = IntEnum("Answer", "FINISHED INTERRUPTED PYTHON STATUS NOT_FINITE COPIED PAUSED", start=0)
+"""Why a walk returned: STATUS, a call that is to be looked at; COPIED, this is a copy made by `fork`."""
+
+
+class OperationData(ctypes.Structure):
+    """An operation of a step program as plain data: `struct operation` of `step_loop.c`."""
+
+    _fields_ = [
+        ("kind", ctypes.c_int64),
+        ("count", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in ("function", "instance", "references")),
+        ("n_references", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in ("values", "first", "second", "factors", "terms")),
+        *((name, ctypes.c_void_p) for name in ("time", "size", "answers", "row")),
+    ]
+
+    def __init__(self, kind: Kind = Kind.CALL, count: int = 0, **fields: Any) -> None:
+        """Lay out an operation.
+
+        Args:
+            count: number of values that it is about.
+            fields: numbers, and arrays or ctypes objects, whose addresses are taken and which are kept alive.
+        """
+        super().__init__(kind, count)
+        for name, value in fields.items():
+            setattr(self, name, _address_of(value))
+        self._kept = fields
+
+
+class _Clock(ctypes.Structure):
+    _fields_ = [("period", ctypes.c_int64), ("time", ctypes.c_void_p)]
+
+
+class _Run(ctypes.Structure):
+    """`struct run` of `step_loop.c`."""
+
+    _fields_ = [
+        *((name, ctypes.c_int64) for name in ("k", "at", "end", "first")),
+        ("programs", ctypes.c_void_p),
+        ("clocks", ctypes.c_void_p),
+        *((name, ctypes.c_int64) for name in ("n_clocks", "start", "step", "scale")),
+        ("pool", ctypes.c_void_p),
+        ("time_at", ctypes.c_int64),
+        ("expected", ctypes.c_void_p),
+        ("n_expected", ctypes.c_int64),
+        ("recorded", ctypes.c_void_p),
+        ("n_recorded", ctypes.c_int64),
+        ("rows", ctypes.c_void_p),
+        ("stride", ctypes.c_int64),
+        ("reached", ctypes.c_void_p),
+        ("stop", ctypes.c_void_p),
+        ("pause", ctypes.c_int64),
+        ("status", ctypes.c_int64),
+    ]
+
+
+def _address_of(value: Any) -> int:
+    if isinstance(value, int):
+        return value
+    return value.ctypes.data if isinstance(value, np.ndarray) else ctypes.addressof(value)
+
+
+class CompiledLoop:
+    """The walk of one run.
+
+    Args:
+        pool: the values of the run.
+        time_at: index of the time in the pool.
+        clocks: period -> beginning of the step of the instances with that period [s].
+        grid: start, step and scale: the k-th communication point is at (start + k step) / scale.
+        recorded: indices of the values of a row.
+        reached: kept equal to the last complete communication point.
+        stop: nonzero if the run is to stop.
+    """
+
+    def __init__(
+        self,
+        pool: np.ndarray,
+        time_at: int,
+        clocks: Mapping[int, ctypes.c_double],
+        grid: tuple[int, int, int],
+        recorded: np.ndarray,
+        reached: ctypes.c_int64,
+        stop: ctypes.c_int32,
+    ) -> None:
+        library = _library()[0]
+        assert library is not None
+        self._walk: Callable[[Any], int] = library.walk
+        start, step, scale = grid
+        moving = (_Clock * len(clocks))()
+        for i, (period, time) in enumerate(clocks.items()):
+            moving[i] = _Clock(period, _address_of(time))
+        self._run = _Run(
+            at=-1,
+            clocks=_address_of(moving),
+            n_clocks=len(clocks),
+            start=start,
+            step=step,
+            scale=scale,
+            pool=_address_of(pool),
+            time_at=time_at,
+            recorded=_address_of(recorded),
+            n_recorded=len(recorded),
+            reached=_address_of(reached),
+            stop=_address_of(stop),
+            pause=PAUSE,
+        )
+        self._kept: list[Any] = [pool, clocks, moving, recorded, reached, stop]
+        self._programs: dict[int, tuple[Sequence[Any], Any]] = {}  # phase -> operations, and as plain data
+        library.begin_process()
+
+    @property
+    def k(self) -> int:
+        """The communication point being stepped to."""
+        return self._run.k
+
+    @property
+    def at(self) -> int:
+        """Index of the current operation in the program of the step to `k`; negative between two steps."""
+        return self._run.at
+
+    @property
+    def status(self) -> int:
+        """Status that the current operation has returned."""
+        return self._run.status
+
+    def expect(self, outputs: np.ndarray) -> None:
+        """Have the outputs with these indices checked to be finite."""
+        self._expected = outputs.astype(np.int64)
+        self._run.expected, self._run.n_expected = _address_of(self._expected), len(outputs)
+
+    def lay(
+        self, points: range, rows: Sequence[np.ndarray], cycle: int, programs: Mapping[int, Sequence[Any]]
+    ) -> None:
+        """Set what the next walks are for.
+
+        Args:
+            points: communication points to be stepped to.
+            rows: one per point, all at the same distance in memory.
+            cycle: the programs repeat after this number of points.
+            programs: phase of the cycle -> the operations of a step, whose `data` describe them.
+        """
+        for phase in [phase for phase, (made_of, _) in self._programs.items() if phase not in programs]:
+            del self._programs[phase]
+        addresses = [self._address(k % cycle, programs[k % cycle]) for k in points[:cycle]]
+        self._table = np.resize(np.array(addresses, np.uint64), len(points))
+        self._rows = rows
+        run, first = self._run, _address_of(rows[0])
+        run.programs, run.first, run.k, run.at = _address_of(self._table), points[0], points[0], -1
+        run.rows = first
+        run.stride = (_address_of(rows[1]) - first) // rows[0].itemsize if len(points) > 1 else 0
+
+    def _address(self, phase: int, operations: Sequence[Any]) -> int:
+        """Return the address of a program as plain data."""
+        if phase not in self._programs or self._programs[phase][0] is not operations:
+            made = (OperationData * (len(operations) + 1))()
+            for i, operation in enumerate(operations):
+                made[i] = operation.data or OperationData(Kind.CALL)
+            made[len(operations)] = OperationData(Kind.END)
+            self._programs[phase] = operations, made
+        return _address_of(self._programs[phase][1])
+
+    def walk(self, end: int) -> Answer:
+        """Step to a communication point, or until Python is needed."""
+        self._run.end = end
+        return Answer(self._walk(ctypes.byref(self._run)))
+
+    def pass_operation(self) -> None:
+        """Go on behind the current operation: Python has seen to it."""
+        self._run.at += 1
+
+    def pass_check(self) -> None:
+        """Go on with recording the step: Python has checked its outputs."""
+        self._run.at = -2
+
+
+def missing_loop(grid: tuple[int, int, int], n_steps: int) -> str:
+    """Return why a run cannot have the compiled loop; empty if it can."""
+    start, step, scale = grid
+    if os.environ.get(WANTED) == "python":
+        return f"{WANTED} asks for it"
+    if max(abs(start), abs(start + n_steps * step), scale) >= EXACT:
+        return "its times are no quotients of numbers of double precision"
+    return _library()[1]
+
+
+@functools.cache
+def _library() -> tuple[ctypes.CDLL | None, str]:
+    """Return the library of the loop, or None and why there is none; compiled once per user and machine."""
+    from fmus.compiler import LOOP_FLAGS, recalled_library
+
+    if os.name != "posix" or sys.maxsize < 2**32:
+        return None, "the compiled loop needs a 64-bit system with POSIX threads"
+    file = Path(__file__).with_name("step_loop.c")
+    try:
+        binary = recalled_library("loop", {file.name: file.read_bytes()}, [*LOOP_FLAGS, file.name])
+        with tempfile.NamedTemporaryFile(dir=cache_folder(), suffix=".so") as copy:
+            copy.write(binary)
+            copy.flush()
+            library = ctypes.CDLL(copy.name)
+    except YawbenchError as error:
+        return None, error.problems[0]
+    except OSError as error:
+        return None, f"the compiled loop cannot be loaded: {error}"
+    return library, ""

@@ -1,0 +1,230 @@
+"""The compiled step loop beside the loop in Python, its reference: same bytes, same sentences, same times."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import signal
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from fmus.build import build_component
+from orchestrator.cli import main
+from orchestrator.errors import Interrupted
+from orchestrator.master import compiled_loop
+from orchestrator.master.simulate import simulate
+from orchestrator.results.read import load_results
+from orchestrator.scenario.catalogue import names
+from orchestrator.scenario.load import load_scenario
+from orchestrator.wiring.make_plan import make_plan
+
+from . import models3
+from .conftest import compiled
+from .models3 import make_fmu
+from .test_foreign import write_fmu
+from .test_run import FAULTY, PAIR
+
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="compiles for Linux"),
+    pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler"),
+]
+COMPILED = "compiled"
+
+CAR = """
+stop_time: 0.6
+step_size: 0.001
+algorithm: {algorithm}
+inputs:
+  tyre.friction_fl: {{file: grip.csv, column: friction, interpolation: {interpolation}}}
+  "friction*": 0.65
+units:
+  driver: {{fmu: driver_sine, parameters: {{amplitude: 0.03, frequency: 2, start_time: 0}}}}
+  reference: {{fmu: reference_steady_state}}
+  controller: {{fmu: controller_fnn, step_size: 0.006}}
+  allocator: {{fmu: allocator_load_proportional, step_size: 0.004}}
+  wheel_control: {{fmu: wheel_control_direct, step_size: 0.002}}
+  plant: {{fmu: plant_seven_dof, parameters: {{initial_speed: 25.0}}}}
+  tyre: {{fmu: tyre_dugoff}}
+connections:
+  - {{from: wheel_control.torque_request_*, to: plant.wheel_torque_*, gain: 0.93, offset: 0.25}}
+"""
+
+
+@pytest.fixture
+def both(tmp_path, monkeypatch, capsys):
+    """Run a scenario with both loops; return the status and the words that both gave, and the record."""
+
+    def run(scenario, *arguments, loop=COMPILED):
+        given = []
+        for wanted in ("python", ""):
+            monkeypatch.setenv(compiled_loop.WANTED, wanted)
+            out = tmp_path / "out"
+            shutil.rmtree(out, ignore_errors=True)
+            with pytest.raises(SystemExit) as ended:
+                main(["run", str(scenario), "--out", str(out), *map(str, arguments)])
+            words = re.sub(r" in [0-9.]+ s\n", "\n", capsys.readouterr().err)
+            assert (out / "run.json").exists(), words
+            record = json.loads((out / "run.json").read_text())
+            made_by = record.pop("loop")
+            keys = ("status", "error", "ended", "rows", "warnings", "more_warnings", "findings", "smallest")
+            kept = {key: record[key] for key in keys}
+            given.append((ended.value.code or 0, words, (out / "results.csv").read_bytes(), kept))
+            asked_for = wanted and loop == COMPILED
+            assert made_by == (f"Python: {compiled_loop.WANTED} asks for it" if asked_for else loop)
+        reference, fast = given
+        assert fast == reference
+        return fast[0], fast[1], fast[3]
+
+    return run
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "held"])
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel", "extrapolated"])
+def test_periods_series_and_converting_wires_give_the_same_bytes(
+    both, fmus, tmp_path, algorithm, interpolation
+):
+    times = np.arange(0.0, 1.0, 0.0137)
+    rows = "".join(f"{t},{0.5 + 0.2 * np.sin(9 * t)}\n" for t in times)
+    (tmp_path / "grip.csv").write_text("time,friction\n" + rows)
+    scenario = tmp_path / "car.yaml"
+    scenario.write_text(CAR.format(algorithm=algorithm, interpolation=interpolation))
+    status, said, record = both(scenario, "--fmus", fmus)
+    assert status == 0, said
+    assert record["rows"] == 601
+
+
+@pytest.mark.sampled(4)
+@pytest.mark.parametrize("name", names("a scenario"))
+def test_a_published_scenario_gives_the_same_bytes(both, fmus, name):
+    status, said, record = both(name, "--fmus", fmus, "--set", "stop_time=2")
+    assert (status, record["status"]) == (0, "completed"), said
+
+
+def test_instances_of_fmi_3_give_the_same_bytes(both, tmp_path, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("models3")
+    (folder / "stubs.h").write_text(models3.stubs(), encoding="utf-8")
+    library = compiled(models3.HERE / "models3.c", folder / "models3.so", f"-I{folder}")
+    models = ("Dahlquist", "VanDerPol", "BouncingBall", "Stair", "Early", "Every")
+    units = {model: {"fmu": str(make_fmu(tmp_path, model, library))} for model in models}
+    constants = {f"Every.{v}_in": 1 for v in models3.TYPES if v not in ("Float64", "Float32", "Boolean")}
+    constants |= {"Every.Boolean_in": True, "Every.String_in": "a", "Every.mode_in": "wet"}
+    wires = [
+        {"from": "Dahlquist.x", "to": "Every.Float64_in"},
+        {"from": "VanDerPol.x0", "to": "Every.Float32_in"},
+    ]
+    scenario = tmp_path / "s.yaml"
+    told = {"units": units, "inputs": constants, "connections": wires, "stop_time": 3, "step_size": 0.1}
+    scenario.write_text(json.dumps(told))
+    status, said, record = both(scenario)
+    assert (status, record["rows"]) == (0, 31), said
+    assert record["smallest"]["Every.Float32_out"] < 0.0
+
+
+FOREIGN = """
+stop_time: 0.5
+step_size: 0.05
+inputs: {{a.Real_in: 0.75}}
+units:
+  a: {{fmu: ./foreign.fmu}}
+  b: {{fmu: ./foreign.fmu, parameters: {{answer: {answer}}}}}
+connections:
+  - {{from: a.Real_out, to: b.Real_in}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("answer", "guid", "status", "sentence"),
+    [
+        (1, "{good}", 0, "warning: b at t = 0.25 s: valve 3 of b is 99.5% open"),
+        (2, "{good}", 1, "b: step failed at t = 0.25 s: valve 3"),
+        (3, "{good}", 1, "b: step failed at t = 0.25 s: valve 3"),
+        (4, "{good}", 1, "b: step failed at t = 0.25 s: valve 3"),
+        (0, "{whole}", 0, "a ended the run at t = 0.3 s"),
+        (0, "{half}", 0, "a ended the run at t = 0.275 s"),
+    ],
+)
+def test_a_status_ends_the_run_with_the_same_sentence(
+    both, library, tmp_path, answer, guid, status, sentence
+):
+    write_fmu(tmp_path / "foreign.fmu", library, "Real", guid=guid)
+    (tmp_path / "two.yaml").write_text(FOREIGN.format(answer=answer))
+    given, said, _ = both(tmp_path / "two.yaml")
+    assert given == status
+    assert sentence in said
+
+
+@pytest.mark.parametrize(
+    ("act", "value", "status", "sentence"),
+    [
+        (
+            "pass",
+            "float('nan') if t > 0.045 else 0.0",
+            1,
+            "controller: yaw_moment is not a number at t = 0.05 s",
+        ),
+        (
+            "raise ValueError('flat tyre')",
+            "0.0",
+            1,
+            "controller: step failed at t = 0.05 s: ValueError: flat tyre",
+        ),
+        ("self.warn('soft tyre')", "0.0", 0, "warning: controller at t = 0.05 s: soft tyre"),
+        ("os.kill(os.getpid(), signal.SIGINT)", "0.0", 130, "the run was interrupted at t = 0.06 s"),
+    ],
+)
+def test_a_component_that_fails_does_so_at_the_same_time(both, fmus, tmp_path, act, value, status, sentence):
+    file = tmp_path / "faulty.py"
+    file.write_text(FAULTY.format(name="Faulty", act=act, value=value), encoding="utf-8")
+    fmu = build_component(file, tmp_path, role="controllers")
+    scenario = tmp_path / "pair.yaml"
+    wired = "connections:\n  - {from: controller.yaw_moment, to: follower.steer_angle, gain: 0.001}\n"
+    follower = f"  follower: {{fmu: {fmu.name}}}\n"
+    scenario.write_text(PAIR.format(controller=fmu.name) + follower + wired)
+    given, said, _ = both(scenario, "--fmus", fmus)
+    assert given == status
+    assert sentence in said
+
+
+def test_isolated_instances_are_left_to_the_loop_in_python(both, library, tmp_path):
+    write_fmu(tmp_path / "foreign.fmu", library, "Real")
+    (tmp_path / "two.yaml").write_text(FOREIGN.format(answer=3))
+    why = "Python: no instance is stepped in this process by a C function"
+    status, _, _ = both(tmp_path / "two.yaml", "--isolate", loop=why)
+    assert status == 1
+
+
+def test_ctrl_c_reaches_a_walk_within_a_moment(fmus, tmp_path):
+    scenario = tmp_path / "car.yaml"
+    scenario.write_text("stop_time: 1e5\nstep_size: 0.001\nunits:\n  driver: {fmu: driver_sine}\n")
+    plan = make_plan(load_scenario(scenario), fmus=fmus)
+    asked = threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT))
+    asked.start()
+    begin = time.monotonic()
+    with pytest.raises(Interrupted):
+        simulate(plan, tmp_path / "out")
+    assert time.monotonic() - begin < 5.0
+    record = load_results(tmp_path / "out").run
+    assert (record["status"], record["loop"]) == ("interrupted", COMPILED)
+
+
+def test_without_a_compiler_the_loop_is_in_python(tmp_path, monkeypatch):
+    monkeypatch.setenv("CC", "no-such-compiler")
+    monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "cache"))
+    compiled_loop._library.cache_clear()
+    try:
+        why = "there is no C compiler (no-such-compiler); CC can name one"
+        assert compiled_loop.missing_loop((0, 1, 1000), 10) == why
+    finally:
+        compiled_loop._library.cache_clear()
+
+
+def test_times_beyond_whole_numbers_are_left_to_python():
+    assert not compiled_loop.missing_loop((0, 1, 2**53 - 1), 10)
+    for grid in ((0, 1, 2**53), (2**53, 1, 1000), (0, 2**52, 1000)):
+        assert "times" in compiled_loop.missing_loop(grid, 10)
