@@ -1,7 +1,8 @@
-"""C sources as shared libraries; the launcher and the step loop are kept in a cache, once per source."""
+"""C sources as shared libraries; the launcher, and what this program itself calls, are kept in a cache."""
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import os
 import platform
@@ -14,8 +15,8 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
-from orchestrator.cache import keep, recall
-from orchestrator.errors import BuildError
+from orchestrator.cache import cache_folder, keep, recall
+from orchestrator.errors import BuildError, YawbenchError
 from orchestrator.messages import printable
 
 HERE = Path(__file__).resolve().parent
@@ -24,8 +25,8 @@ FLAGS = ("-std=c11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-Wl,--bu
 LIBRARIES = ("-ldl", "-pthread")
 STORE = "launcher"
 """Of compiled launchers in the cache."""
-LOOP_FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-pthread")
-"""Of the step loop (see `orchestrator.master.compiled_loop`)."""
+OWN_FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-pthread")
+"""Of C code that this program calls itself; contracted operations would give other bits than Python."""
 
 
 def compiler_command() -> list[str]:
@@ -101,6 +102,24 @@ def recalled_library(
         binary = compile_library(command, sources, *arguments)
         keep(store, key, binary)
     return binary
+
+
+@cache
+def load_compiled(source: Path) -> tuple[ctypes.CDLL | None, str]:
+    """Return a file of C as a library loaded into this process, or None with the reason why there is none."""
+    if os.name != "posix" or sys.maxsize < 2**32:
+        return None, f"{source.name} is for 64-bit systems with POSIX threads"
+    try:
+        sources = {source.name: source.read_bytes()}
+        binary = recalled_library(source.stem, sources, [*OWN_FLAGS, source.name])
+        with tempfile.NamedTemporaryFile(dir=cache_folder(), suffix=".so") as copy:
+            copy.write(binary)
+            copy.flush()
+            return ctypes.CDLL(copy.name), ""
+    except YawbenchError as error:
+        return None, error.problems[0]
+    except OSError as error:
+        return None, f"{source.name} cannot be loaded: {error}"
 
 
 def compile_launcher() -> tuple[bytes | None, str]:

@@ -209,7 +209,7 @@ def sources_hash(parts: tuple[str, ...]) -> str:
     digest = hashlib.sha256()
     for part in parts:
         path = _HERE / part
-        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
+        for file in sorted([*path.rglob("*.py"), *path.rglob("*.c")]) if path.is_dir() else [path]:
             digest.update(f"{file.relative_to(_HERE).as_posix()}\0".encode())
             digest.update(file.read_bytes())
     return digest.hexdigest()[:12]

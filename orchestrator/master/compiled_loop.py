@@ -12,19 +12,13 @@ in Python makes the run.
 from __future__ import annotations
 
 import ctypes
-import functools
 import os
-import sys
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from ..cache import cache_folder
-from ..errors import YawbenchError
 
 WANTED = "YAWBENCH_LOOP"
 """Environment variable: `python` asks for the loop in Python."""
@@ -225,22 +219,8 @@ def missing_loop(grid: tuple[int, int, int], n_steps: int) -> str:
     return _library()[1]
 
 
-@functools.cache
 def _library() -> tuple[ctypes.CDLL | None, str]:
-    """Return the library of the loop, or None and why there is none; compiled once per user and machine."""
-    from fmus.compiler import LOOP_FLAGS, recalled_library
+    """Return the library of the loop, or None and why there is none."""
+    from fmus.compiler import load_compiled
 
-    if os.name != "posix" or sys.maxsize < 2**32:
-        return None, "the compiled loop needs a 64-bit system with POSIX threads"
-    file = Path(__file__).with_name("step_loop.c")
-    try:
-        binary = recalled_library("loop", {file.name: file.read_bytes()}, [*LOOP_FLAGS, file.name])
-        with tempfile.NamedTemporaryFile(dir=cache_folder(), suffix=".so") as copy:
-            copy.write(binary)
-            copy.flush()
-            library = ctypes.CDLL(copy.name)
-    except YawbenchError as error:
-        return None, error.problems[0]
-    except OSError as error:
-        return None, f"the compiled loop cannot be loaded: {error}"
-    return library, ""
+    return load_compiled(Path(__file__).with_name("step_loop.c"))

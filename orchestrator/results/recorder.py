@@ -26,6 +26,7 @@ from ..checksums import checksum, shown, with_checksums
 from ..errors import ResultsError
 from ..files import reason, write_whole
 from ..plan import Value
+from .csv_file import rows_text
 from .folder import PART, RUN_FILE, RUNNING, put_in_place, tidy
 from .formats import RESULTS_FILE
 from .lock import FolderLock
@@ -150,13 +151,8 @@ class Recorder(RowBlock):
         self._append(header.getvalue().encode())
 
     def _take(self, block: np.ndarray, others: list[list[Value]]) -> None:
-        values = block.tolist()
-        if len(self._order) == self._block.shape[1]:
-            # repr of a list of lists is the fastest way to format many shortest decimal numbers
-            text = repr(values)[2:-2].replace("], [", "\n").replace(", ", ",") + "\n"
-        else:
-            text = self._mixed(values, others)
-        self._append(text.encode())
+        whole = len(self._order) == self._block.shape[1]
+        self._append(rows_text(block) if whole else self._mixed(block.tolist(), others).encode())
 
     def _mixed(self, values: list[list[float]], others: list[list[Value]]) -> str:
         text = io.StringIO()

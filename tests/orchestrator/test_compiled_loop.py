@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from fmus.build import build_component
+from fmus.compiler import load_compiled
 from orchestrator.cli import main
 from orchestrator.errors import Interrupted
 from orchestrator.master import compiled_loop
@@ -216,12 +217,12 @@ def test_ctrl_c_reaches_a_walk_within_a_moment(fmus, tmp_path):
 def test_without_a_compiler_the_loop_is_in_python(tmp_path, monkeypatch):
     monkeypatch.setenv("CC", "no-such-compiler")
     monkeypatch.setenv("YAWBENCH_CACHE", str(tmp_path / "cache"))
-    compiled_loop._library.cache_clear()
+    load_compiled.cache_clear()
     try:
         why = "there is no C compiler (no-such-compiler); CC can name one"
         assert compiled_loop.missing_loop((0, 1, 1000), 10) == why
     finally:
-        compiled_loop._library.cache_clear()
+        load_compiled.cache_clear()
 
 
 def test_times_beyond_whole_numbers_are_left_to_python():

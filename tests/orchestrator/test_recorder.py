@@ -3,6 +3,7 @@ import errno
 import json
 import math
 import os
+import shutil
 import sys
 
 import numpy as np
@@ -12,6 +13,7 @@ from pydantic import BaseModel
 from orchestrator.errors import ResultsError, SimulationError
 from orchestrator.files import write_whole
 from orchestrator.master.simulate import simulate
+from orchestrator.results import csv_file
 from orchestrator.results import recorder as module
 from orchestrator.results.read import load_results
 from orchestrator.results.recorder import BLOCK, Recorder, record_text
@@ -49,6 +51,34 @@ def test_numbers_are_read_back_to_the_last_bit(rows, tmp_path):
     results = load_results(tmp_path)
     assert results.time.tolist() == values[:, 0].tolist()
     assert [column.tolist() for column in results.columns.values()] == values[:, 1:].T.tolist()
+
+
+def hard_numbers():
+    """Numbers around every boundary that matters to their shortest decimals, and of all magnitudes."""
+    powers = np.concatenate([2.0 ** np.arange(-1074, 1024), 10.0 ** np.arange(-323, 309)])
+    near = [np.nextafter(powers, 0.0), powers, np.nextafter(powers, math.inf)]
+    generator = np.random.default_rng(1)
+    bits = generator.integers(0, 2**64, 300_000, dtype=np.uint64).view(float)
+    round_ones = np.round(generator.uniform(-1e4, 1e4, 50_000), 3)
+    whole = generator.integers(-(10**17), 10**17, 50_000).astype(float)
+    special = [0.0, -0.0, math.nan, -math.nan, math.inf, -math.inf, 9.5e15, 1e16, 1e-4, 9.9e-5, 2.0**53 + 2]
+    return np.concatenate([*near, *(-one for one in near), bits, round_ones, whole, special])
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+def test_numbers_are_written_as_python_writes_them():
+    numbers = hard_numbers()
+    assert csv_file._writer() is not None
+    text = csv_file.rows_text(numbers[: len(numbers) // 3 * 3].reshape(-1, 3)).decode()
+    rows = numbers[: len(numbers) // 3 * 3].reshape(-1, 3).tolist()
+    assert text.splitlines() == [",".join(map(repr, row)) for row in rows]
+
+
+def test_without_a_compiler_the_bytes_are_the_same(tmp_path, monkeypatch):
+    record(tmp_path / "c", table(100))
+    monkeypatch.setattr(csv_file, "_writer", lambda: None)
+    record(tmp_path / "python", table(100))
+    assert (tmp_path / "c" / "results.csv").read_bytes() == (tmp_path / "python" / "results.csv").read_bytes()
 
 
 def test_the_file_is_a_plain_csv_with_a_header(tmp_path):
